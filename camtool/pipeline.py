@@ -17,7 +17,6 @@ from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
-from itertools import combinations
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeVar
 
@@ -26,6 +25,7 @@ from msgspec import Struct, field
 from camtool.bounds import TooLongError
 from camtool.errors import OptionError, ProgramError
 from camtool.findings import Finding, Severity, worst
+from camtool.geometry.turn import UNTURNED
 from camtool.planning.job import Job
 from camtool.planning.naming import tool_words
 from camtool.progress import Progress
@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Job, Tool
     from camtool.planning.plan import Plan
     from camtool.simulation.motion import Effects
+    from camtool.stock.before import StockBefore
     from camtool.stock.checks import StockRequest
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.moves import CompensatedToolpath, Toolpath
@@ -124,6 +125,7 @@ class _Posting(Struct, frozen=True):
     brief: bool = False
     is_whole: bool = True
     progress: Progress = field(default_factory=Progress)
+    before: StockBefore | None = None
 
 
 def post_drawing(
@@ -144,15 +146,22 @@ def post_drawing(
     `trace_points` of the slides' path are kept (None: the default). `progress` is told of each
     stage. Raises OptionError, MachineError, and PostError for what the target cannot write.
     """
-    from camtool.planning.plan import planned
-
     how = _Posting(check, gates, trace_points, brief, progress=progress or Progress())
+    how.progress.begin(PLANNING)
+    how = replace(how, before=_stock_before(drawing, job, target.machine))
+    return _post_drawing(drawing, job, target, how)
+
+
+def _post_drawing(drawing: Drawing, job: Job, target: LoadedTarget, how: _Posting) -> Run:
+    """The program of a job, judged in the stock that is there before it."""
+    from camtool.planning.plan import planned
 
     def plain() -> Run | None:
         other = _without_measures(job)
-        if brief or other == job:
+        if how.brief or other == job:
             return None
-        return post_drawing(drawing, other, target, progress=progress)
+        plainly = _Posting(progress=how.progress, before=how.before)
+        return _post_drawing(drawing, other, target, plainly)
 
     def whole() -> Plan:
         return planned(drawing, job, target.machine, undivided=True)
@@ -182,6 +191,7 @@ def post_by_tool(
     how = _Posting(check, gates, trace_points, progress=progress or Progress())
     machine = target.machine
     how.progress.begin(PLANNING)
+    how = replace(how, before=_stock_before(drawing, job, machine))
     every = planned(drawing, job, machine)
     turns = turns_of_tools(every)
     how = replace(how, is_whole=len(turns) == 1)
@@ -220,73 +230,37 @@ def post_by_setup(
 ) -> tuple[Run, ...]:
     """As `post_drawing`, with one program for each set-up of the job, in their order.
 
-    Each is judged alone, in its own frame; what set-ups from both faces leave of the stock between
-    them is compared besides. OptionError for a job without set-ups."""
+    Each is judged in its own frame, in the stock that those before it leave. OptionError for a job
+    without set-ups."""
+    from camtool.stock.before import stock_before
+
     if not job.setups:
         raise OptionError("the job has no set-ups", where="[[setups]]", mend="post it as it is")
-    runs = []
+    how = _Posting(check, gates, trace_points, progress=progress or Progress())
+    runs: list[Run] = []
+    cut: list[tuple[Job, Toolpath]] = []
     for setup in job.setups:
-        run = post_drawing(
-            drawing,
-            job.setup(setup.name),
-            target,
-            check=check,
-            gates=gates,
-            trace_points=trace_points,
-            progress=progress,
-        )
+        own = job.setup(setup.name)
+        how = replace(how, before=stock_before(own, cut))
+        run = _post_drawing(drawing, own, target, how)
         runs.append(replace(run, part=f"set-up {setup.name}"))
-    if not check or any(run.failed for run in runs):
-        return tuple(runs)
-    more: list[list[Finding]] = [[] for _ in runs]
-    for (row, run), (column, other) in combinations(enumerate(runs), 2):
-        for k, finding in zip((row, column), _meeting_findings(run, other), strict=False):
-            more[k].append(finding)
-    return tuple(_add_findings(run, tuple(each)) for run, each in zip(runs, more, strict=True))
+        if run.wanted is not None:
+            cut.append((own, run.wanted))
+    return tuple(runs)
 
 
-def _meeting_findings(run: Run, other: Run) -> tuple[Finding, ...]:
-    """Return FACES_MEET for each of two set-ups that meet within the stock, with the place in its
-    own frame; () where they do not, or the thickness of the stock is not known."""
-    import numpy as np
+def _stock_before(drawing: Drawing, job: Job, machine: Machine) -> StockBefore:
+    """Return what the set-ups before that of a job leave of the stock."""
+    from camtool.planning.plan import planned
+    from camtool.stock.before import WHOLE, stock_before
 
-    from camtool.planning.naming import setup_name
-    from camtool.stock.cut import MEETING_MM, cut_stock, greatest_meeting, turned_over
-    from camtool.stock.findings import FACES_MEET, place_words
-
-    (decoded, job), (other_decoded, other_job) = _cut_of(run), _cut_of(other)
-    turn = job.placement.flip or other_job.placement.flip
-    same_face = (job.placement.flip is None) == (other_job.placement.flip is None)
-    if job.stock is None or turn is None or same_face:
-        return ()
-    meeting = greatest_meeting(
-        cut_stock(decoded, run.target, job),
-        cut_stock(other_decoded, other.target, other_job),
-        turn,
-        job.stock.thickness_mm,
+    if job.setup_of is None:
+        return WHOLE
+    whole, own = job.setup_of
+    earlier = [whole.setup(each.name) for each in whole.setups[: whole.setups.index(own)]]
+    return stock_before(
+        job, [(each, planned(drawing, each, machine).toolpath) for each in earlier]
     )
-    if meeting.low <= MEETING_MM:
-        return ()
-    place = np.array([meeting.at_mm])
-    places = (place, turned_over(place, turn))
-    return tuple(
-        FACES_MEET(where=place_words(place[0]), measured=meeting.low, other=setup_name(beside))
-        for place, beside in zip(places, (other_job, job), strict=True)
-    )
-
-
-def _cut_of(run: Run) -> tuple[Toolpath, Job]:
-    assert run.decoded is not None
-    assert run.job is not None
-    return run.decoded, run.job
-
-
-def _add_findings(run: Run, more: tuple[Finding, ...]) -> Run:
-    """Return the run and its report with more findings."""
-    if not more or run.verification is None:
-        return run
-    findings = _merge_findings(run.findings, more)
-    return replace(run, findings=findings, verification=run.verification.with_findings(findings))
 
 
 def _kth_of(several: Callable[[], tuple[T, ...]], k: int) -> T:
@@ -323,7 +297,8 @@ def _post_plan(
     repeated = _repeated_findings(program, decoded)
     findings = _merge_findings(findings, program.findings, decoded.findings, without=repeated)
     if judged is None:
-        findings = _merge_findings(findings, _stock_findings(Case(decoded, target), None, job))
+        found = _stock_findings(Case(decoded, target), None, job, before=how.before)
+        findings = _merge_findings(findings, found)
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
     from camtool.planning.naming import setup_words
@@ -362,18 +337,20 @@ def _post_plan(
         operations=_operations(judged.steps),
         tools=_tools(judged.steps),
         stock=_stock(job),
-        zero=job.placement.origin,
+        zero=job.placement.origin if job.placement.turn == UNTURNED else "set-up",
         cut_mm=_cut_mm(wanted),
         swept_mm=_swept_mm(wanted, judged.steps),
         touch_mm=_touch_mm(wanted),
         setup=setup_words(job),
     )
-    asked = stock_request(judged.steps, job, _beside_mm(case), is_whole=how.is_whole)
+    asked = stock_request(
+        judged.steps, job, _beside_mm(case), before=how.before, is_whole=how.is_whole
+    )
     del judged, whole  # the paths of the stages are not needed any more
     verification = _judge_program(case, program.data, progress)
     findings = _merge_findings(
         findings,
-        _stock_findings(case, asked, job, findings),
+        _stock_findings(case, asked, job, findings, before=how.before),
         _stock_gates(case, asked, job, how.gates),
     )
     figures = _with_times(figures, written, case, verification)
@@ -410,6 +387,7 @@ def verify_program(
     case = Case(decoded, target)
     kept: tuple[ProtectedRegion, ...] = ()
     asked_of_stock: StockRequest | None = None
+    before: StockBefore | None = None
     if drawing is not None and judging.found:
         case, job = _register_drawing(case, drawing, job or Job(), align=judging.align)
     elif drawing is not None:
@@ -432,7 +410,8 @@ def verify_program(
             asked=asked,
         )
         kept = kept_of(plan.steps)
-        asked_of_stock = stock_request(plan.steps, wanted, _beside_mm(case))
+        before = _stock_before(drawing, wanted, machine)
+        asked_of_stock = stock_request(plan.steps, wanted, _beside_mm(case), before=before)
     options = VerifyOptions(
         interpolator=judging.interpolator,
         effects=judging.effects or ALL,
@@ -448,7 +427,8 @@ def verify_program(
     beyond = _gate_findings(found, judging.gates)
     beyond = (*_stock_gates(case, asked_of_stock, job, judging.gates), *beyond)
     planning = case.wanted.findings if case.wanted is not None else ()
-    beyond = (*_stock_findings(case, asked_of_stock, job or Job(), planning), *beyond)
+    in_stock = _stock_findings(case, asked_of_stock, job or Job(), planning, before=before)
+    beyond = (*in_stock, *beyond)
     if beyond:
         found = found.with_findings((*found.findings, *beyond))
     return replace(
@@ -824,7 +804,12 @@ def _beside_mm(case: Case) -> float:
 
 
 def _stock_findings(
-    case: Case, request: StockRequest | None, job: Job, planning: tuple[Finding, ...] = ()
+    case: Case,
+    request: StockRequest | None,
+    job: Job,
+    planning: tuple[Finding, ...] = (),
+    *,
+    before: StockBefore | None = None,
 ) -> tuple[Finding, ...]:
     """Return the findings of a program in its stock: of the path that its controller decodes, or
     of the slides where that is bent against the mechanics. Where tools are not known, or cut no
@@ -844,7 +829,7 @@ def _stock_findings(
         if request is not None and shapes:
             found.append(STOCK_NOT_JUDGED_TOOLS(measured=len(shapes), mend=error.mend))
     beside_mm = WALL_COVERAGES * case.coverage_mm
-    found += rapid_findings(decoded, moves, job.stock, beside_mm)
+    found += rapid_findings(decoded, moves, job.stock, beside_mm, before)
     if moves is None or tools is None or request is None:
         return tuple(found)
     if not any(cutter.radius_mm for cutter in tools.cutters):

@@ -61,6 +61,7 @@ from camtool.planning.job import (
     SIDES,
     STARTS,
     TOOL_KINDS,
+    ZEROS,
     Entry,
     Lead,
     Tabs,
@@ -170,6 +171,11 @@ def origin(value: object) -> str | tuple[float, float]:
 def start(value: object) -> str | tuple[float, float]:
     """A word, [x, y] or "x,y"."""
     return _word_or_place(value, STARTS)
+
+
+def zero(value: object) -> str | tuple[float, float]:
+    """A place of the stock, [x, y] or "x,y"."""
+    return _word_or_place(value, tuple(ZEROS))
 
 
 def places(value: object) -> tuple[tuple[float, float], ...]:
@@ -392,6 +398,7 @@ SETUP = {
     "line": Key("line_mm", LENGTH),
     "pins": Key("pins_mm", Value(plain(places))),
     "flip_error": Key("flip_error_mm", LENGTH),
+    "zero": Key("zero", Value(plain(zero))),
 }
 """Keys of `[[setups]]`: `name` and `operations` must be there."""
 

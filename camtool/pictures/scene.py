@@ -516,13 +516,14 @@ def _place_in(words: str) -> tuple[float, float] | None:
 
 
 def _faults(report: Report) -> tuple[tuple[float, float], ...]:
-    """Return the places of the findings of the stock."""
+    """Return the places of the findings of the stock, remarks left out."""
     from camtool.stock.findings import StockCode
     from camtool.toolpath.findings import ProgramCode
 
     codes = {each.name for each in StockCode}
     codes |= {ProgramCode.RAPID_IN_STOCK.name, ProgramCode.LOOSE_PIECE.name}
-    places = [_place_in(item.where) for item in report.findings if item.code in codes]
+    told = [item for item in report.findings if item.severity != "info"]
+    places = [_place_in(item.where) for item in told if item.code in codes]
     return tuple(dict.fromkeys(place for place in places if place is not None))
 
 

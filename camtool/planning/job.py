@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from camtool.errors import OptionError
+from camtool.geometry.turn import UNTURNED, Box, Turn
 from camtool.patterns import guess, matches
 from camtool.planning.kinds import OperationKind, function_of, installed_kinds, kind_named
 from camtool.records import replace
@@ -55,6 +56,15 @@ FINISH = " finish"
 
 PIN_SLACK_MM = 0.001
 """Pins meet within this, when a part is turned over."""
+
+ZEROS = {
+    "stock-lower-left": (0.0, 0.0),
+    "stock-lower-right": (1.0, 0.0),
+    "stock-upper-left": (0.0, 1.0),
+    "stock-upper-right": (1.0, 1.0),
+    "stock-centre": (0.5, 0.5),
+}
+"""Places of the stock that may be the zero of a set-up, as shares of its width and height."""
 
 ORIGINS = ("drawing", "lower-left", "centre")
 """Places of part zero: at the drawing's own zero, or at a place of the paths that are cut."""
@@ -855,9 +865,8 @@ class Placement:
     """The way of the drawing into the work frame, in this order: mirrored ("x" turns the sign of
     x, "y" of y), rotated, scaled by `scale` or to fit into `fit_mm` (width, height; 0: any),
     repeated `copies` (columns, rows) times at `pitch_mm`; then `origin` becomes part zero: one
-    of ORIGINS, or the place (x, y) mm of the drawing so changed. Last the part is turned over, as
-    `flip` says: about a line along "x" or "y", which lies so far from zero, mm. A set-up gives
-    that."""
+    of ORIGINS, or the place (x, y) mm of the drawing so changed. Last comes the `turn` of a
+    set-up."""
 
     origin: str | tuple[float, float] = "drawing"
     mirror: str | None = None
@@ -866,7 +875,7 @@ class Placement:
     fit_mm: tuple[float, float] | None = None
     copies: tuple[int, int] = (1, 1)
     pitch_mm: tuple[float, float] = (0.0, 0.0)
-    flip: tuple[str, float] | None = None
+    turn: Turn = UNTURNED
 
     def __post_init__(self) -> None:
         if isinstance(self.origin, str):
@@ -934,21 +943,17 @@ class Stock:
             at_least_zero("spoilboard", self.spoilboard_mm, "mm")
 
     @property
-    def box_mm(self) -> tuple[float, float, float, float] | None:
+    def box_mm(self) -> Box | None:
         """Its left, lower, right and upper edge; None where the job does not give them."""
         if self.corner_mm is None or self.size_mm is None:
             return None
         (x, y), (width, height) = self.corner_mm, self.size_mm
         return x, y, x + width, y + height
 
-    def turned(self, axis: str, line_mm: float) -> Stock:
-        """Return the stock turned over about a line along an axis, so far from zero."""
-        if self.corner_mm is None or self.size_mm is None:
-            return self
-        across = 0 if axis == "y" else 1
-        corner = list(self.corner_mm)
-        corner[across] = 2.0 * line_mm - corner[across] - self.size_mm[across]
-        return replace(self, corner_mm=(corner[0], corner[1]))
+    def turned(self, turn: Turn) -> Stock:
+        """Return the stock as it lies in a set-up."""
+        box = self.box_mm
+        return self if box is None else replace(self, corner_mm=turn.box(box)[:2])
 
     @property
     def through_mm(self) -> float:
@@ -977,6 +982,11 @@ class KeepOutBox:
                     mend="give the lesser one first",
                 )
 
+    def moved(self, by_mm: tuple[float, float]) -> KeepOutBox:
+        """Return the box moved in the plane."""
+        (x, y), (left, right), (low, high) = by_mm, self.x_mm, self.y_mm
+        return replace(self, x_mm=(left + x, right + x), y_mm=(low + y, high + y))
+
 
 @dataclass(frozen=True)
 class JobSetup:
@@ -984,9 +994,10 @@ class JobSetup:
 
     `flip`: the part lies turned over, about a line along "x" or "y" that is `line_mm` from zero
     (None: through the middle of the stock), so that its other face is up, and the top of the stock
-    is Z0 again; X0 Y0 stays where it is. `pins_mm`: places (x, y) of alignment pins, which meet
-    again when the part is turned. `flip_error_mm`: how far the faces may lie beside each other,
-    None if that is not known."""
+    is Z0 again. X0 Y0 stays where it is, or is the `zero` of the set-up: one of ZEROS of the stock
+    as it lies then, or a place (x, y) mm of the frame without it. `pins_mm`: places (x, y) of
+    alignment pins in the frame of the first face, which meet again when the part is turned.
+    `flip_error_mm`: how far the faces may lie beside each other, None if that is not known."""
 
     name: str
     operations: tuple[str, ...]
@@ -994,8 +1005,11 @@ class JobSetup:
     line_mm: float | None = None
     pins_mm: tuple[tuple[float, float], ...] = ()
     flip_error_mm: float | None = None
+    zero: str | tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
+        if isinstance(self.zero, str):
+            one_of("zero", self.zero, tuple(ZEROS))
         if self.flip is not None:
             one_of("flip", self.flip, ("x", "y"))
             at_least_zero("flip error", self.flip_error_mm or 0.0, "mm")
@@ -1011,6 +1025,21 @@ class JobSetup:
                     where=f"key {key}",
                     mend='give flip = "y" for a part that is turned over left to right',
                 )
+
+
+def _refuse_pins(setup: JobSetup, turn: Turn, where: str) -> None:
+    """Refuse pins that meet none again when the part is turned over."""
+    for x, y in setup.pins_mm:
+        place = turn.point((x, y))
+        if not any(math.dist(place, pin) <= PIN_SLACK_MM for pin in setup.pins_mm):
+            across = turn.signs.index(-1.0)
+            raise OptionError(
+                f"the pin at X{x:g} Y{y:g} meets no other one, nor itself, when the part is"
+                f" turned over: there is none at X{place[0]:g} Y{place[1]:g}",
+                where=f"{where}, key pins",
+                mend=f"put pins on the line {'XY'[across]}{0.5 * turn.shift_mm[across]:g}, or the"
+                " same distance on both sides of it",
+            )
 
 
 @dataclass(frozen=True)
@@ -1075,8 +1104,7 @@ class Job:
                 raise OptionError(
                     "has no operations", where=where, mend=f"known: {', '.join(known)}"
                 )
-            if setup.flip is not None:
-                self._turned(setup, where)
+            self._turn(setup, where)
         taken = {name for setup in self.setups for name in setup.operations}
         for name in known:
             if self.setups and name not in taken:
@@ -1104,47 +1132,52 @@ class Job:
             if each.name.removesuffix(FINISH if each.stage == "finish" else "")
             in chosen.operations
         )
-        placement, stock = self.placement, self.stock
-        if chosen.flip is not None:
-            line = self._turned(chosen, f"set-up {name!r}")
-            placement = replace(placement, flip=(chosen.flip, line))
-            stock = None if stock is None else stock.turned(chosen.flip, line)
+        turn, zero = self._turn(chosen, f"set-up {name!r}")
         return replace(
             self,
             operations=operations,
-            placement=placement,
-            stock=stock,
+            placement=replace(self.placement, turn=turn),
+            stock=None if self.stock is None else self.stock.turned(turn),
+            keep_out=tuple(box.moved((-zero[0], -zero[1])) for box in self.keep_out),
             setups=(),
             setup_of=(self, chosen),
         )
 
-    def _turned(self, setup: JobSetup, where: str) -> float:
-        """Return where the line lies about which a set-up is turned over, mm; OptionError where
-        nobody knows, and for pins that do not meet again."""
+    def flip_line_mm(self, setup: JobSetup) -> float | None:
+        """Return where the line lies about which a set-up is turned over, mm; None if it is not
+        turned over, or nobody knows."""
+        box = None if self.stock is None else self.stock.box_mm
         across = 0 if setup.flip == "y" else 1
-        line = setup.line_mm
-        if line is None:
-            box = None if self.stock is None else self.stock.box_mm
-            if box is None:
+        if setup.line_mm is not None or setup.flip is None or box is None:
+            return setup.line_mm
+        return 0.5 * (box[across] + box[across + 2])
+
+    def _turn(self, setup: JobSetup, where: str) -> tuple[Turn, tuple[float, float]]:
+        """Return the map into the frame of a set-up, and where its zero lies in the frame that has
+        the zero of the others; OptionError where nobody knows, and for pins that do not meet."""
+        turn, line = Turn(), self.flip_line_mm(setup)
+        if setup.flip is not None:
+            if line is None:
                 raise OptionError(
                     "the line about which the part is turned over is not known",
                     where=where,
                     mend="give line, its distance from zero, or [stock] with corner and size: then"
                     " it goes through the middle of the stock",
                 )
-            line = 0.5 * (box[across] + box[across + 2])
-        for x, y in setup.pins_mm:
-            place = [x, y]
-            place[across] = 2.0 * line - place[across]
-            if not any(math.dist(place, pin) <= PIN_SLACK_MM for pin in setup.pins_mm):
+            turn = Turn.about(setup.flip, line)
+            _refuse_pins(setup, turn, where)
+        zero = setup.zero or (0.0, 0.0)
+        if isinstance(zero, str):
+            box = None if self.stock is None else self.stock.box_mm
+            if box is None:
                 raise OptionError(
-                    f"the pin at X{x:g} Y{y:g} meets no other one, nor itself, when the part is"
-                    f" turned over: there is none at X{place[0]:g} Y{place[1]:g}",
-                    where=f"{where}, key pins",
-                    mend=f"put pins on the line {'XY'[across]}{line:g}, or the same distance on"
-                    " both sides of it",
+                    f"where the {zero} is is not known",
+                    where=f"{where}, key zero",
+                    mend="write [stock] with its corner and size, or give zero = [x, y]",
                 )
-        return line
+            (left, low, right, high), (x, y) = turn.box(box), ZEROS[zero]
+            zero = left + x * (right - left), low + y * (high - low)
+        return turn.then(Turn(shift_mm=(-zero[0], -zero[1]))), zero
 
     @property
     def whole(self) -> Job:

@@ -95,22 +95,46 @@ def setup_name(job: Job) -> str:
     return "" if job.setup_of is None else job.setup_of[1].name
 
 
+def setup_heading(job: Job) -> tuple[str, ...]:
+    """Return in words what set-up of a part this is, which face is up, and how the part is turned
+    to it from the face that is drawn; () for a job that is no set-up."""
+    if job.setup_of is None:
+        return ()
+    whole, setup = job.setup_of
+    line_mm, turn = whole.flip_line_mm(setup), job.placement.turn
+    if line_mm is None or setup.flip is None:
+        return f"set-up {setup.name}", "the face that is drawn is up"
+    across, sides = (0, "left and right") if setup.flip == "y" else (1, "front and back")
+    line = turn.point((line_mm, line_mm))[across]
+    return (
+        f"set-up {setup.name}",
+        "the other face is up",
+        f"turned over about {'XY'[across]}{line:g} so that {sides} change places",
+    )
+
+
 def setup_words(job: Job) -> str:
-    """Return in words what set-up of a part this is, how the part lies in it, and how far its face
-    may lie beside the other; "" for a job that is no set-up."""
+    """Return the heading of a set-up with its pins, and how far its face may lie beside the other;
+    "" for a job that is no set-up."""
     if job.setup_of is None:
         return ""
-    setup, turn = job.setup_of[1], job.placement.flip
-    if turn is None:
-        return setup.name
-    axis, line_mm = turn
-    sides = ("left and right", "X") if axis == "y" else ("front and back", "Y")
-    words = [f"{setup.name}: turned over about {sides[1]} {line_mm:g}, {sides[0]} change places"]
-    if setup.pins_mm:
-        words.append("pins at " + ", ".join(f"X{x:g} Y{y:g}" for x, y in setup.pins_mm))
-    beside = setup.flip_error_mm
-    known = "an unknown length" if beside is None else f"up to {beside:g} mm"
-    words.append(
-        f"its cuts lie {known} beside those of the other face (flip_error), which is in no error"
-    )
+    setup, words = job.setup_of[1], list(setup_heading(job))
+    words[0] = setup.name
+    if pins := pins_of(job):
+        words.append("pins at " + ", ".join(f"X{x:g} Y{y:g}" for x, y in pins))
+    if setup.flip is not None:
+        beside = setup.flip_error_mm
+        known = "an unknown length" if beside is None else f"up to {beside:g} mm"
+        words.append(
+            f"its cuts lie {known} beside those of the other face (flip_error), which is in no "
+            "error"
+        )
     return "; ".join(words)
+
+
+def pins_of(job: Job) -> tuple[tuple[float, float], ...]:
+    """Return the places of all alignment pins of a part in the frame of one of its set-ups."""
+    if job.setup_of is None:
+        return ()
+    places = dict.fromkeys(pin for setup in job.setup_of[0].setups for pin in setup.pins_mm)
+    return tuple(map(job.placement.turn.point, places))

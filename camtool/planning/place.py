@@ -29,6 +29,7 @@ from camtool.geometry.polylines import (
     segment_rows,
     without_repeats,
 )
+from camtool.geometry.turn import Turn
 from camtool.planning.findings import POINTS_MERGED
 from camtool.planning.job import ALLOWED_TIMES, Job, Placement
 from camtool.records import replace
@@ -73,6 +74,11 @@ class AffineMap(Struct, frozen=True, eq=False):
         """Return the map followed by a shift (2,) mm."""
         return replace(self, shift=self.shift + shift)
 
+    def turned(self, turn: Turn) -> AffineMap:
+        """Return the map followed by turning the part over."""
+        matrix = np.diag(turn.signs) @ self.matrix
+        return AffineMap(matrix, self.shift * turn.signs + turn.shift_mm, self.scale)
+
 
 def place(drawing: Drawing, job: Job) -> Drawing:
     """Return the drawing in the work frame, as the job's placement says; itself when nothing
@@ -108,17 +114,7 @@ def placements(drawing: Drawing, job: Job) -> list[AffineMap]:
     """
     first, shifts = _first_map(drawing, job), _copy_shifts(job.placement)
     first = first.moved(-_origin(drawing, job, first, shifts))
-    return [_turn_over(first.moved(shift), job.placement.flip) for shift in shifts]
-
-
-def _turn_over(where: AffineMap, flip: tuple[str, float] | None) -> AffineMap:
-    """Return the map followed by turning over about a line along an axis, so far from zero."""
-    if flip is None:
-        return where
-    axis, line_mm = flip
-    turn = np.diag([-1.0, 1.0] if axis == "y" else [1.0, -1.0])
-    shift = np.array([2.0 * line_mm, 0.0] if axis == "y" else [0.0, 2.0 * line_mm])
-    return AffineMap(turn @ where.matrix, turn @ where.shift + shift, where.scale)
+    return [first.moved(shift).turned(job.placement.turn) for shift in shifts]
 
 
 def part_scale(drawing: Drawing, job: Job) -> float:

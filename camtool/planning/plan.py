@@ -52,7 +52,7 @@ from camtool.planning.job import Job, Operation, Tool, refuse_endless
 from camtool.planning.kinds import function_of
 from camtool.planning.leads import KeepOut
 from camtool.planning.link import link
-from camtool.planning.naming import key_of, operation_name
+from camtool.planning.naming import key_of, operation_name, setup_heading
 from camtool.planning.order import (
     Point,
     best_order,
@@ -159,6 +159,7 @@ def _linked(
         toolpath,
         findings=tuple(findings),
         made_from=made_from,
+        setup=setup_heading(job),
         tabs_mm=_tabs(steps),
         drawn=drawn_of(toolpath, builder.runs, steps, placed),
     )

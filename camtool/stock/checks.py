@@ -25,13 +25,17 @@ from camtool.planning.job import Job, KeepOutBox, Operation, Stock, Tool
 from camtool.planning.naming import operation_name, tool_name
 from camtool.planning.sides import runs_beside
 from camtool.simulation.rows import block_of
-from camtool.stock.cut import CutStock
+from camtool.stock.before import WHOLE, StockBefore, least_remaining
+from camtool.stock.cut import CutStock, cut_box
 from camtool.stock.cutters import cutter_profile
 from camtool.stock.findings import (
     CUT_TOO_DEEP,
+    FACES_MEET,
     FINDINGS_LISTED,
+    FLOOR_LEFT,
     KEEP_OUT_ENTERED,
     LOOSE_PIECE,
+    LOOSE_PIECE_BEFORE,
     LOOSE_PIECE_CUT,
     MATERIAL_LEFT,
     PASS_TOO_DEEP,
@@ -45,7 +49,7 @@ from camtool.stock.findings import (
 )
 from camtool.stock.heights import Bracket, greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
-from camtool.stock.pieces import LoosePiece, loose_pieces
+from camtool.stock.pieces import BEFORE, LoosePiece, loose_pieces
 from camtool.stock.wanted import WantedSolid, wanted_solid
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
@@ -91,6 +95,9 @@ TAB_SLACK_MM = 0.05
 PIECE_POINTS = 50
 """Points at which it is looked whether a loose piece is a part."""
 
+MEETING_MM = 1e-3
+"""Faces that meet by less are not told."""
+
 MIN_CHORDS = 48
 """A tab is looked at in as many steps as this along its contour."""
 
@@ -98,8 +105,9 @@ MIN_CHORDS = 48
 class StockRequest(Struct, frozen=True, eq=False):
     """The solid that a job asks for, its closed contours, and which of them (C,) are the outlines
     of parts without tabs; its operations that cut, in their order, each with its depth, mm, and
-    the bridges of its tabs; the boxes that are to be kept free, and the stock. `is_whole`: nothing
-    has cut before: passes, and what is left, can be judged."""
+    the bridges of its tabs; the boxes that are to be kept free, the stock, and what set-ups before
+    have cut of it. `is_whole`: nothing else has cut before: passes, and what is left, can be
+    judged."""
 
     solid: WantedSolid
     contours: Polylines
@@ -110,11 +118,17 @@ class StockRequest(Struct, frozen=True, eq=False):
     tabs_left_out: bool
     keep_out: tuple[KeepOutBox, ...]
     stock: Stock | None
+    before: StockBefore = WHOLE
     is_whole: bool = True
 
 
 def stock_request(
-    steps: Sequence[Step], job: Job, wall_mm: float, *, is_whole: bool = True
+    steps: Sequence[Step],
+    job: Job,
+    wall_mm: float,
+    *,
+    before: StockBefore | None = None,
+    is_whole: bool = True,
 ) -> StockRequest:
     """Return what a job asks of the stock, of the steps of its plan; for the rest see
     `StockRequest`."""
@@ -137,6 +151,7 @@ def stock_request(
         "TAB_LEFT_OUT" in said,
         job.keep_out,
         job.stock,
+        before or WHOLE,
         is_whole,
     )
 
@@ -156,6 +171,7 @@ def stock_findings(
         *checks.too_deep(Severity.WARNING if gouged else Severity.ERROR),
         *checks.tabs(),
         *checks.loose(),
+        *checks.remaining(),
         *checks.keep_out(),
         *checks.not_known(),
     ]
@@ -170,25 +186,13 @@ def proved_gouge(stock: CutStock, request: StockRequest, limit_mm: float) -> Bra
     """Return the greatest depth, mm, to which the slides cut below the wanted solid, outside of a
     band of `limit_mm` beside its walls, between proved bounds; depths below the limit are not
     searched further."""
-    solid = WantedSolid(request.solid.may, request.solid.must, limit_mm)
-    return _proved(
-        stock,
-        limit_mm,
-        lambda at: solid.bands(at)[:, 0] - stock.tree.heights(at)[0],
-        lambda squares: solid.bounds(squares)[:, 1] - stock.tree.least(squares),
-    )
+    return _proved(stock, limit_mm, *_Judged.of(stock.tree, request, limit_mm).gouge)
 
 
 def proved_leftover(stock: CutStock, request: StockRequest, limit_mm: float) -> Bracket:
     """Return the greatest height, mm, to which material stands above what must be cut, as
     `proved_gouge` does."""
-    solid = WantedSolid(request.solid.may, request.solid.must, limit_mm)
-    return _proved(
-        stock,
-        limit_mm,
-        lambda at: stock.tree.heights(at)[0] - solid.bands(at)[:, 1],
-        lambda squares: stock.tree.greatest(squares) - solid.bounds(squares)[:, 2],
-    )
+    return _proved(stock, limit_mm, *_Judged.of(stock.tree, request, limit_mm).leftover)
 
 
 def _proved(
@@ -204,6 +208,58 @@ def _proved(
         value, upper, stock.box_mm, slack_mm, floor=floor, max_squares=MAX_PROVED_SQUARES
     )
     return Bracket(found.low, found.high + beside_mm, found.at_mm, found.squares)
+
+
+Judgement = tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]
+"""A value at points (J, 2), and upper bounds of it over squares (K, 3)."""
+
+
+class _Judged(Struct, frozen=True, eq=False):
+    """The stock after a program, of which set-ups before have cut `before`, beside what is wanted
+    of it."""
+
+    tree: StockTree
+    solid: WantedSolid
+    before: StockBefore
+
+    @classmethod
+    def of(cls, tree: StockTree, request: StockRequest, wall_mm: float) -> _Judged:
+        """Return the stock beside what a job asks for, outside of a band beside its walls."""
+        solid = WantedSolid(request.solid.may, request.solid.must, wall_mm)
+        return cls(tree, solid, request.before)
+
+    def tops(self, at: Floats, until: Ints | None = None) -> Floats:
+        """Return the heights (J,) of what is left over points (J, 2), after all moves or before
+        the moves `until` (J,)."""
+        return np.minimum(self.tree.heights(at, until)[0], self.before.tops(at))
+
+    @property
+    def gouge(self) -> Judgement:
+        """Depth of what is cut though it is to stay, mm."""
+
+        def value(at: Floats) -> Floats:
+            low = np.minimum(self.solid.bands(at)[:, 0], self.before.tops(at))
+            return low - np.maximum(self.tree.heights(at)[0], self.before.floors(at))
+
+        def upper(squares: Floats) -> Floats:
+            low = np.minimum(self.solid.bounds(squares)[:, 1], self.before.greatest_tops(squares))
+            return low - np.maximum(self.tree.least(squares), self.before.least_floors(squares))
+
+        return value, upper
+
+    @property
+    def leftover(self) -> Judgement:
+        """Height of what is left though it is to go, mm."""
+
+        def value(at: Floats) -> Floats:
+            return self.tops(at) - np.maximum(self.solid.bands(at)[:, 1], self.before.floors(at))
+
+        def upper(squares: Floats) -> Floats:
+            top = np.minimum(self.tree.greatest(squares), self.before.greatest_tops(squares))
+            lowest = self.solid.bounds(squares)[:, 2]
+            return top - np.maximum(lowest, self.before.least_floors(squares))
+
+        return value, upper
 
 
 class _Points(Struct, frozen=True, eq=False):
@@ -235,6 +291,8 @@ class _Checks:
         ]
         self.solid, self.deep_mm = request.solid, deep_mm
         self.tree: StockTree = stock_tree(moves)
+        self.before: StockBefore = request.before
+        self.stock = _Judged(self.tree, self.solid, self.before)
         lowest = np.minimum(moves.start[:, 2], moves.end[:, 2])
         self.low: Ints = np.flatnonzero(lowest < STOCK_TOP_MM - POSITION_EPS_MM)
         every = max(1, math.ceil(len(self.low) / MAX_CUTS))
@@ -278,12 +336,7 @@ class _Checks:
     def too_deep(self, severity: Severity) -> Iterator[Finding]:
         """Yield CUT_TOO_DEEP for places at which the stock is below the lowest that is allowed."""
 
-        def deep(at: Floats) -> Floats:
-            return np.asarray(self.solid.bands(at)[:, 0] - self.tree.heights(at)[0])
-
-        def upper(squares: Floats) -> Floats:
-            return np.asarray(self.solid.bounds(squares)[:, 1] - self.tree.least(squares))
-
+        deep, upper = self.stock.gouge
         points = self.cuts.at[self._in_stock(self.cuts.at)]
         for place, more in self._worst(points, deep(points), deep, upper):
             z, which = self.tree.heights(place[None])
@@ -292,7 +345,7 @@ class _Checks:
             name = self.solid.cut_by((float(place[0]), float(place[1])))
             yield CUT_TOO_DEEP(
                 where=self._where(row, place),
-                measured=low - float(z[0]),
+                measured=float(deep(place[None])[0]),
                 limit=self.deep_mm,
                 severity=severity,
                 by=f"operation {name!r}: " if name else "",
@@ -304,13 +357,7 @@ class _Checks:
     def left(self) -> Iterator[Finding]:
         """Yield MATERIAL_LEFT for places at which the stock is above the highest that is asked."""
 
-        def standing(at: Floats) -> Floats:
-            return np.asarray(self.tree.heights(at)[0] - self.solid.bands(at)[:, 1])
-
-        def upper(squares: Floats) -> Floats:
-            lowest = self.solid.bounds(squares)[:, 2]
-            return np.asarray(self.tree.greatest(squares) - lowest)
-
+        standing, upper = self.stock.leftover
         boxes = [layer.curves.boxes for layer in self.solid.must if len(layer.lines)]
         if not boxes:
             return
@@ -322,10 +369,10 @@ class _Checks:
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         points = points[self._in_stock(points)]
         for place, more in self._worst(points, standing(points), standing, upper):
-            z, high_z = self.tree.heights(place[None])[0], self.solid.bands(place[None])[0, 1]
+            z, high_z = self.stock.tops(place[None]), self.solid.bands(place[None])[0, 1]
             yield MATERIAL_LEFT(
                 where=place_words(place),
-                measured=float(z[0] - high_z),
+                measured=float(standing(place[None])[0]),
                 limit=self.deep_mm,
                 z=float(z[0]),
                 high=float(high_z),
@@ -366,12 +413,12 @@ class _Checks:
         limit = self._chips_mm()
         feeds = ~self.moves.rapid[self.cuts.move] & self._in_stock(self.cuts.at)
         at, move = np.ascontiguousarray(self.cuts.at[feeds]), self.cuts.move[feeds]
-        before, _ = self.tree.heights(at, move)
+        before = self.stock.tops(at, move)
         # No move cuts below its lower end.
         lowest = np.minimum(self.moves.start[move, 2], self.moves.end[move, 2])
         doubtful = before - lowest > limit[move] + self.deep_mm
         at, move, before = at[doubtful], move[doubtful], before[doubtful]
-        after, _ = self.tree.heights(at, move + 1)
+        after = np.maximum(self.stock.tops(at, move + 1), self.before.floors(at))
         chip = before - after
         over = chip - limit[move]
         blocks: dict[int, int] = {}
@@ -451,22 +498,24 @@ class _Checks:
         half = 0.5 * width_mm
         step = half * np.arange(-MIN_CHORDS, MIN_CHORDS + 1) / MIN_CHORDS
         at = bridge.centre + step[:, None] * bridge.ahead
-        z, _ = self.tree.heights(np.ascontiguousarray(at))
-        gone = z < height_mm - depth_mm - self.deep_mm
+        left = self.stock.tops(at) - np.maximum(self.before.floors(at), -depth_mm)
+        gone = left < height_mm - self.deep_mm
         low, high = step[gone & (step <= 0.0)], step[gone & (step >= 0.0)]
         wide = high.min(initial=half) - low.max(initial=-half)
-        return float(wide), float(z[MIN_CHORDS] + depth_mm)
+        return float(wide), float(left[MIN_CHORDS])
 
     def loose(self) -> Iterator[Finding]:
-        """Yield LOOSE_PIECE for pieces that come loose, and for parts that are cut after that."""
+        """Yield LOOSE_PIECE for pieces that come loose, and for parts that are cut after that, in
+        this set-up or in one before."""
         stock = self.request.stock
         if stock is None:
             return
+        every = loose_pieces(self.moves, stock.thickness_mm, stock.box_mm, self.before)
         found = [
             (piece, is_part)
-            for piece in loose_pieces(self.moves, stock.thickness_mm, stock.box_mm)
+            for piece in every
             for is_part in (self._is_part(piece),)
-            if not is_part or piece.again >= 0
+            if piece.move != BEFORE and (not is_part or piece.again >= 0)
         ]
         for number, (piece, is_part) in enumerate(found[:FINDINGS_LISTED], start=1):
             left, low, right, high = piece.box_mm
@@ -481,6 +530,33 @@ class _Checks:
                 again=block_of(self.decoded, int(self.moves.row[piece.again])),
                 more=max(len(found) - FINDINGS_LISTED, 0) if number == FINDINGS_LISTED else 0,
             )
+        for piece in every:
+            z, move = self.tree.heights(piece.points)
+            cut = z < self.before.tops(piece.points) - self.deep_mm
+            if piece.move == BEFORE and cut.any():
+                left, low, right, high = piece.box_mm
+                yield LOOSE_PIECE_BEFORE(
+                    where=self._where(int(self.moves.row[move[cut].min()]), piece.points[cut][0]),
+                    measured=piece.area_mm2,
+                    width=right - left,
+                    height=high - low,
+                )
+
+    def remaining(self) -> Iterator[Finding]:
+        """Yield FACES_MEET where the other face's cuts meet these, or else the least thickness
+        that both leave."""
+        stock = self.request.stock
+        if stock is None or not self.before.below:
+            return
+        box = stock.box_mm or cut_box(self.moves)
+        found = least_remaining(self.tree, self.before, box)
+        if not math.isfinite(found.low):
+            return
+        where, other = place_words(found.at_mm), self.before.deepest_below(np.array(found.at_mm))
+        if found.low > MEETING_MM:
+            yield FACES_MEET(where=where, measured=found.low, other=other)
+        else:
+            yield FLOOR_LEFT(where=where, measured=max(-found.low, 0.0), other=other)
 
     def _is_part(self, piece: LoosePiece) -> bool:
         """True if the innermost contour round most of a piece is the outline of a part."""
@@ -524,8 +600,9 @@ class _Checks:
         worst: dict[int, tuple[float, Floats]] = {}
         for offset in (*rim, *(0.5 * (rim + tool.radius_mm * rim / radius))):
             at = np.ascontiguousarray(axis[:, :2] + offset)
-            z, _ = self.tree.heights(at, rows[which] + 1)
-            deep = np.where(self._in_stock(at), z - (axis[:, 2] + begin), -np.inf)
+            floor = np.maximum(axis[:, 2] + begin, self.before.floors(at))
+            z = self.stock.tops(at, rows[which] + 1)
+            deep = np.where(self._in_stock(at), z - floor, -np.inf)
             for k in np.flatnonzero(deep > self.deep_mm).tolist():
                 row = int(self.moves.row[rows[which[k]]])
                 if deep[k] > worst.get(row, (0.0,))[0]:

@@ -45,15 +45,6 @@ bracket is then wider."""
 DIFFERENCE_SHARE = 1e-3
 """Volumes of differences are told to this part of the volume that is cut."""
 
-MEETING_MM = 1e-3
-"""Faces that meet by less are not told."""
-
-MAX_MEETING_SQUARES = 400_000
-"""The search for a place where they meet ends after this many squares."""
-
-THROUGH_SLACK_MM = 1e-6
-"""A cut that gets so near to the bottom of the stock goes through it."""
-
 Box = tuple[float, float, float, float]
 """Low x, low y, high x and high y, mm."""
 
@@ -133,46 +124,6 @@ def _across(axis: str, at_mm: float, place: Floats) -> Floats:
     """Return points (J, 2) of a section."""
     level = np.full(len(place), at_mm)
     return np.column_stack([level, place] if axis == "x" else [place, level])
-
-
-def greatest_meeting(
-    one: CutStock, other: CutStock, turn: tuple[str, float], thickness_mm: float
-) -> Bracket:
-    """Bracket by how much two stocks, the second of which is cut from the other face, are cut more
-    than their thickness, mm, where neither is cut through by itself; the bracket begins at
-    MEETING_MM. `turn`: the line along an axis about which the one frame is turned over into the
-    other, and its distance from zero."""
-
-    def depths(stock: CutStock, points: Floats) -> Floats:
-        deep = stock.tree.top - stock.heights(points)
-        return np.where(deep < thickness_mm - THROUGH_SLACK_MM, deep, -np.inf)
-
-    def value(points: Floats) -> Floats:
-        return depths(one, points) + depths(other, turned_over(points, turn)) - thickness_mm
-
-    def upper(squares: Floats) -> Floats:
-        pairs = ((one, squares), (other, turned_over(squares, turn)))
-        bound = np.full(len(squares), -thickness_mm)
-        for stock, at in pairs:
-            bound += (stock.tree.top - stock.tree.least(at)).clip(max=thickness_mm)
-            # Where one is cut through all over a square, nothing is left that could meet.
-            shallow = stock.tree.top - stock.tree.greatest(at)
-            bound[shallow >= thickness_mm - THROUGH_SLACK_MM] = -np.inf
-        return bound
-
-    return greatest_value(
-        value, upper, one.box_mm, floor=MEETING_MM, max_squares=MAX_MEETING_SQUARES
-    )
-
-
-def turned_over(points: Floats, turn: tuple[str, float]) -> Floats:
-    """Return points, or squares (J, 2 or more) by their middles, turned over about a line along an
-    axis, "x" or "y", so far from zero, mm."""
-    axis, line_mm = turn
-    across = 0 if axis == "y" else 1
-    moved = points.copy()
-    moved[:, across] = 2.0 * line_mm - moved[:, across]
-    return moved
 
 
 def cut_stock(

@@ -90,6 +90,13 @@ class StockCode(Code):
         "though neither goes through the stock there; its place and by how much are given",
         "less depth in one of the set-ups, unless they shall meet",
     )
+    FLOOR_LEFT = (
+        611,
+        INFO,
+        "the least thickness that set-ups from both faces leave of the stock between them, where "
+        "neither goes through it",
+        "nothing, if it is thick enough",
+    )
 
 
 CUT_TOO_DEEP = Sentence(
@@ -152,6 +159,12 @@ LOOSE_PIECE_CUT = Sentence(
     "on: cut its outline last, or give it tabs" + and_more("pieces"),
     "mm2",
 )
+LOOSE_PIECE_BEFORE = Sentence(
+    ProgramCode.LOOSE_PIECE,
+    "what is cut here, {width:.3g} by {height:.3g} mm, has come loose in a set-up before: cut its "
+    "outline in the last set-up, or give it tabs",
+    "mm2",
+)
 STOCK_NOT_JUDGED_TOOLS = Sentence(
     StockCode.STOCK_NOT_JUDGED,
     "it is not known which of {measured:.0f} tools cuts what: depths, passes, tabs, loose pieces, "
@@ -168,5 +181,10 @@ FACES_MEET = Sentence(
     StockCode.FACES_MEET,
     "this set-up and {other!r} meet: together they cut {measured:.4g} mm more than the stock is "
     "thick",
+    "mm",
+)
+FLOOR_LEFT = Sentence(
+    StockCode.FLOOR_LEFT,
+    "this set-up and {other!r} leave {measured:.4g} mm of the stock here, and nowhere less",
     "mm",
 )

@@ -5,6 +5,10 @@ through; so whatever holds a piece, however thin, keeps a cell, and cells that t
 a corner hold each other. The cells are a third of the narrowest cut wide, so that gone cells close
 round every piece that is cut out. What reaches the edge of the stock, or beyond all cuts, is held.
 
+Where other set-ups have cut from the other face before, cuts need not go as deep: each cell has
+its own floor, one of `MAX_LEVELS` heights, rounded down. A cell that is gone already has the time
+BEFORE.
+
 Backwards in time, gone cells come back, those cut last first: where one joins two pieces, its move
 has parted them, and the one that is not held has come loose then. Of a loose piece that is cut in
 two only the smaller part counts, and only if something is left of it at the end.
@@ -21,6 +25,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.records import replace
+from camtool.stock.before import THROUGH_SLACK_MM, WHOLE, StockBefore
 from camtool.stock.cutters import CutterProfile
 from camtool.stock.heightmap import Box, HeightMap, cell_for, height_map
 from camtool.stock.moves import StockMoves
@@ -47,6 +52,16 @@ STANDING = np.iinfo(np.int64).max
 """Time of cells that are never cut through."""
 
 
+BEFORE = -1
+"""Time of cells that other set-ups have cut through."""
+
+MAX_LEVELS = 16
+"""So many heights of floors from below are told apart, ..."""
+
+LEVEL_POINTS = 20_000
+"""... of those at so many points of the stock."""
+
+
 class LoosePiece(Struct, frozen=True, eq=False):
     """A piece as it comes loose: the number of the move that frees it, its area, mm², its box (low
     x, low y, high x, high y), mm, and points (P, 2) in it. `again`: the move from which on it is
@@ -70,10 +85,26 @@ class _Parting(Struct, frozen=True):
     cut: int
 
 
-def loose_pieces(moves: StockMoves, thickness_mm: float, box_mm: Box | None) -> list[LoosePiece]:
+class _Level(Struct, frozen=True, eq=False):
+    """The cuts that go through the stock where its floor is at a height, mm, and the number of
+    each among all moves."""
+
+    floor_mm: float
+    cuts: StockMoves
+    number: Ints
+
+
+def loose_pieces(
+    moves: StockMoves, thickness_mm: float, box_mm: Box | None, before: StockBefore = WHOLE
+) -> list[LoosePiece]:
     """Return the pieces that come loose of a stock with this thickness and these sides (None:
-    without limits), in the order of time."""
-    cuts, number = _through(moves, -thickness_mm)
+    without limits), which set-ups have cut before, in the order of time."""
+    levels = [
+        _Level(floor, *_through(moves, floor)) for floor in _floors(moves, thickness_mm, before)
+    ]
+    # Of whole stock only what is cut through can come loose.
+    has_others = bool(before.above or before.below)
+    cuts = moves.select(moves.table[moves.tool, 0] > 0.0) if has_others else levels[0].cuts
     across = (cuts.start[:, :2] != cuts.end[:, :2]).any(axis=1)
     if not across.any():
         return []
@@ -83,26 +114,41 @@ def loose_pieces(moves: StockMoves, thickness_mm: float, box_mm: Box | None) -> 
     high = np.maximum(cuts.start, cuts.end)[:, :2] + radius[:, None]
     edge = 3.0 * narrow
     low, high = low.min(axis=0) - edge, high.max(axis=0) + edge
-    if box_mm is not None:
+    if box_mm is not None and has_others:
+        low, high = np.array(box_mm).reshape(2, 2)
+    elif box_mm is not None:
         low, high = np.maximum(low, box_mm[:2]), np.minimum(high, box_mm[2:])
     if (low >= high).any():
         return []
     box = (*low.tolist(), *high.tolist())
-    cell = max(CELL_SHARE * 2.0 * narrow, cell_for(box, MAX_RASTER_CELLS))
-    whole = _raster(cuts, box, cell, math.sqrt(0.5) * cell)
-    assert whole.owner is not None
-    time = np.where(whole.owner >= 0, whole.owner, STANDING).astype(np.int64)
+    most = MAX_PIECE_CELLS if has_others else MAX_RASTER_CELLS
+    cell = max(CELL_SHARE * 2.0 * narrow, cell_for(box, most))
+    raster = _Raster(levels, before, box, cell)
+    time = raster.times(box, cell, math.sqrt(0.5) * cell)[1]
     disc = math.pi * narrow**2
     partings = list(_partings(time, MIN_PIECE_SHARE * disc / cell**2))
     cells = min(MAX_PIECE_CELLS, MAX_RASTER_CELLS // max(len(partings), 1))
     found = []
     for parting in partings:
-        piece = _measured(cuts, whole, time, parting, cells)
+        piece = raster.measured(time, parting, cells)
         if piece is not None and piece.area_mm2 >= MIN_PIECE_SHARE * disc:
             is_cut = parting.cut * cell**2 >= MIN_CUT_SHARE * disc
-            again = int(number[piece.again]) if is_cut else -1
-            found.append(replace(piece, move=int(number[piece.move]), again=again))
+            found.append(piece if is_cut else replace(piece, again=-1))
     return sorted(found, key=lambda each: each.move)
+
+
+def _floors(moves: StockMoves, thickness_mm: float, before: StockBefore) -> list[float]:
+    """Return the heights of the floors through which moves cut, the lowest first."""
+    if not before.below:
+        return [-thickness_mm]
+    ends = np.concatenate([moves.start, moves.end])[:, :2]
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    step = math.sqrt(max(float(np.prod(high - low)), 1e-12) / LEVEL_POINTS)
+    x, y = (np.arange(low[k], high[k] + step, step) for k in (0, 1))
+    floors = before.floors(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
+    floors = np.unique(np.floor(floors / WIDTH_STEP_MM) * WIDTH_STEP_MM)
+    floors = floors[(floors > -thickness_mm) & (floors < 0.0)]
+    return [-thickness_mm, *floors[:: max(1, math.ceil(len(floors) / MAX_LEVELS))].tolist()]
 
 
 def _through(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
@@ -139,17 +185,73 @@ WIDTH_STEP_MM = 1e-3
 """Widths of cuts are rounded down to this."""
 
 
-def _raster(cuts: StockMoves, box: Box, cell: float, inwards_mm: float) -> HeightMap:
-    """Draw cuts into a raster, with tools that are slimmer by `inwards_mm`; its owners are the
-    first moves that cut each cell."""
-    slim = [max(each.radius_mm - inwards_mm, 0.0) for each in cuts.cutters]
-    cutters = tuple(CutterProfile(radius, radius) for radius in slim)
-    wide = np.array(slim)[cuts.tool] > 0.0
-    kept = np.flatnonzero(wide)
-    drawn = height_map(replace(cuts, cutters=cutters).select(kept), box, cell, owners=True)
-    assert drawn.owner is not None
-    owner = np.where(drawn.owner >= 0, kept[drawn.owner.clip(min=0)] if len(kept) else -1, -1)
-    return replace(drawn, owner=owner)
+class _Raster(Struct, frozen=True, eq=False):
+    """The cuts of each level, what other set-ups have cut, and the box and the cells in which
+    pieces are looked for."""
+
+    levels: list[_Level]
+    before: StockBefore
+    box: Box
+    cell_mm: float
+
+    def times(
+        self, box: Box, cell_mm: float, inwards_mm: float, until: int | None = None
+    ) -> tuple[HeightMap, Ints]:
+        """Return a raster of a box, and the first move (NY, NX) that cuts each of its cells
+        through, of those up to `until`, with tools that are slimmer by `inwards_mm`."""
+        found: Ints | None = None
+        for level in self.levels:
+            chosen = level.number <= (STANDING if until is None else until)
+            cuts = level.cuts.select(chosen)
+            slim = [max(each.radius_mm - inwards_mm, 0.0) for each in cuts.cutters]
+            cutters = tuple(CutterProfile(radius, radius) for radius in slim)
+            kept = np.flatnonzero(np.array(slim)[cuts.tool] > 0.0)
+            drawn = height_map(
+                replace(cuts, cutters=cutters).select(kept), box, cell_mm, owners=True
+            )
+            assert drawn.owner is not None
+            number = np.append(level.number[chosen][kept], STANDING)
+            time = number[drawn.owner]  # the last for cells that nothing cuts
+            if not (self.before.above or self.before.below):
+                return drawn, time
+            if found is None:
+                points = _centres(drawn)
+                floor = self.before.floors(points, -inwards_mm).reshape(time.shape)
+                top = self.before.tops(points, -inwards_mm).reshape(time.shape)
+                is_gone = np.maximum(floor, level.floor_mm) >= top - THROUGH_SLACK_MM
+            found = time if found is None else np.where(floor >= level.floor_mm, time, found)
+        assert found is not None
+        return drawn, np.where(is_gone, BEFORE, found)
+
+    def measured(self, time: Ints, parting: _Parting, cells: int) -> LoosePiece | None:
+        """Return a piece as it is when a move frees it; None where all its cells are cut in
+        part."""
+        (low, high), (left, right) = parting.rows, parting.columns
+        time = time[low : high + 1, left : right + 1]
+        label = _labels(time > parting.time)
+        row, column = parting.place
+        mine = label == label[row - low, column - left]
+        cell = self.cell_mm
+        corner = np.array(self.box[:2]) + cell * np.array([left, low])
+        size = cell * np.array(mine.shape[::-1])
+        box = (*corner.tolist(), *(corner + size).tolist())
+        fine, cut = self.times(box, min(cell, cell_for(box, cells)), 0.0, parting.time)
+        points = _centres(fine)[(cut == STANDING).ravel()]
+        x, y = np.floor((points - corner) / cell).astype(np.int64).T
+        inside = mine[y.clip(max=len(mine) - 1), x.clip(max=mine.shape[1] - 1)]
+        points = points[inside]
+        if not len(points):
+            return None
+        half = 0.5 * fine.cell_mm
+        ends = (*(points.min(axis=0) - half).tolist(), *(points.max(axis=0) + half).tolist())
+        later = time[mine & (time != STANDING)]
+        again = int(later.min()) if len(later) else -1
+        return LoosePiece(parting.time, len(points) * fine.cell_mm**2, ends, points, again)
+
+
+def _centres(drawn: HeightMap) -> Floats:
+    """Return the centres (P, 2) of all cells of a raster, row by row."""
+    return np.stack(np.meshgrid(drawn.x, drawn.y), axis=-1).reshape(-1, 2)
 
 
 def _partings(time: Ints, least: float) -> Iterator[_Parting]:
@@ -248,33 +350,3 @@ def _labels(standing: Bools) -> Ints:
     if not len(label):
         return np.full(standing.shape, -1, dtype=np.int64)
     return np.where(standing, label[run.clip(min=0)], -1).astype(np.int64)
-
-
-def _measured(
-    cuts: StockMoves, whole: HeightMap, time: Ints, parting: _Parting, cells: int
-) -> LoosePiece | None:
-    """Return a piece as it is when a move frees it; None where all its cells are cut in part."""
-    (low, high), (left, right) = parting.rows, parting.columns
-    time = time[low : high + 1, left : right + 1]
-    label = _labels(time > parting.time)
-    row, column = parting.place
-    mine = label == label[row - low, column - left]
-    cell = whole.cell_mm
-    corner = np.array(whole.corner_mm) + cell * np.array([left, low])
-    size = cell * np.array(mine.shape[::-1])
-    box = (*corner.tolist(), *(corner + size).tolist())
-    before = cuts.select(slice(0, parting.time + 1))
-    fine = _raster(before, box, min(cell, cell_for(box, cells)), 0.0)
-    assert fine.owner is not None
-    rows, columns = np.nonzero(fine.owner < 0)
-    points = np.column_stack([fine.x[columns], fine.y[rows]])
-    x, y = np.floor((points - corner) / cell).astype(np.int64).T
-    inside = mine[y.clip(max=len(mine) - 1), x.clip(max=mine.shape[1] - 1)]
-    points = points[inside]
-    if not len(points):
-        return None
-    half = 0.5 * fine.cell_mm
-    ends = (*(points.min(axis=0) - half).tolist(), *(points.max(axis=0) + half).tolist())
-    later = time[mine & (time != STANDING)]
-    again = int(later.min()) if len(later) else -1
-    return LoosePiece(parting.time, len(points) * fine.cell_mm**2, ends, points, again)

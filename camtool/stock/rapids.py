@@ -25,6 +25,7 @@ from camtool.kernels.stock import heights_of_moves
 from camtool.planning.job import Stock
 from camtool.records import replace
 from camtool.simulation.rows import block_of
+from camtool.stock.before import WHOLE, StockBefore
 from camtool.stock.cutters import CutterProfile
 from camtool.stock.findings import FINDINGS_LISTED, RAPID_IN_STOCK, place_words
 from camtool.stock.heights import divided, greatest_value, move_columns, stock_tree
@@ -67,15 +68,18 @@ def rapids_through_stock(
     moves: StockMoves,
     box_mm: tuple[float, float, float, float] | None = None,
     tolerance_mm: float = CLEARED_MM,
+    before: StockBefore | None = None,
 ) -> list[RapidThroughStock]:
-    """Return the rapids through what the feeds before them have left of the stock, in order;
-    `box_mm`: its sides (low x, low y, high x, high y), None without limits."""
+    """Return the rapids through what the feeds before them, and other set-ups `before`, have left
+    of the stock, in order; `box_mm`: its sides (low x, low y, high x, high y), None without
+    limits."""
     start, end = moves.start, moves.end
     low = np.minimum(start[:, 2], end[:, 2]) < STOCK_TOP_MM - HEIGHT_EPS_MM
     is_up = (start[:, :2] == end[:, :2]).all(axis=1) & (end[:, 2] >= start[:, 2])
     if not (moves.rapid & low & ~is_up).any():
         return []
-    search = _Search(moves, np.flatnonzero(moves.rapid & low & ~is_up), box_mm, tolerance_mm)
+    rows = np.flatnonzero(moves.rapid & low & ~is_up)
+    search = _Search(moves, rows, box_mm, tolerance_mm, before)
     doubtful = np.flatnonzero(~search.follow_a_feed())
     found: list[RapidThroughStock] = []
     for first in range(0, len(doubtful), RAPIDS_AT_ONCE):
@@ -84,7 +88,11 @@ def rapids_through_stock(
 
 
 def rapid_findings(
-    decoded: Toolpath, moves: StockMoves | None, stock: Stock | None, tolerance_mm: float
+    decoded: Toolpath,
+    moves: StockMoves | None,
+    stock: Stock | None,
+    tolerance_mm: float,
+    before: StockBefore | None = None,
 ) -> Iterator[Finding]:
     """Yield RAPID_IN_STOCK for the rapids of a program that get farther than a tolerance into what
     is not cut before them; without the moves of its tools for all below the stock top that may."""
@@ -92,7 +100,7 @@ def rapid_findings(
         found = low_rapids(decoded)
     else:
         box_mm = None if stock is None else stock.box_mm
-        found = rapids_through_stock(moves, box_mm, max(CLEARED_MM, tolerance_mm))
+        found = rapids_through_stock(moves, box_mm, max(CLEARED_MM, tolerance_mm), before)
     for number, one in enumerate(found[:FINDINGS_LISTED], start=1):
         yield RAPID_IN_STOCK(
             where=f"{block_of(decoded, one.row)} {place_words(one.at_mm)}",
@@ -139,7 +147,9 @@ class _Search:
         chosen: Ints,
         box_mm: tuple[float, float, float, float] | None,
         tolerance_mm: float,
+        before: StockBefore | None,
     ) -> None:
+        self.others = before or WHOLE
         self.room_mm = ROOM_SHARE * tolerance_mm
         self.least_mm = MIN_HALF_SHARE * tolerance_mm
         self.low, self.high = np.array(box_mm or (-np.inf, -np.inf, np.inf, np.inf)).reshape(2, 2)
@@ -237,6 +247,8 @@ class _Search:
             self.columns[of], self.tools[of], points, np.full(len(of), -self.room_mm)
         )
         within = ((points >= self.low) & (points <= self.high)).all(axis=1)
+        stock = np.minimum(stock, self.others.tops(points, self.room_mm))
+        mine = np.maximum(mine, self.others.floors(points, self.room_mm))
         return np.where(within, stock - mine, -np.inf)
 
     def _most_taken(self, of: Ints, squares: Floats) -> Floats:
@@ -250,7 +262,9 @@ class _Search:
         most = np.full(len(of), -np.inf)
         near = np.flatnonzero(within.all(axis=1) & np.isfinite(mine))
         stock = self.tree.greatest(squares[near], None, self.room_mm, self.before[of[near]])
-        most[near] = stock - mine[near]
+        stock = np.minimum(stock, self.others.greatest_tops(squares[near], self.room_mm))
+        floor = self.others.least_floors(squares[near], self.room_mm)
+        most[near] = stock - np.maximum(mine[near], floor)
         return most
 
 

@@ -111,10 +111,11 @@ class Toolpath:
     no arc; feed (N,) mm/min, NaN for rapids and events; value (N,), NaN where none; source (N,)
     index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
     program block that the row was read from, −1 when planned; start (3,) mm; `tabs_mm` where
-    tabs (x, y) were planned; `made_from` the name
-    of the drawing, "" when unknown; mode (N,) index into `modes`, or −1 where the machine decides
-    how to meet the corner behind the row (−1 in all rows without modes); `drawn` the edges that
-    the rows cut, and `operations` the operation of each row: both None except for plans.
+    tabs (x, y) were planned; `made_from` the name of the drawing, "" when unknown; `setup` which
+    set-up of a part this is, in words, () for the only one; mode (N,) index into `modes`, or −1
+    where the machine decides how to meet the corner behind the row (−1 in all rows without modes);
+    `drawn` the edges that the rows cut, and `operations` the operation of each row: both None
+    except for plans.
     ValueError when columns disagree.
     """
 
@@ -129,6 +130,7 @@ class Toolpath:
     texts: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     made_from: str = ""
+    setup: tuple[str, ...] = ()
     tabs_mm: tuple[tuple[float, float], ...] = ()
     mode: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     modes: tuple[PathMode, ...] = ()

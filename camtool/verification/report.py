@@ -419,10 +419,11 @@ class Planned(msgspec.Struct, frozen=True):
     """The length of rapids in XY, mm: of the program, and what it would be in the order and from
     the starts of the drawing; how the operations cut, their tools, and the stock, if the job says
     it. `zero`: where part zero is on the drawing, "drawing" for its own, "lower-left" or "centre"
-    of what is cut, or a place (x, y) mm of it; `cut_mm`: left, lower, right and upper end of what
-    the tools cut, `swept_mm` of what tools and holders pass over, at any height; `touch_mm`: for
-    each tool that is mounted in the program, a place (x, y) mm where the top of the stock is not
-    cut yet, None where there is none; `setup`: which set-up of the part this is, in words."""
+    of what is cut, a place (x, y) mm of it, or "set-up" where a set-up has turned or moved it;
+    `cut_mm`: left, lower, right and upper end of what the tools cut, `swept_mm` of what tools and
+    holders pass over, at any height; `touch_mm`: for each tool that is mounted in the program, a
+    place (x, y) mm where the top of the stock is not cut yet, None where there is none; `setup`:
+    which set-up of the part this is, in words."""
 
     rapid_drawn_mm: float
     rapid_mm: float
@@ -1195,6 +1196,7 @@ def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "d
         "drawing": "is the drawing's own zero",
         "lower-left": "is the lower left corner of the contours that are cut",
         "centre": "is the centre of the contours that are cut",
+        "set-up": "is where it was before the part was turned over",
     }
     if isinstance(zero, str):
         drawn = places[zero]
@@ -1203,12 +1205,19 @@ def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "d
     if stock is None or stock.corner_mm is None:
         return f"X0 Y0 {drawn}; Z0 is the top of the stock"
     x, y = (-place + 0.0 for place in stock.corner_mm)
-    too = "" if zero == "drawing" else f", and {drawn}"
-    if x == y == 0.0:
-        return f"X0 Y0 is the lower left corner of the stock{too}; Z0 is its top"
+    too = "" if zero in ("drawing", "set-up") else f", and {drawn}"
+    corner = "lower left corner"
+    if zero == "set-up" and stock.size_mm is not None:
+        # The corner that is nearest to zero is where it is touched off.
+        wide, high = stock.size_mm
+        right, upper = 2.0 * x > wide, 2.0 * y > high
+        corner = f"{'upper' if upper else 'lower'} {'right' if right else 'left'} corner"
+        x, y = x - wide * right, y - high * upper
+    if round(x, 6) == round(y, 6) == 0.0:
+        return f"X0 Y0 is the {corner} of the stock{too}; Z0 is its top"
     across = f"{abs(x):g} mm {'right' if x >= 0.0 else 'left'} of"
     along = f"{abs(y):g} mm {'above' if y >= 0.0 else 'below'}"
-    return f"X0 Y0 is {across} and {along} the lower left corner of the stock{too}; Z0 is its top"
+    return f"X0 Y0 is {across} and {along} the {corner} of the stock{too}; Z0 is its top"
 
 
 def setup_sheets(planned: Planned) -> Iterator[ReportSheet]:

@@ -34,8 +34,8 @@ Lines = Callable[[int], str]
 
 
 def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[str]:
-    """The program's maker, machine, drawing and units, and how far it reaches. Toolpath and
-    dialect are in the program's own units."""
+    """Return the program's maker, machine, drawing, set-up and units, and how far it reaches.
+    Toolpath and dialect are in the program's own units."""
     if dialect.comments == "none":
         return []
     style, unit = NumberStyle(dialect.decimals), UNITS[dialect.units].name
@@ -47,6 +47,7 @@ def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[
     lines = [
         f"{MAKER}{version_of('camtool')} for {machine.target.name}: {machine.target.title}",
         *made,
+        *pack(toolpath.setup),
         f"{unit} and {unit}/min - part zero at X0 Y0 Z0",
         *bounds,
     ]
@@ -187,7 +188,9 @@ def mounting_messages(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
 
 
 def pack(parts: Sequence[str]) -> Iterator[str]:
-    """Join parts with dashes, as many on a line as fit into a comment."""
+    """Yield parts joined with dashes, as many on a line as fit into a comment."""
+    if not parts:
+        return
     line = ""
     for part in parts:
         longer = f"{line} - {part}" if line else part

@@ -34,6 +34,7 @@ import numpy.typing as npt
 from camtool.arrays import Bools, Ints
 from camtool.bounds import refuse_too_long
 from camtool.findings import Finding
+from camtool.records import replace
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 
@@ -98,6 +99,8 @@ def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
     dialect = machine.dialect
     check_toolpath(toolpath, machine, dialect)
     records = records_of(toolpath, machine, dialect)
+    said = ((0, words) for words in toolpath.setup)
+    records = replace(records, messages=(*said, *records.messages))
     extension = TEXT_EXTENSION
     if dialect.format == "listing":
         refuse_too_long(len(records) + len(records.messages) + 2, "line")  # its head, and END

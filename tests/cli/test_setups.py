@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import OptionError
 from camtool.geometry.polylines import Polyline
+from camtool.geometry.turn import Turn
 from camtool.planning.job import Job, JobSetup, Placement, Stock, job_of, operation_of
 from camtool.planning.place import place
 from camtool.records import replace
@@ -73,8 +74,8 @@ def write_part(folder: Path, flip: str = "y", back: tuple[int, ...] = BACK) -> N
     (folder / "part.toml").write_text(JOB.replace("FLIP", flip), encoding="utf-8")
 
 
-def cut_needles(program: Path) -> Needles:
-    needles = Needles((0.0, 0.0), (WIDE, HIGH))
+def cut_needles(program: Path, corner: tuple[float, float] = (0.0, 0.0)) -> Needles:
+    needles = Needles(corner, (corner[0] + WIDE, corner[1] + HIGH))
     for move in moves_of(program.read_text(encoding="ascii")):
         needles.cut(move, Cutter(1.5))
     return needles
@@ -117,11 +118,17 @@ def test_both_faces_are_cut_where_they_are_drawn(camtool: Run, tmp_path: Path, f
     assert set(np.round(heights[ring], 6).tolist()) == {-6.0, -5.0}
 
 
-@pytest.mark.parametrize(("back", "meets"), [(BACK, False), ((28, 12, 50, 20), True)])
-def test_pockets_that_meet_between_the_faces_are_told(
-    camtool: Run, tmp_path: Path, back: tuple[int, ...], meets: bool
+@pytest.mark.parametrize(
+    ("back", "depth", "left"),
+    [(BACK, 3.0, None), ((28, 12, 50, 20), 3.0, -0.5), ((28, 12, 50, 20), 2.2, 0.3)],
+)
+def test_what_pockets_leave_between_the_faces_is_told(
+    camtool: Run, tmp_path: Path, back: tuple[int, ...], depth: float, left: float | None
 ) -> None:
     write_part(tmp_path, back=back)
+    job = (tmp_path / "part.toml").read_text(encoding="utf-8")
+    job = job.replace('depth = "3mm"', f'depth = "{depth}mm"')
+    (tmp_path / "part.toml").write_text(job, encoding="utf-8")
     done = camtool("post", "part.dxf", "-t", "grbl", "--job", "part.toml", "--json", "all.json")
     assert done.returncode == 0, done.stderr
     said = json.loads((tmp_path / "all.json").read_text(encoding="utf-8"))["programs"]
@@ -129,13 +136,14 @@ def test_pockets_that_meet_between_the_faces_are_told(
         finding
         for each in said
         for finding in each["report"]["findings"]
-        if finding["code"] == "FACES_MEET"
+        if finding["code"] in ("FACES_MEET", "FLOOR_LEFT")
     ]
-    assert len(found) == 2 * meets
-    for finding, low in zip(found, (28.0, WIDE - 30.0), strict=False):
-        assert finding["measured"] == pytest.approx(0.5, abs=1e-6)
+    assert len(found) == (left is not None)  # in the set-up that comes last
+    for finding in found:
+        assert finding["code"] == ("FACES_MEET" if left < 0.0 else "FLOOR_LEFT")
+        assert finding["measured"] == pytest.approx(abs(left), abs=1e-6)
         words = finding["where"].split()
-        assert low < float(words[2]) < low + 2.0
+        assert WIDE - 30.0 < float(words[2]) < WIDE - 28.0
         assert 12.0 < float(words[4]) < 20.0
 
 
@@ -186,6 +194,7 @@ def test_what_set_ups_cannot_have_is_refused(
         ('name = "bottom"', 'name = "top"', "names of their own"),
         ('flip = "y"', 'line = "3mm"', "has no effect without flip"),
         ('flip = "y"', 'flip = "z"', "'z'"),
+        ('flip = "y"', 'flip = "y"\nzero = "stock-left"', "stock-lower-left"),
         ('flip_error = "0.05mm"', 'flip_error = "-0.05mm"', "flip error"),
         ('flip_error = "0.05mm"', "pins = [[3, 20], [56, 20]]", "there is none at X57 Y20"),
         ('corner = [0, 0]\nsize = "60x40mm"\n', "", "line about which the part is turned"),
@@ -203,6 +212,109 @@ def test_wrong_set_ups_are_refused_with_their_place(
     assert error in done.stderr.decode()
     assert "part.toml" in done.stderr.decode()
     assert "setups" in done.stderr.decode()
+
+
+ZERO = {
+    "stock-lower-left": (0.0, 0.0),
+    "stock-lower-right": (WIDE, 0.0),
+    "stock-upper-left": (0.0, HIGH),
+    "stock-upper-right": (WIDE, HIGH),
+    "stock-centre": (0.5 * WIDE, 0.5 * HIGH),
+    "4, -3mm": (4.0, -3.0),
+}
+
+
+@pytest.mark.parametrize("zero", ZERO)
+def test_a_set_up_may_have_its_own_zero(camtool: Run, tmp_path: Path, zero: str) -> None:
+    """The same program, shifted; pins, stock and clamps move with it."""
+    write_part(tmp_path)
+    box = '[[keep_out]]\nname = "clamp"\nx = "70..80mm"\ny = "0..10mm"\n'
+    pins = "pins = [[30, 2], [30, 37]]\n"
+    text = (tmp_path / "part.toml").read_text(encoding="utf-8") + pins + box
+    flags = ("-t", "grbl", "--job", "part.toml", "--setup", "bottom")
+    said, found = [], []
+    for name, more in (("plain", ""), ("moved", f'zero = "{zero}"\n')):
+        (tmp_path / "part.toml").write_text(text.replace(pins, pins + more), encoding="utf-8")
+        done = camtool("post", "part.dxf", *flags, "-o", f"{name}.nc", "--json", f"{name}.json")
+        assert done.returncode == 0, done.stderr
+        corner = (0.0, 0.0) if name == "plain" else (-ZERO[zero][0], -ZERO[zero][1])
+        found.append(cut_needles(tmp_path / f"{name}.nc", corner))
+        said.append(json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8")))
+        against = ("--against", "part.dxf", *flags)
+        assert camtool("verify", f"{name}.nc", *against).returncode == 0
+    x, y = ZERO[zero]
+    across = (np.linspace(0.53, WIDE - 0.53, 47), np.linspace(0.53, HIGH - 0.53, 33))
+    points = np.stack(np.meshgrid(*across), axis=-1).reshape(-1, 2)
+    one, two = found[0].at(points), found[1].at(points - (x, y))
+    assert set(one.tolist()) == {0.0, -3.0, -5.0, -6.0}
+    # Tabs may stand elsewhere, and needles beside walls.
+    assert (np.where(one < -4.0, -6.0, one) == np.where(two < -4.0, -6.0, two)).mean() > 0.99
+    assert said[1]["planned"]["stock"]["corner_mm"] == pytest.approx([-x, -y])
+    for px, py in ((30.0 - x, 2.0 - y), (30.0 - x, 37.0 - y)):
+        assert f"X{px:g} Y{py:g}" in said[1]["planned"]["setup"]
+    sheet = camtool("post", "part.dxf", *flags, "--report", "sheet.md")
+    assert sheet.returncode == 0, sheet.stderr
+    words = {
+        "stock-lower-left": "X0 Y0 is the lower left corner of the stock",
+        "stock-upper-right": "X0 Y0 is the upper right corner of the stock",
+        "4, -3mm": "X0 Y0 is 4 mm right of and 3 mm below the lower left corner of the stock",
+    }.get(zero, "X0 Y0 is")
+    assert words in (tmp_path / "sheet.md").read_text(encoding="utf-8")
+
+
+def test_a_clamp_moves_with_the_zero_of_its_set_up(camtool: Run, tmp_path: Path) -> None:
+    """A box where the second set-up cuts, in the frame of the machine."""
+    write_part(tmp_path)
+    text = (tmp_path / "part.toml").read_text(encoding="utf-8") + 'zero = "stock-upper-right"\n'
+    for x, inside in (("10..29mm", True), ("-50..-31mm", False)):
+        box = f'[[keep_out]]\nname = "clamp"\nx = "{x}"\ny = "12..20mm"\nz = "..0mm"\n'
+        (tmp_path / "part.toml").write_text(text + box, encoding="utf-8")
+        flags = ("-t", "grbl", "--job", "part.toml", "--setup", "bottom")
+        done = camtool("post", "part.dxf", *flags)
+        assert ("KEEP_OUT_ENTERED" in done.stderr.decode()) == inside
+
+
+I8751 = tuple(
+    word
+    for given in (
+        *(f"axes.{axis}.coded_step_mm=0.01" for axis in "xyz"),
+        "feed.default_mm_min=100",
+    )
+    for word in ("--set", given)
+)
+
+
+@pytest.mark.parametrize(
+    ("target", "more", "begins"),
+    [
+        ("grbl", (), "("),
+        ("linuxcnc", (), "("),
+        ("i8751", (*I8751, "--set", "dialect.format=listing"), "; "),
+        ("i8751", (*I8751, "--set", "dialect.format=hex"), "; "),
+    ],
+)
+def test_programs_say_which_set_up_they_are(
+    camtool: Run, tmp_path: Path, target: str, more: tuple[str, ...], begins: str
+) -> None:
+    write_part(tmp_path)
+    slow = ("--feed", "60", "--plunge-feed", "60")
+    text = (tmp_path / "part.toml").read_text(encoding="utf-8").replace("spindle = 10000\n", "")
+    (tmp_path / "part.toml").write_text(text, encoding="utf-8")
+    done = camtool(
+        "post", "part.dxf", "-t", target, *more, "--job", "part.toml", *slow, "--no-verify"
+    )
+    assert done.returncode == 0, done.stderr
+    (top,), (bottom,) = (
+        [each.read_text(encoding="ascii") for each in tmp_path.glob(f"part-{k}-*.*")]
+        for k in (1, 2)
+    )
+    lines = [line.split(begins, 1)[1] for line in top.splitlines() if begins in line]
+    assert any("set-up top" in line for line in lines)
+    assert any("the face that is drawn is up" in line for line in lines)
+    lines = [line.split(begins, 1)[1] for line in bottom.splitlines() if begins in line]
+    assert any("set-up bottom" in line for line in lines)
+    assert any("the other face is up" in line for line in lines)
+    assert any("turned over about X30" in line for line in lines)
 
 
 SIZES = st.floats(-40.0, 40.0)
@@ -271,8 +383,9 @@ def test_a_turned_part_is_the_mirror_image_of_the_part(
 def test_turned_twice_is_as_it_was() -> None:
     stock = Stock(3.0, (1.0, 2.0), (10.0, 20.0))
     for axis in ("x", "y"):
-        assert stock.turned(axis, 7.5).turned(axis, 7.5) == stock
-        assert stock.turned(axis, 6.0 if axis == "y" else 12.0) == stock
+        turn = Turn.about(axis, 7.5)
+        assert stock.turned(turn).turned(turn) == stock
+        assert stock.turned(Turn.about(axis, 6.0 if axis == "y" else 12.0)) == stock
 
 
 def test_a_window_of_one_set_up_is_cut_inside_the_edge_of_another(

@@ -41,7 +41,7 @@ def test_every_field_of_a_job_has_a_key() -> None:
 
     made_by_jobs = {"tool", "material", "preset", "stage", "may_be_long", "rest_of", "own"}
     assert missing(Operation, OPERATION) == made_by_jobs
-    assert missing(Placement, PLACE) == {"flip"}
+    assert missing(Placement, PLACE) == {"turn"}
     assert missing(Stock, STOCK) == missing(JobSetup, SETUP) == set()
     assert missing(KeepOutBox, KEEP_OUT) == set()
     assert missing(Entry, ENTRY) == missing(Lead, LEAD) == missing(Tabs, TABS) == set()

@@ -1,0 +1,142 @@
+"""The stock as a set-up finds it: what the set-ups before have cut away from either face.
+
+Over a point the material reaches from the *floor*, which cuts from the other face have raised, up
+to the *top*, which cuts from this face have lowered; it is gone where the floor is not below the
+top. Cuts of the other set-ups are those of their planned toolpaths, turned into this frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Floats
+from camtool.errors import OptionError
+from camtool.geometry.turn import Box, Turn
+from camtool.kernels.stock import StockTree
+from camtool.planning.job import Job
+from camtool.planning.naming import setup_name
+from camtool.stock.heights import TOP_MM, Bracket, greatest_value, stock_tree
+from camtool.stock.moves import stock_moves_of_toolpath
+from camtool.stock.slides import tools_of_rows
+from camtool.toolpath.moves import Toolpath
+
+THROUGH_SLACK_MM = 1e-6
+"""A cut that gets so near to the bottom of the stock goes through it."""
+
+MAX_REMAINING_SQUARES = 200_000
+"""The search for the thinnest place ends after this many squares."""
+
+
+class SetupCut(Struct, frozen=True, eq=False):
+    """The cuts of a set-up: its name, its moves, and the map into its frame."""
+
+    name: str
+    tree: StockTree
+    turn: Turn
+
+
+class StockBefore(Struct, frozen=True, eq=False):
+    """What other set-ups have cut before a program, `above` from its own face and `below` from the
+    other one, of a stock that is so thick (inf where nothing is cut below)."""
+
+    above: tuple[SetupCut, ...] = ()
+    below: tuple[SetupCut, ...] = ()
+    thickness_mm: float = np.inf
+
+    def tops(self, points: Floats, grow_mm: float = 0.0) -> Floats:
+        """Return the heights (J,) mm of the tops over points (J, 2), of cuts that are wider by
+        `grow_mm`."""
+        return _lowest(self.above, points, lambda tree, at: tree.heights(at, None, grow_mm)[0])
+
+    def floors(self, points: Floats, grow_mm: float = 0.0) -> Floats:
+        """Return the heights (J,) mm of the floors, −inf where nothing is cut from below."""
+        return self._raised(
+            _lowest(self.below, points, lambda tree, at: tree.heights(at, None, grow_mm)[0])
+        )
+
+    def least_tops(self, squares: Floats) -> Floats:
+        """Return lower bounds (K,) of the tops over squares (K, 3)."""
+        return _lowest(self.above, squares, lambda tree, at: tree.least(at))
+
+    def greatest_tops(self, squares: Floats, grow_mm: float = 0.0) -> Floats:
+        """Return upper bounds (K,) of the tops over squares (K, 3)."""
+        return _lowest(self.above, squares, lambda tree, at: tree.greatest(at, None, grow_mm))
+
+    def least_floors(self, squares: Floats, grow_mm: float = 0.0) -> Floats:
+        """Return lower bounds (K,) of the floors over squares (K, 3)."""
+        return self._raised(
+            _lowest(self.below, squares, lambda tree, at: tree.greatest(at, None, grow_mm))
+        )
+
+    def greatest_floors(self, squares: Floats) -> Floats:
+        """Return upper bounds (K,) of the floors over squares (K, 3)."""
+        return self._raised(_lowest(self.below, squares, lambda tree, at: tree.least(at)))
+
+    def deepest_below(self, point: Floats) -> str:
+        """Return the name of the set-up that has cut deepest from below over a point (2,)."""
+        deep = [each.tree.heights(each.turn.points(point[None]))[0][0] for each in self.below]
+        return self.below[int(np.argmin(deep))].name
+
+    def _raised(self, deep: Floats) -> Floats:
+        """Return the floors (J,) of heights (J,) as they are seen from the other face."""
+        return np.where(deep < TOP_MM, TOP_MM - self.thickness_mm - deep, -np.inf)
+
+
+def _lowest(
+    cuts: Sequence[SetupCut], at: Floats, heights_of: Callable[[StockTree, Floats], Floats]
+) -> Floats:
+    """Return the lowest of the heights (J,) of all cuts at points or over squares (J, 2 or 3)."""
+    lowest = np.full(len(at), TOP_MM)
+    for each in cuts:
+        lowest = np.minimum(lowest, heights_of(each.tree, each.turn.points(at)))
+    return lowest
+
+
+WHOLE = StockBefore()
+"""Stock that nothing has cut before."""
+
+
+def stock_before(job: Job, earlier: Sequence[tuple[Job, Toolpath]]) -> StockBefore:
+    """Return what the planned toolpaths of earlier set-ups, each with its job, leave for the
+    set-up of this job."""
+    above: list[SetupCut] = []
+    below: list[SetupCut] = []
+    if job.stock is None:
+        return WHOLE
+    for other, toolpath in earlier:
+        turn = job.placement.turn.back.then(other.placement.turn)
+        try:
+            tools = tools_of_rows(toolpath, other)
+        except OptionError:  # a set-up that cuts nothing: its own findings say so
+            continue
+        moves = stock_moves_of_toolpath(toolpath, tools.index, tools.cutters)
+        cut = SetupCut(setup_name(other), stock_tree(moves.select(~moves.rapid)), turn)
+        (below if turn.is_over else above).append(cut)
+    return StockBefore(tuple(above), tuple(below), job.stock.thickness_mm)
+
+
+def least_remaining(tree: StockTree, before: StockBefore, box_mm: Box) -> Bracket:
+    """Bracket how far the floors from below get above what a program leaves, mm, where both faces
+    are cut and neither goes through; below 0 it is the least thickness that is left, with the sign
+    changed."""
+    bottom = TOP_MM - before.thickness_mm
+
+    def value(points: Floats) -> Floats:
+        top = np.minimum(tree.heights(points)[0], before.tops(points))
+        floor = before.floors(points)
+        is_between = (top < TOP_MM) & (top > bottom + THROUGH_SLACK_MM)
+        return np.where(is_between & (floor < TOP_MM - THROUGH_SLACK_MM), floor - top, -np.inf)
+
+    def upper(squares: Floats) -> Floats:
+        low = np.minimum(tree.least(squares), before.least_tops(squares)).clip(min=bottom)
+        high = np.minimum(tree.greatest(squares), before.greatest_tops(squares))
+        # Where one is cut through all over a square, nothing is left that could meet.
+        is_between = (low < TOP_MM) & (high > bottom + THROUGH_SLACK_MM)
+        is_between &= before.least_floors(squares) < TOP_MM - THROUGH_SLACK_MM
+        floor = before.greatest_floors(squares).clip(max=TOP_MM)
+        return np.where(is_between, floor - low, -np.inf)
+
+    return greatest_value(value, upper, box_mm, max_squares=MAX_REMAINING_SQUARES)
