@@ -30,7 +30,8 @@ from camtool.planning.job import above_zero
 from camtool.records import replace
 
 if TYPE_CHECKING:
-    from camtool.jobs.template import Proposal, Proposed
+    from camtool.jobs.proposal import Proposal
+    from camtool.jobs.template import Proposed
     from camtool.planning.job import Tool
 
 NOT_CUT = "leave"
@@ -82,7 +83,8 @@ def new(
     every other key stands there as a comment.
     """
     from camtool.geometry.drawing import is_text
-    from camtool.jobs.template import Proposal, job_template, proposed
+    from camtool.jobs.proposal import Proposal
+    from camtool.jobs.template import job_template, proposed
     from camtool.project import project_of
 
     above_zero("tool diameter", tool_diameter, "mm")

@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec import Struct, field
 
+from camtool.jobs.proposal import Proposal
 from camtool.planning.holes import HOLE_SIZE_MM, SAME_HOLE_MM, circle_of
 from camtool.planning.job import Operation, Tool
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
-    from camtool.jobs.template import Proposal
 
 MAX_STEP_SHARE = 3.0
 """A circle wider than so many times the one within it is no counterbore of it."""
@@ -52,7 +52,7 @@ class Sink(Struct, frozen=True):
     is_named: bool
 
 
-class Steps(Struct, frozen=True):
+class SteppedHoles(Struct, frozen=True):
     """The stepped holes of a drawing by the row of their wider circle: those that are `bored`,
     with the row of the hole within, and those that are `sunk`."""
 
@@ -70,14 +70,14 @@ class Steps(Struct, frozen=True):
         return frozenset((*self.bored, *self.sunk)) | self.holes
 
 
-def stepped_holes(drawing: Drawing, proposal: Proposal, habits: Mapping[int, str]) -> Steps:
+def stepped_holes(drawing: Drawing, proposal: Proposal, habits: Mapping[int, str]) -> SteppedHoles:
     """Return the stepped holes that the tools of a proposal can cut. `habits`: what the layers of
     the paths are called, by their rows."""
     tool, thickness = proposal.tool_mm, proposal.thickness_mm
     bored: dict[int, int] = {}
     sunk: dict[int, Sink] = {}
     if not tool:
-        return Steps()
+        return SteppedHoles()
     depth = drawing.nesting.levels.depth
     for wide, narrow, (outer, inner) in _circles_about_one_centre(drawing):
         is_named = "countersink" in (habits[wide], habits[narrow])
@@ -92,7 +92,7 @@ def stepped_holes(drawing: Drawing, proposal: Proposal, habits: Mapping[int, str
                 continue
         if thickness and tool + HOLE_SIZE_MM < outer <= MAX_STEP_SHARE * inner:
             bored[wide] = narrow
-    return Steps(bored, sunk)
+    return SteppedHoles(bored, sunk)
 
 
 def sinking_bit(proposal: Proposal, width_mm: float, *, is_named: bool) -> Tool | None:

@@ -14,9 +14,9 @@ def propose(left: Remaining) -> list[Part]:
     """Return one operation for the countersinks of each width, and each bit. The holes in them are
     left to the kinds that follow."""
     alike = defaultdict(list)
-    for wide, sink in left.steps.sunk.items():
+    for row, sink in left.steps.sunk.items():
         if sink.hole in left.rows:
-            alike[round(sink.width_mm, 3), sink.bit.name, sink.is_named].append((wide, sink))
+            alike[round(sink.width_mm, 3), sink.bit.name, sink.is_named].append((row, sink))
     found = []
     for (width, name, is_named), pairs in alike.items():
         wide = tuple(row for row, _ in pairs)

@@ -1,0 +1,58 @@
+"""The tools and the stock of a job that `camtool job new` proposes."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from camtool.planning.holes import HOLE_SIZE_MM
+from camtool.planning.job import Stock, Tool
+
+BREAKTHROUGH_MM = 0.3
+"""Through cuts are proposed to go so far below the stock."""
+
+
+class Proposal(Struct, frozen=True):
+    """The known sizes of the cut, mm, 0 where it is not: the tool's diameter, the stock's
+    thickness. `tool`: its name in a library, and the materials that it has presets for, which say
+    how deep passes are; `material`: the one of them that is cut, where that is said. `library`:
+    all tools that the job may name for it."""
+
+    tool_mm: float = 0.0
+    thickness_mm: float = 0.0
+    tool: str = ""
+    materials: tuple[str, ...] = ()
+    material: str = ""
+    library: tuple[Tool, ...] = ()
+
+    def tools(self, kind: str) -> list[Tool]:
+        """Return the tools of this kind in the library, the widest first. Where the materials are
+        known, only those with presets for the material that is cut, or for one of all: a tool
+        without would cut with its spindle off."""
+        wanted = {self.material} if self.material else set(self.materials)
+        found = [
+            tool
+            for tool in self.library
+            if tool.kind == kind and (not wanted or wanted & set(tool.materials))
+        ]
+        return sorted(found, key=lambda tool: -tool.diameter_mm)
+
+    def has_drill(self, width_mm: float) -> bool:
+        """True if a drill of the library is as wide as a hole of this diameter."""
+        drills = self.tools("drill")
+        return any(abs(width_mm - tool.diameter_mm) <= HOLE_SIZE_MM for tool in drills)
+
+    def fits_hole(self, width_mm: float) -> bool:
+        """True if a drill or the mill makes a hole of this diameter."""
+        return width_mm >= self.tool_mm - HOLE_SIZE_MM or self.has_drill(width_mm)
+
+    @property
+    def finer_mills(self) -> list[Tool]:
+        """The end mills of the library that are narrower than the tool, the widest first."""
+        return [tool for tool in self.tools("flat") if 0.0 < tool.diameter_mm < self.tool_mm]
+
+    @property
+    def breakthrough_mm(self) -> float:
+        """A little into what the stock lies on; 0 without a thickness."""
+        if not self.thickness_mm:
+            return 0.0
+        return min(BREAKTHROUGH_MM, Stock(self.thickness_mm).through_mm)
