@@ -279,7 +279,7 @@ class Remaining(Struct, frozen=True):
     marks: int
     size_mm: float
     proposal: Proposal
-    steps: SteppedHoles = StepPairs()
+    steps: SteppedHoles = SteppedHoles()
     sunk: tuple[int, ...] = ()
     is_divided: bool = False
 
