@@ -70,8 +70,8 @@ class BoxIndex:
     def touching(self, boxes: Floats) -> tuple[Ints, Ints]:
         """Return the rows (J,), (J,), in order, of boxes (B, 4) and of the index that have a point
         in common."""
-        found = [one * self._count + other for one, other in self.pairs(boxes)]
-        pairs = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *found]))
+        hits = [one * self._count + other for one, other in self.pairs(boxes)]
+        pairs = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *hits]))
         one, other = np.divmod(pairs, max(self._count, 1))
         return one, other
 
@@ -86,8 +86,8 @@ class BoxIndex:
                 yield row, self._order[block]
             elif len(row) > BLOCKS_AT_A_TIME:
                 for begin in reversed(range(0, len(row), BLOCKS_AT_A_TIME)):
-                    some = slice(begin, begin + BLOCKS_AT_A_TIME)
-                    waiting.append((depth, row[some], block[some]))
+                    batch = slice(begin, begin + BLOCKS_AT_A_TIME)
+                    waiting.append((depth, row[batch], block[batch]))
             else:
                 low_x, low_y, high_x, high_y = self._levels[depth]
                 touch = low_x[block] <= columns[2][row, None]
@@ -105,22 +105,22 @@ def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[
     one, other = BoxIndex(boxes_b).touching(_grown_boxes(boxes_a, reach_mm))
     low = np.maximum(boxes_a[one, :2], boxes_b[other, :2])
     high = np.minimum(boxes_a[one, 2:], boxes_b[other, 2:])
-    near = (low <= high + reach_mm).all(axis=1)
-    one, other = one[near], other[near]
+    is_near = (low <= high + reach_mm).all(axis=1)
+    one, other = one[is_near], other[is_near]
     order = np.lexsort((boxes_b[other, 0], one))
     for begin in range(0, len(order), PAIRS_AT_A_TIME):
-        some = order[begin : begin + PAIRS_AT_A_TIME]
-        yield one[some], other[some]
+        batch = order[begin : begin + PAIRS_AT_A_TIME]
+        yield one[batch], other[batch]
 
 
 def near_points(points: Floats, places: Floats, reach_mm: float | Floats) -> tuple[Ints, Ints]:
     """Return the rows (J,), (J,), in order, of all points (P, 2) and places (K, 2) no farther
     apart than `reach_mm`, which may differ from point to point (P,)."""
-    around = _grown_boxes(np.hstack([points, points]), reach_mm)
-    one, other = BoxIndex(np.hstack([places, places])).touching(around)
-    way = points[one] - places[other]
-    near = np.sqrt((way**2).sum(axis=1)) <= np.broadcast_to(reach_mm, len(points))[one]
-    return one[near], other[near]
+    search_boxes = _grown_boxes(np.hstack([points, points]), reach_mm)
+    one, other = BoxIndex(np.hstack([places, places])).touching(search_boxes)
+    difference = points[one] - places[other]
+    is_near = np.sqrt((difference**2).sum(axis=1)) <= np.broadcast_to(reach_mm, len(points))[one]
+    return one[is_near], other[is_near]
 
 
 def _grown_boxes(boxes: Floats, reach_mm: float | Floats) -> Floats:
@@ -132,24 +132,25 @@ def _grown_boxes(boxes: Floats, reach_mm: float | Floats) -> Floats:
 
 
 def touching_boxes(
-    boxes: Floats, same: Ints, differ: Ints, asked: Bools, *, max_pairs: int
+    boxes: Floats, same: Ints, differ: Ints, is_searched: Bools, *, max_pairs: int
 ) -> tuple[Ints, Ints]:
     """Rows (J,), (J,), the lesser first, of boxes (K, 4) that touch; each pair once.
 
-    Both have the same number in `same` (K,), different ones in `differ` (K,), and one of them is
-    `asked` for (K,). No more than `max_pairs` pairs, and none of boxes that come late in a sweep
-    of more than MAX_COMPARISONS: both bound time and memory, far beyond any real drawing.
+    Both have the same number in `same` (K,) and different ones in `differ` (K,), and `is_searched`
+    (K,) is true for one of them. No more than `max_pairs` pairs, and none of boxes that come late
+    in a sweep of more than MAX_COMPARISONS: both bound time and memory, far beyond any real
+    drawing.
     """
     along_x, along_y = boxes, boxes[:, [1, 0, 3, 2]]
-    work, turned, order = min(
-        ((_count_comparisons(way), number, np.argsort(way[:, 0], kind="stable"))
-         for number, way in enumerate((along_x, along_y))),
+    work, swapped, order = min(
+        ((_count_comparisons(spans), number, np.argsort(spans[:, 0], kind="stable"))
+         for number, spans in enumerate((along_x, along_y))),
         key=lambda item: item[:2],
     )  # fmt: skip
     if work > MAX_COMPARISONS:
         order = order[: int(len(order) * MAX_COMPARISONS / work)]
-    way = (along_y if turned else along_x)[order]
-    one, other = touching(way, same[order], differ[order], asked[order], max_pairs)
+    spans = (along_y if swapped else along_x)[order]
+    one, other = touching(spans, same[order], differ[order], is_searched[order], max_pairs)
     one, other = order[one], order[other]
     return np.minimum(one, other), np.maximum(one, other)
 
@@ -183,9 +184,9 @@ def segment_tree(vertices: Floats, begin: Indices, end: Indices) -> SegmentTree:
     of them lie beside points; along Hilbert's curve, since what is near in the plane need not be
     near in a file."""
 
-    def boxes(which: Ints | Indices) -> Floats:
-        here, there = vertices.take(begin[which], axis=0), vertices.take(end[which], axis=0)
-        segments = Segments.between(here[:, :2], there[:, :2], here[:, 2])
+    def boxes(indices: Ints | Indices) -> Floats:
+        starts, ends = vertices.take(begin[indices], axis=0), vertices.take(end[indices], axis=0)
+        segments = Segments.between(starts[:, :2], ends[:, :2], starts[:, 2])
         return curve_boxes(curve_rows_of(segments), 0.0)
 
     return SegmentTree(vertices, (begin, end), *move_tree(len(begin), boxes), LEAF)
@@ -200,7 +201,7 @@ def curve_rows_of(segments: Segments) -> Floats:
 def moves_of(segments: Segments, heights: Floats) -> Moves:
     """Return the segments with the heights of their starts and ends (K, 2) mm, as
     `camtool.kernels.near` takes them."""
-    from camtool.kernels import near as at
+    from camtool.kernels import near as columns
 
     rows = np.flatnonzero(segments.bulge)
     arc = np.broadcast_to(np.int32(-1), len(segments))
@@ -209,11 +210,11 @@ def moves_of(segments: Segments, heights: Floats) -> Moves:
         arc[rows] = np.arange(len(rows))
     bent = segments[rows]
     turn = np.where(bent.bulge < 0.0, -1.0, 1.0)[:, None]
-    arcs = np.empty((len(rows), at.COLUMNS))
-    arcs[:, [at.CX, at.CY]], arcs[:, at.RADIUS] = bent.centre, bent.radius
+    arcs = np.empty((len(rows), columns.COLUMNS))
+    arcs[:, [columns.CX, columns.CY]], arcs[:, columns.RADIUS] = bent.centre, bent.radius
     # Normals that point into the wedge from its two edges.
-    arcs[:, [at.UX, at.UY]] = turn * (bent.start - bent.centre)
-    arcs[:, [at.VX, at.VY]] = turn * (bent.end - bent.centre)
-    arcs[:, at.SWEEP] = np.abs(bent.sweep)
-    arcs[:, [at.LOW_X, at.LOW_Y, at.HIGH_X, at.HIGH_Y]] = segment_boxes(bent)
-    return at.Moves(segments.start, segments.end, heights, arc, arcs)
+    arcs[:, [columns.UX, columns.UY]] = turn * (bent.start - bent.centre)
+    arcs[:, [columns.VX, columns.VY]] = turn * (bent.end - bent.centre)
+    arcs[:, columns.SWEEP] = np.abs(bent.sweep)
+    arcs[:, [columns.LOW_X, columns.LOW_Y, columns.HIGH_X, columns.HIGH_Y]] = segment_boxes(bent)
+    return columns.Moves(segments.start, segments.end, heights, arc, arcs)

@@ -93,11 +93,11 @@ def chain(
     if lines.closed.all():
         return Chained(lines, _single_members(np.arange(len(lines))), (), ())
 
-    found = joints(paths.ends, max(gap_mm, POSITION_EPS_MM))
-    alone = lines.closed | (found.mates.reshape(-1, 2) < 0).all(axis=1)
-    lots = join_chains(lines, Chains(*walk(found.mates, ~alone)))
-    result, members = _sorted_chains(lines, np.flatnonzero(alone), lots)
-    first = np.array([of[0] for of in members], dtype=np.int64)
+    chosen_joints = joints(paths.ends, max(gap_mm, POSITION_EPS_MM))
+    is_single = lines.closed | (chosen_joints.mates.reshape(-1, 2) < 0).all(axis=1)
+    lots = join_chains(lines, Chains(*walk(chosen_joints.mates, ~is_single)))
+    result, members = _sorted_chains(lines, np.flatnonzero(is_single), lots)
+    first = np.array([member_paths[0] for member_paths in members], dtype=np.int64)
     result_ends = Ends.of(result, paths.ends.group[first], paths.ends.style[first])
     names = [paths.layers[index] for index in first.tolist()]
     return Chained(
@@ -105,7 +105,7 @@ def chain(
         members=members,
         closed_gaps=tuple(_closed_gaps(lots, paths.layers)),
         open_gaps=tuple(open_gaps(result_ends, path_lengths(result), names, gap_mm)),
-        branches=found.named(paths.ends, paths.layers, members, result.closed),
+        branches=chosen_joints.named(paths.ends, paths.layers, members, result.closed),
     )
 
 
@@ -124,38 +124,47 @@ def _single_members(paths: Ints) -> tuple[tuple[int, ...], ...]:
 
 
 def _sorted_chains(
-    lines: Polylines, alone: Ints, lots: Sequence[JoinedChains]
+    lines: Polylines, single: Ints, lots: Sequence[JoinedChains]
 ) -> tuple[Polylines, tuple[tuple[int, ...], ...]]:
     """Return the paths that are joined to none and all chains, in the order of their first
     members; and the members."""
     if not lots:
-        return lines, _single_members(alone)
-    members = list(_single_members(alone))
-    least = [alone]
-    for lot in lots:
-        paths = lot.chains.entries // 2
-        begins = lot.chains.begins.tolist()
+        return lines, _single_members(single)
+    members = list(_single_members(single))
+    first_members = [single]
+    for joined_lot in lots:
+        paths = joined_lot.chains.entries // 2
+        begins = joined_lot.chains.begins.tolist()
         flat = paths.tolist()
         members.extend(tuple(flat[a:b]) for a, b in pairwise(begins))
-        least.append(np.minimum.reduceat(paths, lot.chains.begins[:-1]))
-    order = np.argsort(np.concatenate(least), kind="stable")
-    whole = Polylines.joined([lines.select(alone), *(lot.lines for lot in lots)])
-    return whole.select(order), tuple(members[index] for index in order.tolist())
+        first_members.append(np.minimum.reduceat(paths, joined_lot.chains.begins[:-1]))
+    order = np.argsort(np.concatenate(first_members), kind="stable")
+    every_path = Polylines.joined(
+        [lines.select(single), *(joined_lot.lines for joined_lot in lots)]
+    )
+    return every_path.select(order), tuple(members[index] for index in order.tolist())
 
 
 def _closed_gaps(lots: Sequence[JoinedChains], layers: Sequence[str]) -> list[Gap]:
     """Return the bridged gaps, in the order of the first members of their chains."""
-    found: list[tuple[int, Gap]] = []
-    for lot in lots:
-        paths = lot.chains.entries // 2
-        least = np.minimum.reduceat(paths, lot.chains.begins[:-1]) if len(lot.chains) else paths
-        for chain_of, at, size in zip(
-            lot.gap_chain.tolist(), lot.gap_at.tolist(), lot.gap_size.tolist(), strict=True
+    numbered_gaps: list[tuple[int, Gap]] = []
+    for joined_lot in lots:
+        paths = joined_lot.chains.entries // 2
+        first_members = (
+            np.minimum.reduceat(paths, joined_lot.chains.begins[:-1])
+            if len(joined_lot.chains)
+            else paths
+        )
+        for chain_of, place, size in zip(
+            joined_lot.gap_chain.tolist(),
+            joined_lot.gap_at.tolist(),
+            joined_lot.gap_size.tolist(),
+            strict=True,
         ):
-            of = int(least[chain_of])
-            found.append((of, Gap((at[0], at[1]), size, layers[of])))
-    found.sort(key=lambda item: item[0])
-    return [gap for _, gap in found]
+            path = int(first_members[chain_of])
+            numbered_gaps.append((path, Gap((place[0], place[1]), size, layers[path])))
+    numbered_gaps.sort(key=lambda item: item[0])
+    return [gap for _, gap in numbered_gaps]
 
 
 # Which open ends are joined: near ends are paired, at branches the straightest of them.
@@ -216,11 +225,11 @@ class Ends(Struct, frozen=True, eq=False):
         outward = points - vertices[inner, :2]
         # An arc leaves its chord by half its sweep, 2 atan(bulge), to either side.
         bulge = np.column_stack([-vertices[first, 2], vertices[last - 1, 2]]).ravel()
-        leaving = np.arctan2(outward[:, 1], outward[:, 0]) + 2.0 * np.arctan(bulge)
+        directions = np.arctan2(outward[:, 1], outward[:, 0]) + 2.0 * np.arctan(bulge)
         counts = np.diff(lines.offsets)
         arcs = np.add.reduceat(lines.vertices[:, 2] != 0.0, first) if len(first) else counts
         weights = np.column_stack([counts - ~lines.closed, arcs]).astype(np.int64)
-        return cls(points, leaving, group, style, ~lines.closed, weights)
+        return cls(points, directions, group, style, ~lines.closed, weights)
 
 
 class Joints(Struct, frozen=True, eq=False):
@@ -256,13 +265,13 @@ class Joints(Struct, frozen=True, eq=False):
         leads_nowhere[result[np.flatnonzero(self.alone & (self.mates < 0)) // 2]] = True
         meeting = np.flatnonzero(self.node >= 0)
         path = result[meeting // 2]
-        plain = np.where(self.mates[meeting] < 0, leads_nowhere[path], closed[path])
-        matters.update(self.node[meeting[~plain]].tolist())
+        is_harmless = np.where(self.mates[meeting] < 0, leads_nowhere[path], closed[path])
+        matters.update(self.node[meeting[~is_harmless]].tolist())
         passing: dict[int, set[int]] = {number: set() for number in matters}
         for end in meeting.tolist():
             if (number := int(self.node[end])) in passing:
                 passing[number].add(int(result[end // 2]))
-        found = [
+        named_branches = [
             Branch(
                 (float(ends.points[end, 0]), float(ends.points[end, 1])),
                 size,
@@ -271,33 +280,35 @@ class Joints(Struct, frozen=True, eq=False):
             )
             for number, (end, size) in self.branches.items()
         ]
-        return tuple(sorted(found, key=lambda branch: (branch.at_mm, branch.layer, branch.ends)))
+        return tuple(
+            sorted(named_branches, key=lambda branch: (branch.at_mm, branch.layer, branch.ends))
+        )
 
 
 def joints(ends: Ends, reach: float) -> Joints:
     """Choose the ends to be joined, within `reach` and within their group (see the top)."""
     joining = _Joining.of(ends)
-    free = every = np.flatnonzero(np.repeat(ends.is_open, 2))
-    alone = np.ones(len(joining.mates), dtype=np.bool_)
+    free_ends = every = np.flatnonzero(np.repeat(ends.is_open, 2))
+    is_alone = np.ones(len(joining.mates), dtype=np.bool_)
     exact = one, other = _near_pairs(ends, every, POSITION_EPS_MM)
-    alone[one], alone[other] = False, False
+    is_alone[one], is_alone[other] = False, False
     # Of very many ends at one point not all pairs are examined at once.
     while joining.join_clusters(one, other) and len(one) >= MAX_NEIGHBOURS:
-        free = free[joining.mates[free] < 0]
-        one, other = _near_pairs(ends, free, POSITION_EPS_MM)
-    met = frozenset(joining.branches)
-    free = every[alone[every]]
-    while len(free) and reach > POSITION_EPS_MM:
-        near = _bounded_reach(ends.points[free], reach)
-        one, other = _near_pairs(ends, free, near)
-        made = joining.join_clear(*joining.without_empty_rings(one, other), near)
-        if near == reach or made == 0:
+        free_ends = free_ends[joining.mates[free_ends] < 0]
+        one, other = _near_pairs(ends, free_ends, POSITION_EPS_MM)
+    exact_branches = frozenset(joining.branches)
+    free_ends = every[is_alone[every]]
+    while len(free_ends) and reach > POSITION_EPS_MM:
+        bounded_reach = _bounded_reach(ends.points[free_ends], reach)
+        one, other = _near_pairs(ends, free_ends, bounded_reach)
+        joint_count = joining.join_clear(*joining.without_empty_rings(one, other), bounded_reach)
+        if bounded_reach == reach or joint_count == 0:
             break
-        free = free[joining.mates[free] < 0]
+        free_ends = free_ends[joining.mates[free_ends] < 0]
     _split_rings(ends, joining.mates, joining.node, reach)
-    joining.note_left(alone, exact, reach)
-    bridged = frozenset(joining.branches) - met
-    return Joints(joining.mates, joining.node, joining.branches, bridged, alone)
+    joining.note_left(is_alone, exact, reach)
+    bridged = frozenset(joining.branches) - exact_branches
+    return Joints(joining.mates, joining.node, joining.branches, bridged, is_alone)
 
 
 class _Joining(Struct, eq=False):
@@ -315,9 +326,9 @@ class _Joining(Struct, eq=False):
     @classmethod
     def of(cls, ends: Ends) -> _Joining:
         """Begin without any joint."""
-        none = np.full(len(ends.points), -1, dtype=np.int64)
+        no_mates = np.full(len(ends.points), -1, dtype=np.int64)
         segments, arcs = ends.weights[:, 0].copy(), ends.weights[:, 1].copy()
-        return cls(ends, none, none.copy(), {}, np.arange(len(ends.group)), segments, arcs)
+        return cls(ends, no_mates, no_mates.copy(), {}, np.arange(len(ends.group)), segments, arcs)
 
     def join(self, one: Ints, other: Ints) -> int:
         """Join these pairs in their order, if both ends are free; return how many were."""
@@ -333,34 +344,34 @@ class _Joining(Struct, eq=False):
         """Join the ends that lie in twos, and the best pairs where more meet; return how many."""
         label, size = _clusters(len(self.mates), one, other)
         is_branch = size[label[one]] > 2
-        made = self.join(*_sorted_pairs(one[~is_branch], other[~is_branch]))
-        made += self.join(*_rank_pairs(self.ends, one[is_branch], other[is_branch]))
+        joint_count = self.join(*_sorted_pairs(one[~is_branch], other[~is_branch]))
+        joint_count += self.join(*_rank_pairs(self.ends, one[is_branch], other[is_branch]))
         meeting = np.flatnonzero(size[label] > 2)
         self.node[meeting] = label[meeting]
         self.branches.update(_first_ends(self.ends, meeting, label))
-        return made
+        return joint_count
 
-    def note_left(self, alone: Bools, exact: tuple[Ints, Ints], reach: float) -> None:
-        """Note a branch where one of the ends that are `alone` at their place (2M,) has stayed
+    def note_left(self, is_alone: Bools, exact: tuple[Ints, Ints], reach: float) -> None:
+        """Note a branch where one of the ends that are `is_alone` at their place (2M,) has stayed
         free though joined ones lie within reach: it may have been meant to meet these.
 
         `exact` are the pairs of ends that are not alone.
         """
-        free = alone & (self.mates < 0) & (self.node < 0)
-        if reach <= POSITION_EPS_MM or not free.any():
+        is_free = is_alone & (self.mates < 0) & (self.node < 0)
+        if reach <= POSITION_EPS_MM or not is_free.any():
             return
         every = np.flatnonzero(np.repeat(self.ends.is_open, 2))
-        near = _near_pairs(self.ends, every, _bounded_reach(self.ends.points[every], reach))
-        one, other = self.without_empty_rings(*near)
-        beside = free[one] != free[other]
-        one, other = one[beside], other[beside]
-        mated = np.where(free[one], other, one)
+        pairs = _near_pairs(self.ends, every, _bounded_reach(self.ends.points[every], reach))
+        one, other = self.without_empty_rings(*pairs)
+        differs = is_free[one] != is_free[other]
+        one, other = one[differs], other[differs]
+        mated = np.where(is_free[one], other, one)
         mated = mated[self.mates[mated] >= 0]
         one = np.concatenate([one, mated, exact[0]])
         other = np.concatenate([other, self.mates[mated], exact[1]])
         label, size = _clusters(len(self.mates), one, other)
         has_free = np.zeros(len(label), dtype=np.bool_)
-        has_free[label[free]] = True
+        has_free[label[is_free]] = True
         meeting = np.flatnonzero((size[label] > 2) & has_free[label])
         for number in np.unique(self.node[meeting]).tolist():
             self.branches.pop(number, None)  # it is part of a larger one
@@ -372,18 +383,18 @@ class _Joining(Struct, eq=False):
         """Join the ends whose rivals are much farther first (see the top), then the others;
         return how many. All pairs (J,), (J,) are within `reach`."""
         distance = np.hypot(*(self.ends.points[one] - self.ends.points[other]).T)
-        made, least = 0, float(distance.min(initial=reach))
-        for k in range(math.ceil(math.log(reach / least, CLASS_RATIO)), -1, -1):
+        joint_count, min_distance = 0, float(distance.min(initial=reach))
+        for k in range(math.ceil(math.log(reach / min_distance, CLASS_RATIO)), -1, -1):
             scale = reach / CLASS_RATIO**k
             close = distance <= CLASS_RATIO * scale
             label, size = _clusters(len(self.mates), one[close], other[close])
             clear = (distance <= scale) & (size[label[one]] == 2)
-            made += self.join(*_sorted_pairs(one[clear], other[clear]))
-            left = ~clear & (self.mates[one] < 0) & (self.mates[other] < 0)
-            one, other, distance = one[left], other[left], distance[left]
+            joint_count += self.join(*_sorted_pairs(one[clear], other[clear]))
+            is_open = ~clear & (self.mates[one] < 0) & (self.mates[other] < 0)
+            one, other, distance = one[is_open], other[is_open], distance[is_open]
             if not len(one):
-                return made
-        return made + self.join_clusters(one, other)
+                return joint_count
+        return joint_count + self.join_clusters(one, other)
 
 
 def _bounded_reach(points: Floats, reach: float) -> float:
@@ -401,16 +412,16 @@ def _bounded_reach(points: Floats, reach: float) -> float:
 _MIX = np.int64(0x9E3779B1)
 
 
-def _near_pairs(ends: Ends, free: Ints, reach: float) -> tuple[Ints, Ints]:
+def _near_pairs(ends: Ends, free_ends: Ints, reach: float) -> tuple[Ints, Ints]:
     """Return the pairs of free ends within `reach` in one group, the lesser end first."""
-    points = ends.points[free]
+    points = ends.points[free_ends]
     # Wider than the reach by a hair, so that rounding cannot put near points two cells apart.
-    cells = np.column_stack([ends.group[free // 2], np.floor(points / (reach * _WIDER))])
+    cells = np.column_stack([ends.group[free_ends // 2], np.floor(points / (reach * _WIDER))])
     cells = cells.astype(np.int64)
     order = np.lexsort((cells[:, 2], cells[:, 1], cells[:, 0]))
-    most = MAX_NEIGHBOURS if reach <= POSITION_EPS_MM else len(free)
-    one, other = near_pairs(cells[order], points[order], reach, most)
-    one, other = free[order[one]], free[order[other]]
+    max_neighbours = MAX_NEIGHBOURS if reach <= POSITION_EPS_MM else len(free_ends)
+    one, other = near_pairs(cells[order], points[order], reach, max_neighbours)
+    one, other = free_ends[order[one]], free_ends[order[other]]
     return np.minimum(one, other), np.maximum(one, other)
 
 
@@ -436,13 +447,13 @@ def _rank_pairs(ends: Ends, one: Ints, other: Ints) -> tuple[Ints, Ints]:
     with np.errstate(divide="ignore"):
         steps = np.log(distance / POSITION_EPS_MM) / math.log(CLASS_RATIO)
     distance = np.maximum(np.floor(steps), -1.0)
-    unlike = ends.style[one // 2] != ends.style[other // 2]
+    differs_in_style = ends.style[one // 2] != ends.style[other // 2]
     turn = np.abs(wrapped(ends.leaving[one] - ends.leaving[other] - math.pi))
     bend = np.round(turn / SAME_TURN_RAD)
     place = _place_ranks(ends, np.unique(np.concatenate([one, other])))
     first = np.minimum(place[one], place[other])
     second = np.maximum(place[one], place[other])
-    order = np.lexsort((second, first, bend, unlike, distance))
+    order = np.lexsort((second, first, bend, differs_in_style, distance))
     return one[order], other[order]
 
 
@@ -451,14 +462,14 @@ def wrapped(angle: Floats) -> Floats:
     return np.asarray((angle + math.pi) % (2.0 * math.pi) - math.pi)
 
 
-def _place_ranks(ends: Ends, chosen: Ints) -> Ints:
+def _place_ranks(ends: Ends, chosen_ends: Ints) -> Ints:
     """Return the rank (2M,) of the chosen ends by place, direction and the place of the other
     end."""
-    x, y = (np.round(ends.points[chosen] / POSITION_EPS_MM)).T
-    far_x, far_y = (np.round(ends.points[chosen ^ 1] / POSITION_EPS_MM)).T
-    leaving = np.round(wrapped(ends.leaving[chosen]) / SAME_TURN_RAD)
+    x, y = (np.round(ends.points[chosen_ends] / POSITION_EPS_MM)).T
+    far_x, far_y = (np.round(ends.points[chosen_ends ^ 1] / POSITION_EPS_MM)).T
+    directions = np.round(wrapped(ends.leaving[chosen_ends]) / SAME_TURN_RAD)
     rank = np.zeros(len(ends.points), dtype=np.int64)
-    rank[chosen[np.lexsort((leaving, far_y, far_x, y, x))]] = np.arange(len(chosen))
+    rank[chosen_ends[np.lexsort((directions, far_y, far_x, y, x))]] = np.arange(len(chosen_ends))
     return rank
 
 
@@ -481,18 +492,18 @@ def _split_rings(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
 
     entries, begins, rings = walk(mates, ends.is_open)
     ring = np.repeat(np.arange(len(rings)), np.diff(begins))
-    both = np.concatenate([entries, entries ^ 1])
+    branch_ends = np.concatenate([entries, entries ^ 1])
     ring_of = np.concatenate([ring, ring])
-    at_branch = rings[ring_of] & (node[both] >= 0)
-    both, ring_of = both[at_branch], ring_of[at_branch]
-    order = np.argsort(both)
-    both, ring_of = both[order], ring_of[order]
-    if not len(both):
+    at_branch = rings[ring_of] & (node[branch_ends] >= 0)
+    branch_ends, ring_of = branch_ends[at_branch], ring_of[at_branch]
+    order = np.argsort(branch_ends)
+    branch_ends, ring_of = branch_ends[order], ring_of[order]
+    if not len(branch_ends):
         return
-    rank = _place_ranks(ends, both)
-    order = np.lexsort((rank[both], ring_of))
+    rank = _place_ranks(ends, branch_ends)
+    order = np.lexsort((rank[branch_ends], ring_of))
     first = np.unique(ring_of[order], return_index=True)[1]
-    split_loops(both[order][first], mates, node, ends.points, reach, ends.weights)
+    split_loops(branch_ends[order][first], mates, node, ends.points, reach, ends.weights)
 
 
 # The vertices of chains: pieces laid end to end, and the gaps between them bridged.
@@ -516,12 +527,12 @@ class Chains(Struct, frozen=True, eq=False):
     def __len__(self) -> int:
         return len(self.rings)
 
-    def select(self, chosen: Bools, rings: Bools) -> Chains:
+    def select(self, selection: Bools, rings: Bools) -> Chains:
         """Return the chosen chains (C,), as rings or as open chains."""
         counts = np.diff(self.begins)
-        rows = np.repeat(chosen, counts)
-        begins = np.concatenate([[0], np.cumsum(counts[chosen])])
-        return Chains(self.entries[rows], begins, rings[chosen])
+        rows = np.repeat(selection, counts)
+        begins = np.concatenate([[0], np.cumsum(counts[selection])])
+        return Chains(self.entries[rows], begins, rings[selection])
 
     def as_single_paths(self) -> Chains:
         """Return each path as a chain of its own, travelled as it was drawn."""
@@ -541,50 +552,54 @@ class JoinedChains(Struct, frozen=True, eq=False):
 
 def join_chains(lines: Polylines, chains: Chains) -> list[JoinedChains]:
     """Return the chains of these open paths as paths, in up to three lots (see the top)."""
-    done: list[JoinedChains] = []
-    left = chains
+    results: list[JoinedChains] = []
+    remaining = chains
     for _ in range(2):
-        if not len(left):
-            return done
-        good, part = _try_chains(lines, left)
+        if not len(remaining):
+            return results
+        is_path, part = _try_chains(lines, remaining)
         if len(part.chains):
-            done.append(part)
+            results.append(part)
         # A ring may still be an open chain; an open chain only its pieces.
-        again = left.select(~good, np.zeros(len(left), dtype=np.bool_))
-        open_ones = ~left.rings[~good]
-        pieces = again.select(open_ones, again.rings)
+        retried = remaining.select(~is_path, np.zeros(len(remaining), dtype=np.bool_))
+        open_ones = ~remaining.rings[~is_path]
+        pieces = retried.select(open_ones, retried.rings)
         if len(pieces):
-            done.append(_single_paths(lines, pieces.as_single_paths()))
-        left = again.select(~open_ones, again.rings)
-    if len(left):
-        done.append(_single_paths(lines, left.as_single_paths()))
-    return done
+            results.append(_single_paths(lines, pieces.as_single_paths()))
+        remaining = retried.select(~open_ones, retried.rings)
+    if len(remaining):
+        results.append(_single_paths(lines, remaining.as_single_paths()))
+    return results
 
 
 def _try_chains(lines: Polylines, chains: Chains) -> tuple[Bools, JoinedChains]:
     """Return the mask (C,) of the chains that make a path, and these paths."""
     vertices, counts, gaps = _chain_vertices(lines, chains)
-    good = np.asarray(counts >= 2)
+    is_path = np.asarray(counts >= 2)
     path = np.repeat(np.arange(len(chains)), counts)
-    keep = good[path]
-    made = _polylines_of(vertices[keep], counts[good], chains.rings[good])
-    empty = made.closed & (np.abs(signed_areas(made)) <= POSITION_EPS_MM * path_lengths(made))
+    keep = is_path[path]
+    candidates = _polylines_of(vertices[keep], counts[is_path], chains.rings[is_path])
+    empty = candidates.closed & (
+        np.abs(signed_areas(candidates)) <= POSITION_EPS_MM * path_lengths(candidates)
+    )
     if empty.any():
-        good[np.flatnonzero(good)[empty]] = False
-        keep = good[path]
-        made = _polylines_of(vertices[keep], counts[good], chains.rings[good])
-    number = np.cumsum(good) - 1
-    gap_chain, at, size = gaps
-    kept = good[gap_chain]
-    part = chains.select(good, chains.rings)
-    return good, JoinedChains(part, made, number[gap_chain[kept]], at[kept], size[kept])
+        is_path[np.flatnonzero(is_path)[empty]] = False
+        keep = is_path[path]
+        candidates = _polylines_of(vertices[keep], counts[is_path], chains.rings[is_path])
+    number = np.cumsum(is_path) - 1
+    gap_chain, places, size = gaps
+    has_path = is_path[gap_chain]
+    part = chains.select(is_path, chains.rings)
+    return is_path, JoinedChains(
+        part, candidates, number[gap_chain[has_path]], places[has_path], size[has_path]
+    )
 
 
 def _single_paths(lines: Polylines, chains: Chains) -> JoinedChains:
     """Return chains of one path each, unchanged."""
-    none = np.empty(0, dtype=np.int64)
+    no_gaps = np.empty(0, dtype=np.int64)
     return JoinedChains(
-        chains, lines.select(chains.entries // 2), none, np.empty((0, 2)), np.empty(0)
+        chains, lines.select(chains.entries // 2), no_gaps, np.empty((0, 2)), np.empty(0)
     )
 
 
@@ -600,9 +615,9 @@ def _chain_vertices(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Ga
     bridged gaps."""
     rows, counts = _vertex_rows(lines, chains)
     vertices = lines.vertices[rows]
-    turned = np.repeat(chains.entries & 1, counts) == 1
+    is_reversed = np.repeat(chains.entries & 1, counts) == 1
     # The segment that left vertex i now leaves vertex i + 1 and bends to the other side.
-    vertices[turned, 2] = 0.0 - lines.vertices[rows[turned] - 1, 2]
+    vertices[is_reversed, 2] = 0.0 - lines.vertices[rows[is_reversed] - 1, 2]
     last = np.cumsum(counts) - 1
     first = last - counts + 1
     vertices[last, 2] = 0.0
@@ -610,27 +625,27 @@ def _chain_vertices(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Ga
     # Each piece is followed by the next one of its chain, in a ring the last one by the first.
     following = np.arange(1, len(chain) + 1)
     following[chains.begins[1:] - 1] = chains.begins[:-1]
-    meets = np.ones(len(chain), dtype=np.bool_)
-    meets[(chains.begins[1:] - 1)[~chains.rings]] = False
-    end, begin = last[meets], first[following[meets]]
+    has_joint = np.ones(len(chain), dtype=np.bool_)
+    has_joint[(chains.begins[1:] - 1)[~chains.rings]] = False
+    end, begin = last[has_joint], first[following[has_joint]]
     drop, gaps = _bridge_gaps(vertices, end, begin)
     keep = np.ones(len(vertices), dtype=np.bool_)
     keep[end[drop]] = False
     owner = np.repeat(chain, counts)
     vertices, owner = _without_short(vertices[keep], owner[keep], chains.rings)
-    made = np.bincount(owner, minlength=len(chains)).astype(np.int64)
-    wide, at, size = gaps
-    return vertices, made, (chain[meets][wide], at, size)
+    vertex_counts = np.bincount(owner, minlength=len(chains)).astype(np.int64)
+    wide, places, size = gaps
+    return vertices, vertex_counts, (chain[has_joint][wide], places, size)
 
 
 def _vertex_rows(lines: Polylines, chains: Chains) -> tuple[Ints, Ints]:
     """Return the rows of all vertices in the order of travel, and the number of rows of each
     entry."""
-    path, turned = chains.entries // 2, chains.entries % 2
+    path, is_reversed = chains.entries // 2, chains.entries % 2
     counts = np.diff(lines.offsets)[path]
-    begin = np.where(turned, lines.offsets[1:][path] - 1, lines.offsets[:-1][path])
-    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.repeat(begin, counts) + np.repeat(1 - 2 * turned, counts) * within, counts
+    begin = np.where(is_reversed, lines.offsets[1:][path] - 1, lines.offsets[:-1][path])
+    steps = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.repeat(begin, counts) + np.repeat(1 - 2 * is_reversed, counts) * steps, counts
 
 
 def _bridge_gaps(
@@ -659,12 +674,12 @@ def _without_short(vertices: Floats, owner: Ints, rings: Bools) -> tuple[Floats,
     while len(vertices) > 1:
         counts = np.bincount(owner, minlength=len(rings))
         last = np.cumsum(counts) - 1
-        there = counts > 0
+        has_vertices = counts > 0
         following = np.arange(1, len(vertices) + 1)
-        following[last[there]] = (last - counts + 1)[there]
+        following[last[has_vertices]] = (last - counts + 1)[has_vertices]
         step = vertices[following, :2] - vertices[:, :2]
         keep = np.hypot(step[:, 0], step[:, 1]) > POSITION_EPS_MM
-        keep[last[there & ~rings]] = True
+        keep[last[has_vertices & ~rings]] = True
         if keep.all():
             break
         vertices, owner = vertices[keep], owner[keep]
@@ -704,7 +719,7 @@ def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float)
     `ends` are those of M paths with `lengths` (M,) mm and `layers`. Each pair of ends comes once;
     ends that lie on each other are no gap.
     """
-    found: dict[tuple[int, int], Gap] = {}
+    gaps: dict[tuple[int, int], Gap] = {}
     is_open = np.flatnonzero(np.repeat(ends.is_open, 2))
     for group in np.unique(ends.group[is_open // 2]):
         rows = is_open[ends.group[is_open // 2] == group]
@@ -713,24 +728,24 @@ def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float)
         )
         one, other = rows[one], rows[other]
         at_random = SPACING_SHARE * _spacing(ends.points[rows])
-        near = _is_gap(ends, lengths, one, other, size) & (
+        is_gap = _is_gap(ends, lengths, one, other, size) & (
             (one // 2 == other // 2) | (size <= at_random)
         )
         for a, b, distance in zip(
-            one[near].tolist(), other[near].tolist(), size[near].tolist(), strict=True
+            one[is_gap].tolist(), other[is_gap].tolist(), size[is_gap].tolist(), strict=True
         ):
             x, y = (0.5 * (ends.points[a] + ends.points[b])).tolist()
-            found.setdefault((min(a, b), max(a, b)), Gap((x, y), distance, layers[a // 2]))
-    return [found[key] for key in sorted(found)]
+            gaps.setdefault((min(a, b), max(a, b)), Gap((x, y), distance, layers[a // 2]))
+    return [gaps[key] for key in sorted(gaps)]
 
 
 def _is_gap(ends: Ends, lengths: Floats, one: Ints, other: Ints, size: Floats) -> Bools:
     """Mask of the pairs of near ends that look as if they were meant to meet."""
-    own = one // 2 == other // 2
+    same_path = one // 2 == other // 2
     shorter = np.minimum(lengths[one // 2], lengths[other // 2])
-    small = size <= np.where(own, OWN_GAP_SHARE, GAP_SHARE) * shorter
+    is_small = size <= np.where(same_path, OWN_GAP_SHARE, GAP_SHARE) * shorter
     turn = np.abs(wrapped(ends.leaving[one] - ends.leaving[other] - np.pi))
-    return np.asarray(small & (own | (turn <= SHARPEST_TURN_RAD)))
+    return np.asarray(is_small & (same_path | (turn <= SHARPEST_TURN_RAD)))
 
 
 def _spacing(points: Floats) -> float:
@@ -752,6 +767,8 @@ def _nearest_ends(points: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
     size = min(max(spacing, reach / FINEST_CELLS), reach)
     cells = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
     order = np.lexsort((cells[:, 1], cells[:, 0]))
-    nearest, distance = nearest_others(cells[order], points[order], size, POSITION_EPS_MM, reach)
-    there = nearest >= 0
-    return order[there], order[nearest[there]], distance[there]
+    nearest_rows, distance = nearest_others(
+        cells[order], points[order], size, POSITION_EPS_MM, reach
+    )
+    has_neighbour = nearest_rows >= 0
+    return order[has_neighbour], order[nearest_rows[has_neighbour]], distance[has_neighbour]

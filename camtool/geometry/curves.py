@@ -227,8 +227,8 @@ class SplineCurve(Struct, frozen=True, eq=False):
             for level in range(1, degree + 1):
                 t = ends[1 if level <= column else 0]
                 for j in range(degree, level - 1, -1):
-                    left, right = knots[cell - degree + j], knots[cell + 1 + j - level]
-                    share = ((t - left) / (right - left))[:, None]
+                    low_knot, right = knots[cell - degree + j], knots[cell + 1 + j - level]
+                    share = ((t - low_knot) / (right - low_knot))[:, None]
                     rows[j] = (1.0 - share) * rows[j - 1] + share * rows[j]
             control[:, column] = rows[degree]
         tips = control[[0, -1], [0, -1]]
@@ -255,9 +255,9 @@ class SplineCurve(Struct, frozen=True, eq=False):
         rows = [points[cell - degree + j] for j in range(degree + 1)]
         for level in range(1, degree + 1):
             for j in range(degree, level - 1, -1):
-                left = knots[cell - degree + j]
+                low_knot = knots[cell - degree + j]
                 right = knots[cell + 1 + j - level]
-                share = ((t - left) / (right - left))[:, None]
+                share = ((t - low_knot) / (right - low_knot))[:, None]
                 rows[j] = (1.0 - share) * rows[j - 1] + share * rows[j]
         return np.asarray(rows[degree])
 

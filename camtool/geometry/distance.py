@@ -86,15 +86,17 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
     segment = np.empty(len(points), dtype=np.int64)
     for begin in range(0, len(points), POINTS_AT_A_TIME):
         # A copy: the loops take no array that nobody may write to.
-        some = np.array(points[begin : begin + POINTS_AT_A_TIME])
-        reach = nearest_distances(some, curves.rows, curves.tree)
+        batch = np.array(points[begin : begin + POINTS_AT_A_TIME])
+        reach = nearest_distances(batch, curves.rows, curves.tree)
         reach += NEAREST_SPARE_MM + NEAREST_SPARE * reach
-        point, near = curves_within(some, reach, curves.rows, curves.tree).T
-        near = order[near]
-        apart = _distance(some[point], rows[near])
-        best = np.lexsort((near, apart, point))[np.searchsorted(point, np.arange(len(some)))]
-        distance[begin : begin + POINTS_AT_A_TIME] = apart[best]
-        segment[begin : begin + POINTS_AT_A_TIME] = near[best]
+        point, candidates = curves_within(batch, reach, curves.rows, curves.tree).T
+        candidates = order[candidates]
+        distances = _distance(batch[point], rows[candidates])
+        best = np.lexsort((candidates, distances, point))[
+            np.searchsorted(point, np.arange(len(batch)))
+        ]
+        distance[begin : begin + POINTS_AT_A_TIME] = distances[best]
+        segment[begin : begin + POINTS_AT_A_TIME] = candidates[best]
     return Nearest(distance, segment)
 
 
@@ -102,7 +104,7 @@ def approach(a: Polyline, b: Polyline) -> NearestApproach:
     """Return the least distance between two paths, and a point on either where it is reached; 0
     where they cross."""
     first, second = Segments.of(a), Segments.of(b)
-    boxes, others = segment_boxes(first), segment_boxes(second)
+    boxes, other_boxes = segment_boxes(first), segment_boxes(second)
     if len(a.vertices) * len(second) <= FEW_PAIRS:
         from_vertices = points_to_segments(a.vertices[:, :2], second).min(axis=1)
     else:
@@ -110,32 +112,36 @@ def approach(a: Polyline, b: Polyline) -> NearestApproach:
     best = _approach(from_vertices, a.vertices[:, :2])
     step = max(1, PAIRS_AT_A_TIME // len(second))
     for begin in range(0, len(first), step):
-        apart = _box_distance(boxes[begin : begin + step], others)
-        i, j = np.nonzero(apart <= best.distance)
+        distances = _box_distance(boxes[begin : begin + step], other_boxes)
+        i, j = np.nonzero(distances <= best.distance)
         if len(i):
-            found = _approach(*paired_distances(first[i + begin], second[j]))
-            best = min(best, found, key=lambda each: each.distance)
+            candidate = _approach(*paired_distances(first[i + begin], second[j]))
+            best = min(best, candidate, key=lambda each: each.distance)
     return best
 
 
-def near_paths(lines: Polylines, others: Polylines, reach_mm: float) -> Iterator[tuple[int, int]]:
+def near_paths(
+    lines: Polylines, other_lines: Polylines, reach_mm: float
+) -> Iterator[tuple[int, int]]:
     """Yield pairs of paths whose boxes come within `reach_mm` of each other."""
-    one, other = (path_extents(each).transpose(0, 2, 1).reshape(-1, 4) for each in (lines, others))
+    one, other = (
+        path_extents(each).transpose(0, 2, 1).reshape(-1, 4) for each in (lines, other_lines)
+    )
     for rows, columns in box_pairs(one, other, reach_mm=reach_mm):
         yield from zip(rows.tolist(), columns.tolist(), strict=True)
 
 
 def _approach(distance: Floats, points: Floats) -> NearestApproach:
-    at = int(distance.argmin())
-    return NearestApproach(float(distance[at]), (float(points[at, 0]), float(points[at, 1])))
+    row = int(distance.argmin())
+    return NearestApproach(float(distance[row]), (float(points[row, 0]), float(points[row, 1])))
 
 
-def _box_distance(boxes: Floats, others: Floats) -> Floats:
+def _box_distance(boxes: Floats, other_boxes: Floats) -> Floats:
     """Return the distance (N, M) of boxes (N, 4) and (M, 4)."""
-    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
-    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
-    apart = np.maximum(low - high, 0.0)
-    return np.asarray(np.hypot(apart[..., 0], apart[..., 1]))
+    low = np.maximum(boxes[:, None, :2], other_boxes[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], other_boxes[None, :, 2:])
+    gaps = np.maximum(low - high, 0.0)
+    return np.asarray(np.hypot(gaps[..., 0], gaps[..., 1]))
 
 
 class _SegmentRows(Struct, frozen=True, eq=False):
@@ -195,8 +201,8 @@ def _distance(points: Floats, rows: _SegmentRows) -> Floats:
     middle = 0.5 * (rows.a + rows.b)
     normal = _turn_left(rows.d)
     arm = rows.four_b[..., None] * (points - middle) - rows.flat[..., None] * normal
-    whole = np.abs(rows.power(points)) / (np.hypot(arm[..., 0], arm[..., 1]) + rows.size)
-    return np.where(rows.is_beside(points), whole, np.minimum(to_a, to_b))
+    perpendicular = np.abs(rows.power(points)) / (np.hypot(arm[..., 0], arm[..., 1]) + rows.size)
+    return np.where(rows.is_beside(points), perpendicular, np.minimum(to_a, to_b))
 
 
 def paired_distances(a: Segments, b: Segments) -> tuple[Floats, Floats]:
@@ -232,11 +238,11 @@ def _toward(
     foot = rows_a.a + part[:, None] * rows_a.d
     arm = np.where(a.is_arc[:, None], centre - a.centre, 1.0)
     length = np.hypot(arm[:, 0], arm[:, 1])
-    apart = length > 0.0
-    unit = arm / np.where(apart, length, 1.0)[:, None]
+    is_distinct = length > 0.0
+    unit = arm / np.where(is_distinct, length, 1.0)[:, None]
     radius = np.where(a.is_arc, a.radius, 0.0)
     points = np.where(a.is_arc[:, None], a.centre + radius[:, None] * unit, foot)
-    valid = b.is_arc & apart & rows_a.is_beside(points)
+    valid = b.is_arc & is_distinct & rows_a.is_beside(points)
     return np.where(valid, _distance(points, rows_b), np.inf), points
 
 
@@ -266,10 +272,10 @@ def _common_points(a: _SegmentRows, b: _SegmentRows) -> tuple[Floats, Floats]:
     value += np.where(rounder, constant_b, constant_a)
     root = np.sqrt(slope**2 - 4.0 * four_b * value)
     stable = -0.5 * (slope + np.copysign(root, slope))
-    one, two = stable / four_b, value / stable
+    one, second_root = stable / four_b, value / stable
     return (
         origin + foot + one[:, None] * along,
-        origin + foot + two[:, None] * along,
+        origin + foot + second_root[:, None] * along,
     )
 
 

@@ -211,9 +211,11 @@ class Drawing:
             return FitError()
         rows = segment_rows(self.paths)
         largest, rms = self.off_mm[rows].T
-        length = np.concatenate([segment_lengths(some) for some in Segments.lots(self.paths)])
+        length = np.concatenate([segment_lengths(lot) for lot in Segments.lots(self.paths)])
         length[largest == 0.0] = 0.0
-        whole = float(length.sum())
-        if not whole:
+        total_length = float(length.sum())
+        if not total_length:
             return FitError()
-        return FitError(float(largest.max()), math.sqrt(float((length * rms**2).sum()) / whole))
+        return FitError(
+            float(largest.max()), math.sqrt(float((length * rms**2).sum()) / total_length)
+        )

@@ -35,8 +35,8 @@ def drawing_extents(drawing: Drawing) -> Floats:
         boxes.append(np.column_stack([points.min(axis=0), points.max(axis=0)]))
     if not boxes:
         raise GeometryError("nothing is drawn, so there are no extents")
-    both = np.stack(boxes)
-    return np.column_stack([both[:, :, 0].min(axis=0), both[:, :, 1].max(axis=0)])
+    stacked = np.stack(boxes)
+    return np.column_stack([stacked[:, :, 0].min(axis=0), stacked[:, :, 1].max(axis=0)])
 
 
 def drawing_facts(drawing: Drawing) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def _smallest(drawing: Drawing, segments: Segments) -> dict[str, Any]:
     """`radius`, `segment`, `contour` (shorter side of its box) and `distance` (between two closed
     contours): each size_mm, at_mm and paths, or None."""
 
-    found = {
+    features = {
         "radius": smallest_radius(segments),
         "segment": shortest_segment(segments),
         "contour": smallest_contour(drawing.paths),
@@ -88,7 +88,7 @@ def _smallest(drawing: Drawing, segments: Segments) -> dict[str, Any]:
             "at_mm": list(item.at_mm),
             "paths": list(item.paths),
         }
-        for name, item in found.items()
+        for name, item in features.items()
     }
 
 
@@ -114,8 +114,10 @@ def _open_ends(drawing: Drawing) -> list[dict[str, Any]]:
     offsets, vertices = drawing.paths.offsets, drawing.paths.vertices
     rows = np.column_stack([offsets[paths], offsets[paths + 1] - 1]).ravel()
     return [
-        {"at_mm": at, "path": path, "layer": drawing.layers[path]}
-        for at, path in zip(vertices[rows, :2].tolist(), np.repeat(paths, 2).tolist(), strict=True)
+        {"at_mm": place, "path": path, "layer": drawing.layers[path]}
+        for place, path in zip(
+            vertices[rows, :2].tolist(), np.repeat(paths, 2).tolist(), strict=True
+        )
     ]
 
 
@@ -212,8 +214,8 @@ def narrowest_wall(lines: Polylines) -> Feature | None:
     )  # fmt: skip
     x, y = segments.start[row].tolist()
     pair = sorted((int(segments.path[row]), int(segments.path[other])))
-    found = Feature(float(best), (x, y), tuple(pair))
-    near = touching_boxes(
+    nearest = Feature(float(best), (x, y), tuple(pair))
+    neighbour_pairs = touching_boxes(
         _grown(boxes, POSITION_EPS_MM), np.zeros_like(number), number, np.ones(len(number), bool),
         max_pairs=MAX_WALL_PAIRS,
     )  # fmt: skip
@@ -221,9 +223,9 @@ def narrowest_wall(lines: Polylines) -> Feature | None:
         _grown(boxes, 0.5 * best), np.zeros_like(number), number, segments.is_arc,
         max_pairs=MAX_WALL_PAIRS,
     )  # fmt: skip
-    for one, two in (near, arcs):
-        found = _nearer(segments, one, two, found)
-    return found
+    for one, second in (neighbour_pairs, arcs):
+        nearest = _nearer(segments, one, second, nearest)
+    return nearest
 
 
 def _closed_segments(lines: Polylines) -> Segments | None:
@@ -245,8 +247,8 @@ _MORTON_BITS = 16
 def _spread(numbers: Ints) -> Ints:
     """The bits of each number with a gap before each (Morton order keeps near cells near)."""
     spread = np.zeros_like(numbers)
-    for bit in range(_MORTON_BITS):
-        spread |= (numbers >> bit & 1) << 2 * bit
+    for bit_index in range(_MORTON_BITS):
+        spread |= (numbers >> bit_index & 1) << 2 * bit_index
     return spread
 
 
@@ -254,14 +256,14 @@ def _grown(boxes: Floats, margin: float) -> Floats:
     return boxes + margin * np.array([-1.0, -1.0, 1.0, 1.0])
 
 
-def _nearer(segments: Segments, one: Ints, other: Ints, found: Feature) -> Feature:
+def _nearer(segments: Segments, one: Ints, other: Ints, nearest: Feature) -> Feature:
     """The least distance of these pairs, if it is below the one found before."""
     for begin in range(0, len(one), _PAIRS_AT_A_TIME):
         a, b = one[begin : begin + _PAIRS_AT_A_TIME], other[begin : begin + _PAIRS_AT_A_TIME]
         distance, points = paired_distances(segments[a], segments[b])
         row = int(np.argmin(distance))
-        if distance[row] < found.size_mm:
+        if distance[row] < nearest.size_mm:
             x, y = points[row].tolist()
             pair = sorted((int(segments.path[a[row]]), int(segments.path[b[row]])))
-            found = Feature(float(distance[row]), (x, y), tuple(pair))
-    return found
+            nearest = Feature(float(distance[row]), (x, y), tuple(pair))
+    return nearest

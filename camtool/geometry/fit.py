@@ -144,9 +144,9 @@ def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
         point, arrive, leave = (np.ascontiguousarray(rows[:, k : k + 2]) for k in (1, 3, 5))
         return Nodes(rows[:, 0], point, arrive, leave, corner)
 
-    vertices, judged, _ = _fitted(nodes, lambda t: samples_between(control, t), tolerance_mm)
+    vertices, deviations, _ = _fitted(nodes, lambda t: samples_between(control, t), tolerance_mm)
     vertices[:, :2] += pieces.origin
-    return _checked_fit(vertices, judged, pieces.ends)
+    return _checked_fit(vertices, deviations, pieces.ends)
 
 
 def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
@@ -154,15 +154,15 @@ def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
     share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
 
     def samples(t: Floats) -> Floats:
-        between = (t[:-1, None] + share * np.diff(t)[:, None]).ravel()
-        return curve.point(np.append(between, t[-1]))
+        parameters = (t[:-1, None] + share * np.diff(t)[:, None]).ravel()
+        return curve.point(np.append(parameters, t[-1]))
 
-    vertices, judged, nodes = _fitted(
+    vertices, deviations, nodes = _fitted(
         lambda fineness_mm, steps: curve_nodes(curve, fineness_mm, steps), samples, tolerance_mm
     )
     if len(nodes) == 1:
-        return Fit(vertices, *judged)
-    return _checked_fit(vertices, judged, nodes.point[[0, -1]])
+        return Fit(vertices, *deviations)
+    return _checked_fit(vertices, deviations, nodes.point[[0, -1]])
 
 
 def _fitted(
@@ -181,20 +181,20 @@ def _fitted(
         if len(nodes) == 1:
             return np.append(nodes.point[0], 0.0)[None, :], (0.0, 0.0, 0.0), nodes
         columns = (nodes.point, nodes.arrive, nodes.leave, nodes.corner)
-        vertices, judged = fit_nodes(columns, samples(nodes.t), target, tolerance)
-        if not judged[0] > ACCEPTED_SHARE * tolerance or len(nodes) >= MAX_NODES:
+        vertices, deviations = fit_nodes(columns, samples(nodes.t), target, tolerance)
+        if not deviations[0] > ACCEPTED_SHARE * tolerance or len(nodes) >= MAX_NODES:
             break
         steps, fineness = 2 * steps, REFINING * fineness
         if attempt > 0:
-            target *= SEARCH_SHARE * tolerance / judged[0]
-    return vertices, judged, nodes
+            target *= SEARCH_SHARE * tolerance / deviations[0]
+    return vertices, deviations, nodes
 
 
-def _checked_fit(vertices: Floats, judged: Judged, ends: Floats) -> Fit:
-    if not (np.isfinite(vertices).all() and math.isfinite(judged[0] + judged[2])):
+def _checked_fit(vertices: Floats, deviations: Judged, ends: Floats) -> Fit:
+    if not (np.isfinite(vertices).all() and math.isfinite(deviations[0] + deviations[2])):
         raise GeometryError("a point or a tangent of a curve is not finite")
     vertices[-1, :2], vertices[0, :2] = ends[1], ends[0]
-    return Fit(vertices, *judged)
+    return Fit(vertices, *deviations)
 
 
 # Nodes on a curve, dense where it bends: the places where a fitted arc may begin or end.
@@ -237,9 +237,9 @@ def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
     is_break = np.arange(len(t)) % each == 0
     for side, column in ((-1.0, nodes.arrive), (1.0, nodes.leave)):
         # A derivative at a corner is the one of either side.
-        beside, at = directions.aside(breaks, side), column[is_break]
-        differs = turns(beside, at) > CORNER_ANGLE_RAD
-        column[is_break] = np.where(differs[:, None], beside, at)
+        one_sided, derivative = directions.aside(breaks, side), column[is_break]
+        differs = turns(one_sided, derivative) > CORNER_ANGLE_RAD
+        column[is_break] = np.where(differs[:, None], one_sided, derivative)
     _refine(nodes, curve, directions, tolerance_mm)
     return _merge_nodes(nodes)
 
@@ -266,12 +266,12 @@ class _Directions:
         """Directions (n, 2) just before and just after each t."""
         tangent = _finite(self.curve.tangent(t))
         length = np.hypot(tangent[:, 0], tangent[:, 1])
-        plain = length > self.least
-        unit = tangent / np.where(plain, length, 1.0)[:, None]
+        is_regular = length > self.least
+        unit = tangent / np.where(is_regular, length, 1.0)[:, None]
         before, after = unit.copy(), unit.copy()
-        if not plain.all():
-            before[~plain] = self.aside(t[~plain], -1.0)
-            after[~plain] = self.aside(t[~plain], 1.0)
+        if not is_regular.all():
+            before[~is_regular] = self.aside(t[~is_regular], -1.0)
+            after[~is_regular] = self.aside(t[~is_regular], 1.0)
         return before, after
 
     def aside(self, t: Floats, side: float) -> Floats:
@@ -281,27 +281,27 @@ class _Directions:
         room = (self.breaks[place] - self.breaks[place - 1]) * side
         begin, end = self.breaks[0], self.breaks[-1]
         room = np.where((t + room < begin) | (t + room > end), -room, room)
-        found = np.zeros((len(t), 2))
+        tangents = np.zeros((len(t), 2))
         missing = np.ones(len(t), dtype=np.bool_)
         for share in _ASIDE:
             tangent = self.curve.tangent(np.clip(t + share * room, begin, end))
             length = np.hypot(tangent[:, 0], tangent[:, 1])
-            good = missing & (length > self.least)
-            found[good] = tangent[good] / length[good][:, None]
-            missing &= ~good
+            is_resolved = missing & (length > self.least)
+            tangents[is_resolved] = tangent[is_resolved] / length[is_resolved][:, None]
+            missing &= ~is_resolved
             if not missing.any():
                 break
-        found[missing] = (1.0, 0.0)  # the curve stands still here: such nodes are merged
-        return found
+        tangents[missing] = (1.0, 0.0)  # the curve stands still here: such nodes are merged
+        return tangents
 
 
 def _refine(
     nodes: _NodeColumns, curve: Curve, directions: _Directions, tolerance_mm: float
 ) -> None:
     """Halve steps until each is good, or as short as one position, or too many."""
-    fresh = np.ones(len(nodes.t) - 1, dtype=np.bool_)
-    while fresh.any() and len(nodes.t) < MAX_NODES:
-        rows = np.flatnonzero(fresh)
+    is_new = np.ones(len(nodes.t) - 1, dtype=np.bool_)
+    while is_new.any() and len(nodes.t) < MAX_NODES:
+        rows = np.flatnonzero(is_new)
         low, high = nodes.t[rows], nodes.t[rows + 1]
         middle = 0.5 * (low + high)
         halves = (middle > low) & (middle < high)
@@ -311,24 +311,24 @@ def _refine(
         probes = np.concatenate([middle, 0.5 * (low + middle), 0.5 * (middle + high)])
         points = _finite(curve.point(probes)).reshape(3, -1, 2)
         point = points[0]
-        bad = _too_coarse(nodes, rows, points, tolerance_mm)
-        rows, middle, point = rows[bad], middle[bad], point[bad]
+        is_coarse = _too_coarse(nodes, rows, points, tolerance_mm)
+        rows, middle, point = rows[is_coarse], middle[is_coarse], point[is_coarse]
         before, after = directions.both(middle)
         nodes.t = np.insert(nodes.t, rows + 1, middle)
         nodes.point = np.insert(nodes.point, rows + 1, point, axis=0)
         nodes.arrive = np.insert(nodes.arrive, rows + 1, before, axis=0)
         nodes.leave = np.insert(nodes.leave, rows + 1, after, axis=0)
-        fresh = np.zeros(len(nodes.t) - 1, dtype=np.bool_)
+        is_new = np.zeros(len(nodes.t) - 1, dtype=np.bool_)
         halved = rows + np.arange(len(rows))
-        fresh[halved] = fresh[halved + 1] = True
+        is_new[halved] = is_new[halved + 1] = True
 
 
 def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: float) -> Bools:
     """Mask of the steps that must be halved, by points (j, steps, 2) of the curve within each
     step."""
     error = step_errors(nodes.point, nodes.leave, nodes.arrive, rows, probes)
-    away = probes[0] - nodes.point[rows], probes[0] - nodes.point[rows + 1]
-    size = np.maximum(np.hypot(*away[0].T), np.hypot(*away[1].T))
+    arms = probes[0] - nodes.point[rows], probes[0] - nodes.point[rows + 1]
+    size = np.maximum(np.hypot(*arms[0].T), np.hypot(*arms[1].T))
     bends = error > STEP_ERROR_SHARE * tolerance_mm
     bends |= turns(nodes.leave[rows], nodes.arrive[rows + 1]) > STEP_TURN_RAD
     return np.asarray(bends & (size > POSITION_EPS_MM))

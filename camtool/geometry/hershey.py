@@ -87,8 +87,8 @@ def _font() -> MappingProxyType[str, Glyph]:
 def _composed_glyphs(glyphs: dict[str, Glyph]) -> dict[str, Glyph]:
     """Signs that the font lacks, on its own grid."""
     u, plus, zero = glyphs["u"], glyphs["+"], glyphs["O"]
-    left = min(x for stroke in u.strokes for x, _ in stroke)
-    mu = Glyph((*u.strokes, ((left, -5.0), (left, 16.0))), u.advance)
+    low_x = min(x for stroke in u.strokes for x, _ in stroke)
+    mu = Glyph((*u.strokes, ((low_x, -5.0), (low_x, 16.0))), u.advance)
     ring = tuple((8.0 + x, -9.0 + y) for x, y in (*_CIRCLE, _CIRCLE[0]))
     bullet = tuple((8.0 + x, y) for x, y in (*_CIRCLE, _CIRCLE[0]))
     middle = tuple((5.0 + 0.35 * x, 1.0 + 0.35 * y) for x, y in (*_CIRCLE, _CIRCLE[0]))

@@ -74,28 +74,28 @@ def self_crossings(segments: Segments) -> Crossings:
     boxes, frames = segment_boxes(segments), Frames.of(segments)
     parts = []
     for row_a, row_b in box_pairs(boxes, boxes, reach_mm=POSITION_EPS_MM):
-        once = row_a < row_b
-        parts.append(_meetings(frames, frames, row_a[once], row_b[once], POSITION_EPS_MM))
-    found = _concatenate(parts)
-    same = segments.path[found.row_a] == segments.path[found.row_b]
-    count = np.bincount(segments.path, minlength=1)[segments.path[found.row_a]]
-    apart = found.row_b - found.row_a
-    a_first = (apart == 1) & (found.ta == 1.0) & (found.tb == 0.0)
-    b_first = (apart == count - 1) & (found.ta == 0.0) & (found.tb == 1.0)
-    return found[~(same & (a_first | b_first))]
+        is_first = row_a < row_b
+        parts.append(_meetings(frames, frames, row_a[is_first], row_b[is_first], POSITION_EPS_MM))
+    crossings = _concatenate(parts)
+    same_path = segments.path[crossings.row_a] == segments.path[crossings.row_b]
+    count = np.bincount(segments.path, minlength=1)[segments.path[crossings.row_a]]
+    row_gap = crossings.row_b - crossings.row_a
+    a_first = (row_gap == 1) & (crossings.ta == 1.0) & (crossings.tb == 0.0)
+    b_first = (row_gap == count - 1) & (crossings.ta == 0.0) & (crossings.tb == 1.0)
+    return crossings[~(same_path & (a_first | b_first))]
 
 
 def meetings(segments: Segments, row_a: Ints, row_b: Ints) -> tuple[Crossings, Bools]:
     """Return the common points of the rows a and b, pair by pair; and the mask of those that
     cross, not touch."""
     frames = Frames.of(segments)
-    found = _meetings(frames, frames, row_a, row_b, POSITION_EPS_MM)
-    return found, ~_touching(found, frames, POSITION_EPS_MM)
+    crossings = _meetings(frames, frames, row_a, row_b, POSITION_EPS_MM)
+    return crossings, ~_touching(crossings, frames, POSITION_EPS_MM)
 
 
 def _concatenate(parts: list[Crossings]) -> Crossings:
-    none = np.empty(0, dtype=np.int64)
-    parts = [*parts, Crossings(none, none, np.empty((0, 2)), np.empty(0), np.empty(0))]
+    no_rows = np.empty(0, dtype=np.int64)
+    parts = [*parts, Crossings(no_rows, no_rows, np.empty((0, 2)), np.empty(0), np.empty(0))]
     return Crossings(*map(np.concatenate, zip(*map(astuple, parts), strict=True)))
 
 
@@ -108,25 +108,25 @@ def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Cro
         _if_apart(each, frames_a, frames_b, eps) for each in _common_points(frames_a, frames_b)
     ]
     candidates = [*ends, *common]
-    found: list[tuple[Floats, Bools, Floats, Floats]] = []
+    passed: list[tuple[Floats, Bools, Floats, Floats]] = []
     for points in candidates:
         on_a, along_a = _locate_on_segments(points, frames_a, eps)
         on_b, along_b = _locate_on_segments(points, frames_b, eps)
-        fresh = on_a & on_b
-        for earlier, valid, _, _ in found:
-            apart = np.hypot(*(points - earlier).T)
-            fresh &= ~(valid & (apart <= 2.0 * eps))
-        found.append((points, fresh, along_a, along_b))
+        is_new = on_a & on_b
+        for earlier, valid, _, _ in passed:
+            distances = np.hypot(*(points - earlier).T)
+            is_new &= ~(valid & (distances <= 2.0 * eps))
+        passed.append((points, is_new, along_a, along_b))
     return _concatenate(
         [
             Crossings(
-                row_a[fresh],
-                row_b[fresh],
-                points[fresh],
-                _fraction(along_a[fresh], frames_a.length[fresh], eps),
-                _fraction(along_b[fresh], frames_b.length[fresh], eps),
+                row_a[is_new],
+                row_b[is_new],
+                points[is_new],
+                _fraction(along_a[is_new], frames_a.length[is_new], eps),
+                _fraction(along_b[is_new], frames_b.length[is_new], eps),
             )
-            for points, fresh, along_a, along_b in found
+            for points, is_new, along_a, along_b in passed
         ]
     )
 
@@ -172,9 +172,9 @@ def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
         root = beta**2 - k_round * gamma
         stable = beta + np.copysign(np.sqrt(np.maximum(root, 0.0)), beta)
         one = stable / k_round
-        two = np.where((root > 0.0) | (k_round == 0.0), gamma / stable, one)
-        one = np.where(k_round == 0.0, two, one)
-        roots = np.stack([one, two])
+        second_root = np.where((root > 0.0) | (k_round == 0.0), gamma / stable, one)
+        one = np.where(k_round == 0.0, second_root, one)
+        roots = np.stack([one, second_root])
     # NaN, because arithmetic with infinities would warn.
     roots = np.where(np.isfinite(roots), roots, np.nan)[:, :, None]
     first, second = origin + foot + roots * direction
@@ -188,8 +188,8 @@ def _if_apart(points: Floats, a: Frames, b: Frames, eps: float) -> Floats:
     """
     angle, bend = _angle_and_bend(points, a, b)
     shorter = np.minimum(a.length, b.length)
-    together = np.abs(angle) * shorter + 0.5 * bend * shorter**2 <= eps
-    return np.where(together[:, None], np.nan, points)
+    is_indistinct = np.abs(angle) * shorter + 0.5 * bend * shorter**2 <= eps
+    return np.where(is_indistinct[:, None], np.nan, points)
 
 
 def _angle_and_bend(points: Floats, a: Frames, b: Frames) -> tuple[Floats, Floats]:
@@ -200,14 +200,16 @@ def _angle_and_bend(points: Floats, a: Frames, b: Frames) -> tuple[Floats, Float
     return dot(turn_left(tangent_a), tangent_b), np.abs(a.curvature - same_way * b.curvature)
 
 
-def _touching(found: Crossings, frames: Frames, eps: float) -> Bools:
+def _touching(crossings: Crossings, frames: Frames, eps: float) -> Bools:
     """True for meetings at an end, and where the curves enter each other by `eps` at most.
 
     Two curves that meet at the angle θ, with curvatures that differ by k, part again after 2θ/k,
     and are θ²/(2k) apart at most until then.
     """
-    at_end = np.isin(found.ta, (0.0, 1.0)) | np.isin(found.tb, (0.0, 1.0))
-    angle, bend = _angle_and_bend(found.point, frames[found.row_a], frames[found.row_b])
+    at_end = np.isin(crossings.ta, (0.0, 1.0)) | np.isin(crossings.tb, (0.0, 1.0))
+    angle, bend = _angle_and_bend(
+        crossings.point, frames[crossings.row_a], frames[crossings.row_b]
+    )
     return np.asarray(at_end | (angle**2 <= 2.0 * bend * eps))
 
 
@@ -242,18 +244,20 @@ def self_crossings_of(lines: Polylines, layers: Sequence[str]) -> tuple[SelfCros
     segments = Segments.of(lines)
     segments = segments[lines.closed[segments.path]]
     frames = Frames.of(segments)
-    found: dict[tuple[int, int, int], SelfCrossing] = {}
+    places: dict[tuple[int, int, int], SelfCrossing] = {}
     for row_a, row_b in _pairs_of_one_path(segments):
-        meets, crosses = meetings(segments, row_a, row_b)
-        crossing = np.where(_at_vertex(meets), _pass_through(meets, segments, frames), crosses)
+        vertex_meetings, crosses = meetings(segments, row_a, row_b)
+        crossing = np.where(
+            _at_vertex(vertex_meetings), _pass_through(vertex_meetings, segments, frames), crosses
+        )
         for row in np.flatnonzero(crossing).tolist():
-            path = int(segments.path[meets.row_a[row]])
-            x, y = meets.point[row].tolist()
+            path = int(segments.path[vertex_meetings.row_a[row]])
+            x, y = vertex_meetings.point[row].tolist()
             key = (path, round(x / _SAME_MM), round(y / _SAME_MM))
-            found.setdefault(key, SelfCrossing((x, y), path, layers[path]))
-        if len(found) > MAX_CROSSINGS:
+            places.setdefault(key, SelfCrossing((x, y), path, layers[path]))
+        if len(places) > MAX_CROSSINGS:
             break
-    return tuple(found[key] for key in sorted(found))
+    return tuple(places[key] for key in sorted(places))
 
 
 _SAME_MM = 4.0 * POSITION_EPS_MM
@@ -277,37 +281,37 @@ def _pairs_of_one_path(segments: Segments) -> Iterator[tuple[Ints, Ints]]:
         yield one[batch], other[batch]
 
 
-def _at_vertex(meets: Crossings) -> Bools:
-    return np.asarray(np.isin(meets.ta, (0.0, 1.0)) | np.isin(meets.tb, (0.0, 1.0)))
+def _at_vertex(crossings: Crossings) -> Bools:
+    return np.asarray(np.isin(crossings.ta, (0.0, 1.0)) | np.isin(crossings.tb, (0.0, 1.0)))
 
 
-def _pass_through(meets: Crossings, segments: Segments, frames: Frames) -> Bools:
+def _pass_through(crossings: Crossings, segments: Segments, frames: Frames) -> Bools:
     """For meetings at a vertex: whether the passage along a parts that along b.
 
     Each passage has two directions, back along where it came from and on to where it goes.
     """
-    back_a, on_a = _passage(meets.row_a, meets.ta, segments, frames)
-    back_b, on_b = _passage(meets.row_b, meets.tb, segments, frames)
-    same = _one_passage(meets, segments)
+    back_a, on_a = _passage(crossings.row_a, crossings.ta, segments, frames)
+    back_b, on_b = _passage(crossings.row_b, crossings.tb, segments, frames)
+    same_passage = _one_passage(crossings, segments)
     turn = 2.0 * np.pi
     wedge = np.mod(on_a - back_a, turn)
     one, other = np.mod(back_b - back_a, turn), np.mod(on_b - back_a, turn)
-    clear = np.ones(len(same), dtype=np.bool_)
+    clear = np.ones(len(same_passage), dtype=np.bool_)
     for side in (one, other):
         for edge in (0.0, wedge, turn):
             clear &= np.abs(side - edge) > ALONG_RAD
-    return np.asarray(clear & ~same & ((one < wedge) != (other < wedge)))
+    return np.asarray(clear & ~same_passage & ((one < wedge) != (other < wedge)))
 
 
 def _passage(row: Ints, t: Floats, segments: Segments, frames: Frames) -> tuple[Floats, Floats]:
     """The directions (J,) rad back and on at the fraction t of these rows."""
     before, after = _neighbours(segments)
-    came = np.where(t == 0.0, before[row], row)
+    arriving_row = np.where(t == 0.0, before[row], row)
     goes = np.where(t == 1.0, after[row], row)
-    at_came = frames[came].tangent_at(np.where(t == 0.0, 1.0, t))
+    at_came = frames[arriving_row].tangent_at(np.where(t == 0.0, 1.0, t))
     at_goes = frames[goes].tangent_at(np.where(t == 1.0, 0.0, t))
-    back = np.arctan2(-at_came[:, 1], -at_came[:, 0])
-    return back, np.arctan2(at_goes[:, 1], at_goes[:, 0])
+    backward = np.arctan2(-at_came[:, 1], -at_came[:, 0])
+    return backward, np.arctan2(at_goes[:, 1], at_goes[:, 0])
 
 
 def _neighbours(segments: Segments) -> tuple[Ints, Ints]:
@@ -320,9 +324,13 @@ def _neighbours(segments: Segments) -> tuple[Ints, Ints]:
     return before, after
 
 
-def _one_passage(meets: Crossings, segments: Segments) -> Bools:
+def _one_passage(crossings: Crossings, segments: Segments) -> Bools:
     """True for the vertex that a row shares with the next one of its path."""
     _, after = _neighbours(segments)
-    a_first = (after[meets.row_a] == meets.row_b) & (meets.ta == 1.0) & (meets.tb == 0.0)
-    b_first = (after[meets.row_b] == meets.row_a) & (meets.tb == 1.0) & (meets.ta == 0.0)
+    a_first = (
+        (after[crossings.row_a] == crossings.row_b) & (crossings.ta == 1.0) & (crossings.tb == 0.0)
+    )
+    b_first = (
+        (after[crossings.row_b] == crossings.row_a) & (crossings.tb == 1.0) & (crossings.ta == 0.0)
+    )
     return np.asarray(a_first | b_first)

@@ -51,12 +51,12 @@ def signed_areas(lines: Polylines) -> Floats:
     inside = np.zeros(len(lines))
     for segments in Segments.lots(lines):
         # Areas are taken about the first point of each path, so that far drawings lose no digits.
-        about = lines.vertices[lines.offsets[segments.path], :2]
-        start, end = segments.start - about, segments.end - about
+        anchors = lines.vertices[lines.offsets[segments.path], :2]
+        start, end = segments.start - anchors, segments.end - anchors
         below = 0.5 * (start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0])
         chord = segments.end - segments.start
-        beside = (chord**2).sum(axis=1) * _area_beside(segments.bulge)
-        np.add.at(inside, segments.path, below + beside)
+        segment_areas = (chord**2).sum(axis=1) * _area_beside(segments.bulge)
+        np.add.at(inside, segments.path, below + segment_areas)
     areas[rows] = inside
     return areas
 
@@ -71,8 +71,8 @@ def _area_beside(bulge: Floats) -> Floats:
     b = np.where(shallow, 1.0, bulge)
     square = b * b
     sine = 4.0 * b * (1.0 - square) / (1.0 + square) ** 2
-    full = (1.0 + square) ** 2 / (32.0 * square) * (4.0 * np.arctan(b) - sine)
-    return np.where(shallow, bulge / 3.0 * (1.0 + bulge * bulge / 5.0), full)
+    exact_area = (1.0 + square) ** 2 / (32.0 * square) * (4.0 * np.arctan(b) - sine)
+    return np.where(shallow, bulge / 3.0 * (1.0 + bulge * bulge / 5.0), exact_area)
 
 
 def length(p: Polyline) -> float:
@@ -109,8 +109,8 @@ def _extremes(segments: Segments) -> tuple[Ints, Floats]:
     lowest = np.ceil(np.minimum(first, first + sweep) / quarter)
     tangents = (lowest[:, None] + np.arange(3.0)) * quarter
     turn_left = (tangents - first[:, None]) * np.sign(sweep)[:, None]
-    arc, which = np.nonzero((turn_left > 0.0) & (turn_left < np.abs(sweep)[:, None]))
-    return rows[arc], point_at(segments, rows[arc], turn_left[arc, which] / np.abs(sweep[arc]))
+    arc, direction = np.nonzero((turn_left > 0.0) & (turn_left < np.abs(sweep)[:, None]))
+    return rows[arc], point_at(segments, rows[arc], turn_left[arc, direction] / np.abs(sweep[arc]))
 
 
 def path_extents(lines: Polylines) -> Floats:
@@ -159,8 +159,8 @@ def sample(p: Polyline, step_mm: float) -> Floats:
     segments = Segments.of(p)
     counts = np.ceil(segment_lengths(segments) / step_mm).astype(np.int64).clip(min=1)
     rows = np.repeat(np.arange(len(segments)), counts)
-    within = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
-    points = point_at(segments, rows, within / counts[rows])
+    steps = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    points = point_at(segments, rows, steps / counts[rows])
     return points if p.closed else np.concatenate([points, p.end[None, :]])
 
 

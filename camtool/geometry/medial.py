@@ -56,9 +56,9 @@ class MedialTrace(Struct, frozen=True, eq=False):
     def __len__(self) -> int:
         return len(self.t)
 
-    def rows(self, chosen: Ints | Bools) -> MedialTrace:
+    def rows(self, selection: Ints | Bools) -> MedialTrace:
         """Return the chosen rows."""
-        return MedialTrace(*(column[chosen] for column in astuple(self)))
+        return MedialTrace(*(column[selection] for column in astuple(self)))
 
     @property
     def discs(self) -> Floats:
@@ -104,10 +104,12 @@ def medial_trace(region: Polylines, tolerance_mm: float) -> tuple[Boundary, Medi
     for _ in range(MAX_ROUNDS):
         trace, open_gaps = _refine_gaps(boundary, trace, open_gaps, tolerance_mm)
         if not open_gaps.any():
-            seen = _seen_from_partners(boundary, trace)
-            if len(seen) == 0:
+            partner_discs = _seen_from_partners(boundary, trace)
+            if len(partner_discs) == 0:
                 break
-            trace, open_gaps = _insert_rows(trace, seen, np.ones(len(seen), dtype=np.bool_))
+            trace, open_gaps = _insert_rows(
+                trace, partner_discs, np.ones(len(partner_discs), dtype=np.bool_)
+            )
     return boundary, trace
 
 
@@ -117,17 +119,17 @@ def _gaps(trace: MedialTrace) -> Bools:
 
 
 def _insert_rows(
-    trace: MedialTrace, more: MedialTrace, is_open: Bools
+    trace: MedialTrace, new_rows: MedialTrace, is_open: Bools
 ) -> tuple[MedialTrace, Bools]:
     """Return the trace with more rows, and its gaps that are open: those beside the new rows that
     `is_open` names, except gaps too narrow for another number."""
-    both = concatenated([trace, more])
-    order = np.lexsort((both.t, both.element))
-    both = both.rows(order)
+    merged = concatenated([trace, new_rows])
+    order = np.lexsort((merged.t, merged.element))
+    merged = merged.rows(order)
     opens = np.append(np.zeros(len(trace), dtype=np.bool_), is_open)[order]
-    beside = opens | np.append(opens[1:], False)
-    width = np.append(np.diff(both.t), 0.0)
-    return both, beside & _gaps(both) & (width > np.finfo(np.float64).eps)
+    is_beside = opens | np.append(opens[1:], False)
+    width = np.append(np.diff(merged.t), 0.0)
+    return merged, is_beside & _gaps(merged) & (width > np.finfo(np.float64).eps)
 
 
 def _refine_gaps(
@@ -135,41 +137,43 @@ def _refine_gaps(
 ) -> tuple[MedialTrace, Bools]:
     """Halve all open gaps once, or cut them where the partner changes; a halved gap stays open
     while the curve deviates from the chord by more than the tolerance."""
-    at = np.flatnonzero(open_gaps)
-    middle = 0.5 * (trace.t[at] + trace.t[at + 1])
-    halves = discs_at(boundary, trace.element[at], middle, _partners(trace, at))
-    begin, end = trace.discs[at], trace.discs[at + 1]
-    still = np.maximum(_disc_distance(begin, end), _disc_distance(begin, halves.discs)) <= STILL_MM
-    changes = ~still & (trace.partner[at] != trace.partner[at + 1])
+    rows = np.flatnonzero(open_gaps)
+    middle = 0.5 * (trace.t[rows] + trace.t[rows + 1])
+    halves = discs_at(boundary, trace.element[rows], middle, _partners(trace, rows))
+    begin, end = trace.discs[rows], trace.discs[rows + 1]
+    is_still = (
+        np.maximum(_disc_distance(begin, end), _disc_distance(begin, halves.discs)) <= STILL_MM
+    )
+    changes = ~is_still & (trace.partner[rows] != trace.partner[rows + 1])
     bent = off_chord(halves.discs, begin, end) > tolerance_mm
-    bent |= halves.partner != trace.partner[at]
-    inner = ~changes & (middle > trace.t[at]) & (middle < trace.t[at + 1])
-    low, high = _events(boundary, trace, at[changes])
-    more = concatenated([halves.rows(inner), low, high])
-    is_open = np.append((bent & ~still)[inner], np.ones(2 * len(low), dtype=np.bool_))
-    return _insert_rows(trace, more, is_open)
+    bent |= halves.partner != trace.partner[rows]
+    inner = ~changes & (middle > trace.t[rows]) & (middle < trace.t[rows + 1])
+    low, high = _events(boundary, trace, rows[changes])
+    new_rows = concatenated([halves.rows(inner), low, high])
+    is_open = np.append((bent & ~is_still)[inner], np.ones(2 * len(low), dtype=np.bool_))
+    return _insert_rows(trace, new_rows, is_open)
 
 
-def _disc_distance(discs: Floats, others: Floats) -> Floats:
+def _disc_distance(discs: Floats, other_discs: Floats) -> Floats:
     """Return the distance (N,) of discs (N, 3) from others: in the plane plus in radius."""
-    off = discs - others
-    return np.asarray(np.hypot(off[:, 0], off[:, 1]) + np.abs(off[:, 2]))
+    differences = discs - other_discs
+    return np.asarray(np.hypot(differences[:, 0], differences[:, 1]) + np.abs(differences[:, 2]))
 
 
-def _events(boundary: Boundary, trace: MedialTrace, at: Ints) -> tuple[MedialTrace, MedialTrace]:
-    """Return the last disc with the partner of row `at`, and the first disc with another one."""
-    element, partner, guess = trace.element[at], trace.partner[at], _partners(trace, at)
-    low, high = trace.t[at].copy(), trace.t[at + 1].copy()
+def _events(boundary: Boundary, trace: MedialTrace, rows: Ints) -> tuple[MedialTrace, MedialTrace]:
+    """Return the last disc with the partner of row `rows`, and the first disc with another one."""
+    element, partner, guess = trace.element[rows], trace.partner[rows], _partners(trace, rows)
+    low, high = trace.t[rows].copy(), trace.t[rows + 1].copy()
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        same = discs_at(boundary, element, middle, guess).partner == partner
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
+        same_partner = discs_at(boundary, element, middle, guess).partner == partner
+        low, high = np.where(same_partner, middle, low), np.where(same_partner, high, middle)
     return discs_at(boundary, element, low, guess), discs_at(boundary, element, high, guess)
 
 
-def _partners(trace: MedialTrace, at: Ints) -> Ints:
+def _partners(trace: MedialTrace, rows: Ints) -> Ints:
     """(N, 2) the partners at both ends of the gaps behind these rows."""
-    return np.column_stack([trace.partner[at], trace.partner[at + 1]])
+    return np.column_stack([trace.partner[rows], trace.partner[rows + 1]])
 
 
 def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
@@ -183,16 +187,20 @@ def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
 
 def _seen_from_partners(boundary: Boundary, trace: MedialTrace) -> MedialTrace:
     """Discs at the touching points on partners that show no such partner next to that place."""
-    others = trace.partner != trace.element
-    element, t, partner = trace.partner[others], trace.u[others], trace.element[others]
+    has_other_partner = trace.partner != trace.element
+    element, t, partner = (
+        trace.partner[has_other_partner],
+        trace.u[has_other_partner],
+        trace.element[has_other_partner],
+    )
     # Numbers that sort as element and place do; places lie in 0 … 1.
-    key, wanted = 2.0 * trace.element + trace.t, 2.0 * element + t
-    after = np.clip(np.searchsorted(key, wanted), 1, len(trace) - 1)
+    key, wanted_keys = 2.0 * trace.element + trace.t, 2.0 * element + t
+    after = np.clip(np.searchsorted(key, wanted_keys), 1, len(trace) - 1)
     hidden = (trace.partner[after] != partner) & (trace.partner[after - 1] != partner)
-    fresh = (key[after] != wanted) & (key[after - 1] != wanted)
-    element, t, partner = (column[hidden & fresh] for column in (element, t, partner))
-    found = discs_at(boundary, element, t, np.column_stack([partner, partner]))
-    return found.rows(found.partner == partner)
+    is_new = (key[after] != wanted_keys) & (key[after - 1] != wanted_keys)
+    element, t, partner = (column[hidden & is_new] for column in (element, t, partner))
+    discs = discs_at(boundary, element, t, np.column_stack([partner, partner]))
+    return discs.rows(discs.partner == partner)
 
 
 # The boundary of a region as elements that discs in it can touch: lines, arcs, reflex corners.
@@ -214,7 +222,7 @@ class Boundary(Struct, frozen=True, eq=False):
         """The elements of closed paths, outer ones CCW and holes CW."""
         segments = Segments.of(region)
         leave, arrive = _tangents(segments)
-        before, behind = _neighbours(segments.path)
+        before, following = _neighbours(segments.path)
         turn = _turns(arrive[before], leave)
         corner = turn < -ROUND_RAD
         joint = np.where(corner, REFLEX, np.where(turn > SMOOTH_RAD, CONVEX, SMOOTH))
@@ -233,9 +241,11 @@ class Boundary(Struct, frozen=True, eq=False):
             ]
         )
         tangent, end = arrive[before][corner], segments.start[corner]
-        nothing = np.zeros(len(fans))
-        table[fans] = np.column_stack([end, tangent, nothing, turn[corner], end, leave[corner]])
-        links[place] = np.column_stack([place[before], place[behind] - corner[behind], joint])
+        zeros = np.zeros(len(fans))
+        table[fans] = np.column_stack([end, tangent, zeros, turn[corner], end, leave[corner]])
+        links[place] = np.column_stack(
+            [place[before], place[following] - corner[following], joint]
+        )
         links[fans] = np.column_stack(
             [place[before][corner], place[corner], np.full(len(fans), REFLEX)]
         )
@@ -251,8 +261,8 @@ def _tangents(segments: Segments) -> tuple[Floats, Floats]:
     chord = segments.end - segments.start
     unit = chord / np.hypot(chord[:, 0], chord[:, 1])[:, None]
     cosine, sine = np.cos(0.5 * segments.sweep)[:, None], np.sin(0.5 * segments.sweep)[:, None]
-    turned = np.column_stack([-unit[:, 1], unit[:, 0]])
-    return cosine * unit - sine * turned, cosine * unit + sine * turned
+    normal = np.column_stack([-unit[:, 1], unit[:, 0]])
+    return cosine * unit - sine * normal, cosine * unit + sine * normal
 
 
 def _turns(arrive: Floats, leave: Floats) -> Floats:

@@ -87,26 +87,26 @@ class _Pairs(Struct, frozen=True, eq=False):
     @classmethod
     def of(cls, lines: Polylines) -> _Pairs:
         """Compare every closed path with the paths within its box that are no larger."""
-        none = np.empty(0, dtype=np.int32)
-        holder, inner, is_double = [none], [none], [np.empty(0, dtype=np.bool_)]
+        no_rows = np.empty(0, dtype=np.int32)
+        holder, inner, is_double = [no_rows], [no_rows], [np.empty(0, dtype=np.bool_)]
         areas = np.abs(signed_areas(lines))
         closed = np.flatnonzero(lines.closed)
         closed = closed[np.argsort(-areas[closed], kind="stable")]
         rank = np.full(len(lines), len(closed))
         rank[closed] = np.arange(len(closed))
         places: _Places | None = None
-        for j, within in _within_boxes(path_extents(lines), closed) if len(closed) else ():
-            smaller = within[rank[within] > rank[j]]
+        for j, candidates in _within_boxes(path_extents(lines), closed) if len(closed) else ():
+            smaller = candidates[rank[candidates] > rank[j]]
             if len(smaller) == 0:
                 continue
             # Most drawings of very many paths hold none within another.
             places = places or _Places.of(lines)
-            for found, on_line in zip(
+            for contained, on_line in zip(
                 places.contained_paths(smaller, j), (False, True), strict=True
             ):
-                holder.append(np.full(len(found), j, dtype=np.int32))
-                inner.append(found.astype(np.int32))
-                is_double.append(np.full(len(found), on_line))
+                holder.append(np.full(len(contained), j, dtype=np.int32))
+                inner.append(contained.astype(np.int32))
+                is_double.append(np.full(len(contained), on_line))
         return cls(np.concatenate(holder), np.concatenate(inner), np.concatenate(is_double))
 
     def among(self, rows: Ints, count: int) -> _Pairs:
@@ -157,8 +157,8 @@ class _Places(Struct, frozen=True, eq=False):
         ring = self.segments[self.first_segment[j] : self.first_segment[j + 1]]
         curves = IndexedCurves.of(ring)
         arrays = (curves.rows, ring.bulge, curves.tree)
-        said = holds(self.points, self.first_point, arrays, inner, POSITION_EPS_MM)
-        return inner[said == HELD], inner[said == ON_LINE]
+        relations = holds(self.points, self.first_point, arrays, inner, POSITION_EPS_MM)
+        return inner[relations == HELD], inner[relations == ON_LINE]
 
 
 def _within_boxes(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
@@ -169,14 +169,14 @@ def _within_boxes(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
     index = BoxIndex(np.hstack([centres, centres]))
     wide = np.hstack([low - 2.0 * POSITION_EPS_MM, high + 2.0 * POSITION_EPS_MM])
     for begin in range(0, len(holders), HOLDERS_AT_A_TIME):
-        some = holders[begin : begin + HOLDERS_AT_A_TIME]
-        one, other = index.touching(wide[some])
-        holder = some[one]
+        batch = holders[begin : begin + HOLDERS_AT_A_TIME]
+        one, other = index.touching(wide[batch])
+        holder = batch[one]
         inside = (low[other] >= low[holder] - POSITION_EPS_MM).all(axis=1)
         inside &= (high[other] <= high[holder] + POSITION_EPS_MM).all(axis=1)
         one, other = one[inside], other[inside]
-        ends = np.searchsorted(one, np.arange(len(some) + 1)).tolist()
-        for k, j in enumerate(some.tolist()):
+        ends = np.searchsorted(one, np.arange(len(batch) + 1)).tolist()
+        for k, j in enumerate(batch.tolist()):
             yield j, other[ends[k] : ends[k + 1]]
 
 
@@ -190,8 +190,8 @@ def oriented(nest: Nesting) -> Polylines:
     """
     lines = nest.lines
     if not lines.closed.all():
-        where = f"path {np.argmin(lines.closed)}"
-        raise GeometryError("an open path has no inside", where=where, mend="close it")
+        place = f"path {np.argmin(lines.closed)}"
+        raise GeometryError("an open path has no inside", where=place, mend="close it")
     is_ccw = signed_areas(lines) > 0.0
     return reverse_lines(lines, is_ccw != (nest.levels.depth % 2 == 0))
 
@@ -201,9 +201,9 @@ def regions(nest: Nesting) -> list[tuple[int, Polylines]]:
 
     An island in a hole is the outer path of a region of its own. Open paths: GeometryError.
     """
-    turned, levels = oriented(nest), nest.levels
+    oriented_paths, levels = oriented(nest), nest.levels
     is_hole = levels.depth % 2 == 1
     return [
-        (row, turned.select([row, *np.flatnonzero((levels.parent == row) & is_hole)]))
+        (row, oriented_paths.select([row, *np.flatnonzero((levels.parent == row) & is_hole)]))
         for row in np.flatnonzero(~is_hole).tolist()
     ]

@@ -161,19 +161,19 @@ def offset_each(
         return lines, np.arange(len(lines))
     longest = 1.0 if math.isinf(offset.limit) else max(offset.limit, 1.0)
     boxes = path_extents(lines).transpose(0, 2, 1).reshape(-1, 4)
-    made: list[Polyline] = []
+    loops_so_far: list[Polyline] = []
     owners: list[Ints] = []
     for rows in _far_apart(boxes, longest * offset.distance_mm + POSITION_EPS_MM):
-        some = lines.select(rows)
-        meets = np.zeros(len(rows), dtype=np.bool_)
-        meets[np.unique(_touching_paths(some))] = True
-        for each in (rows[~meets], *rows[meets][:, None]):
-            loops, of = _offset_paths(lines.select(each), distance_mm, offset)
-            made += loops
-            owners.append(each[of])
+        group_lines = lines.select(rows)
+        meets_itself = np.zeros(len(rows), dtype=np.bool_)
+        meets_itself[np.unique(_touching_paths(group_lines))] = True
+        for each in (rows[~meets_itself], *rows[meets_itself][:, None]):
+            loops, loop_sources = _offset_paths(lines.select(each), distance_mm, offset)
+            loops_so_far += loops
+            owners.append(each[loop_sources])
     owner = np.concatenate(owners)
     order = np.argsort(owner, kind="stable")
-    return Polylines.of(made).select(order), owner[order]
+    return Polylines.of(loops_so_far).select(order), owner[order]
 
 
 def _checked_offset(
@@ -186,8 +186,8 @@ def _checked_offset(
         mend = "at 1 corners are cut off where an arc would be, at 2 those sharper than 60°"
         raise OptionError(f"a mitre limit of {mitre_limit} is not 1 or more", mend=mend)
     if not lines.closed.all():
-        where = f"path {np.argmin(lines.closed)}"
-        raise GeometryError("an open path has no inside", where=where, mend="close it")
+        place = f"path {np.argmin(lines.closed)}"
+        raise GeometryError("an open path has no inside", where=place, mend="close it")
     if not math.isfinite(distance_mm):
         raise GeometryError(f"an offset of {distance_mm} mm is not finite")
     if abs(distance_mm) <= POSITION_EPS_MM:
@@ -207,12 +207,12 @@ def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:
     wide = boxes + reach_mm * np.array([-1.0, -1.0, 1.0, 1.0])
     index, group = BoxIndex(wide), np.full(len(boxes), -1)
     for begin in range(0, len(order), PATHS_AT_A_TIME):
-        some = order[begin : begin + PATHS_AT_A_TIME]
-        one, other = index.touching(wide[some])
-        ends = np.searchsorted(one, np.arange(len(some) + 1)).tolist()
-        for k, row in enumerate(some.tolist()):
-            taken = np.bincount(group[other[ends[k] : ends[k + 1]]] + 1)[1:]
-            group[row] = np.append(taken, 0).argmin()
+        batch = order[begin : begin + PATHS_AT_A_TIME]
+        one, other = index.touching(wide[batch])
+        ends = np.searchsorted(one, np.arange(len(batch) + 1)).tolist()
+        for k, row in enumerate(batch.tolist()):
+            neighbour_counts = np.bincount(group[other[ends[k] : ends[k + 1]]] + 1)[1:]
+            group[row] = np.append(neighbour_counts, 0).argmin()
     for each in range(int(group.max()) + 1):
         yield order[group[order] == each]
 
@@ -221,8 +221,8 @@ def _offset_paths(lines: Polylines, distance_mm: float, offset: Offset) -> tuple
     """Return the boundary of the region of closed paths moved, and the path that each loop (J,)
     mostly begins along."""
     if distance_mm < 0.0:
-        moved, of = _left_of(reverse_lines(lines), offset)
-        return reverse_lines(moved), of
+        offset_lines, sources = _left_of(reverse_lines(lines), offset)
+        return reverse_lines(offset_lines), sources
     return _left_of(lines, offset)
 
 
@@ -237,17 +237,19 @@ class Offset(Struct, frozen=True):
 def _left_of(lines: Polylines, offset: Offset) -> tuple[Polylines, Ints]:
     """Return the offset to the left, and the path that each of its loops (J,) begins along."""
     stages = shape_stages(lines, offset)
-    moved, kept = paths_of(stages.loops, stages.kept, stages.trimmed.elements)
-    begins = np.array([loop[0] for loop in stages.loops], dtype=np.int64)[kept]
+    offset_lines, loop_rows = paths_of(stages.loops, stages.kept, stages.trimmed.elements)
+    begins = np.array([loop[0] for loop in stages.loops], dtype=np.int64)[loop_rows]
     source = stages.trimmed.source[stages.kept.element[begins]]
-    of = Segments.of(lines).path[source]
+    sources = Segments.of(lines).path[source]
     if len(stages.met) == 0:
-        return moved, of
-    plain = np.ones(len(lines), dtype=np.bool_)
-    plain[stages.met[stages.met[:, 0] == stages.met[:, 1]]] = False
-    turns = _turns_about(moved.vertices[moved.offsets[:-1], :2], lines.select(plain.nonzero()[0]))
-    free = np.flatnonzero(turns >= 0)
-    return moved.select(free), of[free]
+        return offset_lines, sources
+    is_simple = np.ones(len(lines), dtype=np.bool_)
+    is_simple[stages.met[stages.met[:, 0] == stages.met[:, 1]]] = False
+    turns = _turns_about(
+        offset_lines.vertices[offset_lines.offsets[:-1], :2], lines.select(is_simple.nonzero()[0])
+    )
+    is_free = np.flatnonzero(turns >= 0)
+    return offset_lines.select(is_free), sources[is_free]
 
 
 def _turns_about(points: Floats, lines: Polylines) -> Ints:
@@ -256,9 +258,9 @@ def _turns_about(points: Floats, lines: Polylines) -> Ints:
     turns = np.zeros(len(points), dtype=np.int64)
     signs = np.where(signed_areas(lines) > 0.0, 1, -1).tolist()
     for path, box, sign in zip(lines, path_extents(lines), signs, strict=True):
-        near = ((points >= box[:, 0]) & (points <= box[:, 1])).all(axis=1)
-        if near.any():
-            turns[near] += sign * inside(points[near], Segments.of(path))
+        in_box = ((points >= box[:, 0]) & (points <= box[:, 1])).all(axis=1)
+        if in_box.any():
+            turns[in_box] += sign * inside(points[in_box], Segments.of(path))
     return turns
 
 
@@ -280,16 +282,24 @@ def shape_stages(lines: Polylines, offset: Offset) -> Stages:
     raw = raw_offset(lines, offset)
     source = source_arrays(Segments.of(lines), raw.kites)
     trimmed = trim_raw(raw, source, offset)
-    elements, others = trimmed.elements, None
+    elements, cutting_elements = trimmed.elements, None
     # Only where paths meet can what is on their right end what is on their left.
-    met = _touching_paths(lines)
-    if len(met):
+    meeting_paths = _touching_paths(lines)
+    if len(meeting_paths):
         right = raw_offset(reverse_lines(lines), replace(offset, limit=math.inf))
-        others = trim_raw(right, source, offset).elements
-    slices = slice_elements(elements, others)
+        cutting_elements = trim_raw(right, source, offset).elements
+    slices = slice_elements(elements, cutting_elements)
     valid = valid_slices(slices, elements, source, offset)
-    kept = without_dead_ends(without_doubles(slices[valid], elements))
-    return Stages(raw, trimmed, slices, valid, kept, trace_loops(kept, elements), met)
+    final_slices = without_dead_ends(without_doubles(slices[valid], elements))
+    return Stages(
+        raw,
+        trimmed,
+        slices,
+        valid,
+        final_slices,
+        trace_loops(final_slices, elements),
+        meeting_paths,
+    )
 
 
 Arrays = tuple[Floats, Floats, Floats, Floats]
@@ -308,12 +318,12 @@ def _touching_paths(lines: Polylines) -> Ints:
     segments = Segments.of(lines)
     curves = IndexedCurves.of(segments, margin_mm=POSITION_EPS_MM)
     pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
-    met, at = meetings_of(curves.rows, curves.rows, pairs, POSITION_EPS_MM)
-    one, other = met.T
+    meeting_rows, places = meetings_of(curves.rows, curves.rows, pairs, POSITION_EPS_MM)
+    one, other = meeting_rows.T
     following = _next_rows(lines)
-    a_first = (following[one] == other) & (at[:, TA] == 1.0) & (at[:, TB] == 0.0)
-    b_first = (following[other] == one) & (at[:, TA] == 0.0) & (at[:, TB] == 1.0)
-    return np.asarray(segments.path[met[~(a_first | b_first)]])
+    a_first = (following[one] == other) & (places[:, TA] == 1.0) & (places[:, TB] == 0.0)
+    b_first = (following[other] == one) & (places[:, TA] == 0.0) & (places[:, TB] == 1.0)
+    return np.asarray(segments.path[meeting_rows[~(a_first | b_first)]])
 
 
 def _next_rows(lines: Polylines) -> Ints:
@@ -401,9 +411,9 @@ class Mitres(Struct, frozen=True, eq=False):
         reach[rows] = d * np.where(is_cut, (offset.limit - cosine) / sine, np.tan(half))
         before, after = turn_left(corners.before[rows]), turn_left(corners.after[rows])
         middle = _rotate_vectors(before, -half)
-        far = np.where(is_cut, offset.limit * d, np.inf)
-        deep = np.full(len(rows), d)
-        columns = [corners.place[rows], before, after, middle, deep, far]
+        cut_distance = np.where(is_cut, offset.limit * d, np.inf)
+        depth = np.full(len(rows), d)
+        columns = [corners.place[rows], before, after, middle, depth, cut_distance]
         return cls(reach, cut, np.column_stack(columns))
 
     def lines(self, corners: Corners, is_arc: Bools, offset: Offset) -> tuple[Ints, Segments]:
@@ -414,15 +424,18 @@ class Mitres(Struct, frozen=True, eq=False):
         `is_arc` (K, 2) says whether the segments before and after each corner are arcs.
         """
         d, reach = offset.distance_mm, self.reach[:, None]
-        left = corners.place + d * turn_left(corners.before)
+        left_foot = corners.place + d * turn_left(corners.before)
         right = corners.place + d * turn_left(corners.after)
-        near, far = left + reach * corners.before, right - reach * corners.after
-        there = self.reach > 0.0
-        wanted = np.column_stack([there & is_arc[:, 0], self.cut, there & is_arc[:, 1]])
-        start, end = np.stack([left, near, far], axis=1), np.stack([near, far, right], axis=1)
-        wanted &= np.hypot(*np.moveaxis(end - start, 2, 0)) > NODE_EPS_MM
-        corner = np.nonzero(wanted)[0]
-        return corner, Segments.between(start[wanted], end[wanted], np.zeros(len(corner)))
+        near_tip, far_tip = left_foot + reach * corners.before, right - reach * corners.after
+        has_mitre = self.reach > 0.0
+        is_drawn = np.column_stack([has_mitre & is_arc[:, 0], self.cut, has_mitre & is_arc[:, 1]])
+        start, end = (
+            np.stack([left_foot, near_tip, far_tip], axis=1),
+            np.stack([near_tip, far_tip, right], axis=1),
+        )
+        is_drawn &= np.hypot(*np.moveaxis(end - start, 2, 0)) > NODE_EPS_MM
+        corner = np.nonzero(is_drawn)[0]
+        return corner, Segments.between(start[is_drawn], end[is_drawn], np.zeros(len(corner)))
 
 
 def _rotate_vectors(vectors: Floats, angle: Floats) -> Floats:
@@ -456,10 +469,10 @@ def raw_offset(lines: Polylines, offset: Offset) -> RawOffset:
     rounded, mitred = (outer, outer[:0]) if math.isinf(offset.limit) else (outer[:0], outer)
     mitres = Mitres.about(corners, mitred, offset)
     rows, shifted = _shift_segments(segments, frames, corners, mitres, offset)
-    about, arcs = arcs_about(corners, rounded, offset)
-    beside = np.column_stack([segments.is_arc, segments.is_arc[_next_rows(lines)]])
-    along, across = mitres.lines(corners, beside, offset)
-    return _merge_by_source([rows, about, along], [shifted, arcs, across], mitres.kites)
+    arc_corners, arcs = arcs_about(corners, rounded, offset)
+    arc_flags = np.column_stack([segments.is_arc, segments.is_arc[_next_rows(lines)]])
+    along, across = mitres.lines(corners, arc_flags, offset)
+    return _merge_by_source([rows, arc_corners, along], [shifted, arcs, across], mitres.kites)
 
 
 def _shift_segments(
@@ -470,8 +483,8 @@ def _shift_segments(
     start = segments.start + offset.distance_mm * frames.normal
     end = segments.end + offset.distance_mm * turn_left(corners.before)
     left_over = 1.0 - offset.distance_mm * frames.curvature
-    apart = np.hypot(*(end - start).T)
-    rows = np.flatnonzero((left_over > 0.0) & (apart > NODE_EPS_MM))
+    lengths = np.hypot(*(end - start).T)
+    rows = np.flatnonzero((left_over > 0.0) & (lengths > NODE_EPS_MM))
     reach = np.where(segments.is_arc, 0.0, mitres.reach)
     reach_back = np.where(segments.is_arc, 0.0, mitres.reach[corners.earlier])
     end += reach[:, None] * corners.before
@@ -565,31 +578,31 @@ class Slices(Struct, frozen=True, eq=False):
         return self.from_node, self.to_node, len(self.nodes)
 
 
-def slice_elements(elements: Segments, others: Segments | None) -> Slices:
-    """Cut the elements at all meetings with each other and with `others`."""
+def slice_elements(elements: Segments, cutting_elements: Segments | None) -> Slices:
+    """Cut the elements at all meetings with each other and with `cutting_elements`."""
     eps = NODE_EPS_MM
-    own = IndexedCurves.of(elements, margin_mm=eps)
-    pairs = pairs_of(own.boxes, own.tree, own.boxes, own.tree, True)
-    met, at = meetings_of(own.rows, own.rows, pairs, eps)
-    rows = [met[:, 0], met[:, 1]]
-    found = [at[:, [TA, X, Y]], at[:, [TB, X, Y]]]
-    if others is not None:
-        cutting = IndexedCurves.of(others, margin_mm=eps)
-        pairs = pairs_of(own.boxes, own.tree, cutting.boxes, cutting.tree, False)
-        met, at = meetings_of(own.rows, cutting.rows, pairs, eps)
-        rows.append(met[:, 0])
-        found.append(at[:, [TA, X, Y]])
-    return _cut_elements(elements, np.concatenate(rows), np.concatenate(found))
+    curves = IndexedCurves.of(elements, margin_mm=eps)
+    pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
+    meeting_rows, places = meetings_of(curves.rows, curves.rows, pairs, eps)
+    rows = [meeting_rows[:, 0], meeting_rows[:, 1]]
+    cuts = [places[:, [TA, X, Y]], places[:, [TB, X, Y]]]
+    if cutting_elements is not None:
+        cutting = IndexedCurves.of(cutting_elements, margin_mm=eps)
+        pairs = pairs_of(curves.boxes, curves.tree, cutting.boxes, cutting.tree, False)
+        meeting_rows, places = meetings_of(curves.rows, cutting.rows, pairs, eps)
+        rows.append(meeting_rows[:, 0])
+        cuts.append(places[:, [TA, X, Y]])
+    return _cut_elements(elements, np.concatenate(rows), np.concatenate(cuts))
 
 
-def _cut_elements(elements: Segments, rows: Ints, found: Floats) -> Slices:
-    """Cut the elements at `found` (J, 3), the fraction and the place on the element rows[j]."""
+def _cut_elements(elements: Segments, rows: Ints, cuts: Floats) -> Slices:
+    """Cut the elements at `cuts` (J, 3), the fraction and the place on the element rows[j]."""
     count = len(elements)
     every = np.arange(count)
     # Ends come first, so that a node is at an end of an element rather than at a meeting.
     element = np.concatenate([every, every, rows])
-    t = np.concatenate([np.zeros(count), np.ones(count), found[:, 0]])
-    points = np.concatenate([elements.start, elements.end, found[:, 1:]])
+    t = np.concatenate([np.zeros(count), np.ones(count), cuts[:, 0]])
+    points = np.concatenate([elements.start, elements.end, cuts[:, 1:]])
     node, nodes = merge_points(points, 2.0 * NODE_EPS_MM)
     order = in_order(element, t, count)
     element, t, node = element[order], t[order], node[order]
@@ -666,8 +679,10 @@ def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> tuple[Pol
     closed = np.ones(len(loops), dtype=np.bool_)
     columns = (slices.element, slices.span, slices.from_node, slices.to_node)
     vertices, offsets = written(columns, slices.nodes, elements.sweep, (rows, begins, closed), eps)
-    there = np.diff(offsets) > 0
-    lines = Polylines(vertices, np.concatenate([[0], offsets[1:][there]]), closed[there])
+    has_vertices = np.diff(offsets) > 0
+    lines = Polylines(
+        vertices, np.concatenate([[0], offsets[1:][has_vertices]]), closed[has_vertices]
+    )
     wide = np.abs(signed_areas(lines)) > 0.5 * eps * path_lengths(lines)
-    loop = np.flatnonzero(there)
+    loop = np.flatnonzero(has_vertices)
     return (lines, loop) if wide.all() else (lines.select(np.flatnonzero(wide)), loop[wide])

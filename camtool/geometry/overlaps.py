@@ -47,30 +47,30 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
 
     What is shorter than `within_mm` is left out with the overlap beside it.
     """
-    whole = Unlapped(lines, np.arange(len(lines)), 0, 0.0)
+    unchanged = Unlapped(lines, np.arange(len(lines)), 0, 0.0)
     if not _may_be_loose(lines).any():
-        return whole
-    of = _intervals(lines, groups, within_mm)
-    found = covers(of, within_mm)
-    if not len(found.a):
-        return whole
-    left = _remaining_spans(of, found, within_mm)
-    if not left:
-        return whole
+        return unchanged
+    intervals = _intervals(lines, groups, within_mm)
+    coverings = covers(intervals, within_mm)
+    if not len(coverings.a):
+        return unchanged
+    remaining = _remaining_spans(intervals, coverings, within_mm)
+    if not remaining:
+        return unchanged
     touched = np.zeros(len(lines), dtype=np.bool_)
-    touched[of.path[list(left)]] = True
+    touched[intervals.path[list(remaining)]] = True
     parts, source = [lines.select(np.flatnonzero(~touched))], [np.flatnonzero(~touched)]
-    kept = 0.0
-    for row, spans in left.items():
-        path = int(of.path[row])
+    remaining_mm = 0.0
+    for row, spans in remaining.items():
+        path = int(intervals.path[row])
         for span in spans:
-            parts.append(_span_path(lines, of, row, span))
+            parts.append(_span_path(lines, intervals, row, span))
             source.append(np.array([path]))
-            kept += span[1] - span[0]
+            remaining_mm += span[1] - span[0]
     origin = np.concatenate(source)
     order = np.argsort(origin, kind="stable")
-    gone = float(of.length[list(left)].sum()) - kept
-    return Unlapped(_join_parts(parts).select(order), origin[order], len(left), gone)
+    removed_mm = float(intervals.length[list(remaining)].sum()) - remaining_mm
+    return Unlapped(_join_parts(parts).select(order), origin[order], len(remaining), removed_mm)
 
 
 def _may_be_loose(lines: Polylines) -> Bools:
@@ -81,7 +81,7 @@ def _may_be_loose(lines: Polylines) -> Bools:
     return np.asarray(~lines.closed & ((counts == 1) | of_arcs))
 
 
-def _intervals(lines: Polylines, groups: Ints, within: float) -> Intervals:
+def _intervals(lines: Polylines, groups: Ints, tolerance: float) -> Intervals:
     """Return an interval for each loose path, and for each segment of the others."""
     segments = Segments.of(lines)
     counts = np.bincount(segments.path, minlength=len(lines))
@@ -89,12 +89,14 @@ def _intervals(lines: Polylines, groups: Ints, within: float) -> Intervals:
     loose_line = ~lines.closed & (counts == 1) & ~segments.is_arc[first]
     head = first[segments.path]
     radius = np.where(segments.is_arc, segments.radius, np.nan)
-    same = (
-        (np.hypot(*(segments.centre - segments.centre[head]).T) <= within)
-        & (np.abs(radius - radius[head]) <= within)
+    same_circle = (
+        (np.hypot(*(segments.centre - segments.centre[head]).T) <= tolerance)
+        & (np.abs(radius - radius[head]) <= tolerance)
         & (segments.bulge * segments.bulge[head] > 0.0)
     )
-    loose_arc = ~lines.closed & (np.bincount(segments.path[~same], minlength=len(lines)) == 0)
+    loose_arc = ~lines.closed & (
+        np.bincount(segments.path[~same_circle], minlength=len(lines)) == 0
+    )
     loose_arc &= segments.is_arc[first]
     sweep = np.bincount(segments.path, weights=np.abs(segments.sweep), minlength=len(lines))
     loose_arc &= sweep <= 2.0 * math.pi
@@ -120,46 +122,59 @@ def _intervals(lines: Polylines, groups: Ints, within: float) -> Intervals:
     )
 
 
-def _remaining_spans(of: Intervals, found: Covers, within: float) -> dict[int, _Spans]:
+def _remaining_spans(
+    intervals: Intervals, coverings: Covers, tolerance: float
+) -> dict[int, _Spans]:
     """Return the remaining spans of each loose interval that is covered by what stays."""
-    rank = _ranks(of, np.unique(np.concatenate([found.a, found.b])))
+    rank = _ranks(intervals, np.unique(np.concatenate([coverings.a, coverings.b])))
     # A loose interval yields to what is not loose, and to loose ones that rank before it.
-    yields = ~of.loose[found.b] | (rank[found.b] < rank[found.a])
-    order = np.argsort(rank[found.a], kind="stable")
+    yields = ~intervals.loose[coverings.b] | (rank[coverings.b] < rank[coverings.a])
+    order = np.argsort(rank[coverings.a], kind="stable")
     order = order[yields[order]]
-    columns = (found.a, found.b, found.begin, found.end, found.shift, found.sense)
-    left: dict[int, _Spans] = {}
+    columns = (
+        coverings.a,
+        coverings.b,
+        coverings.begin,
+        coverings.end,
+        coverings.shift,
+        coverings.sense,
+    )
+    remaining: dict[int, _Spans] = {}
     for a, b, begin, end, shift, sense in zip(
         *(column[order].tolist() for column in columns), strict=True
     ):
-        spans = left.get(a, [(0.0, float(of.length[a]))])
-        if b in left:
-            held = [sorted((shift + sense * low, shift + sense * high)) for low, high in left[b]]
-            hidden = [(max(low, begin), min(high, end)) for low, high in held]
+        spans = remaining.get(a, [(0.0, float(intervals.length[a]))])
+        if b in remaining:
+            other_spans = [
+                sorted((shift + sense * low, shift + sense * high)) for low, high in remaining[b]
+            ]
+            hidden = [(max(low, begin), min(high, end)) for low, high in other_spans]
         else:
             hidden = [(begin, end)]
         for low, high in hidden:
-            spans = _subtract_span(spans, low, high, within)
-        left[a] = spans
-    whole = {a for a, spans in left.items() if spans == [(0.0, float(of.length[a]))]}
-    return {a: spans for a, spans in left.items() if a not in whole}
+            spans = _subtract_span(spans, low, high, tolerance)
+        remaining[a] = spans
+    untouched = {
+        a for a, spans in remaining.items() if spans == [(0.0, float(intervals.length[a]))]
+    }
+    return {a: spans for a, spans in remaining.items() if a not in untouched}
 
 
-def _ranks(of: Intervals, rows: Ints) -> Ints:
+def _ranks(intervals: Intervals, rows: Ints) -> Ints:
     """Return the rank (K,) of each interval: the longest first, then by place, independent of the
     order in which they were drawn."""
-    of_line = of.start + 0.5 * of.length[:, None] * of.direction
-    middle = np.where(np.isnan(of.centre), of_line, of.centre)
-    low = np.where(np.isnan(of.low), 0.0, np.mod(of.low, 2.0 * math.pi))
-    keys = (low, middle[:, 1], middle[:, 0], -of.length)
+    of_line = intervals.start + 0.5 * intervals.length[:, None] * intervals.direction
+    middle = np.where(np.isnan(intervals.centre), of_line, intervals.centre)
+    low = np.where(np.isnan(intervals.low), 0.0, np.mod(intervals.low, 2.0 * math.pi))
+    keys = (low, middle[:, 1], middle[:, 0], -intervals.length)
     order = np.lexsort(tuple(np.round(key[rows], 9) for key in keys))
-    rank = np.zeros(len(of.path), dtype=np.int64)
+    rank = np.zeros(len(intervals.path), dtype=np.int64)
     rank[rows[order]] = np.arange(len(rows))
     return rank
 
 
-def _subtract_span(spans: _Spans, low: float, high: float, within: float) -> _Spans:
-    """Return the spans without low … high; crumbs no longer than `within` go too."""
+def _subtract_span(spans: _Spans, low: float, high: float, tolerance: float) -> _Spans:
+    """Return the spans without low … high; crumbs no longer than `tolerance` go too."""
     if high <= low:
         return spans
     cut: _Spans = []
@@ -168,29 +183,31 @@ def _subtract_span(spans: _Spans, low: float, high: float, within: float) -> _Sp
             cut.append((begin, end))
             continue
         pieces = [(begin, min(end, low)), (max(begin, high), end)]
-        cut.extend(piece for piece in pieces if piece[1] - piece[0] > within)
+        cut.extend(piece for piece in pieces if piece[1] - piece[0] > tolerance)
     return cut
 
 
-def _span_path(lines: Polylines, of: Intervals, row: int, span: tuple[float, float]) -> Polylines:
+def _span_path(
+    lines: Polylines, intervals: Intervals, row: int, span: tuple[float, float]
+) -> Polylines:
     """Return a span of a loose interval as a path that runs as the interval was drawn."""
-    path = lines[int(of.path[row])].vertices
+    path = lines[int(intervals.path[row])].vertices
     begin, end = span
-    if math.isnan(of.radius[row]):
-        ends = of.start[row] + np.outer([begin, end], of.direction[row])
+    if math.isnan(intervals.radius[row]):
+        ends = intervals.start[row] + np.outer([begin, end], intervals.direction[row])
         vertices = np.column_stack([ends, np.zeros(2)])
         clockwise = False
     else:
         clockwise = bool(path[0, 2] < 0.0)
-        radius, low = float(of.radius[row]), float(of.low[row])
+        radius, low = float(intervals.radius[row]), float(intervals.low[row])
         parts = 1 if end - begin <= math.pi * radius else 2
         angles = np.linspace(low + begin / radius, low + end / radius, parts + 1)
         bulge = math.tan((end - begin) / radius / parts / 4.0)
-        x, y = of.centre[row][:, None] + radius * np.array([np.cos(angles), np.sin(angles)])
+        x, y = intervals.centre[row][:, None] + radius * np.array([np.cos(angles), np.sin(angles)])
         vertices = np.column_stack([x, y, np.full(parts + 1, bulge)])
     if clockwise:
         vertices = vertices[::-1] * np.array([1.0, 1.0, -1.0])
-    at_low, at_high = begin == 0.0, end == float(of.length[row])
+    at_low, at_high = begin == 0.0, end == float(intervals.length[row])
     if at_high if clockwise else at_low:
         vertices[0, :2] = path[0, :2]
     if at_low if clockwise else at_high:
@@ -267,90 +284,104 @@ class Covers(Struct, frozen=True, eq=False):
 
 def covers(all_of: Intervals, within_mm: float) -> Covers:
     """Find every interval that covers part of a loose one of another path of its group."""
-    found: list[Covers] = []
+    coverings: list[Covers] = []
     count = 0
     for part in chain(_on_lines(all_of, within_mm), _on_circles(all_of, within_mm)):
-        found.append(part)
+        coverings.append(part)
         count += len(part.a)
         if count > MAX_PAIRS:
             break
     row, place = np.empty(0, dtype=np.int64), np.empty(0)
-    every = [Covers(row, row, place, place, place, place), *found]
+    every = [Covers(row, row, place, place, place, place), *coverings]
     return Covers(*map(np.concatenate, zip(*map(astuple, every), strict=True)))
 
 
-def _on_lines(of: Intervals, within_mm: float) -> Iterator[Covers]:
+def _on_lines(intervals: Intervals, within_mm: float) -> Iterator[Covers]:
     """Bin by bin: lines of nearly one direction, turned level so that their boxes are flat."""
-    lines = np.flatnonzero(~np.isnan(of.direction[:, 0]))
-    angle = np.arctan2(of.direction[lines, 1], of.direction[lines, 0])
+    lines = np.flatnonzero(~np.isnan(intervals.direction[:, 0]))
+    angle = np.arctan2(intervals.direction[lines, 1], intervals.direction[lines, 0])
     of_bin = np.round(angle / (np.pi / BINS)).astype(np.int64) % BINS
-    for number in np.unique(of_bin[of.loose[lines]]).tolist():
-        near = lines[(of_bin - number + 1) % BINS <= 2]
-        asked = of.loose[near] & (of_bin[(of_bin - number + 1) % BINS <= 2] == number)
-        boxes = _level_boxes(of, near, number * np.pi / BINS, 0.5 * within_mm)
-        pairs = touching_boxes(boxes, of.group[near], of.path[near], asked, max_pairs=MAX_PAIRS)
+    for number in np.unique(of_bin[intervals.loose[lines]]).tolist():
+        bin_lines = lines[(of_bin - number + 1) % BINS <= 2]
+        is_searched = intervals.loose[bin_lines] & (
+            of_bin[(of_bin - number + 1) % BINS <= 2] == number
+        )
+        boxes = _level_boxes(intervals, bin_lines, number * np.pi / BINS, 0.5 * within_mm)
+        pairs = touching_boxes(
+            boxes,
+            intervals.group[bin_lines],
+            intervals.path[bin_lines],
+            is_searched,
+            max_pairs=MAX_PAIRS,
+        )
         for a, b in (pairs, pairs[::-1]):
-            wanted = asked[a]
-            yield _shared_line(of, near[a[wanted]], near[b[wanted]], within_mm)
+            is_loose = is_searched[a]
+            yield _shared_line(
+                intervals, bin_lines[a[is_loose]], bin_lines[b[is_loose]], within_mm
+            )
 
 
-def _level_boxes(of: Intervals, rows: Ints, angle: float, margin: float) -> Floats:
+def _level_boxes(intervals: Intervals, rows: Ints, angle: float, margin: float) -> Floats:
     """(R, 4) boxes of lines turned by −angle, grown by the margin."""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    start = of.start[rows]
-    end = start + of.length[rows, None] * of.direction[rows]
+    start = intervals.start[rows]
+    end = start + intervals.length[rows, None] * intervals.direction[rows]
     start, end = start @ turn, end @ turn
     low, high = np.minimum(start, end) - margin, np.maximum(start, end) + margin
     return np.concatenate([low, high], axis=1)
 
 
-def _shared_line(of: Intervals, a: Ints, b: Ints, within: float) -> Covers:
+def _shared_line(intervals: Intervals, a: Ints, b: Ints, tolerance: float) -> Covers:
     """Compute the stretch that each line a has in common with the line b of the same row.
 
     Along a, the distance of b's line is linear: it is largest at the ends of what they share.
     """
-    along, length_b = of.direction[a], of.length[b]
-    from_a = of.start[b] - of.start[a]
+    along, length_b = intervals.direction[a], intervals.length[b]
+    from_a = intervals.start[b] - intervals.start[a]
     shift = (from_a * along).sum(axis=1)
-    sense = (of.direction[b] * along).sum(axis=1)
-    aside = along[:, 0] * from_a[:, 1] - along[:, 1] * from_a[:, 0]
-    rise = along[:, 0] * of.direction[b, 1] - along[:, 1] * of.direction[b, 0]
-    far = shift + sense * length_b
-    begin = np.maximum(np.minimum(shift, far), 0.0)
-    end = np.minimum(np.maximum(shift, far), of.length[a])
+    sense = (intervals.direction[b] * along).sum(axis=1)
+    offset = along[:, 0] * from_a[:, 1] - along[:, 1] * from_a[:, 0]
+    rise = along[:, 0] * intervals.direction[b, 1] - along[:, 1] * intervals.direction[b, 0]
+    far_end = shift + sense * length_b
+    begin = np.maximum(np.minimum(shift, far_end), 0.0)
+    end = np.minimum(np.maximum(shift, far_end), intervals.length[a])
     slope = rise / np.where(sense == 0.0, np.inf, sense)
-    off = np.maximum(
-        np.abs(aside + slope * (begin - shift)), np.abs(aside + slope * (end - shift))
+    distance = np.maximum(
+        np.abs(offset + slope * (begin - shift)), np.abs(offset + slope * (end - shift))
     )
-    good = (end - begin >= MIN_SHARED_TOLERANCES * within) & (off <= within)
-    return Covers(a, b, begin, end, shift, np.where(sense < 0.0, -1.0, 1.0))[good]
+    is_shared = (end - begin >= MIN_SHARED_TOLERANCES * tolerance) & (distance <= tolerance)
+    return Covers(a, b, begin, end, shift, np.where(sense < 0.0, -1.0, 1.0))[is_shared]
 
 
-def _on_circles(of: Intervals, within_mm: float) -> Iterator[Covers]:
+def _on_circles(intervals: Intervals, within_mm: float) -> Iterator[Covers]:
     """Arcs on one circle. Circles of a grid of holes have equal centres in x, or in y, and equal
     radii: on a slanted line their centres are apart."""
-    arcs = np.flatnonzero(~np.isnan(of.radius))
-    asked = of.loose[arcs]
-    if not asked.any():
+    arcs = np.flatnonzero(~np.isnan(intervals.radius))
+    is_searched = intervals.loose[arcs]
+    if not is_searched.any():
         return
-    slanted = of.centre[arcs] @ np.array([np.cos(1.0), np.sin(1.0)])
-    place = np.column_stack([slanted, of.radius[arcs]])
+    slanted = intervals.centre[arcs] @ np.array([np.cos(1.0), np.sin(1.0)])
+    place = np.column_stack([slanted, intervals.radius[arcs]])
     boxes = np.concatenate([place - 0.5 * within_mm, place + 0.5 * within_mm], axis=1)
-    pairs = touching_boxes(boxes, of.group[arcs], of.path[arcs], asked, max_pairs=MAX_PAIRS)
+    pairs = touching_boxes(
+        boxes, intervals.group[arcs], intervals.path[arcs], is_searched, max_pairs=MAX_PAIRS
+    )
     for one, other in (pairs, pairs[::-1]):
-        a, b = arcs[one[asked[one]]], arcs[other[asked[one]]]
-        apart = np.hypot(*(of.centre[a] - of.centre[b]).T)
-        same = (apart <= within_mm) & (np.abs(of.radius[a] - of.radius[b]) <= within_mm)
-        yield from _shared_circle(of, a[same], b[same], within_mm)
+        a, b = arcs[one[is_searched[one]]], arcs[other[is_searched[one]]]
+        distances = np.hypot(*(intervals.centre[a] - intervals.centre[b]).T)
+        same_circle = (distances <= within_mm) & (
+            np.abs(intervals.radius[a] - intervals.radius[b]) <= within_mm
+        )
+        yield from _shared_circle(intervals, a[same_circle], b[same_circle], within_mm)
 
 
-def _shared_circle(of: Intervals, a: Ints, b: Ints, within: float) -> Iterator[Covers]:
+def _shared_circle(intervals: Intervals, a: Ints, b: Ints, tolerance: float) -> Iterator[Covers]:
     """Yield the stretches that each arc a has in common with the arc b of the same row: b may
     cover a's beginning and its end, from two turns."""
-    radius, turn = of.radius[a], 2.0 * np.pi
-    ahead = np.mod(of.low[b] - of.low[a], turn)
-    for shift in (ahead * radius, (ahead - turn) * radius):
+    radius, turn = intervals.radius[a], 2.0 * np.pi
+    lead_angle = np.mod(intervals.low[b] - intervals.low[a], turn)
+    for shift in (lead_angle * radius, (lead_angle - turn) * radius):
         begin = np.maximum(shift, 0.0)
-        end = np.minimum(shift + of.length[b], of.length[a])
-        good = end - begin >= MIN_SHARED_TOLERANCES * within
-        yield Covers(a, b, begin, end, shift, np.ones(len(a)))[good]
+        end = np.minimum(shift + intervals.length[b], intervals.length[a])
+        is_shared = end - begin >= MIN_SHARED_TOLERANCES * tolerance
+        yield Covers(a, b, begin, end, shift, np.ones(len(a)))[is_shared]

@@ -145,17 +145,17 @@ class Polylines:
         IndexError for one that is not there."""
         if not isinstance(indices, np.ndarray):
             indices = np.fromiter((int(index) for index in indices), dtype=np.int64)
-        chosen: Ints = indices.astype(np.int64)
-        bad = (chosen < -len(self)) | (chosen >= len(self))
-        if bad.any():
-            raise IndexError(f"path {chosen[np.argmax(bad)]} of {len(self)}")
-        chosen %= max(len(self), 1)
-        if np.array_equal(chosen, np.arange(len(self))):
+        selection: Ints = indices.astype(np.int64)
+        is_missing = (selection < -len(self)) | (selection >= len(self))
+        if is_missing.any():
+            raise IndexError(f"path {selection[np.argmax(is_missing)]} of {len(self)}")
+        selection %= max(len(self), 1)
+        if np.array_equal(selection, np.arange(len(self))):
             return self
-        counts = np.diff(self.offsets)[chosen]
+        counts = np.diff(self.offsets)[selection]
         offsets = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(counts)])
-        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[chosen] - offsets[:-1], counts)
-        return Polylines._trusted(self.vertices[rows], offsets, self.closed[chosen])
+        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[selection] - offsets[:-1], counts)
+        return Polylines._trusted(self.vertices[rows], offsets, self.closed[selection])
 
     @classmethod
     def _trusted(cls, vertices: Floats, offsets: Ints, closed: Bools) -> Polylines:
@@ -223,7 +223,9 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
         last = following == offsets[path + 1]
         following[last] = offsets[path[last]]
         # Rows are taken several times as fast as they are indexed.
-        start, end = (vertices.take(which, axis=0)[:, :2].copy() for which in (rows, following))
+        start, end = (
+            vertices.take(outgoing, axis=0)[:, :2].copy() for outgoing in (rows, following)
+        )
         return cls.between(start, end, vertices[rows, 2], path)
 
     @classmethod
@@ -249,8 +251,8 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
     def centre(self) -> Floats:
         """Centres (K, 2) of arcs, mm; NaN for lines."""
         chord, safe = self.end - self.start, np.where(self.is_arc, self.bulge, 1.0)
-        turned = np.column_stack([-chord[:, 1], chord[:, 0]])
-        middle = 0.5 * (self.start + self.end) + ((1.0 - safe**2) / (4.0 * safe))[:, None] * turned
+        normal = np.column_stack([-chord[:, 1], chord[:, 0]])
+        middle = 0.5 * (self.start + self.end) + ((1.0 - safe**2) / (4.0 * safe))[:, None] * normal
         return np.where(self.is_arc[:, None], middle, np.nan)
 
     @cached_property
@@ -291,19 +293,19 @@ def _check_vertices(vertices: Floats, offsets: Ints, closed: Bools | list[bool])
     bulge[offsets[1:][~is_closed] - 1] = 0.0
     finite = np.isfinite(array[:, :2]).all(axis=1) & np.isfinite(bulge)
     _refuse(~finite, "a number is not finite", offsets)
-    over = np.abs(bulge) > 1.0
+    is_large = np.abs(bulge) > 1.0
     _refuse(np.abs(bulge) > 1.0 + BULGE_EPS, "|bulge| above 1: split the arc", offsets)
-    bulge[over] = np.sign(bulge[over])
+    bulge[is_large] = np.sign(bulge[is_large])
     bulge[np.abs(bulge) < BULGE_EPS] = 0.0
     if bulge.tobytes() != array[:, 2].tobytes():
         array = array.copy() if is_own else array
         array[:, 2] = bulge
     array.flags.writeable = False
     lines = Polylines._trusted(array, offsets, is_closed)
-    short = np.concatenate([np.empty(0, np.bool_), *map(_is_short, Segments.lots(lines))])
-    if short.any():
+    is_short = np.concatenate([np.empty(0, np.bool_), *map(_is_short, Segments.lots(lines))])
+    if is_short.any():
         repeated = np.zeros(len(array), dtype=np.bool_)
-        repeated[segment_rows(lines)] = short
+        repeated[segment_rows(lines)] = is_short
         _refuse(repeated, "a point is repeated", offsets)
     return array
 
@@ -314,11 +316,11 @@ def _is_short(segments: Segments) -> Bools:
     return np.asarray(np.hypot(chord[:, 0], chord[:, 1]) <= POSITION_EPS_MM)
 
 
-def _refuse(bad: Bools, message: str, offsets: Ints) -> None:
+def _refuse(is_bad: Bools, message: str, offsets: Ints) -> None:
     """Raise GeometryError with path and vertex of the first bad row, if there is one."""
-    if not bad.any():
+    if not is_bad.any():
         return
-    row = int(np.argmax(bad))
+    row = int(np.argmax(is_bad))
     path = int(np.searchsorted(offsets, row, side="right")) - 1
     raise GeometryError(message, where=f"path {path}, vertex {row - int(offsets[path])}")
 
@@ -338,21 +340,21 @@ def reverse(p: Polyline) -> Polyline:
     return Polyline(vertices, p.closed)
 
 
-def reverse_lines(lines: Polylines, which: Bools | None = None) -> Polylines:
-    """Return the paths with all (or those of `which` (M,)) travelled backwards, as `reverse`
+def reverse_lines(lines: Polylines, is_chosen: Bools | None = None) -> Polylines:
+    """Return the paths with all (or those of `is_chosen` (M,)) travelled backwards, as `reverse`
     does."""
-    if which is not None and not which.any():
+    if is_chosen is not None and not is_chosen.any():
         return lines
     counts = np.diff(lines.offsets)
     low, count = np.repeat(lines.offsets[:-1], counts), np.repeat(counts, counts)
     place = np.arange(len(low)) - low
-    back = np.where(np.repeat(lines.closed, counts), count - place, count - 1 - place) % count
-    bulge = 0.0 - lines.vertices[low + (back - 1) % count, 2]
-    if which is not None:
-        turned = np.repeat(which, counts)
-        back = np.where(turned, back, place)
-        bulge = np.where(turned, bulge, lines.vertices[:, 2])
-    vertices = lines.vertices[low + back]
+    sources = np.where(np.repeat(lines.closed, counts), count - place, count - 1 - place) % count
+    bulge = 0.0 - lines.vertices[low + (sources - 1) % count, 2]
+    if is_chosen is not None:
+        is_reversed = np.repeat(is_chosen, counts)
+        sources = np.where(is_reversed, sources, place)
+        bulge = np.where(is_reversed, bulge, lines.vertices[:, 2])
+    vertices = lines.vertices[low + sources]
     vertices[:, 2] = bulge
     return Polylines._trusted(vertices, lines.offsets, lines.closed)
 
@@ -361,8 +363,8 @@ def rotate(p: Polyline, angle_rad: float) -> Polyline:
     """Return the path turned about (0, 0), CCW positive."""
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
     x, y, bulge = p.vertices.T
-    turned = np.column_stack([cosine * x - sine * y, sine * x + cosine * y, bulge])
-    return Polyline(turned, p.closed)
+    vertices = np.column_stack([cosine * x - sine * y, sine * x + cosine * y, bulge])
+    return Polyline(vertices, p.closed)
 
 
 def begin_at(p: Polyline, start_index: int) -> Polyline:
@@ -416,29 +418,32 @@ def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bool
     return keep, repeated
 
 
-def encloses(vertices: Floats, owner: Ints, left: Ints) -> Bools:
-    """Mask (M,), false for paths of two vertices (of `left` (M,)) without a bulge: there and
+def encloses(vertices: Floats, owner: Ints, counts: Ints) -> Bools:
+    """Mask (M,), false for paths of two vertices (of `counts` (M,)) without a bulge: there and
     back along one line encloses nothing; it is that line, once. `owner` (N,) names each
     vertex's path."""
-    bent = np.bincount(owner, weights=vertices[:, 2] != 0.0, minlength=len(left))
-    return np.asarray((left != 2) | (bent != 0.0))
+    bent = np.bincount(owner, weights=vertices[:, 2] != 0.0, minlength=len(counts))
+    return np.asarray((counts != 2) | (bent != 0.0))
 
 
 def _leave_out(path: Floats, keep: Bools) -> None:
     """Remove vertices of one path from `keep`, which is false for those on the one before them:
     those on the last one that is kept, which takes the bulge of the last of these."""
-    done = 0
+    next_row = 0
     for row in np.flatnonzero(~keep).tolist():
-        if row < done:
+        if row < next_row:
             continue
-        last, done = row - 1, row
-        while done < len(path) and math.dist(path[done, :2], path[last, :2]) <= POSITION_EPS_MM:
-            keep[done] = False
-            path[last, 2] = path[done, 2]
-            done += 1
-        if done < len(path):
-            keep[done] = True
-            done += 1
+        last, next_row = row - 1, row
+        while (
+            next_row < len(path)
+            and math.dist(path[next_row, :2], path[last, :2]) <= POSITION_EPS_MM
+        ):
+            keep[next_row] = False
+            path[last, 2] = path[next_row, 2]
+            next_row += 1
+        if next_row < len(path):
+            keep[next_row] = True
+            next_row += 1
 
 
 def _drop_closing(vertices: Floats, keep: Bools, owner: Ints, first: Ints, closed: Bools) -> None:
@@ -449,8 +454,8 @@ def _drop_closing(vertices: Floats, keep: Bools, owner: Ints, first: Ints, close
         is_last = np.append(owner[rows][1:] != owner[rows][:-1], True) & waiting[owner[rows]]
         last = rows[is_last]
         begin = first[owner[last]]
-        apart = np.hypot(*(vertices[last, :2] - vertices[begin, :2]).T)
-        same = (apart <= POSITION_EPS_MM) & (last != begin)
-        keep[last[same]] = False
+        distances = np.hypot(*(vertices[last, :2] - vertices[begin, :2]).T)
+        is_double = (distances <= POSITION_EPS_MM) & (last != begin)
+        keep[last[is_double]] = False
         waiting[:] = False
-        waiting[owner[last[same]]] = True
+        waiting[owner[last[is_double]]] = True

@@ -57,17 +57,15 @@ def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
     vertices = path.vertices
     if path.closed:
         vertices = np.concatenate([vertices, vertices[:1]])
-    rows, found = _replace_chords(vertices, noise, tolerance_mm)
-    if path.closed and found and not _is_full_circle(rows):
+    rows, arcs = _replace_chords(vertices, noise, tolerance_mm)
+    if path.closed and arcs and not _is_full_circle(rows):
         # Begin anew where an arc ends, so that no arc is cut by where the path began.
-        first = found[0][1] % len(path.vertices)
+        first = arcs[0][1] % len(path.vertices)
         vertices = np.roll(path.vertices, -first, axis=0)
-        rows, found = _replace_chords(
-            np.concatenate([vertices, vertices[:1]]), noise, tolerance_mm
-        )
-    if not found:
+        rows, arcs = _replace_chords(np.concatenate([vertices, vertices[:1]]), noise, tolerance_mm)
+    if not arcs:
         return path, 0
-    return Polyline(rows[:-1] if path.closed else rows, path.closed), len(found)
+    return Polyline(rows[:-1] if path.closed else rows, path.closed), len(arcs)
 
 
 def rounding_noise(points: Floats) -> float:
@@ -85,7 +83,7 @@ def _replace_chords(
 ) -> tuple[Floats, list[tuple[int, int]]]:
     """Return the open path with its arcs, and the first and last vertex of each before."""
     keep = np.ones(len(vertices), dtype=np.bool_)
-    found: list[tuple[int, int]] = []
+    arcs: list[tuple[int, int]] = []
     inserted: list[tuple[int, Floats]] = []
     rows = vertices.copy()
     for begin, end in _line_runs(vertices):
@@ -105,15 +103,15 @@ def _replace_chords(
             rows[high, :2] = arc[-1, :2]
             if len(arc) == 3:
                 inserted.append((low + 1, arc[1]))
-            found.append((low, high))
-    if not found:
-        return vertices, found
+            arcs.append((low, high))
+    if not arcs:
+        return vertices, arcs
     place = np.cumsum(keep) - 1  # where a kept row is afterwards
-    kept = rows[keep]
+    kept_rows = rows[keep]
     if inserted:
-        at = [int(place[row - 1]) + 1 for row, _ in inserted]
-        kept = np.insert(kept, at, np.array([row for _, row in inserted]), axis=0)
-    return kept, found
+        places = [int(place[row - 1]) + 1 for row, _ in inserted]
+        kept_rows = np.insert(kept_rows, places, np.array([row for _, row in inserted]), axis=0)
+    return kept_rows, arcs
 
 
 def _line_runs(vertices: Floats) -> list[tuple[int, int]]:
@@ -130,8 +128,8 @@ def _arcs(start: Floats, end: Floats, circle: Floats) -> Iterator[Floats]:
     turn = math.copysign(1.0, sweep)
     if np.array_equal(start, end):
         side = (start - centre) / np.hypot(*(start - centre))
-        around, across = centre + radius * side, centre - radius * side
-        yield np.array([[*around, turn], [*across, turn], [*around, 0.0]])
+        far_point, across = centre + radius * side, centre - radius * side
+        yield np.array([[*far_point, turn], [*across, turn], [*far_point, 0.0]])
         return
     if abs(sweep) <= math.pi * (1.0 + HALF_SLACK):
         bulge = math.tan(0.25 * sweep)
@@ -170,20 +168,20 @@ def without_tiny(lines: Polylines, limit_mm: float) -> MergedPaths:
 
     A path of which too little would be left stays as it is.
     """
-    short = np.zeros(len(lines), dtype=np.bool_)
+    has_short = np.zeros(len(lines), dtype=np.bool_)
     for segments in Segments.lots(lines):
-        short[segments.path[segment_lengths(segments) <= limit_mm]] = True
-    if not short.any():
+        has_short[segments.path[segment_lengths(segments) <= limit_mm]] = True
+    if not has_short.any():
         return MergedPaths(lines, 0)
-    paths, gone = list(lines), 0
-    for index in np.flatnonzero(short).tolist():
+    paths, removed = list(lines), 0
+    for index in np.flatnonzero(has_short).tolist():
         path = paths[index]
-        keep, moved = _merge_vertices(path, segment_lengths(Segments.of(path)), limit_mm)
-        made = _path_of(path, keep, moved)
-        if made is not None:
-            gone += len(path) - len(made)
-            paths[index] = made
-    return MergedPaths(Polylines.of(paths), gone)
+        keep, positions = _merge_vertices(path, segment_lengths(Segments.of(path)), limit_mm)
+        shortened = _path_of(path, keep, positions)
+        if shortened is not None:
+            removed += len(path) - len(shortened)
+            paths[index] = shortened
+    return MergedPaths(Polylines.of(paths), removed)
 
 
 def _merge_vertices(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints, Ints]:
