@@ -115,30 +115,30 @@ def assemble(
         callouts=tuple(callouts),
     )
     # What is drawn twice has a finding of its own.
-    once = [item for item in clean.skipped if item.reason != IS_DRAWN_TWICE]
-    found = [*findings, *skip_findings(skipped, [*unwanted, *once, *repeated])]
-    return replace(drawing, findings=(*found, *_drawing_findings(drawing, options)))
+    other_skips = [item for item in clean.skipped if item.reason != IS_DRAWN_TWICE]
+    all_findings = [*findings, *skip_findings(skipped, [*unwanted, *other_skips, *repeated])]
+    return replace(drawing, findings=(*all_findings, *_drawing_findings(drawing, options)))
 
 
 def _closed_contours_left_out(
-    every: Sequence[Piece], chosen: Sequence[Piece], file: str, options: ReadOptions
+    every: Sequence[Piece], chosen_pieces: Sequence[Piece], file: str, options: ReadOptions
 ) -> Unchosen:
     """The closed contours among the pieces that were not chosen.
 
     They are joined among themselves alone, without findings, because they are not cut. Pieces with
     coordinates that are not finite or too large are left out.
     """
-    kept = set(chosen)
-    others = [piece for piece in every if piece not in kept and is_placed(piece)]
-    if not others:
+    chosen_set = set(chosen_pieces)
+    unchosen = [piece for piece in every if piece not in chosen_set and is_placed(piece)]
+    if not unchosen:
         return Unchosen()
-    found = heal_contours(others, clean_pieces(others, file), options)
-    rows = np.flatnonzero(found.lines.closed).tolist()
-    first = [others[found.members[row][0]] for row in rows]
+    healed = heal_contours(unchosen, clean_pieces(unchosen, file), options)
+    rows = np.flatnonzero(healed.lines.closed).tolist()
+    first = [unchosen[healed.members[row][0]] for row in rows]
     return Unchosen(
-        paths=found.lines.select(rows),
+        paths=healed.lines.select(rows),
         layers=tuple(piece.layer for piece in first),
-        sources=tuple(_source([others[k] for k in found.members[row]]) for row in rows),
+        sources=tuple(_source([unchosen[k] for k in healed.members[row]]) for row in rows),
         line_types=tuple(piece.line_type for piece in first),
     )
 
@@ -159,16 +159,16 @@ def _source(members: Sequence[Piece]) -> str:
     if len(members) == 1:
         return members[0].source
     names = list(dict.fromkeys(piece.source for piece in members))
-    more = len(names) - _SOURCES_NAMED
+    extra = len(names) - _SOURCES_NAMED
     head = " + ".join(names[:_SOURCES_NAMED])
-    return f"{head} + {more} more" if more > 0 else head
+    return f"{head} + {extra} more" if extra > 0 else head
 
 
 def _nothing_drawn_error(skipped: Sequence[Skipped], file: str) -> DrawingError:
     """The error for a drawing without geometry, saying what it held instead."""
-    held = ", ".join(f"{item.count} {item.kind} ({item.reason})" for item in skipped)
+    contents = ", ".join(f"{item.count} {item.kind} ({item.reason})" for item in skipped)
     return DrawingError(
-        "holds no lines or curves" + (f", only {held}" if held else ""),
+        "holds no lines or curves" + (f", only {contents}" if contents else ""),
         file=file,
         mend="check what was exported, and that its layers are visible",
     )
@@ -178,23 +178,23 @@ def _nothing_drawn_error(skipped: Sequence[Skipped], file: str) -> DrawingError:
 
 
 def selected_with_marks(
-    pieces: Sequence[Piece], marks: Sequence[Mark], wanted: Selection, file: str
+    pieces: Sequence[Piece], marks: Sequence[Mark], selection: Selection, file: str
 ) -> tuple[list[Piece], list[Mark], list[Skipped]]:
     """The chosen pieces and marks, and what was left out and why.
 
     Both go through one selection, so that a layer of marks alone is a layer that exists.
     Raises DrawingError as `selected` does.
     """
-    if wanted == Selection():
+    if selection == Selection():
         return list(pieces), list(marks), []
     nowhere = np.zeros((1, 3))
     standing_in = {
         Piece(nowhere, False, mark.layer, mark.colour, mark.source, mark.line_type): mark
         for mark in marks
     }
-    kept, gone = select_pieces([*pieces, *standing_in], wanted, file)
-    lines = [piece for piece in kept if piece not in standing_in]
-    return lines, [standing_in[piece] for piece in kept if piece in standing_in], gone
+    selected, skips = select_pieces([*pieces, *standing_in], selection, file)
+    lines = [piece for piece in selected if piece not in standing_in]
+    return lines, [standing_in[piece] for piece in selected if piece in standing_in], skips
 
 
 def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], list[Skipped]]:
@@ -202,9 +202,9 @@ def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], l
 
     DrawingError when a number is not finite or beyond MAX_COORDINATE_MM.
     """
-    kept: list[Mark] = []
-    seen: set[tuple[str, int, int]] = set()
-    gone: Counter[str] = Counter()
+    unique_marks: list[Mark] = []
+    cells: set[tuple[str, int, int]] = set()
+    removed: Counter[str] = Counter()
     for mark in marks:
         if not all(math.isfinite(v) and abs(v) <= MAX_COORDINATE_MM for v in mark.at_mm):
             where = f"layer {mark.layer}, {mark.source}"
@@ -212,12 +212,14 @@ def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], l
                 "a point has a number that is not finite or too large", file=file, where=where
             )
         column, row = (round(value / POSITION_EPS_MM) for value in mark.at_mm)
-        if (mark.layer, column, row) in seen:
-            gone[mark.source.partition(" ")[0]] += 1
+        if (mark.layer, column, row) in cells:
+            removed[mark.source.partition(" ")[0]] += 1
             continue
-        seen.add((mark.layer, column, row))
-        kept.append(mark)
-    return tuple(kept), [Skipped(kind, count, IS_DRAWN_TWICE) for kind, count in gone.items()]
+        cells.add((mark.layer, column, row))
+        unique_marks.append(mark)
+    return tuple(unique_marks), [
+        Skipped(kind, count, IS_DRAWN_TWICE) for kind, count in removed.items()
+    ]
 
 
 # Findings of a drawing, each with its place.
@@ -268,11 +270,11 @@ def size_findings(drawing: Drawing) -> list[Finding]:
         return []
     if MIN_SIZE_MM <= longest <= MAX_SIZE_MM:
         return []
-    small = longest < MIN_SIZE_MM
+    is_small = longest < MIN_SIZE_MM
     return [
         IMPLAUSIBLE_SIZE(
             measured=longest,
-            limit=MIN_SIZE_MM if small else MAX_SIZE_MM,
+            limit=MIN_SIZE_MM if is_small else MAX_SIZE_MM,
             width=width,
             height=height,
             drawn_in=units.name,
@@ -284,7 +286,7 @@ def size_findings(drawing: Drawing) -> list[Finding]:
 def gap_findings(gaps: Sequence[Gap], gap_mm: float, *, closed: bool) -> list[Finding]:
     """A finding for each gap, largest first, and one for all that are more than are read."""
     ranked = sorted(gaps, key=lambda gap: -gap.size_mm if closed else gap.size_mm)
-    found = [
+    findings = [
         (GAP_CLOSED if closed else GAP_OPEN)(
             where=_where(gap.layer, gap.at_mm),
             measured=gap.size_mm,
@@ -295,7 +297,7 @@ def gap_findings(gaps: Sequence[Gap], gap_mm: float, *, closed: bool) -> list[Fi
     ]
     sizes = [gap.size_mm for gap in ranked[MAX_GAP_FINDINGS:]]
     if sizes:
-        found.append(
+        findings.append(
             (GAP_CLOSED_MORE if closed else GAP_OPEN_MORE)(
                 measured=max(sizes),
                 limit=gap_mm,
@@ -304,35 +306,35 @@ def gap_findings(gaps: Sequence[Gap], gap_mm: float, *, closed: bool) -> list[Fi
                 most_um=max(sizes) * UM_PER_MM,
             )
         )
-    return found
+    return findings
 
 
 def healing_findings(healed: Healing, tolerance_mm: float) -> list[Finding]:
     """Return a finding for each kind of repair; branches and crossings name their places."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if healed.duplicates or healed.overlaps:
         length = healed.duplicates_mm + healed.overlaps_mm
-        found.append(
+        findings.append(
             DRAWN_TWICE(measured=length, doubles=healed.duplicates, overlaps=healed.overlaps)
         )
     if healed.tiny_merged:
-        found.append(TINY_MERGED(measured=healed.tiny_merged, limit=tolerance_mm))
+        findings.append(TINY_MERGED(measured=healed.tiny_merged, limit=tolerance_mm))
     if healed.arcs_recognised:
-        found.append(ARCS_RECOGNISED(measured=healed.arcs_recognised, limit=tolerance_mm))
-    return [*found, *_branch_findings(healed), *_crossing_findings(healed.crossings)]
+        findings.append(ARCS_RECOGNISED(measured=healed.arcs_recognised, limit=tolerance_mm))
+    return [*findings, *_branch_findings(healed), *_crossing_findings(healed.crossings)]
 
 
 def _branch_findings(healed: Healing) -> list[Finding]:
     """Branches where the most ends meet first, the rest counted."""
     ranked = sorted(healed.branches, key=lambda branch: -branch.ends)
-    found = [
+    findings = [
         BRANCHED(where=_where(branch.layer, branch.at_mm), measured=branch.ends, limit=2.0)
         for branch in ranked[:MAX_PLACES]
     ]
-    more = len(ranked) - MAX_PLACES
-    if more > 0:
-        found.append(BRANCHED_MORE(measured=more))
-    return found
+    extra = len(ranked) - MAX_PLACES
+    if extra > 0:
+        findings.append(BRANCHED_MORE(measured=extra))
+    return findings
 
 
 def _crossing_findings(crossings: Sequence[SelfCrossing]) -> list[Finding]:
@@ -340,14 +342,18 @@ def _crossing_findings(crossings: Sequence[SelfCrossing]) -> list[Finding]:
     MAX_PLACES are counted."""
     times = Counter(crossing.path for crossing in crossings)
     first = {crossing.path: crossing for crossing in reversed(crossings)}
-    found = []
+    findings = []
     for path, count in sorted(times.items())[:MAX_PLACES]:
-        at = first[path]
-        found.append(SELF_CROSSING(where=_where(at.layer, at.at_mm), measured=count, limit=0.0))
-    more = len(times) - MAX_PLACES
-    if more > 0:
-        found.append(SELF_CROSSING_MORE(measured=more))
-    return found
+        first_crossing = first[path]
+        findings.append(
+            SELF_CROSSING(
+                where=_where(first_crossing.layer, first_crossing.at_mm), measured=count, limit=0.0
+            )
+        )
+    extra = len(times) - MAX_PLACES
+    if extra > 0:
+        findings.append(SELF_CROSSING_MORE(measured=extra))
+    return findings
 
 
 def _where(layer: str, at_mm: tuple[float, float]) -> str:

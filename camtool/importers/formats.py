@@ -133,14 +133,14 @@ def _by_bytes(data: bytes, file: str) -> str | None:
             return "svg"
         raise DrawingError("is compressed with gzip", file=file, mend="unpack it first (gunzip)")
     if data.startswith(_ZIP):
-        what, mend = next(
+        complaint, mend = next(
             (answer for sign, answer in _ZIPPED.items() if sign in data[:HEAD_BYTES]),
             ("is a ZIP archive", "unpack it first"),
         )
-        raise DrawingError(what, file=file, mend=mend)
-    for pattern, (what, mend) in _OTHERS.items():
+        raise DrawingError(complaint, file=file, mend=mend)
+    for pattern, (complaint, mend) in _OTHERS.items():
         if re.match(pattern, data[:HEAD_BYTES], re.DOTALL):
-            raise DrawingError(what, file=file, mend=mend)
+            raise DrawingError(complaint, file=file, mend=mend)
     return None
 
 
@@ -198,10 +198,10 @@ def _xml(head: str, file: str) -> str:
 
 def _xml_root(head: str) -> str | None:
     """The name of the first element, without its prefix; None when none is to be seen."""
-    at = 0
-    while found := _XML_BEFORE.match(head, at):
-        at = found.end()
-    element = _XML_ELEMENT.match(head, at)
+    offset = 0
+    while match := _XML_BEFORE.match(head, offset):
+        offset = match.end()
+    element = _XML_ELEMENT.match(head, offset)
     # A head that was cut within a comment or a DOCTYPE shows no element.
     return element[1].lower() if element else None
 
@@ -216,12 +216,12 @@ def _unpacked_head(data: bytes) -> bytes:
 
 def _refuse_program(head: str, file: str) -> None:
     """DrawingError when the first line that is no comment is a block of a machine program."""
-    at = 0
-    while at < len(head) and (comment := _COMMENT.match(head, at)):
-        if comment.end() == at:
+    offset = 0
+    while offset < len(head) and (comment := _COMMENT.match(head, offset)):
+        if comment.end() == offset:
             break
-        at = comment.end()
-    if _G_BLOCK.match(head, at) and _G_CODE.search(head):
+        offset = comment.end()
+    if _G_BLOCK.match(head, offset) and _G_CODE.search(head):
         raise NoDrawingError(
             "is a machine program (G-code), no drawing",
             file=file,

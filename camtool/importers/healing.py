@@ -69,39 +69,39 @@ def clean_pieces(pieces: Sequence[Piece], file: str) -> Cleaned:
     keep, repeated = without_repeats(vertices, counts, closed)
     owner = np.repeat(np.arange(len(pieces)), counts)[keep]
     vertices = _select_rows(vertices, keep)
-    left = np.bincount(owner, minlength=len(pieces))
-    long_enough = left >= 2
-    closed &= encloses(vertices, owner, left)
-    gone = _kinds(pieces, ~long_enough, "has no length")
+    remaining = np.bincount(owner, minlength=len(pieces))
+    long_enough = remaining >= 2
+    closed &= encloses(vertices, owner, remaining)
+    skips = _kinds(pieces, ~long_enough, "has no length")
     points = _kinds(pieces, long_enough & (repeated > 0), "is repeated", repeated, "point of ")
     rows = np.flatnonzero(long_enough)
-    chosen = [pieces[row] for row in rows.tolist()]
+    lasting = [pieces[row] for row in rows.tolist()]
     vertices = _select_rows(vertices, long_enough[owner])
     vertices.flags.writeable = False
-    lines = _lines(vertices, left[rows], closed[rows], chosen, file)
-    once = _drawn_once(lines, [(piece.layer, piece.colour) for piece in chosen])
+    lines = _lines(vertices, remaining[rows], closed[rows], lasting, file)
+    is_first = _drawn_once(lines, [(piece.layer, piece.colour) for piece in lasting])
     twice = np.zeros(len(pieces), dtype=np.bool_)
-    twice[rows[~once]] = True
+    twice[rows[~is_first]] = True
     lengths = path_lengths(lines)
     return Cleaned(
-        lines=lines.select(np.flatnonzero(once)),
-        piece=rows[once],
-        skipped=(*gone, *points, *_kinds(pieces, twice, IS_DRAWN_TWICE)),
-        duplicates=int(np.count_nonzero(~once)),
-        duplicates_mm=float(lengths[~once].sum()),
+        lines=lines.select(np.flatnonzero(is_first)),
+        piece=rows[is_first],
+        skipped=(*skips, *points, *_kinds(pieces, twice, IS_DRAWN_TWICE)),
+        duplicates=int(np.count_nonzero(~is_first)),
+        duplicates_mm=float(lengths[~is_first].sum()),
     )
 
 
-def _select_rows(rows: Floats, chosen: Bools) -> Floats:
+def _select_rows(rows: Floats, is_chosen: Bools) -> Floats:
     """The chosen rows; the very array where these are all."""
-    return rows if chosen.all() else rows[chosen]
+    return rows if is_chosen.all() else rows[is_chosen]
 
 
 def is_placed(piece: Piece) -> bool:
     """True if every number of a piece is finite, and every point within MAX_COORDINATE_MM."""
     vertices = piece.vertices
-    near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all()
-    return bool(near and np.isfinite(vertices).all())
+    is_near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all()
+    return bool(is_near and np.isfinite(vertices).all())
 
 
 def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
@@ -111,10 +111,10 @@ def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
         raise too_many_points(file)
     vertices = np.concatenate([piece.vertices for piece in pieces], dtype=np.float64)
     finite = np.asarray(np.isfinite(vertices).all(axis=1))
-    near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all(axis=1)
-    if (finite & near).all():
+    is_near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all(axis=1)
+    if (finite & is_near).all():
         return vertices, counts
-    row = int(np.argmin(finite & near))
+    row = int(np.argmin(finite & is_near))
     where = pieces[int(np.searchsorted(np.cumsum(counts), row, side="right"))].where
     if not finite[row]:
         raise DrawingError("a number is not finite", file=file, where=where)
@@ -129,14 +129,14 @@ def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
 
 def _kinds(
     pieces: Sequence[Piece],
-    chosen: Bools,
+    is_chosen: Bools,
     reason: str,
     times: Ints | None = None,
     before: str = "",
 ) -> list[Skipped]:
     """The chosen pieces counted by kind; `times` counts each so often."""
     counts: Counter[str] = Counter()
-    for index in np.flatnonzero(chosen).tolist():
+    for index in np.flatnonzero(is_chosen).tolist():
         counts[pieces[index].kind] += 1 if times is None else int(times[index])
     return [Skipped(before + kind, count, reason) for kind, count in counts.items()]
 
@@ -170,30 +170,30 @@ def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
     segment[lines.offsets[1:][~lines.closed] - 1] = 0
     kind = 2 * numbered(list(styles), count) + lines.closed
     key = _mix_bits(np.add.reduceat(segment, lines.offsets[:-1]) + _mix_bits(kind.view(np.uint64)))
-    once = np.zeros(count, dtype=np.bool_)
-    once[np.unique(key, return_index=True)[1]] = True
-    return once
+    is_first = np.zeros(count, dtype=np.bool_)
+    is_first[np.unique(key, return_index=True)[1]] = True
+    return is_first
 
 
 def segment_numbers(vertices: Floats, begin: Ints | Indices, end: Ints | Indices) -> _Words:
     """(K,) a number mixed from the rounded ends and the bulge of the segment between two vertices
     (of N, 3), the rows (K,) of which are given; the same in both directions."""
-    found = np.empty(len(begin), dtype=np.uint64)
+    numbers = np.empty(len(begin), dtype=np.uint64)
     for first in range(0, len(begin), SEGMENTS_AT_ONCE):
-        some = slice(first, first + SEGMENTS_AT_ONCE)
+        batch = slice(first, first + SEGMENTS_AT_ONCE)
         # Adding 0 makes −0 and 0 one.
-        grid, ahead = (
-            (np.round(vertices[rows[some]] / POSITION_EPS_MM) + 0.0).astype(np.int64)
+        grid, next_grid = (
+            (np.round(vertices[rows[batch]] / POSITION_EPS_MM) + 0.0).astype(np.int64)
             for rows in (begin, end)
         )
         point, onward = (
             _mix_bits(_mix_bits(place[:, 0].view(np.uint64)) + place[:, 1].view(np.uint64))
-            for place in (grid, ahead)
+            for place in (grid, next_grid)
         )
         bend = np.where(onward < point, -grid[:, 2], grid[:, 2]).view(np.uint64)
         segment = _mix_bits(_mix_bits(np.minimum(point, onward)) + np.maximum(point, onward))
-        found[some] = _mix_bits(segment + bend)
-    return found
+        numbers[batch] = _mix_bits(segment + bend)
+    return numbers
 
 
 def _mix_bits(words: _Words) -> _Words:
@@ -228,15 +228,15 @@ def gap_of(options: ReadOptions) -> float:
 
 def heal_contours(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions) -> Healed:
     """The contours of the cleaned pieces."""
-    chosen = [pieces[index] for index in clean.piece.tolist()]
-    places = [("" if options.across_layers else piece.layer, piece.colour) for piece in chosen]
-    within = min(SAME_LINE_MM, options.tolerance_mm)
-    single = without_overlaps(clean.lines, numbered(places, len(chosen)), within)
-    of = clean.piece[single.source]
-    chained = _chain_paths(pieces, single.lines, of, options)
+    lasting = [pieces[index] for index in clean.piece.tolist()]
+    places = [("" if options.across_layers else piece.layer, piece.colour) for piece in lasting]
+    tolerance = min(SAME_LINE_MM, options.tolerance_mm)
+    single = without_overlaps(clean.lines, numbered(places, len(lasting)), tolerance)
+    sources = clean.piece[single.source]
+    chained = _chain_paths(pieces, single.lines, sources, options)
     lines, arcs = _recognise_arcs(chained.lines, options)
     merged = without_tiny(lines, TINY_SHARE * options.tolerance_mm)
-    members = _members(chained.members, of)
+    members = _members(chained.members, sources)
     return Healed(
         lines=merged.lines,
         members=members,
@@ -255,23 +255,24 @@ def heal_contours(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions)
     )
 
 
-def _members(chains: tuple[tuple[int, ...], ...], of: Ints) -> tuple[tuple[int, ...], ...]:
-    """The pieces of each chain of paths, each once; `of` says which piece each path is from."""
-    if np.array_equal(of, np.arange(len(of))):
+def _members(chains: tuple[tuple[int, ...], ...], sources: Ints) -> tuple[tuple[int, ...], ...]:
+    """The pieces of each chain of paths, each once; `sources` says which piece each path is
+    from."""
+    if np.array_equal(sources, np.arange(len(sources))):
         return chains
-    rows = of.tolist()
+    rows = sources.tolist()
     return tuple(tuple(dict.fromkeys(rows[index] for index in one)) for one in chains)
 
 
 def _chain_paths(
-    pieces: Sequence[Piece], lines: Polylines, of: Ints, options: ReadOptions
+    pieces: Sequence[Piece], lines: Polylines, sources: Ints, options: ReadOptions
 ) -> Chained:
     """The paths joined, within their layers unless `across_layers`."""
-    chosen = [pieces[index] for index in of.tolist()]
-    layers = [piece.layer for piece in chosen]
+    members = [pieces[index] for index in sources.tolist()]
+    layers = [piece.layer for piece in members]
     kinds = Kinds(
         groups=None if options.across_layers else layers,
-        styles=[(piece.colour, piece.line_type) for piece in chosen],
+        styles=[(piece.colour, piece.line_type) for piece in members],
         layers=layers,
     )
     return chain(lines, gap_of(options), kinds=kinds)
@@ -282,8 +283,8 @@ def _recognise_arcs(lines: Polylines, options: ReadOptions) -> tuple[Polylines, 
     if not options.recognise_arcs:
         return lines, 0
 
-    made = [recognise_arcs(path, options.tolerance_mm) for path in lines]
-    return Polylines.of(path for path, _ in made), sum(count for _, count in made)
+    results = [recognise_arcs(path, options.tolerance_mm) for path in lines]
+    return Polylines.of(path for path, _ in results), sum(count for _, count in results)
 
 
 # How far contours lie from what was drawn: fitting and mending together, measured.
@@ -304,26 +305,35 @@ PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
 def distance_from_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
     """(N, 2) mm: the largest and the rms distance between what was drawn as `pieces` and the
     segment that leaves each vertex of the paths made of them."""
-    nothing = np.broadcast_to(0.0, (len(lines.vertices), 2))  # one number, seen as many
-    drawn, said = _drawn_segments(pieces)
+    zeros = np.broadcast_to(0.0, (len(lines.vertices), 2))  # one number, seen as many
+    drawn, drawn_off = _drawn_segments(pieces)
     if not len(drawn) or not len(lines):
-        return nothing
+        return zeros
     rows = segment_rows(lines).astype(np.int32)
-    made = _Joined(lines.vertices, rows, next_vertices(lines.offsets)[rows].astype(np.int32))
-    drawn_as, made_as = drawn.numbers(), made.numbers()
-    kept, gone = _is_among(made_as, drawn_as), ~_is_among(drawn_as, made_as)
-    if not said.any() and not gone.any() and kept.all():
-        return nothing
-    found = np.zeros((len(lines.vertices), 2))
-    if said.any():
+    result = _Joined(lines.vertices, rows, next_vertices(lines.offsets)[rows].astype(np.int32))
+    drawn_as, made_as = drawn.numbers(), result.numbers()
+    is_unchanged, is_gone = _is_among(made_as, drawn_as), ~_is_among(drawn_as, made_as)
+    if not drawn_off.any() and not is_gone.any() and is_unchanged.all():
+        return zeros
+    distances = np.zeros((len(lines.vertices), 2))
+    if drawn_off.any():
         order = np.argsort(drawn_as, kind="stable")
         numbers, first = np.unique(drawn_as[order], return_index=True)
-        most = np.maximum.reduceat(said[drawn.begin[order]], first, axis=0)
-        found[rows[kept]] = most[np.searchsorted(numbers, made_as[kept])]
-    if gone.any() or not kept.all():
+        max_distances = np.maximum.reduceat(drawn_off[drawn.begin[order]], first, axis=0)
+        distances[rows[is_unchanged]] = max_distances[
+            np.searchsorted(numbers, made_as[is_unchanged])
+        ]
+    if is_gone.any() or not is_unchanged.all():
         del drawn_as, made_as  # the index takes their room
-        _add_distances(drawn, said, made, np.flatnonzero(gone), np.flatnonzero(~kept), found)
-    return found
+        _add_distances(
+            drawn,
+            drawn_off,
+            result,
+            np.flatnonzero(is_gone),
+            np.flatnonzero(~is_unchanged),
+            distances,
+        )
+    return distances
 
 
 class _Joined(Struct, frozen=True, eq=False):
@@ -340,17 +350,17 @@ class _Joined(Struct, frozen=True, eq=False):
         """(K,) as `segment_numbers` gives them."""
         return segment_numbers(self.vertices, self.begin, self.end)
 
-    def of(self, which: Ints) -> Segments:
+    def of(self, indices: Ints) -> Segments:
         """These segments."""
-        begin = self.vertices[self.begin[which]]
-        return Segments.between(begin[:, :2], self.vertices[self.end[which], :2], begin[:, 2])
+        begin = self.vertices[self.begin[indices]]
+        return Segments.between(begin[:, :2], self.vertices[self.end[indices], :2], begin[:, 2])
 
 
-def _is_among(numbers: _Words, others: _Words) -> Bools:
+def _is_among(numbers: _Words, candidates: _Words) -> Bools:
     """(K,) which numbers are among the others, of which there is at least one."""
-    ordered = np.sort(others)
-    at = np.searchsorted(ordered, numbers)
-    return np.asarray(ordered[np.minimum(at, len(ordered) - 1, out=at)] == numbers)
+    ordered = np.sort(candidates)
+    positions = np.searchsorted(ordered, numbers)
+    return np.asarray(ordered[np.minimum(positions, len(ordered) - 1, out=positions)] == numbers)
 
 
 def _drawn_segments(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
@@ -361,49 +371,51 @@ def _drawn_segments(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
     offsets = np.cumsum(counts)
     every = [piece.vertices for piece in lasting] or [np.empty((0, 3))]
     vertices = every[0] if len(every) == 1 else np.concatenate(every)
-    said = np.broadcast_to(0.0, (len(vertices), 2))  # one number, seen as many
+    drawn_off = np.broadcast_to(0.0, (len(vertices), 2))  # one number, seen as many
     if any(piece.off_mm is not None for piece in lasting):
-        said = np.zeros((len(vertices), 2))
+        drawn_off = np.zeros((len(vertices), 2))
         for k, piece in enumerate(lasting):
             if piece.off_mm is not None:
-                said[offsets[k] : offsets[k + 1]] = piece.off_mm
+                drawn_off[offsets[k] : offsets[k + 1]] = piece.off_mm
     following = next_vertices(offsets)
-    there = np.hypot(*(vertices[following, k] - vertices[:, k] for k in (0, 1))) > POSITION_EPS_MM
-    there[offsets[1:][[not piece.closed for piece in lasting]] - 1] = False
-    rows = np.flatnonzero(there).astype(np.int32)
-    return _Joined(vertices, rows, following[rows].astype(np.int32)), said
+    has_length = (
+        np.hypot(*(vertices[following, k] - vertices[:, k] for k in (0, 1))) > POSITION_EPS_MM
+    )
+    has_length[offsets[1:][[not piece.closed for piece in lasting]] - 1] = False
+    rows = np.flatnonzero(has_length).astype(np.int32)
+    return _Joined(vertices, rows, following[rows].astype(np.int32)), drawn_off
 
 
 def _add_distances(
-    drawn: _Joined, said: Floats, made: _Joined, gone: Ints, new: Ints, off: Floats
+    drawn: _Joined, drawn_off: Floats, result: _Joined, is_gone: Ints, new: Ints, off_mm: Floats
 ) -> None:
-    """Add to `off` (N, 2), of the segment that leaves each vertex, what `gone` of the drawn
+    """Add to `off_mm` (N, 2), of the segment that leaves each vertex, what `is_gone` of the drawn
     segments, and which of the made ones are `new`, says of it, measured both there and back."""
     # What was drawn, to what is there now: the nearest of it, and what is about as near.
-    for rows, apart, point, row in _near(drawn, gone, made, 2.0):
-        most = apart[point, None] + said[drawn.begin[rows[point]]]
-        np.maximum.at(off, made.begin[row], most)
+    for rows, distances, point, row in _near(drawn, is_gone, result, 2.0):
+        total = distances[point, None] + drawn_off[drawn.begin[rows[point]]]
+        np.maximum.at(off_mm, result.begin[row], total)
     # What is there now, to what was drawn.
-    for rows, apart, point, row in _near(made, new, drawn, 1.0):
-        most = apart[point, None] + said[drawn.begin[row]]
-        np.maximum.at(off, made.begin[rows[point]], most)
+    for rows, distances, point, row in _near(result, new, drawn, 1.0):
+        total = distances[point, None] + drawn_off[drawn.begin[row]]
+        np.maximum.at(off_mm, result.begin[rows[point]], total)
 
 
 def _near(
-    segments: _Joined, which: Ints, others: _Joined, times: float
+    segments: _Joined, indices: Ints, other_segments: _Joined, times: float
 ) -> Iterator[tuple[Ints, Floats, Ints, Ints]]:
-    """For some of the segments `which` at a time: which of them (P,) each point along them is on,
-    and how far (P,) mm the nearest of the others is from it; and pairs (J,), (J,) of a point and
-    one of the others that is no farther from it than so many times that."""
-    if not len(which):
+    """For some of the segments `indices` at a time: which of them (P,) each point along them is
+    on, and how far (P,) mm the nearest of the others is from it; and pairs (J,), (J,) of a point
+    and one of the others that is no farther from it than so many times that."""
+    if not len(indices):
         return
-    tree = segment_tree(others.vertices, others.begin, others.end)
-    for first in range(0, len(which), SEGMENTS_AT_ONCE):
-        some = which[first : first + SEGMENTS_AT_ONCE]
-        row = np.repeat(np.arange(len(some)), len(PLACES))
-        points = point_at(segments.of(some), row, np.tile(PLACES, len(some)))
-        apart = distances_from(points, tree)
-        pairs = segments_within(points, times * apart + POSITION_EPS_MM, tree)
+    tree = segment_tree(other_segments.vertices, other_segments.begin, other_segments.end)
+    for first in range(0, len(indices), SEGMENTS_AT_ONCE):
+        batch = indices[first : first + SEGMENTS_AT_ONCE]
+        row = np.repeat(np.arange(len(batch)), len(PLACES))
+        points = point_at(segments.of(batch), row, np.tile(PLACES, len(batch)))
+        distances = distances_from(points, tree)
+        pairs = segments_within(points, times * distances + POSITION_EPS_MM, tree)
         # Two positions nearer than that are one.
-        apart = np.where(apart > POSITION_EPS_MM, apart, 0.0)
-        yield some[row], apart, pairs[:, 0], pairs[:, 1]
+        distances = np.where(distances > POSITION_EPS_MM, distances, 0.0)
+        yield batch[row], distances, pairs[:, 0], pairs[:, 1]

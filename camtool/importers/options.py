@@ -198,8 +198,8 @@ class ReadOptions:
 
     def __post_init__(self) -> None:
         if self.units is not None and self.units.lower() not in MM_PER_UNIT:
-            known = ", ".join(u for u in MM_PER_UNIT if u.isascii() and u != '"')
-            raise OptionError(f"unknown unit {self.units!r}", mend=f"use one of {known}")
+            units = ", ".join(u for u in MM_PER_UNIT if u.isascii() and u != '"')
+            raise OptionError(f"unknown unit {self.units!r}", mend=f"use one of {units}")
         if self.format is not None and self.format not in FORMATS:
             raise OptionError(
                 f"unknown drawing format {self.format!r}", mend=f"use one of {', '.join(FORMATS)}"
@@ -321,7 +321,7 @@ def colour_named(text: str) -> str:
     )
 
 
-def options_of(given: Mapping[str, Any], machine: Machine | None = None) -> ReadOptions:
+def options_of(fields: Mapping[str, Any], machine: Machine | None = None) -> ReadOptions:
     """Return the options of these fields of `ReadOptions` and `Selection`, by name.
 
     Lengths may be texts with a unit, and a single pattern may stand without a list. Tolerances
@@ -331,14 +331,14 @@ def options_of(given: Mapping[str, Any], machine: Machine | None = None) -> Read
     if machine is not None:
         defaults = machine.defaults
         settings = {"tolerance_mm": defaults.fit_tolerance_mm, "gap_mm": defaults.gap_mm}
-    chosen: dict[str, tuple[str, ...]] = {}
-    for name, value in given.items():
+    selection: dict[str, tuple[str, ...]] = {}
+    for name, value in fields.items():
         if name in Selection.__dataclass_fields__:
             patterns = (value,) if isinstance(value, str) else tuple(value)
             named = name == "colours"
-            chosen[name] = tuple(map(colour_named, patterns)) if named else patterns
+            selection[name] = tuple(map(colour_named, patterns)) if named else patterns
         elif name.endswith("_mm") and isinstance(value, str):
             settings[name] = parse_length(value, name=name)
         else:
             settings[name] = value
-    return ReadOptions(**settings, select=Selection(**chosen))
+    return ReadOptions(**settings, select=Selection(**selection))

@@ -75,12 +75,12 @@ NAMED = 12
 class NoMatchError(DrawingError):
     """A pattern that chooses nothing of a drawing."""
 
-    def __init__(self, what: str, pattern: str, file: str, known: Sequence[str]) -> None:
-        listed = ", ".join(sorted(known)[:NAMED]) + (" …" if len(known) > NAMED else "")
+    def __init__(self, what: str, pattern: str, file: str, names: Sequence[str]) -> None:
+        listed = ", ".join(sorted(names)[:NAMED]) + (" …" if len(names) > NAMED else "")
         super().__init__(
             f"no {what} matches {pattern!r}",
             file=file,
-            mend=f"{guess(pattern, known)}it has {listed or 'none'}",
+            mend=f"{guess(pattern, names)}it has {listed or 'none'}",
         )
         self.pattern = pattern
 
@@ -90,45 +90,47 @@ NO_LINE_TYPE = "continuous"
 
 
 def select_pieces(
-    pieces: Sequence[Piece], wanted: Selection, file: str
+    pieces: Sequence[Piece], selection: Selection, file: str
 ) -> tuple[list[Piece], list[Skipped]]:
     """The chosen pieces in order, and how many of each kind were left out, and why.
 
     DrawingError when a pattern (save of `exclude_layers`) matches no piece at all.
     """
-    if wanted == Selection():
+    if selection == Selection():
         return list(pieces), []
-    rules = _rules(wanted, pieces, file)
-    kept: list[Piece] = []
-    gone: Counter[tuple[str, str]] = Counter()
+    rules = _rules(selection, pieces, file)
+    chosen_pieces: list[Piece] = []
+    left_out: Counter[tuple[str, str]] = Counter()
     for piece in pieces:
         reason = next((reason for reason, holds in rules if not holds(piece)), None)
         if reason is None:
-            kept.append(piece)
+            chosen_pieces.append(piece)
         else:
-            gone[piece.kind, reason] += 1
-    return kept, [Skipped(kind, count, why) for (kind, why), count in gone.items()]
+            left_out[piece.kind, reason] += 1
+    return chosen_pieces, [
+        Skipped(kind, count, explanation) for (kind, explanation), count in left_out.items()
+    ]
 
 
 _Rule = tuple[str, Callable[[Piece], bool]]
 
 
-def _rules(wanted: Selection, pieces: Sequence[Piece], file: str) -> list[_Rule]:
+def _rules(selection: Selection, pieces: Sequence[Piece], file: str) -> list[_Rule]:
     """Return the conditions of the selection, each with the reason for leaving out a piece that
     does not fulfil it."""
     rules: list[_Rule] = []
-    layers = matching_names(wanted.layers, (piece.layer for piece in pieces), "layer", file)
+    layers = matching_names(selection.layers, (piece.layer for piece in pieces), "layer", file)
     if layers is not None:
         rules.append(("is on a layer that was not asked for", lambda piece: piece.layer in layers))
-    away = {piece.layer for piece in pieces if matches(wanted.exclude_layers, piece.layer)}
-    if wanted.exclude_layers:
-        rules.append(("is on an excluded layer", lambda piece: piece.layer not in away))
-    types = matching_names(wanted.line_types, map(_line_type, pieces), "line type", file)
+    excluded = {piece.layer for piece in pieces if matches(selection.exclude_layers, piece.layer)}
+    if selection.exclude_layers:
+        rules.append(("is on an excluded layer", lambda piece: piece.layer not in excluded))
+    types = matching_names(selection.line_types, map(_line_type, pieces), "line type", file)
     if types is not None:
         rules.append(
             ("has a line type that was not asked for", lambda piece: _line_type(piece) in types)
         )
-    colours = matching_names(wanted.colours, (piece.colour for piece in pieces), "colour", file)
+    colours = matching_names(selection.colours, (piece.colour for piece in pieces), "colour", file)
     if colours is not None:
         rules.append(
             ("has a colour that was not asked for", lambda piece: piece.colour in colours)
@@ -145,11 +147,11 @@ def matching_names(
     """
     if not patterns:
         return None
-    known = list(dict.fromkeys(names))
+    available = list(dict.fromkeys(names))
     for pattern in patterns:
-        if not any(matches((pattern,), name) for name in known):
-            raise NoMatchError(what, pattern, file, known)
-    return {name for name in known if matches(patterns, name)}
+        if not any(matches((pattern,), name) for name in available):
+            raise NoMatchError(what, pattern, file, available)
+    return {name for name in available if matches(patterns, name)}
 
 
 def _line_type(piece: Piece) -> str:

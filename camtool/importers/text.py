@@ -120,7 +120,7 @@ class WantedFont(Struct, frozen=True):
 
 
 @lru_cache(maxsize=_CHOICES_KEPT)
-def font_for(wanted: WantedFont, mode: str) -> tuple[Font, str]:
+def font_for(request: WantedFont, mode: str) -> tuple[Font, str]:
     """The font to draw with, and the wanted one's name when that is not it ("" otherwise).
 
     mode "stroke" draws all with single strokes, "outline" only what a stroke font is wanted for.
@@ -128,17 +128,19 @@ def font_for(wanted: WantedFont, mode: str) -> tuple[Font, str]:
     """
     if mode == "stroke":
         return stroke_font(), ""
-    if wanted.is_stroked:
-        return stroke_font(), str(wanted)
-    found = _font_named(wanted)
-    font = _outline_font(found.path) if found else None
+    if request.is_stroked:
+        return stroke_font(), str(request)
+    named = _font_named(request)
+    font = _outline_font(named.path) if named else None
     if font is not None:
         return font, ""
-    for face in _substitutes(wanted):
+    for face in _substitutes(request):
         font = _outline_font(face.path)
         if font is not None:
-            return font, str(wanted)
-    raise Unusable(f"is in the font {wanted}, but no outline font is installed; use --text stroke")
+            return font, str(request)
+    raise Unusable(
+        f"is in the font {request}, but no outline font is installed; use --text stroke"
+    )
 
 
 @lru_cache(maxsize=1)
@@ -181,11 +183,16 @@ class _Face(Struct, frozen=True, order=True):
     def italic(self) -> bool:
         return any(word in self.style.lower() for word in ("italic", "oblique"))
 
-    def distance(self, wanted: WantedFont) -> tuple[bool, int, int, str]:
+    def distance(self, request: WantedFont) -> tuple[bool, int, int, str]:
         """Smaller is more alike."""
-        weight = _BOLD if wanted.bold else _REGULAR
-        unlike = self.italic is not wanted.italic
-        return unlike, abs(self.weight - weight), abs(self.width - _NORMAL_WIDTH), self.path
+        weight = _BOLD if request.bold else _REGULAR
+        has_other_slant = self.italic is not request.italic
+        return (
+            has_other_slant,
+            abs(self.weight - weight),
+            abs(self.width - _NORMAL_WIDTH),
+            self.path,
+        )
 
 
 @lru_cache(maxsize=1)
@@ -200,24 +207,24 @@ def installed_fonts() -> tuple[_Face, ...]:
     return tuple(sorted(f for f in faces if PurePath(f.path).suffix.lower() in _OUTLINES))
 
 
-def _font_named(wanted: WantedFont) -> _Face | None:
+def _font_named(request: WantedFont) -> _Face | None:
     """The installed font of this family or file name."""
-    if wanted.family and (found := _of_family(wanted.family, wanted)) is not None:
-        return found
-    name = PurePath(wanted.file.replace("\\", "/")).name.lower()
+    if request.family and (face := _of_family(request.family, request)) is not None:
+        return face
+    name = PurePath(request.file.replace("\\", "/")).name.lower()
     return next((f for f in installed_fonts() if PurePath(f.path).name.lower() == name), None)
 
 
-def _of_family(family: str, wanted: WantedFont) -> _Face | None:
+def _of_family(family: str, request: WantedFont) -> _Face | None:
     faces = [f for f in installed_fonts() if f.family.lower() == family.lower()]
-    return min(faces, key=lambda face: face.distance(wanted), default=None)
+    return min(faces, key=lambda face: face.distance(request), default=None)
 
 
-def _substitutes(wanted: WantedFont) -> list[_Face]:
+def _substitutes(request: WantedFont) -> list[_Face]:
     """Fonts to try in place of the wanted one, the best first."""
-    best = [face for name in SUBSTITUTES if (face := _of_family(name, wanted)) is not None]
-    others = sorted(installed_fonts(), key=lambda face: face.distance(wanted))
-    return best + others[:_FONTS_KEPT]
+    best = [face for name in SUBSTITUTES if (face := _of_family(name, request)) is not None]
+    candidates = sorted(installed_fonts(), key=lambda face: face.distance(request))
+    return best + candidates[:_FONTS_KEPT]
 
 
 @lru_cache(maxsize=_FONTS_KEPT)
@@ -255,14 +262,14 @@ def _outline(glyphs: Any, capital: float, character: str) -> Letter | None:
     base = np.array([0.0, float(glyphs.font_measurements.baseline)])
     contours = []
     for path in glyphs.get_glyph_path(character).to_path().sub_paths():
-        at, parts = path.start, []
+        position, parts = path.start, []
         for command in path.commands():
             controls = [getattr(command, name, None) for name in ("ctrl", "ctrl1", "ctrl2")]
-            points = [at, *(point for point in controls if point is not None), command.end]
+            points = [position, *(point for point in controls if point is not None), command.end]
             part = np.array([(p.x, p.y) for p in points], dtype=np.float64)
             if np.ptp(part, axis=0).any():
                 parts.append((part - base) / capital)
-            at = command.end
+            position = command.end
         if parts:
             contours.append(parts)
     return Letter.of(contours, float(glyphs.get_glyph_width(character)) / capital)
@@ -309,8 +316,8 @@ def describe_lacking(font: str, substituted: str, missing: str) -> str:
         notes.append(f"font {substituted} is not installed: drawn with {font}")
     if missing:
         signs = [_visible(sign) for sign in dict.fromkeys(missing)]
-        more = len(signs) - MAX_CHARACTERS_NAMED
-        tail = f" and {more} more" if more > 0 else ""
+        extra = len(signs) - MAX_CHARACTERS_NAMED
+        tail = f" and {extra} more" if extra > 0 else ""
         notes.append(f"{font} has no {' '.join(signs[:MAX_CHARACTERS_NAMED])}{tail}: left blank")
     return "; ".join(notes)
 
@@ -367,9 +374,10 @@ class Ink(Struct, eq=False):
     contours: list[tuple[tuple[int, ...], bool]] = field(default_factory=list)
     missing: Counter[str] = field(default_factory=Counter)
 
-    def write(self, text: str, look: TextLook, at: tuple[float, float]) -> float:
-        """Draw `text` with its baseline's left end at `at`; the x where the next text begins."""
-        x, y = at
+    def write(self, text: str, look: TextLook, place: tuple[float, float]) -> float:
+        """Draw `text` with its baseline's left end at `place`; the x where the next text
+        begins."""
+        x, y = place
         across = look.height * look.width_factor
         # (x, y) of a letter ↦ (across·x + height·slant·y, height·y)
         form = np.array([[across, 0.0], [look.height * look.slant, look.height]])
@@ -401,7 +409,9 @@ class Ink(Struct, eq=False):
             return
         along = ends[1] - ends[0]
         half = 0.5 * RULE_SHARE * look.height / float(np.hypot(*along))
-        aside = half * np.array([-along[1], along[0]])
-        corners = np.array([ends[0] - aside, ends[1] - aside, ends[1] + aside, ends[0] + aside])
+        offset = half * np.array([-along[1], along[0]])
+        corners = np.array(
+            [ends[0] - offset, ends[1] - offset, ends[1] + offset, ends[0] + offset]
+        )
         self.points.append(corners[[0, 1, 1, 2, 2, 3, 3, 0]])
         self.contours.append(((2, 2, 2, 2), True))

@@ -101,10 +101,10 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> RowArcs:
     offset[rows[written]] = (centre - begin)[written]
     holds = arcs_accepted(np.abs(sweep), (begin, stop, centre), kind[rows], dialect)
     halves = dialect.full_circles == "halves"
-    full = (begin == stop).all(axis=1) & written & holds
-    special = huge | (written & ~holds) | (full & halves)
-    for at in np.flatnonzero(special).tolist():
-        _repair(arcs, toolpath, int(rows[at]), float(sweep[at]), dialect)
+    is_full = (begin == stop).all(axis=1) & written & holds
+    special = huge | (written & ~holds) | (is_full & halves)
+    for index in np.flatnonzero(special).tolist():
+        _repair(arcs, toolpath, int(rows[index]), float(sweep[index]), dialect)
     return arcs
 
 
@@ -118,20 +118,25 @@ def arcs_accepted(
     """
     unit = 10.0**-dialect.decimals
     start, end, centre = points
-    out, back = (start - centre).astype(np.float64), (end - centre).astype(np.float64)
-    r1, r2 = np.hypot(*out.T) * unit, np.hypot(*back.T) * unit
+    start_arm, end_arm = (start - centre).astype(np.float64), (end - centre).astype(np.float64)
+    r1, r2 = np.hypot(*start_arm.T) * unit, np.hypot(*end_arm.T) * unit
     gap = np.abs(r1 - r2) / RULE_MARGIN
     wide = (gap > dialect.arc_difference_mm) & (
         gap > dialect.arc_difference_part * np.minimum(r1, r2)
     )
-    small = np.minimum(r1, r2) <= dialect.arc_least_radius_mm / RULE_MARGIN
-    turn = turns_of(out, back, kind == Kind.ARC_CW)
+    is_small = np.minimum(r1, r2) <= dialect.arc_least_radius_mm / RULE_MARGIN
+    turn = turns_of(start_arm, end_arm, kind == Kind.ARC_CW)
     limit = dialect.arc_full_turn_rad / RULE_MARGIN
-    same = (start == end).all(axis=1)
-    vague = ~same & ((turn <= limit) | (turn >= 2.0 * math.pi - limit))
-    turned = np.abs(turn - sweep_rad) < math.pi
+    same_ends = (start == end).all(axis=1)
+    vague = ~same_ends & ((turn <= limit) | (turn >= 2.0 * math.pi - limit))
+    has_direction = np.abs(turn - sweep_rad) < math.pi
     return np.asarray(
-        ~wide & (gap <= dialect.arc_most_difference_mm) & ~small & ~vague & turned & (r1 > 0.0)
+        ~wide
+        & (gap <= dialect.arc_most_difference_mm)
+        & ~is_small
+        & ~vague
+        & has_direction
+        & (r1 > 0.0)
     )
 
 
@@ -142,11 +147,12 @@ def sagitta_of(radius: Floats, sweep_rad: Floats) -> Floats:
     return np.asarray(radius * 2.0 * np.sin(half / 2.0) ** 2)
 
 
-def turns_of(out: Floats, back: Floats, clockwise: Bools) -> Floats:
-    """(K,) in (0, 2π]: how far arcs turn from the arms `out` to the arms `back`, both (K, 2)."""
-    cross = out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0]
+def turns_of(start_arm: Floats, end_arm: Floats, clockwise: Bools) -> Floats:
+    """(K,) in (0, 2π]: how far arcs turn from the arms `start_arm` to the arms `end_arm`, both (K,
+    2)."""
+    cross = start_arm[:, 0] * end_arm[:, 1] - start_arm[:, 1] * end_arm[:, 0]
     sign = np.where(clockwise, -1.0, 1.0)
-    angle = np.mod(sign * np.arctan2(cross, (out * back).sum(axis=1)), 2.0 * math.pi)
+    angle = np.mod(sign * np.arctan2(cross, (start_arm * end_arm).sum(axis=1)), 2.0 * math.pi)
     return np.where(angle == 0.0, 2.0 * math.pi, angle)
 
 
@@ -157,30 +163,30 @@ def _repair(
     begin = arcs.end[row - 1, :2] if row else units_of(toolpath.start[:2], dialect.decimals)
     stop, kind = arcs.end[row, :2], Kind(int(toolpath.kind[row]))
     counts = arcs.counts
-    wanted = _Wanted(toolpath.starts[row, :2], toolpath.centre[row], toolpath.end[row, :2], sweep)
+    arc = _Wanted(toolpath.starts[row, :2], toolpath.centre[row], toolpath.end[row, :2], sweep)
     if (begin == stop).all() and abs(sweep) < math.pi:
         rises = toolpath.end[row, 2] != toolpath.starts[row, 2]
         counts.dropped += not rises
         arcs.pieces[row] = [ReplacementRow(Kind.LINE, _pair(stop))] if rises else []
         return
-    whole = bool((wanted.start == wanted.end).all())
-    huge = math.dist(wanted.start, wanted.centre) > dialect.arc_most_radius_mm
-    one = None if huge or whole else _recentre(wanted, (begin, stop), kind, dialect)
-    two = None if huge or one else _halves(wanted, (begin, stop), kind, dialect)
-    if whole and two:
-        arcs.pieces[row] = two
+    is_circle = bool((arc.start == arc.end).all())
+    huge = math.dist(arc.start, arc.centre) > dialect.arc_most_radius_mm
+    one = None if huge or is_circle else _recentre(arc, (begin, stop), kind, dialect)
+    halves = None if huge or one else _halves(arc, (begin, stop), kind, dialect)
+    if is_circle and halves:
+        arcs.pieces[row] = halves
         return
     if counts.first < 0:
         counts.first = row
     if one:
         counts.recentred += 1
         arcs.pieces[row] = [one]
-    elif two:
+    elif halves:
         counts.split += 1
-        arcs.pieces[row] = two
+        arcs.pieces[row] = halves
     else:
         counts.lines += 1
-        arcs.pieces[row] = _chords(wanted, begin, stop, dialect)
+        arcs.pieces[row] = _chords(arc, begin, stop, dialect)
 
 
 class _Wanted(Struct, frozen=True, eq=False):
@@ -194,17 +200,17 @@ class _Wanted(Struct, frozen=True, eq=False):
 
     def at(self, parts: Floats) -> Floats:
         """(k, 2) points at these parts (0 to 1) of the sweep."""
-        out = self.start - self.centre
-        r1, r2 = math.hypot(*out), math.dist(self.end, self.centre)
+        start_arm = self.start - self.centre
+        r1, r2 = math.hypot(*start_arm), math.dist(self.end, self.centre)
         radius = r1 + (r2 - r1) * parts
-        angle = math.atan2(out[1], out[0]) + self.sweep * parts
+        angle = math.atan2(start_arm[1], start_arm[0]) + self.sweep * parts
         return np.asarray(
             self.centre + radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
         )
 
 
 def _recentre(
-    wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
+    arc: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> ReplacementRow | None:
     """The arc about the nearest centre that the controller takes; None when there is none close.
 
@@ -218,32 +224,32 @@ def _recentre(
     if length == 0.0:
         return None
     unit = 10.0**-dialect.decimals
-    centre, along = wanted.centre / unit, chord / length
-    moved = float(((begin + stop) / 2.0 - centre) @ along)
-    tried = np.rint(centre + moved * along).astype(np.int64) + _AROUND
-    away = np.hypot(*(tried - centre).T)
-    tried = tried[np.argsort(away, kind="stable")]
-    most = max(dialect.arc_difference_mm / unit, RECENTRE_UNITS)
-    tried = tried[np.sort(away, kind="stable") <= most]
-    same = np.ones((len(tried), 1), dtype=np.int64)
-    points = (begin * same, stop * same, tried)
-    sweeps = np.full(len(tried), abs(wanted.sweep))
-    holds = arcs_accepted(sweeps, points, np.full(len(tried), int(kind)), dialect)
+    centre, along = arc.centre / unit, chord / length
+    shift = float(((begin + stop) / 2.0 - centre) @ along)
+    candidates = np.rint(centre + shift * along).astype(np.int64) + _AROUND
+    distances = np.hypot(*(candidates - centre).T)
+    candidates = candidates[np.argsort(distances, kind="stable")]
+    max_distance = max(dialect.arc_difference_mm / unit, RECENTRE_UNITS)
+    candidates = candidates[np.sort(distances, kind="stable") <= max_distance]
+    ones = np.ones((len(candidates), 1), dtype=np.int64)
+    points = (begin * ones, stop * ones, candidates)
+    sweeps = np.full(len(candidates), abs(arc.sweep))
+    holds = arcs_accepted(sweeps, points, np.full(len(candidates), int(kind)), dialect)
     if not holds.any():
         return None
-    return ReplacementRow(kind, _pair(stop), _pair(tried[int(np.argmax(holds))] - begin))
+    return ReplacementRow(kind, _pair(stop), _pair(candidates[int(np.argmax(holds))] - begin))
 
 
 def _halves(
-    wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
+    arc: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> list[ReplacementRow] | None:
     """Two arcs that meet at the middle; None when the controller would refuse one of them."""
     begin, stop = ends
-    mid_mm = wanted.at(np.array([0.5]))[0]
+    mid_mm = arc.at(np.array([0.5]))[0]
     mid = units_of(mid_mm, dialect.decimals)
-    half = wanted.sweep / 2.0
-    first = _Wanted(wanted.start, wanted.centre, mid_mm, half)
-    second = _Wanted(mid_mm, wanted.centre, wanted.end, half)
+    half = arc.sweep / 2.0
+    first = _Wanted(arc.start, arc.centre, mid_mm, half)
+    second = _Wanted(mid_mm, arc.centre, arc.end, half)
     pieces = [
         _keep_centre(first, (begin, mid), kind, dialect)
         or _recentre(first, (begin, mid), kind, dialect),
@@ -256,34 +262,32 @@ def _halves(
 
 
 def _keep_centre(
-    wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
+    arc: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> ReplacementRow | None:
     """The arc with its own centre, if the controller takes it."""
     begin, stop = ends
-    centre = units_of(wanted.centre, dialect.decimals)
+    centre = units_of(arc.centre, dialect.decimals)
     points = (begin[None, :], stop[None, :], centre[None, :])
-    sweep = np.array([abs(wanted.sweep)])
+    sweep = np.array([abs(arc.sweep)])
     if not arcs_accepted(sweep, points, np.array([kind]), dialect)[0]:
         return None
     return ReplacementRow(kind, _pair(stop), _pair(centre - begin))
 
 
-def _chords(
-    wanted: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect
-) -> list[ReplacementRow]:
+def _chords(arc: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> list[ReplacementRow]:
     """The fewest equal chords within a unit of the arc: a chord over the angle a strays by
     R (1 − cos(a/2)) = 2 R sin²(a/4)."""
-    radius = math.dist(wanted.start, wanted.centre)
+    radius = math.dist(arc.start, arc.centre)
     unit = 10.0**-dialect.decimals
     ratio = min(0.5, LINE_SAGITTA_UNITS * unit / (2.0 * radius)) if radius > 0.0 else 0.5
-    count = max(1, math.ceil(abs(wanted.sweep) / (4.0 * math.asin(math.sqrt(ratio)))))
+    count = max(1, math.ceil(abs(arc.sweep) / (4.0 * math.asin(math.sqrt(ratio)))))
     shares = np.arange(1, count) / count
-    inner = units_of(wanted.at(shares), dialect.decimals)
-    pieces, at = [], begin
+    inner = units_of(arc.at(shares), dialect.decimals)
+    pieces, position = [], begin
     for point, share in zip(inner, shares.tolist(), strict=True):
-        if (point != at).any():
+        if (point != position).any():
             pieces.append(ReplacementRow(Kind.LINE, _pair(point), share=share))
-            at = point
+            position = point
     # Moves nothing when the last chord was too small, but for the rest of a helix's rise.
     return [*pieces, ReplacementRow(Kind.LINE, _pair(stop))]
 

@@ -113,9 +113,9 @@ class PlainBlocks(Struct, frozen=True, eq=False):
         return np.asarray((self.facts[:, words.MASK] >> column) & 1 == 1)
 
 
-def fill_forward(given: Bools, values: Floats, before: float) -> Floats:
+def fill_forward(has_value: Bools, values: Floats, before: float) -> Floats:
     """Return (N,) the last given value up to each row; `before` where none was given yet."""
-    latest = np.maximum.accumulate(np.where(given, np.arange(1, len(given) + 1), 0))
+    latest = np.maximum.accumulate(np.where(has_value, np.arange(1, len(has_value) + 1), 0))
     return np.asarray(np.concatenate([[before], values])[latest])
 
 
@@ -136,8 +136,8 @@ class PlainRuns:
     it is asked less and less often; and twice as many are offered at most as were taken before.
     `most_chars` and `free` are those of `words.plain_lines`."""
 
-    def __init__(self, lines: ProgramLines, most_chars: int, *, free: bool) -> None:
-        self._lines, self._most_chars, self._free = lines, most_chars, free
+    def __init__(self, lines: ProgramLines, most_chars: int, *, free_order: bool) -> None:
+        self._lines, self._most_chars, self._free = lines, most_chars, free_order
         self._numbers = np.zeros((0, 7))
         self._facts = np.empty((0, words.FACT_COLUMNS), dtype=np.int64)
         self._wait, self._waited = 1, 0
@@ -155,7 +155,7 @@ class PlainRuns:
             self._facts = np.empty((ROWS_AT_ONCE, words.FACT_COLUMNS), dtype=np.int64)
         begin = int(self._lines.begins[number])
         numbers, facts = self._numbers[: self._most], self._facts[: self._most]
-        rows, _, behind = words.plain_lines(
+        rows, _, line_behind = words.plain_lines(
             self._lines.octets, begin, number + 1, self._most_chars, self._free, numbers, facts
         )
         count = 0
@@ -165,7 +165,7 @@ class PlainRuns:
         self._most = min(2 * max(count, MIN_RUN), ROWS_AT_ONCE)
         if not count:
             return 0, number
-        return count, behind - 1 if count == rows else int(facts[count, words.LINE]) - 1
+        return count, line_behind - 1 if count == rows else int(facts[count, words.LINE]) - 1
 
 
 class Lexing(Struct, frozen=True):
@@ -195,7 +195,7 @@ class WordBlock:
 
     def column(self, word: int) -> int:
         """Column, from 1, of a word's letter."""
-        return [found.start() + 1 for found in re.finditer("[A-Z]", self.text)][word]
+        return [match.start() + 1 for match in re.finditer("[A-Z]", self.text)][word]
 
     def fail(self, message: str, *, word: int | None = None, mend: str = "") -> NoReturn:
         """ProgramError at this block and the column of `word` (its first one when None)."""
@@ -213,7 +213,7 @@ def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator
     check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     check_ascii(data)
     lines = ProgramLines(data)
-    runs = PlainRuns(lines, lexing.line_chars, free=False)
+    runs = PlainRuns(lines, lexing.line_chars, free_order=False)
     row_of_words, word = _patterns(lexing)
     number, index = 0, 0
     while number < lines.count:
@@ -232,9 +232,9 @@ def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator
         packed = text.translate(_NO_BLANKS) if lexing.blanks == "anywhere" else text
         if row_of_words.fullmatch(packed) is None:
             raise _fault(text, index, number, lexing)
-        found: list[tuple[str, str]] = word.findall(packed)
-        if found:
-            yield WordBlock(index, number, text, found)
+        letters: list[tuple[str, str]] = word.findall(packed)
+        if letters:
+            yield WordBlock(index, number, text, letters)
             index += 1
 
 
@@ -260,27 +260,31 @@ def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
 
 
 def _error(message: str, index: int, line: int, column: int, mend: str) -> ProgramError:
-    where = f"block {index + 1}, line {line}, column {column}"
-    return ProgramError(message, where=where, mend=mend)
+    place = f"block {index + 1}, line {line}, column {column}"
+    return ProgramError(message, where=place, mend=mend)
 
 
 def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
     """Why a line is no row of words: the first place where it stops being one."""
-    kept = [at for at, sign in enumerate(raw) if lexing.blanks == "between" or sign not in " \t"]
-    packed = "".join([raw[at] for at in kept])
+    columns = [
+        position
+        for position, sign in enumerate(raw)
+        if lexing.blanks == "between" or sign not in " \t"
+    ]
+    packed = "".join([raw[position] for position in columns])
     row = _patterns(lexing)[0].match(packed)
-    at = row.end() if row else 0
-    message, mend, more = _explain(packed[at:], lexing)
-    return _error(message, index, line, kept[at + more] + 1, mend)
+    position = row.end() if row else 0
+    message, mend, extra = _explain(packed[position:], lexing)
+    return _error(message, index, line, columns[position + extra] + 1, mend)
 
 
-def _explain(rest: str, lexing: Lexing) -> tuple[str, str, int]:
+def _explain(remainder: str, lexing: Lexing) -> tuple[str, str, int]:
     """(message, mend, characters to pass over) for text that begins with no word."""
-    sign, shown = rest[0], repr(rest[:SHOWN_CHARS])
+    sign, shown = remainder[0], repr(remainder[:SHOWN_CHARS])
     if sign in lexing.letters:
-        wrong = re.match(r"[+-]?", rest[1:])
-        past = 1 + (wrong.end() if wrong else 0)
-        past = past if past < len(rest) else 0
+        sign_match = re.match(r"[+-]?", remainder[1:])
+        past = 1 + (sign_match.end() if sign_match else 0)
+        past = past if past < len(remainder) else 0
         return f"no number after {sign}", "digits, with a point if need be, follow a letter", past
     if sign in _SIGNS:
         return _SIGNS[sign][0], _SIGNS[sign][1], 0

@@ -29,8 +29,8 @@ whole."""
 def check(toolpath: Toolpath, machine: Machine) -> None:
     """Refuse what cannot be written or done, whatever the order of the rows."""
     refuse_start(toolpath)
-    far = np.abs(toolpath.end).max(axis=1, initial=0.0) > MAX_MM
-    refuse(toolpath, far, f"a coordinate beyond {MAX_MM:g} mm", "check the units")
+    is_far = np.abs(toolpath.end).max(axis=1, initial=0.0) > MAX_MM
+    refuse(toolpath, is_far, f"a coordinate beyond {MAX_MM:g} mm", "check the units")
     refuse_two_radii(toolpath, ARC_RADIUS_SPREAD_MM)
     _check_feeds(toolpath, machine)
 
@@ -41,10 +41,10 @@ def feed_units(
     """(N,) feeds as whole units of the F word, rounded down, 0 where none; and FEED_ROUNDED when
     one had to be."""
     scale = 10.0 ** (feed_decimals(machine) + unit.more_decimals) / unit.mm
-    wanted = np.where(toolpath.is_feed, toolpath.feed, 0.0) * scale
-    nearest = np.rint(wanted)
-    exact = np.abs(wanted - nearest) <= FEED_TOLERANCE
-    units = np.where(exact, nearest, np.floor(wanted)).astype(np.int64)
+    exact_units = np.where(toolpath.is_feed, toolpath.feed, 0.0) * scale
+    rounded = np.rint(exact_units)
+    exact = np.abs(exact_units - rounded) <= FEED_TOLERANCE
+    units = np.where(exact, rounded, np.floor(exact_units)).astype(np.int64)
     refuse(
         toolpath,
         toolpath.is_feed & (units <= 0),

@@ -43,10 +43,10 @@ def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[
         f"{axis} {' to '.join(format_column(reach, style))}"
         for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
     ]
-    made = [toolpath.made_from, f"settings {machine.short_digest}"] if toolpath.made_from else []
+    origin = [toolpath.made_from, f"settings {machine.short_digest}"] if toolpath.made_from else []
     lines = [
         f"{MAKER}{version_of('camtool')} for {machine.target.name}: {machine.target.title}",
-        *made,
+        *origin,
         *pack(toolpath.setup),
         f"{unit} and {unit}/min - part zero at X0 Y0 Z0",
         *bounds,
@@ -75,30 +75,32 @@ def comments(
     `mounted`: what the operator is told at the rows where a tool is changed by hand; `seconds`
     (N,): how long the controller takes for each row, where that is known.
     """
-    none = np.empty(0, dtype=np.int64)
-    begins, tells = none, np.flatnonzero(toolpath.kind == Kind.MESSAGE)
+    no_rows = np.empty(0, dtype=np.int64)
+    begins, tells = no_rows, np.flatnonzero(toolpath.kind == Kind.MESSAGE)
     if dialect.comments == "contours":
         motions = np.flatnonzero(toolpath.is_motion)
         named = toolpath.source[motions]
         begins = motions[(np.diff(named, prepend=-1) != 0) & (named >= 0)]
-    own: list[tuple[int, str]] = []
+    own_comments: list[tuple[int, str]] = []
     if dialect.comments in ("contours", "operations") and toolpath.operations is not None:
         unit = UNITS[dialect.units]
-        own += _of_operations(toolpath, toolpath.operations, unit, seconds)
-    own += [
+        own_comments += _of_operations(toolpath, toolpath.operations, unit, seconds)
+    own_comments += [
         (row, f"({message}{comment(line)[1:]}") for row, lines in mounted.items() for line in lines
     ]
-    own.sort(key=lambda one: one[0])
-    rows = np.concatenate([np.array([row for row, _ in own], dtype=np.int64), begins, tells])
+    own_comments.sort(key=lambda one: one[0])
+    rows = np.concatenate(
+        [np.array([row for row, _ in own_comments], dtype=np.int64), begins, tells]
+    )
     order = np.argsort(rows, kind="stable")
     # The comments of a row that was left out stand before the next block that is sent.
     blocks = np.searchsorted(np.maximum.accumulate(of_row), rows[order])
 
     def text(k: int) -> str:
-        which = int(order[k])
-        if which < len(own):
-            return own[which][1]
-        row = int(rows[which])
+        entry = int(order[k])
+        if entry < len(own_comments):
+            return own_comments[entry][1]
+        row = int(rows[entry])
         if toolpath.kind[row] == Kind.MESSAGE:
             return _message(toolpath, row, message)
         return comment(toolpath.text(row))
@@ -119,9 +121,9 @@ def _of_operations(
 ) -> Iterator[tuple[int, str]]:
     """(row, comment): what each operation does, where it begins. `seconds` (N,): how long the
     controller takes for each row; None: only the cuts are timed, at their feeds."""
-    how = "takes {}"
+    template = "takes {}"
     if seconds is None:
-        seconds, how = _feed_seconds(toolpath) * unit.mm, "cuts {} at these feeds"
+        seconds, template = _feed_seconds(toolpath) * unit.mm, "cuts {} at these feeds"
     count, ends = len(operations.notes), [*operations.begin[1:].tolist(), len(toolpath)]
     begins = operations.begin.tolist()
     total_s = np.concatenate([[0.0], np.cumsum(seconds)])
@@ -130,23 +132,23 @@ def _of_operations(
     ):
         if low == high:
             continue
-        of = f"operation {number} of {count}" if count > 1 else "operation"
+        title = f"operation {number} of {count}" if count > 1 else "operation"
         speed = [] if note.spindle_rpm is None else [f"{note.spindle_rpm:g} rev/min"]
         # Rows before the first operation are its own, as in the report.
         taken_s = total_s[high] - total_s[0 if number == 1 else low]
         for line in (
-            f"{of}: {note.name or note.kind}",
+            f"{title}: {note.name or note.kind}",
             *pack([tool_words(note.tool, unit), *speed]),
-            *pack([*_depth_words(note, unit), how.format(duration(float(taken_s)))]),
+            *pack([*_depth_words(note, unit), template.format(duration(float(taken_s)))]),
         ):
             yield low, comment(line)
 
 
 def _depth_words(note: OperationNote, unit: Unit) -> Iterator[str]:
-    deep = f"{_length(note.depth_mm, unit)} deep"
+    depth_text = f"{_length(note.depth_mm, unit)} deep"
     if note.passes is not None and note.passes > 1:
-        deep += f" in {note.passes} passes"
-    yield deep if note.peck_mm is None else f"{deep} by {_length(note.peck_mm, unit)}"
+        depth_text += f" in {note.passes} passes"
+    yield depth_text if note.peck_mm is None else f"{depth_text} by {_length(note.peck_mm, unit)}"
     feed = "" if note.drills else f"feed {note.feed_mm_min / unit.mm:.5g} "
     yield f"{feed}plunge {note.plunge_mm_min / unit.mm:.5g} {unit.name}/min"
 
@@ -174,14 +176,14 @@ def mounting_messages(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
         later = int(np.searchsorted(operations.begin, row, side="right")) - 1
         note = operations.notes[max(later, 0)].tool
         tool = note if note.number == tool.number else tool
-    what = tool_words(tool, unit) if tool.diameter_mm else f"tool {tool.number}"
+    mounted_tool = tool_words(tool, unit) if tool.diameter_mm else f"tool {tool.number}"
     place, tip = untouched_place(toolpath, row, unit.mm), f"Z {toolpath.end[row, 2]:.4g}"
     if place is None:
         where = "zero Z again"
     else:
         where = f"zero Z on top of the stock at X{place[0]:.4g} Y{place[1]:.4g}"
     return [
-        f"stop: mount {what}",
+        f"stop: mount {mounted_tool}",
         f"{where} - not cut yet" if place else where,
         f"or set its tip to {tip} {unit.name} here - then start",
     ]
@@ -209,10 +211,10 @@ def duration(seconds: float) -> str:
     >>> duration(0.3)
     'less than 1 s'
     """
-    whole = round(seconds)
-    if whole == 0:
+    total_s = round(seconds)
+    if total_s == 0:
         return "less than 1 s"
-    parts = ((whole // 3600, "h"), (whole // 60 % 60, "min"), (whole % 60, "s"))
+    parts = ((total_s // 3600, "h"), (total_s // 60 % 60, "min"), (total_s % 60, "s"))
     return " ".join(f"{count} {unit}" for count, unit in parts if count)
 
 
@@ -220,13 +222,13 @@ def _feed_seconds(toolpath: Toolpath) -> Floats:
     """(N,) s that each row cuts if it has its feed from end to end, 0 for rapids and events, where
     places are in mm."""
 
-    def seconds(some: Toolpath) -> Floats:
-        begin = some.starts
-        flat = np.hypot(*(some.end - begin)[:, :2].T)
-        arcs = np.flatnonzero(some.is_arc)
-        radius = np.hypot(*(begin[arcs, :2] - some.centre[arcs]).T)
-        flat[arcs] = radius * np.abs(some.sweeps_of(arcs))
-        length = np.hypot(flat, some.end[:, 2] - begin[:, 2])
-        return np.where(some.is_feed, 60.0 * length / np.where(some.is_feed, some.feed, 1.0), 0.0)
+    def seconds(part: Toolpath) -> Floats:
+        begin = part.starts
+        flat = np.hypot(*(part.end - begin)[:, :2].T)
+        arcs = np.flatnonzero(part.is_arc)
+        radius = np.hypot(*(begin[arcs, :2] - part.centre[arcs]).T)
+        flat[arcs] = radius * np.abs(part.sweeps_of(arcs))
+        length = np.hypot(flat, part.end[:, 2] - begin[:, 2])
+        return np.where(part.is_feed, 60.0 * length / np.where(part.is_feed, part.feed, 1.0), 0.0)
 
     return toolpath.by_parts(seconds)

@@ -68,22 +68,22 @@ def _holes(toolpath: Toolpath, low: int, high: int) -> Iterator[CycleHole]:
         toolpath.end[low:high].tolist(),
         toolpath.feed[low:high].tolist(),
     )
-    above, at = float(toolpath.starts_of(np.array([low]))[0, 2]), 0
-    while at < len(rows.kind):
-        found = rows.hole(at, above)
-        if found is not None:
-            dwell = found.last - 1
+    above, row = float(toolpath.starts_of(np.array([low]))[0, 2]), 0
+    while row < len(rows.kind):
+        hole = rows.hole(row, above)
+        if hole is not None:
+            dwell = hole.last - 1
             waits = rows.kind[dwell] == Kind.DWELL
             yield replace(
-                found,
-                first=low + found.first,
-                cut=low + found.cut,
-                last=low + found.last,
+                hole,
+                first=low + hole.first,
+                cut=low + hole.cut,
+                last=low + hole.last,
                 dwell_s=float(toolpath.value[low + dwell]) if waits else None,
             )
-            at = found.last
-        above = rows.end[at][2]
-        at += 1
+            row = hole.last
+        above = rows.end[row][2]
+        row += 1
 
 
 class _Rows(Struct, frozen=True):
@@ -103,15 +103,15 @@ class _Rows(Struct, frozen=True):
             last += 1
         moves = [k for k in range(first + 1, last) if self.kind[k] != Kind.DWELL]
         dwells = last - first - 1 - len(moves)
-        out = (
+        retract = (
             last < len(self.kind) and self.kind[last] == Kind.RAPID and self.end[last] == [x, y, z]
         )
-        if not (moves and out) or dwells > 1 or (dwells and self.kind[last - 1] != Kind.DWELL):
+        if not (moves and retract) or dwells > 1 or (dwells and self.kind[last - 1] != Kind.DWELL):
             return None
         cut = first + 1 + (self.kind[first + 1] == Kind.RAPID)
         cuts = range(cut, moves[-1] + 1, 3)
-        alike = all(self.kind[k] == (Kind.LINE if k in cuts else Kind.RAPID) for k in moves)
-        if not alike or len({self.feed[k] for k in cuts}) != 1:
+        has_kinds = all(self.kind[k] == (Kind.LINE if k in cuts else Kind.RAPID) for k in moves)
+        if not has_kinds or len({self.feed[k] for k in cuts}) != 1:
             return None
         depths = [0.0, *(self.end[k][2] for k in cuts)]
         bites = -np.diff(depths)
@@ -142,13 +142,13 @@ def cycle_blocks(
         if before is not None and (before.words, feed_words[k - 1]) == (hole.words, feed):
             block = place
         else:
-            code, more = "G81", ""
+            code, words = "G81", ""
             if hole.bite is not None:
-                code, more = "G83", f" Q{number(_rounded_down(hole.bite, style))}"
+                code, words = "G83", f" Q{number(_rounded_down(hole.bite, style))}"
             elif hole.dwell_s is not None:
-                code, more = "G82", f" P{format_number(hole.dwell_s, NumberStyle(3, strip=True))}"
+                code, words = "G82", f" P{format_number(hole.dwell_s, NumberStyle(3, strip=True))}"
             levels = f"Z{number(hole.bottom)} R{number(hole.height)}"
-            block = f"G98 {code} {place} {levels}{more} {feed}"
+            block = f"G98 {code} {place} {levels}{words} {feed}"
         goes_on = k + 1 < len(holes) and holes[k + 1].first == hole.last + 1
         blocks[hole.cut] = (block,) if goes_on else (block, "G80")
     return blocks
@@ -162,8 +162,8 @@ def _rounded_down(bite: float, style: NumberStyle) -> float:
 
 def rows_kept(count: int, holes: Sequence[CycleHole]) -> Ints:
     """Of so many rows those that are no part of a hole, and the first row at a feed of each."""
-    kept = np.ones(count, dtype=np.bool_)
+    is_kept = np.ones(count, dtype=np.bool_)
     for hole in holes:
-        kept[hole.first : hole.last + 1] = False
-        kept[hole.cut] = True
-    return np.flatnonzero(kept)
+        is_kept[hole.first : hole.last + 1] = False
+        is_kept[hole.cut] = True
+    return np.flatnonzero(is_kept)

@@ -100,15 +100,15 @@ def feed_decimals(machine: Machine) -> int:
     """Digits behind the point of an F word in mm/min, from `feed.unit_mm_min`; MachineError when
     that is no power of ten between 1 and 10^−6."""
     digits = -math.log10(machine.feed.unit_mm_min)
-    whole = round(digits)
-    if abs(digits - whole) > POWER_OF_TEN_TOLERANCE or not 0 <= whole <= MAX_FEED_DECIMALS:
+    rounded = round(digits)
+    if abs(digits - rounded) > POWER_OF_TEN_TOLERANCE or not 0 <= rounded <= MAX_FEED_DECIMALS:
         raise MachineError(
             f"{machine.feed.unit_mm_min:g} is not a unit that F words can have",
             file=machine.target.name,
             where="table [feed], key unit_mm_min",
             mend="use 1, 0.1, 0.01 or 0.001",
         )
-    return whole
+    return rounded
 
 
 MAX_BLOCKS: Final = 100
@@ -142,22 +142,22 @@ def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) 
                 mend=error.mend,
             ) from error
         spans = np.ptp(toolpath_extents(path), axis=1).tolist()
-        beyond = [
+        beyond_limits = [
             name
             for name, span, axis in zip("XYZ", spans, machine.axes, strict=True)
             if axis.travel_mm is not None and span > axis.travel_mm
         ]
-        wrong = ""
+        complaint = ""
         if len(blocks) > MAX_BLOCKS:
-            wrong = f"{len(blocks)} blocks are more than {MAX_BLOCKS}"
+            complaint = f"{len(blocks)} blocks are more than {MAX_BLOCKS}"
         elif path.is_feed.any():
-            wrong = "they cut: only rapids and switches may stand here"
+            complaint = "they cut: only rapids and switches may stand here"
         elif path.block[path.kind == Kind.END].tolist() != [len(blocks) + 1]:
-            wrong = "they end the program, which camtool does"
-        elif beyond:
-            wrong = f"they leave the travel of {' and '.join(beyond)}"
-        if wrong:
-            raise MachineError(wrong, file=machine.target.name, where=where)
+            complaint = "they end the program, which camtool does"
+        elif beyond_limits:
+            complaint = f"they leave the travel of {' and '.join(beyond_limits)}"
+        if complaint:
+            raise MachineError(complaint, file=machine.target.name, where=where)
 
 
 def _check_block(block: str, where: str, machine: Machine[Any, Any]) -> None:

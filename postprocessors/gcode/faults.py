@@ -8,6 +8,6 @@ class LineFault(Exception):
     the word, None for the line as a whole. The reader makes a ProgramError of it, which has the
     place."""
 
-    def __init__(self, message: str, at: int | str | None = None, mend: str = "") -> None:
+    def __init__(self, message: str, column: int | str | None = None, mend: str = "") -> None:
         super().__init__(message)
-        self.message, self.at, self.mend = message, at, mend
+        self.message, self.at, self.mend = message, column, mend

@@ -50,13 +50,13 @@ def units_of(values: Floats, decimals: int) -> Ints:
     ValueError for what is not finite or too large to be exact.
     """
     units = np.empty(np.shape(values), dtype=np.int64)
-    given, found = np.ravel(values), units.reshape(-1)
-    for low in range(0, len(given), VALUES_AT_ONCE):
-        some = slice(low, low + VALUES_AT_ONCE)
-        scaled = given[some] * 10.0**decimals
+    flat_values, flat_units = np.ravel(values), units.reshape(-1)
+    for low in range(0, len(flat_values), VALUES_AT_ONCE):
+        batch = slice(low, low + VALUES_AT_ONCE)
+        scaled = flat_values[batch] * 10.0**decimals
         if not (np.abs(scaled) <= MAX_UNITS).all():
             raise ValueError("a value is not finite, or too large for its decimals")
-        found[some] = np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)
+        flat_units[batch] = np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)
     return units
 
 

@@ -105,11 +105,12 @@ class PartMoves:
     def snap(self, place: Point) -> Point:
         """Return the point, with those coordinates of the tool that differ from it by rounding
         alone."""
-        here = self.path.position
-        if here == place:
-            return here
+        position = self.path.position
+        if position == place:
+            return position
         x, y, z = (
-            old if abs(new - old) <= SAME_MM else new for old, new in zip(here, place, strict=True)
+            old if abs(new - old) <= SAME_MM else new
+            for old, new in zip(position, place, strict=True)
         )
         return x, y, z
 
@@ -141,22 +142,26 @@ class PartMoves:
         controller takes it for a full circle is one, and a line to its end."""
         path = self.path
         x, y, z = path.position
-        to = self.snap(self.to_part(*end))
+        target = self.snap(self.to_part(*end))
         middle = self.to_part(*centre, 0.0)[:2]
-        own = turn_of((x, y), to[:2], middle)
-        same = (x, y) == to[:2]
+        own_turn = turn_of((x, y), target[:2], middle)
+        same_ends = (x, y) == target[:2]
         ccw = turn > 0
-        full = same or abs(own) <= self._full_turn_rad
-        sweep = _FULL_TURN if full else math.fmod((own if ccw else -own) + _FULL_TURN, _FULL_TURN)
+        is_full_turn = same_ends or abs(own_turn) <= self._full_turn_rad
+        sweep = (
+            _FULL_TURN
+            if is_full_turn
+            else math.fmod((own_turn if ccw else -own_turn) + _FULL_TURN, _FULL_TURN)
+        )
         turns = abs(turn)
-        rise = (to[2] - z) / (_FULL_TURN * (turns - 1) + sweep)
+        rise = (target[2] - z) / (_FULL_TURN * (turns - 1) + sweep)
         if turns > 1:
             heights = np.arange(1.0, turns) * (rise * _FULL_TURN)
             self._whole_turns((x, y, z), middle, ccw, heights)
-        ends = (x, y) if full else to[:2]
-        path.arc(*ends, to[2], centre=middle, ccw=ccw, feed=self.feed)
-        if full and not same:
-            path.line(*to[:2], feed=self.feed)
+        ends = (x, y) if is_full_turn else target[:2]
+        path.arc(*ends, target[2], centre=middle, ccw=ccw, feed=self.feed)
+        if is_full_turn and not same_ends:
+            path.line(*target[:2], feed=self.feed)
 
     def _whole_turns(
         self, start: Point, centre: tuple[float, float], ccw: bool, rise: Floats
@@ -178,9 +183,9 @@ class PartMoves:
         axes = PLANES[self.plane]
         start = self._program(self.path.position)
         begin = [start[axis] for axis in axes]
-        out = (begin[0] - centre[0], begin[1] - centre[1])
-        back = (end[0] - centre[0], end[1] - centre[1])
-        alpha, beta = math.atan2(out[1], out[0]), math.atan2(back[1], back[0])
+        start_arm = (begin[0] - centre[0], begin[1] - centre[1])
+        end_arm = (end[0] - centre[0], end[1] - centre[1])
+        alpha, beta = math.atan2(start_arm[1], start_arm[0]), math.atan2(end_arm[1], end_arm[0])
         if turn > 0:
             sweep = math.fmod(beta - alpha + 2.0 * _FULL_TURN, _FULL_TURN)
         else:
@@ -188,7 +193,7 @@ class PartMoves:
         if abs(sweep) <= self._full_turn_rad:
             sweep = math.copysign(_FULL_TURN, turn)
         sweep += math.copysign(_FULL_TURN * (abs(turn) - 1), turn)
-        radii = math.hypot(*out), math.hypot(*back)
+        radii = math.hypot(*start_arm), math.hypot(*end_arm)
         largest = max(radii) * self.mm
         chord = 4.0 * math.asin(math.sqrt(min(CHORD_MM / (2.0 * largest), 0.5)))
         count = max(math.ceil(abs(sweep) / chord), 1)
@@ -202,10 +207,10 @@ class PartMoves:
         points[:, axes[1]] = centre[1] + radius * np.sin(angle)
         points[:, axes[2]] = begin[2] + share * (end[2] - begin[2])
         points[-1, list(axes)] = end
-        placed = np.column_stack(self.to_part(*points.T))
+        part_points = np.column_stack(self.to_part(*points.T))
         self.path.moves(
             kind=np.full(count, int(Kind.LINE)),
-            end=placed,
+            end=part_points,
             centre=np.full((count, 2), np.nan),
             feed=np.full(count, self.feed),
         )
@@ -238,6 +243,6 @@ def turn_of(
     return math.atan2(ox * ey - oy * ex, ox * ex + oy * ey)
 
 
-def too_many(what: str) -> str:
+def too_many(subject: str) -> str:
     """The message for a program of too many moves."""
-    return f"with {what} the program has more than {bounds.MAX_MOVES} moves"
+    return f"with {subject} the program has more than {bounds.MAX_MOVES} moves"

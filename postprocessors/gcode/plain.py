@@ -77,13 +77,13 @@ def check_plain(toolpath: Toolpath, machine: Machine) -> None:
 def split_z(toolpath: Toolpath, machine: Machine) -> tuple[LoweredToolpath, list[Finding]]:
     """XY and Z apart, slopes and helices as steps; and MOVE_SPLIT when a feed move had to be."""
     step_mm = slope_step_mm(machine)
-    lowered = helices_to_steps(toolpath, step_mm)
-    twice = np.bincount(lowered.row, minlength=len(toolpath)) > 1
+    parts = helices_to_steps(toolpath, step_mm)
+    twice = np.bincount(parts.row, minlength=len(toolpath)) > 1
     twice &= toolpath.is_feed
     if not twice.any():
-        return lowered, []
-    where = toolpath.place(int(twice.argmax()))
-    return lowered, [MOVE_SPLIT(where=where, measured=step_mm, count=int(twice.sum()))]
+        return parts, []
+    place = toolpath.place(int(twice.argmax()))
+    return parts, [MOVE_SPLIT(where=place, measured=step_mm, count=int(twice.sum()))]
 
 
 def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) -> Iterator[Finding]:
@@ -139,35 +139,35 @@ class PlainRows(Struct, frozen=True, eq=False):
 
 def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
     """The rows of a toolpath (in the program's own lengths) in units, arcs made consistent."""
-    lowered = _halve_circles(toolpath, rules)
-    path = lowered.toolpath
+    halved = _halve_circles(toolpath, rules)
+    path = halved.toolpath
     rows = np.flatnonzero(path.is_arc)
     begin, stop = units_of(path.starts, rules.decimals), units_of(path.end, rules.decimals)
-    wanted = WantedArcs(path, rows, begin[rows, :2], stop[rows, :2], rules)
-    flat = wanted.sagitta < FLAT_UNITS
-    centre, found, moved = _centres(wanted)
-    bad, moved = ~flat & ~found, moved & ~flat & found
-    changed = lowered.row[rows[bad | moved]]
+    arcs = WantedArcs(path, rows, begin[rows, :2], stop[rows, :2], rules)
+    flat = arcs.sagitta < FLAT_UNITS
+    centre, has_centre, has_moved = _centres(arcs)
+    has_no_centre, has_moved = ~flat & ~has_centre, has_moved & ~flat & has_centre
+    changed_rows = halved.row[rows[has_no_centre | has_moved]]
     kind = path.kind.copy()
     kind[rows[flat]] = Kind.LINE
     # By row of `path`, so that they survive the rows that lines add.
     offset = np.zeros((len(path), 2), dtype=np.int64)
-    kept = ~flat & found
-    offset[rows[kept]] = centre[kept] - begin[rows[kept], :2]
-    chosen = np.zeros(len(path), dtype=np.bool_)
-    chosen[rows[bad]] = True
+    has_arc = ~flat & has_centre
+    offset[rows[has_arc]] = centre[has_arc] - begin[rows[has_arc], :2]
+    is_line = np.zeros(len(path), dtype=np.bool_)
+    is_line[rows[has_no_centre]] = True
     unit = 10.0**-rules.decimals
-    chords = arcs_to_lines(replace(path, kind=kind), chosen, LINE_SAGITTA_UNITS * unit)
+    chords = arcs_to_lines(replace(path, kind=kind), is_line, LINE_SAGITTA_UNITS * unit)
     return PlainRows(
         kind=chords.toolpath.kind,
         end=units_of(chords.toolpath.end, rules.decimals),
         offset=offset[chords.row],
         start=units_of(toolpath.start, rules.decimals),
-        row=lowered.row[chords.row],
+        row=halved.row[chords.row],
         flat=int(flat.sum()),
-        recentred=int(moved.sum()),
-        lines=int(bad.sum()),
-        first=int(changed[0]) if len(changed) else -1,
+        recentred=int(has_moved.sum()),
+        lines=int(has_no_centre.sum()),
+        first=int(changed_rows[0]) if len(changed_rows) else -1,
     )
 
 
@@ -190,13 +190,13 @@ def _halve_circles(toolpath: Toolpath, rules: ArcRules) -> LoweredToolpath:
     unchanged."""
     begin = units_of(toolpath.starts, rules.decimals)
     stop = units_of(toolpath.end, rules.decimals)
-    full = toolpath.is_arc & (begin[:, :2] == stop[:, :2]).all(axis=1)
-    full &= np.abs(toolpath.sweeps()) > math.pi
-    if rules.full_circles == "whole" or not full.any():
+    is_full = toolpath.is_arc & (begin[:, :2] == stop[:, :2]).all(axis=1)
+    is_full &= np.abs(toolpath.sweeps()) > math.pi
+    if rules.full_circles == "whole" or not is_full.any():
         return LoweredToolpath(toolpath, np.arange(len(toolpath)))
     # Other arcs pass for lines meanwhile, so that these alone are cut.
-    alone = np.where(toolpath.is_arc & ~full, int(Kind.LINE), toolpath.kind)
-    halves = arcs_within(replace(toolpath, kind=alone), math.pi)
+    kinds = np.where(toolpath.is_arc & ~is_full, int(Kind.LINE), toolpath.kind)
+    halves = arcs_within(replace(toolpath, kind=kinds), math.pi)
     kind = toolpath.kind[halves.row]
     return LoweredToolpath(replace(halves.toolpath, kind=kind), halves.row)
 
@@ -217,45 +217,45 @@ class WantedArcs:
         self.sagitta = sagitta_of(self.radius, self.sweep)
         self.most = rules.most_mm * scale
 
-    def fits(self, which: Ints, centre: Floats) -> Bools:
+    def fits(self, indices: Ints, centre: Floats) -> Bools:
         """Return the mask (L,) of arcs that satisfy the dialect's rules about these rounded
         centres (L, 2)."""
-        begin, stop = self.begin[which], self.stop[which]
-        out, back = begin - centre, stop - centre
-        r1, r2 = np.hypot(*out.T), np.hypot(*back.T)
-        turn = turns_of(out, back, self.clockwise[which])
-        good = (np.abs(r1 - r2) <= SPREAD_UNITS) & (r1 >= MIN_RADIUS_UNITS)
-        good &= (np.abs(turn - self.sweep[which]) < math.pi) & (
-            np.abs(out).max(axis=1) <= self.most
+        begin, stop = self.begin[indices], self.stop[indices]
+        start_arm, end_arm = begin - centre, stop - centre
+        r1, r2 = np.hypot(*start_arm.T), np.hypot(*end_arm.T)
+        turn = turns_of(start_arm, end_arm, self.clockwise[indices])
+        is_fit = (np.abs(r1 - r2) <= SPREAD_UNITS) & (r1 >= MIN_RADIUS_UNITS)
+        is_fit &= (np.abs(turn - self.sweep[indices]) < math.pi) & (
+            np.abs(start_arm).max(axis=1) <= self.most
         )
         if self.rules.chord_fits:
-            good &= np.hypot(*(stop - begin).T) <= 2.0 * r1
-        return np.asarray(good)
+            is_fit &= np.hypot(*(stop - begin).T) <= 2.0 * r1
+        return np.asarray(is_fit)
 
 
-def _centres(wanted: WantedArcs) -> tuple[Ints, Bools, Bools]:
+def _centres(arcs: WantedArcs) -> tuple[Ints, Bools, Bools]:
     """For each arc its centre (K, 2) in units, whether there is one, and whether it is another
     than the rounded one."""
-    count = len(wanted.radius)
-    in_range = wanted.radius <= wanted.most
+    count = len(arcs.radius)
+    in_range = arcs.radius <= arcs.most
     centre = np.zeros((count, 2), dtype=np.int64)
-    centre[in_range] = np.rint(wanted.centre[in_range]).astype(np.int64)
+    centre[in_range] = np.rint(arcs.centre[in_range]).astype(np.int64)
     every = np.arange(count)
-    found = in_range.copy()
-    found[in_range] = wanted.fits(every[in_range], centre[in_range].astype(np.float64))
-    moved = np.zeros(count, dtype=np.bool_)
-    left = every[in_range & ~found & (wanted.radius >= MIN_RADIUS_UNITS - SPREAD_UNITS)]
-    if not len(left):
-        return centre, found, moved
+    has_centre = in_range.copy()
+    has_centre[in_range] = arcs.fits(every[in_range], centre[in_range].astype(np.float64))
+    has_moved = np.zeros(count, dtype=np.bool_)
+    open_arcs = every[in_range & ~has_centre & (arcs.radius >= MIN_RADIUS_UNITS - SPREAD_UNITS)]
+    if not len(open_arcs):
+        return centre, has_centre, has_moved
     reach = np.arange(-RECENTRE_REACH, RECENTRE_REACH + 1)
     steps = np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2)
-    tried = centre[left][:, None, :] + steps[None, :, :]
-    far = np.hypot(*np.moveaxis(tried - wanted.centre[left][:, None, :], -1, 0))
-    flat = tried.reshape(-1, 2).astype(np.float64)
-    good = wanted.fits(np.repeat(left, len(steps)), flat).reshape(far.shape)
-    best = np.where(good, far, np.inf).argmin(axis=1)
-    any_good = good.any(axis=1)
-    centre[left[any_good]] = tried[np.flatnonzero(any_good), best[any_good]]
-    found[left[any_good]] = True
-    moved[left[any_good]] = True
-    return centre, found, moved
+    candidates = centre[open_arcs][:, None, :] + steps[None, :, :]
+    distances = np.hypot(*np.moveaxis(candidates - arcs.centre[open_arcs][:, None, :], -1, 0))
+    flat = candidates.reshape(-1, 2).astype(np.float64)
+    is_fit = arcs.fits(np.repeat(open_arcs, len(steps)), flat).reshape(distances.shape)
+    best = np.where(is_fit, distances, np.inf).argmin(axis=1)
+    any_good = is_fit.any(axis=1)
+    centre[open_arcs[any_good]] = candidates[np.flatnonzero(any_good), best[any_good]]
+    has_centre[open_arcs[any_good]] = True
+    has_moved[open_arcs[any_good]] = True
+    return centre, has_centre, has_moved

@@ -58,12 +58,12 @@ class PlainMoves:
     whether it moves. `count`: so many, from the first on, are surely what a reader makes of them
     one by one too; the others are not to be used."""
 
-    def __init__(self, plain: PlainBlocks, state: PlainState, rule: ArcRule) -> None:
-        self._plain = plain
-        has_g, has_feed = plain.has(words.G_WORD), plain.has(words.F_WORD)
-        has = [plain.has(column) for column in (words.X_WORD, words.Y_WORD, words.Z_WORD)]
-        has_i, has_j = plain.has(words.I_WORD), plain.has(words.J_WORD)
-        numbers = plain.numbers
+    def __init__(self, blocks: PlainBlocks, state: PlainState, rule: ArcRule) -> None:
+        self._plain = blocks
+        has_g, has_feed = blocks.has(words.G_WORD), blocks.has(words.F_WORD)
+        has_axis = [blocks.has(column) for column in (words.X_WORD, words.Y_WORD, words.Z_WORD)]
+        has_i, has_j = blocks.has(words.I_WORD), blocks.has(words.J_WORD)
+        numbers = blocks.numbers
         self.motion = fill_forward(
             has_g, np.where(has_g, numbers[:, words.G_WORD] * 10.0, 0.0), state.motion
         ).astype(np.int64)
@@ -71,13 +71,15 @@ class PlainMoves:
         self.end = np.column_stack(
             [
                 fill_forward(
-                    has[axis], numbers[:, words.X_WORD + axis] * state.mm, state.position[axis]
+                    has_axis[axis],
+                    numbers[:, words.X_WORD + axis] * state.mm,
+                    state.position[axis],
                 )
                 for axis in range(3)
             ]
         )
         start = np.concatenate([[state.position], self.end[:-1]])
-        self.moving = has[0] | has[1] | has[2]
+        self.moving = has_axis[0] | has_axis[1] | has_axis[2]
         centred = has_i | has_j
         offset = np.column_stack(
             [
@@ -87,32 +89,32 @@ class PlainMoves:
         )
         self.centre = start[:, :2] + offset
         arc = self.motion > LINE
-        sure = ~(has_feed & ~(self.feed > 0.0))
-        sure &= self.moving | ~centred
-        sure &= ~self.moving | (self.motion >= 0)
-        sure &= ~(has_g | self.moving) | (self.motion == RAPID) | (self.feed > 0.0)
-        sure &= ~(has_g & arc) | self.moving
-        sure &= ~self.moving | (arc == centred)
-        arcs = np.flatnonzero(arc & self.moving & sure)
+        is_sure = ~(has_feed & ~(self.feed > 0.0))
+        is_sure &= self.moving | ~centred
+        is_sure &= ~self.moving | (self.motion >= 0)
+        is_sure &= ~(has_g | self.moving) | (self.motion == RAPID) | (self.feed > 0.0)
+        is_sure &= ~(has_g & arc) | self.moving
+        is_sure &= ~self.moving | (arc == centred)
+        arcs = np.flatnonzero(arc & self.moving & is_sure)
         if rule.ends_in_plane:
-            sure[arcs] &= (has[0] | has[1])[arcs]
-        sure[arcs] &= sure_arcs(start[arcs, :2], self.end[arcs, :2], self.centre[arcs], rule)
-        self.count = len(sure) if sure.all() else int(sure.argmin())
+            is_sure[arcs] &= (has_axis[0] | has_axis[1])[arcs]
+        is_sure[arcs] &= sure_arcs(start[arcs, :2], self.end[arcs, :2], self.centre[arcs], rule)
+        self.count = len(is_sure) if is_sure.all() else int(is_sure.argmin())
 
     def add_to(self, path: ToolpathBuilder, fast: FastFeeds) -> bool:
         """Add the rows of the sure ones, of which there is one at least, to a path; whether any
         moves. Their feeds are noted."""
-        some = slice(self.count)
-        rows, feeds = self.moving[some], self.feed[some]
-        given = self._plain.has(words.F_WORD)[some]
-        fast.note(self._plain.first, np.where(given, feeds, np.nan))
+        sure_rows = slice(self.count)
+        rows, feeds = self.moving[sure_rows], self.feed[sure_rows]
+        has_feed_word = self._plain.has(words.F_WORD)[sure_rows]
+        fast.note(self._plain.first, np.where(has_feed_word, feeds, np.nan))
         if not rows.any():
             return False
-        kind = self.motion[some][rows]
+        kind = self.motion[sure_rows][rows]
         path.moves(
             kind=KINDS[kind],
-            end=self.end[some][rows],
-            centre=np.where(kind[:, None] > LINE, self.centre[some][rows], np.nan),
+            end=self.end[sure_rows][rows],
+            centre=np.where(kind[:, None] > LINE, self.centre[sure_rows][rows], np.nan),
             feed=np.where(kind >= LINE, feeds[rows], np.nan),
             block=self._plain.first + np.flatnonzero(rows),
         )
@@ -128,14 +130,14 @@ class PlainMoves:
 def sure_arcs(start: Floats, end: Floats, centre: Floats, rule: ArcRule) -> Bools:
     """(K,) which arcs surely have one radius, and turn by more than what is taken for a full
     circle or end where they start."""
-    out, back = start - centre, end - centre
-    r1, r2 = np.hypot(out[:, 0], out[:, 1]), np.hypot(back[:, 0], back[:, 1])
-    cross = out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0]
-    turn = np.abs(np.arctan2(cross, (out * back).sum(axis=1)))
-    same = (start == end).all(axis=1)
-    sure = np.abs(r1 - r2) <= SURE_PART * rule.gap_mm
-    sure &= SURE_PART * np.minimum(r1, r2) > rule.radius_mm
-    return np.asarray(sure & (same | (SURE_PART * turn > rule.full_turn_rad)))
+    start_arm, end_arm = start - centre, end - centre
+    r1, r2 = np.hypot(start_arm[:, 0], start_arm[:, 1]), np.hypot(end_arm[:, 0], end_arm[:, 1])
+    cross = start_arm[:, 0] * end_arm[:, 1] - start_arm[:, 1] * end_arm[:, 0]
+    turn = np.abs(np.arctan2(cross, (start_arm * end_arm).sum(axis=1)))
+    same_ends = (start == end).all(axis=1)
+    is_sure = np.abs(r1 - r2) <= SURE_PART * rule.gap_mm
+    is_sure &= SURE_PART * np.minimum(r1, r2) > rule.radius_mm
+    return np.asarray(is_sure & (same_ends | (SURE_PART * turn > rule.full_turn_rad)))
 
 
 class FastFeeds:

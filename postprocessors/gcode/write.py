@@ -120,31 +120,31 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
         blocks = {**events.blocks, **cycle_blocks(holes, feed_words, number)}
         events = replace(events, blocks=blocks)
     unmoved = _first_change(toolpath, events) if style.change_first else 0
-    sent = sent_rows(toolpath, arcs, feeds, events.changes, holes, unmoved)
+    rows_sent = sent_rows(toolpath, arcs, feeds, events.changes, holes, unmoved)
     arc_counts = arcs.counts
     del arcs, feeds
     frame = [style.frame] if style.frame else []
-    first_mode, changes = _path_modes(toolpath, sent, style)
-    ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
-    order = BlockOrder(sent.is_motion)
+    first_mode, changes = _path_modes(toolpath, rows_sent, style)
+    has_end = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
+    order = BlockOrder(rows_sent.is_motion)
     order.add(0, [*style.header, *first_mode, *dialect.start_blocks])
-    for at, row in sent.event_rows(events):
-        order.add(at, events.blocks[row], row)
-    for at, block in changes.items():
-        order.add(at, [block])
+    for index, row in rows_sent.event_rows(events):
+        order.add(index, events.blocks[row], row)
+    for index, block in changes.items():
+        order.add(index, [block])
     footer = _footer(toolpath, events, dialect)
-    order.add(len(sent.row), footer[:-1])
-    order.add(len(sent.row), footer[-1:], len(toolpath) - 1 if ended else -1)
-    of_row = order.rows(sent.row)
+    order.add(len(rows_sent.row), footer[:-1])
+    order.add(len(rows_sent.row), footer[-1:], len(toolpath) - 1 if has_end else -1)
+    of_row = order.rows(rows_sent.row)
     tell = style.mounted
     mounted = {} if tell is None else {row: tell(toolpath, row) for row in events.changes}
-    said = comments(toolpath, of_row, dialect, style.message, mounted, seconds)
+    remarks = comments(toolpath, of_row, dialect, style.message, mounted, seconds)
     head = [*frame, *header(toolpath, machine, dialect)]
-    refuse_too_long(len(head) + len(of_row) + len(said[0]) + len(frame), "line")
+    refuse_too_long(len(head) + len(of_row) + len(remarks[0]) + len(frame), "line")
     data = b"".join(
         [
             *(f"{line}\n".encode("ascii") for line in head),
-            order.text(sent, dialect, decimals, *said),
+            order.text(rows_sent, dialect, decimals, *remarks),
             *(f"{line}\n".encode("ascii") for line in frame),
         ]
     )
@@ -155,7 +155,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
         of_row,
         (
             *rounded_feeds,
-            *_arc_findings(toolpath, arc_counts, sent.dropped),
+            *_arc_findings(toolpath, arc_counts, rows_sent.dropped),
             *_rounded(toolpath, events.rounded),
         ),
     )
@@ -166,9 +166,9 @@ def _first_change(toolpath: Toolpath, events: Events) -> int:
     Behind the change the tool goes to its height anyway."""
     row = events.changes[0] if events.changes else 0
     motion = toolpath.is_motion[:row]
-    up = (toolpath.kind[:row] == Kind.RAPID) & (toolpath.end[:row, 2] >= toolpath.start[2])
-    up &= (toolpath.end[:row, :2] == toolpath.start[:2]).all(axis=1)
-    return row if bool((up | ~motion).all()) else 0
+    is_upward = (toolpath.kind[:row] == Kind.RAPID) & (toolpath.end[:row, 2] >= toolpath.start[2])
+    is_upward &= (toolpath.end[:row, :2] == toolpath.start[:2]).all(axis=1)
+    return row if bool((is_upward | ~motion).all()) else 0
 
 
 def _seconds(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Floats | None:
@@ -205,19 +205,19 @@ def in_units(
 
 
 def _path_modes(
-    toolpath: Toolpath, sent: Sent, style: ProgramStyle
+    toolpath: Toolpath, rows_sent: Sent, style: ProgramStyle
 ) -> tuple[tuple[str, ...], dict[int, str]]:
     """The path mode to begin with, and the blocks that change it, by the place among the rows
     that are sent; none for dialects that know no such thing."""
     if style.path_mode is None or style.own_mode is None:
         return (), {}
     written = [style.path_mode(mode) for mode in (*toolpath.modes, style.own_mode)]
-    moving = np.flatnonzero(sent.is_motion)
-    asked = toolpath.mode[sent.row[moving]]
-    if len(asked) == 0:
+    moving = np.flatnonzero(rows_sent.is_motion)
+    modes = toolpath.mode[rows_sent.row[moving]]
+    if len(modes) == 0:
         return (written[-1],), {}
-    turns = np.flatnonzero(np.diff(asked)) + 1
-    return (written[asked[0]],), {int(moving[k]): written[asked[k]] for k in turns.tolist()}
+    turns = np.flatnonzero(np.diff(modes)) + 1
+    return (written[modes[0]],), {int(moving[k]): written[modes[k]] for k in turns.tolist()}
 
 
 class BlockOrder:
@@ -229,23 +229,23 @@ class BlockOrder:
         self._is_motion = is_motion
         self._others: list[tuple[int, str, int]] = []
 
-    def add(self, at: int, blocks: Sequence[str], row: int = -1) -> None:
-        """Blocks in front of row `at` of those that are sent, with the toolpath's row."""
-        self._others += [(at, block, row) for block in blocks]
+    def add(self, index: int, blocks: Sequence[str], row: int = -1) -> None:
+        """Blocks in front of row `index` of those that are sent, with the toolpath's row."""
+        self._others += [(index, block, row) for block in blocks]
 
     def _sorted(self) -> tuple[list[tuple[int, str, int]], Ints]:
         """The others in order, and how many motions are in front of each."""
-        others = sorted(self._others, key=lambda other: other[0])
-        return others, self._before[[at for at, _, _ in others]]
+        other_blocks = sorted(self._others, key=lambda other: other[0])
+        return other_blocks, self._before[[index for index, _, _ in other_blocks]]
 
     def rows(self, row: Ints) -> Ints:
         """(B,) the toolpath's row of each block; `row` (M,) of those that are sent."""
-        others, before = self._sorted()
-        return np.insert(row[self._is_motion], before, [one for _, _, one in others])
+        other_blocks, before = self._sorted()
+        return np.insert(row[self._is_motion], before, [one for _, _, one in other_blocks])
 
     def text(
         self,
-        sent: Sent,
+        rows_sent: Sent,
         dialect: GcodeDialect,
         feed_decimals: int,
         commented: Ints,
@@ -253,30 +253,30 @@ class BlockOrder:
     ) -> bytes:
         """All blocks, with C lines of comments, the k-th before block commented[k] (from 0); these
         ascend."""
-        others, before = self._sorted()
-        at = np.array([at for at, _, _ in others], dtype=np.int64)
-        number = before + np.arange(1, len(others) + 1)
-        columns = motion_words(sent, dialect, feed_decimals)
+        other_blocks, before = self._sorted()
+        indices = np.array([indices for indices, _, _ in other_blocks], dtype=np.int64)
+        number = before + np.arange(1, len(other_blocks) + 1)
+        columns = motion_words(rows_sent, dialect, feed_decimals)
         if dialect.block_numbers:
-            every = np.arange(len(sent.row))
-            mine = self._before[1:] + np.searchsorted(at, every, side="right")
-            columns.insert(0, WordColumn("N", mine, sent.is_motion))
+            every = np.arange(len(rows_sent.row))
+            numbers = self._before[1:] + np.searchsorted(indices, every, side="right")
+            columns.insert(0, WordColumn("N", numbers, rows_sent.is_motion))
         # In front of a row: the other blocks, each behind its comments; then those of a motion.
         other, moves = np.searchsorted(number - 1, commented), ~np.isin(commented, number - 1)
         motion = (commented - other)[moves]
         place, rank = np.empty(len(commented), dtype=np.int64), 2 * other
         place[moves] = np.searchsorted(self._before, motion, side="right") - 1
-        place[~moves] = at[other[~moves]]
-        rank[moves] = 2 * len(others)
-        rows = np.append(at, place)
-        order = np.lexsort((np.append(2 * np.arange(len(others)) + 1, rank), rows))
+        place[~moves] = indices[other[~moves]]
+        rank[moves] = 2 * len(other_blocks)
+        rows = np.append(indices, place)
+        order = np.lexsort((np.append(2 * np.arange(len(other_blocks)) + 1, rank), rows))
 
         def lines() -> Iterator[tuple[int, str]]:
             for k, row in zip(order.tolist(), rows[order].tolist(), strict=True):
-                if k >= len(others):
-                    yield row, comment_at(k - len(others))
+                if k >= len(other_blocks):
+                    yield row, comment_at(k - len(other_blocks))
                 else:
-                    block = others[k][1]
+                    block = other_blocks[k][1]
                     yield row, f"N{number[k]} {block}" if dialect.block_numbers else block
 
         return texts_of(columns, blanks=True).with_lines(lines())
@@ -339,10 +339,10 @@ class Sent(Struct, frozen=True, eq=False):
 
     def event_rows(self, events: Events) -> Iterator[tuple[int, int]]:
         """Yield the position of each event that has a block, and its row of the toolpath."""
-        for at in np.flatnonzero(~self.is_motion).tolist():
-            row = int(self.row[at])
+        for index in np.flatnonzero(~self.is_motion).tolist():
+            row = int(self.row[index])
             if row in events.blocks:
-                yield at, row
+                yield index, row
 
 
 def sent_rows(
@@ -356,78 +356,88 @@ def sent_rows(
     """All rows with pieces in place of arcs, without moves that move nothing, and without motions
     among the first `unmoved` rows. `changes`: the rows of tool changes that have a block; of
     `holes`, which are written as cycles, there is one."""
-    of, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
+    origins, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
     if arcs.pieces:
-        many = np.ones(len(toolpath), dtype=np.int64)
+        piece_counts = np.ones(len(toolpath), dtype=np.int64)
         for row, pieces in arcs.pieces.items():
-            many[row] = len(pieces)
-        of = np.repeat(of, many)
-        kind, end, offset = kind[of], end[of], offset[of]
-        first = np.cumsum(many) - many
+            piece_counts[row] = len(pieces)
+        origins = np.repeat(origins, piece_counts)
+        kind, end, offset = kind[origins], end[origins], offset[origins]
+        first = np.cumsum(piece_counts) - piece_counts
         for row, pieces in arcs.pieces.items():
             sunk = int(arcs.end[row - 1, 2]) if row else 0
             rise = int(arcs.end[row, 2]) - sunk
-            for at, piece in enumerate(pieces, int(first[row])):
+            for index, piece in enumerate(pieces, int(first[row])):
                 height = sunk + round(rise * piece.share)
-                kind[at], end[at], offset[at] = piece.kind, (*piece.end, height), piece.offset
+                kind[index], end[index], offset[index] = (
+                    piece.kind,
+                    (*piece.end, height),
+                    piece.offset,
+                )
     if holes:
-        rows = np.flatnonzero(np.isin(of, rows_kept(len(toolpath), holes)))
-        of, kind, end, offset = of[rows], kind[rows], end[rows], offset[rows]
-        drilled = np.searchsorted(of, [hole.cut for hole in holes])
+        rows = np.flatnonzero(np.isin(origins, rows_kept(len(toolpath), holes)))
+        origins, kind, end, offset = origins[rows], kind[rows], end[rows], offset[rows]
+        drilled = np.searchsorted(origins, [hole.cut for hole in holes])
         kind[drilled], end[drilled] = CYCLE, arcs.end[[hole.last for hole in holes]]
-    raised = np.zeros(len(of), dtype=np.bool_)
-    changed = (kind == Kind.TOOL_CHANGE) & np.isin(of, changes)
-    if again := _raised_again(kind, end, changed):
-        before = np.array(again) - 1
-        of, kind = np.insert(of, again, of[before]), np.insert(kind, again, kind[before])
-        end = np.insert(end, again, end[before], axis=0)
-        offset = np.insert(offset, again, 0, axis=0)
-        raised, changed = np.insert(raised, again, True), np.insert(changed, again, False)
+    raised = np.zeros(len(origins), dtype=np.bool_)
+    is_changed = (kind == Kind.TOOL_CHANGE) & np.isin(origins, changes)
+    if raised_rows := _raised_again(kind, end, is_changed):
+        before = np.array(raised_rows) - 1
+        origins, kind = (
+            np.insert(origins, raised_rows, origins[before]),
+            np.insert(kind, raised_rows, kind[before]),
+        )
+        end = np.insert(end, raised_rows, end[before], axis=0)
+        offset = np.insert(offset, raised_rows, 0, axis=0)
+        raised, is_changed = (
+            np.insert(raised, raised_rows, True),
+            np.insert(is_changed, raised_rows, False),
+        )
         kind[raised] = Kind.RAPID
     motion = kind <= Kind.ARC_CCW
     is_arc = motion & (kind >= Kind.ARC_CW)
-    late = motion & (of < unmoved)
+    is_late = motion & (origins < unmoved)
     written = _differ(end, np.zeros(3))
-    written[~motion | late] = False
+    written[~motion | is_late] = False
     written[raised, 2] = True
-    elsewhere = changed | (kind == CYCLE)
+    elsewhere = is_changed | (kind == CYCLE)
     home_xy, home_z = elsewhere | (kind == Kind.HOME_XY), elsewhere | (kind == Kind.HOME_Z)
     flat = written[:, :2].any(axis=1) | is_arc
     # A rapid to where X and Y should be already is not left out before they were ever written.
-    still = (kind == Kind.RAPID) & ~written.any(axis=1)
-    still &= _not_yet_written(flat, home_xy) & ~_not_yet_written(written[:, 2], home_z)
-    still &= _not_yet_written(flat | still, home_xy)
-    both = is_arc | still | (flat & _not_yet_written(flat | still, home_xy))
-    written[both, :2] = True
-    kept = ~motion | (written.any(axis=1) & ~late)
-    gone = of[~kept & ~late]
-    wanted = (toolpath.end[gone] != toolpath.starts_of(gone)).any(axis=1)
-    rows = np.flatnonzero(kept)
-    of = of[rows]
+    is_still = (kind == Kind.RAPID) & ~written.any(axis=1)
+    is_still &= _not_yet_written(flat, home_xy) & ~_not_yet_written(written[:, 2], home_z)
+    is_still &= _not_yet_written(flat | is_still, home_xy)
+    fixed = is_arc | is_still | (flat & _not_yet_written(flat | is_still, home_xy))
+    written[fixed, :2] = True
+    is_kept = ~motion | (written.any(axis=1) & ~is_late)
+    dropped = origins[~is_kept & ~is_late]
+    has_moved = (toolpath.end[dropped] != toolpath.starts_of(dropped)).any(axis=1)
+    rows = np.flatnonzero(is_kept)
+    origins = origins[rows]
     return Sent(
         kind[rows],
         end[rows],
         rows_of(offset, rows),
-        feeds[of],
-        of,
+        feeds[origins],
+        origins,
         written[rows],
         _first_after((home_xy | home_z)[rows], motion[rows]),
-        int(wanted.sum()) + arcs.counts.dropped,
+        int(has_moved.sum()) + arcs.counts.dropped,
     )
 
 
-def _raised_again(kind: Codes, end: Ints, changed: Bools) -> list[int]:
+def _raised_again(kind: Codes, end: Ints, is_changed: Bools) -> list[int]:
     """The rows before which the tool must be sent to its height once more: those behind a change
     of tools that stands between moves, unless the next move is a rapid in Z anyway."""
     motions = np.flatnonzero(kind <= Kind.ARC_CCW)
-    found = []
-    for at in np.flatnonzero(changed).tolist():
-        k = int(np.searchsorted(motions, at))
+    raised = []
+    for index in np.flatnonzero(is_changed).tolist():
+        k = int(np.searchsorted(motions, index))
         if 0 < k < len(motions):
-            goes = end[motions[k]] != end[at]
+            goes = end[motions[k]] != end[index]
             if kind[motions[k]] != Kind.RAPID or goes[:2].any() or not goes[2]:
-                found.append(at + 1)
-    return found
+                raised.append(index + 1)
+    return raised
 
 
 def _differ(ends: Ints | Floats, start: Floats) -> Bools:
@@ -439,51 +449,54 @@ def _differ(ends: Ints | Floats, start: Floats) -> Bools:
 
 def _not_yet_written(written: Bools, home: Bools) -> Bools:
     """(M,) true where nothing was written before the row since the start, or since homing."""
-    found = np.ones(len(written), dtype=np.bool_)
+    is_first = np.ones(len(written), dtype=np.bool_)
     for begin, end in pairwise([0, *np.flatnonzero(home).tolist(), len(written)]):
         if written[begin:end].any():
-            found[begin + int(written[begin:end].argmax()) + 1 : end] = False
-    return found
+            is_first[begin + int(written[begin:end].argmax()) + 1 : end] = False
+    return is_first
 
 
 def _first_after(home: Bools, motion: Bools) -> Bools:
     """(M,) true for the first motion behind each homing, of several in a row behind the last."""
-    found = np.zeros(len(home), dtype=np.bool_)
+    is_first = np.zeros(len(home), dtype=np.bool_)
     homes = np.flatnonzero(home)
     if len(homes):
         moving = np.flatnonzero(motion)
-        at = np.searchsorted(moving, homes)
-        found[moving[at[at < len(moving)]]] = True
-    return found
+        next_moves = np.searchsorted(moving, homes)
+        is_first[moving[next_moves[next_moves < len(moving)]]] = True
+    return is_first
 
 
-def motion_words(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[WordColumn]:
+def motion_words(rows_sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[WordColumn]:
     """The words of the motions among the rows."""
-    motion = sent.is_motion
+    motion = rows_sent.is_motion
     rows = np.flatnonzero(motion)
     number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
     turns = np.zeros(len(motion), dtype=bool)
-    turns[rows] = np.diff(sent.kind[rows], prepend=-1) != 0
-    is_arc = motion & (sent.kind >= Kind.ARC_CW)
-    fed = (motion & (sent.kind >= Kind.LINE)) | (sent.kind == CYCLE)
-    feed = motion & _changes(sent.feed, fed)
+    turns[rows] = np.diff(rows_sent.kind[rows], prepend=-1) != 0
+    is_arc = motion & (rows_sent.kind >= Kind.ARC_CW)
+    fed = (motion & (rows_sent.kind >= Kind.LINE)) | (rows_sent.kind == CYCLE)
+    feed = motion & _changes(rows_sent.feed, fed)
     return [
-        WordColumn("G", sent.kind, turns | (sent.forget & motion)),
+        WordColumn("G", rows_sent.kind, turns | (rows_sent.forget & motion)),
         *(
-            word_of(axis, sent.end[:, at], sent.written[:, at], number)
-            for at, axis in enumerate("XYZ")
+            word_of(axis, rows_sent.end[:, index], rows_sent.written[:, index], number)
+            for index, axis in enumerate("XYZ")
         ),
-        *(word_of(axis, sent.offset[:, at], is_arc, number) for at, axis in enumerate("IJ")),
-        word_of("F", sent.feed, feed, NumberStyle(feed_decimals, strip=True)),
+        *(
+            word_of(axis, rows_sent.offset[:, index], is_arc, number)
+            for index, axis in enumerate("IJ")
+        ),
+        word_of("F", rows_sent.feed, feed, NumberStyle(feed_decimals, strip=True)),
     ]
 
 
 def _changes(values: Ints, counts: Bools) -> Bools:
     """(M,) true where a row that counts has another value than the last one that counted."""
     rows = np.flatnonzero(counts)
-    changed = np.zeros(len(values), dtype=bool)
-    changed[rows] = np.diff(values[rows], prepend=-1) != 0
-    return changed
+    is_changed = np.zeros(len(values), dtype=bool)
+    is_changed[rows] = np.diff(values[rows], prepend=-1) != 0
+    return is_changed
 
 
 # Events, as the blocks that grbl and linuxcnc both know.

@@ -73,7 +73,7 @@ class _Reader:
             full_turn_rad=dialect.arc_full_turn_rad,
             ends_in_plane=True,
         )
-        self._runs = PlainRuns(self._lines, dialect.line_chars, free=True)
+        self._runs = PlainRuns(self._lines, dialect.line_chars, free_order=True)
         self._most = dialect.line_chars
         self._blocks = 0
         self._slashes: list[int] = []

@@ -57,9 +57,9 @@ class Canon(PartMoves):
             return
 
         def later() -> None:
-            here, self.path.block = self.path.block, block
+            outer_block, self.path.block = self.path.block, block
             self.path.event(kind, value)
-            self.path.block = here
+            self.path.block = outer_block
 
         self.queue.append(later)
 
@@ -75,22 +75,22 @@ class Canon(PartMoves):
             return
         waiting, self.queue = self.queue, []
         path, feed = self.path, self.feed
-        here = path.block, path.source
+        place_before = path.block, path.source
         for each in waiting:
             if not isinstance(each, Queued):
                 each()
                 continue
             path.block, path.source, self.feed = each.block, each.source, each.feed
             self._emit(each)
-        (path.block, path.source), self.feed = here, feed
+        (path.block, path.source), self.feed = place_before, feed
 
     def _emit(self, move: Queued) -> None:
         axes = PLANES[self.plane]
         x, z = self.nose
-        off = (x, 0.0, z) if self.plane == 180 else (0.0, 0.0, 0.0)
-        end = [move.end[k] + off[axis] for k, axis in enumerate(axes)]
+        offsets = (x, 0.0, z) if self.plane == 180 else (0.0, 0.0, 0.0)
+        end = [move.end[k] + offsets[axis] for k, axis in enumerate(axes)]
         if move.turn:
-            centre = (move.centre[0] + off[axes[0]], move.centre[1] + off[axes[1]])
+            centre = (move.centre[0] + offsets[axes[0]], move.centre[1] + offsets[axes[1]])
             self.arc(end, centre, move.turn)
             return
         place = [0.0, 0.0, 0.0]

@@ -74,87 +74,100 @@ class Compensation:
                 move.end = [value * factor for value in move.end]
                 move.centre = move.centre[0] * factor, move.centre[1] * factor
 
-    def switch_off(self, at: list[float]) -> bool:
+    def switch_off(self, centre: list[float]) -> bool:
         """Carry out G40: the last move ends beside its end. True if the cutter was beside the
         path."""
-        beside = self.active and not self.first
-        if beside:
-            self._end_at(at[0], at[1])
+        was_beside = self.active and not self.first
+        if was_beside:
+            self._end_at(centre[0], centre[1])
         self.side, self.first = 0, True
-        return beside
+        return was_beside
 
-    def settle(self, at: list[float]) -> None:
+    def settle(self, centre: list[float]) -> None:
         """A stop: what waits ends where it is."""
-        self._end_at(at[0], at[1])
+        self._end_at(centre[0], centre[1])
 
     # Moves; each gives where the cutter's centre comes to stand
 
-    def line(self, kind: Kind, to: list[float], at: list[float]) -> list[float]:
+    def line(self, kind: Kind, target: list[float], centre: list[float]) -> list[float]:
         """A straight move to a programmed point, from where the centre stands."""
-        return (self._entry_line if self.first else self._line)(kind, to, at)
+        return (self._entry_line if self.first else self._line)(kind, target, centre)
 
-    def _entry_line(self, kind: Kind, to: list[float], at: list[float]) -> list[float]:
-        way = to[0] - at[0], to[1] - at[1]
-        if math.hypot(*way) <= self.radius:
+    def _entry_line(self, kind: Kind, target: list[float], centre: list[float]) -> list[float]:
+        direction = target[0] - centre[0], target[1] - centre[1]
+        if math.hypot(*direction) <= self.radius:
             raise LineFault(
                 "the move onto the compensated path is no longer than the tool's radius"
             )
-        normal = math.atan2(way[1], way[0]) + self.side * _HALF
-        aside = math.cos(normal), math.sin(normal)
-        end = [to[0] + self.radius * aside[0], to[1] + self.radius * aside[1], to[2]]
-        self._from = at[0], at[1]
-        self._canon.wait(Queued(kind, end, direction=aside))
-        self.first, self.programmed = False, list(to)
+        normal = math.atan2(direction[1], direction[0]) + self.side * _HALF
+        normal_xy = math.cos(normal), math.sin(normal)
+        end = [
+            target[0] + self.radius * normal_xy[0],
+            target[1] + self.radius * normal_xy[1],
+            target[2],
+        ]
+        self._from = centre[0], centre[1]
+        self._canon.wait(Queued(kind, end, direction=normal_xy))
+        self.first, self.programmed = False, list(target)
         return list(end)
 
-    def _line(self, kind: Kind, to: list[float], at: list[float]) -> list[float]:
+    def _line(self, kind: Kind, target: list[float], centre: list[float]) -> list[float]:
         op, radius, side = self.programmed, self.radius, self.side
-        way = to[0] - op[0], to[1] - op[1]
-        if way == (0.0, 0.0):
-            end = [at[0], at[1], to[2]]
-            self._canon.wait(Queued(kind, list(end), direction=way))
-            self.programmed = list(to)
+        direction = target[0] - op[0], target[1] - op[1]
+        if direction == (0.0, 0.0):
+            end = [centre[0], centre[1], target[2]]
+            self._canon.wait(Queued(kind, list(end), direction=direction))
+            self.programmed = list(target)
             return end
-        theta, alpha = math.atan2(at[1] - op[1], at[0] - op[0]), math.atan2(way[1], way[0])
+        theta, alpha = (
+            math.atan2(centre[1] - op[1], centre[0] - op[0]),
+            math.atan2(direction[1], direction[0]),
+        )
         swing = (theta - alpha) * side
         beta = (swing + 2.0 * math.pi if swing < 0.0 else swing) - _HALF
         normal = alpha + side * _HALF
-        end = [to[0] + radius * math.cos(normal), to[1] + radius * math.sin(normal), to[2]]
+        end = [
+            target[0] + radius * math.cos(normal),
+            target[1] + radius * math.sin(normal),
+            target[2],
+        ]
         before = self._waiting()
         concave = beta < -CORNER_RAD or beta > math.pi + CORNER_RAD
         if before is not None and before.turn * side < 0 and beta > math.pi - CORNER_RAD:
             concave = True
         if concave and before is not None and before.turn:
-            self._end_at(*self._arc_then_line(before, way))
+            self._end_at(*self._arc_then_line(before, direction))
         elif concave:
             half = (beta + math.pi) / 2.0
             if half == 0.0:
                 raise LineFault("a corner inside of which the path turns straight back")
-            back = radius / math.tan(half)
+            setback = radius / math.tan(half)
             angle = theta + side * _HALF
-            self._end_at(at[0] + back * math.cos(angle), at[1] + back * math.sin(angle))
+            self._end_at(
+                centre[0] + setback * math.cos(angle), centre[1] + setback * math.sin(angle)
+            )
         elif beta > CORNER_RAD:
-            self._round(kind, (op[0], op[1]), normal, at)
+            self._round(kind, (op[0], op[1]), normal, centre)
         else:
             self._canon.flush()
-            self._from = at[0], at[1]
-        self._canon.wait(Queued(kind, list(end), direction=way))
-        self.programmed = list(to)
+            self._from = centre[0], centre[1]
+        self._canon.wait(Queued(kind, list(end), direction=direction))
+        self.programmed = list(target)
         return end
 
-    def _round(self, kind: Kind, corner: Flat, angle: float, at: list[float]) -> None:
+    def _round(self, kind: Kind, corner: Flat, angle: float, centre: list[float]) -> None:
         """About a corner, to where the next move begins."""
         x = corner[0] + self.radius * math.cos(angle)
         y = corner[1] + self.radius * math.sin(angle)
-        self._end_at(at[0], at[1])
+        self._end_at(centre[0], centre[1])
         if kind == Kind.RAPID:
-            self._canon.wait(Queued(kind, [x, y, at[2]]))
+            self._canon.wait(Queued(kind, [x, y, centre[2]]))
         else:
-            self._canon.wait(Queued(Kind.ARC_CW, [x, y, at[2]], corner, -self.side))
+            self._canon.wait(Queued(Kind.ARC_CW, [x, y, centre[2]], corner, -self.side))
         self._canon.flush()
         self._from = x, y
 
-    def _arc_then_line(self, arc: Queued, way: Flat) -> Flat:
+    def _arc_then_line(self, arc: Queued, direction: Flat) -> Flat:
         """Intersect the offset of an arc with the offset of the line that follows it.
 
         With the arc's centre c, the offset line lies d2 from it along its normal theta; the
@@ -162,54 +175,54 @@ class Compensation:
         """
         op, (cx, cy) = self.programmed, arc.centre
         old = math.hypot(cy - arc.end[1], cx - arc.end[0])
-        theta = math.atan2(way[1], way[0]) + (_HALF if arc.turn > 0 else -_HALF)
+        theta = math.atan2(direction[1], direction[0]) + (_HALF if arc.turn > 0 else -_HALF)
         phi = math.atan2(cy - op[1], cx - op[0])
         inside = arc.turn * self.side > 0
-        own = old + self.radius if inside else old - self.radius
-        d = own * math.cos(theta - phi)
+        offset_radius = old + self.radius if inside else old - self.radius
+        d = offset_radius * math.cos(theta - phi)
         part = (d - self.radius if inside else d + self.radius) / old if old else 2.0
         if not -1.0 <= part <= 1.0:
             raise LineFault(_GOUGES)
-        beside = math.acos(part)
-        angle = theta + math.pi + (-beside if (arc.turn > 0) == inside else beside)
+        half_angle = math.acos(part)
+        angle = theta + math.pi + (-half_angle if (arc.turn > 0) == inside else half_angle)
         return cx + old * math.cos(angle), cy + old * math.sin(angle)
 
-    def arc(self, arc: ProgrammedArc, at: list[float], spread: float) -> list[float]:
+    def arc(self, arc: ProgrammedArc, centre: list[float], spread: float) -> list[float]:
         """An arc, from where the centre stands."""
-        return self._entry_arc(arc, at, spread) if self.first else self._arc(arc, at)
+        return self._entry_arc(arc, centre, spread) if self.first else self._arc(arc, centre)
 
-    def _entry_arc(self, arc: ProgrammedArc, at: list[float], spread: float) -> list[float]:
+    def _entry_arc(self, arc: ProgrammedArc, centre: list[float], spread: float) -> list[float]:
         """Onto the path along another arc, which ends beside the end."""
-        if math.hypot(arc.end[0] - at[0], arc.end[1] - at[1]) <= self.radius:
+        if math.hypot(arc.end[0] - centre[0], arc.end[1] - centre[1]) <= self.radius:
             raise LineFault(
                 "the arc onto the compensated path is no larger than the tool's radius"
             )
         inside = arc.turn * self.side > 0
         sign = 1.0 if inside else -1.0
-        out = sign * (arc.centre[1] - arc.end[1]), sign * (arc.centre[0] - arc.end[0])
-        gamma = math.atan2(*out)
+        tangent = sign * (arc.centre[1] - arc.end[1]), sign * (arc.centre[0] - arc.end[0])
+        gamma = math.atan2(*tangent)
         self.first, self.programmed = False, list(arc.end)
         x = arc.end[0] + self.radius * math.cos(gamma)
         y = arc.end[1] + self.radius * math.sin(gamma)
         to_centre = math.atan2(arc.centre[1] - y, arc.centre[0] - x)
-        angle = math.atan2(at[1] - y, at[0] - x) - to_centre
+        angle = math.atan2(centre[1] - y, centre[0] - x) - to_centre
         if abs(math.cos(angle)) < 1e-4:
             raise LineFault("the arc onto the compensated path is smaller than the tool")
-        reach = math.hypot(at[1] - y, at[0] - x) / 2.0 / math.cos(angle)
+        reach = math.hypot(centre[1] - y, centre[0] - x) / 2.0 / math.cos(angle)
         cx, cy = x + reach * math.cos(to_centre), y + reach * math.sin(to_centre)
-        if abs(math.hypot(cx - x, cy - y) - math.hypot(cx - at[0], cy - at[1])) > spread:
+        if abs(math.hypot(cx - x, cy - y) - math.hypot(cx - centre[0], cy - centre[1])) > spread:
             raise LineFault("no arc leads onto the compensated path here")
         self._canon.flush()
         end = [x, y, arc.end[2]]
-        sweep = sweep_of((at[0], at[1]), (cx, cy), arc.turn, (x, y))
+        sweep = sweep_of((centre[0], centre[1]), (cx, cy), arc.turn, (x, y))
         self._canon.wait(Queued(Kind.ARC_CW, list(end), (cx, cy), arc.turn, sweep=sweep))
         return end
 
-    def _arc(self, arc: ProgrammedArc, at: list[float]) -> list[float]:
+    def _arc(self, arc: ProgrammedArc, centre: list[float]) -> list[float]:
         op, radius, side, (cx, cy) = self.programmed, self.radius, self.side, arc.centre
-        own = math.hypot(cx - arc.end[0], cy - arc.end[1])
+        offset_radius = math.hypot(cx - arc.end[0], cy - arc.end[1])
         inside = arc.turn * side > 0
-        theta = math.atan2(at[1] - op[1], at[0] - op[0]) - side * _HALF
+        theta = math.atan2(centre[1] - op[1], centre[0] - op[0]) - side * _HALF
         delta = math.atan2(cy - op[1], cx - op[0])
         alpha = delta - _HALF if arc.turn > 0 else delta + _HALF
         beta = (theta - alpha) * side
@@ -217,7 +230,7 @@ class Compensation:
             beta -= 2.0 * math.pi
         elif beta < -_HALF:
             beta += 2.0 * math.pi
-        if inside and own <= radius:
+        if inside and offset_radius <= radius:
             raise LineFault("an arc whose radius is no larger than the tool's")
         sign = 1.0 if inside else -1.0
         gamma = math.atan2(sign * (cy - arc.end[1]), sign * (cx - arc.end[0]))
@@ -229,22 +242,24 @@ class Compensation:
         before = self._waiting()
         flat = abs(beta - math.pi) < CORNER_RAD
         if beta < -CORNER_RAD or beta > math.pi + CORNER_RAD or (flat and not inside):
-            new = own - radius if inside else own + radius
+            new = offset_radius - radius if inside else offset_radius + radius
             if before is not None and before.turn:
                 meeting = self._arc_then_arc(before, arc, new)
             else:
-                meeting = self._line_then_arc(arc, theta, own * math.sin(beta - _HALF), new)
+                meeting = self._line_then_arc(
+                    arc, theta, offset_radius * math.sin(beta - _HALF), new
+                )
             self._end_at(*meeting)
         elif beta > CORNER_RAD:
             self._canon.flush()
             angle = delta if inside else delta + math.pi
             x, y = op[0] + radius * math.cos(angle), op[1] + radius * math.sin(angle)
-            self._canon.wait(Queued(Kind.ARC_CW, [x, y, at[2]], (op[0], op[1]), -side))
+            self._canon.wait(Queued(Kind.ARC_CW, [x, y, centre[2]], (op[0], op[1]), -side))
             self._canon.flush()
             self._from = x, y
         else:
             self._canon.flush()
-            self._from = at[0], at[1]
+            self._from = centre[0], centre[1]
         sweep = sweep_of((op[0], op[1]), arc.centre, arc.turn, (arc.end[0], arc.end[1]))
         self._canon.wait(Queued(Kind.ARC_CW, list(end), arc.centre, arc.turn, sweep=sweep))
         self.programmed = list(arc.end)
@@ -257,9 +272,9 @@ class Compensation:
         part = (across + self.radius if inside else across - self.radius) / new if new else 2.0
         if not -1.0 <= part <= 1.0:
             raise LineFault(_GOUGES)
-        beside = math.asin(part)
+        half_angle = math.asin(part)
         angle = theta + (0.0 if inside else math.pi)
-        angle += beside if (arc.turn > 0) == inside else -beside
+        angle += half_angle if (arc.turn > 0) == inside else -half_angle
         return arc.centre[0] + new * math.cos(angle), arc.centre[1] + new * math.sin(angle)
 
     def _arc_then_arc(self, before: Queued, arc: ProgrammedArc, new: float) -> Flat:
@@ -267,16 +282,18 @@ class Compensation:
         centres."""
         (px, py), (cx, cy) = before.centre, arc.centre
         old = math.hypot(py - before.end[1], px - before.end[0])
-        apart = math.hypot(py - cy, px - cx)
-        if old == 0.0 or apart == 0.0:
+        centre_distance = math.hypot(py - cy, px - cx)
+        if old == 0.0 or centre_distance == 0.0:
             raise LineFault("two arcs about one centre cannot be compensated")
-        part = (old * old + apart * apart - new * new) / (2.0 * old * apart)
+        part = (old * old + centre_distance * centre_distance - new * new) / (
+            2.0 * old * centre_distance
+        )
         if not -1.0 <= part <= 1.0:
             raise LineFault(_GOUGES)
         inside = before.turn * self.side > 0
-        back = math.acos(part)
+        angle_back = math.acos(part)
         angle = math.atan2(cy - py, cx - px)
-        angle += back if (arc.turn > 0) == inside else -back
+        angle += angle_back if (arc.turn > 0) == inside else -angle_back
         return px + old * math.cos(angle), py + old * math.sin(angle)
 
     # The waiting move
@@ -300,8 +317,8 @@ class Compensation:
         start = self._from
         if not move.turn:
             if start is not None:
-                way = x - start[0], y - start[1]
-                if way[0] * move.direction[0] + way[1] * move.direction[1] < 0.0:
+                step = x - start[0], y - start[1]
+                if step[0] * move.direction[0] + step[1] * move.direction[1] < 0.0:
                     raise LineFault(_GOUGES)
             move.end[:2] = x, y
             return

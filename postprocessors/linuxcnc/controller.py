@@ -150,8 +150,10 @@ class _Run:
 
     def blocks(self) -> Iterator[SampledRows]:
         """All rows."""
-        wanted = 2 * np.arange(0, len(self._path), ROWS_AT_ONCE)
-        first = sorted({self._move_at_row(int(k)) for k in np.searchsorted(self._begins, wanted)})
+        first_places = 2 * np.arange(0, len(self._path), ROWS_AT_ONCE)
+        first = sorted(
+            {self._move_at_row(int(k)) for k in np.searchsorted(self._begins, first_places)}
+        )
         for low, high in pairwise([*first, len(self._begins)]):
             if low < high:
                 yield self._block(low, high)
@@ -165,26 +167,28 @@ class _Run:
     def _block(self, low: int, high: int) -> SampledRows:
         """The rows of the moves low:high."""
         base, rows = self._place(low - 1), 2 * len(self._path)
-        own = slice(min(low, 1), min(low, 1) + high - low)
-        window = known = self._machine.controller.lookahead_moves
+        own_moves = slice(min(low, 1), min(low, 1) + high - low)
+        window = lookahead = self._machine.controller.lookahead_moves
         while True:
-            end = self._place(high + known)
-            planned = self._planned(base, end)
-            places = slice(2 * own.start, None if end == rows else -1)
-            lasting, speeds = _speeds(planned, places, self._rules.modes, self._before)
-            overlap = np.append(planned.corners.overlap[1:], 0.0)
+            end = self._place(high + lookahead)
+            window_plan = self._planned(base, end)
+            places = slice(2 * own_moves.start, None if end == rows else -1)
+            lasting, speeds = _speeds(window_plan, places, self._rules.modes, self._before)
+            overlap = np.append(window_plan.corners.overlap[1:], 0.0)
             overlaps = _in_turns(0.0, overlap)[lasting]
-            done = int(lasting[: 2 * own.stop].sum())
-            if end == rows or len(speeds.length_mm) >= done + window:
+            done_count = int(lasting[: 2 * own_moves.stop].sum())
+            if end == rows or len(speeds.length_mm) >= done_count + window:
                 break
-            known *= 2  # some of the moves are too short to be planned
-        taken = np.zeros(len(lasting) + 1)
-        taken[:-1][lasting] = self._in_periods(speeds, overlaps, done)
-        here, first = slice(self._place(low) // 2, self._place(high) // 2), base // 2
-        seconds = _seconds(planned, taken)[here.start - first : here.stop - first]
-        samples = LinuxcncSamples(planned, self._machine, self._spacing_mm, self._passed_mm)
-        self._passed_mm = samples.passed_mm(own.stop - 1)
-        return SampledRows(here.start, here.stop, first, samples, seconds)
+            lookahead *= 2  # some of the moves are too short to be planned
+        part_seconds = np.zeros(len(lasting) + 1)
+        part_seconds[:-1][lasting] = self._in_periods(speeds, overlaps, done_count)
+        block_rows, first = slice(self._place(low) // 2, self._place(high) // 2), base // 2
+        seconds = _seconds(window_plan, part_seconds)[
+            block_rows.start - first : block_rows.stop - first
+        ]
+        samples = LinuxcncSamples(window_plan, self._machine, self._spacing_mm, self._passed_mm)
+        self._passed_mm = samples.passed_mm(own_moves.stop - 1)
+        return SampledRows(block_rows.start, block_rows.stop, first, samples, seconds)
 
     def _place(self, move: int) -> int:
         """Return the place at which a move begins."""
@@ -195,31 +199,31 @@ class _Run:
         """Plan the moves between two places."""
         part, modes = self._path.part(low // 2, (high + 1) // 2), self._rules.modes
         part, origin = halve_arcs(part, modes.merging_mm(part.mode))
-        own = slice(low % 2, len(part) - high % 2)
-        part, origin = part.part(own.start, own.stop), origin[own]
+        own_rows = slice(low % 2, len(part) - high % 2)
+        part, origin = part.part(own_rows.start, own_rows.stop), origin[own_rows]
         part, chain = merge_rows(part, modes.merging_mm(part.mode))
         tangents = Tangents(part)
         moves = moves_of(tangents, chain, self._rules)
         return PlannedWindow(origin, tangents, moves, corners_of(moves, tangents, self._rules))
 
-    def _in_periods(self, plan: SpeedPlan, overlaps: Floats, done: int) -> Floats:
+    def _in_periods(self, plan: SpeedPlan, overlaps: Floats, done_count: int) -> Floats:
         """(N,) s of each block, less its overlap (N,) with the next; from rest to rest it takes
-        whole servo periods, and `REST_PERIODS`. The next plan begins behind the first `done` of
-        these."""
+        whole servo periods, and `REST_PERIODS`. The next plan begins behind the first `done_count`
+        of these."""
         controller = self._machine.controller
         period_s = controller.servo_period_s
         squares = plan.squares(controller.lookahead_moves)
         seconds = plan.seconds(squares)
         seconds -= np.minimum(overlaps, 0.5 * seconds)
-        stands = (squares[1:] == 0.0) & (overlaps == 0.0)
-        rests = np.flatnonzero(stands)  # blocks behind which the machine stands
-        since = np.concatenate([[0], rests + 1])
-        runs = np.add.reduceat(seconds, since[:-1]) if len(rests) else np.zeros(0)
+        has_rest = (squares[1:] == 0.0) & (overlaps == 0.0)
+        rests = np.flatnonzero(has_rest)  # blocks behind which the machine stands
+        run_starts = np.concatenate([[0], rests + 1])
+        runs = np.add.reduceat(seconds, run_starts[:-1]) if len(rests) else np.zeros(0)
         runs[:1] += self._since_rest_s
-        last = int(np.searchsorted(rests, done))
+        last = int(np.searchsorted(rests, done_count))
         before_s = 0.0 if last else self._since_rest_s
-        self._since_rest_s = before_s + float(seconds[since[last] : done].sum())
-        self._before = plan.entry_after(done, squares)
+        self._since_rest_s = before_s + float(seconds[run_starts[last] : done_count].sum())
+        self._before = plan.entry_after(done_count, squares)
         periods = np.rint(runs / period_s) + REST_PERIODS
         seconds[rests] += periods * period_s - runs
         return seconds
@@ -230,19 +234,19 @@ class LinuxcncSamples(CountedSamples):
 
     def __init__(
         self,
-        planned: PlannedWindow,
+        window_plan: PlannedWindow,
         machine: _Machine,
         spacing_mm: float,
         passed_mm: tuple[float, float],
     ) -> None:
         """`passed_mm`: the lengths of all rows and of all moves before these, so that positions do
         not depend, in their last bits, on where a block begins."""
-        path, moves, corners = planned.tangents.path, planned.moves, planned.corners
+        path, moves, corners = window_plan.tangents.path, window_plan.moves, window_plan.corners
         super().__init__(path, machine, spacing_mm)
-        self._origin = planned.origin
+        self._origin = window_plan.origin
         halves = np.searchsorted(self._origin, np.arange(int(self._origin[-1]) + 2))
         self.first = self.first[halves]
-        self._tangents = planned.tangents
+        self._tangents = window_plan.tangents
         self._row_of, self._row = moves.row_of, moves.row
         self._reach, self._reach_on = (
             np.append(corners.reach, 0.0),
@@ -284,37 +288,47 @@ class LinuxcncSamples(CountedSamples):
             return
         move = self._row_of[row]
         along = self._into[row] + share * self._row_length[row]
-        left = np.maximum(self._length[move] - along, 0.0)
-        ahead = np.flatnonzero(left < self._reach[move + 1])
-        behind = np.flatnonzero(along < self._reach_on[move])
-        corner = move[ahead] + 1
-        self._on_blends(points, ahead, corner, 0.5 - 0.5 * left[ahead] / self._reach[corner])
-        corner = move[behind]
-        self._on_blends(points, behind, corner, 0.5 + 0.5 * along[behind] / self._reach_on[corner])
-        ahead = np.flatnonzero(left < self._before[move + 1])
-        behind = np.flatnonzero(along < self._behind[move])
-        corner = move[ahead] + 1
+        leftover = np.maximum(self._length[move] - along, 0.0)
+        before_corner = np.flatnonzero(leftover < self._reach[move + 1])
+        after_corner = np.flatnonzero(along < self._reach_on[move])
+        corner = move[before_corner] + 1
+        self._on_blends(
+            points,
+            before_corner,
+            corner,
+            0.5 - 0.5 * leftover[before_corner] / self._reach[corner],
+        )
+        corner = move[after_corner]
+        self._on_blends(
+            points, after_corner, corner, 0.5 + 0.5 * along[after_corner] / self._reach_on[corner]
+        )
+        before_corner = np.flatnonzero(leftover < self._before[move + 1])
+        after_corner = np.flatnonzero(along < self._behind[move])
+        corner = move[before_corner] + 1
         turn = self._turn[corner]
         self._put_overlaps(
-            points, ahead, corner, turn * (1.0 - left[ahead] / self._before[corner])
+            points,
+            before_corner,
+            corner,
+            turn * (1.0 - leftover[before_corner] / self._before[corner]),
         )
-        corner = move[behind]
+        corner = move[after_corner]
         turn = self._turn[corner]
-        later = (1.0 - turn) * along[behind] / self._behind[corner]
-        self._put_overlaps(points, behind, corner, turn + later)
+        later = (1.0 - turn) * along[after_corner] / self._behind[corner]
+        self._put_overlaps(points, after_corner, corner, turn + later)
 
-    def _put_overlaps(self, points: Floats, on: Ints, corner: Ints, x: Floats) -> None:
+    def _put_overlaps(self, points: Floats, rows: Ints, corner: Ints, x: Floats) -> None:
         """Put points (K, 3) where moves overlap: while the first slows down evenly over its last
         `before` mm, the second speeds up in the first part `ramp` of that time, and goes on, over
         its first `behind` mm. At the part x of the time the tool is where both are, one on top of
         the other; what is before `_turn_of` stands for the end of the first move, the rest for the
         start of the second."""
         first = corner - 1
-        gone = _covered_share(x, self._ramp[corner])
+        covered = _covered_share(x, self._ramp[corner])
         slowing = self._length[first] - (1.0 - x) ** 2 * self._before[corner]
-        points[on] = self._unblended_points(first, slowing)
-        points[on] += self._unblended_points(
-            corner, gone * self._behind[corner]
+        points[rows] = self._unblended_points(first, slowing)
+        points[rows] += self._unblended_points(
+            corner, covered * self._behind[corner]
         ) - self._unblended_points(corner, 0.0 * x)
 
     def _unblended_points(self, move: Ints, along: Floats) -> Floats:
@@ -322,25 +336,27 @@ class LinuxcncSamples(CountedSamples):
         blended."""
         row = self._row[move]
         arc = self._tangents.path.is_arc[row]
-        found = np.empty((len(row), 3))
-        found[arc] = super().points(row[arc], along[arc] / self._length[move[arc]])
+        points = np.empty((len(row), 3))
+        points[arc] = super().points(row[arc], along[arc] / self._length[move[arc]])
         row, straight = row[~arc], along[~arc, None]
-        found[~arc] = self._tangents.path.starts_of(row) + straight * self._tangents.at_starts(row)
-        return found
+        points[~arc] = self._tangents.path.starts_of(row) + straight * self._tangents.at_starts(
+            row
+        )
+        return points
 
-    def _on_blends(self, points: Floats, on: Ints, corner: Ints, share: Floats) -> None:
+    def _on_blends(self, points: Floats, rows: Ints, corner: Ints, share: Floats) -> None:
         """Put points at shares (K,) of the ways of blends: both spokes, turned into each other."""
         centre, first, last = self._shape[:, corner]
         angle = _angle_between(first, last)
-        turned = share * angle
-        whole = np.sin(angle)
-        points[on] = centre
-        points[on] += (np.sin(angle - turned) / whole)[:, None] * first
-        points[on] += (np.sin(turned) / whole)[:, None] * last
+        turn = share * angle
+        full_sine = np.sin(angle)
+        points[rows] = centre
+        points[rows] += (np.sin(angle - turn) / full_sine)[:, None] * first
+        points[rows] += (np.sin(turn) / full_sine)[:, None] * last
 
 
 def _speeds(
-    planned: PlannedWindow, places: slice, modes: CornerModes, before: EntryState
+    window_plan: PlannedWindow, places: slice, modes: CornerModes, before: EntryState
 ) -> tuple[Bools, SpeedPlan]:
     """Blends and moves as blocks of their own. At even places of all (2 M,) stands the blend
     before a move, then the move: which of them last and lie in `places`, and these.
@@ -350,17 +366,17 @@ def _speeds(
     entered no faster than it could stop within its half, for a blend could have taken the other
     half (`tpCalculateOptimizationInitialVel`).
     """
-    moves, corners = planned.moves, planned.corners
-    own = moves.length - corners.reach_on
-    own -= np.append(corners.reach[1:], 0.0)
-    ways = _in_turns(corners.way, np.maximum(own, 0.0, out=own))
-    lasting = np.zeros(len(ways), dtype=np.bool_)
-    lasting[places] = ways[places] > MIN_LENGTH_MM
+    moves, corners = window_plan.moves, window_plan.corners
+    own_length = moves.length - corners.reach_on
+    own_length -= np.append(corners.reach[1:], 0.0)
+    path_lengths = _in_turns(corners.way, np.maximum(own_length, 0.0, out=own_length))
+    lasting = np.zeros(len(path_lengths), dtype=np.bool_)
+    lasting[places] = path_lengths[places] > MIN_LENGTH_MM
     along, fastest = _along_moves(moves, modes, corners)
-    met = np.where(corners.way > 0.0, np.inf, corners.speed)
-    entered = np.minimum(met, np.where(moves.last, np.sqrt(along * own), np.inf))
+    entry_speed = np.where(corners.way > 0.0, np.inf, corners.speed)
+    entered = np.minimum(entry_speed, np.where(moves.last, np.sqrt(along * own_length), np.inf))
     return lasting, SpeedPlan(
-        ways[lasting],
+        path_lengths[lasting],
         _in_turns(corners.speed, np.minimum(moves.speed, fastest))[lasting],
         _in_turns(corners.acceleration, along)[lasting],
         _in_turns(np.inf, entered)[lasting],
@@ -368,26 +384,26 @@ def _speeds(
     )
 
 
-def _seconds(planned: PlannedWindow, taken: Floats) -> Floats:
-    """(N,) s of each row, with what each blend and move takes, `taken` (2 M + 1,).
+def _seconds(window_plan: PlannedWindow, part_seconds: Floats) -> Floats:
+    """(N,) s of each row, with what each blend and move takes, `part_seconds` (2 M + 1,).
 
     Half of a blend belongs to the row on either side; the rows of a merged line share its time by
     their lengths.
     """
-    path, moves = planned.tangents.path, planned.moves
+    path, moves = window_plan.tangents.path, window_plan.moves
     seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
-    whole = taken[1::2] + 0.5 * (taken[0:-1:2] + taken[2::2])
+    move_seconds = part_seconds[1::2] + 0.5 * (part_seconds[0:-1:2] + part_seconds[2::2])
     moving = np.flatnonzero(moves.row_of >= 0)
     move = moves.row_of[moving]
-    seconds[moving] = whole[move] * (move_lengths(path)[moving] / moves.length[move])
-    return np.asarray(np.bincount(planned.origin, seconds), dtype=np.float64)
+    seconds[moving] = move_seconds[move] * (move_lengths(path)[moving] / moves.length[move])
+    return np.asarray(np.bincount(window_plan.origin, seconds), dtype=np.float64)
 
 
 def _in_turns(blends: Floats | float, moves: Floats) -> Floats:
     """(2 M,) of the blends before moves (M,), and of the moves."""
-    both = np.empty(2 * len(moves))
-    both[0::2], both[1::2] = blends, moves
-    return both
+    values = np.empty(2 * len(moves))
+    values[0::2], values[1::2] = blends, moves
+    return values
 
 
 def _along_moves(
@@ -396,12 +412,12 @@ def _along_moves(
     """(M,) mm/s² along the moves, less what bends at their ends and a last stop take; and (M,)
     mm/s, how fast arcs may be with that. An arc before a wait was never finished for its next
     move, and keeps half for turning."""
-    lost = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
+    lost_share = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
     last = moves.last
     overlapped = corners.overlap > 0.0
     overlapped |= np.append(overlapped[1:], False)
     spared = np.where(overlapped | (last & modes.blend(moves.mode)), LAST_PART, 1.0)
-    overall = moves.acceleration * (1.0 - lost) * spared
+    overall = moves.acceleration * (1.0 - lost_share) * spared
     along, fastest = moves.tangential(np.arange(len(overall)), overall)
     rough = last & moves.is_arc
     along[rough], fastest[rough] = TANGENT_RATIO * overall[rough], np.inf
@@ -548,12 +564,12 @@ def merge_rows(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     same_feed = np.zeros(count, dtype=np.bool_)
     same_feed[1:] = path.feed[1:] == path.feed[:-1]
     is_line = path.kind == Kind.LINE
-    apart = ~(is_line & same_feed) | (tolerance_mm == 0.0)
-    apart[1:] |= ~is_line[:-1] | (path.mode[1:] != path.mode[:-1])
+    is_break = ~(is_line & same_feed) | (tolerance_mm == 0.0)
+    is_break[1:] |= ~is_line[:-1] | (path.mode[1:] != path.mode[:-1])
     points = np.concatenate([path.start[None, :], path.end])
-    chain, moved = np.empty(count, dtype=np.int64), np.empty((count, 3))
-    merge_lines(points, apart, tolerance_mm, chain, moved)
-    return replace(path, end=read_only(moved)), chain
+    chain, merged_ends = np.empty(count, dtype=np.int64), np.empty((count, 3))
+    merge_lines(points, is_break, tolerance_mm, chain, merged_ends)
+    return replace(path, end=read_only(merged_ends)), chain
 
 
 def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
@@ -573,15 +589,15 @@ def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
         part, chain = merge_rows(part, modes.merging_mm(part.mode))
         # The last line may go on.
         rows = len(part) if ends_here else int(np.searchsorted(chain, chain[-1]))
-        own = move_lengths(part)[:rows]
-        lasting = np.bincount(chain[:rows], own) > 0.0
+        own_length = move_lengths(part)[:rows]
+        lasting = np.bincount(chain[:rows], own_length) > 0.0
         first = np.searchsorted(chain[:rows], np.flatnonzero(lasting))
         begins.append(place[first].astype(np.int32))
-        by_row = np.bincount(origin[:rows], own)
+        by_row = np.bincount(origin[:rows], own_length)
         length[base : base + len(by_row)] += by_row
         low = end if ends_here else int(place[rows])
-    found = np.concatenate(begins)
-    return np.concatenate([found[:1], found[2:]]), length
+    all_begins = np.concatenate(begins)
+    return np.concatenate([all_begins[:1], all_begins[2:]]), length
 
 
 class PlannerMoves(Struct, frozen=True, eq=False):
@@ -610,16 +626,16 @@ class PlannerMoves(Struct, frozen=True, eq=False):
         """Mask (M,) of the moves behind which the machine waits."""
         return np.append(self.waits[1:], np.ones(min(len(self.waits), 1), dtype=np.bool_))
 
-    def tangential(self, which: Ints, overall: Floats) -> tuple[Floats, Floats]:
+    def tangential(self, indices: Ints, overall: Floats) -> tuple[Floats, Floats]:
         """(K,) mm/s² along moves (K,) that accelerate by `overall` (K,) in all, and (K,) mm/s, the
         highest speed with that: what turning at it leaves, where that is more than half, else
         half (`pmCircleActualMaxVel`)."""
-        bend, part = self.bend[which], NORMAL_RATIO * overall
+        bend, part = self.bend[indices], NORMAL_RATIO * overall
         steep = bend > part
-        left = np.sqrt(np.maximum(1.0 - (bend / overall) ** 2, 0.0))
-        along = np.where(steep, TANGENT_RATIO, left) * overall
+        tangent_share = np.sqrt(np.maximum(1.0 - (bend / overall) ** 2, 0.0))
+        along = np.where(steep, TANGENT_RATIO, tangent_share) * overall
         with np.errstate(divide="ignore", invalid="ignore"):
-            slower = self.highest[which] * np.sqrt(part / bend)
+            slower = self.highest[indices] * np.sqrt(part / bend)
         return along, np.where(steep, slower, np.inf)
 
 
@@ -638,18 +654,18 @@ def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> PlannerMove
     is_arc = path.is_arc[lead]
     begin = tangents.at_starts(lead)
     highest, along = max_along(rules.rate, begin), max_along(rules.acceleration, begin)
-    on = np.flatnonzero(is_arc)
-    arm, limits = tangents.arm_of(lead[on]), (rules.rate, rules.acceleration)
+    arcs = np.flatnonzero(is_arc)
+    arm, limits = tangents.arm_of(lead[arcs]), (rules.rate, rules.acceleration)
     bend = np.zeros(len(lead))
-    highest[on], along[on], bend[on] = _arc_limits(tangents.arms, arm, length[on], limits)
+    highest[arcs], along[arcs], bend[arcs] = _arc_limits(tangents.arms, arm, length[arcs], limits)
     highest = np.minimum(highest, length / (MIN_PERIODS * period_s))
     cuts = path.is_feed[lead]
     speed = np.minimum(np.where(cuts, path.feed[lead], np.inf) / 60.0, highest)
     waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
-    like = cuts == np.roll(cuts, 1)
+    same_kind = cuts == np.roll(cuts, 1)
     mode = path.mode[lead]
     return PlannerMoves(
-        row_of, lead, mode, length, speed, along, is_arc, highest, bend, waits, like
+        row_of, lead, mode, length, speed, along, is_arc, highest, bend, waits, same_kind
     )
 
 
@@ -676,27 +692,27 @@ class Tangents:
         """(K, 3) unit vectors of what accelerates a tool at the starts of rows (K,): along lines,
         and of arcs along and inward, at accelerations (K,) and half of speeds (K,)."""
         push = self._at(rows, self.arms.radius, 0.0, level=True)
-        on = np.flatnonzero(are_arcs(self.path.kind[rows]))
-        arm = self.arm_of(rows[on])
+        arcs = np.flatnonzero(are_arcs(self.path.kind[rows]))
+        arm = self.arm_of(rows[arcs])
         angle, radius = self.arms.angle[arm], self.arms.radius[arm]
-        inward = np.column_stack([-np.cos(angle), -np.sin(angle), np.zeros(len(on))])
-        push[on] *= acceleration[on, None]
-        push[on] += ((0.5 * speed[on]) ** 2 / radius)[:, None] * inward
+        inward = np.column_stack([-np.cos(angle), -np.sin(angle), np.zeros(len(arcs))])
+        push[arcs] *= acceleration[arcs, None]
+        push[arcs] += ((0.5 * speed[arcs]) ** 2 / radius)[:, None] * inward
         return _unit(push)
 
     def _at(self, rows: Ints, radius: Floats, share: float, *, level: bool = False) -> Floats:
         path, arms = self.path, self.arms
         tangent = path.end.take(rows, axis=0) - path.starts_of(rows)
         kind = path.kind[rows]
-        on = np.flatnonzero(are_arcs(kind))
-        arm = self.arm_of(rows[on])
+        arcs = np.flatnonzero(are_arcs(kind))
+        arm = self.arm_of(rows[arcs])
         sweep, grows = arms.sweep[arm], (arms.end_radius - arms.radius)[arm]
         angle, r = arms.angle[arm] + share * sweep, radius[arm]
         cos, sin = np.cos(angle), np.sin(angle)
-        tangent[on, 0] = grows * cos - r * sweep * sin
-        tangent[on, 1] = grows * sin + r * sweep * cos
+        tangent[arcs, 0] = grows * cos - r * sweep * sin
+        tangent[arcs, 1] = grows * sin + r * sweep * cos
         if level:
-            tangent[on, 2] = 0.0
+            tangent[arcs, 2] = 0.0
         tangent /= np.linalg.norm(tangent, axis=1)[:, None]
         return tangent
 
@@ -710,9 +726,9 @@ def _arc_limits(
     r, r_end, sweep = arms.radius[arm], arms.end_radius[arm], np.abs(arms.sweep[arm])
     rise = np.abs(arms.end[arm, 2] - arms.begin[arm, 2])
     grows = r_end - r
-    least = np.minimum(r, r_end)
-    radius = np.hypot(least, grows / sweep)
-    level = np.hypot(least * sweep, grows)
+    min_radius = np.minimum(r, r_end)
+    radius = np.hypot(min_radius, grows / sweep)
+    level = np.hypot(min_radius * sweep, grows)
     planar = np.minimum(v_xy, np.sqrt(a_xy * NORMAL_RATIO * radius))
     highest = length / np.maximum(rise / rate[2], level / planar)
     overall = length / np.maximum(rise / acceleration[2], level / a_xy)
@@ -727,7 +743,7 @@ def _covered_share(x: Floats, ramp: Floats) -> Floats:
     return np.where(x < ramp, x**2 / (2.0 * ramp), x - 0.5 * ramp) / (1.0 - 0.5 * ramp)
 
 
-def _turn_of(before: Floats, behind: Floats, ramp: Floats) -> Floats:
+def _turn_of(before: Floats, after: Floats, ramp: Floats) -> Floats:
     """(M,) the part x of the time of an overlap at which the first move lacks as much as the
     second has gone: there the tool is nearest to the corner, and one ends and the other begins.
 
@@ -738,9 +754,9 @@ def _turn_of(before: Floats, behind: Floats, ramp: Floats) -> Floats:
     ramp = np.where(before > 0.0, ramp, 1.0)
     for _ in range(TURN_ROUNDS):
         middle = 0.5 * (low + high)
-        early = (1.0 - middle) ** 2 * before > _covered_share(middle, ramp) * behind
+        early = (1.0 - middle) ** 2 * before > _covered_share(middle, ramp) * after
         low, high = np.where(early, middle, low), np.where(early, high, middle)
-    return np.where((before > 0.0) & (behind > 0.0), 0.5 * (low + high), 0.5)
+    return np.where((before > 0.0) & (after > 0.0), 0.5 * (low + high), 0.5)
 
 
 TURN_ROUNDS = 40
@@ -861,9 +877,9 @@ class Bends(Struct, frozen=True, eq=False):
         cosine = np.clip(-(self.before * self.after).sum(axis=1), -1.0, 1.0)
         return np.asarray(0.5 * np.arccos(cosine))
 
-    def subset(self, which: Ints) -> Bends:
+    def subset(self, indices: Ints) -> Bends:
         """Return a subset of the corners."""
-        return Bends(self.before[which], self.after[which])
+        return Bends(self.before[indices], self.after[indices])
 
 
 def corners_of(moves: PlannerMoves, tangents: Tangents, rules: CornerRules) -> PlannerCorners:
@@ -872,12 +888,12 @@ def corners_of(moves: PlannerMoves, tangents: Tangents, rules: CornerRules) -> P
         tangents.at_ends(np.roll(moves.row, 1)),  # nothing comes of that before the first
         tangents.at_starts(moves.row),
     )
-    used = np.zeros(len(moves.length))  # of each move, by the blend at its start
+    used_mm = np.zeros(len(moves.length))  # of each move, by the blend at its start
     for _ in range(MAX_ROUNDS):
-        corners = _meet(moves, tangents, bends, used, rules)
-        if not moves.is_arc.any() or (corners.reach_on == used).all():
+        corners = _meet(moves, tangents, bends, used_mm, rules)
+        if not moves.is_arc.any() or (corners.reach_on == used_mm).all():
             break
-        used = corners.reach_on
+        used_mm = corners.reach_on
     return corners
 
 
@@ -887,40 +903,45 @@ leave."""
 
 
 def _meet(
-    moves: PlannerMoves, tangents: Tangents, bends: Bends, used: Floats, rules: CornerRules
+    moves: PlannerMoves, tangents: Tangents, bends: Bends, used_mm: Floats, rules: CornerRules
 ) -> PlannerCorners:
     """All corners, where blends at the starts of moves use so much (M,) mm of them."""
     count = len(moves.length)
-    none = [np.zeros(count) for _ in range(10)]
+    zeros = [np.zeros(count) for _ in range(10)]
     corners = PlannerCorners(
-        none[0], none[1], none[2], none[3], none[4], none[5], np.zeros((3, count, 3)),
-        none[6], none[7], none[8], none[9],
+        zeros[0], zeros[1], zeros[2], zeros[3], zeros[4], zeros[5], np.zeros((3, count, 3)),
+        zeros[6], zeros[7], zeros[8], zeros[9],
     )  # fmt: skip
-    at = np.arange(count)
-    before = moves.mode[at - 1]
+    every_move = np.arange(count)
+    before = moves.mode[every_move - 1]
     turn = bends.after - bends.before
-    back = np.linalg.norm(bends.after + bends.before, axis=1) < STRAIGHT_BACK_RAD
+    is_reversal = np.linalg.norm(bends.after + bends.before, axis=1) < STRAIGHT_BACK_RAD
     # The move before a corner says how it is met; both say how far a blend may leave it.
-    free = ~moves.waits[at] & moves.like[at] & ~back & ~rules.modes.stop(before)
+    is_free = (
+        ~moves.waits[every_move]
+        & moves.like[every_move]
+        & ~is_reversal
+        & ~rules.modes.stop(before)
+    )
     # A kink: the change of velocity within one period, as a part of what each axis can do.
-    highest = np.minimum(moves.speed[at - 1], moves.speed[at])
-    jolt = highest / rules.period_s + moves.acceleration[at]
+    highest = np.minimum(moves.speed[every_move - 1], moves.speed[every_move])
+    jolt = highest / rules.period_s + moves.acceleration[every_move]
     part = (np.abs(turn) * jolt[:, None] / rules.acceleration).max(axis=1, initial=0.0)
-    curved = moves.is_arc[at] | moves.is_arc[at - 1]
+    curved = moves.is_arc[every_move] | moves.is_arc[every_move - 1]
     part = np.where(curved, part / TANGENT_RATIO, part)
-    smooth = free & (part < rules.kink_ratio)
-    corners.speed[at] = np.where(smooth, np.inf, 0.0)
-    corners.lost[at] = np.where(smooth, part, 0.0)
-    blends = free & ~smooth & rules.modes.blend(before)
+    smooth = is_free & (part < rules.kink_ratio)
+    corners.speed[every_move] = np.where(smooth, np.inf, 0.0)
+    corners.lost[every_move] = np.where(smooth, part, 0.0)
+    blends = is_free & ~smooth & rules.modes.blend(before)
     normal = np.cross(bends.before, bends.after)
     flat = np.hypot(normal[:, 0], normal[:, 1]) <= COPLANAR * np.linalg.norm(normal, axis=1)
     straight = np.flatnonzero(blends & ~curved)
-    _round_lines(corners, moves, tangents, straight, bends.subset(straight), used, rules)
+    _round_lines(corners, moves, tangents, straight, bends.subset(straight), used_mm, rules)
     bent = np.flatnonzero(blends & curved & flat)
-    _round_arcs(corners, moves, tangents, bent, bends.subset(bent), used, rules)
-    on = np.flatnonzero(blends)
-    kink = highest[on] * rules.kink_ratio / part[on]
-    _choose(corners, moves, tangents, on, kink, used, rules)
+    _round_arcs(corners, moves, tangents, bent, bends.subset(bent), used_mm, rules)
+    blended = np.flatnonzero(blends)
+    kink = highest[blended] * rules.kink_ratio / part[blended]
+    _choose(corners, moves, tangents, blended, kink, used_mm, rules)
     return corners
 
 
@@ -928,24 +949,24 @@ def _choose(
     corners: PlannerCorners,
     moves: PlannerMoves,
     tangents: Tangents,
-    on: Ints,
+    rows: Ints,
     kink: Floats,
-    used: Floats,
+    used_mm: Floats,
     rules: CornerRules,
 ) -> None:
-    """Let moves overlap at the corners `on` (K,), or meet at the speed that passes for straight
+    """Let moves overlap at the corners `rows` (K,), or meet at the speed that passes for straight
     `kink` (K,), or be rounded, as it seems the fastest, the first of equals
     (`tpChooseBestBlend`)."""
-    arc = corners.speed[on]
-    overlap = _worth(moves, tangents, on, used, rules)
+    arc = corners.speed[rows]
+    overlap = _worth(moves, tangents, rows, used_mm, rules)
     overlaps = (overlap >= kink) & (overlap >= arc)
     bends = ~overlaps & (kink >= arc)
-    for none in (corners.reach, corners.reach_on, corners.way):
-        none[on[overlaps | bends]] = 0.0
-    corners.speed[on[overlaps]] = 0.0
-    _overlap(corners, moves, tangents, on[overlaps], rules)
-    corners.speed[on[bends]] = kink[bends]
-    corners.lost[on[bends]] = rules.kink_ratio
+    for column in (corners.reach, corners.reach_on, corners.way):
+        column[rows[overlaps | bends]] = 0.0
+    corners.speed[rows[overlaps]] = 0.0
+    _overlap(corners, moves, tangents, rows[overlaps], rules)
+    corners.speed[rows[bends]] = kink[bends]
+    corners.lost[rows[bends]] = rules.kink_ratio
 
 
 class _Overlaps(Struct, frozen=True, eq=False):
@@ -962,7 +983,7 @@ class _Overlaps(Struct, frozen=True, eq=False):
 def _overlaps(
     moves: PlannerMoves,
     tangents: Tangents,
-    on: Ints,
+    rows: Ints,
     rates: tuple[Floats, Floats],
     lengths: tuple[Floats, Floats],
     overall: Floats,
@@ -974,53 +995,61 @@ def _overlaps(
     one, other = rates
     reachable = [
         np.minimum(np.sqrt(rate * length), moves.speed[k])
-        for k, rate, length in ((on - 1, one, lengths[0]), (on, other, lengths[1]))
+        for k, rate, length in ((rows - 1, one, lengths[0]), (rows, other, lengths[1]))
     ]
-    lasting = np.minimum(moves.length[on - 1] / reachable[0], moves.length[on] / reachable[1])
+    lasting = np.minimum(moves.length[rows - 1] / reachable[0], moves.length[rows] / reachable[1])
     blend_s = np.minimum(lasting, np.maximum(reachable[0] / one, reachable[1] / other))
     first = np.minimum(reachable[0], blend_s * one)
     second = np.minimum(reachable[1], blend_s * other)
-    before = tangents.at_ends(moves.row[on - 1], level=True)
-    after = tangents.pushed_at_starts(moves.row[on], overall, moves.speed[on])
+    before = tangents.at_ends(moves.row[rows - 1], level=True)
+    after = tangents.pushed_at_starts(moves.row[rows], overall, moves.speed[rows])
     theta = Bends(before, after).theta
-    asked, cosine = modes.tolerance_mm(moves.mode[on - 1]), np.cos(theta)
+    tolerance, cosine = modes.tolerance_mm(moves.mode[rows - 1]), np.cos(theta)
     bends = cosine > 0.5 * MIN_BEND_RAD
-    within = 2.0 * np.sqrt(one * asked / np.where(bends, cosine, 1.0))
-    within = np.where(bends, within, np.inf)
-    return _Overlaps(np.minimum(first, within), np.minimum(second, within), one, other, theta)
+    tolerance_speed = 2.0 * np.sqrt(one * tolerance / np.where(bends, cosine, 1.0))
+    tolerance_speed = np.where(bends, tolerance_speed, np.inf)
+    return _Overlaps(
+        np.minimum(first, tolerance_speed), np.minimum(second, tolerance_speed), one, other, theta
+    )
 
 
 def _worth(
-    moves: PlannerMoves, tangents: Tangents, on: Ints, used: Floats, rules: CornerRules
+    moves: PlannerMoves, tangents: Tangents, rows: Ints, used_mm: Floats, rules: CornerRules
 ) -> Floats:
     """(K,) mm/s that the planner thinks an overlap is worth, before it knows the next corner: half
     of each move may be gone by then, bends take their part, and arcs keep half for turning."""
     rates = [
         LAST_PART * (1.0 - rules.kink_ratio) * moves.acceleration[k]
         * np.where(moves.is_arc[k], TANGENT_RATIO, 1.0)
-        for k in (on - 1, on)
+        for k in (rows - 1, rows)
     ]  # fmt: skip
-    lengths = 0.5 * (moves.length[on - 1] - used[on - 1]), 0.5 * moves.length[on]
-    overall = LAST_PART * (1.0 - rules.kink_ratio) * moves.acceleration[on]
-    found = _overlaps(moves, tangents, on, (rates[0], rates[1]), lengths, overall, rules.modes)
-    return np.asarray(0.25 * np.sin(found.theta) * (found.first + found.second))
+    lengths = 0.5 * (moves.length[rows - 1] - used_mm[rows - 1]), 0.5 * moves.length[rows]
+    overall = LAST_PART * (1.0 - rules.kink_ratio) * moves.acceleration[rows]
+    overlaps = _overlaps(
+        moves, tangents, rows, (rates[0], rates[1]), lengths, overall, rules.modes
+    )
+    return np.asarray(0.25 * np.sin(overlaps.theta) * (overlaps.first + overlaps.second))
 
 
 def _overlap(
-    corners: PlannerCorners, moves: PlannerMoves, tangents: Tangents, on: Ints, rules: CornerRules
+    corners: PlannerCorners,
+    moves: PlannerMoves,
+    tangents: Tangents,
+    rows: Ints,
+    rules: CornerRules,
 ) -> None:
-    """Fill in how moves overlap at the corners `on` (K,)."""
-    one, _ = moves.tangential(on - 1, LAST_PART * moves.acceleration[on - 1])
-    other, _ = moves.tangential(on, LAST_PART * moves.acceleration[on])
-    lengths = moves.length[on - 1], moves.length[on]
-    overall = LAST_PART * moves.acceleration[on]
-    found = _overlaps(moves, tangents, on, (one, other), lengths, overall, rules.modes)
+    """Fill in how moves overlap at the corners `rows` (K,)."""
+    one, _ = moves.tangential(rows - 1, LAST_PART * moves.acceleration[rows - 1])
+    other, _ = moves.tangential(rows, LAST_PART * moves.acceleration[rows])
+    lengths = moves.length[rows - 1], moves.length[rows]
+    overall = LAST_PART * moves.acceleration[rows]
+    overlaps = _overlaps(moves, tangents, rows, (one, other), lengths, overall, rules.modes)
     # While the first comes to rest, the second begins as from rest, whatever its share was.
-    seconds = found.first / one
-    reached = np.minimum(moves.speed[on], seconds * other)
-    corners.overlap[on], corners.ramp[on] = seconds, reached / other / seconds
-    corners.before[on] = 0.5 * found.first * seconds
-    corners.behind[on] = reached * (seconds - 0.5 * reached / other)
+    seconds = overlaps.first / one
+    reached = np.minimum(moves.speed[rows], seconds * other)
+    corners.overlap[rows], corners.ramp[rows] = seconds, reached / other / seconds
+    corners.before[rows] = 0.5 * overlaps.first * seconds
+    corners.behind[rows] = reached * (seconds - 0.5 * reached / other)
 
 
 class _Rounds(Struct, frozen=True, eq=False):
@@ -1036,98 +1065,100 @@ class _Rounds(Struct, frozen=True, eq=False):
 
 def _rounds(
     moves: PlannerMoves,
-    on: Ints,
+    rows: Ints,
     normal: Floats,
     theta: Floats,
     longest: Floats,
     planar: Floats,
     rules: CornerRules,
 ) -> _Rounds:
-    """The blends at the corners `on` (K,) in planes of the unit normals (K, 3), which use at most
-    `longest` (K,) mm of either move; `planar` (K,) mm/s: no faster than that, or than the axes in
-    that plane, whichever is more (`blendParamKinematics`, `blendComputeParameters`).
+    """The blends at the corners `rows` (K,) in planes of the unit normals (K, 3), which use at
+    most `longest` (K,) mm of either move; `planar` (K,) mm/s: no faster than that, or than the
+    axes in that plane, whichever is more (`blendParamKinematics`, `blendComputeParameters`).
 
     In the plane no axis exceeds its limit when the whole is limited to min(limit / √(1 − m²)).
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.sqrt(np.maximum(1.0 - normal**2, 0.0))
-        whole = (rules.acceleration / share).min(axis=1, initial=np.inf)
+        acceleration = (rules.acceleration / share).min(axis=1, initial=np.inf)
         rate = np.maximum((rules.rate / share).min(axis=1, initial=np.inf), planar)
-        shorter = np.minimum(moves.length[on], moves.length[on - 1])
+        shorter = np.minimum(moves.length[rows], moves.length[rows - 1])
         modes = rules.modes
-        asked = np.minimum(
-            modes.tolerance_mm(moves.mode[on]), modes.tolerance_mm(moves.mode[on - 1])
+        allowed = np.minimum(
+            modes.tolerance_mm(moves.mode[rows]), modes.tolerance_mm(moves.mode[rows - 1])
         )
-        tolerance = np.minimum(asked, TOLERANCE_PART * shorter)
+        tolerance = np.minimum(allowed, TOLERANCE_PART * shorter)
         by_tolerance = tolerance * np.cos(theta) / (1.0 - np.sin(theta))
         reach = np.minimum(longest, by_tolerance)
         widest = reach * np.tan(theta)
-        across = NORMAL_RATIO * whole
-        wanted = np.maximum(moves.speed[on - 1], moves.speed[on])
-        speed = np.minimum(np.minimum(wanted, rate), np.sqrt(across * widest))
-        half = 0.5 * whole
+        across = NORMAL_RATIO * acceleration
+        programmed = np.maximum(moves.speed[rows - 1], moves.speed[rows])
+        speed = np.minimum(np.minimum(programmed, rate), np.sqrt(across * widest))
+        half = 0.5 * acceleration
         by_time = np.minimum(np.sqrt(2.0 * half * reach), speed) / half * speed
         by_time /= np.pi - 2.0 * theta
         radius = np.maximum(speed**2 / across, np.minimum(by_time, widest))
-    return _Rounds(theta, tolerance, radius, speed, whole)
+    return _Rounds(theta, tolerance, radius, speed, acceleration)
 
 
 def _fill(
     corners: PlannerCorners,
-    on: Ints,
+    rows: Ints,
     rounds: _Rounds,
     reach: tuple[Floats, Floats],
     shape: Floats,
-    good: Bools,
+    is_valid: Bools,
     rules: CornerRules,
 ) -> None:
     """Fill in blends that reach so far on both moves, with centre and spokes `shape` (3, K, 3),
-    where they are `good` (K,)."""
-    on, shape = on[good], shape[:, good]
-    way = np.linalg.norm(shape[1], axis=1) * _angle_between(shape[1], shape[2])
-    lasting = way / (MIN_PERIODS * rules.period_s)
-    corners.speed[on] = np.minimum(rounds.speed[good], lasting)
-    corners.reach[on], corners.reach_on[on] = reach[0][good], reach[1][good]
-    corners.acceleration[on] = TANGENT_RATIO * rounds.whole[good]
-    corners.way[on] = way
-    corners.shape[:, on] = shape
+    where they are `is_valid` (K,)."""
+    rows, shape = rows[is_valid], shape[:, is_valid]
+    length = np.linalg.norm(shape[1], axis=1) * _angle_between(shape[1], shape[2])
+    lasting = length / (MIN_PERIODS * rules.period_s)
+    corners.speed[rows] = np.minimum(rounds.speed[is_valid], lasting)
+    corners.reach[rows], corners.reach_on[rows] = reach[0][is_valid], reach[1][is_valid]
+    corners.acceleration[rows] = TANGENT_RATIO * rounds.whole[is_valid]
+    corners.way[rows] = length
+    corners.shape[:, rows] = shape
 
 
 def _round_lines(
     corners: PlannerCorners,
     moves: PlannerMoves,
     tangents: Tangents,
-    on: Ints,
+    rows: Ints,
     bends: Bends,
-    used: Floats,
+    used_mm: Floats,
     rules: CornerRules,
 ) -> None:
-    """Fill in the blends between lines at the corners `on`."""
+    """Fill in the blends between lines at the corners `rows`."""
     theta = bends.theta
     bent = np.pi - 2.0 * theta
-    longest = np.minimum(moves.length[on - 1] - used[on - 1], LINE_PART * moves.length[on - 1])
-    longest = np.minimum(longest, LINE_PART * moves.length[on])
+    longest = np.minimum(
+        moves.length[rows - 1] - used_mm[rows - 1], LINE_PART * moves.length[rows - 1]
+    )
+    longest = np.minimum(longest, LINE_PART * moves.length[rows])
     # The height of the triangle of both highest speeds.
     clipped = np.cos(np.minimum(bent, CLIPPED_RAD))
-    one, other = moves.highest[on - 1], moves.highest[on]
+    one, other = moves.highest[rows - 1], moves.highest[rows]
     one, other = np.minimum(one, other / clipped), np.minimum(other, one / clipped)
     across = other[:, None] * bends.after - one[:, None] * bends.before
     with np.errstate(divide="ignore", invalid="ignore"):
         planar = one * other * np.sin(bent) / np.linalg.norm(across, axis=1)
         normal = _unit(np.cross(bends.before, bends.after))
-        rounds = _rounds(moves, on, normal, theta, longest, planar, rules)
+        rounds = _rounds(moves, rows, normal, theta, longest, planar, rules)
         reach = rounds.radius / np.tan(theta)
-        far = rounds.radius / np.sin(theta)
-    inward = far[:, None] * bends.inward
+        centre_distance = rounds.radius / np.sin(theta)
+    inward = centre_distance[:, None] * bends.inward
     shape = np.stack(
         [
-            tangents.path.starts_of(moves.row[on]) + inward,
+            tangents.path.starts_of(moves.row[rows]) + inward,
             -reach[:, None] * bends.before - inward,
             reach[:, None] * bends.after - inward,
         ]
     )
-    good = (bent > MIN_BEND_RAD) & (rounds.radius * bent > MIN_LENGTH_MM)
-    _fill(corners, on, rounds, (reach, reach), shape, good, rules)
+    is_valid = (bent > MIN_BEND_RAD) & (rounds.radius * bent > MIN_LENGTH_MM)
+    _fill(corners, rows, rounds, (reach, reach), shape, is_valid, rules)
 
 
 CLIPPED_RAD = 0.49 * np.pi
@@ -1156,31 +1187,31 @@ class _Side(Struct, frozen=True, eq=False):
 def _side(
     moves: PlannerMoves,
     tangents: Tangents,
-    which: Ints,
+    rows: Ints,
     corner: Floats,
     tangent: Floats,
     other: Floats,
     theta: Floats,
-    used: Floats,
+    used_mm: Floats,
     *,
     ends: bool,
 ) -> _Side:
-    """The moves `which` (K,) at corners (K,), which end there, or begin."""
-    is_arc, arms = moves.is_arc[which], tangents.arms
-    on = np.flatnonzero(is_arc)
-    arm = tangents.arm_of(moves.row[which[on]])
-    own = corner[on], tangent[on], other[on]
+    """The moves `rows` (K,) at corners (K,), which end there, or begin."""
+    is_arc, arms = moves.is_arc[rows], tangents.arms
+    arcs = np.flatnonzero(is_arc)
+    arm = tangents.arm_of(moves.row[rows[arcs]])
+    geometry = corner[arcs], tangent[arcs], other[arcs]
     growth = (arms.end_radius - arms.radius)[arm] / np.abs(arms.sweep[arm])
-    centre = arms.centre[arm, 0] + 1j * arms.centre[arm, 1] + growth * own[1]
-    spoke = own[0] - centre
-    towards = (spoke * own[2].conj()).real
+    centre = arms.centre[arm, 0] + 1j * arms.centre[arm, 1] + growth * geometry[1]
+    spoke = geometry[0] - centre
+    towards = (spoke * geometry[2].conj()).real
     convex = towards < 0.0 if ends else towards >= 0.0
     sweep = np.abs(arms.sweep[arm])
-    left = sweep * (1.0 - used[which[on]] / moves.length[which[on]]) if ends else sweep
+    remaining = sweep * (1.0 - used_mm[rows[arcs]] / moves.length[rows[arcs]]) if ends else sweep
     part = ARC_END_PART if ends else ARC_START_PART
-    most = np.minimum(part * left, np.where(convex, theta[on], 0.5 * np.pi))
+    max_angle = np.minimum(part * remaining, np.where(convex, theta[arcs], 0.5 * np.pi))
     radius = np.abs(spoke)
-    count = len(which)
+    count = len(rows)
     side = _Side(
         is_arc=is_arc,
         tangent=tangent,
@@ -1188,15 +1219,15 @@ def _side(
         radius=np.zeros(count),
         sign=np.zeros(count),
         most=np.zeros(count),
-        longest=LINE_PART * moves.length[which],
+        longest=LINE_PART * moves.length[rows],
         less=np.zeros(count),
     )
     if ends:
-        side.longest[:] = np.minimum(side.longest, moves.length[which] - used[which])
-    side.centre[on], side.radius[on], side.most[on] = centre, radius, most
-    side.sign[on] = np.where(convex, -1.0, 1.0)
-    side.longest[on] = np.where(convex, np.sin(0.25 * most), most) * radius
-    side.less[on] = np.where(convex, 0.25 * most, 0.0)
+        side.longest[:] = np.minimum(side.longest, moves.length[rows] - used_mm[rows])
+    side.centre[arcs], side.radius[arcs], side.most[arcs] = centre, radius, max_angle
+    side.sign[arcs] = np.where(convex, -1.0, 1.0)
+    side.longest[arcs] = np.where(convex, np.sin(0.25 * max_angle), max_angle) * radius
+    side.less[arcs] = np.where(convex, 0.25 * max_angle, 0.0)
     return side
 
 
@@ -1204,29 +1235,29 @@ def _round_arcs(
     corners: PlannerCorners,
     moves: PlannerMoves,
     tangents: Tangents,
-    on: Ints,
+    rows: Ints,
     bends: Bends,
-    used: Floats,
+    used_mm: Floats,
     rules: CornerRules,
 ) -> None:
-    """Fill in the blends at corners with arcs, all in XY, at the corners `on`."""
-    if len(on) == 0:
+    """Fill in the blends at corners with arcs, all in XY, at the corners `rows`."""
+    if len(rows) == 0:
         return
     theta_tan = bends.theta
-    starts = tangents.path.starts_of(moves.row[on])
+    starts = tangents.path.starts_of(moves.row[rows])
     corner, height = starts[:, 0] + 1j * starts[:, 1], starts[:, 2]
     one, other = (each[:, 0] + 1j * each[:, 1] for each in (bends.before, bends.after))
-    first = _side(moves, tangents, on - 1, corner, one, other, theta_tan, used, ends=True)
-    last = _side(moves, tangents, on, corner, other, one, theta_tan, used, ends=False)
+    first = _side(moves, tangents, rows - 1, corner, one, other, theta_tan, used_mm, ends=True)
+    last = _side(moves, tangents, rows, corner, other, one, theta_tan, used_mm, ends=False)
     theta = theta_tan - np.maximum(first.less, last.less)
-    left = np.sign((one.conj() * other).imag)
-    normal = np.column_stack([0.0 * left, 0.0 * left, left])
+    side_sign = np.sign((one.conj() * other).imag)
+    normal = np.column_stack([0.0 * side_sign, 0.0 * side_sign, side_sign])
     longest = np.minimum(first.longest, last.longest)
-    rounds = _rounds(moves, on, normal, theta, longest, np.zeros(len(on)), rules)
+    rounds = _rounds(moves, rows, normal, theta, longest, np.zeros(len(rows)), rules)
     with np.errstate(divide="ignore", invalid="ignore"):
-        centre = _centre_of(corner, left, rounds.radius, first, last)
+        centre = _centre_of(corner, side_sign, rounds.radius, first, last)
         strays = np.abs(centre - corner) - rounds.radius
-        turned = [
+        turns = [
             np.where(
                 side.is_arc,
                 np.abs(np.angle((corner - side.centre) * (centre - side.centre).conj())),
@@ -1234,34 +1265,36 @@ def _round_arcs(
             )
             for side in (first, last)
         ]
-    both = first.is_arc & last.is_arc
-    good = np.isfinite(centre) & (strays <= rounds.tolerance) & (theta > 0.0)
-    good &= (np.pi - 2.0 * theta_tan > MIN_BEND_RAD) & ~(both & (theta < MIN_THETA_RAD))
-    good &= rounds.radius * (np.pi - 2.0 * theta) > MIN_LENGTH_MM
+    both_arcs = first.is_arc & last.is_arc
+    is_valid = np.isfinite(centre) & (strays <= rounds.tolerance) & (theta > 0.0)
+    is_valid &= (np.pi - 2.0 * theta_tan > MIN_BEND_RAD) & ~(both_arcs & (theta < MIN_THETA_RAD))
+    is_valid &= rounds.radius * (np.pi - 2.0 * theta) > MIN_LENGTH_MM
     reach, spokes = [], []
-    for side, which, turn, ends in (
-        (first, on - 1, turned[0], True),
-        (last, on, turned[1], False),
+    for side, side_rows, turn, ends in (
+        (first, rows - 1, turns[0], True),
+        (last, rows, turns[1], False),
     ):
-        good &= ~side.is_arc | (turn <= side.most)
-        far, point = turn.copy(), corner + (-turn if ends else turn) * side.tangent
+        is_valid &= ~side.is_arc | (turn <= side.most)
+        distance, point = turn.copy(), corner + (-turn if ends else turn) * side.tangent
         arcs = np.flatnonzero(side.is_arc)
-        arm = tangents.arm_of(moves.row[which[arcs]])
-        share = np.where(good[arcs], turn[arcs], 0.0) / np.abs(tangents.arms.sweep[arm])
-        good[arcs] &= share < 1.0
+        arm = tangents.arm_of(moves.row[side_rows[arcs]])
+        share = np.where(is_valid[arcs], turn[arcs], 0.0) / np.abs(tangents.arms.sweep[arm])
+        is_valid[arcs] &= share < 1.0
         touched = tangents.arms.points(arm, 1.0 - share if ends else share)
         point[arcs] = touched[:, 0] + 1j * touched[:, 1]
-        far[arcs] = share * moves.length[which[arcs]]
-        reach.append(far)
+        distance[arcs] = share * moves.length[side_rows[arcs]]
+        reach.append(distance)
         spokes.append(point - centre)
     shape = np.stack(
         [np.column_stack([centre.real, centre.imag, height])]
         + [np.column_stack([each.real, each.imag, 0.0 * height]) for each in spokes]
     )
-    _fill(corners, on, rounds, (reach[0], reach[1]), shape, good, rules)
+    _fill(corners, rows, rounds, (reach[0], reach[1]), shape, is_valid, rules)
 
 
-def _centre_of(corner: Floats, left: Floats, radius: Floats, first: _Side, last: _Side) -> Floats:
+def _centre_of(
+    corner: Floats, side_sign: Floats, radius: Floats, first: _Side, last: _Side
+) -> Floats:
     """(K,) the centres of circles of a radius (K,) that touch both sides, those nearest to the
     corners; NaN where there are none."""
     distance = [side.sign * radius + side.radius for side in (first, last)]
@@ -1269,22 +1302,22 @@ def _centre_of(corner: Floats, left: Floats, radius: Floats, first: _Side, last:
     line_first = ~first.is_arc
     along = np.where(line_first, first.tangent, last.tangent)
     arc = np.where(line_first, last.centre, first.centre)
-    far = np.where(line_first, distance[1], distance[0])
-    beside = 1j * left * along
+    target_distance = np.where(line_first, distance[1], distance[0])
+    normal = 1j * side_sign * along
     to_arc = arc - corner
-    u, n = (to_arc * along.conj()).real, (to_arc * beside.conj()).real
-    root = np.sqrt(far**2 - (radius - n) ** 2)
+    u, n = (to_arc * along.conj()).real, (to_arc * normal.conj()).real
+    root = np.sqrt(target_distance**2 - (radius - n) ** 2)
     step = np.minimum(np.abs(u + root), np.abs(u - root))
-    by_line = corner + np.where(line_first, -step, step) * along + radius * beside
+    by_line = corner + np.where(line_first, -step, step) * along + radius * normal
     # Two arcs: a triangle.
-    between = last.centre - first.centre
-    apart = np.abs(between)
-    x = (distance[0] ** 2 - distance[1] ** 2 + apart**2) / (2.0 * apart)
+    centre_line = last.centre - first.centre
+    centre_distance = np.abs(centre_line)
+    x = (distance[0] ** 2 - distance[1] ** 2 + centre_distance**2) / (2.0 * centre_distance)
     y = np.sqrt(np.maximum(distance[0] ** 2 - x**2, 0.0))
-    direction = between / apart
-    found = [first.centre + (x + 1j * sign * y) * direction for sign in (1.0, -1.0)]
-    near = np.abs(found[0] - corner) <= np.abs(found[1] - corner)
-    by_arcs = np.where(near, found[0], found[1])
+    direction = centre_line / centre_distance
+    candidates = [first.centre + (x + 1j * sign * y) * direction for sign in (1.0, -1.0)]
+    is_first_nearer = np.abs(candidates[0] - corner) <= np.abs(candidates[1] - corner)
+    by_arcs = np.where(is_first_nearer, candidates[0], candidates[1])
     return np.asarray(np.where(first.is_arc & last.is_arc, by_arcs, by_line))
 
 

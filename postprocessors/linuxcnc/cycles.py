@@ -54,25 +54,25 @@ def drill(machine: InterpreterState, block: LinuxcncBlock, motion: int) -> None:
         raise LineFault("a cycle with feeds of inverse time (G93)")
     if machine.compensation.side:
         raise LineFault("a cycle while the cutter's radius is compensated")
-    again = machine.motion == motion
+    is_repeat = machine.motion == motion
     if machine.series is None:
         machine.series = Series()
     series = machine.series
-    kept = series.words if again else {}
+    inherited = series.words if is_repeat else {}
     axes = PLANES[machine.plane]
     names = [AXES[axis] for axis in axes]
-    r = _word(words, kept, "r", "the height R")
-    depth = _word(words, kept, names[2], f"the depth {names[2].upper()}", key="depth")
+    r = _word(words, inherited, "r", "the height R")
+    depth = _word(words, inherited, names[2], f"the depth {names[2].upper()}", key="depth")
     times = int(words.get("l", 1.0))
     if times == 0:
         raise LineFault("a cycle repeated 0 times", "l")
-    here = [machine.position[axis] for axis in axes]
-    height = series.height if series.height is not None else here[2]
+    start = [machine.position[axis] for axis in axes]
+    height = series.height if series.height is not None else start[2]
     series.height = height
-    at, step = list(here), [0.0, 0.0]
+    place, step = list(start), [0.0, 0.0]
     radius = angle = 0.0
     if machine.absolute:
-        at = _place(machine, words, names, here)
+        place = _place(machine, words, names, start)
         top, bottom = r, depth
     else:
         step = [words.get(name, 0.0) for name in names[:2]]
@@ -83,14 +83,14 @@ def drill(machine: InterpreterState, block: LinuxcncBlock, motion: int) -> None:
         raise LineFault(
             f"R {r:g} lies below {names[2].upper()} {depth:g}", "r", "write a higher R"
         )
-    hole = _Hole(at, top, top if machine.to_r else max(height, top), bottom)
-    run, kept_now = _motion_of(machine, block, motion, again, hole)
+    hole = _Hole(place, top, top if machine.to_r else max(height, top), bottom)
+    run, kept_now = _motion_of(machine, block, motion, is_repeat, hole)
     _bound(machine, times, hole, motion, kept_now)
     kept_now |= {"r": r, "depth": depth}
     mode, canon = machine.canon.path.mode, machine.canon
-    level = here[2]
+    level = start[2]
     if height < top:
-        machine.go(Kind.RAPID, axes, [here[0], here[1], top])
+        machine.go(Kind.RAPID, axes, [start[0], start[1], top])
         level = top
     canon.path.mode = EXACT_PATH
     for time in range(times):
@@ -98,9 +98,9 @@ def drill(machine: InterpreterState, block: LinuxcncBlock, motion: int) -> None:
         hole.at[1] += step[1]
         if radius or angle:
             _polar_step(hole.at, radius, angle)
-        over = level if time == 0 and level > top else hole.clear
-        machine.go(Kind.RAPID, axes, [*hole.at[:2], over])
-        if over > top:
+        next_height = level if time == 0 and level > top else hole.clear
+        machine.go(Kind.RAPID, axes, [*hole.at[:2], next_height])
+        if next_height > top:
             machine.go(Kind.RAPID, axes, [*hole.at[:2], top])
         run(hole)
     canon.path.mode = mode
@@ -116,48 +116,48 @@ def _series_words(machine: InterpreterState) -> dict[str, float]:
 
 
 def _word(
-    words: dict[str, float], kept: dict[str, float], letter: str, name: str, key: str = ""
+    words: dict[str, float], inherited: dict[str, float], letter: str, name: str, key: str = ""
 ) -> float:
     """The number of a word, or of the last block that had it."""
-    value = words.get(letter, kept.get(key or letter))
+    value = words.get(letter, inherited.get(key or letter))
     if value is None:
         raise LineFault(f"a cycle without {name}", "g", f"write {letter.upper()}")
     return value
 
 
 def _place(
-    machine: InterpreterState, words: dict[str, float], names: list[str], here: list[float]
+    machine: InterpreterState, words: dict[str, float], names: list[str], start: list[float]
 ) -> list[float]:
     """Return the place of the (first) hole of an absolute cycle."""
     if "@" in words or "^" in words:
         x, y = machine.position[:2]
         radius = words.get("@", math.hypot(y, x))
         angle = math.radians(words["^"]) if "^" in words else math.atan2(y, x)
-        return [radius * math.cos(angle), radius * math.sin(angle), here[2]]
-    return [words.get(name, value) for name, value in zip(names, here, strict=True)]
+        return [radius * math.cos(angle), radius * math.sin(angle), start[2]]
+    return [words.get(name, value) for name, value in zip(names, start, strict=True)]
 
 
-def _polar_step(at: list[float], radius: float, angle: float) -> None:
+def _polar_step(place: list[float], radius: float, angle: float) -> None:
     """Return a step in polar coordinates."""
-    if at[0] == 0.0 and at[1] == 0.0:
+    if place[0] == 0.0 and place[1] == 0.0:
         raise LineFault("a polar step from zero, which has no direction", "@")
-    length = math.hypot(at[1], at[0]) + radius
-    angle += math.atan2(at[1], at[0])
-    at[:2] = length * math.cos(angle), length * math.sin(angle)
+    length = math.hypot(place[1], place[0]) + radius
+    angle += math.atan2(place[1], place[0])
+    place[:2] = length * math.cos(angle), length * math.sin(angle)
 
 
 def _bound(
-    machine: InterpreterState, times: int, hole: _Hole, motion: int, kept: dict[str, float]
+    machine: InterpreterState, times: int, hole: _Hole, motion: int, inherited: dict[str, float]
 ) -> None:
     """Fault where the holes would be more moves than a program may have."""
     pecks = 1.0
     if motion in WANTS_PECK:
-        pecks = max((hole.r - hole.bottom) / kept["q"], 1.0)
+        pecks = max((hole.r - hole.bottom) / inherited["q"], 1.0)
     if len(machine.canon.path) + times * (3.0 * pecks + 3.0) > bounds.MAX_MOVES:
         by_pecks = pecks > times
-        what = "its pecks" if by_pecks else "the repeats of this cycle"
+        subject = "its pecks" if by_pecks else "the repeats of this cycle"
         mend = "write a larger Q" if by_pecks else bounds.SPLIT_PROGRAM
-        raise LineFault(too_many(what), "q" if by_pecks else "l", mend)
+        raise LineFault(too_many(subject), "q" if by_pecks else "l", mend)
     strokes = int(times * pecks)  # each takes as long as a line
     if strokes > machine.most_lines:
         raise LineFault(
@@ -169,13 +169,13 @@ def _bound(
 
 
 def _motion_of(
-    machine: InterpreterState, block: LinuxcncBlock, motion: int, again: bool, hole: _Hole
+    machine: InterpreterState, block: LinuxcncBlock, motion: int, is_repeat: bool, hole: _Hole
 ) -> tuple[Callable[[_Hole], None], dict[str, float]]:
     """Return the function that makes a hole, from R until the tool is out again, and the words
     that the next hole inherits."""
     words, series = block.words, _series_words(machine)
     axes = PLANES[machine.plane]
-    kept: dict[str, float] = {}
+    inherited: dict[str, float] = {}
 
     def feed(hole: _Hole, level: float) -> None:
         machine.go(Kind.LINE, axes, [*hole.at[:2], level])
@@ -185,21 +185,23 @@ def _motion_of(
 
     dwell = 0.0
     if motion in WANTS_DWELL:
-        dwell = kept["p"] = _word(words, series if again else {}, "p", "the dwell P")
+        dwell = inherited["p"] = _word(words, series if is_repeat else {}, "p", "the dwell P")
     elif motion in TAPS:
-        dwell = kept["p"] = words.get("p", series.get("p", 0.0))
+        dwell = inherited["p"] = words.get("p", series.get("p", 0.0))
     if dwell < 0.0:
         raise LineFault("a dwell below 0 s", "p")
     if motion in WANTS_PECK:
-        peck = kept["q"] = _word(words, series if again else {}, "q", "the depth of a peck, Q")
+        peck = inherited["q"] = _word(
+            words, series if is_repeat else {}, "q", "the depth of a peck, Q"
+        )
         if peck <= 0.0:
             raise LineFault("a peck that is not above 0", "q")
     spindle = machine.spindle
     if motion in (*WANTS_SPINDLE, *TAPS) and spindle is None:
         raise LineFault(f"G{motion // 10} while the spindle stands", "g", "start it with M3 or M4")
     if motion in TAPS:
-        wanted = Kind.SPINDLE_CCW if motion == 740 else Kind.SPINDLE_CW
-        if spindle != wanted:
+        direction = Kind.SPINDLE_CCW if motion == 740 else Kind.SPINDLE_CW
+        if spindle != direction:
             raise LineFault(f"the spindle turns the wrong way for G{motion // 10}", "g")
         machine.notes.tapping.append(machine.block_index)
 
@@ -212,13 +214,13 @@ def _motion_of(
         (feed if motion == 890 else rapid)(hole, hole.clear)
 
     def pecked(hole: _Hole) -> None:
-        back, level = BACK_MM / machine.canon.mm, hole.r - kept["q"]
+        retract, level = BACK_MM / machine.canon.mm, hole.r - inherited["q"]
         while level > hole.bottom:
             feed(hole, level)
             if motion == 830:
                 rapid(hole, hole.r)
-            rapid(hole, level + back)
-            level -= kept["q"]
+            rapid(hole, level + retract)
+            level -= inherited["q"]
         feed(hole, hole.bottom)
         rapid(hole, hole.clear)
 
@@ -249,37 +251,40 @@ def _motion_of(
         machine.turn(spindle or Kind.SPINDLE_CW)
 
     if motion == 870:
-        return _back_bore(machine, words, again, kept), kept
+        return _back_bore(machine, words, is_repeat, inherited), inherited
     if motion in WANTS_PECK:
-        return pecked, kept
+        return pecked, inherited
     if motion in TAPS:
-        return tapped, kept
-    return (bored if motion in (860, 880) else simple), kept
+        return tapped, inherited
+    return (bored if motion in (860, 880) else simple), inherited
 
 
 def _back_bore(
-    machine: InterpreterState, words: dict[str, float], again: bool, kept: dict[str, float]
+    machine: InterpreterState,
+    words: dict[str, float],
+    is_repeat: bool,
+    inherited: dict[str, float],
 ) -> Callable[[_Hole], None]:
     """G87: beside the hole down through it, over, and up with the spindle turning."""
-    series = _series_words(machine) if again else {}
+    series = _series_words(machine) if is_repeat else {}
     for letter in "ijk":
-        kept[letter] = _word(words, series, letter, letter.upper())
+        inherited[letter] = _word(words, series, letter, letter.upper())
     axes, spindle = PLANES[machine.plane], machine.spindle or Kind.SPINDLE_CW
 
     def bored(hole: _Hole) -> None:
         x, y = hole.at[:2]
-        aside = [x + kept["i"], y + kept["j"]]
-        top = kept["k"] if machine.absolute else hole.bottom + kept["k"]
-        machine.go(Kind.RAPID, axes, [*aside, hole.r])
+        offset_place = [x + inherited["i"], y + inherited["j"]]
+        top = inherited["k"] if machine.absolute else hole.bottom + inherited["k"]
+        machine.go(Kind.RAPID, axes, [*offset_place, hole.r])
         machine.turn(Kind.SPINDLE_OFF)
-        machine.go(Kind.RAPID, axes, [*aside, hole.bottom])
+        machine.go(Kind.RAPID, axes, [*offset_place, hole.bottom])
         machine.go(Kind.RAPID, axes, [x, y, hole.bottom])
         machine.turn(spindle)
         machine.go(Kind.LINE, axes, [x, y, top])
         machine.go(Kind.LINE, axes, [x, y, hole.bottom])
         machine.turn(Kind.SPINDLE_OFF)
-        machine.go(Kind.RAPID, axes, [*aside, hole.bottom])
-        machine.go(Kind.RAPID, axes, [*aside, hole.clear])
+        machine.go(Kind.RAPID, axes, [*offset_place, hole.bottom])
+        machine.go(Kind.RAPID, axes, [*offset_place, hole.clear])
         machine.go(Kind.RAPID, axes, [x, y, hole.clear])
         machine.turn(spindle)
 
@@ -311,23 +316,23 @@ def thread(machine: InterpreterState, block: LinuxcncBlock, end: list[float]) ->
     _need_spindle(machine, 760)
     if machine.compensation.side:
         raise LineFault("G76 while the cutter's radius is compensated", "g")
-    peak, first, full = words["i"], words["j"], words["k"]
-    if peak == 0.0 or first <= 0.0 or full <= first:
+    peak, first, full_depth = words["i"], words["j"], words["k"]
+    if peak == 0.0 or first <= 0.0 or full_depth <= first:
         raise LineFault("G76 wants an I that is not 0, J above 0, and K above J", "g")
     if machine.diameters:
-        peak, first, full = peak / 2.0, first / 2.0, full / 2.0
+        peak, first, full_depth = peak / 2.0, first / 2.0, full_depth / 2.0
     start = list(machine.position)
     pitch = words["p"]
-    way = -1.0 if end[2] > start[2] else 1.0
-    slope = math.tan(way * math.radians(words.get("q", 0.0)))
+    direction = -1.0 if end[2] > start[2] else 1.0
+    slope = math.tan(direction * math.radians(words.get("q", 0.0)))
     degression = max(words.get("r", 1.0), 1.0)
     taper = max(words.get("e", 0.0), 0.0)
-    tapered = pitch * math.hypot(taper, full) / taper if taper else pitch
-    taper *= way
+    tapered = pitch * math.hypot(taper, full_depth) / taper if taper else pitch
+    taper *= direction
     ends = int(words.get("l", 0.0))
     side = 1.0 if peak > 0.0 else -1.0
-    offset, deepest = abs(peak), full + abs(peak)
-    target = end[2] + full * slope
+    offset, deepest = abs(peak), full_depth + abs(peak)
+    target = end[2] + full_depth * slope
     feed = canon.feed
 
     def cut(x: float, z: float, lead: float) -> None:
@@ -337,9 +342,9 @@ def thread(machine: InterpreterState, block: LinuxcncBlock, end: list[float]) ->
 
     def one(depth: float) -> None:
         shift = (depth - offset) * slope
-        out, bottom = start[0] + side * (depth - deepest), start[0] + side * depth
-        raised = start[0] + side * (depth - full)
-        canon.rapid(out, start[1], start[2] - shift)
+        outside, bottom = start[0] + side * (depth - deepest), start[0] + side * depth
+        raised = start[0] + side * (depth - full_depth)
+        canon.rapid(outside, start[1], start[2] - shift)
         if taper and ends & 1:
             cut(raised, start[2] - shift, tapered)
             cut(bottom, start[2] - shift - taper, tapered)
@@ -350,7 +355,7 @@ def thread(machine: InterpreterState, block: LinuxcncBlock, end: list[float]) ->
             cut(raised, target - shift, tapered)
         else:
             cut(bottom, target - shift, pitch)
-        canon.rapid(out, start[1], target - shift)
+        canon.rapid(outside, start[1], target - shift)
 
     depth, number = offset + first, 1
     while depth < deepest:

@@ -41,14 +41,14 @@ _PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 class Scanner:
     """Reads values from a text, from `at` on."""
 
-    def __init__(self, text: str, at: int = 0) -> None:
-        self.text, self.at = text, at
+    def __init__(self, text: str, begin: int = 0) -> None:
+        self.text, self.at = text, begin
         self._depth = 0
 
     def value(self) -> Value:
         """A number, an expression, a parameter or a function."""
-        text, at = self.text, self.at
-        sign, after = text[at : at + 1], text[at + 1 : at + 2]
+        text, begin = self.text, self.at
+        sign, after = text[begin : begin + 1], text[begin + 1 : begin + 2]
         if sign == "[":
             return self.expression()
         if sign == "#":
@@ -68,12 +68,12 @@ class Scanner:
 
     def number(self) -> float:
         """A plain number."""
-        found = NUMBER.match(self.text, self.at)
-        assert found is not None  # it matches nothing too
-        text = found[0]
+        match = NUMBER.match(self.text, self.at)
+        assert match is not None  # it matches nothing too
+        text = match[0]
         if _PLAIN.fullmatch(text) is None:
             raise LineFault(f"{text!r} is no number" if text else "no number", self.at)
-        self.at = found.end()
+        self.at = match.end()
         return float(text)
 
     def whole_number(self) -> Callable[[Parameters], int] | int:
@@ -92,33 +92,33 @@ class Scanner:
         self._depth += 1
         if self._depth > MAX_NESTING:
             raise LineFault("brackets are nested too deeply", begin)
-        found = self._ranked(self.value(), 1)
+        result = self._ranked(self.value(), 1)
         self._operator_at(self.at)  # the bracket
         self.at += 1
         self._depth -= 1
-        if isinstance(found, float):
-            return finite(found, begin)
-        function = found
+        if isinstance(result, float):
+            return finite(result, begin)
+        function = result
         return lambda given: finite(function(given), begin)
 
-    def _ranked(self, left: Value, rank: int) -> Value:
+    def _ranked(self, left_value: Value, rank: int) -> Value:
         """Evaluate operators of this precedence and above, up to the closing bracket."""
         while True:
             name = self._operator_at(self.at)
             if name == "]" or RANKS[name] < rank:
-                return left
+                return left_value
             begin = self.at
             self.at += len(name)
             right = self._ranked(self.value(), RANKS[name] + 1)
-            left = _apply_operator(OPERATORS[name], left, right, begin)
+            left_value = _apply_operator(OPERATORS[name], left_value, right, begin)
 
-    def _operator_at(self, at: int) -> str:
+    def _operator_at(self, begin: int) -> str:
         for name in _BY_LENGTH:
-            if self.text.startswith(name, at):
+            if self.text.startswith(name, begin):
                 return name
-        if at >= len(self.text):
-            raise LineFault("an expression without its closing bracket", at)
-        raise LineFault(f"{self.text[at]!r} is no operator", at)
+        if begin >= len(self.text):
+            raise LineFault("an expression without its closing bracket", begin)
+        raise LineFault(f"{self.text[begin]!r} is no operator", begin)
 
     def parameter(self) -> Value:
         """#5, #[…], ##5 or #<name>."""
@@ -172,89 +172,89 @@ class Scanner:
         self.at += 1
         if self.text[self.at : self.at + 1] == "<":
             name = self.name()
-            found: Value = lambda given: given.has(name, begin)  # noqa: E731 - it is a value
+            result: Value = lambda given: given.has(name, begin)  # noqa: E731 - it is a value
         else:
             index = self.whole_number()
             computed = index if callable(index) else lambda given, fixed=index: fixed
-            found = lambda given: float(1 <= computed(given) < MAX_PARAMETERS)  # noqa: E731
+            result = lambda given: float(1 <= computed(given) < MAX_PARAMETERS)  # noqa: E731
         if self.text[self.at : self.at + 1] != "]":
             raise LineFault("exists wants a closing bracket behind its parameter", self.at)
         self.at += 1
-        return found
+        return result
 
 
-def evaluate(value: Value, given: Parameters) -> float:
+def evaluate(value: Value, parameters: Parameters) -> float:
     """Return the number of a value that may contain parameters."""
-    return value if isinstance(value, float) else value(given)
+    return value if isinstance(value, float) else value(parameters)
 
 
-def finite(value: float, at: int) -> float:
+def finite(value: float, column: int) -> float:
     """The number; Fault for one that is none."""
     if value - value != 0.0:
-        raise LineFault("the result of a calculation is no number", at)
+        raise LineFault("the result of a calculation is no number", column)
     return value
 
 
-def whole_number(value: float, at: int) -> int:
+def whole_number(value: float, column: int) -> int:
     """Return the whole number that is meant; LineFault for a fraction."""
     low = math.floor(value)
     if value - low > 1.0 - WHOLE:
         return low + 1
     if value - low > WHOLE:
-        raise LineFault(f"{value:g} is no whole number", at)
+        raise LineFault(f"{value:g} is no whole number", column)
     return low
 
 
-def check_index(index: int, at: int) -> int:
+def check_index(index: int, column: int) -> int:
     """The number of a parameter; Fault where there is none of it."""
     if not 1 <= index < MAX_PARAMETERS:
-        raise LineFault(f"there is no parameter #{index} (1 to {MAX_PARAMETERS - 1})", at)
+        raise LineFault(f"there is no parameter #{index} (1 to {MAX_PARAMETERS - 1})", column)
     return index
 
 
 Binary = Callable[[float, float, int], float]
 
 
-def _apply_operator(operator: Binary, left: Value, right: Value, at: int) -> Value:
+def _apply_operator(operator: Binary, left_value: Value, right: Value, column: int) -> Value:
     """Apply an operator at once if both sides are numbers, else when the line is executed."""
-    if isinstance(left, float):
+    if isinstance(left_value, float):
         if isinstance(right, float):
-            return operator(left, right, at)
-        one, second = left, right
-        return lambda given: operator(one, second(given), at)
-    first = left
+            return operator(left_value, right, column)
+        one, second = left_value, right
+        return lambda given: operator(one, second(given), column)
+    first = left_value
     if isinstance(right, float):
-        two = right
-        return lambda given: operator(first(given), two, at)
+        constant = right
+        return lambda given: operator(first(given), constant, column)
     other = right
-    return lambda given: operator(first(given), other(given), at)
+    return lambda given: operator(first(given), other(given), column)
 
 
-def _apply_function(function: Callable[[float, int], float], inner: Value, at: int) -> Value:
+def _apply_function(function: Callable[[float, int], float], inner: Value, column: int) -> Value:
     if isinstance(inner, float):
-        return finite(function(inner, at), at)
+        return finite(function(inner, column), column)
     argument = inner
-    return lambda given: finite(function(argument(given), at), at)
+    return lambda given: finite(function(argument(given), column), column)
 
 
-def _divide(left: float, right: float, at: int) -> float:
+def _divide(dividend: float, right: float, column: int) -> float:
     if right == 0.0:
-        raise LineFault("a division by zero", at)
-    return left / right
+        raise LineFault("a division by zero", column)
+    return dividend / right
 
 
-def _modulo(left: float, right: float, _: int) -> float:
+def _modulo(dividend: float, right: float, _: int) -> float:
     if right == 0.0:  # only a result that is no number is an error, at the closing bracket
         return math.nan
-    rest = math.fmod(left, right)
-    return rest + abs(right) if rest < 0.0 else rest
+    remainder = math.fmod(dividend, right)
+    return remainder + abs(right) if remainder < 0.0 else remainder
 
 
-def _power(left: float, right: float, at: int) -> float:
-    if left < 0.0 and math.floor(right) != right:
-        raise LineFault("a negative number to a power that is not whole", at)
+def _power(base: float, right: float, column: int) -> float:
+    if base < 0.0 and math.floor(right) != right:
+        raise LineFault("a negative number to a power that is not whole", column)
     try:
-        return math.pow(left, right)
+        return math.pow(base, right)
     except (OverflowError, ValueError):
         return math.inf
 
@@ -280,37 +280,37 @@ def _of_degrees(
 
 
 def _arc(name: str, function: Callable[[float], float]) -> Callable[[float, int], float]:
-    def applied(value: float, at: int) -> float:
+    def applied(value: float, column: int) -> float:
         if not -1.0 <= value <= 1.0:
-            raise LineFault(f"{name} of {value:g}, which is not from -1 to 1", at)
+            raise LineFault(f"{name} of {value:g}, which is not from -1 to 1", column)
         return _degrees(function(value))
 
     return applied
 
 
-def _ln(value: float, at: int) -> float:
+def _ln(value: float, column: int) -> float:
     if value <= 0.0:
-        raise LineFault(f"ln of {value:g}, which is not above 0", at)
+        raise LineFault(f"ln of {value:g}, which is not above 0", column)
     return math.log(value)
 
 
-def _sqrt(value: float, at: int) -> float:
+def _sqrt(value: float, column: int) -> float:
     if value < 0.0:
-        raise LineFault(f"sqrt of {value:g}, which is below 0", at)
+        raise LineFault(f"sqrt of {value:g}, which is below 0", column)
     return math.sqrt(value)
 
 
-def _exp(value: float, at: int) -> float:
+def _exp(value: float, column: int) -> float:
     try:
         return math.exp(value)
     except OverflowError:
-        raise LineFault("the result of a calculation is no number", at) from None
+        raise LineFault("the result of a calculation is no number", column) from None
 
 
-def _round(value: float, at: int) -> float:
+def _round(value: float, column: int) -> float:
     """To the nearest whole number, halves away from zero."""
     if abs(value) >= MAX_ROUNDED:
-        raise LineFault(f"round of {value:g}, which is too large", at)
+        raise LineFault(f"round of {value:g}, which is too large", column)
     return float(math.trunc(value + (-0.5 if value < 0.0 else 0.5)))
 
 

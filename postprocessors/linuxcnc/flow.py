@@ -195,8 +195,10 @@ class Flow:
         call."""
         if not self.here.text.name:
             return self.here.line
-        own = [call.called for call in self.calls if call.called and not call.called.text.name]
-        return own[-1].line if own else 0
+        program_calls = [
+            call.called for call in self.calls if call.called and not call.called.text.name
+        ]
+        return program_calls[-1].line if program_calls else 0
 
     def fail(self, fault: LineFault) -> NoReturn:
         """ProgramError with the place of the line that was read last."""
@@ -205,12 +207,12 @@ class Flow:
         if number + 1 < len(text.begins):
             end = int(text.begins[number + 1]) - 1
         raw = text.data[begin:end].decode("latin-1").rstrip("\r")
-        at = fault.at
-        if isinstance(at, str):
-            at = self.current.place(at) if self.current is not None else None
-        if at is None:
-            at = self.current.begin if self.current is not None else 0
-        column = column_of(raw, at)
+        fault_column = fault.at
+        if isinstance(fault_column, str):
+            fault_column = self.current.place(fault_column) if self.current is not None else None
+        if fault_column is None:
+            fault_column = self.current.begin if self.current is not None else 0
+        column = column_of(raw, fault_column)
         if text.name:
             where = f"file {text.name}, line {number + 1}, column {column}"
         else:
@@ -247,8 +249,8 @@ class Flow:
             line.word = _word_of(line)
         word: _Word = line.word
         self.branches = True
-        own = self._label(word)
-        label = own if word.kind in OF_THE_PROGRAM else f"{self._scope()}#{own}"
+        own_label = self._label(word)
+        label = own_label if word.kind in OF_THE_PROGRAM else f"{self._scope()}#{own_label}"
         if word.kind in ("sub", "program") and self._defining is not None:
             raise LineFault("a sub within a sub", line.flow)
         skips = self._seeking is not None and self._seeking != label
@@ -319,22 +321,22 @@ class Flow:
         return self._labels[label]
 
     def _label_of(self, label: str) -> FlowLabel:
-        found = self._labels.get(label)
-        if found is None:
+        known_label = self._labels.get(label)
+        if known_label is None:
             raise LineFault(f"no word with the label o<{_own_name(label)}> has come before")
-        return found
+        return known_label
 
     def _unique_label(self, kind: str, label: str, *, after_do: bool = False) -> FlowLabel:
         """Return the label of a word that may stand in one place only."""
-        found = self._labels.get(label)
-        if found is None:
+        known_label = self._labels.get(label)
+        if known_label is None:
             return self._save(kind, label)
-        other = found.place.line != self.here.line
-        if other and not (after_do and found.kind == "do"):
+        other = known_label.place.line != self.here.line
+        if other and not (after_do and known_label.kind == "do"):
             raise LineFault(
-                f"the label o<{_own_name(label)}> is also that of {_of_place(found.place)}"
+                f"the label o<{_own_name(label)}> is also that of {_of_place(known_label.place)}"
             )
-        return found
+        return known_label
 
     def _go_to(self, label: str) -> None:
         place = self._labels[label].place
@@ -354,10 +356,10 @@ class Flow:
     # Subs
 
     def _begin_sub(self, kind: str, label: str) -> None:
-        how = self.calls[-1].kind
-        if kind == "program" and how == "call":
+        call_kind = self.calls[-1].kind
+        if kind == "program" and call_kind == "call":
             raise LineFault("a sub of O and a number alone is called by M98")
-        if kind == "sub" and how == "M98":
+        if kind == "sub" and call_kind == "M98":
             raise LineFault("a sub is called by o… call, not by M98")
         if self._seeking is not None:
             self._save(kind, label)
@@ -399,10 +401,10 @@ class Flow:
                 f"o<{label}> may call itself without end"
             )
         caller = self.calls[-1]
-        back = TextPosition(self.text, self.at)
+        return_place = TextPosition(self.text, self.at)
         go_on = self._way_to(label)
         if word.kind == "M98":
-            self.calls.append(Call(label, "M98", back, self.here))
+            self.calls.append(Call(label, "M98", return_place, self.here))
             self.given.enter(None)
             times = self._times(word)
             if times == 0:
@@ -410,27 +412,27 @@ class Flow:
             if times is not None:
                 caller.again = (times if caller.again == -1 else caller.again) - 1
                 if caller.again > 0:
-                    back.line -= 1
+                    return_place.line -= 1
                 else:
                     caller.again = -1
         else:
             arguments = self._arguments(word)
             before = self.given.enter(arguments)
-            self.calls.append(Call(label, "call", back, self.here, before))
+            self.calls.append(Call(label, "call", return_place, self.here, before))
         go_on()
 
     def _way_to(self, label: str) -> Callable[[], None]:
         """Return a function that jumps to a sub: to its known place, or by a search from the
         beginning of its own file or from the present line on."""
-        own = label.rsplit("/", 1)[-1]
-        if own in self._labels:
-            return lambda: self._go_to(own)
-        found = self.folder.find(label)
+        local_name = label.rsplit("/", 1)[-1]
+        if local_name in self._labels:
+            return lambda: self._go_to(local_name)
+        file_text = self.folder.find(label)
 
         def seek() -> None:
-            if found is not None:
-                self.text, self.at = found, 0
-            self._seeking = self._seeking_sub = own
+            if file_text is not None:
+                self.text, self.at = file_text, 0
+            self._seeking = self._seeking_sub = local_name
 
         return seek
 
@@ -509,9 +511,9 @@ class Flow:
             self._executed_if = True
 
     def _while(self, label: str, value: float) -> None:
-        found = self._unique_label("while", label, after_do=True)
+        loop = self._unique_label("while", label, after_do=True)
         self._seeking = None
-        if found.kind == "while":
+        if loop.kind == "while":
             if value == 0.0:
                 self._seeking = label
         elif value != 0.0 and not self._breaking:
@@ -520,17 +522,17 @@ class Flow:
             self._breaking = False
 
     def _repeat(self, label: str, value: float) -> None:
-        found = self._unique_label("repeat", label)
+        loop = self._unique_label("repeat", label)
         self._seeking = None
-        if found.kind != "repeat":
+        if loop.kind != "repeat":
             return
-        if found.left == -1:
-            found.left = round(value)
-        if found.left > 0:
-            found.left -= 1
+        if loop.left == -1:
+            loop.left = round(value)
+        if loop.left > 0:
+            loop.left -= 1
         else:
             self._seeking = label
-            found.left = -1
+            loop.left = -1
 
     def _leave_loop(self, kind: str, label: str) -> None:
         if self._label_of(label).kind not in ("while", "do"):
@@ -546,9 +548,11 @@ class Flow:
             self._continuing = True
 
     def _end_loop(self, kind: str, label: str) -> None:
-        begun = "repeat" if kind == "endrepeat" else "while"
-        if self._label_of(label).kind != begun:
-            raise LineFault(f"{kind} without its {begun}: o<{_own_name(label)}> is another word")
+        loop_kind = "repeat" if kind == "endrepeat" else "while"
+        if self._label_of(label).kind != loop_kind:
+            raise LineFault(
+                f"{kind} without its {loop_kind}: o<{_own_name(label)}> is another word"
+            )
         if self._seeking == label:
             self._seeking = None
             if not self._continuing:
@@ -559,48 +563,48 @@ class Flow:
 
 def _word_of(line: ParsedLine) -> _Word:
     """The O word, M98 or M99 with which a line begins."""
-    text, at = line.text, line.flow
-    assert at is not None
-    if text[at] == "m":
-        if text.startswith("m99", at):
-            return _Word("M99", None, at + 3)
-        rest = ParsedLine(text[at + 3 :])
-        return _Word("M98", None, len(text), words=rest)
-    at += 1
+    text, begin = line.text, line.flow
+    assert begin is not None
+    if text[begin] == "m":
+        if text.startswith("m99", begin):
+            return _Word("M99", None, begin + 3)
+        call_line = ParsedLine(text[begin + 3 :])
+        return _Word("M98", None, len(text), words=call_line)
+    begin += 1
     label: Any
-    if text[at : at + 1] == "<":
-        end = text.find(">", at)
+    if text[begin : begin + 1] == "<":
+        end = text.find(">", begin)
         if end < 0:
-            raise LineFault("a name without its closing >", at)
-        label, at = text[at + 1 : end], end + 1
+            raise LineFault("a name without its closing >", begin)
+        label, begin = text[begin + 1 : end], end + 1
     else:
-        digits = at
+        digits = begin
         while text[digits : digits + 1].isdigit():
             digits += 1
-        if digits > at and text[digits : digits + 1] != ".":
-            label, at = str(int(text[at:digits])), digits
+        if digits > begin and text[digits : digits + 1] != ".":
+            label, begin = str(int(text[begin:digits])), digits
         else:
             from .expressions import Scanner
 
-            scanner = Scanner(text, at)
+            scanner = Scanner(text, begin)
             label = scanner.whole_number()
             label = str(label) if isinstance(label, int) else label
-            at = scanner.at
+            begin = scanner.at
     for kind in KINDS:
-        if text.startswith(kind, at):
-            return _Word(kind, label, at + len(kind))
-    if text[at : at + 1] in ("", "(", ";"):
-        return _Word("program", label, at)
-    return _Word("", label, at)
+        if text.startswith(kind, begin):
+            return _Word(kind, label, begin + len(kind))
+    if text[begin : begin + 1] in ("", "(", ";"):
+        return _Word("program", label, begin)
+    return _Word("", label, begin)
 
 
 def _check_rest(line: ParsedLine, word: _Word) -> None:
     """Fault where more than comments stands behind an O word."""
-    at = word.rest
-    while at < len(line.text) and line.text[at] != ";":
-        if line.text[at] != "(":
-            raise LineFault("more than comments behind an O word", at)
-        at = line.text.find(")", at) + 1
+    position = word.rest
+    while position < len(line.text) and line.text[position] != ";":
+        if line.text[position] != "(":
+            raise LineFault("more than comments behind an O word", position)
+        position = line.text.find(")", position) + 1
 
 
 def _own_name(label: str) -> str:

@@ -56,7 +56,7 @@ class FrameCodes(InterpreterState, ABC):
         """Return the parameters that the machine has stored, in its units: frames, homes,
         offsets."""
         zero = [-each for each in self._machine.controller.machine_zero_mm]
-        known: dict[int, float] = {5210: 0.0, 5220: 1.0}
+        stored: dict[int, float] = {5210: 0.0, 5220: 1.0}
         if any(zero):
             self._placed.add(1)
         offsets = {str(name): place for name, place in self._dialect.work_offsets_mm.items()}
@@ -67,18 +67,18 @@ class FrameCodes(InterpreterState, ABC):
             if place:
                 self._placed.add((first - 5201) // 20)
             values = [*(place[:3] or zero), *(0.0,) * 6, place[3] if len(place) > 3 else 0.0]
-            known |= {first + k: value / self._user_mm for k, value in enumerate(values[:9])}
-            known[first + 9] = values[9]
+            stored |= {first + k: value / self._user_mm for k, value in enumerate(values[:9])}
+            stored[first + 9] = values[9]
         for name, first in (("G28", 5161), ("G30", 5181)):
             place = list(homes.get(name, ()))
             if place:
                 self._homed.add(first)
-            known |= {
+            stored |= {
                 first + k: value / self._user_mm
                 for k, value in enumerate([*(place or (0.0,) * 3), *(0.0,) * 6])
             }
-        known |= dict.fromkeys(range(OFFSETS, OFFSETS + 9), 0.0)
-        return known | dict.fromkeys(range(5400, 5414), 0.0)
+        stored |= dict.fromkeys(range(OFFSETS, OFFSETS + 9), 0.0)
+        return stored | dict.fromkeys(range(5400, 5414), 0.0)
 
     def _stored_place(self, first: int) -> list[float]:
         """Three lengths of parameters from this one on, in units of the program."""
@@ -122,11 +122,11 @@ class FrameCodes(InterpreterState, ABC):
         self._not_while_compensating("another work frame")
         if number == self._frame:
             return
-        here = self._on_machine()
+        machine_place = self._on_machine()
         self._use_frame(number)
-        self.position[:] = self._in_frame(here)
-        known = {self._first_frame, number} <= self._placed or number in self._set_here
-        if self._first_frame not in (None, number) and not known:
+        self.position[:] = self._in_frame(machine_place)
+        is_known = {self._first_frame, number} <= self._placed or number in self._set_here
+        if self._first_frame not in (None, number) and not is_known:
             self.notes.frames.setdefault(self._frame_name, self.block_index)
 
     @property
@@ -156,7 +156,7 @@ class FrameCodes(InterpreterState, ABC):
     def _end_offsets(self, code: int) -> None:
         """G92.1 and G92.2 take the offsets away, G92.3 brings those back that are stored."""
         self._not_while_compensating("another offset")
-        here = [a + b for a, b in zip(self.position, self._axis_offset, strict=True)]
+        place = [a + b for a, b in zip(self.position, self._axis_offset, strict=True)]
         if code == 923:
             self.given.set_numbered(5210, 1.0)
             self._axis_offset = self._stored_place(OFFSETS)
@@ -165,7 +165,7 @@ class FrameCodes(InterpreterState, ABC):
             self._axis_offset = [0.0, 0.0, 0.0]
             if code == 921:
                 self._store_place(OFFSETS, self._axis_offset)
-        self.position[:] = [a - b for a, b in zip(here, self._axis_offset, strict=True)]
+        self.position[:] = [a - b for a, b in zip(place, self._axis_offset, strict=True)]
         self._replace()
 
     def _g10(self, words: dict[str, float]) -> None:
@@ -185,12 +185,12 @@ class FrameCodes(InterpreterState, ABC):
         if self._compensates and number == self._frame:
             raise LineFault("another work frame while the cutter's radius is compensated", "g")
         first = 5201 + 20 * number
-        here, origin = self._on_machine(), self._stored_place(first)
+        machine_place, origin = self._on_machine(), self._stored_place(first)
         rotation = self.given.stored_value(first + 9)
         if kind == 20:
             if "r" in words:
                 raise LineFault("R beside G10 L20", "r")
-            self._place_here(number, words, here, origin, rotation)
+            self._place_here(number, words, machine_place, origin, rotation)
         else:
             rotation = words.get("r", rotation)
             self.given.set_numbered(first + 9, rotation)
@@ -220,11 +220,11 @@ class FrameCodes(InterpreterState, ABC):
         self,
         number: int,
         words: dict[str, float],
-        here: list[float],
+        machine_place: list[float],
         origin: list[float],
         rotation: float,
     ) -> None:
-        x, y, z = (a - b for a, b in zip(here, origin, strict=True))
+        x, y, z = (a - b for a, b in zip(machine_place, origin, strict=True))
         x, y = rotate(x, y, -rotation)
         if self.given.stored_value(5210):
             dx, dy, dz = self._stored_place(OFFSETS)
@@ -274,8 +274,8 @@ class FrameCodes(InterpreterState, ABC):
         number = 9 if kind == 11 else self._frame
         first = 5201 + 20 * number
         rotation = self.given.stored_value(first + 9)
-        here = [a + b for a, b in zip(self._on_machine(), self._tool_offset, strict=True)]
-        x, y, z = (a - b for a, b in zip(here, self._stored_place(first), strict=True))
+        tip_place = [a + b for a, b in zip(self._on_machine(), self._tool_offset, strict=True)]
+        x, y, z = (a - b for a, b in zip(tip_place, self._stored_place(first), strict=True))
         x, y = rotate(x, y, -rotation)
         if self.given.stored_value(5210) and kind != 11:
             dx, dy, dz = self._stored_place(OFFSETS)

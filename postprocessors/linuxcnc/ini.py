@@ -52,23 +52,23 @@ class _Ini:
 
     def text(self, section: str, key: str) -> str | None:
         """The text of an entry; None without it."""
-        found = self.entries.get((section, key))
-        return None if found is None else found[0]
+        entry = self.entries.get((section, key))
+        return None if entry is None else entry[0]
 
     def where(self, section: str, key: str) -> str:
         """The place of an entry."""
-        found = self.entries.get((section, key))
-        return ("" if found is None else f"line {found[1]}, ") + f"[{section}] {key}"
+        entry = self.entries.get((section, key))
+        return ("" if entry is None else f"line {entry[1]}, ") + f"[{section}] {key}"
 
     def number(self, section: str, key: str) -> float | None:
         """The number of an entry, behind which may stand a comment; None without the entry."""
         text = self.text(section, key)
         if text is None:
             return None
-        found = _NUMBER.match(text)
-        if found is None:
+        match = _NUMBER.match(text)
+        if match is None:
             raise MachineError(f"{text!r} is no number", where=self.where(section, key))
-        return float(found[0])
+        return float(match[0])
 
 
 def settings_of(text: str) -> list[ControllerSetting] | None:
@@ -78,7 +78,7 @@ def settings_of(text: str) -> list[ControllerSetting] | None:
     if not ini.includes and not any(section in _SECTIONS for section, _ in ini.entries):
         return None
     unit, joints = _unit_mm(ini), _joints(ini)
-    found: list[ControllerSetting] = []
+    settings: list[ControllerSetting] = []
     for letter in "XYZ":
         if letter not in joints:
             raise MachineError(
@@ -86,7 +86,7 @@ def settings_of(text: str) -> list[ControllerSetting] | None:
                 where=ini.where("TRAJ", "COORDINATES"),
                 mend="camtool writes programs for machines with X, Y and Z",
             )
-        found += _axis(ini, letter, f"JOINT_{joints[letter]}", unit)
+        settings += _axis(ini, letter, f"JOINT_{joints[letter]}", unit)
     for section, key, name, factor in (
         ("EMCMOT", "SERVO_PERIOD", "controller.servo_period_s", 1e-9),
         ("TRAJ", "ARC_BLEND_OPTIMIZATION_DEPTH", "controller.lookahead_moves", 1.0),
@@ -97,23 +97,23 @@ def settings_of(text: str) -> list[ControllerSetting] | None:
         value = ini.number(section, key)
         if value is not None:
             value = int(value) if name.endswith("_moves") else value * factor
-            found.append(
+            settings.append(
                 ControllerSetting(name, value, f"[{section}] {key}", ini.where(section, key))
             )
-    return found
+    return settings
 
 
 def _unit_mm(ini: _Ini) -> float:
-    said = ini.text("TRAJ", "LINEAR_UNITS")
-    if said is None:
+    unit_text = ini.text("TRAJ", "LINEAR_UNITS")
+    if unit_text is None:
         raise MachineError("says no unit", where="[TRAJ] LINEAR_UNITS", mend=_remedy(ini))
-    word = re.split(r"[\s;#]", said.lower())[0]
+    word = re.split(r"[\s;#]", unit_text.lower())[0]
     if word in _UNITS:
         return _UNITS[word]
     number = ini.number("TRAJ", "LINEAR_UNITS")  # units per mm, as old files say it
     if not number or number < 0.0:
         raise MachineError(
-            f"{said!r} is no unit", where=ini.where("TRAJ", "LINEAR_UNITS"), mend="mm or inch"
+            f"{unit_text!r} is no unit", where=ini.where("TRAJ", "LINEAR_UNITS"), mend="mm or inch"
         )
     return 1.0 / number
 
@@ -131,19 +131,21 @@ def _joints(ini: _Ini) -> dict[str, int]:
     for option in options:
         key, _, value = option.partition("=")
         letters = value.upper() if key.lower() == "coordinates" else letters
-    said = ini.text("TRAJ", "COORDINATES")
-    used = letters if said is None else re.split(r"[;#]", said.upper())[0]
-    return {letter: letters.index(letter) for letter in letters if letter in used}
+    axis_text = ini.text("TRAJ", "COORDINATES")
+    used_letters = letters if axis_text is None else re.split(r"[;#]", axis_text.upper())[0]
+    return {letter: letters.index(letter) for letter in letters if letter in used_letters}
 
 
 def _axis(ini: _Ini, letter: str, joint: str, unit: float) -> list[ControllerSetting]:
     """Return the settings of one axis."""
-    axis, found = f"AXIS_{letter}", list[ControllerSetting]()
+    axis, settings = f"AXIS_{letter}", list[ControllerSetting]()
 
     def add(key: str, value: float, section: str, entry: str) -> None:
-        said = f"{entry} of [{section}]" + (", from inches" if unit == _INCH_MM else "")
+        origin = f"{entry} of [{section}]" + (", from inches" if unit == _INCH_MM else "")
         place = ini.where(section, entry)
-        found.append(ControllerSetting(f"axes.{letter.lower()}.{key}", _clean(value), said, place))
+        settings.append(
+            ControllerSetting(f"axes.{letter.lower()}.{key}", _clean(value), origin, place)
+        )
 
     scale = "SCALE" if ini.text(joint, "SCALE") is not None else "INPUT_SCALE"
     steps = ini.number(joint, scale)
@@ -165,16 +167,16 @@ def _axis(ini: _Ini, letter: str, joint: str, unit: float) -> list[ControllerSet
         places = [(axis, entry), (joint, entry)]
         if entry == "MAX_VELOCITY":
             places.append(("TRAJ", "MAX_LINEAR_VELOCITY"))
-        said = [(ini.number(*place), place) for place in places]
-        if said[0][0] is None and said[1][0] is None:
+        origin = [(ini.number(*place), place) for place in places]
+        if origin[0][0] is None and origin[1][0] is None:
             raise MachineError("is missing", where=f"[{axis}] {entry}", mend=_remedy(ini))
-        value, place = min((value, place) for value, place in said if value is not None)
+        value, place = min((value, place) for value, place in origin if value is not None)
         add(key, value * unit * per, *place)
     backlash = ini.number(joint, "BACKLASH")
     if backlash:
         add("compensation_mm", abs(backlash) * unit, joint, "BACKLASH")
         add("backlash_mm", abs(backlash) * unit, joint, "BACKLASH")
-    return found
+    return settings
 
 
 def _limit(ini: _Ini, axis: str, joint: str, key: str) -> tuple[float, str] | None:

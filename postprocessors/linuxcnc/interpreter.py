@@ -77,10 +77,10 @@ class Interpreter(BlockMoves):
     # Comments, feed, speed, tools
 
     def _comment(self, text: str) -> None:
-        lowered = text.lstrip().lower()
-        if lowered.startswith("msg,"):
+        lower_text = text.lstrip().lower()
+        if lower_text.startswith("msg,"):
             self._message(text.lstrip()[4:])
-        elif "," in lowered:
+        elif "," in lower_text:
             from .comments import obey_comment
 
             shown = obey_comment(text.lstrip(), self.given)
@@ -222,8 +222,8 @@ class Interpreter(BlockMoves):
     def _g_words(self, block: LinuxcncBlock, words: dict[str, float]) -> None:
         """All but the motion."""
         g = block.g
-        once = g.get("one block")
-        if once == 40:
+        one_shot = g.get("one block")
+        if one_shot == 40:
             self.dwell(words["p"])
         if "plane" in g:
             self._set_plane(g["plane"])
@@ -246,8 +246,8 @@ class Interpreter(BlockMoves):
         if "return mode" in g:
             self._not_while_compensating("G98 or G99")
             self.to_r = g["return mode"] == 990
-        if once is not None:
-            self._once(once, words, block.g)
+        if one_shot is not None:
+            self._once(one_shot, words, block.g)
         if "axis offsets" in g:
             self._end_offsets(g["axis offsets"])
 
@@ -343,8 +343,8 @@ class Interpreter(BlockMoves):
             self._go_home(code, words, g)
         elif code in (281, 301):
             self._not_while_compensating("G28.1 or G30.1")
-            here = [a + b for a, b in zip(self._on_machine(), self._tool_offset, strict=True)]
-            self._store_place(HOMES[code], here)
+            place = [a + b for a, b in zip(self._on_machine(), self._tool_offset, strict=True)]
+            self._store_place(HOMES[code], place)
             self._homed.add(HOMES[code])
         elif code in (520, 920):
             self._set_offsets(code, words)

@@ -87,10 +87,10 @@ def close_up(text: str) -> str:
     if "(" not in text and ";" not in text:
         return text.translate(_BLANKS).lower()
     parts: list[str] = []
-    at = 0
-    while at < len(text):
-        begin = next((k for k in range(at, len(text)) if text[k] in "(;"), len(text))
-        parts.append(text[at:begin].translate(_BLANKS).lower())
+    position = 0
+    while position < len(text):
+        begin = next((k for k in range(position, len(text)) if text[k] in "(;"), len(text))
+        parts.append(text[position:begin].translate(_BLANKS).lower())
         if begin == len(text):
             break
         if text[begin] == ";":
@@ -105,23 +105,23 @@ def close_up(text: str) -> str:
                 "write one ( and one ) for each comment",
             )
         parts.append(text[begin : end + 1])
-        at = end + 1
+        position = end + 1
     return "".join(parts)
 
 
-def column_of(text: str, at: int) -> int:
+def column_of(text: str, place: int) -> int:
     """The column, from 1, of a place in the closed text of a line."""
-    seen, column, comment = 0, 1, ""
+    signs, column, comment = 0, 1, ""
     for column, sign in enumerate(text, 1):
         blank = not comment and sign in " \t\r"
-        if seen == at and not blank:
+        if signs == place and not blank:
             return column
         if not comment and sign in "(;":
             comment = ")" if sign == "(" else "end"
         elif sign == comment:
             comment = ""
-        seen += not blank
-    return column + (seen <= at and bool(text))
+        signs += not blank
+    return column + (signs <= place and bool(text))
 
 
 class LinuxcncBlock(Struct, frozen=True):
@@ -157,14 +157,18 @@ class ParsedLine:
     def __init__(self, raw: str) -> None:
         self.text = text = close_up(raw)
         self.delete = text[:1] == "/"
-        at = 1 if self.delete else 0
-        if text[at : at + 1] == "n":
-            found = _BLOCK_NUMBER.match(text, at)
-            if found is None:
-                raise LineFault("no number after N", at + 1)
-            at = found.end()
-        self.begin = at
-        self.flow = at if text[at : at + 1] in ("o", "m") and _FLOW.match(text, at) else None
+        position = 1 if self.delete else 0
+        if text[position : position + 1] == "n":
+            match = _BLOCK_NUMBER.match(text, position)
+            if match is None:
+                raise LineFault("no number after N", position + 1)
+            position = match.end()
+        self.begin = position
+        self.flow = (
+            position
+            if text[position : position + 1] in ("o", "m") and _FLOW.match(text, position)
+            else None
+        )
         self.word: Any = None
         """Its O word, which flow has read."""
         self.comment: str | None = None
@@ -175,12 +179,12 @@ class ParsedLine:
     @property
     def is_block(self) -> bool:
         """True if the line has more than comments."""
-        rest = self.text[self.begin :]
-        while rest[:1] == "(":
-            rest = rest[rest.find(")") + 1 :]
-        return bool(rest) and rest[0] != ";"
+        remainder = self.text[self.begin :]
+        while remainder[:1] == "(":
+            remainder = remainder[remainder.find(")") + 1 :]
+        return bool(remainder) and remainder[0] != ";"
 
-    def block(self, given: Parameters) -> LinuxcncBlock:
+    def block(self, parameters: Parameters) -> LinuxcncBlock:
         """Its words; Fault where LinuxCNC would stop while it reads them."""
         if self._block is not None:
             return self._block
@@ -189,100 +193,100 @@ class ParsedLine:
             if all(isinstance(item.value, float) and item.letter != "#" for item in self._items):
                 self._block = group_words(self._items, self.comment)
                 return self._block
-        return self._evaluate(given)
+        return self._evaluate(parameters)
 
     def place(self, letter: str) -> int | None:
         """Return the column of the last word with this letter; None if there is none."""
-        found = [item.at for item in self._items if item.letter == letter]
-        return found[-1] if found else None
+        columns = [item.at for item in self._items if item.letter == letter]
+        return columns[-1] if columns else None
 
-    def _evaluate(self, given: Parameters) -> LinuxcncBlock:
+    def _evaluate(self, parameters: Parameters) -> LinuxcncBlock:
         words: list[Item] = []
         settings: list[tuple[int | str, float]] = []
         for item in self._items:
             if item.letter != "#":
                 value = item.value
-                number = value if isinstance(value, float) else value(given)
+                number = value if isinstance(value, float) else value(parameters)
                 words.append(Item(item.letter, number, item.at))
                 continue
             if isinstance(item.name, str):
-                given.declare(item.name, item.at)
+                parameters.declare(item.name, item.at)
                 name: int | str = item.name
             else:
-                name = item.name(given)
+                name = item.name(parameters)
             value = item.value
-            settings.append((name, value if isinstance(value, float) else value(given)))
+            settings.append((name, value if isinstance(value, float) else value(parameters)))
         block = group_words(words, self.comment)
         return LinuxcncBlock(block.words, block.g, block.m, block.comment, tuple(settings))
 
     def _compile(self) -> None:
         """Find its words."""
-        text, at = self.text, self.begin
-        while at < len(text):
-            letter = text[at]
+        text, position = self.text, self.begin
+        while position < len(text):
+            letter = text[position]
             if letter in _WORDS:
-                found = _NUMBER.match(text, at + 1)
-                if found is not None:
-                    self._items.append(Item(letter, float(found[0]), at))
-                    at = found.end()
+                match = _NUMBER.match(text, position + 1)
+                if match is not None:
+                    self._items.append(Item(letter, float(match[0]), position))
+                    position = match.end()
                     continue
-                value, end = _parse_value(text, at + 1, letter)
-                self._items.append(Item(letter, value, at))
-                at = end
+                value, end = _parse_value(text, position + 1, letter)
+                self._items.append(Item(letter, value, position))
+                position = end
             elif letter == "#":
-                item, at = _parse_setting(text, at)
+                item, position = _parse_setting(text, position)
                 self._items.append(item)
             elif letter == "(":
-                end = text.find(")", at)
-                self.comment = text[at + 1 : end]
-                at = end + 1
+                end = text.find(")", position)
+                self.comment = text[position + 1 : end]
+                position = end + 1
             elif letter == ";":
                 break
             elif letter == "[":
-                raise LineFault("an expression without the letter of its word", at)
+                raise LineFault("an expression without the letter of its word", position)
             elif letter == "/":
-                raise LineFault("a / that does not begin its line", at)
+                raise LineFault("a / that does not begin its line", position)
             elif letter.isascii() and letter.isalpha():
-                raise LineFault(f"the letter {letter.upper()} is no word here", at)
+                raise LineFault(f"the letter {letter.upper()} is no word here", position)
             else:
                 message = _MESSAGES.get(letter, f"the sign {letter!r} belongs to no word")
-                raise LineFault(message, at)
+                raise LineFault(message, position)
         self._parse_value = True
 
 
-def _parse_value(text: str, at: int, letter: str) -> tuple[Value, int]:
+def _parse_value(text: str, position: int, letter: str) -> tuple[Value, int]:
     """Parse a value that is no plain number, and return it with its end."""
-    sign = text[at : at + 1]
+    sign = text[position : position + 1]
     if not (sign.isalpha() or (sign and sign in "[#+-")):
-        raise LineFault(f"no number after {letter.upper()}", at - 1)
+        raise LineFault(f"no number after {letter.upper()}", position - 1)
     if letter == "$" and sign.isalpha():
-        raise LineFault(_MESSAGES["$"], at - 1)
+        raise LineFault(_MESSAGES["$"], position - 1)
     from .expressions import Scanner
 
-    scanner = Scanner(text, at)
+    scanner = Scanner(text, position)
     try:
         return scanner.value(), scanner.at
     except LineFault as fault:
-        if fault.message == "no number" and fault.at == at:
-            raise LineFault(f"no number after {letter.upper()}", at - 1) from None
+        if fault.message == "no number" and fault.at == position:
+            raise LineFault(f"no number after {letter.upper()}", position - 1) from None
         raise
 
 
-def _parse_setting(text: str, at: int) -> tuple[Item, int]:
+def _parse_setting(text: str, position: int) -> tuple[Item, int]:
     """Parse #index=value or #<name>=value, and return it with its end."""
     from .expressions import Scanner, check_index
     from .parameters import READ_ONLY
 
-    scanner = Scanner(text, at + 1)
+    scanner = Scanner(text, position + 1)
 
     def settable(index: int) -> int:
-        check_index(index, at)
+        check_index(index, position)
         if index in READ_ONLY:
-            raise LineFault(f"#{index} cannot be set", at)
+            raise LineFault(f"#{index} cannot be set", position)
         return index
 
     name: str | Callable[[Parameters], int]
-    if text[at + 1 : at + 2] == "<":
+    if text[position + 1 : position + 2] == "<":
         name = scanner.name()
     else:
         index = scanner.whole_number()
@@ -296,7 +300,7 @@ def _parse_setting(text: str, at: int) -> tuple[Item, int]:
         raise LineFault("a parameter without =: only a word's number may be one", scanner.at)
     scanner.at += 1
     value = scanner.value()
-    return Item("#", value, at, name), scanner.at
+    return Item("#", value, position, name), scanner.at
 
 
 def group_words(items: list[Item], comment: str | None) -> LinuxcncBlock:
@@ -336,34 +340,34 @@ def group_words(items: list[Item], comment: str | None) -> LinuxcncBlock:
     return LinuxcncBlock(words, g, m, comment)
 
 
-def g_code(value: float, at: int) -> int:
+def g_code(value: float, column: int) -> int:
     """The tenfold code of a G word."""
     tenfold = 10.0 * value
     code = int(tenfold // 1)
-    rest = tenfold - code
-    if rest > 1.0 - TENTHS:
+    excess = tenfold - code
+    if excess > 1.0 - TENTHS:
         code += 1
-    elif rest > TENTHS:
-        raise LineFault(f"the controller does not know G{value:g}", at)
+    elif excess > TENTHS:
+        raise LineFault(f"the controller does not know G{value:g}", column)
     if code not in G_GROUPS:
-        raise LineFault(f"the controller does not know G{value:g}", at)
+        raise LineFault(f"the controller does not know G{value:g}", column)
     return code
 
 
-def m_code(value: float, at: int) -> int:
+def m_code(value: float, column: int) -> int:
     """The code of an M word."""
     try:
-        code = _whole(value, at)
+        code = _whole(value, column)
     except LineFault:
         code = -1
     if code not in M_GROUPS:
-        raise LineFault(f"the controller does not know M{value:g}", at)
+        raise LineFault(f"the controller does not know M{value:g}", column)
     return code
 
 
-def _whole(value: float, at: int) -> int:
+def _whole(value: float, column: int) -> int:
     if value == value // 1:
         return int(value)
     from .expressions import whole_number
 
-    return whole_number(value, at)
+    return whole_number(value, column)

@@ -53,21 +53,21 @@ def restore(machine: InterpreterState, saved: ActiveModes, execute: Execute) -> 
     units = saved.g["units"]
     if modes_of(machine).g["units"] != units:
         execute(_block(machine, f"g{units // 10}"))
-    now = modes_of(machine)
+    present = modes_of(machine)
     words = []
-    if saved.feed != now.feed:
+    if saved.feed != present.feed:
         words.append(f"f{saved.feed:.1f}")
-    if saved.speed != now.speed:
+    if saved.speed != present.speed:
         words.append(f"s{saved.speed:.0f}")
     for group, code in saved.g.items():
-        if group not in ("units", "path") and code != now.g[group]:
+        if group not in ("units", "path") and code != present.g[group]:
             words.append(f"g{code / 10:g}")
     path = saved.g["path"]
-    if path == 640 and (now.g["path"] != 640 or saved.tolerances != now.tolerances):
+    if path == 640 and (present.g["path"] != 640 or saved.tolerances != present.tolerances):
         words.append("g64 p{:f} q{:f}".format(*saved.tolerances))
-    elif path != now.g["path"]:
+    elif path != present.g["path"]:
         words.append(f"g{path / 10:g}")
-    texts = [f"m{code}" for group, code in saved.m.items() if code not in (None, now.m[group])]
+    texts = [f"m{code}" for group, code in saved.m.items() if code not in (None, present.m[group])]
     for k, text in enumerate(texts or [""]):
         execute(_block(machine, " ".join([*words, text]) if k == 0 else text))
 
@@ -111,7 +111,7 @@ def modes_of(state: InterpreterState) -> ActiveModes:
 def names_of(state: FrameCodes) -> dict[str, Callable[[], float]]:
     """The names that show the modes (interp_namedparams.cc)."""
 
-    def is_(name: str, value: Any) -> Callable[[], float]:
+    def matches_mode(name: str, value: Any) -> Callable[[], float]:
         return lambda: float(getattr(state, name) == value)
 
     def machine(axis: int) -> Callable[[], float]:
@@ -127,24 +127,24 @@ def names_of(state: FrameCodes) -> dict[str, Callable[[], float]]:
         ),
         "_metric": lambda: float(state.canon.mm == 1.0),
         "_imperial": lambda: float(state.canon.mm != 1.0),
-        "_absolute": is_("absolute", True),
-        "_incremental": is_("absolute", False),
-        "_inverse_time": is_("feed_mode", 930),
-        "_units_per_minute": is_("feed_mode", 940),
-        "_units_per_rev": is_("feed_mode", 950),
+        "_absolute": matches_mode("absolute", True),
+        "_incremental": matches_mode("absolute", False),
+        "_inverse_time": matches_mode("feed_mode", 930),
+        "_units_per_minute": matches_mode("feed_mode", 940),
+        "_units_per_rev": matches_mode("feed_mode", 950),
         "_coord_system": lambda: float(frame[state._frame]),
         "_tool_offset": lambda: float(any(state._tool_offset)),
-        "_retract_r_plane": is_("to_r", True),
-        "_retract_old_z": is_("to_r", False),
-        "_spindle_rpm_mode": is_("_spindle_mode", 970),
-        "_spindle_css_mode": is_("_spindle_mode", 960),
-        "_ijk_absolute_mode": is_("absolute_centres", True),
-        "_lathe_diameter_mode": is_("diameters", True),
-        "_lathe_radius_mode": is_("diameters", False),
+        "_retract_r_plane": matches_mode("to_r", True),
+        "_retract_old_z": matches_mode("to_r", False),
+        "_spindle_rpm_mode": matches_mode("_spindle_mode", 970),
+        "_spindle_css_mode": matches_mode("_spindle_mode", 960),
+        "_ijk_absolute_mode": matches_mode("absolute_centres", True),
+        "_lathe_diameter_mode": matches_mode("diameters", True),
+        "_lathe_radius_mode": matches_mode("diameters", False),
         "_spindle_on": lambda: float(state.spindle is not None),
-        "_spindle_cw": is_("spindle", Kind.SPINDLE_CW),
-        "_mist": is_("_mist", True),
-        "_flood": is_("_flood", True),
+        "_spindle_cw": matches_mode("spindle", Kind.SPINDLE_CW),
+        "_mist": matches_mode("_mist", True),
+        "_flood": matches_mode("_flood", True),
         "_speed_override": lambda: 1.0,
         "_feed_override": lambda: 1.0,
         "_adaptive_feed": lambda: 0.0,

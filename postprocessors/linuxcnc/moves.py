@@ -143,8 +143,8 @@ class BlockMoves(FrameCodes):
                 raise LineFault("G53 while the cutter's radius is compensated", "g")
             kind = Kind.RAPID if motion == 0 else Kind.LINE
             self.effort += COMPENSATION_LINES
-            at = self._compensation.line(kind, self._flat(end), self._flat())
-            self._put(at)
+            target = self._compensation.line(kind, self._flat(end), self._flat())
+            self._put(target)
             return
         if motion == 10:
             canon.line(*end)
@@ -189,8 +189,8 @@ class BlockMoves(FrameCodes):
     def _polar(self, words: dict[str, float], end: list[float]) -> tuple[float, float]:
         x, y = end[0], end[1]
         radius, angle = math.hypot(y, x), math.atan2(y, x)
-        lost = x == 0.0 and y == 0.0 and not (self.absolute and "^" in words)
-        if lost:
+        is_origin = x == 0.0 and y == 0.0 and not (self.absolute and "^" in words)
+        if is_origin:
             raise LineFault("polar coordinates at zero, which has no direction", "@")
         if self.absolute:
             radius = words.get("@", radius)
@@ -235,8 +235,10 @@ class BlockMoves(FrameCodes):
             )
         missing = [letter for letter in centres[:2] if letter not in offsets]
         if self.absolute_centres and offsets and missing:
-            both = " and ".join(letter.upper() for letter in centres[:2])
-            raise LineFault(f"with G90.1 an arc needs both {both}", mend=f"write {both}")
+            letter_pair = " and ".join(letter.upper() for letter in centres[:2])
+            raise LineFault(
+                f"with G90.1 an arc needs both {letter_pair}", mend=f"write {letter_pair}"
+            )
         if self.feed_mode != 930:
             self._rate(block)
         end = self._flat(self._ends(words, block.g))
@@ -291,13 +293,16 @@ class BlockMoves(FrameCodes):
         r1 = math.hypot(x - begin[0], y - begin[1]) * mm
         r2 = math.hypot(x - end[0], y - end[1]) * mm
         looser = INCH_SLACK if mm != 1.0 else 1.0
-        least, most = dialect.arc_difference_mm * looser, dialect.arc_most_difference_mm * looser
+        min_gap, max_gap = (
+            dialect.arc_difference_mm * looser,
+            dialect.arc_most_difference_mm * looser,
+        )
         letter = next(letter for letter in letters if letter in offsets)
         if min(r1, r2) < dialect.arc_least_radius_mm:
             raise LineFault(f"an arc of radius {min(r1, r2):.5f} mm is none for LinuxCNC", letter)
         gap = abs(r1 - r2)
-        wide = gap > least and gap > dialect.arc_difference_part * max(r1, r2)
-        if gap > most or wide:
+        wide = gap > min_gap and gap > dialect.arc_difference_part * max(r1, r2)
+        if gap > max_gap or wide:
             message = (
                 f"the radius is {r1:.4f} mm at the start and {r2:.4f} mm at the end of the arc"
             )
@@ -317,14 +322,14 @@ class BlockMoves(FrameCodes):
         if half - size > self._dialect.arc_chord_slack_mm / self.canon.mm:
             message = f"half the chord is {half * self.canon.mm:.4f} mm, more than the radius"
             raise LineFault(message, "r")
-        aside = 0.0
+        height = 0.0
         if half < size * (1.0 - EQUAL_TO_ONE):
-            aside = math.sqrt((size - half) * (size + half))
-        left = aside if ccw == (radius > 0.0) else -aside
+            height = math.sqrt((size - half) * (size + half))
+        offset = height if ccw == (radius > 0.0) else -height
         chord = 2.0 * half
         return (
-            (begin[0] + end[0]) / 2.0 - left * dy / chord,
-            (begin[1] + end[1]) / 2.0 + left * dx / chord,
+            (begin[0] + end[0]) / 2.0 - offset * dy / chord,
+            (begin[1] + end[1]) / 2.0 + offset * dx / chord,
         )
 
     # Splines
@@ -341,11 +346,11 @@ class BlockMoves(FrameCodes):
         for letter in "zabc":
             if letter in words:
                 raise LineFault(f"a spline with a {letter.upper()} word", letter)
-        both = ("i" in words) + ("j" in words)
-        if both == 1 or (motion == 51 and not both):
+        letter_count = ("i" in words) + ("j" in words)
+        if letter_count == 1 or (motion == 51 and not letter_count):
             raise LineFault("a spline wants both I and J", "g")
         x, y, _ = self.position
-        lead = (words["i"], words["j"]) if both else self._leaving
+        lead = (words["i"], words["j"]) if letter_count else self._leaving
         points = [(x, y, 1.0), (x + lead[0], y + lead[1], 1.0)]
         end = self._ends(words, block.g)
         if motion == 50:
@@ -366,20 +371,20 @@ class BlockMoves(FrameCodes):
         if ("x" in words) != ("y" in words):
             raise LineFault("a control point wants both X and Y", "g")
         weight = words.get("p", -1.0)
-        placed = "x" in words
-        if self._spline and not placed and weight > 0.0:
+        has_place = "x" in words
+        if self._spline and not has_place and weight > 0.0:
             raise LineFault("P without X and Y is for the first control point", "p")
         if self._spline and weight <= 0.0:
             raise LineFault("a control point without a weight P above 0", "g")
         if self.feed_mode == 940 and self.feed_mm == 0.0:
             raise LineFault(NO_FEED, mend="write F first")
         if not self._spline:
-            first = weight if not placed and weight > 0.0 else 1.0
+            first = weight if not has_place and weight > 0.0 else 1.0
             self._spline = [(self.position[0], self.position[1], first)]
             self._order = 3
         if words.get("l", 0.0) > 3:
             self._order = int(words["l"])
-        if placed:
+        if has_place:
             end = self._ends(words, block.g)
             self._spline.append((end[0], end[1], weight))
         self.motion = 52

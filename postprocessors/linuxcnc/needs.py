@@ -59,19 +59,19 @@ def motion_of(state: InterpreterState, block: LinuxcncBlock) -> int | None:
         raise LineFault("both polar coordinates and X or Y", "@")
     if polar and state.plane != 170:
         raise LineFault("polar coordinates in a plane other than that of G17", "@")
-    once, own = g.get("one block"), g.get("motion")
-    covets = once in AXIS_MODES
-    if once in (520, 920) and not axes and (own is None or own == 800):
-        raise LineFault(f"G{once // 10} without an axis", "g", "write the axes that it sets")
-    if own is not None:
-        if own == 800:
+    one_shot, own_motion = g.get("one block"), g.get("motion")
+    covets = one_shot in AXIS_MODES
+    if one_shot in (520, 920) and not axes and (own_motion is None or own_motion == 800):
+        raise LineFault(f"G{one_shot // 10} without an axis", "g", "write the axes that it sets")
+    if own_motion is not None:
+        if own_motion == 800:
             if (axes or polar) and not covets:
                 raise LineFault("coordinates beside G80", "g")
         elif covets:
             raise LineFault("two G words that both use the coordinates", "g")
-        elif not axes and not polar and own not in WITHOUT_AXES:
-            raise LineFault(f"G{own / 10:g} without coordinates", "g")
-        return own
+        elif not axes and not polar and own_motion not in WITHOUT_AXES:
+            raise LineFault(f"G{own_motion / 10:g} without coordinates", "g")
+        return own_motion
     if covets:
         return None
     if axes or polar:
@@ -87,9 +87,9 @@ def motion_of(state: InterpreterState, block: LinuxcncBlock) -> int | None:
 def check(state: InterpreterState, block: LinuxcncBlock, motion: int | None) -> None:
     """Refuse words without what they need beside them (check_g_codes, check_other_codes)."""
     words, g, m = block.words, block.g, block.m
-    once = g.get("one block")
-    if once is not None:
-        _check_once(state, block, once, motion)
+    one_shot = g.get("one block")
+    if one_shot is not None:
+        _check_once(state, block, one_shot, motion)
     from_user = "user" in m
     if not from_user:
         for letter in words:
@@ -115,22 +115,22 @@ def check(state: InterpreterState, block: LinuxcncBlock, motion: int | None) -> 
 
 
 def _check_once(
-    state: InterpreterState, block: LinuxcncBlock, once: int, motion: int | None
+    state: InterpreterState, block: LinuxcncBlock, one_shot: int, motion: int | None
 ) -> None:
     words = block.words
-    if once == 40:
+    if one_shot == 40:
         if words.get("p", -1.0) == -1.0:
             raise LineFault("a dwell without P", "g", "write G4 P1.5 for 1.5 s")
         if block.g.get("motion") in (20, 30):
             raise LineFault("a dwell beside an arc: both use P", "g")
         if words["p"] < 0.0:
             raise LineFault("a dwell below 0 s", "p")
-    elif once == 53:
+    elif one_shot == 53:
         if block.g.get("motion") not in (None, 52):
             raise LineFault("another motion between G5.2 and G5.3", "g")
-    elif once == 100:
+    elif one_shot == 100:
         _check_g10(words)
-    elif once == 530:
+    elif one_shot == 530:
         if motion not in (0, 10):
             raise LineFault("G53 without G0 or G1", "g")
         distance = block.g.get("distance", 900 if state.absolute else 910)
@@ -153,15 +153,15 @@ def _check_g10(words: dict[str, float]) -> None:
 
 def _check_use(letter: str, block: LinuxcncBlock, motion: int | None) -> None:
     """Fault where nothing in the block uses a letter."""
-    motions, once, m, others = USES[letter]
-    used = (
+    motions, one_shots, m, other_codes = USES[letter]
+    is_used = (
         motion in motions
-        or block.g.get("one block") in once
+        or block.g.get("one block") in one_shots
         or any(code in m for code in block.m.values())
-        or any(code in others for code in block.g.values())
+        or any(code in other_codes for code in block.g.values())
         or (letter == "$" and "s" in block.words)
     )
-    if not used:
+    if not is_used:
         raise LineFault(f"nothing in the block uses the {letter.upper()} word", letter)
 
 

@@ -45,7 +45,7 @@ class Parameters:
 
     def __init__(
         self,
-        known: Mapping[int, float],
+        stored: Mapping[int, float],
         state: Callable[[], Mapping[str, Callable[[], float]]],
         position: Callable[[], Iterable[float]],
     ) -> None:
@@ -54,7 +54,7 @@ class Parameters:
         """True while the cutter's radius is compensated; the position cannot be read then."""
         self.line = 0
         """Number of the line that is executed."""
-        self._values = {DEBUG: 1.0, 5600: 0.0, 5601: 0.0, **known}
+        self._values = {DEBUG: 1.0, 5600: 0.0, 5601: 0.0, **stored}
         self._names_of = state
         self._more: dict[str, Callable[[], float]] = {}
         self._position = position
@@ -69,7 +69,7 @@ class Parameters:
     def _state(self) -> dict[str, Callable[[], float]]:
         return {**self._names_of(), **self._more}
 
-    def value_of_number(self, index: int, at: int) -> float:
+    def value_of_number(self, index: int, column: int) -> float:
         """Return the value of a numbered parameter; 0 if it has none yet."""
         value = self._values.get(index)
         if value is not None:
@@ -77,10 +77,10 @@ class Parameters:
         if index in CURRENT:
             if self.compensating:
                 message = "the position cannot be read while the cutter's radius is compensated"
-                raise LineFault(message, at)
+                raise LineFault(message, column)
             return list(self._position())[index - CURRENT.start]
         if index in UNKNOWN:
-            raise LineFault(f"#{index} is {UNKNOWN[index]}, which only the machine knows", at)
+            raise LineFault(f"#{index} is {UNKNOWN[index]}, which only the machine knows", column)
         self.unset.setdefault(index, self.line)
         return 0.0
 
@@ -88,7 +88,7 @@ class Parameters:
         """Return the value of a numbered parameter for the interpreter itself."""
         return self._values.get(index, 0.0)
 
-    def value_of_name(self, name: str, at: int) -> float:
+    def value_of_name(self, name: str, column: int) -> float:
         """Return the value of a named parameter."""
         if name in self._state:
             return self._state[name]()
@@ -97,22 +97,22 @@ class Parameters:
             if name.startswith(("_ini[", "_hal[")):
                 where = "the machine's INI file" if name[1] == "i" else "HAL"
                 raise LineFault(
-                    f"#<{name}> is a value of {where}, which only the machine knows", at
+                    f"#<{name}> is a value of {where}, which only the machine knows", column
                 )
             mend = "set it first" if name[:1] == "_" else "names without _ are known in one sub"
-            raise LineFault(f"nobody has set #<{name}>", at, mend)
+            raise LineFault(f"nobody has set #<{name}>", column, mend)
         return value
 
-    def has(self, name: str, at: int) -> float:
+    def has(self, name: str, column: int) -> float:
         """Return 1 if a name has a value, else 0."""
         if name.startswith(("_ini[", "_hal[")):
-            return float(bool(self.value_of_name(name, at)))
+            return float(bool(self.value_of_name(name, column)))
         return float(name in self._state or name in self._of(name))
 
-    def declare(self, name: str, at: int) -> None:
+    def declare(self, name: str, column: int) -> None:
         """A line that sets a name makes it exist while the line is still read."""
         if name in self._state:
-            raise LineFault(f"#<{name}> cannot be set", at)
+            raise LineFault(f"#<{name}> cannot be set", column)
         self._of(name).setdefault(name, 0.0)
 
     def set_named(self, name: str, value: float) -> None:

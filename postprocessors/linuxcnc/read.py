@@ -102,7 +102,7 @@ class _Reader:
             radius_mm=dialect.arc_least_radius_mm,
             full_turn_rad=dialect.arc_full_turn_rad,
         )
-        self._runs = PlainRuns(self.text, dialect.line_chars, free=True)
+        self._runs = PlainRuns(self.text, dialect.line_chars, free_order=True)
         self._blocks = 0
         """Blocks so far, of a program whose lines are read once and in order."""
         self._empty, self._cut_off = True, False
@@ -150,8 +150,8 @@ class _Reader:
         self._empty = self._empty and not line.is_block
         machine.block_index = self.path.block = index
         if flow.level:
-            here = flow.here.text.name
-            self.path.source = f"{here}: {flow.caller}" if here else flow.caller
+            file_name = flow.here.text.name
+            self.path.source = f"{file_name}: {flow.caller}" if file_name else flow.caller
         elif self.path.source:
             self.path.source = ""
         machine.execute(line.block(machine.given))
@@ -179,7 +179,7 @@ class _Reader:
         self._empty = self._empty and not count
         return count > 0
 
-    def _decode_plain(self, plain: PlainBlocks) -> int:
+    def _decode_plain(self, blocks: PlainBlocks) -> int:
         """Add the rows of plain blocks, up to the first that is no move which LinuxCNC surely
         executes."""
         machine, path = self.machine, self.path
@@ -187,11 +187,11 @@ class _Reader:
         mm = machine.canon.mm
         position = machine.canon.snap(machine.canon.to_part(*machine.position))
         state = PlainState(motion, machine.feed_mm, mm, position)
-        moves = PlainMoves(plain, state, self._rule)
+        moves = PlainMoves(blocks, state, self._rule)
         if moves.count:
             path.source = self.flow.caller if self.flow.level else ""
-            moved = moves.add_to(path, self._fast)
-            machine.continue_from(*moves.last, path.position, moved=moved)
+            has_moved = moves.add_to(path, self._fast)
+            machine.continue_from(*moves.last, path.position, has_moved=has_moved)
         return moves.count
 
     # What is said of the program
@@ -201,8 +201,8 @@ class _Reader:
         end that was met need not be the last."""
         if self._branches:
             return []
-        behind = range(self.flow.at, self.text.count)
-        return [number + 1 for number in behind if _has_text(self._raw_line(number))]
+        lines_after = range(self.flow.at, self.text.count)
+        return [number + 1 for number in lines_after if _has_text(self._raw_line(number))]
 
     def _raw_line(self, number: int) -> str:
         try:
@@ -223,9 +223,9 @@ class _Reader:
             yield NO_END_OF_FILE(where=place)
         if notes.speedless:
             yield SPINDLE_SPEED_NOT_SAID(where=block(notes.speedless[0]))
-        behind = self._unread_lines()
-        if behind:
-            yield NEVER_READ(where=f"line {behind[0]}", measured=len(behind))
+        unread = self._unread_lines()
+        if unread:
+            yield NEVER_READ(where=f"line {unread[0]}", measured=len(unread))
         for sentence, blocks in (
             (WORDS_PASSED_OVER_COOLANT, notes.coolant),
             (WORDS_PASSED_OVER_PAUSE, notes.pauses),
@@ -249,9 +249,11 @@ class _Reader:
         if self.machine.canon.chords:
             yield NOT_SIMULATED_CHORDS(measured=self.machine.canon.chords)
         if flow.deleted:
-            how = "left out" if flow.block_delete else "read"
+            treatment = "left out" if flow.block_delete else "read"
             line = next(iter(flow.deleted))
-            yield NOT_SIMULATED_DELETED(where=f"line {line}", count=len(flow.deleted), how=how)
+            yield NOT_SIMULATED_DELETED(
+                where=f"line {line}", count=len(flow.deleted), how=treatment
+            )
         unset = self.machine.given.unset
         if unset:
             index, line = next(iter(unset.items()))
@@ -271,12 +273,16 @@ def _lengths(mounted: list[Mounted], path: Toolpath) -> Iterator[Finding]:
     if len({each.tool for each in cutting}) < 2:
         return
     # What is off by the same length for all tools is part of where the zero was set.
-    off = [each.own_mm - each.length_mm for each in cutting if each.own_mm is not None]
-    apart = max(off) - min(off) if off else 0.0
-    if apart > LENGTHS_EQUAL_MM:
-        which = next(k for k, each in enumerate(off) if abs(each - off[0]) > LENGTHS_EQUAL_MM)
-        first = [each for each in cutting if each.own_mm is not None][which]
-        yield TOOL_LENGTH_WRONG(where=f"block {first.block + 1}", tool=first.tool, measured=apart)
+    differences = [each.own_mm - each.length_mm for each in cutting if each.own_mm is not None]
+    spread = max(differences) - min(differences) if differences else 0.0
+    if spread > LENGTHS_EQUAL_MM:
+        index = next(
+            k
+            for k, each in enumerate(differences)
+            if abs(each - differences[0]) > LENGTHS_EQUAL_MM
+        )
+        first = [each for each in cutting if each.own_mm is not None][index]
+        yield TOOL_LENGTH_WRONG(where=f"block {first.block + 1}", tool=first.tool, measured=spread)
     unmeasured = [each for each in cutting if each.own_mm is None and not each.measured]
     if unmeasured:
         tools = ", ".join(str(tool) for tool in sorted({each.tool for each in unmeasured}))

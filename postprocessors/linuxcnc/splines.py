@@ -46,44 +46,46 @@ def pieces_of(points: Sequence[tuple[float, float, float]], order: int) -> Itera
     if len(points) > MAX_CONTROL_POINTS:
         raise LineFault(f"a spline of more than {MAX_CONTROL_POINTS} control points")
     count = PIECES * len(points)
-    most = len(points) - 1 - order + 2
-    where = most * np.arange(count + 1) / count
+    knot_span = len(points) - 1 - order + 2
+    parameters = knot_span * np.arange(count + 1) / count
     table = np.array(points, dtype=np.float64)
-    places = _places(table, order, where)
-    low, high = np.maximum(where - NEAR, 0.0), np.minimum(where + NEAR, most)
-    ways = _places(table, order, high) - _places(table, order, low)
-    ways /= np.maximum(np.hypot(ways[:, 0], ways[:, 1]), 1e-300)[:, None]
+    places = _places(table, order, parameters)
+    low, high = np.maximum(parameters - NEAR, 0.0), np.minimum(parameters + NEAR, knot_span)
+    directions = _places(table, order, high) - _places(table, order, low)
+    directions /= np.maximum(np.hypot(directions[:, 0], directions[:, 1]), 1e-300)[:, None]
     for k in range(count):
         yield from _two_arcs(
             (float(places[k, 0]), float(places[k, 1])),
-            (float(ways[k, 0]), float(ways[k, 1])),
+            (float(directions[k, 0]), float(directions[k, 1])),
             (float(places[k + 1, 0]), float(places[k + 1, 1])),
-            (float(ways[k + 1, 0]), float(ways[k + 1, 1])),
+            (float(directions[k + 1, 0]), float(directions[k + 1, 1])),
         )
 
 
-def _places(points: Floats, order: int, at: Floats) -> Floats:
+def _places(points: Floats, order: int, parameters: Floats) -> Floats:
     """(N, 2) the points of the spline at these parameters (N,), by Cox and de Boor."""
     last = len(points) - 1
     knots = np.clip(np.arange(last + order + 1) - order + 1, 0, last - order + 2).astype(float)
-    basis = np.zeros((len(at), last + order))
+    basis = np.zeros((len(parameters), last + order))
     # A parameter belongs to the last span that it begins, the end of the curve to the last of all.
-    span = np.clip(np.searchsorted(knots, at, side="right") - 1, order - 1, last)
-    basis[np.arange(len(at)), span] = 1.0
+    span = np.clip(np.searchsorted(knots, parameters, side="right") - 1, order - 1, last)
+    basis[np.arange(len(parameters)), span] = 1.0
     for degree in range(1, order):
         for i in range(last + order - degree):
-            left, right = knots[i + degree] - knots[i], knots[i + degree + 1] - knots[i + 1]
-            grown = np.zeros(len(at))
-            if left > 0.0:
-                grown += (at - knots[i]) / left * basis[:, i]
+            low_weight, right = knots[i + degree] - knots[i], knots[i + degree + 1] - knots[i + 1]
+            grown = np.zeros(len(parameters))
+            if low_weight > 0.0:
+                grown += (parameters - knots[i]) / low_weight * basis[:, i]
             if right > 0.0:
-                grown += (knots[i + degree + 1] - at) / right * basis[:, i + 1]
+                grown += (knots[i + degree + 1] - parameters) / right * basis[:, i + 1]
             basis[:, i] = grown
     weighted = basis[:, : last + 1] * points[:, 2]
     return np.asarray(weighted @ points[:, :2] / weighted.sum(axis=1)[:, None])
 
 
-def _two_arcs(start: Flat, leaving: Flat, end: Flat, arriving: Flat) -> Iterator[SplinePiece]:
+def _two_arcs(
+    start: Flat, start_direction: Flat, end: Flat, arriving: Flat
+) -> Iterator[SplinePiece]:
     """Two arcs that leave and arrive along these directions (unit vectors), and meet as one.
 
     The legs of both tangent polygons are of one length b, where the polygon's middle leg is 2b:
@@ -91,8 +93,8 @@ def _two_arcs(start: Flat, leaving: Flat, end: Flat, arriving: Flat) -> Iterator
     """
     vx, vy = start[0] - end[0], start[1] - end[1]
     c = vx * vx + vy * vy
-    b = 2.0 * (vx * (leaving[0] + arriving[0]) + vy * (leaving[1] + arriving[1]))
-    a = 2.0 * (leaving[0] * arriving[0] + leaving[1] * arriving[1] - 1.0)
+    b = 2.0 * (vx * (start_direction[0] + arriving[0]) + vy * (start_direction[1] + arriving[1]))
+    a = 2.0 * (start_direction[0] * arriving[0] + start_direction[1] * arriving[1] - 1.0)
     root = math.sqrt(max(b * b - 4.0 * a * c, 0.0))
     if b < 0.0:  # a is not above 0: one root is not below 0, and this is the steady way to it
         leg = 2.0 * c / (root - b)
@@ -100,20 +102,22 @@ def _two_arcs(start: Flat, leaving: Flat, end: Flat, arriving: Flat) -> Iterator
         leg = (-b - root) / 2.0 / a
     else:
         raise LineFault("a spline that turns back on itself")
-    p1 = start[0] + leg * leaving[0], start[1] + leg * leaving[1]
+    p1 = start[0] + leg * start_direction[0], start[1] + leg * start_direction[1]
     p3 = end[0] - leg * arriving[0], end[1] - leg * arriving[1]
     middle = (p1[0] + p3[0]) / 2.0, (p1[1] + p3[1]) / 2.0
     mx, my = p3[0] - middle[0], p3[1] - middle[1]
     length = math.hypot(mx, my) or 1.0
-    yield _arc(start, middle, leaving)
+    yield _arc(start, middle, start_direction)
     yield _arc(middle, end, (mx / length, my / length))
 
 
-def _arc(start: Flat, end: Flat, way: Flat) -> SplinePiece:
+def _arc(start: Flat, end: Flat, direction: Flat) -> SplinePiece:
     """The arc from here to there that leaves along a direction."""
     x, y = end[0] - start[0], end[1] - start[1]
-    across = 2.0 * (y * way[0] - x * way[1])
+    across = 2.0 * (y * direction[0] - x * direction[1])
     if abs(across) <= STRAIGHT:
         return SplinePiece(end)
     radius = -(x * x + y * y) / across
-    return SplinePiece(end, (start[0] + way[1] * radius, start[1] - way[0] * radius), radius < 0.0)
+    return SplinePiece(
+        end, (start[0] + direction[1] * radius, start[1] - direction[0] * radius), radius < 0.0
+    )

@@ -163,16 +163,21 @@ class InterpreterState:
         )
 
     def continue_from(
-        self, motion: int | None, feed: float, at: tuple[float, float, float], *, moved: bool
+        self,
+        motion: int | None,
+        feed: float,
+        position: tuple[float, float, float],
+        *,
+        has_moved: bool,
     ) -> None:
         """Adopt motion and feed (mm/min) in force, and position (mm), behind blocks of plain moves
         that were read by columns."""
         mm = self.canon.mm
         self.motion = self.motion if motion is None else motion
         self.feed_mm = feed
-        x, y, z = at
+        x, y, z = position
         self.position[:] = x / mm, y / mm, z / mm
-        if moved:
+        if has_moved:
             self.canon.moved = True
             if self._first_frame is None:
                 self._first_frame = self._frame
@@ -228,38 +233,38 @@ class InterpreterState:
     def _note_length(self, *, measured: bool) -> None:
         tool = self._tools.get(self._loaded)
         length = self._tool_offset[2] * self.canon.mm
-        own = None if tool is None else tool.length_mm
+        own_length = None if tool is None else tool.length_mm
         row = len(self.canon.path)
         self.notes.mounted.append(
-            Mounted(row, self.block_index, self._loaded, length, own, measured)
+            Mounted(row, self.block_index, self._loaded, length, own_length, measured)
         )
 
-    def _not_while_compensating(self, what: str) -> None:
+    def _not_while_compensating(self, action: str) -> None:
         if self._compensates:
-            raise LineFault(f"{what} while the cutter's radius is compensated")
+            raise LineFault(f"{action} while the cutter's radius is compensated")
 
     def go(self, kind: Kind, axes: tuple[int, int, int], place: list[float]) -> None:
         """A straight move to a place in the order of a plane."""
-        to = [0.0, 0.0, 0.0]
+        target = [0.0, 0.0, 0.0]
         for axis, value in zip(axes, place, strict=True):
-            to[axis] = value
-        (self.canon.rapid if kind == Kind.RAPID else self.canon.line)(*to)
+            target[axis] = value
+        (self.canon.rapid if kind == Kind.RAPID else self.canon.line)(*target)
 
     def _begin(self) -> list[float]:
         """Return the start of the programmed move; with compensation, the cutter itself stands
         beside it."""
         compensation = self._compensation
         if compensation is not None and compensation.active and not compensation.first:
-            to = [0.0, 0.0, 0.0]
+            target = [0.0, 0.0, 0.0]
             for axis, value in zip(PLANES[self.plane], compensation.programmed, strict=True):
-                to[axis] = value
-            return to
+                target[axis] = value
+            return target
         return list(self.position)
 
     def _flat(self, place: list[float] | None = None) -> list[float]:
         """A place, or the position, in the order of the plane."""
-        of = self.position if place is None else place
-        return [of[axis] for axis in PLANES[self.plane]]
+        source = self.position if place is None else place
+        return [source[axis] for axis in PLANES[self.plane]]
 
     def _put(self, flat: list[float]) -> None:
         for axis, value in zip(PLANES[self.plane], flat, strict=True):

@@ -82,8 +82,8 @@ class Folder:
             return self._found[label]
         if len(self._found) >= MAX_FILES:
             raise LineFault(f"the program calls more than {MAX_FILES} files")
-        self._found[label] = found = self._open(label)
-        return found
+        self._found[label] = program = self._open(label)
+        return program
 
     @property
     def mend(self) -> str:
@@ -117,9 +117,9 @@ def _check_bytes(data: bytes, name: str) -> None:
     odd = _CONTROL.search(data)
     if odd is not None:
         before = data[: odd.start()].split(b"\n")
-        where = f"line {len(before)}, column {len(before[-1]) + 1}"
+        place = f"line {len(before)}, column {len(before[-1]) + 1}"
         raise ProgramError(
             f"the byte 0x{data[odd.start()]:02x} belongs to no program",
-            where=f"file {name}, {where}" if name else where,
+            where=f"file {name}, {place}" if name else place,
             mend="give a program of plain text",
         )

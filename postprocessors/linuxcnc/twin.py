@@ -85,9 +85,9 @@ class LinuxcncTwin(Twin):
 
     def connect(self, now: float) -> bytes:
         """Accept a new client, which has to greet again; a running program goes on."""
-        sent = self.advance(now)
+        output = self.advance(now)
         self._hang_up()
-        return sent
+        return output
 
     def next_s(self) -> float | None:
         """It says nothing by itself."""
@@ -109,8 +109,8 @@ class LinuxcncTwin(Twin):
         self._out += f"{text}\r\n".encode()
 
     def _do(self, line: str) -> None:
-        verb, _, rest = line.partition(" ")
-        name, _, value = rest.strip().partition(" ")
+        verb, _, argument = line.partition(" ")
+        name, _, value = argument.strip().partition(" ")
         verb, name, value = verb.lower(), name.lower(), value.strip()
         if verb == "hello":
             words = line.split()
@@ -122,9 +122,9 @@ class LinuxcncTwin(Twin):
             answer = self._get(name)
             self._say(f"GET {name.upper()} NAK" if answer is None else f"{name.upper()} {answer}")
         elif verb == "set":
-            done = self._set(name, value)
-            if self._verbose or not done:
-                self._out += f"SET {name.upper()} {'ACK' if done else 'NAK'}\n\r".encode()
+            is_done = self._set(name, value)
+            if self._verbose or not is_done:
+                self._out += f"SET {name.upper()} {'ACK' if is_done else 'NAK'}\n\r".encode()
 
     # Questions.
 
@@ -164,14 +164,14 @@ class LinuxcncTwin(Twin):
         """The line that it is at, from 1; behind the end the last that moved."""
         if not len(self._lines):
             return 0
-        at = int(np.searchsorted(self._line_ends, self._program_s(), side="right"))
-        return int(self._lines[min(at, len(self._lines) - 1)])
+        index = int(np.searchsorted(self._line_ends, self._program_s(), side="right"))
+        return int(self._lines[min(index, len(self._lines) - 1)])
 
     def _program_s(self) -> float:
         """Time since the program began, s, without pauses."""
         if self._status == "RUNNING" and self.slides.ends_s is not None:
-            left = max(self.slides.ends_s - self.now, 0.0)
-            return self._since + self._segment_s - left
+            remaining = max(self.slides.ends_s - self.now, 0.0)
+            return self._since + self._segment_s - remaining
         return self._since
 
     # Orders.
@@ -202,10 +202,10 @@ class LinuxcncTwin(Twin):
         }
         if name not in orders or not self._enabled:
             return False
-        done = orders[name](value)
-        if done:
+        is_done = orders[name](value)
+        if is_done:
             self.commands.append(f"{name} {value}".strip().encode())
-        return done
+        return is_done
 
     def _set_estop(self, value: str) -> bool:
         self._estop = value.lower() == "on"
@@ -242,22 +242,22 @@ class LinuxcncTwin(Twin):
             return False
         if self._mode != "MANUAL" or not self._may_move():
             return False
-        speed, way = float(words[1]) / 60.0, float(words[2])
-        here = self.slides.commanded_mm
-        to = here.copy()
-        to["xyz".index(words[0])] += np.copysign(way, speed)
-        self.slides.begin(_straight(here, to, abs(speed)), self.now, -1)
+        speed, distance = float(words[1]) / 60.0, float(words[2])
+        place = self.slides.commanded_mm
+        target = place.copy()
+        target["xyz".index(words[0])] += np.copysign(distance, speed)
+        self.slides.begin(_straight(place, target, abs(speed)), self.now, -1)
         return True
 
     def _mdi(self, value: str) -> bool:
         """G10 L20 P0, or a line in absolute coordinates."""
         if self._mode != "MDI" or not self._may_move() or not self._homed:
             return True  # it is acknowledged, and an operator's error is shown
-        found = FRAME.fullmatch(value)
-        if found:
-            for axis, text in WORD.findall(found[1]):
-                at = "XYZ".index(axis.upper())
-                self._zero[at] = self.slides.commanded_mm[at] - float(text)
+        match = FRAME.fullmatch(value)
+        if match:
+            for axis, text in WORD.findall(match[1]):
+                axis_index = "XYZ".index(axis.upper())
+                self._zero[axis_index] = self.slides.commanded_mm[axis_index] - float(text)
             return True
         path = self._decoded(value.encode() + b"\nM2\n", here=True)
         if path is not None:
@@ -341,20 +341,20 @@ class LinuxcncTwin(Twin):
     def _begin_segment(self) -> None:
         """Set out on the program from where it is, to where it waits next."""
         assert self._travel is not None
-        whole = self._travel
-        end = next((at for at in self._halts if at > self._since), whole.total_s)
+        program = self._travel
+        end = next((halt for halt in self._halts if halt > self._since), program.total_s)
         if self._steps:
             moves = self._line_ends[self._line_ends > self._since]
-            end = min(end, float(moves[0]) if len(moves) else whole.total_s)
-        last = int(np.searchsorted(whole.seconds, end, side="right"))
-        last = len(whole) if end >= whole.total_s else last
+            end = min(end, float(moves[0]) if len(moves) else program.total_s)
+        last = int(np.searchsorted(program.seconds, end, side="right"))
+        last = len(program) if end >= program.total_s else last
         part = slice(self._done, last)
         self._segment_s = end - self._since
         self._status = "RUNNING"
         travel = Travel(
-            whole.commanded[part],
-            np.maximum(whole.seconds[part] - self._since, 0.0),
-            whole.added_s[part],
+            program.commanded[part],
+            np.maximum(program.seconds[part] - self._since, 0.0),
+            program.added_s[part],
             self._segment_s,
         )
         self.slides.begin(travel, self.now, len(self.decoded) - 1)
@@ -370,13 +370,13 @@ class LinuxcncTwin(Twin):
             if self._since >= self._travel.total_s and self._since not in self._halts:
                 self._status, self._travel = "IDLE", None
             else:
-                self._halts = [at for at in self._halts if at != self._since]
+                self._halts = [halt for halt in self._halts if halt != self._since]
                 self._status = "PAUSED"
 
 
 def _has_words(line: bytes) -> bool:
-    bare = re.sub(rb"\([^()]*\)|;.*|[ \t%]", b"", line)
-    return bool(re.sub(rb"^[Nn]\d+(?:\.\d*)?", b"", bare))
+    content = re.sub(rb"\([^()]*\)|;.*|[ \t%]", b"", line)
+    return bool(re.sub(rb"^[Nn]\d+(?:\.\d*)?", b"", content))
 
 
 def _on(value: bool) -> str:
@@ -387,10 +387,10 @@ def _place(mm: Floats) -> str:
     return " ".join(f"{value:.6f}" for value in [*mm.tolist(), 0.0, 0.0, 0.0])
 
 
-def _straight(here: Floats, to: Floats, speed: float = HOMING_MM_S) -> Travel:
+def _straight(start: Floats, target: Floats, speed: float = HOMING_MM_S) -> Travel:
     """A line, in parts of 0.01 mm."""
-    length = float(np.linalg.norm(to - here))
+    length = float(np.linalg.norm(target - start))
     count = max(int(np.ceil(length / 0.01)), 1)
     share = np.arange(1, count + 1)[:, None] / count
     seconds = share[:, 0] * length / max(speed, 1e-9)
-    return Travel(here + share * (to - here), seconds, np.zeros(count), float(seconds[-1]))
+    return Travel(start + share * (target - start), seconds, np.zeros(count), float(seconds[-1]))

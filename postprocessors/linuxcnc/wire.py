@@ -243,9 +243,9 @@ class LinuxcncConversation(Conversation):
         if not self._asked:
             self._go(None, now)
         elif self._aborting or not self._begun:
-            more = f"; {UNSURE}" if self._begun else ""
-            why = self._why_aborted or f"no answer to {_without_password(self._asked)!r}"
-            self._end(WireState.FAILED, why + more)
+            suffix = f"; {UNSURE}" if self._begun else ""
+            reason = self._why_aborted or f"no answer to {_without_password(self._asked)!r}"
+            self._end(WireState.FAILED, reason + suffix)
         else:
             self._why_aborted, self._asked = f"no answer to {_without_password(self._asked)!r}", ""
             self._abort_at(now)
@@ -255,17 +255,17 @@ class LinuxcncConversation(Conversation):
         self._now = now
         try:
             # A script that begins has asked nothing yet, whatever was answered to another.
-            fresh, self._fresh = self._fresh, False
-            step = self._script.send(cast(str, None if fresh else answer))
+            was_fresh, self._fresh = self._fresh, False
+            step = self._script.send(cast(str, None if was_fresh else answer))
         except StopIteration:
             return
-        except _Refused as refused:
+        except _Refused as refusal:
             if self._begun and not self._aborting:
-                self._why_aborted = str(refused)
+                self._why_aborted = str(refusal)
                 self._abort_at(now)
             else:
-                more = f"; {UNSURE}" if self._aborting else ""
-                self._end(WireState.FAILED, (self._why_aborted or str(refused)) + more)
+                suffix = f"; {UNSURE}" if self._aborting else ""
+                self._end(WireState.FAILED, (self._why_aborted or str(refusal)) + suffix)
             return
         if isinstance(step, str):
             self._asked = step
@@ -315,7 +315,7 @@ class LinuxcncConversation(Conversation):
         yield from self._set("verbose on")
         yield from self._set("echo off")
         yield from self._set(f"enable {self._link.enable_password}")
-        for name, wanted, mend in (
+        for name, expected, mend in (
             ("estop", "OFF", "its emergency stop is pressed: release it at the machine"),
             ("machine", "ON", "it is off: switch it on at the machine"),
             (
@@ -324,7 +324,7 @@ class LinuxcncConversation(Conversation):
                 "a program runs on it: wait for its end, or abort it",
             ),
         ):
-            if (yield from self._get(name)).upper() != wanted:
+            if (yield from self._get(name)).upper() != expected:
                 raise _Refused(mend)
         yield from self._set("set_wait received")
         yield from self._set("linear_unit_conversion mm")
@@ -334,11 +334,11 @@ class LinuxcncConversation(Conversation):
             yield from self._homing()
         if act != self._home and not (yield from self._homed()):
             raise _Refused("it is not homed: give --home, or home it by camtool home")
-        standing = self.manner.standing
-        if act == self._run and standing is not None and not self.manner.home:
-            why = standing.refusal((yield from self._place()), restarted=False)
-            if why:
-                raise _Refused(why)
+        position_record = self.manner.standing
+        if act == self._run and position_record is not None and not self.manner.home:
+            reason = position_record.refusal((yield from self._place()), restarted=False)
+            if reason:
+                raise _Refused(reason)
         yield from act()
 
     def _homed(self) -> Generator[str | float, str, bool]:
@@ -364,36 +364,36 @@ class LinuxcncConversation(Conversation):
         yield from self._set("mode auto")
         yield from self._set(f"open {file}")
         if (yield from self._get("program")) != file:
-            said = yield from self._get("error")
-            raise _Refused(f"it cannot open {file}{'' if said == 'OK' else f' ({said})'}")
+            message = yield from self._get("error")
+            raise _Refused(f"it cannot open {file}{'' if message == 'OK' else f' ({message})'}")
         self._begun, self.state, self.sent = True, WireState.SENDING, len(self.packets)
         yield from self._set("step" if self.single else "run")
         yield from self._watch()
 
     def _watch(self) -> Script:
         """Until it is idle again."""
-        begun, ran, before = self._now, 0.0, self._now
-        busy, still, last = False, 0, None
+        start_s, ran, before = self._now, 0.0, self._now
+        busy, still_count, last = False, 0, None
         while True:
             status = (yield from self._get("program_status")).upper()
             line = yield from self._get("program_line")
             place = yield from self._place()
             yield from self._errors()
-            still, last = (still + 1 if place == last else 0), place
-            now = self._now
+            still_count, last = (still_count + 1 if place == last else 0), place
+            time_s = self._now
             if status == "RUNNING":
-                ran += now - before
-            before = now
+                ran += time_s - before
+            before = time_s
             if status != "IDLE":
                 busy = True
                 self._count_done(line, ran)
-                yield from self._obey(status, still >= STILL_REPORTS - 1)
-            elif busy or now - begun > POLL_FACTOR * self._poll_s:
+                yield from self._obey(status, still_count >= STILL_REPORTS - 1)
+            elif busy or time_s - start_s > POLL_FACTOR * self._poll_s:
                 self._finish(line, ran)
                 return
             yield self._poll_s
 
-    def _obey(self, status: str, stands: bool) -> Script:
+    def _obey(self, status: str, is_still: bool) -> Script:
         """Send the user's pause or resume, and follow the status of the running program."""
         if self._pausing:
             self._pausing = False
@@ -401,7 +401,7 @@ class LinuxcncConversation(Conversation):
         elif self._going_on:
             self._going_on = False
             yield from self._set("step" if self.single else "resume")
-        elif status == "PAUSED" and stands:
+        elif status == "PAUSED" and is_still:
             if self.state is WireState.PAUSING:
                 self.state = WireState.PAUSED
             elif self.state is WireState.SENDING and self.single:
@@ -419,18 +419,20 @@ class LinuxcncConversation(Conversation):
         it."""
         line = _whole_number(text)
         if self._lines and self._lines[0]:
-            at = int(np.searchsorted(self._lines, line))
+            index = int(np.searchsorted(self._lines, line))
             possible = int(np.searchsorted(self._ends, ran, side="right"))
-            self.acknowledged = max(self.acknowledged, min(at, len(self.packets)))
-            self.done = max(self.done, min(at, possible))
+            self.acknowledged = max(self.acknowledged, min(index, len(self.packets)))
+            self.done = max(self.done, min(index, possible))
 
     def _finish(self, text: str, ran: float) -> None:
         """End the conversation with an idle machine: at the end of the program, or before it."""
         if self._said:
             raise _Refused(f"it has stopped: {self._said}")
         end, total = self.packets[-1].end_mm, float(self._ends[-1])
-        at = int(np.searchsorted(self._lines, _whole_number(text)))
-        left = total - float(self._ends[min(at, len(self._ends) - 1)]) if self._lines[0] else 0.0
+        index = int(np.searchsorted(self._lines, _whole_number(text)))
+        remaining_s = (
+            total - float(self._ends[min(index, len(self._ends) - 1)]) if self._lines[0] else 0.0
+        )
         place = self.place_mm
         elsewhere = (
             end is not None
@@ -438,7 +440,7 @@ class LinuxcncConversation(Conversation):
             and max(abs(one - other) for one, other in zip(end, place, strict=True)) > NEAR_MM
         )
         early = MAX_OVERRIDE * ran + self.manner.patience_s < total
-        if elsewhere or early or left > self.manner.patience_s:
+        if elsewhere or early or remaining_s > self.manner.patience_s:
             raise _Refused("it has stopped before the end of the program")
         self.acknowledged = self.done = len(self.packets)
         self._end(WireState.FINISHED)
@@ -446,21 +448,21 @@ class LinuxcncConversation(Conversation):
     def _abort(self) -> Script:
         """Until it is idle, and stands."""
         yield from self._set("abort")
-        end, last, still = self._now + self.manner.patience_s, None, 0
-        while still < STILL_REPORTS:
+        end, last, still_count = self._now + self.manner.patience_s, None, 0
+        while still_count < STILL_REPORTS:
             status = yield from self._get("program_status")
             place = yield from self._place()
-            still = still + 1 if place == last and status.upper() == "IDLE" else 0
+            still_count = still_count + 1 if place == last and status.upper() == "IDLE" else 0
             last = place
             if self._now > end:
-                why = self._why_aborted or "it was told to stop"
-                self._why_aborted = f"{why}; it does not stand: stop it at the machine"
+                reason = self._why_aborted or "it was told to stop"
+                self._why_aborted = f"{reason}; it does not stand: stop it at the machine"
                 break
             yield self._poll_s
-        stands = "stopped: it is idle, and gives the same place again"
+        message = "stopped: it is idle, and gives the same place again"
         self._end(
             WireState.FAILED if self._why_aborted else WireState.STOPPED,
-            self._why_aborted or stands,
+            self._why_aborted or message,
         )
 
     # By hand.
@@ -477,8 +479,8 @@ class LinuxcncConversation(Conversation):
         place = yield from self._place()
         yield from self._errors()
         yield from self._set("mode manual")
-        off = [abs(place["xyz".index(axis)] - self._values[axis]) for axis in self._axes]
-        if self._said or max(off) > NEAR_MM:
+        differences = [abs(place["xyz".index(axis)] - self._values[axis]) for axis in self._axes]
+        if self._said or max(differences) > NEAR_MM:
             raise _Refused(f"it has not taken it {self._said}".strip())
         self._end(WireState.FINISHED)
 
@@ -492,13 +494,13 @@ class LinuxcncConversation(Conversation):
         yield from self._set("teleop_enable on")
         self._begun = True
         for axis in self._axes:
-            way, feed = self._values[axis], self._values["feed"]
-            at = "xyz".index(axis)
-            to = (yield from self._place())[at] + way
-            sense = "-" if way < 0.0 else ""
-            yield from self._set(f"jog_incr {axis} {sense}{feed:.6f} {abs(way):.6f}")
-            end = self._now + 2.0 * 60.0 * abs(way) / feed + 2.0 * self.manner.patience_s
-            while abs((yield from self._place())[at] - to) > NEAR_MM / 10.0:
+            distance, feed = self._values[axis], self._values["feed"]
+            axis_index = "xyz".index(axis)
+            target = (yield from self._place())[axis_index] + distance
+            sense = "-" if distance < 0.0 else ""
+            yield from self._set(f"jog_incr {axis} {sense}{feed:.6f} {abs(distance):.6f}")
+            end = self._now + 2.0 * 60.0 * abs(distance) / feed + 2.0 * self.manner.patience_s
+            while abs((yield from self._place())[axis_index] - target) > NEAR_MM / 10.0:
                 yield from self._errors()
                 if self._said or self._now > end:
                     raise _Refused(self._said or f"{axis.upper()} does not arrive")

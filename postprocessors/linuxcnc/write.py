@@ -59,8 +59,12 @@ def _path_mode(mode: PathMode, unit: Unit) -> str:
     corner, merging = (
         format_number(length / unit.mm, style) for length in (mode.tolerance_mm, mode.merging_mm)
     )
-    apart = mode.merging_mm != mode.tolerance_mm
-    return "G64" + (f" P{corner}" if mode.tolerance_mm else "") + (f" Q{merging}" if apart else "")
+    has_merging = mode.merging_mm != mode.tolerance_mm
+    return (
+        "G64"
+        + (f" P{corner}" if mode.tolerance_mm else "")
+        + (f" Q{merging}" if has_merging else "")
+    )
 
 
 def _words(event: Event, dialect: LinuxcncDialect) -> tuple[str, ...]:

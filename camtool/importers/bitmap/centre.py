@@ -55,42 +55,38 @@ def thin(dark: Bools) -> Bools:
     """(H, W) the pixels that remain of the dark ones."""
     height, width = dark.shape
     wide = width + 2
-    on = np.zeros((height + 2) * wide, dtype=np.bool_)
-    on.reshape(height + 2, wide)[1:-1, 1:-1] = dark
+    pixels = np.zeros((height + 2) * wide, dtype=np.bool_)
+    pixels.reshape(height + 2, wide)[1:-1, 1:-1] = dark
     around = np.array([-wide, 1 - wide, 1, wide + 1, wide, wide - 1, -1, -wide - 1])
-    edge, changed = _edge(np.flatnonzero(on), on, around), True
+    edge, changed = _edge(np.flatnonzero(pixels), pixels, around), True
     while changed:
         changed = False
         for turn in range(2):
-            gone = edge[_removable(on[edge[:, None] + around], turn)]
-            on[gone] = False
-            changed |= len(gone) > 0
-            beside = (gone[:, None] + around).ravel()
+            removed = edge[_removable(pixels[edge[:, None] + around], turn)]
+            pixels[removed] = False
+            changed |= len(removed) > 0
+            beside = (removed[:, None] + around).ravel()
             edge = np.concatenate([edge, beside])
-            edge = np.unique(edge[on[edge]])
-    return on.reshape(height + 2, wide)[1:-1, 1:-1]
+            edge = np.unique(edge[pixels[edge]])
+    return pixels.reshape(height + 2, wide)[1:-1, 1:-1]
 
 
-def _edge(pixels: Ints, on: Bools, around: Ints) -> Ints:
+def _edge(pixels: Ints, pixels_set: Bools, neighbours: Ints) -> Ints:
     """Those with a light pixel beside them."""
     inner = np.ones(len(pixels), dtype=np.bool_)
-    for step in around:
-        inner &= on[pixels + step]
+    for step in neighbours:
+        inner &= pixels_set[pixels + step]
     return pixels[~inner]
 
 
-def _removable(beside: Bools, turn: int) -> Bools:
+def _removable(neighbours: Bools, turn: int) -> Bools:
     """(N,) which pixels may go at once, by their neighbours (N, 8): clockwise from above. In one
     turn those on the lower right, in the other those on the upper left."""
-    p2, p3, p4, p5, p6, p7, p8, p9 = beside.T
+    p2, p3, p4, p5, p6, p7, p8, p9 = neighbours.T
     pairs = ((p2, p3, p4), (p4, p5, p6), (p6, p7, p8), (p8, p9, p2))
-    runs = sum((~one & (two | three)).astype(np.int8) for one, two, three in pairs)
-    first = sum(
-        (one | two).astype(np.int8) for one, two in ((p9, p2), (p3, p4), (p5, p6), (p7, p8))
-    )
-    second = sum(
-        (one | two).astype(np.int8) for one, two in ((p2, p3), (p4, p5), (p6, p7), (p8, p9))
-    )
+    runs = sum((~one & (b | c)).astype(np.int8) for one, b, c in pairs)
+    first = sum((one | b).astype(np.int8) for one, b in ((p9, p2), (p3, p4), (p5, p6), (p7, p8)))
+    second = sum((one | b).astype(np.int8) for one, b in ((p2, p3), (p4, p5), (p6, p7), (p8, p9)))
     count = np.minimum(first, second)
     side = (p2 | p3 | ~p5) & p4 if turn else (p6 | p7 | ~p9) & p8
     return np.asarray((runs == 1) & (count >= 2) & (count <= 3) & ~side)
@@ -104,44 +100,44 @@ class _Graph:
         self.dark = np.pad(dark, 1)
         rows, columns = np.nonzero(thin)
         pixels = list(zip(rows.tolist(), columns.tolist(), strict=True))
-        known = set(pixels)
+        pixel_set = set(pixels)
         self.links: dict[Pixel, list[Pixel]] = {}
         for row, column in pixels:
-            near = [
+            sides = [
                 (row + dy, column + dx)
                 for dy, dx in ((-1, 0), (0, 1), (1, 0), (0, -1))
-                if (row + dy, column + dx) in known
+                if (row + dy, column + dx) in pixel_set
             ]
-            far = [
+            diagonals = [
                 (row + dy, column + dx)
                 for dy, dx in ((-1, 1), (1, 1), (1, -1), (-1, -1))
-                if (row + dy, column + dx) in known
-                and (row + dy, column) not in known
-                and (row, column + dx) not in known
+                if (row + dy, column + dx) in pixel_set
+                and (row + dy, column) not in pixel_set
+                and (row, column + dx) not in pixel_set
             ]
-            self.links[row, column] = near + far
+            self.links[row, column] = sides + diagonals
 
     def chains(self) -> list[list[Pixel]]:
         """Between ends and junctions, these included; last the closed ones, which begin and end at
         one pixel."""
-        found, used = [], set[tuple[Pixel, Pixel]]()
-        seen = set[Pixel]()
+        chains, used_links = [], set[tuple[Pixel, Pixel]]()
+        visited = set[Pixel]()
         for begin, links in self.links.items():
             if len(links) == 2:
                 continue
             for link in links:
-                if (begin, link) in used:
+                if (begin, link) in used_links:
                     continue
                 chain = self._follow(begin, link)
-                used |= {(chain[0], chain[1]), (chain[-1], chain[-2])}
-                seen.update(chain)
-                found.append(chain)
+                used_links |= {(chain[0], chain[1]), (chain[-1], chain[-2])}
+                visited.update(chain)
+                chains.append(chain)
         for begin, links in self.links.items():
-            if len(links) == 2 and begin not in seen:
+            if len(links) == 2 and begin not in visited:
                 chain = self._follow(begin, links[0])
-                seen.update(chain)
-                found.append(chain)
-        return found
+                visited.update(chain)
+                chains.append(chain)
+        return chains
 
     def _follow(self, begin: Pixel, link: Pixel) -> list[Pixel]:
         chain = [begin, link]
@@ -166,9 +162,9 @@ class _Graph:
             low = max(row - reach, 0), max(column - reach, 0)
             light = np.argwhere(~self.dark[low[0] : row + reach + 1, low[1] : column + reach + 1])
             if len(light):
-                off = np.hypot(*(light + np.array(low) - [row, column]).T)
-                if off.min() <= reach:
-                    return float(off.min()) - 0.5
+                distances = np.hypot(*(light + np.array(low) - [row, column]).T)
+                if distances.min() <= reach:
+                    return float(distances.min()) - 0.5
             reach *= 2
 
 
@@ -194,21 +190,21 @@ def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
         chains.append(chain)
     middles = _middles(nodes)
     height = dark.shape[0]
-    through: dict[tuple[int, bool], tuple[int, bool]] = {}
+    continuations: dict[tuple[int, bool], tuple[int, bool]] = {}
     for node, arms in ends.items():
-        width = max(graph.half_width(pixel) for pixel, of in nodes.items() if of == node)
+        width = max(graph.half_width(pixel) for pixel, number in nodes.items() if number == node)
         look = max(MIN_LOOK_PX, int(LOOK_BACK * width))
-        through |= _pair_straightest(chains, arms, middles[node], look)
+        continuations |= _pair_straightest(chains, arms, middles[node], look)
     return [
         (_points(path, chains, nodes, middles, height), closed)
-        for path, closed in _paths(len(chains), chains, through)
+        for path, closed in _paths(len(chains), chains, continuations)
     ], dots
 
 
 def _prune(graph: _Graph) -> None:
     """Take out spurs until none is left."""
     for _ in range(MAX_ROUNDS):
-        gone: list[Pixel] = []
+        spur_pixels: list[Pixel] = []
         for chain in graph.chains():
             first, last = (len(graph.links[end]) for end in (chain[0], chain[-1]))
             if last == 1 and first > 2:
@@ -217,10 +213,10 @@ def _prune(graph: _Graph) -> None:
                 continue
             reach = math.dist(chain[0], chain[-1])
             if reach <= SPUR_SHARE * graph.half_width(chain[-1]) + 1.0:
-                gone += chain[:-1]
-        if not gone:
+                spur_pixels += chain[:-1]
+        if not spur_pixels:
             return
-        graph.without(gone)
+        graph.without(spur_pixels)
 
 
 def _without_hook(chain: list[Pixel], graph: _Graph) -> list[Pixel]:
@@ -239,18 +235,18 @@ def _without_hook(chain: list[Pixel], graph: _Graph) -> list[Pixel]:
 def _junctions(graph: _Graph) -> dict[Pixel, int]:
     """Number the junctions: return the junction of each pixel with three links or more, where
     linked pixels are one junction."""
-    many = {pixel for pixel, links in graph.links.items() if len(links) > 2}
-    found: dict[Pixel, int] = {}
+    junctions = {pixel for pixel, links in graph.links.items() if len(links) > 2}
+    numbers: dict[Pixel, int] = {}
     for begin in graph.links:
-        if begin not in many or begin in found:
+        if begin not in junctions or begin in numbers:
             continue
-        number, waiting = len(set(found.values())), [begin]
+        number, waiting = len(set(numbers.values())), [begin]
         while waiting:
             pixel = waiting.pop()
-            if pixel not in found:
-                found[pixel] = number
-                waiting += [link for link in graph.links[pixel] if link in many]
-    return found
+            if pixel not in numbers:
+                numbers[pixel] = number
+                waiting += [link for link in graph.links[pixel] if link in junctions]
+    return numbers
 
 
 def _middles(nodes: dict[Pixel, int]) -> dict[int, tuple[float, float]]:
@@ -258,8 +254,8 @@ def _middles(nodes: dict[Pixel, int]) -> dict[int, tuple[float, float]]:
     for pixel, node in nodes.items():
         members[node].append(pixel)
     return {
-        node: (sum(p[0] for p in of) / len(of), sum(p[1] for p in of) / len(of))
-        for node, of in members.items()
+        node: (sum(p[0] for p in pixels) / len(pixels), sum(p[1] for p in pixels) / len(pixels))
+        for node, pixels in members.items()
     }
 
 
@@ -274,46 +270,46 @@ def _pair_straightest(
     headings = []
     for chain, last in arms:
         path = chains[chain][::-1] if last else chains[chain]
-        away = path[min(look, len(path) - 1)]
-        headings.append(math.atan2(away[0] - middle[0], away[1] - middle[1]))
+        probe = path[min(look, len(path) - 1)]
+        headings.append(math.atan2(probe[0] - middle[0], probe[1] - middle[1]))
     pairs = sorted(
         (abs(math.remainder(headings[i] - headings[j] - math.pi, 2.0 * math.pi)), i, j)
         for i in range(len(arms))
         for j in range(i)
     )
-    found: dict[tuple[int, bool], tuple[int, bool]] = {}
+    mates: dict[tuple[int, bool], tuple[int, bool]] = {}
     for bend, i, j in pairs:
-        if bend < STRAIGHT_ON_RAD and arms[i] not in found and arms[j] not in found:
-            found[arms[i]], found[arms[j]] = arms[j], arms[i]
-    return found
+        if bend < STRAIGHT_ON_RAD and arms[i] not in mates and arms[j] not in mates:
+            mates[arms[i]], mates[arms[j]] = arms[j], arms[i]
+    return mates
 
 
 def _paths(
     count: int,
     chains: list[list[Pixel]],
-    through: dict[tuple[int, bool], tuple[int, bool]],
+    continuations: dict[tuple[int, bool], tuple[int, bool]],
 ) -> list[tuple[list[tuple[int, bool]], bool]]:
     """Chains that go on into each other, each with whether it runs backwards; and whether the path
     is closed."""
-    found, used = [], [False] * count
+    paths, visited = [], [False] * count
     # Paths that begin somewhere first; the rest are rings.
-    ends = ((k, back) for k in range(count) for back in (False, True))
-    begins = [end for end in ends if end not in through]
-    for chain, back in [*begins, *((k, False) for k in range(count))]:
+    ends = ((k, is_reversed) for k in range(count) for is_reversed in (False, True))
+    begins = [end for end in ends if end not in continuations]
+    for chain, is_reversed in [*begins, *((k, False) for k in range(count))]:
         path: list[tuple[int, bool]] = []
-        while not used[chain]:
-            used[chain] = True
-            path.append((chain, back))
-            following = through.get((chain, not back))
+        while not visited[chain]:
+            visited[chain] = True
+            path.append((chain, is_reversed))
+            following = continuations.get((chain, not is_reversed))
             if following is None:
                 break
-            chain, back = following
+            chain, is_reversed = following
         if path:
             first, last = path[0], path[-1]
-            ring = through.get((last[0], not last[1])) == first
+            ring = continuations.get((last[0], not last[1])) == first
             ring |= len(path) == 1 and chains[first[0]][0] == chains[first[0]][-1]
-            found.append((path, ring))
-    return found
+            paths.append((path, ring))
+    return paths
 
 
 def _points(
@@ -325,8 +321,8 @@ def _points(
 ) -> Floats:
     """The centres of the pixels of a path, (n, 2), and the middles of its junctions."""
     places: list[tuple[float, float]] = []
-    for chain, back in path:
-        pixels = chains[chain][::-1] if back else chains[chain]
+    for chain, is_reversed in path:
+        pixels = chains[chain][::-1] if is_reversed else chains[chain]
         for pixel in pixels:
             place = middles[nodes[pixel]] if pixel in nodes else pixel
             if not places or places[-1] != place:

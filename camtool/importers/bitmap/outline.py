@@ -62,23 +62,23 @@ def outlines(ink: Ink, level: float) -> list[Floats]:
     begin, end = _directed(field, field >= level, level)
     order = np.argsort(begin)
     begin, end = begin[order], end[order]
-    behind = np.searchsorted(begin, end).tolist()
+    followers = np.searchsorted(begin, end).tolist()
     points = _places(field, begin, level)
     points -= 0.5
     points[:, 1] = height - points[:, 1]
     np.clip(points, 0.0, [width, height], out=points)
-    found: list[Floats] = []
-    seen = np.zeros(len(begin), dtype=np.bool_).tolist()
-    for first in range(len(seen)):
-        if seen[first]:
+    lines: list[Floats] = []
+    visited = np.zeros(len(begin), dtype=np.bool_).tolist()
+    for first in range(len(visited)):
+        if visited[first]:
             continue
         row, run = first, []
-        while not seen[row]:
-            seen[row] = True
+        while not visited[row]:
+            visited[row] = True
             run.append(row)
-            row = behind[row]
-        found.append(points[run])
-    return found
+            row = followers[row]
+        lines.append(points[run])
+    return lines
 
 
 def _directed(field: Ink, dark: Bools, level: float) -> tuple[Ints, Ints]:
@@ -87,40 +87,42 @@ def _directed(field: Ink, dark: Bools, level: float) -> tuple[Ints, Ints]:
     width = field.shape[1]
     corners = [dark[:-1, :-1], dark[:-1, 1:], dark[1:, 1:], dark[1:, :-1]]
     code = np.zeros(corners[0].shape, dtype=np.uint8)
-    for bit, corner in enumerate(corners):
-        code += corner.astype(np.uint8) << np.uint8(bit)
+    for position, corner in enumerate(corners):
+        code += corner.astype(np.uint8) << np.uint8(position)
     row, column = np.nonzero((code > 0) & (code < 15))
     code = code[row, column]
-    at = row * width + column
-    sides = np.column_stack([at, field.size + at + 1, at + width, field.size + at])
+    squares = row * width + column
+    sides = np.column_stack(
+        [squares, field.size + squares + 1, squares + width, field.size + squares]
+    )
     middle = 0.25 * (
         field[row, column].astype(np.float64)
         + field[row, column + 1]
         + field[row + 1, column]
         + field[row + 1, column + 1]
     )
-    pairs = [(code == of, lines) for of, lines in _LINES.items()]
+    pairs = [(code == case, lines) for case, lines in _LINES.items()]
     pairs += [
-        ((code == of) & ((middle >= level) == joined), lines)
-        for (of, joined), lines in _SADDLES.items()
+        ((code == case) & ((middle >= level) == joined), lines)
+        for (case, joined), lines in _SADDLES.items()
     ]
     begin, end = [], []
-    for which, lines in pairs:
+    for is_case, lines in pairs:
         for enters, leaves in lines:
-            begin.append(sides[which, enters])
-            end.append(sides[which, leaves])
+            begin.append(sides[is_case, enters])
+            end.append(sides[is_case, leaves])
     return np.concatenate(begin), np.concatenate(end)
 
 
 def _places(field: Ink, side: Ints, level: float) -> Floats:
     """(K, 2) where lines cross these sides: column and row, between the centres of pixels."""
-    down = side >= field.size
-    at = np.where(down, side - field.size, side)
-    row, column = np.divmod(at, field.shape[1])
-    here = field[row, column].astype(np.float64)
-    there = field[row + down, column + ~down].astype(np.float64)
-    share = np.clip((level - here) / (there - here), INWARD, 1.0 - INWARD)
-    return np.column_stack([column + ~down * share, row + down * share])
+    is_vertical = side >= field.size
+    start_pixels = np.where(is_vertical, side - field.size, side)
+    row, column = np.divmod(start_pixels, field.shape[1])
+    start_values = field[row, column].astype(np.float64)
+    end_values = field[row + is_vertical, column + ~is_vertical].astype(np.float64)
+    share = np.clip((level - start_values) / (end_values - start_values), INWARD, 1.0 - INWARD)
+    return np.column_stack([column + ~is_vertical * share, row + is_vertical * share])
 
 
 def enclosed_area(points: Floats) -> float:

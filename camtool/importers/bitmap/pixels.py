@@ -68,13 +68,13 @@ def picture(data: bytes, file: str) -> PixelPicture:
         width, height = image.size
         if width * height > MAX_PIXELS:
             raise _too_large(f"{width} x {height}", file)
-        kind, said = str(image.format), image.info.get("dpi")
+        kind, dpi = str(image.format), image.info.get("dpi")
         try:
             image.load()
             ink = _ink(ImageOps.exif_transpose(image))
         except _BROKEN as error:
             raise _broken_file_error(file) from error
-    return PixelPicture(ink, _dpi(said), kind)
+    return PixelPicture(ink, _dpi(dpi), kind)
 
 
 def _ink(image: Any) -> Ink:
@@ -97,9 +97,9 @@ def _ink(image: Any) -> Ink:
     return ink
 
 
-def _dpi(said: Any) -> tuple[float, float] | None:
+def _dpi(dpi: Any) -> tuple[float, float] | None:
     try:
-        x, y = (float(one) for one in said)
+        x, y = (float(one) for one in dpi)
     except (TypeError, ValueError, ZeroDivisionError):
         return None
     return (x, y) if 0.0 < x < np.inf and 0.0 < y < np.inf else None

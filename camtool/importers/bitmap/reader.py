@@ -41,9 +41,9 @@ BINS = 256
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     """The Drawing of a PNG or JPEG; DrawingError for one that is broken or shows nothing, and for
     one whose size nothing says."""
-    found = picture(data, file)
-    units = _units(found, file, options)
-    ink = np.float32(1.0) - found.ink if options.invert else found.ink
+    pixels = picture(data, file)
+    units = _units(pixels, file, options)
+    ink = np.float32(1.0) - pixels.ink if options.invert else pixels.ink
     _check_tones(ink, options, file)
     if crossings(ink, options.threshold) > 10 * MAX_POINTS:
         raise _too_noisy(file)
@@ -57,7 +57,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     skipped = _skipped("speck", len(lines) - len(shapes), f"under {options.speckle_px:g} pixels")
     limit = max(options.smooth_px, options.tolerance_mm / units.mm_per_unit)
     if options.trace == "outline":
-        made = [(strokes(line, limit, closed=True), True) for line in shapes]
+        shapes_and_rings = [(strokes(line, limit, closed=True), True) for line in shapes]
     else:
         specks = [
             (abs(area), area < 0.0, line)
@@ -69,33 +69,35 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         for _, hole, line in specks:
             _fill(dark, line, hole)
         paths, dots = centre_lines(dark)
-        made = [(strokes(path, limit + CENTRE_PX, closed=ring), ring) for path, ring in paths]
+        shapes_and_rings = [
+            (strokes(path, limit + CENTRE_PX, closed=ring), ring) for path, ring in paths
+        ]
         skipped += _skipped("dot", dots, "has no centre line: read it with --trace outline")
     return assemble(
         [
             _piece(each, closed, number, options.trace, units.mm_per_unit)
-            for number, (each, closed) in enumerate(made, start=1)
+            for number, (each, closed) in enumerate(shapes_and_rings, start=1)
         ],
         file=file,
         units=units,
-        used={options.trace: len(made)},
+        used={options.trace: len(shapes_and_rings)},
         skipped=skipped,
         findings=[],
         options=options,
     )
 
 
-def _units(found: PixelPicture, file: str, options: ReadOptions) -> Units:
+def _units(pixels: PixelPicture, file: str, options: ReadOptions) -> Units:
     """Return the size of a pixel; DrawingError where no option gives it, or more than one."""
-    width = found.ink.shape[1]
+    width = pixels.ink.shape[1]
     if options.units is not None:
         raise DrawingError(
             "has no numbers that --units could be of",
             file=file,
             mend="give its width, --width 60mm, or --dpi 300",
         )
-    said = [options.width_mm is not None, options.dpi is not None, options.own_dpi]
-    if sum(said) > 1:
+    size_options = [options.width_mm is not None, options.dpi is not None, options.own_dpi]
+    if sum(size_options) > 1:
         raise DrawingError(
             "is given more than one size", file=file, mend="give --width, --dpi or --own-dpi alone"
         )
@@ -105,36 +107,36 @@ def _units(found: PixelPicture, file: str, options: ReadOptions) -> Units:
     if options.dpi is not None:
         return Units("px", options.mm_per("px"), f"{options.dpi:g} pixels an inch, as asked")
     claim = ""
-    if found.dpi is not None:
-        claim = f"; the file itself says {found.dpi[0]:.6g} dpi: --own-dpi"
+    if pixels.dpi is not None:
+        claim = f"; the file itself says {pixels.dpi[0]:.6g} dpi: --own-dpi"
     if not options.own_dpi:
         raise DrawingError(
-            f"is a picture of {width} x {found.ink.shape[0]} pixels, which have no size",
+            f"is a picture of {width} x {pixels.ink.shape[0]} pixels, which have no size",
             file=file,
             mend=f"say how wide it is, --width 60mm, or --dpi 300{claim}",
         )
-    if found.dpi is None or not is_square(found.dpi):
-        what = "says no" if found.dpi is None else "says two different"
+    if pixels.dpi is None or not is_square(pixels.dpi):
+        complaint = "says no" if pixels.dpi is None else "says two different"
         raise DrawingError(
-            f"{what} pixels an inch", file=file, mend="give --width 60mm or --dpi 300"
+            f"{complaint} pixels an inch", file=file, mend="give --width 60mm or --dpi 300"
         )
-    return Units("px", MM_PER_UNIT["in"] / found.dpi[0], f"{found.dpi[0]:.6g} pixels an inch")
+    return Units("px", MM_PER_UNIT["in"] / pixels.dpi[0], f"{pixels.dpi[0]:.6g} pixels an inch")
 
 
 def _check_tones(ink: Ink, options: ReadOptions, file: str) -> None:
     """DrawingError where no pixel, or every one, is dark."""
-    least, most = float(ink.min()), float(ink.max())
-    if least < options.threshold <= most:
+    lightest, darkest = float(ink.min()), float(ink.max())
+    if lightest < options.threshold <= darkest:
         return
-    tone = "darker" if least >= options.threshold else "lighter"
-    if most - least < MIN_DARKNESS_RANGE:
+    tone = "darker" if lightest >= options.threshold else "lighter"
+    if darkest - lightest < MIN_DARKNESS_RANGE:
         mend = "it is of one tone: nothing in it can be told from the rest"
     else:
         other = "" if options.invert else ", or --invert where light lines are on dark"
         mend = f"--threshold {_otsu_threshold(ink):.2f} lies between its tones{other}"
     raise DrawingError(
         f"is {tone} than the threshold {options.threshold:g} everywhere "
-        f"(it is between {least:.2f} and {most:.2f} dark)",
+        f"(it is between {lightest:.2f} and {darkest:.2f} dark)",
         file=file,
         mend=mend,
     )
@@ -146,10 +148,12 @@ def _otsu_threshold(ink: Ink) -> float:
     tones = 0.5 * (edges[1:] + edges[:-1])
     below, sums = np.cumsum(counts), np.cumsum(counts * tones)
     above = below[-1] - below
-    known = (below > 0) & (above > 0)
-    apart = sums[known] / below[known] - (sums[-1] - sums[known]) / above[known]
-    spread = below[known] * above[known] * apart**2
-    best = edges[1:][known][spread >= spread.max() * (1.0 - 1e-9)]
+    is_divided = (below > 0) & (above > 0)
+    mean_gap = (
+        sums[is_divided] / below[is_divided] - (sums[-1] - sums[is_divided]) / above[is_divided]
+    )
+    spread = below[is_divided] * above[is_divided] * mean_gap**2
+    best = edges[1:][is_divided][spread >= spread.max() * (1.0 - 1e-9)]
     return float(best.mean())
 
 
@@ -164,20 +168,20 @@ def _fill(dark: Bools, line: Floats, hole: bool) -> None:
     low, high = np.floor(line.min(axis=0)).astype(int), np.ceil(line.max(axis=0)).astype(int)
     x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
     inside = np.zeros(x.shape, dtype=np.bool_)
-    for (ax, ay), (bx, by) in zip(line, np.roll(line, -1, axis=0), strict=True):
-        if ay != by:
-            inside ^= ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / (by - ay))
+    for (ax, ay), (bx, y2) in zip(line, np.roll(line, -1, axis=0), strict=True):
+        if ay != y2:
+            inside ^= ((ay > y) != (y2 > y)) & (x < ax + (y - ay) * (bx - ax) / (y2 - ay))
     rows, columns = height - 1 - np.floor(y[inside]).astype(int), np.floor(x[inside]).astype(int)
     dark[rows, columns] = hole
 
 
-def _piece(made: PixelStrokes, closed: bool, number: int, trace: str, mm_per_px: float) -> Piece:
-    vertices = made.vertices * [mm_per_px, mm_per_px, 1.0]
-    return Piece(vertices, closed, trace, "", f"{trace} {number}", off_mm=made.off * mm_per_px)
+def _piece(stroke: PixelStrokes, closed: bool, number: int, trace: str, mm_per_px: float) -> Piece:
+    vertices = stroke.vertices * [mm_per_px, mm_per_px, 1.0]
+    return Piece(vertices, closed, trace, "", f"{trace} {number}", off_mm=stroke.off * mm_per_px)
 
 
-def _skipped(kind: str, count: int, why: str) -> list[Skipped]:
-    return [Skipped(kind, count, why)] if count else []
+def _skipped(kind: str, count: int, reason: str) -> list[Skipped]:
+    return [Skipped(kind, count, reason)] if count else []
 
 
 def _too_noisy(file: str) -> DrawingError:

@@ -117,13 +117,13 @@ def strokes(points: Floats, limit: float, *, closed: bool) -> PixelStrokes:
         return circle
     ring, area = np.roll(points, -_sharpest(points), axis=0), enclosed_area(points)
     for _ in range(HALVINGS):
-        made = _chain_of_shapes(
+        chain = _chain_of_shapes(
             *_begin_at_best_division(ring, _runs(ring, limit), limit), limit, closed=True
         )
-        if len(made.vertices) > 1:
-            found = signed_area(Polyline(made.vertices, closed=True))
-            if abs(found - area) <= AREA_SHARE * abs(area):
-                return made
+        if len(chain.vertices) > 1:
+            chain_area = signed_area(Polyline(chain.vertices, closed=True))
+            if abs(chain_area - area) <= AREA_SHARE * abs(area):
+                return chain
         limit *= 0.5
     return PixelStrokes(np.column_stack([ring, np.zeros(len(ring))]), np.zeros((len(ring), 2)))
 
@@ -134,34 +134,36 @@ def _begin_at_best_division(
     """A closed path and its runs, begun where the last run and the first leave the least."""
     if len(ends) < 3:
         return ring, [0, len(ring) // 2, len(ring)]
-    before, behind = len(ring) - ends[-2], ends[1]
-    both = np.concatenate([ring[ends[-2] :], ring[: ends[1]]])
-    moved = _division_index(both, before, limit) - before
-    moved = min(max(moved, 1 - before), behind - 1)
-    inner = [end - moved for end in ends[1:-1]]
-    return np.roll(ring, -moved, axis=0), [0, *inner, len(ring)]
+    before, after = len(ring) - ends[-2], ends[1]
+    joined = np.concatenate([ring[ends[-2] :], ring[: ends[1]]])
+    shift = _division_index(joined, before, limit) - before
+    shift = min(max(shift, 1 - before), after - 1)
+    inner = [end - shift for end in ends[1:-1]]
+    return np.roll(ring, -shift, axis=0), [0, *inner, len(ring)]
 
 
 def _sharpest(points: Floats) -> int:
     """The point at which a closed path turns most."""
     arm = max(min(CORNER_POINTS, len(points) // 4), 1)
-    before, behind = (points - np.roll(points, arm * k, axis=0) for k in (1, -1))
-    lengths = np.hypot(*before.T) * np.hypot(*behind.T)
-    straight = -(before * behind).sum(axis=1) / np.where(lengths > 0.0, lengths, 1.0)
+    before, after = (points - np.roll(points, arm * k, axis=0) for k in (1, -1))
+    lengths = np.hypot(*before.T) * np.hypot(*after.T)
+    straight = -(before * after).sum(axis=1) / np.where(lengths > 0.0, lengths, 1.0)
     return int(straight.argmin())
 
 
 def _circle(points: Floats) -> PixelStrokes | None:
     """All points as a circle of two halves."""
-    found = _centre(points)
-    if found is None:
+    circle = _centre(points)
+    if circle is None:
         return None
-    centre, radius = found
-    off = np.abs(np.hypot(*(points - centre).T) - radius)
+    centre, radius = circle
+    deviations = np.abs(np.hypot(*(points - centre).T) - radius)
     turn = 1.0 if enclosed_area(points) > 0.0 else -1.0
     vertices = np.array([[radius, 0.0, turn], [-radius, 0.0, turn]])
     vertices[:, :2] += centre
-    return PixelStrokes(vertices, np.tile([off.max(), math.sqrt((off**2).mean())], (2, 1)))
+    return PixelStrokes(
+        vertices, np.tile([deviations.max(), math.sqrt((deviations**2).mean())], (2, 1))
+    )
 
 
 def _centre(points: Floats) -> tuple[Floats, float] | None:
@@ -187,34 +189,39 @@ def _line(points: Floats) -> _Shape:
         return _Shape(middle, np.zeros(2), 0.0, 0.0, 0.0, 0.0)
     x, y = (points - middle).T
     angle = 0.5 * math.atan2(2.0 * float(x @ y), float(x @ x) - float(y @ y))
-    way = np.array([math.cos(angle), math.sin(angle)])
-    if float((points[-1] - points[0]) @ way) < 0.0:
-        way = -way
-    off = x * way[1] - y * way[0]
+    direction = np.array([math.cos(angle), math.sin(angle)])
+    if float((points[-1] - points[0]) @ direction) < 0.0:
+        direction = -direction
+    deviations = x * direction[1] - y * direction[0]
     return _Shape(
-        middle, way, 0.0, 0.0, float(np.abs(off).max()), math.sqrt(float(off @ off) / len(off))
+        middle,
+        direction,
+        0.0,
+        0.0,
+        float(np.abs(deviations).max()),
+        math.sqrt(float(deviations @ deviations) / len(deviations)),
     )
 
 
 def _arc(points: Floats) -> _Shape | None:
     """The arc of least squares along points; None where they run along none."""
-    found = _centre(points) if len(points) > MIN_RUN_POINTS else None
-    if found is None:
+    circle = _centre(points) if len(points) > MIN_RUN_POINTS else None
+    if circle is None:
         return None
-    centre, radius = found
+    centre, radius = circle
     arms = points - centre
     angles = np.arctan2(arms[:, 1], arms[:, 0])
     turns = angles[1:] - angles[:-1]
     turns = np.mod(turns + math.pi, 2.0 * math.pi) - math.pi
     along = np.concatenate([[0.0], np.cumsum(turns)])
     sweep = float(along[-1])
-    ahead = along if sweep >= 0.0 else -along
-    back = float((np.maximum.accumulate(ahead) - ahead).max()) * radius
-    if abs(sweep) > MAX_SWEEP_RAD or back > BACK_PX:
+    progress = along if sweep >= 0.0 else -along
+    backtrack = float((np.maximum.accumulate(progress) - progress).max()) * radius
+    if abs(sweep) > MAX_SWEEP_RAD or backtrack > BACK_PX:
         return None
-    off = np.hypot(*arms.T) - radius
-    mean = math.sqrt(float(off @ off) / len(off))
-    return _Shape(centre, np.zeros(2), radius, sweep, float(np.abs(off).max()), mean)
+    deviations = np.hypot(*arms.T) - radius
+    mean = math.sqrt(float(deviations @ deviations) / len(deviations))
+    return _Shape(centre, np.zeros(2), radius, sweep, float(np.abs(deviations).max()), mean)
 
 
 def _best(points: Floats, limit: float) -> _Shape | None:
@@ -243,46 +250,46 @@ def _goes_back(points: Floats, line: _Shape) -> bool:
 def _runs(points: Floats, limit: float) -> list[int]:
     """First points of runs, and the number of points: each run is as long as a line or an arc
     reaches, then ends where it and the next one leave the least."""
-    within, ends = SEARCH_SHARE * limit, [0]
+    tolerance, ends = SEARCH_SHARE * limit, [0]
     while ends[-1] < len(points):
-        ends.append(_reach(points, ends[-1], within))
+        ends.append(_reach(points, ends[-1], tolerance))
     for k in range(1, len(ends) - 1):
         low, high = ends[k - 1], ends[k + 1]
-        ends[k] = low + _division_index(points[low:high], ends[k] - low, within)
+        ends[k] = low + _division_index(points[low:high], ends[k] - low, tolerance)
     return ends
 
 
-def _division_index(points: Floats, here: int, limit: float) -> int:
-    """Return the index near `here` at which to divide the points into two runs, so that the sum of
-    squares of the distances from their shapes is least."""
-    one, other = (_best(part, limit) or _line(part) for part in (points[:here], points[here:]))
-    low, high = max(here - MOVES_BACK, 1), min(here + MOVES_ON, len(points) - 1)
-    between = points[low:high]
-    first, second = (shape.squares(between) for shape in (one, other))
+def _division_index(points: Floats, index: int, limit: float) -> int:
+    """Return the index near `index` at which to divide the points into two runs, so that the sum
+    of squares of the distances from their shapes is least."""
+    one, other = (_best(part, limit) or _line(part) for part in (points[:index], points[index:]))
+    low, high = max(index - MOVES_BACK, 1), min(index + MOVES_ON, len(points) - 1)
+    moving_points = points[low:high]
+    first, second = (shape.squares(moving_points) for shape in (one, other))
     prices = np.append(0.0, np.cumsum(first)) + np.append(np.cumsum(second[::-1])[::-1], 0.0)
-    found = low + int(prices.argmin())
-    fit = all(_best(part, limit) is not None for part in (points[:found], points[found:]))
-    return found if fit else here
+    best = low + int(prices.argmin())
+    fit = all(_best(part, limit) is not None for part in (points[:best], points[best:]))
+    return best if fit else index
 
 
 def _reach(points: Floats, first: int, limit: float) -> int:
     """The end of the longest run from `first` on: by doubling, then by halving."""
     last = len(points)
-    good, step = min(first + MIN_RUN_POINTS, last), MIN_RUN_POINTS
-    bad = last + 1
-    while good < last:
-        ahead = min(good + step, last)
-        if _best(points[first:ahead], limit) is None:
-            bad = ahead
+    reached, step = min(first + MIN_RUN_POINTS, last), MIN_RUN_POINTS
+    too_long = last + 1
+    while reached < last:
+        end = min(reached + step, last)
+        if _best(points[first:end], limit) is None:
+            too_long = end
             break
-        good, step = ahead, 2 * step
-    while bad - good > 1 and bad <= last:
-        middle = (good + bad) // 2
+        reached, step = end, 2 * step
+    while too_long - reached > 1 and too_long <= last:
+        middle = (reached + too_long) // 2
         if _best(points[first:middle], limit) is None:
-            bad = middle
+            too_long = middle
         else:
-            good = middle
-    return good
+            reached = middle
+    return reached
 
 
 def _chain_of_shapes(
@@ -294,12 +301,12 @@ def _chain_of_shapes(
         _Run(part := points[low:high], _best(part, limit) or _line(part))
         for low, high in pairwise(ends)
     ]
-    still = [0.5 * (points[end - 1] + points[end % len(points)]) for end in ends]
+    fixed_ends = [0.5 * (points[end - 1] + points[end % len(points)]) for end in ends]
     if not closed:
-        still[0], still[-1] = points[0], points[-1]
-    places = list(still)
+        fixed_ends[0], fixed_ends[-1] = points[0], points[-1]
+    places = list(fixed_ends)
     for k in range(0 if closed else 1, len(runs)):
-        places[k] = _meeting_point(runs[k - 1].shape, runs[k].shape, still[k], limit)
+        places[k] = _meeting_point(runs[k - 1].shape, runs[k].shape, fixed_ends[k], limit)
     if closed:
         places[-1] = places[0]
     waiting = list(range(len(runs)))
@@ -308,33 +315,33 @@ def _chain_of_shapes(
         if runs[k].suits(places[k], places[k + 1], limit):
             continue
         for end in (k, k + 1):
-            if places[end] is still[end]:
+            if places[end] is fixed_ends[end]:
                 continue
-            same = {end, *((0, len(runs)) if closed and end in (0, len(runs)) else ())}
-            for each in same:
-                places[each] = still[each]
+            joints = {end, *((0, len(runs)) if closed and end in (0, len(runs)) else ())}
+            for each in joints:
+                places[each] = fixed_ends[each]
             waiting += [(end - 1) % len(runs), end % len(runs)]
     rows: list[list[float]] = []
-    off: list[list[float]] = []
+    errors: list[list[float]] = []
     for run, (begin, end) in zip(runs, pairwise(places), strict=True):
-        made, apart = run.segments(begin, end, limit)
-        rows += made
-        off += apart
+        part_rows, part_errors = run.segments(begin, end, limit)
+        rows += part_rows
+        errors += part_errors
     if not closed:
         rows.append([*places[-1], 0.0])
-        off.append([0.0, 0.0])
-    return PixelStrokes(np.array(rows), np.array(off))
+        errors.append([0.0, 0.0])
+    return PixelStrokes(np.array(rows), np.array(errors))
 
 
 def _meeting_point(one: _Shape, other: _Shape, place: Floats, limit: float) -> Floats:
     """Return the point near `place` where two neighbouring shapes meet, or come nearest; at most
     `limit` + MEETING_PX from `place`."""
-    met = place
+    meeting = place
     for _ in range(MEETINGS):
-        met = other.nearest(one.nearest(met))
-    way = 0.5 * (one.nearest(met) + other.nearest(met)) - place
-    far = math.hypot(*way)
-    return np.asarray(place + way * min((limit + MEETING_PX) / (far or 1.0), 1.0))
+        meeting = other.nearest(one.nearest(meeting))
+    step = 0.5 * (one.nearest(meeting) + other.nearest(meeting)) - place
+    distance = math.hypot(*step)
+    return np.asarray(place + step * min((limit + MEETING_PX) / (distance or 1.0), 1.0))
 
 
 class _Run(Struct, frozen=True, eq=False):
@@ -347,8 +354,8 @@ class _Run(Struct, frozen=True, eq=False):
         """Its vertices (n, 3) between two places, that of the end last."""
         shape, bulge = self.shape, 0.0
         if shape.radius > 0.0:
-            one, two = begin - shape.at, end - shape.at
-            turn = math.atan2(one[0] * two[1] - one[1] * two[0], float(one @ two))
+            one, last = begin - shape.at, end - shape.at
+            turn = math.atan2(one[0] * last[1] - one[1] * last[0], float(one @ last))
             turn += 2.0 * math.pi * round((shape.sweep - turn) / (2.0 * math.pi))
             bulge = math.tan(0.25 * turn) if turn * shape.sweep > 0.0 else 0.0
         return split_bulges(np.array([[*begin, bulge], [*end, 0.0]]), closed=False)
@@ -360,8 +367,8 @@ class _Run(Struct, frozen=True, eq=False):
     def suits(self, begin: Floats, end: Floats, limit: float) -> bool:
         """True if the points lie within the limit of the shape, which runs in their direction."""
         if abs(self.shape.sweep) < 0.5 * math.pi:
-            way = self.part[-1] - self.part[0]
-            if float((end - begin) @ way) < 0.0:
+            chord = self.part[-1] - self.part[0]
+            if float((end - begin) @ chord) < 0.0:
                 return False
         return self.far(begin, end) <= limit
 
@@ -374,16 +381,16 @@ class _Run(Struct, frozen=True, eq=False):
             return [], []
         half = len(self.part) // 2
         if half == 0 or self.suits(begin, end, limit):
-            rows, far = self.rows(begin, end)[:-1].tolist(), self.far(begin, end)
-            return rows, [[far, min(self.shape.mean, far)]] * len(rows)
+            rows, error = self.rows(begin, end)[:-1].tolist(), self.far(begin, end)
+            return rows, [[error, min(self.shape.mean, error)]] * len(rows)
         middle = 0.5 * (self.part[half - 1] + self.part[half])
-        made: list[list[float]] = []
-        apart: list[list[float]] = []
+        all_rows: list[list[float]] = []
+        all_errors: list[list[float]] = []
         for part, low, high in (
             (self.part[:half], begin, middle),
             (self.part[half:], middle, end),
         ):
             run = _Run(part, _best(part, limit) or _line(part))
-            rows, off = run.segments(low, high, limit)
-            made, apart = made + rows, apart + off
-        return made, apart
+            rows, errors = run.segments(low, high, limit)
+            all_rows, all_errors = all_rows + rows, all_errors + errors
+        return all_rows, all_errors

@@ -65,28 +65,28 @@ class Bulk(Struct, frozen=True, eq=False):
             return cls.none(tags)
         first, last = np.searchsorted(tags.marks, [part.begin + 1, part.end]).tolist()
         marks, kinds = tags.marks[first : last + 1], np.array(tags.kinds[first:last], dtype=object)
-        others = np.ones(len(tags.codes), dtype=np.bool_)
+        is_other = np.ones(len(tags.codes), dtype=np.bool_)
         try:
-            lines = _lines(tags, marks, np.asarray(kinds == "LINE", dtype=np.bool_), others)
+            lines = _lines(tags, marks, np.asarray(kinds == "LINE", dtype=np.bool_), is_other)
             polylines = np.flatnonzero(kinds == "LWPOLYLINE")
-            vertices = _vertices(tags, marks[polylines], marks[polylines + 1], others)
+            vertices = _vertices(tags, marks[polylines], marks[polylines + 1], is_other)
         except ValueError:  # a number that is none: ezdxf says where
             return cls.none(tags)
-        found = cls(others, lines, vertices)
-        return found if found._is_plain(tags, frame) else cls.none(tags)
+        bulk = cls(is_other, lines, vertices)
+        return bulk if bulk._is_plain(tags, frame) else cls.none(tags)
 
     def _is_plain(self, tags: Tags, frame: DxfSections) -> bool:
         """True if each handle names one entity, and no hatch refers to a LINE that is left out."""
         followers = {handle for each in self.lines.values() for handle in each.handles}
         names = {*followers, *self.lines, *self.vertices}
-        held = np.isin(tags.codes, _HANDLES)
+        has_handle = np.isin(tags.codes, _HANDLES)
         for section in frame.sections:
             if section.name == "HEADER":
-                held[section.begin : section.end] = False
+                has_handle[section.begin : section.end] = False
         count = sum(len(each.handles) for each in self.lines.values())
         count += len(self.lines) + len(self.vertices)
-        said = sum(handle in names for handle in tags.values(np.flatnonzero(held)))
-        if not len(names) == count == said:
+        handle_count = sum(handle in names for handle in tags.values(np.flatnonzero(has_handle)))
+        if not len(names) == count == handle_count:
             return False
         if _HATCHES.isdisjoint(tags.kinds):
             return True
@@ -94,58 +94,58 @@ class Bulk(Struct, frozen=True, eq=False):
         return followers.isdisjoint(tags.values(references))
 
 
-def _lines(tags: Tags, marks: Ints, is_line: Bools, others: Bools) -> dict[str, BulkLines]:
+def _lines(tags: Tags, marks: Ints, is_line: Bools, is_other: Bools) -> dict[str, BulkLines]:
     """The LINEs that follow another one and say the same, by the handle of the first; their tags
-    leave `others`. Entity k stands from marks[k] to marks[k + 1]."""
+    leave `is_other`. Entity k stands from marks[k] to marks[k + 1]."""
     sizes = np.diff(marks)
     follows = np.zeros(len(sizes) + 1, dtype=np.bool_)
     follows[1:-1] = is_line[1:] & is_line[:-1] & (sizes[1:] == sizes[:-1])
     for size in np.unique(sizes[follows[:-1]]).tolist():
-        chosen = np.flatnonzero(follows[:-1] & (sizes == size))
-        follows[chosen] = _say_the_same(tags, marks[chosen], size)
+        candidates = np.flatnonzero(follows[:-1] & (sizes == size))
+        follows[candidates] = _say_the_same(tags, marks[candidates], size)
     firsts, lasts = (np.flatnonzero(np.diff(follows.astype(np.int8)) == step) for step in (1, -1))
-    alike: dict[tuple[int, ...], list[int]] = {}
+    rows_by_codes: dict[tuple[int, ...], list[int]] = {}
     for row, first in enumerate(firsts.tolist()):
         codes = tuple(tags.codes[marks[first] : marks[first + 1]].tolist())
-        alike.setdefault(codes, []).append(row)
-    found: dict[str, BulkLines] = {}
-    for codes, of in alike.items():
+        rows_by_codes.setdefault(codes, []).append(row)
+    groups: dict[str, BulkLines] = {}
+    for codes, alike_rows in rows_by_codes.items():
         if not _is_simple(codes):
             continue
-        heads, counts = firsts[of], (lasts - firsts)[of]
+        heads, counts = firsts[alike_rows], (lasts - firsts)[alike_rows]
         begins = np.cumsum(counts) - counts
         rows = marks[np.arange(counts.sum()) + np.repeat(heads + 1 - begins, counts)]
         ends = np.zeros((len(rows), 6))
         for column, code in enumerate((*_START, *_END)):
             if code in codes:
                 ends[:, column] = tags.numbers(rows + codes.index(code))
-        at = codes.index(_HANDLE)
-        handles = list(tags.values(rows + at))
+        place = codes.index(_HANDLE)
+        handles = list(tags.values(rows + place))
         for head, begin, count in zip(
-            tags.values(marks[heads] + at), begins.tolist(), counts.tolist(), strict=True
+            tags.values(marks[heads] + place), begins.tolist(), counts.tolist(), strict=True
         ):
             part = slice(begin, begin + count)
-            found[head] = BulkLines(handles[part], ends[part].reshape(-1, 2, 3))
+            groups[head] = BulkLines(handles[part], ends[part].reshape(-1, 2, 3))
         for k in range(len(codes)):
-            others[rows + k] = False
-    return found
+            is_other[rows + k] = False
+    return groups
 
 
 def _say_the_same(tags: Tags, rows: Ints, size: int) -> Bools:
     """(K,) whether the entities of so many tags, which begin at these rows (K,), have the codes
     and values of those just before them, save handle and ends."""
     table = tags.codes[rows[:, None] + np.arange(size)]
-    same = np.asarray((table == tags.codes[rows[:, None] + np.arange(-size, 0)]).all(axis=1))
+    is_same = np.asarray((table == tags.codes[rows[:, None] + np.arange(-size, 0)]).all(axis=1))
     for k in range(size):
-        chosen = np.flatnonzero(same & ~np.isin(table[:, k], _OWN))
-        here, before = rows[chosen] + k, rows[chosen] + k - size
+        candidates = np.flatnonzero(is_same & ~np.isin(table[:, k], _OWN))
+        tag_rows, before = rows[candidates] + k, rows[candidates] + k - size
         # Most of them stand before one and after another: each is looked up once.
-        asked = np.zeros(len(tags.codes), dtype=np.bool_)
-        asked[here] = asked[before] = True
-        place = np.cumsum(asked) - 1
-        values = np.array([*tags.raw(np.flatnonzero(asked)), None], dtype=object)
-        same[chosen] = values[place[here]] == values[place[before]]
-    return same
+        is_wanted = np.zeros(len(tags.codes), dtype=np.bool_)
+        is_wanted[tag_rows] = is_wanted[before] = True
+        place = np.cumsum(is_wanted) - 1
+        values = np.array([*tags.raw(np.flatnonzero(is_wanted)), None], dtype=object)
+        is_same[candidates] = values[place[tag_rows]] == values[place[before]]
+    return is_same
 
 
 def _is_simple(codes: tuple[int, ...]) -> bool:
@@ -158,32 +158,36 @@ def _is_simple(codes: tuple[int, ...]) -> bool:
     for point in (_START, _END):
         if any(codes.count(code) > 1 for code in point) or point[0] not in codes:
             return False
-        at = codes.index(point[0])
+        index = codes.index(point[0])
         count = 3 if point[2] in codes else 2
-        if codes[at : at + count] != point[:count]:
+        if codes[index : index + count] != point[:count]:
             return False
     return True
 
 
-def _vertices(tags: Tags, begins: Ints, ends: Ints, others: Bools) -> dict[str, Floats]:
+def _vertices(tags: Tags, begins: Ints, ends: Ints, is_other: Bools) -> dict[str, Floats]:
     """The vertices (K, 5) of the larger ones of the LWPOLYLINEs that stand there, by their
-    handles; their tags leave `others`."""
-    found: dict[str, Floats] = {}
+    handles; their tags leave `is_other`."""
+    rows_by_handle: dict[str, Floats] = {}
     for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
         codes = tags.codes[begin:end]
-        x, *more = (np.flatnonzero(codes == code) for code in _VERTEX)
+        x, *other_columns = (np.flatnonzero(codes == code) for code in _VERTEX)
         handle, subclass = (np.flatnonzero(codes == code) for code in (_HANDLE, _SUBCLASS))
-        if len(x) < MIN_VERTICES or not np.array_equal(x + 1, more[0]) or len(handle) != 1:
+        if (
+            len(x) < MIN_VERTICES
+            or not np.array_equal(x + 1, other_columns[0])
+            or len(handle) != 1
+        ):
             continue
         if not {*codes[: handle[0]].tolist()}.isdisjoint(_DIVISIONS):
             continue
-        first = min(at.min(initial=end) for at in (x, *more))
+        first = min(places.min(initial=end) for places in (x, *other_columns))
         if first < x[0] or not len(subclass) or subclass[-1] > x[0] or (codes == _HEIGHT).any():
             continue
         rows = np.zeros((len(x), len(_VERTEX)))
         rows[:, 0] = tags.numbers(begin + x)
-        for column, at in enumerate(more, 1):
-            rows[np.searchsorted(x, at) - 1, column] = tags.numbers(begin + at)
-        found[str(tags.value(begin + int(handle[0])))] = rows
-        others[begin + np.concatenate([x, *more])] = False
-    return found
+        for column, places in enumerate(other_columns, 1):
+            rows[np.searchsorted(x, places) - 1, column] = tags.numbers(begin + places)
+        rows_by_handle[str(tags.value(begin + int(handle[0])))] = rows
+        is_other[begin + np.concatenate([x, *other_columns])] = False
+    return rows_by_handle

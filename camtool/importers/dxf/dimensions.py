@@ -68,11 +68,11 @@ def callout(
         raise Unusable("stands in a block of unequal scales")
     first, second = frame.flat(np.array(places, dtype=np.float64))
     span = second - first
-    turned = None
+    angle = None
     if direction is not None:
         along = np.asarray(math.cos(direction) * plane.u + math.sin(direction) * plane.v)
         along = along / math.hypot(*along)
-        turned = math.atan2(along[1], along[0]) % math.pi
+        angle = math.atan2(along[1], along[0]) % math.pi
         measured_mm = abs(float(span @ along))
     else:
         measured_mm = math.hypot(*span)
@@ -88,7 +88,7 @@ def callout(
         text=_text(entity, style),
         layer=layer,
         source=source,
-        direction_rad=turned,
+        direction_rad=angle,
         upper_mm=upper_mm,
         lower_mm=lower_mm,
         mm_per_unit=unit_mm,
@@ -114,34 +114,34 @@ def _measured_places(
         # is as far from the centre as group 42 says.
         require(entity, ("defpoint", "jog_point"))
         return "radius", [dxf.defpoint, dxf.jog_point], None
-    of = int(dxf.dimtype) & _TYPE
+    kind = int(dxf.dimtype) & _TYPE
     if entity.dxftype() == "ARC_DIMENSION":
         raise Unusable(_NOT_READ[8])
-    if of in (_ROTATED, _ALIGNED):
+    if kind in (_ROTATED, _ALIGNED):
         require(entity, ("defpoint2", "defpoint3"))
-        direction = math.radians(dxf.angle) if of == _ROTATED else None
+        direction = math.radians(dxf.angle) if kind == _ROTATED else None
         if direction is not None and not math.isfinite(direction):
             raise Unusable("has an angle that is not finite")
         return "linear", [dxf.defpoint2, dxf.defpoint3], direction
-    if of in (_DIAMETER, _RADIUS):
+    if kind in (_DIAMETER, _RADIUS):
         require(entity, ("defpoint", "defpoint4"))
         return (
-            "diameter" if of == _DIAMETER else "radius",
+            "diameter" if kind == _DIAMETER else "radius",
             [dxf.defpoint, dxf.defpoint4],
             None,
         )
-    raise Unusable(_NOT_READ.get(of, "is of a type that is not known"))
+    raise Unusable(_NOT_READ.get(kind, "is of a type that is not known"))
 
 
 def _style(entity: Any) -> dict[str, Any]:
     """The values of its style, and over them those of the entity itself (the list DSTYLE in its
     data of ACAD)."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     name = entity.dxf.dimstyle
     styles = entity.doc.dimstyles
     if styles.has_entry(name):
-        said = vars(styles.get(name).dxf)
-        found = {key: said[key] for key in _VALUES.values() if key in said}
+        attributes = vars(styles.get(name).dxf)
+        values = {key: attributes[key] for key in _VALUES.values() if key in attributes}
     if entity.has_xdata_list("ACAD", "DSTYLE"):
         # {code of the value, value}, between braces that ezdxf takes away or not.
         tags = [tag for tag in entity.get_xdata_list("ACAD", "DSTYLE") if tag.code != 1002]
@@ -149,8 +149,8 @@ def _style(entity: Any) -> dict[str, Any]:
             tags = tags[1:]
         for key, value in zip(tags[::2], tags[1::2], strict=False):
             if key.value in _VALUES:
-                found[_VALUES[key.value]] = value.value
-    return found
+                values[_VALUES[key.value]] = value.value
+    return values
 
 
 def _number(style: Mapping[str, Any], name: str, otherwise: float) -> float:
@@ -201,7 +201,7 @@ def _text(entity: Any, style: Mapping[str, Any]) -> str:
 
     # What follows [] is of the alternative units.
     shown, _, _ = post.partition("[]")
-    around = shown if "<>" in shown else f"<>{shown}"
-    text = (raw or "<>").replace("<>", around).replace("[]", "")
-    plain = " ".join(printable(plain_text(text)).split())
-    return "" if plain == "<>" else plain
+    replacement = shown if "<>" in shown else f"<>{shown}"
+    text = (raw or "<>").replace("<>", replacement).replace("[]", "")
+    content = " ".join(printable(plain_text(text)).split())
+    return "" if content == "<>" else content

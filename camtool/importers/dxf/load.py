@@ -75,11 +75,11 @@ def load(data: bytes, file: str) -> Loaded:
         tags = tags.ended(max(part.end for part in frame.sections if part.end is not None) + 1)
         frame = frame_of(tags)
     notes = [*tags.notes, *cut, *frame.faults, *lost_entities(tags, frame)]
-    with quiet() as said, without_collector():
+    with quiet() as warnings, without_collector():
         bulk = Bulk.of(tags, frame)
-        document = None if frame.faults else _load_plainly(tags, bulk, said)
-        notes.extend(said)
-        if document is None or (said and tags.is_text):
+        document = None if frame.faults else _load_plainly(tags, bulk, warnings)
+        notes.extend(warnings)
+        if document is None or (warnings and tags.is_text):
             bulk = Bulk.none(tags)
             check_numbers(tags, file, np.arange(len(tags.codes)))
             document = _recover(tags, notes, file)
@@ -104,16 +104,16 @@ def quiet() -> Iterator[list[str]]:
     """ezdxf logs and warns of nothing in here, its warnings gather in the list; all is as before
     behind."""
     logger = logging.getLogger("ezdxf")
-    kept, propagate = _Kept(), logger.propagate
-    logger.addHandler(kept)
+    collector, propagate = _Kept(), logger.propagate
+    logger.addHandler(collector)
     logger.propagate = False
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            yield kept.messages
+            yield collector.messages
     finally:
         logger.propagate = propagate
-        logger.removeHandler(kept)
+        logger.removeHandler(collector)
 
 
 def printable(text: str) -> str:
@@ -138,9 +138,9 @@ def _check_bytes(data: bytes, file: str) -> None:
     if not data.strip():
         raise DrawingError("is empty", file=file, mend=AGAIN)
     if len(data) > MAX_BYTES:
-        size, most = len(data) // 1_000_000, MAX_BYTES // 1_000_000
+        size, limit_mb = len(data) // 1_000_000, MAX_BYTES // 1_000_000
         raise DrawingError(
-            f"is {size} MB large, at most {most} MB are read",
+            f"is {size} MB large, at most {limit_mb} MB are read",
             file=file,
             mend="split the drawing, or delete what is not to be made",
         )
@@ -151,9 +151,9 @@ def _check_bytes(data: bytes, file: str) -> None:
         raise DrawingError("is no DXF: it has no section", file=file, mend=AGAIN)
 
 
-def _too_large(what: str, most: int, file: str) -> DrawingError:
+def _too_large(subject: str, limit: int, file: str) -> DrawingError:
     return DrawingError(
-        f"holds more than {most} {what}",
+        f"holds more than {limit} {subject}",
         file=file,
         mend="split the drawing, or delete what is not to be made",
     )
@@ -176,9 +176,9 @@ def _check_whole(tags: Tags, frame: DxfSections, file: str) -> list[str]:
     return ["the end mark EOF is missing: what stood behind the entities is left out"]
 
 
-def _load_plainly(tags: Tags, bulk: Bulk, said: list[str]) -> Any:
+def _load_plainly(tags: Tags, bulk: Bulk, notes: list[str]) -> Any:
     """The document of ezdxf's ordinary reader, without what is read in bulk; None when it fails
-    or finds fault, as `said`."""
+    or finds fault, as `notes`."""
     from ezdxf.document import Drawing
     from ezdxf.lldxf.types import DXFBinaryTag, DXFTag
 
@@ -190,7 +190,7 @@ def _load_plainly(tags: Tags, bulk: Bulk, said: list[str]) -> Any:
         document: Any = Drawing.load(starmap(DXFTag if tags.is_text else tag_of, pairs))
     # A damaged file makes ezdxf fail in every possible way; each one is the file's fault.
     except Exception as error:
-        said.append(_reason(error))
+        notes.append(_reason(error))
         return None
     if not all(handle in document.entitydb for handle in bulk.lines):
         raise RuntimeError("LINEs that are read in bulk follow none of the document")
@@ -209,9 +209,9 @@ def _recover(tags: Tags, notes: list[str], file: str) -> Any:
     pairs = tags.pairs(np.arange(len(tags.codes)))
     lines = "".join(f"{code}\n{value}\n" for code, value in pairs)
     # Recovery reads bytes in whatever code page they name; escapes are the same in all of them.
-    plain = _NO_ASCII.sub(lambda sign: f"\\U+{ord(sign[0]):04X}", lines)
+    escaped = _NO_ASCII.sub(lambda sign: f"\\U+{ord(sign[0]):04X}", lines)
     try:
-        recover = Recover.run(BytesIO(plain.encode("ascii")))
+        recover = Recover.run(BytesIO(escaped.encode("ascii")))
         document = Drawing()
         document._load_section_dict(recover.section_dict)
     except Exception as error:

@@ -67,14 +67,14 @@ def write_mtext(
     width = columns.width or max(line.right for line in lines)
     exact = int(entity.dxf.get("line_spacing_style", 1)) == _EXACT_SPACING
     pitch = Pitch(float(entity.dxf.line_spacing_factor), look.height if exact else 0.0)
-    placed = stack_lines(lines, columns, pitch)
-    total = width + (width + columns.gutter) * placed[-1].column
-    depth = min(place.baseline for place in placed)
+    positions = stack_lines(lines, columns, pitch)
+    total = width + (width + columns.gutter) * positions[-1].column
+    depth = min(place.baseline for place in positions)
     anchor = _SHARES[column] * total, _SHARES[row] * depth
     ink = Ink()
-    for place in placed:
-        left = place.column * (width + columns.gutter) - anchor[0]
-        draw(ink, place.line, width, (left, place.baseline - anchor[1]))
+    for place in positions:
+        left_edge = place.column * (width + columns.gutter) - anchor[0]
+        draw(ink, place.line, width, (left_edge, place.baseline - anchor[1]))
     return ink, reader.fonts
 
 
@@ -111,11 +111,11 @@ def _columns(entity: Any) -> Columns:
     width = max(0.0, float(entity.dxf.get("width", 0.0)))
     if not entity.has_columns:
         return Columns(width)
-    said = entity.columns
-    heights = [float(height) for height in said.heights]
-    if not heights and said.defined_height:
-        heights = [abs(float(said.defined_height))] * max(1, int(said.count))
-    width, gutter, *heights = finite(said.width, said.gutter_width, *heights)
+    settings = entity.columns
+    heights = [float(height) for height in settings.heights]
+    if not heights and settings.defined_height:
+        heights = [abs(float(settings.defined_height))] * max(1, int(settings.count))
+    width, gutter, *heights = finite(settings.width, settings.gutter_width, *heights)
     return Columns(max(0.0, width), max(0.0, gutter), tuple(heights[:-1]))
 
 
@@ -138,11 +138,11 @@ class _Reader:
         start.oblique = math.degrees(math.atan(self._look.slant))
         self._first_face = start.font_face
         cells: list[MTextCell] = []
-        ended, context = False, start
+        is_ended, context = False, start
         breaks = (TokenType.NEW_PARAGRAPH, TokenType.NEW_COLUMN, TokenType.WRAP_AT_DIMLINE)
         for token in MTextParser(_plain(content), start):
-            context, ended = token.ctx, token.type in breaks
-            if ended:
+            context, is_ended = token.ctx, token.type in breaks
+            if is_ended:
                 last = token.type == TokenType.NEW_COLUMN
                 yield self._paragraph(cells, context, share, last)
                 cells = []
@@ -165,8 +165,8 @@ class _Reader:
     def _paragraph(
         self, cells: list[MTextCell], context: Any, share: float, ends_column: bool
     ) -> Paragraph:
-        said = context.paragraph
-        align = said.align.name
+        attributes = context.paragraph
+        align = attributes.align.name
         share = {"LEFT": 0.0, "RIGHT": 1.0, "CENTER": 0.5}.get(align, share)
         justified = align in ("JUSTIFIED", "DISTRIBUTED")
         unit = self._look.height
@@ -174,13 +174,17 @@ class _Reader:
             (float(stop[1:]) * unit, _TAB_SHARES[stop[0]])
             if isinstance(stop, str)
             else (float(stop) * unit, 0.0)
-            for stop in said.tab_stops
+            for stop in attributes.tab_stops
         ]
         return Paragraph(
             cells=tuple(cells),
             share=0.0 if justified else share,
             justified=justified,
-            indents=((said.left + said.indent) * unit, said.left * unit, said.right * unit),
+            indents=(
+                (attributes.left + attributes.indent) * unit,
+                attributes.left * unit,
+                attributes.right * unit,
+            ),
             stops=tuple(sorted(stops)),
             tab=TAB_HEIGHTS * unit,
             blank=float(context.cap_height),
@@ -191,10 +195,10 @@ class _Reader:
         """The look that the codes make."""
         key = context.font_face
         if key not in self._known:
-            wanted = self._wanted
+            request = self._wanted
             if key is not self._first_face:
-                wanted = WantedFont("", key.family, key.is_bold, key.is_italic)
-            font, other = font_for(wanted, self._mode)
+                request = WantedFont("", key.family, key.is_bold, key.is_italic)
+            font, other = font_for(request, self._mode)
             self._known[key] = replace(self._look, font=font), other
             self.fonts.append((font.name, other))
         look, _ = self._known[key]
@@ -321,27 +325,27 @@ class Placed(Struct, frozen=True, eq=False):
 
 def wrap_paragraph(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
     """The lines of a paragraph, no wider than `width` where words allow that (0: one line)."""
-    left, following, margin = paragraph.indents
+    first_indent, following, margin = paragraph.indents
     limit = (width - margin) + WRAP_SLACK * width
-    x = left
-    placed: list[tuple[float, MTextCell]] = []
+    x = first_indent
+    cells: list[tuple[float, MTextCell]] = []
     groups = [*_unbreakable(paragraph.cells), ()]
-    for group, ahead in pairwise(groups):
+    for group, next_group in pairwise(groups):
         size = sum(cell.width for cell in group)
         glue = group[0].glue
         if glue is Glue.TAB:
-            x = _tab_position(x, sum(cell.width for cell in ahead), paragraph)
+            x = _tab_position(x, sum(cell.width for cell in next_group), paragraph)
         elif glue is Glue.SPACE:
-            placed.append((x, group[0]))
+            cells.append((x, group[0]))
             x += size
         else:
-            if width > 0.0 and x + size > limit and any(_is_word(cell) for _, cell in placed):
-                yield _line(paragraph, placed, left, stretch=paragraph.justified)
-                left, x, placed = following, following, []
+            if width > 0.0 and x + size > limit and any(_is_word(cell) for _, cell in cells):
+                yield _line(paragraph, cells, first_indent, stretch=paragraph.justified)
+                first_indent, x, cells = following, following, []
             for cell in group:
-                placed.append((x, cell))
+                cells.append((x, cell))
                 x += cell.width
-    last = _line(paragraph, placed, left, stretch=False)
+    last = _line(paragraph, cells, first_indent, stretch=False)
     yield replace(last, ends_column=paragraph.ends_column)
 
 
@@ -364,67 +368,72 @@ def _unbreakable(cells: Sequence[MTextCell]) -> Iterator[tuple[MTextCell, ...]]:
         yield tuple(run)
 
 
-def _tab_position(x: float, ahead: float, paragraph: Paragraph) -> float:
-    """Return the x at which the text after a tab begins; it is `ahead` wide up to the next tab."""
+def _tab_position(x: float, text_width: float, paragraph: Paragraph) -> float:
+    """Return the x at which the text after a tab begins; it is `text_width` wide up to the next
+    tab."""
     for stop, share in paragraph.stops:
-        if stop > x and stop - share * ahead >= x:
-            return stop - share * ahead
+        if stop > x and stop - share * text_width >= x:
+            return stop - share * text_width
     return (x // paragraph.tab + 1.0) * paragraph.tab
 
 
 def _line(
-    paragraph: Paragraph, placed: list[tuple[float, MTextCell]], left: float, *, stretch: bool
+    paragraph: Paragraph,
+    placed_cells: list[tuple[float, MTextCell]],
+    left_edge: float,
+    *,
+    stretch: bool,
 ) -> MTextLine:
     """A line without the spaces at its end."""
-    count = len(placed)
-    while count and placed[count - 1][1].glue is Glue.SPACE:
+    count = len(placed_cells)
+    while count and placed_cells[count - 1][1].glue is Glue.SPACE:
         count -= 1
-    cells = tuple(placed[:count])
+    cells = tuple(placed_cells[:count])
     height = max((cell.height for _, cell in cells), default=0.0) or paragraph.blank
-    right = cells[-1][0] + cells[-1][1].width if cells else left
+    right = cells[-1][0] + cells[-1][1].width if cells else left_edge
     return MTextLine(cells, height, right, paragraph.indents[2], paragraph.share, stretch)
 
 
 def stack_lines(lines: Sequence[MTextLine], columns: Columns, pitch: Pitch) -> list[Placed]:
     """Lines below each other, in the next column where one is full or ended."""
-    placed: list[Placed] = []
+    results: list[Placed] = []
     column, start = 0, True
     for line in lines:
         baseline = -line.height
         if not start:
-            above = placed[-1]
+            above = results[-1]
             baseline = above.baseline - pitch.drop(above.line.height, line.height)
             room = columns.heights[column] if column < len(columns.heights) else None
             if room is not None and -baseline > room * (1.0 + WRAP_SLACK):
                 column, baseline = column + 1, -line.height
-        placed.append(Placed(column, baseline, line))
+        results.append(Placed(column, baseline, line))
         start = line.ends_column
         column += line.ends_column
-    return placed
+    return results
 
 
-def draw(ink: Ink, line: MTextLine, width: float, at: tuple[float, float]) -> None:
-    """A line into its column, whose left edge at the line's baseline is `at`."""
+def draw(ink: Ink, line: MTextLine, width: float, place: tuple[float, float]) -> None:
+    """A line into its column, whose left edge at the line's baseline is `place`."""
     spare = width - line.margin - line.right
     gaps = sum(cell.glue is Glue.SPACE for _, cell in line.cells)
     widened = spare / gaps if line.stretch and gaps and spare > 0.0 else 0.0
-    shift = at[0] + line.share * spare
+    shift = place[0] + line.share * spare
     ruled: list[tuple[float, float, MTextCell]] = []
     for x, cell in line.cells:
         start = shift + x
         if cell.glue is Glue.NONE:
             lift = 0.5 * cell.lift * (line.height - cell.height)
-            _draw_cell(ink, cell, (start, at[1] + lift))
+            _draw_cell(ink, cell, (start, place[1] + lift))
         shift += widened * (cell.glue is Glue.SPACE)
         ruled.append((start, shift + x + cell.width, cell))
-    _rule(ink, ruled, at[1])
+    _rule(ink, ruled, place[1])
 
 
 def _rule(ink: Ink, cells: Sequence[tuple[float, float, MTextCell]], baseline: float) -> None:
     """Underlines and the like, each in one piece along cells that look alike."""
 
-    def manner(placed: tuple[float, float, MTextCell]) -> tuple[int, float]:
-        return int(placed[2].look.rules), placed[2].look.height
+    def manner(item: tuple[float, float, MTextCell]) -> tuple[int, float]:
+        return int(item[2].look.rules), item[2].look.height
 
     for (rules, _), group in groupby(cells, manner):
         run = list(group)
@@ -432,12 +441,12 @@ def _rule(ink: Ink, cells: Sequence[tuple[float, float, MTextCell]], baseline: f
             ink.rule(run[0][2].look, (run[0][0], run[-1][1]), baseline)
 
 
-def _draw_cell(ink: Ink, cell: MTextCell, at: tuple[float, float]) -> None:
+def _draw_cell(ink: Ink, cell: MTextCell, place: tuple[float, float]) -> None:
     """A word, or the two of a stack and what divides them."""
-    x, y = at
+    x, y = place
     look = cell.look
     if not cell.bar:
-        ink.write(cell.text, look, at)
+        ink.write(cell.text, look, place)
         return
     upper, lower = look.width(cell.text), look.width(cell.lower)
     rise = cell.height - look.height

@@ -48,7 +48,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         file=file,
         units=units,
         used=dict(walk.used),
-        skipped=[Skipped(kind, count, why) for (kind, why), count in walk.skipped.items()],
+        skipped=[Skipped(kind, count, reason) for (kind, reason), count in walk.skipped.items()],
         findings=[
             *_repair_findings(repairs),
             *findings,
@@ -66,8 +66,8 @@ def _space(document: Any, layout: str | None, file: str) -> Any:
         return document.modelspace()
     named = {str(space.name).casefold(): space for space in document.layouts}
     if layout.casefold() not in named:
-        known = ", ".join(str(space.name) for space in document.layouts)
-        raise DrawingError(f"has no layout {layout!r}", file=file, mend=f"use one of {known}")
+        names = ", ".join(str(space.name) for space in document.layouts)
+        raise DrawingError(f"has no layout {layout!r}", file=file, mend=f"use one of {names}")
     return named[layout.casefold()]
 
 
@@ -75,16 +75,16 @@ def _repair_findings(repairs: tuple[str, ...]) -> list[Finding]:
     """Return one finding for all repairs, which quotes the first REPAIRS_NAMED of them."""
     if not repairs:
         return []
-    more = len(repairs) - REPAIRS_NAMED
+    extra = len(repairs) - REPAIRS_NAMED
     text = "; ".join(" ".join(message.split()) for message in repairs[:REPAIRS_NAMED])
-    return [FILE_REPAIRED(measured=len(repairs), repairs=text, more=max(more, 0))]
+    return [FILE_REPAIRED(measured=len(repairs), repairs=text, more=max(extra, 0))]
 
 
 def _not_applied_findings(lacking: Counter[tuple[str, str]]) -> list[Finding]:
     """Return a finding for each kind of property that was not applied to entities."""
     return [
-        NOT_APPLIED_TO_ENTITY(measured=count, kind=kind, what=what)
-        for (kind, what), count in lacking.items()
+        NOT_APPLIED_TO_ENTITY(measured=count, kind=kind, what=subject)
+        for (kind, subject), count in lacking.items()
     ]
 
 
@@ -146,21 +146,21 @@ def units_of(header: Mapping[str, Any], options: ReadOptions) -> tuple[Units, li
     code, measurement = (
         _header_number(header.get(name)) for name in ("$INSUNITS", "$MEASUREMENT")
     )
-    said = "no $INSUNITS" if code is None else f"$INSUNITS {code}"
+    file_says = "no $INSUNITS" if code is None else f"$INSUNITS {code}"
     if options.units is not None:
         unit = options.units.lower()
-        return Units(unit, options.mm_per(unit), f"as asked; the file says {said}"), []
+        return Units(unit, options.mm_per(unit), f"as asked; the file says {file_says}"), []
     if code in _MM_PER_INSUNIT:
-        return Units(*_MM_PER_INSUNIT[code], said), []
+        return Units(*_MM_PER_INSUNIT[code], file_says), []
     if not code and measurement in _GUESSES:
         name, mm, meaning, severity = _GUESSES[measurement]
-        why = f"{said}, but $MEASUREMENT {measurement} ({meaning})"
-        return Units(name, mm, why), [UNIT_GUESSED(severity=severity, why=why, taken=name)]
+        reason = f"{file_says}, but $MEASUREMENT {measurement} ({meaning})"
+        return Units(name, mm, reason), [UNIT_GUESSED(severity=severity, why=reason, taken=name)]
     if code in _NO_PART:
-        said = f"{said} ({_NO_PART[code]}, in which no part is drawn)"
+        file_says = f"{file_says} ({_NO_PART[code]}, in which no part is drawn)"
     elif code:
-        said = f"{said}, which is no unit"
-    return Units("mm", 1.0, f"taken as mm: {said}"), [UNITLESS(said=said)]
+        file_says = f"{file_says}, which is no unit"
+    return Units("mm", 1.0, f"taken as mm: {file_says}"), [UNITLESS(said=file_says)]
 
 
 def _header_number(value: Any) -> int | None:

@@ -108,10 +108,10 @@ class WorldMap(Struct, frozen=True, eq=False):
 
     def flat_each(self, points: Floats) -> tuple[Floats, Any]:
         """Many entities' points (m, n, 3) as (m, n, 2) mm, and whether each is flat (m,)."""
-        placed = points @ self.linear + self.offset
-        width = np.ptp(placed[..., :2], axis=1).max(axis=1)
-        rise = np.ptp(placed[..., 2], axis=1)
-        return placed[..., :2], rise <= np.maximum(FLAT_TILT * width, POSITION_EPS_MM)
+        world_points = points @ self.linear + self.offset
+        width = np.ptp(world_points[..., :2], axis=1).max(axis=1)
+        rise = np.ptp(world_points[..., 2], axis=1)
+        return world_points[..., :2], rise <= np.maximum(FLAT_TILT * width, POSITION_EPS_MM)
 
     def plane(self, extrusion: Any, elevation: float) -> Plane:
         """The plane of an OCS at this elevation; Unusable when it is tilted."""
@@ -132,8 +132,8 @@ class WorldMap(Struct, frozen=True, eq=False):
             axes = np.array(
                 [tuple(ocs.to_wcs(axis)) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
             )
-        u, v, up = axes @ self.linear
-        return Plane.of(u, v, self.offset, up)
+        u, v, rise = axes @ self.linear
+        return Plane.of(u, v, self.offset, rise)
 
 
 class DxfShape(Struct, frozen=True, eq=False):
@@ -151,8 +151,8 @@ class DxfShape(Struct, frozen=True, eq=False):
 
     def ring(self) -> DxfShape:
         """The same closed, whose last vertex is its first one."""
-        off = None if self.off_mm is None else self.off_mm[:-1]
-        return DxfShape(self.vertices[:-1], True, off, self.lacks)
+        errors = None if self.off_mm is None else self.off_mm[:-1]
+        return DxfShape(self.vertices[:-1], True, errors, self.lacks)
 
 
 def require(entity: Any, names: tuple[str, ...]) -> None:
@@ -164,13 +164,13 @@ def require(entity: Any, names: tuple[str, ...]) -> None:
 
 def numbers(values: Any) -> Floats:
     """Any numbers as an array; DrawingError when one of them is none."""
-    plain = isinstance(values, (list, np.ndarray))
-    found = np.array(values if plain else tuple(values), dtype=np.float64)
-    if not np.isfinite(found).all():
+    is_array = isinstance(values, (list, np.ndarray))
+    result = np.array(values if is_array else tuple(values), dtype=np.float64)
+    if not np.isfinite(result).all():
         raise DrawingError(
             "has a coordinate that is not a finite number", mend="delete it or draw it again"
         )
-    return found
+    return result
 
 
 def straight(points: Floats) -> Floats:
@@ -255,10 +255,14 @@ def _round(
 
 
 def circle_or_arc(
-    plane: Plane, of: tuple[float, float, float], start: float, sweep: float, tolerance_mm: float
+    plane: Plane,
+    circle: tuple[float, float, float],
+    start: float,
+    sweep: float,
+    tolerance_mm: float,
 ) -> DxfShape:
     """Circle or arc of a centre and a radius (x, y, r) in a plane; angles in rad, either way."""
-    x, y, radius = of
+    x, y, radius = circle
     centre = plane.origin + x * plane.u + y * plane.v
     if not plane.scale:
         axes = np.array([centre, radius * plane.u, radius * plane.v])
@@ -365,7 +369,7 @@ def polyline_with_bulges(
     if not closed:
         is_arc[-1] = False
     parts: list[Floats] = []
-    off: list[Floats] = []
+    errors: list[Floats] = []
     for k, row in enumerate(rows):
         if is_arc[k]:
             centre = plane.points(arcs.centre[k : k + 1])[0]
@@ -374,11 +378,11 @@ def polyline_with_bulges(
             curve = EllipseCurve(centre, u, v, *ends)
             fit = fit_arcs(curve, np.array([centre, u, v]), tolerance_mm)
             parts.append(fit.vertices[:-1])
-            off.append(fit.off_mm[:-1])
+            errors.append(fit.off_mm[:-1])
         else:
             parts.append(np.array([[row[0], row[1], 0.0]]))
-            off.append(np.zeros((1, 2)))
-    return DxfShape(np.concatenate(parts), closed, np.concatenate(off))
+            errors.append(np.zeros((1, 2)))
+    return DxfShape(np.concatenate(parts), closed, np.concatenate(errors))
 
 
 # Splines, helices and the outlines of text.
@@ -456,21 +460,21 @@ def spline_of(
 def outline(parts: list[Floats], closed: bool, frame: WorldMap, tolerance_mm: float) -> DxfShape:
     """Béziers of 2 (a line), 3 or 4 control points (k, 3) in world coordinates, end to end."""
     vertices: list[Floats] = []
-    off: list[Floats] = []
+    errors: list[Floats] = []
     flat = frame.flat(np.concatenate([numbers(list(part)) for part in parts]))
     counts = np.cumsum([len(part) for part in parts])
     for control in np.split(flat, counts[:-1]):
         if len(control) == _LINE_POINTS:
             vertices.append(straight(control[:1]))
-            off.append(np.zeros((1, 2)))
+            errors.append(np.zeros((1, 2)))
             continue
         fit = fit_arcs(BezierCurve(control), control, tolerance_mm)
         count = max(len(fit.vertices) - 1, 1)
         vertices.append(fit.vertices[:count])
-        off.append(fit.off_mm[:count])
+        errors.append(fit.off_mm[:count])
     vertices.append(straight(flat[-1:]))
-    off.append(np.zeros((1, 2)))
-    return DxfShape(np.concatenate(vertices), closed, np.concatenate(off))
+    errors.append(np.zeros((1, 2)))
+    return DxfShape(np.concatenate(vertices), closed, np.concatenate(errors))
 
 
 # The outlines of areas: HATCH, MPOLYGON, SOLID, TRACE and 3DFACE.
@@ -490,11 +494,11 @@ def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     paths = [path for path in entity.paths if not path.path_type_flags & _TEXT_BOX]
     if not paths:
         raise Unusable("has no outline")
-    own = [path for path in paths if not _is_boundary_of_entities(path, entity)]
-    if not own:
+    own_paths = [path for path in paths if not _is_boundary_of_entities(path, entity)]
+    if not own_paths:
         raise Unusable("has the outline of other entities, which are read")
     shapes: list[DxfShape] = []
-    for path in own:
+    for path in own_paths:
         if hasattr(path, "edges"):
             shapes.extend(_edge(edge, plane, tolerance_mm) for edge in path.edges)
         else:

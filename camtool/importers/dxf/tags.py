@@ -92,8 +92,8 @@ class Tags(ABC):
 
     def pairs(self, rows: Ints) -> Iterator[tuple[int, Any]]:
         """Code and value of each of these tags."""
-        for some in lots(rows):
-            yield from zip(self.codes[some].tolist(), self.values(some), strict=True)
+        for part in lots(rows):
+            yield from zip(self.codes[part].tolist(), self.values(part), strict=True)
 
     def where(self, row: int) -> str:
         """The place of a tag for messages."""
@@ -153,16 +153,16 @@ class TextTags(Tags):
     def raw(self, rows: Ints) -> Iterator[bytes]:
         """The lines of the values of these tags."""
         data = self.data
-        for some in lots(rows):
-            ends = zip(self.at[2 * some + 1].tolist(), self.at[2 * some + 2].tolist(), strict=True)
+        for part in lots(rows):
+            ends = zip(self.at[2 * part + 1].tolist(), self.at[2 * part + 2].tolist(), strict=True)
             yield from [data[begin : end - 1] for begin, end in ends]
 
     def values(self, rows: Ints) -> Iterator[str]:
         """The values of these tags."""
-        for some in lots(rows):
+        for part in lots(rows):
             texts = [
                 line.decode(self.encoding, "surrogateescape").rstrip("\r")
-                for line in self.raw(some)
+                for line in self.raw(part)
             ]
             yield from _without_escapes(texts) if self.escaped else texts
 
@@ -237,20 +237,20 @@ def ascii_tags(data: bytes, file: str) -> Tags:
     data, encoding, notes = _plain_lines(data)
     letters = np.frombuffer(data, dtype=np.uint8)
     feeds = np.flatnonzero(letters == ord("\n")).astype(np.int32)
-    at = np.concatenate([[0], feeds + 1, [len(data) + 1]], dtype=np.int32)
-    count = (len(at) - 1) // 2
+    starts = np.concatenate([[0], feeds + 1, [len(data) + 1]], dtype=np.int32)
+    count = (len(starts) - 1) // 2
     codes = np.empty(count, dtype=np.int32)
-    known: dict[bytes, int] = {}
+    codes_by_line: dict[bytes, int] = {}
     for first in range(0, count, AT_ONCE):
         last = min(first + AT_ONCE, count)
-        lines = data[at[2 * first] : at[2 * last] - 1].split(b"\n")[::2]
-        for line in {*lines} - known.keys():
-            known[line] = int(line) if _CODE.fullmatch(line) else -1
-        codes[first:last] = [known[line] for line in lines]
+        lines = data[starts[2 * first] : starts[2 * last] - 1].split(b"\n")[::2]
+        for line in {*lines} - codes_by_line.keys():
+            codes_by_line[line] = int(line) if _CODE.fullmatch(line) else -1
+        codes[first:last] = [codes_by_line[line] for line in lines]
     escaped = b"\\U+" in data or b"\\M+" in data
-    tags = TextTags(codes, notes, data, at, encoding, escaped)
-    said = zip(tags.marks.tolist(), tags.values(tags.marks), strict=True)
-    end = next((row for row, value in said if value == "EOF"), None)
+    tags = TextTags(codes, notes, data, starts, encoding, escaped)
+    marks = zip(tags.marks.tolist(), tags.values(tags.marks), strict=True)
+    end = next((row for row, value in marks if value == "EOF"), None)
     if end is not None:
         tags = replace(tags, codes=codes[: end + 1])
     _check_codes(tags, file)
@@ -296,43 +296,51 @@ def lost_entities(tags: Tags, frame: DxfSections) -> list[str]:
 
     An entity that has two layers is two entities, the mark (0) of one being damaged.
     """
-    found: list[str] = []
+    losses: list[str] = []
     for section in frame.sections:
         if section.name not in ("ENTITIES", "BLOCKS"):
             continue
         rows = np.flatnonzero(tags.codes[section.begin : section.end] == _LAYER) + section.begin
         entity = np.searchsorted(tags.marks, rows, side="right")
         twice = rows[1:][np.diff(entity) == 0]
-        found.extend(f"{tags.where(int(k))}: two entities run into one" for k in twice)
-    return found + _lost_vertices(tags)
+        losses.extend(f"{tags.where(int(k))}: two entities run into one" for k in twice)
+    return losses + _lost_vertices(tags)
 
 
 def _lost_vertices(tags: Tags) -> list[str]:
     """LWPOLYLINEs that do not have the vertices that they count, in words."""
-    found: list[str] = []
+    losses: list[str] = []
     vertices, counts = (np.flatnonzero(tags.codes == code) for code in (_POINT, _COUNT))
     ends = [*tags.marks[1:].tolist(), len(tags.codes)]
     for begin, end, kind in zip(tags.marks.tolist(), ends, tags.kinds, strict=True):
         if str(kind).strip() == "LWPOLYLINE":
-            held = int(np.searchsorted(vertices, end) - np.searchsorted(vertices, begin))
-            at = int(np.searchsorted(counts, begin))
-            said = str(tags.value(int(counts[at]))).strip() if at < len(counts) else ""
-            if at < len(counts) and counts[at] < end and said != str(held):
+            holds = int(np.searchsorted(vertices, end) - np.searchsorted(vertices, begin))
+            count_row = int(np.searchsorted(counts, begin))
+            stated_count = (
+                str(tags.value(int(counts[count_row]))).strip() if count_row < len(counts) else ""
+            )
+            if (
+                count_row < len(counts)
+                and counts[count_row] < end
+                and stated_count != str(holds)
+            ):
                 where = tags.where(begin)
-                found.append(f"{where}: LWPOLYLINE counts {said[:9]} vertices and holds {held}")
-    return found
+                losses.append(
+                    f"{where}: LWPOLYLINE counts {stated_count[:9]} vertices and holds {holds}"
+                )
+    return losses
 
 
 def header_of(tags: Tags, frame: DxfSections) -> dict[str, Any]:
     """The variables of the header that the file itself says, each with its first value."""
-    found: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
     for section in frame.sections:
         if section.name == "HEADER":
             end = len(tags.codes) if section.end is None else section.end
             rows = np.flatnonzero(tags.codes[section.begin : end - 1] == _VARIABLE) + section.begin
             for name, value in zip(tags.values(rows), tags.values(rows + 1), strict=True):
-                found.setdefault(str(name).strip(), value)
-    return found
+                variables.setdefault(str(name).strip(), value)
+    return variables
 
 
 def _plain_lines(data: bytes) -> tuple[bytes, str, tuple[str, ...]]:
@@ -412,8 +420,10 @@ def _without_escapes(values: list[str]) -> list[str]:
         has_mif_encoding,
     )
 
-    plain = [decode_dxf_unicode(value) if has_dxf_unicode(value) else value for value in values]
-    return [decode_mif_to_unicode(value) if has_mif_encoding(value) else value for value in plain]
+    decoded = [decode_dxf_unicode(value) if has_dxf_unicode(value) else value for value in values]
+    return [
+        decode_mif_to_unicode(value) if has_mif_encoding(value) else value for value in decoded
+    ]
 
 
 def _section_name(tags: Tags, begin: int) -> str:
@@ -425,12 +435,12 @@ def _section_name(tags: Tags, begin: int) -> str:
 def _wrong_names(tags: Tags, sections: list[Section]) -> list[str]:
     """Sections that are unknown or stand twice, in words."""
     faults: list[str] = []
-    seen: set[str] = set()
+    names_so_far: set[str] = set()
     for section in sections:
         name, where = section.name, tags.where(section.begin)
         if name not in SECTIONS:
             faults.append(f"{where}: section {name[:20]!r} is unknown and left out")
-        elif name in seen:
+        elif name in names_so_far:
             faults.append(f"{where}: section {name} stands twice")
-        seen.add(name)
+        names_so_far.add(name)
     return faults

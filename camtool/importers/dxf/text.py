@@ -97,12 +97,12 @@ class _Place(Struct, frozen=True, eq=False):
         if not ink.points:
             return []
         points = np.concatenate(ink.points) @ np.array([self.u, self.v]) + self.origin
-        contours, at = [], 0
+        contours, pen = [], 0
         for counts, closed in ink.contours:
-            ends = list(accumulate(counts, initial=at))
+            ends = list(accumulate(counts, initial=pen))
             parts = [points[start:end] for start, end in pairwise(ends)]
             contours.append(TextContour(parts, closed))
-            at = ends[-1]
+            pen = ends[-1]
         return contours
 
 
@@ -136,12 +136,12 @@ def _text(entity: Any, mode: str) -> TextShape:
 def _runs(raw: str) -> list[tuple[str, Rule]]:
     """The text without its codes: %%c %%d %%p %%% %%nnn are signs; %%u %%o %%k begin and end
     lines along it."""
-    rules, runs, at = Rule.NONE, [], 0
+    rules, runs, position = Rule.NONE, [], 0
     text = "".join(c if c >= " " else " " for c in _CARET.sub(_control, raw))
     for code in [*_CODE.finditer(text), None]:
-        run = text[at : code.start() if code else None]
+        run = text[position : code.start() if code else None]
         if code:
-            at = code.end()
+            position = code.end()
             run += character_of_number(code[1]) if code[1] else _SIGNS.get(code[2].lower(), "")
         if run:
             runs.append((run, rules))
@@ -163,7 +163,7 @@ def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
     insert = finite(*dxf.insert)
     second = finite(*dxf.get("align_point", dxf.insert))
     (turn,) = finite(math.radians(dxf.rotation))
-    stretch, at = (1.0, 1.0), second
+    stretch, anchor = (1.0, 1.0), second
     halign = int(dxf.halign)
     if halign in (_ALIGNED, _FIT):
         length = math.dist(insert[:2], second[:2])
@@ -173,9 +173,9 @@ def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
         turn = math.atan2(second[1] - insert[1], second[0] - insert[0])
         signs = [1.0, signs[0] * signs[1]]
         stretch = (length / width, length / width if halign == _ALIGNED else 1.0)
-        at = insert
+        anchor = insert
     elif halign == 0 and int(dxf.valign) == 0:
-        at = insert
+        anchor = insert
     cosine, sine = math.cos(turn), math.sin(turn)
     if not any(finite(*dxf.extrusion)):
         raise Unusable("has an extrusion of 0")
@@ -185,7 +185,7 @@ def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
         for vector in (
             (signs[0] * cosine, signs[0] * sine, 0.0),
             (-signs[1] * sine, signs[1] * cosine, 0.0),
-            tuple(at),
+            tuple(anchor),
         )
     )
     return _Place(origin, u, v), stretch
@@ -219,24 +219,24 @@ def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
     )
     if not height > 0.0:
         raise Unusable("has no size")
-    wanted = _wanted_font(style)
-    font, _ = font_for(wanted, mode)
+    requested = _wanted_font(style)
+    font, _ = font_for(requested, mode)
     look = TextLook(font, height, factor, slant(oblique))
-    ink, fonts = write_mtext(entity, content, look, (wanted, mode))
+    ink, fonts = write_mtext(entity, content, look, (requested, mode))
     names = dict.fromkeys(name for name, _ in fonts)
-    others = dict.fromkeys(other for _, other in fonts if other)
-    return _shape(ink, _block(entity), ", ".join(names), ", ".join(others))
+    other_names = dict.fromkeys(other for _, other in fonts if other)
+    return _shape(ink, _block(entity), ", ".join(names), ", ".join(other_names))
 
 
 def _block(entity: Any) -> _Place:
     """The plane of an MTEXT, its insertion point at (0, 0)."""
     insert = np.array(finite(*entity.dxf.insert))
     normal, along = (finite(*v) for v in (entity.dxf.extrusion, entity.get_text_direction()))
-    up = np.cross(normal, along)
-    sizes = math.hypot(*along), math.hypot(*up)
+    rise = np.cross(normal, along)
+    sizes = math.hypot(*along), math.hypot(*rise)
     if not min(sizes) > 0.0:
         raise Unusable("has no direction")
-    return _Place(insert, np.array(along) / sizes[0], up / sizes[1])
+    return _Place(insert, np.array(along) / sizes[0], rise / sizes[1])
 
 
 def _shape(ink: Ink, place: _Place, font: str, substituted: str) -> TextShape:

@@ -101,12 +101,12 @@ class DxfWalk:
     def _entities(self, entities: Iterable[Any], scope: DxfScope) -> None:
         lines: list[tuple[int, Any, DxfLook]] = []
         for entity in entities:
-            kind, said = entity.dxftype(), vars(entity.dxf)
-            look = self._looks.of_entity(said, scope.look)
+            kind, attributes = entity.dxftype(), vars(entity.dxf)
+            look = self._looks.of_entity(attributes, scope.look)
             try:
                 if scope.blocks:
                     self._visit()
-                self._check_shown(kind, said, look)
+                self._check_shown(kind, attributes, look)
                 if kind == "LINE":
                     require(entity, ("start", "end"))
                     lines.append((len(self.pieces), entity, look))
@@ -120,12 +120,12 @@ class DxfWalk:
         if lines:
             self._lines(lines, scope)
 
-    def _check_shown(self, kind: str, said: dict[str, Any], look: DxfLook) -> None:
+    def _check_shown(self, kind: str, attributes: dict[str, Any], look: DxfLook) -> None:
         """Unusable when the entity does not show."""
         # An INSERT on a layer that is off still shows what its block has on other layers.
         if look.hidden and (kind != "INSERT" or look.frozen):
             raise Unusable(look.hidden)
-        if said.get("invisible"):
+        if attributes.get("invisible"):
             raise Unusable("is invisible")
 
     def _entity(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
@@ -160,7 +160,7 @@ class DxfWalk:
     def _lines(self, lines: list[tuple[int, Any, DxfLook]], scope: DxfScope) -> None:
         """All LINEs of a scope, each into the place that was kept for it."""
         following = [self._following(entity) for _, entity, _ in lines]
-        counts = np.array([1 + len(more.handles) for more in following])
+        counts = np.array([1 + len(bulk.handles) for bulk in following])
         first = np.cumsum(counts) - counts
         is_first = np.zeros(counts.sum(), dtype=np.bool_)
         is_first[first] = True
@@ -168,14 +168,14 @@ class DxfWalk:
         ends = [(*entity.dxf.start, *entity.dxf.end) for _, entity, _ in lines]
         points[is_first] = np.array(ends, dtype=np.float64).reshape(-1, 2, 3)
         points[~is_first] = np.concatenate(
-            [_NO_LINES.ends, *(more.ends for more in following if more.handles)]
+            [_NO_LINES.ends, *(bulk.ends for bulk in following if bulk.handles)]
         )
         finite = np.isfinite(points).all(axis=(1, 2))
         if not finite.all():
-            at = int(np.argmin(finite))
-            of = int(np.searchsorted(first, at, side="right")) - 1
-            _, entity, look = lines[of]
-            handle = (entity.dxf.handle, *following[of].handles)[at - int(first[of])]
+            bad_row = int(np.argmin(finite))
+            line = int(np.searchsorted(first, bad_row, side="right")) - 1
+            _, entity, look = lines[line]
+            handle = (entity.dxf.handle, *following[line].handles)[bad_row - int(first[line])]
             raise DrawingError(
                 "has a coordinate that is not a finite number",
                 file=self.file,
@@ -186,8 +186,8 @@ class DxfWalk:
         vertices = np.zeros((len(points), 2, 3))
         vertices[:, :, :2] = flat
         rows = iter(zip(vertices, is_flat.tolist(), strict=True))
-        for (place, entity, look), more in zip(lines, following, strict=True):
-            for k, handle in enumerate((entity.dxf.handle, *more.handles)):
+        for (place, entity, look), bulk in zip(lines, following, strict=True):
+            for k, handle in enumerate((entity.dxf.handle, *bulk.handles)):
                 row, usable = next(rows)
                 if usable:
                     source = scope.source or f"LINE {handle}{scope.within}"
@@ -247,13 +247,13 @@ class DxfWalk:
         source, paper = _source(entity, scope), self.options.layout is not None
         unit_mm = self._mm_per_unit
         try:
-            said = callout(
+            measured = callout(
                 entity, scope.frame, unit_mm, layer=look.layer, source=source, paper=paper
             )
         except Unusable as reason:
             self.unread[entity.dxftype(), printable(str(reason))] += 1
         else:
-            self.callouts.append(said)
+            self.callouts.append(measured)
 
     def _parts(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
         """Walk through the entities that draw a dimension, a multiple line or a proxy."""
@@ -427,8 +427,8 @@ def parts_of(entity: Any) -> list[Any]:
 
 def _virtual(entity: Any) -> Iterable[Any]:
     if hasattr(entity, "virtual_entities"):
-        found: Iterable[Any] = entity.virtual_entities()
-        return found
+        entities: Iterable[Any] = entity.virtual_entities()
+        return entities
     if hasattr(entity, "__virtual_entities__"):
         return list(entity.__virtual_entities__())
     return ()
@@ -563,40 +563,49 @@ class DxfLooks(Struct):
         """With the layers of the document's table."""
         return cls({block_key(layer.dxf.name): _layer(layer) for layer in document.layers})
 
-    def of_entity(self, said: dict[str, Any], block: DxfLook | None) -> DxfLook:
+    def of_entity(self, attributes: dict[str, Any], block: DxfLook | None) -> DxfLook:
         """The look of an entity that says these attributes, in a block placed with `block`."""
-        wanted = tuple(said.get(name) for name in ("layer", "color", "true_color", "linetype"))
-        key = (*wanted, block)
+        attribute_key = tuple(
+            attributes.get(name) for name in ("layer", "color", "true_color", "linetype")
+        )
+        key = (*attribute_key, block)
         look = self._known.get(key)
         if look is None:
-            look = self._known[key] = self._resolved(said, block or DxfLook(), block is not None)
+            look = self._known[key] = self._resolved(
+                attributes, block or DxfLook(), block is not None
+            )
         return look
 
-    def _resolved(self, said: dict[str, Any], block: DxfLook, inside: bool) -> DxfLook:
-        name = printable(str(said.get("layer") or "0"))
+    def _resolved(self, attributes: dict[str, Any], block: DxfLook, inside: bool) -> DxfLook:
+        name = printable(str(attributes.get("layer") or "0"))
         if inside and name == "0":
             name = block.layer
-        on = self.layers.get(block_key(name), DxfLook(name))
-        line_type = printable(str(said.get("linetype") or "BYLAYER"))
-        by = {"BYLAYER": on.line_type, "BYBLOCK": block.line_type}
+        layer_look = self.layers.get(block_key(name), DxfLook(name))
+        line_type = printable(str(attributes.get("linetype") or "BYLAYER"))
+        inherited = {"BYLAYER": layer_look.line_type, "BYBLOCK": block.line_type}
         return DxfLook(
-            on.layer,
-            _colour(said.get("color"), said.get("true_color"), on.colour, block.colour),
-            by.get(line_type.upper(), line_type),
-            on.hidden,
-            on.frozen,
+            layer_look.layer,
+            _colour(
+                attributes.get("color"),
+                attributes.get("true_color"),
+                layer_look.colour,
+                block.colour,
+            ),
+            inherited.get(line_type.upper(), line_type),
+            layer_look.hidden,
+            layer_look.frozen,
         )
 
 
 def _layer(layer: Any) -> DxfLook:
     """The look that a layer gives."""
-    said = vars(layer.dxf)
+    attributes = vars(layer.dxf)
     name, frozen = printable(str(layer.dxf.name)), bool(layer.is_frozen())
     state = "frozen" if frozen else "off" if layer.is_off() else ""
     return DxfLook(
         name,
-        _colour(said.get("color"), said.get("true_color"), FOREGROUND, FOREGROUND),
-        printable(str(said.get("linetype", CONTINUOUS))),
+        _colour(attributes.get("color"), attributes.get("true_color"), FOREGROUND, FOREGROUND),
+        printable(str(attributes.get("linetype", CONTINUOUS))),
         f"layer {name} is {state}" if state else "",
         frozen,
     )

@@ -108,14 +108,14 @@ class _Job:
         rows = [self._vector(part) for part in _PARTS[name]]
         x, y = rows
         if (x is None) != (y is None):
-            here = self.values[_PARTS[name][x is None]]
-            self._fail(f"{_PARTS[name][x is None]} has no {_PARTS[name][x is not None]}", here)
+            line = self.values[_PARTS[name][x is None]]
+            self._fail(f"{_PARTS[name][x is None]} has no {_PARTS[name][x is not None]}", line)
         parts = None
         if x is not None and y is not None:
-            here = self.values[_PARTS[name][0]]
+            line = self.values[_PARTS[name][0]]
             if len(x) != len(y):
-                self._fail(f"{_PARTS[name][0]} and {_PARTS[name][1]} differ in length", here)
-            parts = np.column_stack([x, y]), here.line
+                self._fail(f"{_PARTS[name][0]} and {_PARTS[name][1]} differ in length", line)
+            parts = np.column_stack([x, y]), line.line
         if value is None:
             return parts
         array = value.array if self.sideways else value.array.T
@@ -168,9 +168,9 @@ class _Job:
             self._fail_at("velxy has not the directions of the lines of xy", speeds[1])
         self._count(len(steps))
         for name, place in zip(("first_pointx", "first_pointy"), points[:1].ravel(), strict=False):
-            wanted = self._scalar(name)
-            if wanted is not None and abs(wanted - place) > AGREES_UNITS:
-                self._fail(f"{name} is {wanted:g}, xy begins at {place:g}", self.values[name])
+            expected = self._scalar(name)
+            if expected is not None and abs(expected - place) > AGREES_UNITS:
+                self._fail(f"{name} is {expected:g}, xy begins at {place:g}", self.values[name])
 
     def _count(self, lines: int) -> None:
         count = self._scalar("size_of_array")
@@ -257,7 +257,7 @@ class _Parser:
 
     def values(self) -> dict[str, MatlabArray]:
         """Every assigned array by its name."""
-        found: dict[str, MatlabArray] = {}
+        arrays: dict[str, MatlabArray] = {}
         while self._now.kind != "end":
             token = self._take()
             if token.text in ("\n", ";", ","):
@@ -268,10 +268,10 @@ class _Parser:
                 continue
             if token.text not in self.names:
                 self._fail(f"{token.text!r} is none of the known arrays", token, self._known())
-            if token.text in found:
+            if token.text in arrays:
                 self._fail(f"{token.text} is assigned twice", token, "give one job a file")
-            found[token.text] = MatlabArray(self._value(token.text), token.line)
-        return found
+            arrays[token.text] = MatlabArray(self._value(token.text), token.line)
+        return arrays
 
     def _value(self, name: str) -> Floats:
         """Parse the value that is assigned to a name, up to the end of the statement."""

@@ -111,13 +111,13 @@ class _Lines(Struct):
     starts: list[tuple[int, int]] = field(default_factory=list)
 
     def parse(self, text: str) -> PointTable:
-        fresh, may_name = True, True
+        starts_stroke, may_name = True, True
         pattern: re.Pattern[str] | None = None
         for number, line in enumerate(_lines_of(text), start=1):
             content = _COMMENT.split(line, maxsplit=1)[0] if "#" in line or "%" in line else line
             if not content.strip(_BLANK_LINE):
                 # A line that is nothing but a comment does not end a stroke.
-                fresh = fresh or not line.strip(_BLANK_LINE)
+                starts_stroke = starts_stroke or not line.strip(_BLANK_LINE)
                 continue
             content = content.rstrip()
             named = may_name and self._names(content, number)
@@ -127,9 +127,9 @@ class _Lines(Struct):
             if pattern is None:
                 self.parted = _separator(content, self.columns)
                 pattern = _row_pattern(self.parted, self.columns)
-            if fresh:
+            if starts_stroke:
                 self.starts.append((len(self.numbers) // self.columns, number))
-                fresh = False
+                starts_stroke = False
             self.numbers.extend(self._row(content, number, pattern))
         self._refuse_ambiguous()
         return PointTable(self._strokes(), self.unit)
@@ -144,20 +144,20 @@ class _Lines(Struct):
 
     def _row(self, content: str, line: int, pattern: re.Pattern[str]) -> tuple[float, ...]:
         """The numbers of one line; the pattern reads what is plain, and is many times faster."""
-        found = pattern.fullmatch(content)
-        if found is None:
+        match = pattern.fullmatch(content)
+        if match is None:
             return self._diagnosed(content, line)
         if self.parted != ",":
             if "," in content:
                 self._comma(content, content.count(",") < self.columns, line)
                 content = content.replace(",", ".")
-                found = pattern.fullmatch(content)
-                assert found is not None
+                match = pattern.fullmatch(content)
+                assert match is not None
             elif "." in content:
                 self._point(line)
             else:
                 self.proven = True
-        values = tuple(map(float, found.groups()))
+        values = tuple(map(float, match.groups()))
         if not all(map(math.isfinite, values)):
             return self._diagnosed(content, line)
         return values
@@ -166,9 +166,9 @@ class _Lines(Struct):
         """The numbers of one line, field by field; DrawingError naming the first bad one."""
         fields = _fields(content, self.parted or "")
         if len(fields) != self.columns:
-            wanted = "x and y" if self.columns == 2 else "x, y and bulge"
+            expected = "x and y" if self.columns == 2 else "x, y and bulge"
             raise DrawingError(
-                f"{len(fields)} fields, wanted {wanted}",
+                f"{len(fields)} fields, wanted {expected}",
                 file=self.file,
                 where=f"line {line}",
                 mend="if the comma is the decimal sign too, separate x and y by a semicolon"
@@ -178,16 +178,16 @@ class _Lines(Struct):
         return tuple(self._number(text, column, line) for text, column in fields)
 
     def _number(self, text: str, column: int, line: int) -> float:
-        bare = text.strip("\"'").strip()
+        content = text.strip("\"'").strip()
         if self.parted != "," or _QUOTED.fullmatch(text):
-            if "," in bare:
-                self._comma(bare, False, line)
-            elif "." in bare:
+            if "," in content:
+                self._comma(content, False, line)
+            elif "." in content:
                 self._point(line)
-            bare = bare.replace(",", ".", 1)
-        value = float(bare) if _NUMBER.fullmatch(bare) else None
+            content = content.replace(",", ".", 1)
+        value = float(content) if _NUMBER.fullmatch(content) else None
         if value is None or not math.isfinite(value):
-            odd = "is not finite" if value is not None or _not_finite(bare) else "is no number"
+            odd = "is not finite" if value is not None or _not_finite(content) else "is no number"
             where = f"line {line}, column {column}"
             raise DrawingError(f"{text!r} {odd}", file=self.file, where=where)
         return value
@@ -227,14 +227,14 @@ class _Lines(Struct):
         """True if the line names the columns; DrawingError if it names them in another order."""
         parted = next((sign for sign in (";", "\t", ",") if sign in content), "")
         fields = content.split(parted) if parted else content.split()
-        found = [_NAME.fullmatch(name) for name in fields]
-        names = [match[1].strip() for match in found if match]
+        matches = [_NAME.fullmatch(name) for name in fields]
+        names = [match[1].strip() for match in matches if match]
         if len(names) < len(fields) or any(_not_finite(name) for name in names):
             return False
         first = [name.lower()[:1] for name in names]
-        known = first == ["x", "y"] or not set(first) & {"x", "y"}
+        in_order = first == ["x", "y"] or not set(first) & {"x", "y"}
         bulged = len(names) == 3 and first[:2] == ["x", "y"] and names[2].lower() == "bulge"
-        if not bulged and (len(names) != 2 or not known):
+        if not bulged and (len(names) != 2 or not in_order):
             raise DrawingError(
                 f"columns are {content.strip()!r}",
                 file=self.file,
@@ -269,19 +269,19 @@ class _Lines(Struct):
 def _separator(content: str, columns: int) -> str:
     """Return the separator of the fields of this line; "" for blanks."""
     content = content.strip()
-    bare = _QUOTED.sub("0", content)
-    if ";" in bare:
+    unquoted = _QUOTED.sub("0", content)
+    if ";" in unquoted:
         return ";"
-    if "," in bare:
-        pieces = [piece.strip() for piece in bare.split(",")]
-        whole = len(pieces) == columns and all(map(_NUMBER.fullmatch, pieces))
-        if whole or _COMMA_THEN_BLANK.search(bare):
+    if "," in unquoted:
+        pieces = [piece.strip() for piece in unquoted.split(",")]
+        is_complete = len(pieces) == columns and all(map(_NUMBER.fullmatch, pieces))
+        if is_complete or _COMMA_THEN_BLANK.search(unquoted):
             return ","
-        if "\t" in bare:
+        if "\t" in unquoted:
             return "\t"
         blank = content.split()
         return "" if len(blank) == columns and all(map(_NUMBER_COMMA.fullmatch, blank)) else ","
-    return "\t" if "\t" in bare else ""
+    return "\t" if "\t" in unquoted else ""
 
 
 def _row_pattern(parted: str, columns: int) -> re.Pattern[str]:
@@ -381,10 +381,12 @@ class _Walker:
     def _points(self, value: object, where: str) -> list[tuple[float, float]]:
         points: list[tuple[float, float]] = []
         for row, pair in enumerate(self._list(value, where)):
-            at = f"{where}[{row}]"
+            place = f"{where}[{row}]"
             if not isinstance(pair, list) or len(pair) != 2:
-                self._fail("is no [x, y]", at)
-            points.append((self._number(pair[0], f"{at}[0]"), self._number(pair[1], f"{at}[1]")))
+                self._fail("is no [x, y]", place)
+            points.append(
+                (self._number(pair[0], f"{place}[0]"), self._number(pair[1], f"{place}[1]"))
+            )
         return points
 
     def _number(self, value: object, where: str) -> float:
@@ -503,20 +505,22 @@ def _array(data: bytes, file: str, name: str) -> Floats:
     where = f"array {name}" if name else None
     shape, fortran, dtype, begin = _header(data, file, where)
     if dtype.hasobject or dtype.kind not in "fiu":
-        what = "objects" if dtype.hasobject else f"numbers of type {dtype}"[:60]
-        raise DrawingError(f"holds {what}, no coordinates", file=file, where=where, mend=_SAVE)
+        content = "objects" if dtype.hasobject else f"numbers of type {dtype}"[:60]
+        raise DrawingError(f"holds {content}, no coordinates", file=file, where=where, mend=_SAVE)
     if len(shape) != 2 or shape[1] not in COLUMNS:
-        turned = len(shape) == 2 and shape[0] in COLUMNS
+        is_transposed = len(shape) == 2 and shape[0] in COLUMNS
         raise DrawingError(
             f"is an array {shape}",
             file=file,
             where=where,
-            mend="transpose it (array.T): a row is a point" if turned else _SAVE,
+            mend="transpose it (array.T): a row is a point" if is_transposed else _SAVE,
         )
-    wanted = math.prod(shape) * dtype.itemsize
-    if len(data) - begin != wanted:
+    expected_bytes = math.prod(shape) * dtype.itemsize
+    if len(data) - begin != expected_bytes:
         raise DrawingError(
-            f"holds {len(data) - begin} bytes of numbers, wanted {wanted}", file=file, where=where
+            f"holds {len(data) - begin} bytes of numbers, wanted {expected_bytes}",
+            file=file,
+            where=where,
         )
     raw = np.frombuffer(data, dtype, offset=begin)
     with np.errstate(over="ignore", invalid="ignore"):

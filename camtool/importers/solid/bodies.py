@@ -70,14 +70,14 @@ def subshapes(shape: Any, kind: Any, outside: Any = None) -> list[Any]:
     from OCP.TopAbs import TopAbs_SHAPE
     from OCP.TopExp import TopExp_Explorer
 
-    found: dict[int, list[Any]] = {}
+    parts_by_hash: dict[int, list[Any]] = {}
     parts: list[Any] = []
     explorer = TopExp_Explorer(shape, kind, TopAbs_SHAPE if outside is None else outside)
     while explorer.More():
         part = explorer.Current()
-        same = found.setdefault(hash(part), [])
-        if not any(part.IsSame(other) for other in same):
-            same.append(part)
+        twins = parts_by_hash.setdefault(hash(part), [])
+        if not any(part.IsSame(other) for other in twins):
+            twins.append(part)
             parts.append(_as_own_class(part))
         explorer.Next()
     return parts
@@ -226,20 +226,20 @@ class _Tree:
         from OCP.Quantity import Quantity_Color
         from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType
 
-        found = Quantity_Color()
+        colour = Quantity_Color()
         for kind in (XCAFDoc_ColorType.XCAFDoc_ColorGen, XCAFDoc_ColorType.XCAFDoc_ColorSurf):
-            if XCAFDoc_ColorTool.GetColor_s(label, kind, found):
-                return colour_of(found)
+            if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):
+                return colour_of(colour)
         return ""
 
     def _shape_colour(self, shape: Any) -> str:
         from OCP.Quantity import Quantity_Color
         from OCP.XCAFDoc import XCAFDoc_ColorType
 
-        found = Quantity_Color()
+        colour = Quantity_Color()
         for kind in (XCAFDoc_ColorType.XCAFDoc_ColorGen, XCAFDoc_ColorType.XCAFDoc_ColorSurf):
-            if self.colours.GetColor(shape, kind, found):
-                return colour_of(found)
+            if self.colours.GetColor(shape, kind, colour):
+                return colour_of(colour)
         return ""
 
 
@@ -291,8 +291,8 @@ def run_script(data: bytes, file: str) -> list[Body]:
         raise DrawingError(f"is no Python: {error.msg}", where=where, mend=_MEND) from error
     # Whatever the script raises is a fault of the script.
     except Exception as error:
-        what = f"{type(error).__name__}: {error}".rstrip(": ")
-        raise _script_error(f"stopped with {what}", error, file) from error
+        error_text = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise _script_error(f"stopped with {error_text}", error, file) from error
     return _bodies_of_result(names)
 
 
@@ -322,10 +322,10 @@ def _bodies_of_result(names: dict[str, Any]) -> list[Body]:
             f"{name} is of type {error}, no shape",
             mend="let it be a shape, a list of shapes or a builder of build123d",
         ) from error
-    found = [body for shape in shapes for body in shape_bodies(shape)]
-    if not found:
+    bodies = [body for shape in shapes for body in shape_bodies(shape)]
+    if not bodies:
         raise DrawingError(f"{name} is empty", mend=_MEND)
-    return found
+    return bodies
 
 
 def _shapes(value: Any) -> list[Any]:
@@ -334,8 +334,8 @@ def _shapes(value: Any) -> list[Any]:
 
     for builder, inside in ((BuildPart, "part"), (BuildSketch, "sketch"), (BuildLine, "line")):
         if isinstance(value, builder):
-            made = getattr(value, inside)
-            return [] if made is None else _shapes(made)
+            inner = getattr(value, inside)
+            return [] if inner is None else _shapes(inner)
     if isinstance(value, Shape) and value.wrapped is not None:
         return [value]
     if isinstance(value, list | tuple):

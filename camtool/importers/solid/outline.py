@@ -56,20 +56,22 @@ def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outl
             f"{high:.6g}",
             mend="give a --section-z between them",
         )
-    found: list[SolidOutline] = []
+    outlines_found: list[SolidOutline] = []
     levels: list[float] = []
-    missed: Counter[str] = Counter()
+    missed_kinds: Counter[str] = Counter()
     for body, box in zip(bodies, boxes, strict=True):
         kind, faces, edges, level = _choose_faces(body, box, height)
         wires = [_wires(face, tolerance) for face in faces]
         if edges:
             wires.append([edge_path(edge, tolerance) for edge in edges])
-        found.extend(SolidOutline(kind, body.layer, body.colour, paths) for paths in wires)
+        outlines_found.extend(
+            SolidOutline(kind, body.layer, body.colour, paths) for paths in wires
+        )
         if not wires:
-            missed[_why_nothing_drawn(kind, height)] += 1
+            missed_kinds[_why_nothing_drawn(kind, height)] += 1
         if wires and level is not None:
             levels.append(level)
-    return Outlines(found, levels, (low, high), dict(missed))
+    return Outlines(outlines_found, levels, (low, high), dict(missed_kinds))
 
 
 def _why_nothing_drawn(kind: str, height: float | None) -> str:
@@ -172,14 +174,14 @@ def _wires(face: Any, tolerance: float) -> list[EdgePath]:
             ring.append(walk.Current())
             walk.Next()
         edges = subshapes(wire, TopAbs_EDGE)
-        whole = len(ring) == len(edges)
+        is_complete = len(ring) == len(edges)
         parts = [
             edge_path(edge, tolerance)
-            for edge in (ring if whole else edges)
+            for edge in (ring if is_complete else edges)
             if not BRep_Tool.Degenerated_s(edge)
         ]
         parts = [part for part in parts if len(part.vertices) > 1]
-        if parts and whole and is_ring(parts):
+        if parts and is_complete and is_ring(parts):
             paths.append(join_edges(parts))
         else:
             paths.extend(parts)
@@ -233,29 +235,29 @@ def edge_path(edge: Any, tolerance: float) -> EdgePath:
     exact = _exact(curve, start, end)
     if exact is None:
         fit = fit_curve(_free(curve, start, end), tolerance)
-        exact, off = fit.vertices, fit.off_mm
+        exact, error_mm = fit.vertices, fit.off_mm
     else:
-        off = np.zeros((len(exact), 2))
+        error_mm = np.zeros((len(exact), 2))
     if edge.Orientation() == TopAbs_REVERSED:
         exact = reversed_vertices(exact)  # and all of one edge is equally far off
-    return EdgePath(exact, False, off)
+    return EdgePath(exact, False, error_mm)
 
 
 def reversed_vertices(vertices: Floats) -> Floats:
     """The open path from its end to its beginning; bulges change their sign and their owner."""
-    back = vertices[::-1].copy()
-    back[:-1, 2] = -vertices[-2::-1, 2]
-    back[-1, 2] = 0.0
-    return back
+    vertices_back = vertices[::-1].copy()
+    vertices_back[:-1, 2] = -vertices[-2::-1, 2]
+    vertices_back[-1, 2] = 0.0
+    return vertices_back
 
 
 def join_edges(edges: list[EdgePath]) -> EdgePath:
     """Edges one after the other as one closed path; each ends where the next one begins."""
     vertices = np.concatenate([path.vertices[:-1] for path in edges])
-    off = [path.off[:-1].copy() for path in edges]
-    for row, step in zip(off, _steps(edges).tolist(), strict=True):
+    errors = [path.off[:-1].copy() for path in edges]
+    for row, step in zip(errors, _steps(edges).tolist(), strict=True):
         row[-1] += step if step > POSITION_EPS_MM else 0.0
-    return EdgePath(vertices, True, np.concatenate(off))
+    return EdgePath(vertices, True, np.concatenate(errors))
 
 
 def is_ring(edges: list[EdgePath]) -> bool:
@@ -276,17 +278,17 @@ def _exact(curve: Any, start: float, end: float) -> Floats | None:
 
     kind = curve.GetType()
     if kind == GeomAbs_Line:
-        return np.array([[*_xy(curve.Value(at)), 0.0] for at in (start, end)])
+        return np.array([[*_xy(curve.Value(t)), 0.0] for t in (start, end)])
     if kind != GeomAbs_Circle:
         return None
     circle = curve.Circle()
-    up = circle.Axis().Direction().Z()
+    axis_z = circle.Axis().Direction().Z()
     if math.hypot(circle.Axis().Direction().X(), circle.Axis().Direction().Y()) > LEVEL_RAD:
         return None
     centre, first = np.array(_xy(circle.Location())), np.array(_xy(curve.Value(start)))
-    sweep = math.copysign(end - start, up)
+    sweep = math.copysign(end - start, axis_z)
     if abs(abs(sweep) - 2.0 * math.pi) <= FULL_TURN_RAD:
-        sweep = math.copysign(2.0 * math.pi, up)
+        sweep = math.copysign(2.0 * math.pi, axis_z)
     angle = math.atan2(first[1] - centre[1], first[0] - centre[0])
     return arc_vertices(centre, circle.Radius(), angle, sweep)
 
@@ -350,7 +352,7 @@ def _sample_curve(curve: Any, start: float, end: float) -> Curve:
     curve.Intervals(bounds, GeomAbs_C1)
     breaks = np.array([bounds.Value(index) for index in range(1, count + 2)])
 
-    def at(order: int) -> Callable[[Floats], Floats]:
+    def sample_at(order: int) -> Callable[[Floats], Floats]:
         def values(t: Floats) -> Floats:
             point, slope = gp_Pnt(), gp_Vec()
             rows: list[tuple[float, float]] = []
@@ -361,7 +363,7 @@ def _sample_curve(curve: Any, start: float, end: float) -> Curve:
 
         return values
 
-    return FunctionCurve(at(0), at(1), breaks)
+    return FunctionCurve(sample_at(0), sample_at(1), breaks)
 
 
 def _reals(count: int) -> Any:

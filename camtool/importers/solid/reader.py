@@ -52,25 +52,25 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     kind, unit = _kind(data, file, options)
     scale = unit.scale(options, file)
     height = None if options.section_z_mm is None else options.section_z_mm / scale
-    wanted = {
+    request = {
         "kind": kind,
         "file": file,
         "height": height,
         "tolerance": max(options.tolerance_mm / scale, POSITION_EPS_MM),
     }
-    found = run_worker(data, wanted, file)
+    answer = run_worker(data, request, file)
     units = (
         Units("mm", 1.0, unit.why)
         if options.units is None
         else Units(options.units.lower(), options.mm_per(options.units), "as asked")
     )
     return assemble(
-        _pieces(found["outlines"], scale),
+        _pieces(answer["outlines"], scale),
         file=file,
         units=units,
-        used=dict(Counter(outline["kind"] for outline in found["outlines"])),
-        skipped=[Skipped("body", count, why) for why, count in found["missed"].items()],
-        findings=[*_faults(found), *_section_finding(found, scale, height)],
+        used=dict(Counter(outline["kind"] for outline in answer["outlines"])),
+        skipped=[Skipped("body", count, reason) for reason, count in answer["missed"].items()],
+        findings=[*_faults(answer), *_section_finding(answer, scale, height)],
         options=options,
     )
 
@@ -104,28 +104,28 @@ def _pieces(outlines: list[dict[str, Any]], scale: float) -> list[Piece]:
             vertices = np.array(path["vertices"], dtype=np.float64).reshape(-1, 3)
             vertices[:, :2] *= scale
             source = f"{outline['kind']} {number} wire {wire}"
-            off = scale * np.array(path["off"], dtype=np.float64).reshape(-1, 2)
+            errors = scale * np.array(path["off"], dtype=np.float64).reshape(-1, 2)
             look = outline["layer"], outline["colour"]
-            pieces.append(Piece(vertices, path["closed"], *look, source, off_mm=off))
+            pieces.append(Piece(vertices, path["closed"], *look, source, off_mm=errors))
     return pieces
 
 
-def _faults(found: dict[str, Any]) -> list[Finding]:
+def _faults(answer: dict[str, Any]) -> list[Finding]:
     """FILE_REPAIRED when the reader complained or a body does not hold together."""
     findings: list[Finding] = []
-    if found["faulty"]:
-        findings.append(FILE_REPAIRED_BODIES(measured=found["faulty"], bodies=found["bodies"]))
-    if found["complaint"]:
-        findings.append(FILE_REPAIRED_IN_PART(complaint=found["complaint"]))
+    if answer["faulty"]:
+        findings.append(FILE_REPAIRED_BODIES(measured=answer["faulty"], bodies=answer["bodies"]))
+    if answer["complaint"]:
+        findings.append(FILE_REPAIRED_IN_PART(complaint=answer["complaint"]))
     return findings
 
 
-def _section_finding(found: dict[str, Any], scale: float, height: float | None) -> list[Finding]:
+def _section_finding(answer: dict[str, Any], scale: float, height: float | None) -> list[Finding]:
     """SECTION_CHOSEN: what was taken, at which height, and how high the model is."""
-    if not found["levels"]:
+    if not answer["levels"]:
         return []
-    low, high = scale * min(found["levels"]), scale * max(found["levels"])
-    bottom, top = (scale * z for z in found["span"])
+    low, high = scale * min(answer["levels"]), scale * max(answer["levels"])
+    bottom, top = (scale * z for z in answer["span"])
     heights = f"{low:.6g}" if high - low <= POSITION_EPS_MM else f"{low:.6g} to {high:.6g}"
     sentence = SECTION_CHOSEN_FACES if height is None else SECTION_CHOSEN
     return [sentence(measured=high, heights=heights, bottom=bottom, top=top)]
@@ -153,21 +153,21 @@ _STDERR = 2
 _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 
 
-def run_worker(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
+def run_worker(data: bytes, request_items: dict[str, Any], file: str) -> dict[str, Any]:
     """Run the worker on these bytes; return its answer with a `complaint` of the reader, or "".
 
     DrawingError when the model is damaged; RuntimeError for a fault of camtool itself.
     """
-    script = wanted["kind"] == "script"
+    script = request_items["kind"] == "script"
     with tempfile.TemporaryDirectory() as folder:
         source, answer, chatter = (Path(folder, name) for name in ("source", "answer", "chatter"))
         source.write_bytes(data)
-        request = wanted | {"source": str(source), "answer": str(answer), "path": sys.path}
-        asked = Path(folder, "request")
-        asked.write_text(json.dumps(request), encoding="utf-8")
+        request = request_items | {"source": str(source), "answer": str(answer), "path": sys.path}
+        request_file = Path(folder, "request")
+        request_file.write_text(json.dumps(request), encoding="utf-8")
         with chatter.open("wb") as words:
             seconds = None if script else FILE_SECONDS + SECONDS_PER_MB * len(data) / 1e6
-            code = _run(asked, _STDERR if script else words.fileno(), seconds, file)
+            code = _run(request_file, _STDERR if script else words.fileno(), seconds, file)
         result = _answer(answer, code, script, file)
         with chatter.open("rb") as words:
             output = words.read(CHATTER_BYTES).decode("utf-8", errors="replace")
@@ -182,7 +182,7 @@ def run_worker(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]
 def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
     """The exit code of the worker, whose words go to this file descriptor."""
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-P", "-c", START, str(request)],
             stdin=subprocess.DEVNULL,
             stdout=output,
@@ -196,7 +196,7 @@ def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
             file=file,
             mend="simplify the model, or export it again",
         ) from error
-    return done.returncode
+    return process.returncode
 
 
 def _answer(answer: Path, code: int, script: bool, file: str) -> dict[str, Any]:

@@ -74,8 +74,8 @@ def parse_colour(text: str) -> str:
     if match := _RGB.fullmatch(text):
         return _joined([_channel(part) for part in match.groups()])
     if match := _HSL.fullmatch(text):
-        hue, full, light = (float(part) for part in match.groups())
-        share = [min(max(value / 100.0, 0.0), 1.0) for value in (light, full)]
+        hue, saturation, light = (float(part) for part in match.groups())
+        share = [min(max(value / 100.0, 0.0), 1.0) for value in (light, saturation)]
         return _joined(list(colorsys.hls_to_rgb(hue / 360.0 % 1.0, *share)))
     return ""
 

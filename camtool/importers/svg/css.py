@@ -84,11 +84,11 @@ class _Rule(Struct, frozen=True):
             if not places:
                 return False
             if child:
-                near = [place.parent for place in places if place.parent is not None]
+                parents = [place.parent for place in places if place.parent is not None]
             else:
                 # What lies around the inmost place lies around all others, or is one.
-                near = _around(places[0])
-            places = [place for place in near if step.matches(place)]
+                parents = _around(places[0])
+            places = [place for place in parents if step.matches(place)]
         return bool(places)
 
 
@@ -104,9 +104,9 @@ class CssRules(Struct):
 
     def read(self, text: str, properties: Iterable[str]) -> None:
         """Adds the rules of one sheet that say one of these properties."""
-        wanted = frozenset(properties)
+        kept_properties = frozenset(properties)
         for selectors, body in self._blocks(_without_comments(text)):
-            declarations = parse_declarations(body, wanted)
+            declarations = parse_declarations(body, kept_properties)
             if not declarations:
                 continue
             for selector in selectors.split(","):
@@ -117,32 +117,38 @@ class CssRules(Struct):
         when the sheets would take too long to apply."""
         if not self._count:
             return []
-        near = [self._by_tag[""], self._by_tag.get(node.tag, []), self._by_id.get(node.get("id"))]
-        near += [self._by_class.get(name) for name in dict.fromkeys(node.get("class").split())]
-        found: list[_Rule] = []
-        for rules in near:
+        rule_lists = [
+            self._by_tag[""],
+            self._by_tag.get(node.tag, []),
+            self._by_id.get(node.get("id")),
+        ]
+        rule_lists += [
+            self._by_class.get(name) for name in dict.fromkeys(node.get("class").split())
+        ]
+        rules_found: list[_Rule] = []
+        for rules in rule_lists:
             if rules:
                 self._matches += sum(rule.cost for rule in rules)
                 if self._matches > MAX_MATCHES:
                     raise DrawingError("its style sheets have too many rules", mend="simplify it")
-                found += [rule for rule in rules if rule.matches(node)]
-        found.sort(key=lambda rule: rule.weight)
-        return [rule.declarations for rule in found]
+                rules_found += [rule for rule in rules if rule.matches(node)]
+        rules_found.sort(key=lambda rule: rule.weight)
+        return [rule.declarations for rule in rules_found]
 
     def _blocks(self, text: str) -> Iterable[tuple[str, str]]:
         """Selectors and body of each rule; @-blocks are skipped, @media counted."""
-        at = 0
-        while (begin := text.find("{", at)) >= 0:
-            selectors = text[at:begin].rpartition(";")[2].strip()
+        offset = 0
+        while (begin := text.find("{", offset)) >= 0:
+            selectors = text[offset:begin].rpartition(";")[2].strip()
             end = text.find("}", begin)
             if selectors.startswith("@"):
-                at = _block_end(text, begin)
+                offset = _block_end(text, begin)
                 self.left_out += selectors.startswith("@media")
             elif end < 0:
                 return
             else:
                 yield selectors, text[begin + 1 : end]
-                at = end + 1
+                offset = end + 1
 
     def _add(self, selector: str, declarations: Declarations) -> None:
         parsed = _parse_selector(selector)
@@ -160,18 +166,18 @@ class CssRules(Struct):
             self._by_tag[last.tag].append(rule)
 
 
-def parse_declarations(text: str, wanted: frozenset[str]) -> Declarations:
+def parse_declarations(text: str, properties: frozenset[str]) -> Declarations:
     """The wanted properties of "name: value; ..."; of two the later wins, or the important one."""
-    found: Declarations = {}
+    declarations: Declarations = {}
     for item in text.split(";"):
         name, colon, value = item.partition(":")
         name = name.strip().lower()
-        if not colon or name not in wanted:
+        if not colon or name not in properties:
             continue
-        plain, important = _IMPORTANT.subn("", value.strip())
-        if plain.strip() and (important or not found.get(name, ("", False))[1]):
-            found[name] = plain.strip(), bool(important)
-    return found
+        content, important = _IMPORTANT.subn("", value.strip())
+        if content.strip() and (important or not declarations.get(name, ("", False))[1]):
+            declarations[name] = content.strip(), bool(important)
+    return declarations
 
 
 def _parse_selector(selector: str) -> tuple[tuple[_Compound, ...], tuple[bool, ...]] | None:
@@ -199,49 +205,49 @@ def _parse_selector(selector: str) -> tuple[tuple[_Compound, ...], tuple[bool, .
 
 def _compound(word: str) -> _Compound | None:
     tag = ""
-    found: dict[str, list[str]] = {"#": [], ".": []}
+    parts: dict[str, list[str]] = {"#": [], ".": []}
     tests: list[_Test] = []
-    at = 0
-    while at < len(word):
-        match = _SIMPLE.match(word, at)
-        if match is None or (at > 0 and not match[1] and not match[4]):
+    offset = 0
+    while offset < len(word):
+        match = _SIMPLE.match(word, offset)
+        if match is None or (offset > 0 and not match[1] and not match[4]):
             return None
         if match[4]:
             tests.append((match[4], match[5] or "", (match[6] or "").strip("\"'")))
         elif match[1]:
-            found[match[1]].append(match[2])
+            parts[match[1]].append(match[2])
         else:
             tag = match[2] or ""
-        at = match.end()
-    return _Compound(tag, tuple(found["#"]), tuple(found["."]), tuple(tests))
+        offset = match.end()
+    return _Compound(tag, tuple(parts["#"]), tuple(parts["."]), tuple(tests))
 
 
 def _passes_test(node: Node, test: _Test) -> bool:
     """True if the element passes a test of an attribute: [name], [name=value], [name~=value] …"""
     name, sign, value = test
-    own = node.attributes.get(name)
-    if own is None or not sign:
-        return own is not None
+    content = node.attributes.get(name)
+    if content is None or not sign:
+        return content is not None
     if sign == "=":
-        return own == value
+        return content == value
     if sign == "~=":
-        return value in own.split()
+        return value in content.split()
     if sign == "|=":
-        return own == value or own.startswith(value + "-")
+        return content == value or content.startswith(value + "-")
     if not value:
         return False
     if sign == "^=":
-        return own.startswith(value)
-    return own.endswith(value) if sign == "$=" else value in own
+        return content.startswith(value)
+    return content.endswith(value) if sign == "$=" else value in content
 
 
 def _around(node: Node) -> list[Node]:
     """Parent, its parent and so on."""
-    found: list[Node] = []
+    ancestors: list[Node] = []
     while node.parent is not None:
         node = node.parent
-        found.append(node)
-    return found
+        ancestors.append(node)
+    return ancestors
 
 
 def _block_end(text: str, begin: int) -> int:
@@ -257,9 +263,9 @@ def _block_end(text: str, begin: int) -> int:
 def _without_comments(text: str) -> str:
     """The text without `/* ... */` and the marks of old `<!-- ... -->`."""
     parts: list[str] = []
-    at = 0
-    while (begin := text.find("/*", at)) >= 0:
-        parts.append(text[at:begin])
+    offset = 0
+    while (begin := text.find("/*", offset)) >= 0:
+        parts.append(text[offset:begin])
         end = text.find("*/", begin + 2)
-        at = len(text) if end < 0 else end + 2
-    return " ".join([*parts, text[at:]]).replace("<!--", " ").replace("-->", " ")
+        offset = len(text) if end < 0 else end + 2
+    return " ".join([*parts, text[offset:]]).replace("<!--", " ").replace("-->", " ")

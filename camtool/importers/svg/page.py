@@ -81,9 +81,9 @@ def _by_the_file(
     named = width if width.size_mm is not None else height
     if named.size_mm is None:
         return _sizeless(box, options)
-    why = f'width="{width.text}" height="{height.text}"'
-    findings = () if named.unit else (_unitless(f"{why} name no unit", options),)
-    units = Units(named.unit or "px", options.mm_per(named.unit or "px"), why)
+    reason = f'width="{width.text}" height="{height.text}"'
+    findings = () if named.unit else (_unitless(f"{reason} name no unit", options),)
+    units = Units(named.unit or "px", options.mm_per(named.unit or "px"), reason)
     if box is None:
         px = options.mm_per("px")
         return SvgPage(_flip(height.size_mm or 0.0) @ scaling(px, px), _size(width, height, px),
@@ -95,8 +95,8 @@ def _by_the_file(
         height = _Side("", named.size_mm * box.height / box.width, named.unit)
     onto = SvgBox(0.0, 0.0, width.size_mm or 0.0, height.size_mm or 0.0)
     inner = view_box_map(box, onto, root.get("preserveAspectRatio"))
-    why += f", {inner.a:.6g} mm a user unit"
-    units = Units(units.name, units.mm_per_unit, why)
+    reason += f", {inner.a:.6g} mm a user unit"
+    units = Units(units.name, units.mm_per_unit, reason)
     return SvgPage(_flip(onto.height) @ inner, (box.width, box.height), units, findings)
 
 
@@ -157,5 +157,5 @@ def _flip(height_mm: float) -> Affine:
     return Affine(d=-1.0, f=height_mm)
 
 
-def _unitless(why: str, options: ReadOptions) -> Finding:
-    return UNITLESS_PX(why=why, px_an_inch=options.px_an_inch)
+def _unitless(reason: str, options: ReadOptions) -> Finding:
+    return UNITLESS_PX(why=reason, px_an_inch=options.px_an_inch)

@@ -136,8 +136,8 @@ class SvgWalk:
         if root.get("transform") or style.transform:
             self.notes.changed["transform of the page", "is not applied"] += 1
         if self._sheet.left_out:
-            why = "of <style> not applied: other selectors or media"
-            self.notes.changed["rules", why] += self._sheet.left_out
+            reason = "of <style> not applied: other selectors or media"
+            self.notes.changed["rules", reason] += self._sheet.left_out
         self._limits(style, "page")
         self._children(root, SvgScope(page.to_mm, style, page.viewport))
 
@@ -196,8 +196,8 @@ class SvgWalk:
         to_mm = scope.to_mm
         if style.transform or "transform" in node.attributes:
             try:
-                own = own_transform(node, style, self._lengths(scope, style))
-                to_mm = (to_mm @ own).checked()
+                transform = own_transform(node, style, self._lengths(scope, style))
+                to_mm = (to_mm @ transform).checked()
             except DrawingError as error:
                 self._unreadable(node, error)
                 return None
@@ -224,34 +224,36 @@ class SvgWalk:
             self.notes.left_out[node.tag, "has neither stroke nor fill"] += 1
             return
         try:
-            found, fault = self._subpaths(node, scope)
+            subpaths, fault = self._subpaths(node, scope)
         except DrawingError as error:
             self.notes.fault(node.tag, "cannot be read", node, error)
             return
         if scope.uses:
-            self._spend(_cost(found), node)
+            self._spend(_cost(subpaths), node)
         try:
-            fitted = [self.fitter.vertices(one, scope.to_mm) for one in found]
+            fitted = [self.fitter.vertices(one, scope.to_mm) for one in subpaths]
         except DrawingError as error:
             self.notes.fault(node.tag, "cannot be drawn", node, error)
             return
         if fault:
-            what = "cut off where its data are wrong" if found else "cannot be read"
-            self.notes.fault(f"rest of {node.tag}" if found else node.tag, what, node, fault)
-        if not found:
+            complaint = "cut off where its data are wrong" if subpaths else "cannot be read"
+            self.notes.fault(
+                f"rest of {node.tag}" if subpaths else node.tag, complaint, node, fault
+            )
+        if not subpaths:
             if not fault:
                 self.notes.left_out[node.tag, "draws nothing"] += 1
             return
-        self._take(found, fitted, node, scope)
+        self._take(subpaths, fitted, node, scope)
         self.notes.used[node.tag] += 1
 
     def _take(
-        self, found: list[Subpath], fitted: list[Fitted], node: Node, scope: SvgScope
+        self, subpaths: list[Subpath], fitted: list[Fitted], node: Node, scope: SvgScope
     ) -> None:
         """Subpaths of an element, in mm, as pieces."""
         style = scope.style
         source = node.label + (f" by use {scope.uses[-1]}" if scope.uses else "")
-        for subpath, (vertices, off) in zip(found, fitted, strict=True):
+        for subpath, (vertices, errors) in zip(subpaths, fitted, strict=True):
             self.pieces.append(
                 Piece(
                     vertices,
@@ -260,7 +262,7 @@ class SvgWalk:
                     style.colour,
                     source,
                     style.line_type,
-                    off,
+                    errors,
                 )
             )
 
@@ -300,11 +302,11 @@ class SvgWalk:
         for run, rows in zip(text.runs, fitted, strict=True):
             self._take(run.subpaths, rows, node, scope._replace(style=run.style))
             drawn |= bool(rows)
-        for why in text.unseen:
-            self.notes.left_out["part of a text" if drawn else "text", why] += 1
+        for cause in text.unseen:
+            self.notes.left_out["part of a text" if drawn else "text", cause] += 1
         for weight in text.plainer:
-            what = f"font-weight {weight} of text"
-            self.notes.changed[what, "is not applied: 600 and more is bold"] += 1
+            subject = f"font-weight {weight} of text"
+            self.notes.changed[subject, "is not applied: 600 and more is bold"] += 1
         for lacks in text.lacks:
             self.notes.fonts[lacks] += 1
         if drawn:
@@ -327,8 +329,8 @@ class SvgWalk:
         target = self._ids.get(name)
         if target is None:
             outside = bool(reference) and not reference.startswith("#")
-            why = "refers to another file" if outside else "refers to nothing in the file"
-            self.notes.left_out["use", why] += 1
+            reason = "refers to another file" if outside else "refers to nothing in the file"
+            self.notes.left_out["use", reason] += 1
             return
         if name in scope.uses or len(scope.uses) >= MAX_USE_DEPTH:
             raise DrawingError(f"use of {name!r} leads back to itself", where=node.label)
@@ -364,8 +366,8 @@ class SvgWalk:
         if scope.style.overflow not in ("visible", "auto"):
             count = sum(frame.is_left_by(piece.vertices[:, :2]) for piece in self.pieces[first:])
             if count:
-                what = f"pieces reach out of the frame of {node.tag}s"
-                self.notes.changed[what, "which would hide them: they are drawn whole"] += count
+                subject = f"pieces reach out of the frame of {node.tag}s"
+                self.notes.changed[subject, "which would hide them: they are drawn whole"] += count
 
     def _lengths(self, scope: SvgScope, style: SvgStyle) -> Lengths:
         return Lengths(self.options, scope.viewport, style.font_px)
@@ -377,11 +379,11 @@ class SvgWalk:
             if inner is not node and inner.tag in _COUNTED:
                 self.notes.left_out[inner.tag, f"stands in a {node.tag} that cannot be read"] += 1
 
-    def _count(self, node: Node, why: str) -> None:
+    def _count(self, node: Node, reason: str) -> None:
         """Counts what would have been drawn in and below an element that is left out."""
         for inner in node.walk():
             if inner.tag in _COUNTED:
-                self.notes.left_out[inner.tag, why] += 1
+                self.notes.left_out[inner.tag, reason] += 1
 
     def _spend(self, cost: int, node: Node) -> None:
         """Bounds what is drawn through use."""
@@ -393,9 +395,9 @@ class SvgWalk:
             )
 
 
-def _cost(found: list[Subpath]) -> int:
+def _cost(subpaths: list[Subpath]) -> int:
     """Curves, and hundreds of corners."""
-    segments = [segment for one in found for segment in one.segments]
+    segments = [segment for one in subpaths for segment in one.segments]
     corners = sum(len(segment.points) for segment in segments if isinstance(segment, SvgLines))
     curves = sum(not isinstance(segment, SvgLines) for segment in segments)
     return curves + corners // _CORNERS_A_UNIT
@@ -414,26 +416,26 @@ class Notes(Struct):
     _faults: Counter[tuple[str, str]] = field(default_factory=Counter)
     _first: dict[tuple[str, str], str] = field(default_factory=dict)
 
-    def fault(self, kind: str, what: str, node: Node, fault: DrawingError | str) -> None:
-        """A node whose numbers are wrong: `what` was done with it ("cannot be read")."""
-        self._faults[kind, what] += 1
-        if (kind, what) not in self._first:
+    def fault(self, kind: str, outcome: str, node: Node, fault: DrawingError | str) -> None:
+        """A node whose numbers are wrong: `outcome` was done with it ("cannot be read")."""
+        self._faults[kind, outcome] += 1
+        if (kind, outcome) not in self._first:
             text = str(fault)
-            self._first[kind, what] = f"{node.label}: {text}"
+            self._first[kind, outcome] = f"{node.label}: {text}"
 
     def skipped(self) -> list[Skipped]:
         """Return the elements that were left out, by kind and reason."""
         faults = [
-            Skipped(kind, count, f"{what} ({self._first[kind, what]})")
-            for (kind, what), count in self._faults.items()
+            Skipped(kind, count, f"{outcome} ({self._first[kind, outcome]})")
+            for (kind, outcome), count in self._faults.items()
         ]
-        return faults + [Skipped(kind, n, why) for (kind, why), n in self.left_out.items()]
+        return faults + [Skipped(kind, n, reason) for (kind, reason), n in self.left_out.items()]
 
     def findings(self) -> list[Finding]:
         """NOT_APPLIED for each thing that changes the look and was not done; what fonts lack."""
         applied = [
-            NOT_APPLIED(measured=count, what=what, why=why)
-            for (what, why), count in self.changed.items()
+            NOT_APPLIED(measured=count, what=subject, why=reason)
+            for (subject, reason), count in self.changed.items()
         ]  # fmt: skip
         return applied + font_findings(self.fonts)
 
@@ -472,28 +474,28 @@ class CurveFitter:
         if len(subpath.segments) == 1 and isinstance(first, SvgLines):
             points = np.concatenate([subpath.start[None, :], first.points])
             return _in_reach(_straight(to_mm, points)), None
-        rows, off = [_straight(to_mm, subpath.start[None, :])], [np.zeros((1, 2))]
+        rows, errors = [_straight(to_mm, subpath.start[None, :])], [np.zeros((1, 2))]
         for segment in subpath.segments:
-            piece, apart = self._segment(rows[-1][-1, :2], segment, to_mm)
+            piece, error = self._segment(rows[-1][-1, :2], segment, to_mm)
             # The segment's first vertex is the last one so far; what leaves it goes there.
             rows[-1][-1, 2] = piece[0, 2]
             rows.append(piece[1:])
-            if apart is None:
-                off.append(np.zeros((len(piece) - 1, 2)))
+            if error is None:
+                errors.append(np.zeros((len(piece) - 1, 2)))
             else:
-                off[-1][-1] = apart[0]
-                off.append(apart[1:].copy())
-        return _in_reach(np.concatenate(rows)), np.concatenate(off)
+                errors[-1][-1] = error[0]
+                errors.append(error[1:].copy())
+        return _in_reach(np.concatenate(rows)), np.concatenate(errors)
 
-    def _segment(self, here: Floats, segment: Segment, to_mm: Affine) -> Fitted:
-        """(n, 3) from `here` (2,) mm to the segment's end, both exact."""
+    def _segment(self, start: Floats, segment: Segment, to_mm: Affine) -> Fitted:
+        """(n, 3) from `start` (2,) mm to the segment's end, both exact."""
         if isinstance(segment, SvgLines):
             points = _straight(to_mm, segment.points)
-            return np.concatenate([[[here[0], here[1], 0.0]], points]), None
+            return np.concatenate([[[start[0], start[1], 0.0]], points]), None
         if isinstance(segment, Bezier):
-            control = np.concatenate([here[None, :], to_mm.points(segment.control)])
+            control = np.concatenate([start[None, :], to_mm.points(segment.control)])
             return self._fitted(BezierCurve(control), control)
-        ends = np.array([here, to_mm.points(segment.end[None, :])[0]])
+        ends = np.array([start, to_mm.points(segment.end[None, :])[0]])
         centre = to_mm.points(segment.centre[None, :])[0]
         u, v = to_mm.vectors(np.array([segment.u, segment.v]))
         circle = _circle(centre, u, v, segment)
@@ -501,8 +503,8 @@ class CurveFitter:
             return _with_ends(circle, ends), None
         curve = EllipseCurve(centre, u, v, segment.begin, segment.begin + segment.sweep)
         bounds = np.array([centre, np.abs(u) + np.abs(v)])
-        vertices, off = self._fitted(curve, bounds)
-        return _with_ends(vertices, ends), off
+        vertices, errors = self._fitted(curve, bounds)
+        return _with_ends(vertices, ends), errors
 
     def _fitted(self, curve: Curve, bounds: Floats) -> Fitted:
         """Arcs for a curve whose size and place `bounds` (n, 2) give."""

@@ -44,15 +44,15 @@ def own_transform(node: Node, style: SvgStyle, lengths: Lengths) -> Affine:
     """Its transform: of its style, else its attribute, about its origin; DrawingError."""
     attribute = node.get("transform")
     if style.transform:
-        own = (
+        transform = (
             Affine()
             if style.transform == "none"
             else parse_css_transform(style.transform, lengths.length)
         )
     else:
-        own = Affine() if attribute == "none" else parse_transform(attribute)
+        transform = Affine() if attribute == "none" else parse_transform(attribute)
     origin = style.transform_origin or node.get("transform-origin")
-    return about_point(parse_origin(origin, lengths.length), own) if origin else own
+    return about_point(parse_origin(origin, lengths.length), transform) if origin else transform
 
 
 def is_for_us(node: Node) -> bool:
@@ -111,14 +111,14 @@ def frame_of(node: Node, size: Node, scope: SvgScope, lengths: Lengths) -> ClipF
     `size`: the element that says how large, itself or the `use` that draws it. An svg that a `use`
     draws keeps its place and the sizes that the `use` does not name.
     """
-    own = node if node.tag == "svg" else None
-    x = lengths.along(own, "x", "x") if own else 0.0
-    y = lengths.along(own, "y", "y") if own else 0.0
+    frame_node = node if node.tag == "svg" else None
+    x = lengths.along(frame_node, "x", "x") if frame_node else 0.0
+    y = lengths.along(frame_node, "y", "y") if frame_node else 0.0
     sides: list[float] = []
-    whole = scope.viewport or (0.0, 0.0)
-    for name, axis, default in zip(("width", "height"), "xy", whole, strict=True):
-        kept = lengths.size(own, name, axis, default) if own else default
-        sides.append(lengths.size(size, name, axis, kept))
+    viewport = scope.viewport or (0.0, 0.0)
+    for name, axis, default in zip(("width", "height"), "xy", viewport, strict=True):
+        fallback = lengths.size(frame_node, name, axis, default) if frame_node else default
+        sides.append(lengths.size(size, name, axis, fallback))
     place = SvgBox(x, y, *sides)
     box = parse_view_box(node.get("viewBox"))
     if box is None:

@@ -85,14 +85,14 @@ def arc_between(start: complex, end: complex, radii: complex, turn: float, flags
     positive, large = bool(flags & 1), bool(flags & 2)
     side = 1.0 if positive != large else -1.0
     offset = side * rise * half * 1j / size
-    small = 2.0 * math.atan2(min(size, 1.0), rise)
-    sweep = (2.0 * math.pi - small) if large else small
+    smaller_angle = 2.0 * math.atan2(min(size, 1.0), rise)
+    sweep = (2.0 * math.pi - smaller_angle) if large else smaller_angle
     from_centre = -half / grow - offset
     centre = (middle + offset) if size < 1.0 else middle
-    at = complex(centre.real * rx, centre.imag * ry) * axis
+    centre_point = complex(centre.real * rx, centre.imag * ry) * axis
     u, v = rx * grow * axis, 1j * ry * grow * axis
     return Arc(
-        centre=_pair(at),
+        centre=_pair(centre_point),
         u=_pair(u),
         v=_pair(v),
         begin=math.atan2(from_centre.imag, from_centre.real),
@@ -149,10 +149,10 @@ def _drawn(data: str, pen: _Pen) -> str:
     if lead.strip() or (words and words[0] not in "Mm"):
         begin = lead.strip() or words[0]
         return f"path data begin with {begin[:12]!r}, wanted M or m"
-    at = len(lead)
+    offset = len(lead)
     for letter, text in zip(words[::2], words[1::2], strict=True):
         kind = letter.upper()
-        name = f"path data at sign {at + 1}: {letter!r}"
+        name = f"path data at sign {offset + 1}: {letter!r}"
         if kind == "A":
             fault = _arcs(pen, letter.islower(), text)
         else:
@@ -160,29 +160,29 @@ def _drawn(data: str, pen: _Pen) -> str:
             end = match.end() if match else 0
             numbers = NUMBER.findall(text, 0, end)
             count = _COUNTS[kind]
-            whole = len(numbers) // count * count if count else 0
+            used_count = len(numbers) // count * count if count else 0
             fault = "" if end == len(text) else _odd(text[end:])
-            if not fault and (whole != len(numbers) or (count and not numbers)):
+            if not fault and (used_count != len(numbers) or (count and not numbers)):
                 fault = f"has {len(numbers)} numbers, wanted {count or 'none'}"
-            pen.command(letter, numbers[:whole])
+            pen.command(letter, numbers[:used_count])
         if fault:
             return f"{name} {fault}"
-        at += 1 + len(text)
+        offset += 1 + len(text)
     return ""
 
 
 def _arcs(pen: _Pen, relative: bool, text: str) -> str:
     """A commands: their flags may stick to what follows ("a1 1 0 011 2"); the fault or ""."""
     start = _START.match(text)
-    at = start.end() if start else 0
+    offset = start.end() if start else 0
     drawn = 0
-    while match := _ARC.match(text, at):
+    while match := _ARC.match(text, offset):
         rx, ry, turn, large, positive, x, y = (float(number) for number in match.groups())
         pen.arc(complex(rx, ry), turn, int(positive + 2.0 * large), complex(x, y), relative)
-        at = match.end()
+        offset = match.end()
         drawn += 1
-    if at < len(text):
-        return _odd(text[at:])
+    if offset < len(text):
+        return _odd(text[offset:])
     return "" if drawn else "has no numbers, wanted 7"
 
 
@@ -221,9 +221,11 @@ class _Pen(Struct):
             if numbers:
                 self._straight(kind, relative, numbers)
 
-    def arc(self, radii: complex, turn: float, flags: int, to: complex, relative: bool) -> None:
+    def arc(
+        self, radii: complex, turn: float, flags: int, end_point: complex, relative: bool
+    ) -> None:
         """Add an arc; without a radius it is a line, and nothing if it ends at its start."""
-        end = _bounded(to + self.here if relative else to)
+        end = _bounded(end_point + self.here if relative else end_point)
         if not max(abs(radii.real), abs(radii.imag), abs(turn)) <= MAX_NUMBER:
             raise DrawingError("path data have an arc that is too large")
         if radii.real == 0.0 or radii.imag == 0.0 or end == self.here:
@@ -248,11 +250,11 @@ class _Pen(Struct):
     def _straight(self, kind: str, relative: bool, n: list[float]) -> None:
         """L, H, V, and the pairs after the first one of M."""
         if kind == "H":
-            rest = self.here.imag if not relative else 0.0
-            ends = [complex(x, rest) for x in n]
+            other_axis = self.here.imag if not relative else 0.0
+            ends = [complex(x, other_axis) for x in n]
         elif kind == "V":
-            rest = self.here.real if not relative else 0.0
-            ends = [complex(rest, y) for y in n]
+            other_axis = self.here.real if not relative else 0.0
+            ends = [complex(other_axis, y) for y in n]
         else:
             ends = list(map(complex, n[::2], n[1::2]))
         if relative:
@@ -278,8 +280,8 @@ class _Pen(Struct):
         if isinstance(last, Bezier) and len(last.control) == degree:
             before = complex(*last.control[-2])
         controls: list[complex] = []
-        for at in range(0, len(points), each):
-            control = points[at : at + each]
+        for index in range(0, len(points), each):
+            control = points[index : index + each]
             if relative:
                 control = [self.here + point for point in control]
             if kind in "ST":
@@ -383,8 +385,8 @@ def split_length(text: str, name: str) -> tuple[float, str]:
         raise DrawingError(f"{name} {text[:24]!r} is no length")
     unit = match[2].lower()
     if unit and unit != "%" and unit not in _CSS_UNITS and unit not in FONT_UNITS:
-        known = ", ".join((*_CSS_UNITS, *FONT_UNITS))
-        raise DrawingError(f"{name} {text[:24]!r} has the unit {unit!r}", mend=f"use {known}")
+        units = ", ".join((*_CSS_UNITS, *FONT_UNITS))
+        raise DrawingError(f"{name} {text[:24]!r} has the unit {unit!r}", mend=f"use {units}")
     return in_bounds(float(match[1]), name), unit
 
 
@@ -473,12 +475,12 @@ def _rect(node: Node, lengths: Lengths) -> list[Subpath]:
         (complex(x + rx, bottom), complex(x, bottom - ry)),
         (complex(x, y + ry), complex(x + rx, y)),
     )
-    here = rounds[-1][1]
-    start = np.array([here.real, here.imag])
+    corner = rounds[-1][1]
+    start = np.array([corner.real, corner.imag])
     segments: list[Segment] = []
     for enter, leave in rounds:
-        if enter != here:
+        if enter != corner:
             segments.append(SvgLines(np.array([[enter.real, enter.imag]])))
         segments.append(arc_between(enter, leave, complex(rx, ry), 0.0, 1))
-        here = leave
+        corner = leave
     return [Subpath(start, tuple(segments), True)]

@@ -154,16 +154,16 @@ class StyleSheet:
         values = {name: attributes[name] for name in _ATTRIBUTES if name in attributes}
         strong: dict[str, str] = {}
         sheets = self._rules.holding(node)
-        own = attributes.get("style")
-        if own:
-            sheets.append(parse_declarations(own, _PROPERTIES))
+        attribute = attributes.get("style")
+        if attribute:
+            sheets.append(parse_declarations(attribute, _PROPERTIES))
         for declarations in sheets:
             for name, (value, important) in declarations.items():
-                chosen = strong if important else values
+                target = strong if important else values
                 if name == "font":
-                    chosen.update(_longhands(value))
+                    target.update(_longhands(value))
                 else:
-                    chosen[name] = value
+                    target[name] = value
         values.update(strong)
         key = above, tuple(values.items())
         style = self._known.get(key)
@@ -174,67 +174,69 @@ class StyleSheet:
 
 def _under(above: SvgStyle, values: dict[str, str]) -> SvgStyle:
     """The style of these values; what is missing or "inherit" comes from above."""
-    own: dict[str, Any] = dict(_BLANK)
+    fields: dict[str, Any] = dict(_BLANK)
     for name, written in values.items():
         value = written.strip().lower()
         if name in LIMITS:
             if value not in ("none", "inherit", "initial", "unset", ""):
-                own["limits"] = (*own["limits"], name)
+                fields["limits"] = (*fields["limits"], name)
             continue
         if name in PLAIN_TEXT or name.startswith("text-decoration"):
-            _text_property(name, value, above, own)
+            _text_property(name, value, above, fields)
             continue
         target = _FIELDS.get(name, name)
         if value == "inherit" or (value == "unset" and name not in _NOT_INHERITED):
-            own[target] = getattr(above, target)
+            fields[target] = getattr(above, target)
         elif value in ("initial", "unset"):
-            own[target] = _INITIAL[target]
+            fields[target] = _INITIAL[target]
         elif name == "font-size":
             px = _font_px(value, above.font_px)
-            own[target] = above.font_px if px is None else px
-            own["odd"] = own.get("odd", above.odd) - {name} | ({name} if px is None else set())
+            fields[target] = above.font_px if px is None else px
+            fields["odd"] = fields.get("odd", above.odd) - {name} | (
+                {name} if px is None else set()
+            )
         elif name == "font-family":
-            own[target] = written.strip()
+            fields[target] = written.strip()
         elif value:
-            own[target] = value
-    return replace(above, **own)
+            fields[target] = value
+    return replace(above, **fields)
 
 
-def _text_property(name: str, value: str, above: SvgStyle, own: dict[str, Any]) -> None:
+def _text_property(name: str, value: str, above: SvgStyle, fields: dict[str, Any]) -> None:
     """Apply a property in PLAIN_TEXT, or text-decoration, which adds to that of the elements
     around."""
     if value in ("inherit", "unset", ""):
         return
     if name in PLAIN_TEXT:
-        plain = value == "initial" or value in PLAIN_TEXT[name]
-        plain = plain or ("0" in PLAIN_TEXT[name] and _ZERO.fullmatch(value) is not None)
-        own["odd"] = own.get("odd", above.odd) - {name} | (set() if plain else {name})
+        is_default = value == "initial" or value in PLAIN_TEXT[name]
+        is_default = is_default or ("0" in PLAIN_TEXT[name] and _ZERO.fullmatch(value) is not None)
+        fields["odd"] = fields.get("odd", above.odd) - {name} | (set() if is_default else {name})
     else:
-        own["decoration"] = above.decoration | {*value.split()}
+        fields["decoration"] = above.decoration | {*value.split()}
 
 
 def _longhands(text: str) -> dict[str, str]:
     """Split `font: [style, variant, weight or stretch] size[/line-height] family` into its single
     properties; the size is "?" for a system font and for text that is no font."""
-    said = {"font-style": "normal", "font-weight": "normal", "font-variant": "normal",
+    longhands = {"font-style": "normal", "font-weight": "normal", "font-variant": "normal",
             "font-stretch": "normal", "font-size": "?", "font-family": ""}  # fmt: skip
     if text.lower() in ("inherit", "initial", "unset"):
-        return dict.fromkeys(said, text)
+        return dict.fromkeys(longhands, text)
     words = text.split()
     for place, word in enumerate(words[:_FONT_PARTS]):
         size = word.lower().partition("/")[0]
         if not size.isdigit() and _font_px(size, FONT_PX) is not None:
-            said["font-size"], said["font-family"] = size, " ".join(words[place + 1 :])
+            longhands["font-size"], longhands["font-family"] = size, " ".join(words[place + 1 :])
             break
         if size in ("italic", "oblique"):
-            said["font-style"] = size
+            longhands["font-style"] = size
         elif size in ("bold", "bolder", "lighter") or size.isdigit():
-            said["font-weight"] = size
+            longhands["font-weight"] = size
         elif size == "small-caps":
-            said["font-variant"] = size
+            longhands["font-variant"] = size
         elif size != "normal":
-            said["font-stretch"] = size
-    return said
+            longhands["font-stretch"] = size
+    return longhands
 
 
 def _font_px(text: str, above: float) -> float | None:

@@ -106,9 +106,9 @@ def text_of(
 def _keeps_blanks(node: Node | None) -> bool:
     """xml:space of the element or of the nearest one around it."""
     while node is not None:
-        given = node.get("xml:space")
-        if given:
-            return given == "preserve"
+        space = node.get("xml:space")
+        if space:
+            return space == "preserve"
         node = node.parent
     return False
 
@@ -142,8 +142,8 @@ class _Flow(Struct, eq=False):
                 elif not is_for_us(child):
                     self.unseen["is for another language or program"] = None
                 else:
-                    given = child.get("xml:space")
-                    self.visit(child, inner, given == "preserve" if given else keep)
+                    space = child.get("xml:space")
+                    self.visit(child, inner, space == "preserve" if space else keep)
             elif child.tag not in _LETTERLESS:
                 raise Unusable(f"has a {child.tag[:40]} in it, which is not read")
             self._add(child.tail, style, keep)
@@ -175,9 +175,11 @@ class _Flow(Struct, eq=False):
         text = raw if keep else _BLANK.sub(" ", raw)
         if len(self.letters) + len(text) > MAX_CHARACTERS + 2:  # blanks at its ends may go
             raise Unusable(f"has more than {MAX_CHARACTERS} characters")
-        whole = unicodedata.normalize("NFC", text)
-        self._recounted |= len(whole) != len(text) or any(letter > "\uffff" for letter in whole)
-        for letter in whole:
+        composed = unicodedata.normalize("NFC", text)
+        self._recounted |= len(composed) != len(text) or any(
+            letter > "\uffff" for letter in composed
+        )
+        for letter in composed:
             blank = letter in _BLANKS
             if not blank:
                 _check(letter)
@@ -257,12 +259,14 @@ class _Writer(Struct, eq=False):
         named = style.family.split(",", MAX_FAMILIES)[:MAX_FAMILIES]
         families = [family for name in named if (family := _family(name))] or [DEFAULT_FAMILY]
         bold = weight >= _BOLD_FROM
-        wanted = [WantedFont(family=family, bold=bold, italic=italic) for family in families]
-        for one in wanted:
+        requests = [WantedFont(family=family, bold=bold, italic=italic) for family in families]
+        for one in requests:
             font, other = font_for(one, self.mode)
             if not other:
-                return font, "" if one is wanted[0] or self.mode == "stroke" else str(wanted[0])
-        return font_for(wanted[0], self.mode)
+                return font, "" if one is requests[0] or self.mode == "stroke" else str(
+                    requests[0]
+                )
+        return font_for(requests[0], self.mode)
 
 
 def _family(name: str) -> str:
@@ -285,14 +289,14 @@ def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
     chunk: list[_Words] = []
     looks: dict[SvgStyle, tuple[TextLook, tuple[str, str]]] = {}
     for first, last in pairwise([*starts, len(flow.letters)]):
-        at = flow.at.get(first, {})
-        if chunk and ("x" in at or "y" in at):
-            if "x" not in at and chunk[0].style.anchor != "start":
+        position = flow.at.get(first, {})
+        if chunk and ("x" in position or "y" in position):
+            if "x" not in position and chunk[0].style.anchor != "start":
                 raise Unusable("has a y without an x behind letters that text-anchor moves")
             yield chunk
             chunk = []
-        x = at.get("x", x) + at.get("dx", 0.0)
-        y = at.get("y", y) + at.get("dy", 0.0)
+        x = position.get("x", x) + position.get("dx", 0.0)
+        y = position.get("y", y) + position.get("dy", 0.0)
         style = flow.styles[first]
         if style not in looks:
             looks[style] = writer.look(style)
@@ -335,14 +339,14 @@ def _subpaths(ink: Ink) -> list[Subpath]:
     if not ink.points:
         return []
     points = np.concatenate(ink.points) * (1.0, -1.0)
-    found, at = [], 0
+    subpaths, position = [], 0
     for counts, closed in ink.contours:
-        ends = list(accumulate(counts, initial=at))
+        ends = list(accumulate(counts, initial=position))
         parts = [points[start:stop] for start, stop in pairwise(ends)]
-        at = ends[-1]
+        position = ends[-1]
         if parts:
-            found.append(Subpath(parts[0][0], _segments(parts), closed))
-    return found
+            subpaths.append(Subpath(parts[0][0], _segments(parts), closed))
+    return subpaths
 
 
 def _segments(parts: list[Floats]) -> tuple[Segment, ...]:

@@ -98,10 +98,10 @@ def in_bounds(value: float, name: str) -> float:
 
 def parse_numbers(text: str, name: str) -> list[float]:
     """Numbers separated by blanks or commas; DrawingError naming what is not a number."""
-    rest = NUMBER.sub(" ", text).strip(BETWEEN)
-    rest = rest.replace(",", " ").strip()
-    if rest:
-        raise DrawingError(f"{name} holds {short(rest)}, which is no number")
+    remainder = NUMBER.sub(" ", text).strip(BETWEEN)
+    remainder = remainder.replace(",", " ").strip()
+    if remainder:
+        raise DrawingError(f"{name} holds {short(remainder)}, which is no number")
     values = [float(number) for number in NUMBER.findall(text)]
     furthest = max(values, key=abs, default=0.0)
     in_bounds(furthest, name)
@@ -173,20 +173,20 @@ Length = Callable[[str, str], float]
 
 def parse_transform(text: str) -> Affine:
     """A transform list: matrix, translate, scale, rotate, skewX, skewY; DrawingError."""
-    whole = Affine()
+    product = Affine()
     for name, inside in _functions(text):
         numbers = parse_numbers(inside, f"transform {name}")
-        whole = (whole @ _single(name, numbers)).checked()
-    return whole
+        product = (product @ _single(name, numbers)).checked()
+    return product
 
 
 def parse_css_transform(text: str, length: Length) -> Affine:
     """A CSS transform list in the plane, with units; DrawingError for what is none."""
-    whole = Affine()
+    product = Affine()
     for name, inside in _functions(text):
         words = [word for word in re.split(r"[\s,]+", inside) if word]
-        whole = (whole @ _css_single(name.lower(), words, length)).checked()
-    return whole
+        product = (product @ _css_single(name.lower(), words, length)).checked()
+    return product
 
 
 def parse_origin(text: str, length: Length) -> tuple[float, float]:
@@ -211,17 +211,17 @@ def about_point(origin: tuple[float, float], inner: Affine) -> Affine:
 
 def _functions(text: str) -> list[tuple[str, str]]:
     """Name and inside of each function of a list."""
-    found: list[tuple[str, str]] = []
-    at = 0
-    while text[at:].strip(BETWEEN):
-        match = _FUNCTION.match(text, at)
+    parts: list[tuple[str, str]] = []
+    offset = 0
+    while text[offset:].strip(BETWEEN):
+        match = _FUNCTION.match(text, offset)
         if match is None:
-            raise DrawingError(f"transform {short(text[at:])} is no transform")
-        at = match.end()
-        found.append((match[1], match[2]))
-        if len(found) > _MAX_FUNCTIONS:
+            raise DrawingError(f"transform {short(text[offset:])} is no transform")
+        offset = match.end()
+        parts.append((match[1], match[2]))
+        if len(parts) > _MAX_FUNCTIONS:
             raise DrawingError("transform has too many parts")
-    return found
+    return parts
 
 
 _MAX_FUNCTIONS = 1000
@@ -285,8 +285,8 @@ def _with_unit(word: str, units: dict[str, float]) -> float:
 
 def _rotation(degrees: float) -> Affine:
     """Quarter turns are exact, so that a turned square stays one."""
-    quarter, rest = divmod(degrees, 90.0)
-    if rest == 0.0:
+    quarter, remainder = divmod(degrees, 90.0)
+    if remainder == 0.0:
         cosine, sine = _QUARTERS[int(quarter) % 4]
     else:
         cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))

@@ -135,8 +135,8 @@ def _parser(builder: _Builder, data: bytes) -> Any:
         def defused_entity_decl(self, name: str, is_parameter: bool, value: str | None,
                                 *outside: str | None) -> None:  # fmt: skip
             text = value or ""
-            plain = len(text) <= MAX_ENTITY_SIGNS and not any(sign in text for sign in "&<%")
-            if not (entities and plain) or is_parameter or value is None:
+            is_safe = len(text) <= MAX_ENTITY_SIGNS and not any(sign in text for sign in "&<%")
+            if not (entities and is_safe) or is_parameter or value is None:
                 super().defused_entity_decl(name, is_parameter, value, *outside)
 
     parser = Parser(bufsize=len(data) + 1)
@@ -164,13 +164,13 @@ class _Builder(ContentHandler):
         spaces, or bare without a namespace."""
         self._count += 1
         if len(self._open) >= MAX_DEPTH or self._count > MAX_ELEMENTS:
-            deep = len(self._open) >= MAX_DEPTH
+            is_too_deep = len(self._open) >= MAX_DEPTH
             raise DrawingError(
                 f"is nested deeper than {MAX_DEPTH} elements"
-                if deep
+                if is_too_deep
                 else f"has more than {MAX_ELEMENTS} elements",
                 where=f"line {line}",
-                mend="ungroup the drawing" if deep else "save it in parts",
+                mend="ungroup the drawing" if is_too_deep else "save it in parts",
             )
         if self._letters:
             self._put_letters()
@@ -325,13 +325,13 @@ def _decode(data: bytes) -> bytes:
         if name.lower() in _NATIVE:
             return data
     try:
-        known = codecs.lookup(name).name
+        encoding = codecs.lookup(name).name
     except LookupError:
-        known = ""
-    if not known or known in _NO_CHARSETS:
+        encoding = ""
+    if not encoding or encoding in _NO_CHARSETS:
         raise DrawingError(f"names the encoding {name!r}", mend="save it in UTF-8")
     try:
-        text = data.decode(known)
+        text = data.decode(encoding)
     # A codec that makes no text (base64, zlib) may raise anything of these.
     except (UnicodeError, LookupError, ValueError, zlib.error, OSError) as error:
         raise DrawingError(
