@@ -77,12 +77,12 @@ class FlashcutModel(ControllerModel[FlashcutController, FlashcutDialect]):
         controller = machine.controller
         shortest = shortest_ms(np.array([False, True]), controller)
         step_mm = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-        both, one = feeds_of(shortest, step_mm, controller).tolist()
+        both_axes, one = feeds_of(shortest, step_mm, controller).tolist()
         return (
             f"a step takes {controller.half_periods_per_step} half periods of at least "
             f"{shortest[0]:g} ms (controller.half_period_ms), or {shortest[1]:g} ms where one "
             "axis moves alone (controller.single_axis_half_period_ms), each a millisecond late: "
-            f"no move is faster than {both:.3g} or {one:.3g} mm/min, whatever its F",
+            f"no move is faster than {both_axes:.3g} or {one:.3g} mm/min, whatever its F",
             "the longer axis of a move keeps the feed; speeds change at once",
             f"an arc becomes {controller.chords_per_turn} chords a turn "
             "(controller.chords_per_turn)",
@@ -116,11 +116,11 @@ class FlashcutRun:
         self._mechanics = Mechanics(machine, path.start, options.effects)
         self._parts = controller.half_periods_per_step
         self._compensation_ms = controller.compensation_half_period_ms
-        nearest = controller.rounding == "nearest"
+        is_nearest = controller.rounding == "nearest"
         self._rules = Rules(
             origin=path.start,
             step_mm=np.array([axis.coded_step_mm for axis in machine.axes]),
-            added=HALF_STEP_GUARD + (0.5 if nearest else 0.0),
+            added=HALF_STEP_GUARD + (0.5 if is_nearest else 0.0),
             from_reached=controller.goes_on_from == "reached",
             late_longer=controller.clock == "late-longer",
         )
@@ -131,16 +131,16 @@ class FlashcutRun:
         """The chunks of all rows up to the end of the program."""
         low = 0
         while low < self._rows:
-            made = np.cumsum(self._table.moves_of(low, low + MOVES_AT_ONCE))
-            high = low + max(int(np.searchsorted(made, MOVES_AT_ONCE, side="right")), 1)
+            move_counts = np.cumsum(self._table.moves_of(low, low + MOVES_AT_ONCE))
+            high = low + max(int(np.searchsorted(move_counts, MOVES_AT_ONCE, side="right")), 1)
             yield from self._window(low, high)
             low = high
 
     def _window(self, low: int, high: int) -> Iterator[Chunk]:
         """The chunks of the rows low:high."""
         moves = self._table.moves(low, high)
-        move = done = 0  # rows from `low` on whose ledger is complete
-        while done < high - low:
+        move = done_rows = 0  # rows from `low` on whose ledger is complete
+        while done_rows < high - low:
             issued = Issued(
                 np.empty((self._samples, 3)),
                 np.empty(self._samples, np.int64),
@@ -149,9 +149,9 @@ class FlashcutRun:
             )
             move, filled = timers_fill(moves, move, self._rules, self._counters, issued)
             under_way = int(moves.row[move]) if move < len(moves.row) else high - low
-            rows = np.arange(done, min(under_way + 1, high - low))
+            rows = np.arange(done_rows, min(under_way + 1, high - low))
             yield self._chunk(low, rows, issued, filled)
-            done = under_way
+            done_rows = under_way
 
     def _chunk(self, low: int, rows: Ints, issued: Issued, filled: int) -> Chunk:
         """The first samples of `issued`, and what the rows low + rows did in them."""
@@ -161,9 +161,9 @@ class FlashcutRun:
         slide = NO_SAMPLES
         if filled:
             offsets = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [filled]])
-            moved = row[offsets[:-1]] - low - rows[0]
-            slide, reversals[moved] = self._mechanics.follow(commanded, offsets)
-            samples[moved] = np.diff(offsets)
+            moving_rows = row[offsets[:-1]] - low - rows[0]
+            slide, reversals[moving_rows] = self._mechanics.follow(commanded, offsets)
+            samples[moving_rows] = np.diff(offsets)
         compensation_s = self._seconds(reversals, low + rows)
         moving_s = self._parts * issued.duration_ms[rows] / 1000.0
         ledger = Ledger(
@@ -209,47 +209,50 @@ def place_events(toolpath: Toolpath, machine: _Machine) -> Toolpath:
     ProgramError for arcs without a centre and positions of more steps than can be counted.
     """
     check_positions(toolpath, machine)
-    most = 0.25 * MAX_LONG * np.array([axis.coded_step_mm for axis in machine.axes])
-    far = toolpath.by_parts(lambda part: np.asarray((np.abs(part.end) > most).any(axis=1)))
-    far |= (np.abs(toolpath.start) > most).any()
+    max_mm = 0.25 * MAX_LONG * np.array([axis.coded_step_mm for axis in machine.axes])
+    is_far = toolpath.by_parts(lambda part: np.asarray((np.abs(part.end) > max_mm).any(axis=1)))
+    is_far |= (np.abs(toolpath.start) > max_mm).any()
     arcs = np.flatnonzero(toolpath.is_arc)
     spoke = toolpath.centre[arcs] - toolpath.starts_of(arcs)[:, :2]
-    far[arcs] |= (np.abs(spoke) > most[:2]).any(axis=1)
-    refuse(toolpath, far, "a position is beyond all that the controller can count")
+    is_far[arcs] |= (np.abs(spoke) > max_mm[:2]).any(axis=1)
+    refuse(toolpath, is_far, "a position is beyond all that the controller can count")
     return with_event_positions(
         toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64)
     )
 
 
 def half_periods(
-    toolpath: Toolpath, machine: _Machine, step_mm: float, alone: Callable[[Toolpath], Bools]
+    toolpath: Toolpath,
+    machine: _Machine,
+    step_mm: float,
+    moves_one_axis: Callable[[Toolpath], Bools],
 ) -> Indices:
     """(N,) ms of the longer axis of each row, for steps of `step_mm`; rapids have the shortest.
-    `alone` gives the rows of one axis.
+    `moves_one_axis` gives the rows of one axis.
 
     ProgramError for feeds whose half period the controller cannot count.
     """
 
-    def counted(part: Toolpath) -> Indices:
+    def count_periods(part: Toolpath) -> Indices:
         feed = np.where(part.is_feed, part.feed, np.inf)
-        wanted = half_periods_ms(feed, step_mm, alone(part), machine.controller)
-        return np.minimum(wanted, MAX_LONG).astype(np.int32)
+        periods_ms = half_periods_ms(feed, step_mm, moves_one_axis(part), machine.controller)
+        return np.minimum(periods_ms, MAX_LONG).astype(np.int32)
 
-    found = toolpath.by_parts(counted)
-    slow = found == MAX_LONG
+    periods = toolpath.by_parts(count_periods)
+    slow = periods == MAX_LONG
     if slow.any():
         feed = float(toolpath.feed[slow.argmax()])
         message = f"a feed of {feed:g} mm/min is too slow for the timers to count"
         refuse(toolpath, slow, message, "write a higher F")
-    return found
+    return periods
 
 
 def _moves_one_axis(toolpath: Toolpath, x_mm: float, y_mm: float) -> Bools:
     """Mask (N,) of the rows that move X or Y alone, by their steps of `x_mm` and `y_mm`; no
     arcs."""
-    way = np.abs(toolpath.end - toolpath.starts)
-    apart = np.minimum(to_steps(way[:, 0], x_mm), to_steps(way[:, 1], y_mm)) == 0
-    return np.asarray(~toolpath.is_arc & (apart | (toolpath.kind >= Kind.HOME_XY)))
+    travel = np.abs(toolpath.end - toolpath.starts)
+    has_one_axis = np.minimum(to_steps(travel[:, 0], x_mm), to_steps(travel[:, 1], y_mm)) == 0
+    return np.asarray(~toolpath.is_arc & (has_one_axis | (toolpath.kind >= Kind.HOME_XY)))
 
 
 def _rises(toolpath: Toolpath) -> Bools:
@@ -303,13 +306,13 @@ class MoveTable(Struct, frozen=True, eq=False):
         path, chords = self.toolpath, self.chords[row]
         homes = path.kind[row] >= Kind.HOME_XY
         upward = part == chords
-        what = np.where(upward, np.where(homes, HOME_Z, Z), XY)
-        what[homes & ~upward] = np.where(part[homes & ~upward] == 0, HOME_Y, HOME_X)
+        drives = np.where(upward, np.where(homes, HOME_Z, Z), XY)
+        drives[homes & ~upward] = np.where(part[homes & ~upward] == 0, HOME_Y, HOME_X)
         target = path.end[row].copy()
         inner = np.flatnonzero(path.is_arc[row] & (part < chords - 1))
         target[inner, :2] = self._on_arc(row[inner], (part[inner] + 1) / chords[inner])
         half_period = np.where(upward, self.half_period_z[row], self.half_period_xy[row])
-        return Moves(what, target, half_period.astype(np.int64), row - low)
+        return Moves(drives, target, half_period.astype(np.int64), row - low)
 
     def _on_arc(self, row: Ints, share: Floats) -> Floats:
         """(J, 2) mm at these shares of the arcs' sweeps, as far from the centre as the start
@@ -318,5 +321,5 @@ class MoveTable(Struct, frozen=True, eq=False):
         spoke = self.toolpath.starts_of(row)[:, :2] - centre
         radius = np.hypot(spoke[:, 0], spoke[:, 1])
         angle = np.arctan2(spoke[:, 1], spoke[:, 0]) + share * self.toolpath.sweeps_of(row)
-        turned = np.column_stack([np.cos(angle), np.sin(angle)])
-        return np.asarray(centre + radius[:, None] * turned)
+        directions = np.column_stack([np.cos(angle), np.sin(angle)])
+        return np.asarray(centre + radius[:, None] * directions)

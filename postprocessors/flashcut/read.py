@@ -146,21 +146,23 @@ class _Reader:
             self.path.event(Kind.END)
             self._ended = code
 
-    def take(self, plain: PlainBlocks) -> int:
+    def take(self, blocks: PlainBlocks) -> int:
         """Decode moves by columns, up to the first that is not surely what `block` would make of
         it; how many were decoded."""
         if self._ended:
             return 0
         moves = DecodedMoves(
-            plain, self._plain_keys, (*self.path.position, self._feed), self._dialect
+            blocks, self._plain_keys, (*self.path.position, self._feed), self._dialect
         )
         count = moves.count
         if count == 0:
             return 0
         self.blocks += count
-        given = plain.has(words.F_WORD)[:count]
-        for at in np.flatnonzero(given & exceeds(moves.feed[:count], self._max_feed)).tolist():
-            self._fast.add(plain.first + at, float(moves.feed[at]))
+        has_feed = blocks.has(words.F_WORD)[:count]
+        for index in np.flatnonzero(
+            has_feed & exceeds(moves.feed[:count], self._max_feed)
+        ).tolist():
+            self._fast.add(blocks.first + index, float(moves.feed[index]))
         self._feed = float(moves.feed[count - 1])
         rows = np.flatnonzero(moves.moving[:count])
         if len(rows):
@@ -169,7 +171,7 @@ class _Reader:
                 end=moves.end[rows],
                 centre=np.where(moves.is_arc[rows, None], moves.centre[rows], np.nan),
                 feed=np.where(moves.kind[rows] == Kind.RAPID, np.nan, moves.feed[rows]),
-                block=plain.first + rows,
+                block=blocks.first + rows,
             )
         return count
 
@@ -186,8 +188,10 @@ class _Reader:
     def _motion(self, block: WordBlock, code: str, form: str, numbers: list[float]) -> None:
         """G00 to G03: X Y Z from part zero, I J from where the arc begins (L1000, L1016)."""
         if not max(map(abs, numbers)) <= MAX_MM:
-            at = next(at for at, number in enumerate(numbers, 1) if not abs(number) <= MAX_MM)
-            block.fail(f"a number beyond ±{MAX_MM:g}", word=at, mend="check the units")
+            word = next(
+                word for word, number in enumerate(numbers, 1) if not abs(number) <= MAX_MM
+            )
+            block.fail(f"a number beyond ±{MAX_MM:g}", word=word, mend="check the units")
         if form[-1] == "F":
             self._set_feed(block, numbers.pop(), len(form))
         if code != "G00" and math.isnan(self._feed):
@@ -220,12 +224,12 @@ class _Reader:
         radius, other = math.hypot(i, j), math.hypot(x - centre[0], y - centre[1])
         if radius == 0.0:
             block.fail("an arc about its own start", word=3, mend="give I and J from the start")
-        spread, most = abs(radius - other), self._dialect.arc_spread_mm
-        if spread > most:
+        spread, max_spread = abs(radius - other), self._dialect.arc_spread_mm
+        if spread > max_spread:
             block.fail(
                 f"the arc's start is {radius:.6g} mm from its centre, its end {other:.6g} mm",
                 word=3,
-                mend=f"they may differ by {most:g} mm",
+                mend=f"they may differ by {max_spread:g} mm",
             )
         if (x, y) == (at_x, at_y) and self._dialect.full_circles == "halves":
             block.fail(
@@ -245,13 +249,15 @@ class _Reader:
                 mend="remove it; lengths are mm",
             )
         if forms is None:
-            known = " ".join(TEMPLATES)
-            block.fail(f"{code} is not known", mend=f"use one of {known}, with two digits")
-        wanted = " or ".join(" ".join([code, *one]) for one in sorted(forms))
-        for at, letter in enumerate(form):
-            if not any(one.startswith(form[: at + 1]) for one in forms):
-                block.fail(f"{letter} has no place here", word=at + 1, mend=f"write only {wanted}")
-        block.fail(f"{code} lacks a word", word=len(form), mend=f"write {wanted}")
+            codes = " ".join(TEMPLATES)
+            block.fail(f"{code} is not known", mend=f"use one of {codes}, with two digits")
+        expected = " or ".join(" ".join([code, *one]) for one in sorted(forms))
+        for index, letter in enumerate(form):
+            if not any(one.startswith(form[: index + 1]) for one in forms):
+                block.fail(
+                    f"{letter} has no place here", word=index + 1, mend=f"write only {expected}"
+                )
+        block.fail(f"{code} lacks a word", word=len(form), mend=f"write {expected}")
 
 
 class DecodedMoves:
@@ -261,16 +267,16 @@ class DecodedMoves:
 
     def __init__(
         self,
-        plain: PlainBlocks,
+        blocks: PlainBlocks,
         keys: Ints,
         state: tuple[float, float, float, float],
         dialect: FlashcutDialect,
     ) -> None:
         *position, feed = state
-        numbers, facts = plain.numbers, plain.facts
+        numbers, facts = blocks.numbers, blocks.facts
         sign = 1.0 if dialect.z_up == "+" else -1.0
-        has_feed = plain.has(words.F_WORD)
-        has_code = plain.has(words.G_WORD)
+        has_feed = blocks.has(words.F_WORD)
+        has_code = blocks.has(words.G_WORD)
         self.kind = np.where(has_code, numbers[:, words.G_WORD], 0.0).astype(np.int64)
         self.is_arc = self.kind >= Kind.ARC_CW
         self.feed = fill_forward(has_feed, numbers[:, words.F_WORD], feed)
@@ -278,29 +284,29 @@ class DecodedMoves:
         z = sign * numbers[:, words.Z_WORD] + 0.0
         self.end = np.column_stack(
             [
-                fill_forward(plain.has(words.X_WORD + axis), values, position[axis])
+                fill_forward(blocks.has(words.X_WORD + axis), values, position[axis])
                 for axis, values in enumerate((x, y, z))
             ]
         )
         start = np.concatenate([[position], self.end[:-1]])
         offset = numbers[:, words.I_WORD : words.J_WORD + 1]
         self.centre = start[:, :2] + np.where(self.is_arc[:, None], offset, 0.0)
-        same = (self.end[:, :2] == start[:, :2]).all(axis=1)
+        same_xy = (self.end[:, :2] == start[:, :2]).all(axis=1)
         # A G01 with F to where the tool is sets the feed, no more.
-        self.moving = ~((facts[:, words.FORM] == form_of("GXYF")) & same)
-        sure = np.isin(4 * facts[:, words.FORM] + self.kind, keys)
-        sure &= (facts[:, words.TWO_DIGITS] == 1) & (facts[:, words.ONE_BLANK] == 1)
+        self.moving = ~((facts[:, words.FORM] == form_of("GXYF")) & same_xy)
+        is_sure = np.isin(4 * facts[:, words.FORM] + self.kind, keys)
+        is_sure &= (facts[:, words.TWO_DIGITS] == 1) & (facts[:, words.ONE_BLANK] == 1)
         for column in range(words.X_WORD, words.F_WORD + 1):
-            sure &= ~plain.has(column) | (np.abs(numbers[:, column]) <= MAX_MM)
-        sure &= ~has_feed | (self.feed > 0.0)
-        sure &= (self.kind == Kind.RAPID) | ~np.isnan(self.feed)
+            is_sure &= ~blocks.has(column) | (np.abs(numbers[:, column]) <= MAX_MM)
+        is_sure &= ~has_feed | (self.feed > 0.0)
+        is_sure &= (self.kind == Kind.RAPID) | ~np.isnan(self.feed)
         radius = np.hypot(*(start[:, :2] - self.centre).T)
         other = np.hypot(*(self.end[:, :2] - self.centre).T)
         fine = (radius > 0.0) & (np.abs(radius - other) <= SURE_PART * dialect.arc_spread_mm)
         if dialect.full_circles == "halves":
-            fine &= ~same
-        sure &= ~self.is_arc | fine
-        self.count = len(sure) if sure.all() else int(sure.argmin())
+            fine &= ~same_xy
+        is_sure &= ~self.is_arc | fine
+        self.count = len(is_sure) if is_sure.all() else int(is_sure.argmin())
 
 
 def _refuse_spacing(block: WordBlock) -> None:
@@ -333,19 +339,19 @@ def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> Iterator[Findin
     controller = machine.controller
     if not isinstance(controller, FlashcutController):
         return
-    late, long, rapids = _Worst(), _Worst(), False
+    too_fast, long, rapids = _Worst(), _Worst(), False
     for low in range(0, len(path), ROWS_AT_ONCE):
         rows = _Rows(path, slice(low, low + ROWS_AT_ONCE), machine)
         fastest, _ = rows.fastest_feeds(controller)
         with np.errstate(invalid="ignore"):
-            found = np.flatnonzero(rows.feed > fastest * (1.0 + LIMITED_GUARD))
-        late.add(low + found, rows.feed[found] / fastest[found])
+            fast_rows = np.flatnonzero(rows.feed > fastest * (1.0 + LIMITED_GUARD))
+        too_fast.add(low + fast_rows, rows.feed[fast_rows] / fastest[fast_rows])
         extra = rows.steps_too_many(controller)
-        found = np.flatnonzero(extra > 0)
-        long.add(low + found, extra[found].astype(np.float64))
-        rapids = rapids or bool((rows.kind[found] == Kind.RAPID).any())
-    if late.count:
-        yield _slow_feed_finding(path, machine, controller, late)
+        fast_rows = np.flatnonzero(extra > 0)
+        long.add(low + fast_rows, extra[fast_rows].astype(np.float64))
+        rapids = rapids or bool((rows.kind[fast_rows] == Kind.RAPID).any())
+    if too_fast.count:
+        yield _slow_feed_finding(path, machine, controller, too_fast)
     if long.count:
         rows = _Rows(path, slice(long.row, long.row + 1), machine)
         shorter = int(rows.steps[0, :2].argmin())
@@ -361,18 +367,18 @@ def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> Iterator[Findin
 
 
 def _slow_feed_finding(
-    path: Toolpath, machine: FlashcutMachine, controller: FlashcutController, late: _Worst
+    path: Toolpath, machine: FlashcutMachine, controller: FlashcutController, too_fast: _Worst
 ) -> Finding:
     """FEED_HELD: cuts whose feed the shortest half period does not let them have."""
-    row = _Rows(path, slice(late.row, late.row + 1), machine)
-    fastest, alone = row.fastest_feeds(controller)
-    gets, asked = float(fastest[0]), row.feed[0]
-    return (FEED_HELD_ALONE if alone[0] else FEED_HELD)(
-        severity=Severity.WARNING if gets < WARNED_PART * asked else Severity.INFO,
-        where=f"block {int(path.block[late.row]) + 1}",
+    row = _Rows(path, slice(too_fast.row, too_fast.row + 1), machine)
+    fastest, moves_one_axis = row.fastest_feeds(controller)
+    gets, programmed = float(fastest[0]), row.feed[0]
+    return (FEED_HELD_ALONE if moves_one_axis[0] else FEED_HELD)(
+        severity=Severity.WARNING if gets < WARNED_PART * programmed else Severity.INFO,
+        where=f"block {int(path.block[too_fast.row]) + 1}",
         measured=gets,
-        limit=asked,
-        count=late.count,
+        limit=programmed,
+        count=too_fast.count,
     )
 
 
@@ -397,16 +403,20 @@ class _Rows:
         make.
         """
         moves = self.steps != 0
-        alone = (moves.sum(axis=1) == 1) & (self.kind < Kind.ARC_CW)
-        step_mm = np.where(moves[:, 2] & alone, self.step_mm[2], self.step_mm[:2].max())
-        return feeds_of(shortest_ms(alone, controller), step_mm, controller), alone
+        moves_one_axis = (moves.sum(axis=1) == 1) & (self.kind < Kind.ARC_CW)
+        step_mm = np.where(moves[:, 2] & moves_one_axis, self.step_mm[2], self.step_mm[:2].max())
+        return feeds_of(
+            shortest_ms(moves_one_axis, controller), step_mm, controller
+        ), moves_one_axis
 
     def steps_too_many(self, controller: FlashcutController) -> Ints:
         """(K,) that lines and rapids make on their shorter axis of X and Y."""
         steps = self.steps[:, :2]
         feed = np.where(self.kind == Kind.LINE, self.feed, np.inf)
-        alone = (steps == 0).any(axis=1)
-        half_period = half_periods_ms(feed, float(self.step_mm[:2].max()), alone, controller)
-        whole = np.minimum(half_period, MAX_MS).astype(np.int64)
-        extra = steps_too_many(steps.max(axis=1), steps.min(axis=1), whole, controller)
+        moves_one_axis = (steps == 0).any(axis=1)
+        half_period = half_periods_ms(
+            feed, float(self.step_mm[:2].max()), moves_one_axis, controller
+        )
+        whole_ms = np.minimum(half_period, MAX_MS).astype(np.int64)
+        extra = steps_too_many(steps.max(axis=1), steps.min(axis=1), whole_ms, controller)
         return np.where(self.kind < Kind.ARC_CW, extra, 0)

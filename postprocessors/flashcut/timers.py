@@ -12,11 +12,12 @@ PERIOD_GUARD = 1e-6
 """ms. Half periods of feeds that are decimals may lie this much below a half of a millisecond."""
 
 
-def shortest_ms(alone: Bools, controller: FlashcutController) -> Floats:
-    """(N,) ms: the shortest half period of moves, which are of one axis `alone` (N,) or of two."""
-    both = float(controller.half_period_ms)
+def shortest_ms(has_one_axis: Bools, controller: FlashcutController) -> Floats:
+    """(N,) ms: the shortest half period of moves, which are of one axis `has_one_axis` (N,) or of
+    two."""
+    both_ms = float(controller.half_period_ms)
     one = controller.single_axis_half_period_ms
-    return np.where(alone, both if one is None else min(float(one), both), both)
+    return np.where(has_one_axis, both_ms if one is None else min(float(one), both_ms), both_ms)
 
 
 def feeds_of(half_period_ms: Floats, step_mm: float, controller: FlashcutController) -> Floats:
@@ -25,10 +26,10 @@ def feeds_of(half_period_ms: Floats, step_mm: float, controller: FlashcutControl
 
 
 def half_periods_ms(
-    feed_mm_min: Floats, step_mm: float, alone: Bools, controller: FlashcutController
+    feed_mm_min: Floats, step_mm: float, has_one_axis: Bools, controller: FlashcutController
 ) -> Floats:
     """(N,) whole ms: half periods of the longer axis at these feeds (inf: rapids), of moves of one
-    axis `alone` (N,) or of two.
+    axis `has_one_axis` (N,) or of two.
 
     A step takes some half periods P, each of which is a millisecond late:
 
@@ -36,8 +37,8 @@ def half_periods_ms(
     """
     with np.errstate(over="ignore"):
         step_ms = 60_000.0 * step_mm / feed_mm_min
-    wanted = np.floor(step_ms / controller.half_periods_per_step - 1.0 + 0.5 + PERIOD_GUARD)
-    return np.maximum(wanted, shortest_ms(alone, controller))
+    periods = np.floor(step_ms / controller.half_periods_per_step - 1.0 + 0.5 + PERIOD_GUARD)
+    return np.maximum(periods, shortest_ms(has_one_axis, controller))
 
 
 def steps_too_many(
@@ -45,9 +46,9 @@ def steps_too_many(
 ) -> Ints:
     """(N,) steps that the shorter axis makes beyond its own, of moves of `longer` ≥ `shorter` ≥ 0
     steps; see `steps`, which makes them one by one."""
-    least = np.maximum(shorter, 1)
+    divisor = np.maximum(shorter, 1)
     if controller.clock == "late-longer":
-        made = shorter * (half_period + 1) // half_period
+        made_steps = shorter * (half_period + 1) // half_period
     else:
-        made = longer * (half_period + 1) // (half_period * longer // least + 1)
-    return np.where(shorter > 0, made - shorter, 0)
+        made_steps = longer * (half_period + 1) // (half_period * longer // divisor + 1)
+    return np.where(shorter > 0, made_steps - shorter, 0)

@@ -52,16 +52,16 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
     dialect = machine.dialect
     check_plain(toolpath, machine)
     feeds, rounded_feeds = feed_units(toolpath, machine)
-    lowered, split = split_z(toolpath, machine)
+    lowered_path, split = split_z(toolpath, machine)
     if dialect.slants == "split":
-        lowered = _split_slants(lowered.toolpath, machine).after(lowered)
+        lowered_path = _split_slants(lowered_path.toolpath, machine).after(lowered_path)
     rules = ArcRules(dialect.decimals, dialect.full_circles, MAX_MM)
-    rows = plain_rows(lowered.toolpath, rules)
-    of_row = lowered.row[rows.row]
+    rows = plain_rows(lowered_path.toolpath, rules)
+    of_row = lowered_path.row[rows.row]
     _check_reach(toolpath, rows, of_row, dialect)
     blocks = _Blocks(rows, feeds[of_row], dialect)
-    ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
-    first = toolpath.place(int(lowered.row[rows.first])) if rows.first >= 0 else ""
+    has_end = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
+    first = toolpath.place(int(lowered_path.row[rows.first])) if rows.first >= 0 else ""
     findings = [
         *rounded_feeds,
         *split,
@@ -69,17 +69,19 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
         *_event_findings(toolpath, dialect),
     ]
     words = _event_words(toolpath)
-    others = [
-        (at, words[row], row)
-        for at, row in zip(
+    other_blocks = [
+        (index, words[row], row)
+        for index, row in zip(
             blocks.events.tolist(), of_row[rows.kind > Kind.ARC_CCW].tolist(), strict=True
         )
         if row in words
     ]
-    others.append((len(blocks.row), dialect.program_end, len(toolpath) - 1 if ended else -1))
-    refuse_too_long(len(blocks.row) + len(others), "line")
+    other_blocks.append(
+        (len(blocks.row), dialect.program_end, len(toolpath) - 1 if has_end else -1)
+    )
+    refuse_too_long(len(blocks.row) + len(other_blocks), "line")
     texts = texts_of(blocks.words(dialect, feed_decimals(machine)), blanks=True)
-    places, ends, their_rows = zip(*others, strict=True)
+    places, ends, their_rows = zip(*other_blocks, strict=True)
     return Program.of_text(
         texts.with_lines(zip(places, ends, strict=True)),
         machine,
@@ -106,8 +108,8 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> LoweredToolpa
     travel = toolpath.end[:, :2] - begin[:, :2]
     steps = np.column_stack([to_steps(travel[:, axis], float(q_mm[axis])) for axis in (0, 1)])
     feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
-    alone = (steps == 0).any(axis=1)
-    half_period = half_periods_ms(feed, float(q_mm.max()), alone, controller)
+    moves_one_axis = (steps == 0).any(axis=1)
+    half_period = half_periods_ms(feed, float(q_mm.max()), moves_one_axis, controller)
     exact = np.maximum(half_period - 1.0, 1.0)
     slanted = toolpath.kind == Kind.LINE
     pieces = np.where(slanted, np.ceil(np.abs(steps).min(axis=1) / exact), 1.0)
@@ -126,20 +128,20 @@ def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> LoweredT
     row = np.repeat(np.arange(len(count)), count)
     part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
     inner = np.flatnonzero(part + 1 < count[row])
-    of = row[inner]
-    share = ((part[inner] + 1) / count[of])[:, None]
+    origins = row[inner]
+    share = ((part[inner] + 1) / count[origins])[:, None]
     end = toolpath.end[row]
-    end[inner, :2] = toolpath.starts[of, :2] + np.rint(share * steps[of]) * q_mm
+    end[inner, :2] = toolpath.starts[origins, :2] + np.rint(share * steps[origins]) * q_mm
     return LoweredToolpath(toolpath.picked(row, end=end), row)
 
 
 def _check_reach(
     toolpath: Toolpath, rows: PlainRows, of_row: Ints, dialect: FlashcutDialect
 ) -> None:
-    far = (np.abs(rows.end) > MAX_MM * 10**dialect.decimals).any(axis=1)
+    is_far = (np.abs(rows.end) > MAX_MM * 10**dialect.decimals).any(axis=1)
     refuse(
         toolpath,
-        far,
+        is_far,
         f"a coordinate has more than four digits before the point (±{MAX_MM:g} mm)",
         "check the units",
         rows=of_row,
@@ -181,28 +183,28 @@ class _Blocks:
         begin, end, moves = table.starts, table.end, table.moves
         rapid, arc = table.kind == Kind.RAPID, table.is_arc
         in_xy = (end[:, :2] != begin[:, :2]).any(axis=1)
-        both = (end[:, :2] != begin[:, :2]).all(axis=1)
+        moves_both = (end[:, :2] != begin[:, :2]).all(axis=1)
         # The part along X of a rapid of both axes, before that along Y.
-        corner = moves & rapid & both & (end[:, 2] >= 0) & (dialect.rapids == "one-axis")
+        corner = moves & rapid & moves_both & (end[:, 2] >= 0) & (dialect.rapids == "one-axis")
         cuts = np.flatnonzero(moves & ~rapid)
         changes = np.zeros(len(moves), dtype=np.bool_)
         changes[cuts] = np.diff(feeds[cuts], prepend=0) != 0
         # A block in front that sets the feed where its own cannot.
-        ahead = changes & ~(in_xy & ~arc) & (dialect.feed_words == "syntax")
-        count = moves * (1 + corner.astype(np.int64) + ahead)
+        has_feed_block = changes & ~(in_xy & ~arc) & (dialect.feed_words == "syntax")
+        count = moves * (1 + corner.astype(np.int64) + has_feed_block)
         self.row = np.repeat(np.arange(len(moves)), count)
         self.events = (np.cumsum(count) - count)[table.kind > Kind.ARC_CCW]
         last = np.append(self.row[1:] != self.row[:-1], True)[: len(self.row)]
         self._corner = corner[self.row] & ~last
-        self._ahead = ahead[self.row] & ~last
+        self._ahead = has_feed_block[self.row] & ~last
         self._arc = arc[self.row] & last
         self._flat = self._corner | self._ahead | (in_xy | arc)[self.row]
-        self._feed = self._ahead | ((changes & ~ahead)[self.row] & last)
+        self._feed = self._ahead | ((changes & ~has_feed_block)[self.row] & last)
 
     def words(self, dialect: FlashcutDialect, decimals: int) -> list[WordColumn]:
         """The words of the blocks; `decimals` of a feed."""
         table, row = self._table, self.row
-        kept = None if dialect.trailing_zeros else 1
+        decimals_kept = None if dialect.trailing_zeros else 1
         before, end = table.starts[row], table.end[row]
         x = np.where(self._ahead, before[:, 0], end[:, 0])
         y = np.where(self._ahead | self._corner, before[:, 1], end[:, 1])
@@ -216,8 +218,8 @@ class _Blocks:
         return [
             WordColumn("G", kind, np.ones(len(row), dtype=np.bool_), digits=2),
             *(
-                WordColumn(name, units, has, dialect.decimals, kept)
-                for name, units, has in columns
+                WordColumn(name, units, is_written, dialect.decimals, decimals_kept)
+                for name, units, is_written in columns
             ),
             WordColumn("F", feed, self._feed, shown),
         ]

@@ -115,22 +115,24 @@ def sample_rows(
             if part is None:
                 break
             coming.append(part)
-        own = coming.pop(0)
-        count, high = len(own), min(low + ROWS_AT_ONCE, len(path))
-        known = join_blocks([last, own, *coming]).part(0, len(last) + count + window)
-        plan = speeds_of(known, path, machine, before, len(last), stops)
+        block_group = coming.pop(0)
+        count, high = len(block_group), min(low + ROWS_AT_ONCE, len(path))
+        known_blocks = join_blocks([last, block_group, *coming]).part(
+            0, len(last) + count + window
+        )
+        plan = speeds_of(known_blocks, path, machine, before, len(last), stops)
         squares = plan.squares(window)
         seconds = np.zeros(high - low)
-        np.add.at(seconds, own.row - low, plan.seconds(squares)[:count])
+        np.add.at(seconds, block_group.row - low, plan.seconds(squares)[:count])
         if controller.idle_delay_ms != ALWAYS_ON:
-            behind = np.append(stops.before(known), True)[len(last) + 1 :][:count]
-            np.add.at(seconds, own.row[behind] - low, controller.idle_delay_ms / 1000.0)
+            stop_rows = np.append(stops.before(known_blocks), True)[len(last) + 1 :][:count]
+            np.add.at(seconds, block_group.row[stop_rows] - low, controller.idle_delay_ms / 1000.0)
         dwells = low + np.flatnonzero(path.kind[low:high] == Kind.DWELL)
         seconds[dwells - low] = [dwell_s(value) for value in path.value[dwells].tolist()]
-        samples = GrblSamples(own, np.arange(low, high + 1), machine)
+        samples = GrblSamples(block_group, np.arange(low, high + 1), machine)
         yield SampledRows(low, high, low, samples, seconds, iterates=True)
         before, low = plan.entry_after(count, squares), high
-        last = own.part(count - 1, count) if count else last
+        last = block_group.part(count - 1, count) if count else last
 
 
 class GrblSamples:
@@ -163,13 +165,13 @@ class GrblSamples:
         """Steps of each axis between events."""
         block = np.searchsorted(self._offsets, bounds, side="right") - 1
         begin = int(block[0])
-        way = self._blocks.way[begin : int(block[-1]) + 1].astype(np.int64)
-        travelled = np.zeros((len(way) + 1, 3), dtype=np.int64)
-        np.cumsum(np.abs(way), axis=0, out=travelled[1:])
+        travel = self._blocks.way[begin : int(block[-1]) + 1].astype(np.int64)
+        travelled = np.zeros((len(travel) + 1, 3), dtype=np.int64)
+        np.cumsum(np.abs(travel), axis=0, out=travelled[1:])
         count = travelled[block - begin]
         inside = np.flatnonzero(bounds > self._offsets[block])
         event = bounds[inside] - self._offsets[block[inside]]
-        count[inside] += np.abs(steps_taken(way[block[inside] - begin], event))
+        count[inside] += np.abs(steps_taken(travel[block[inside] - begin], event))
         return np.asarray(np.diff(count, axis=0))
 
 
@@ -251,8 +253,8 @@ class Blocks(Struct, frozen=True, eq=False):
 
     def part(self, low: int, high: int) -> Blocks:
         """Return the blocks low:high."""
-        at = slice(low, high)
-        return Blocks(self.row[at], self.target[at], self.start[at], self.way[at])
+        rows = slice(low, high)
+        return Blocks(self.row[rows], self.target[rows], self.start[rows], self.way[rows])
 
 
 _NONE = np.empty(0, np.int32)
@@ -272,12 +274,12 @@ def join_blocks(parts: list[Blocks]) -> Blocks:
 def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Iterator[Blocks]:
     """The blocks of a program, `ROWS_AT_ONCE` at a time; ProgramError for positions beyond all
     that grbl can count."""
-    begin, asked = _nearest_steps(path.start[None, :].astype(np.float32), machine), 0
+    begin, target_count = _nearest_steps(path.start[None, :].astype(np.float32), machine), 0
     for low in range(0, len(path), ROWS_AT_ONCE):
         rows = np.arange(low, min(low + ROWS_AT_ONCE, len(path)))
         blocks, begin, count = blocks_from(begin, path, rows, machine, controller)
-        yield replace(blocks, target=blocks.target + np.int32(asked))
-        asked += count
+        yield replace(blocks, target=blocks.target + np.int32(target_count))
+        target_count += count
 
 
 def blocks_from(
@@ -287,9 +289,9 @@ def blocks_from(
     last of them ends; and how many targets there are."""
     targets = targets_of(path, rows, machine, controller)
     stop = _nearest_steps(targets.mm, machine)
-    far = (np.abs(stop) > MAX_STEPS).any(axis=1)
-    if far.any():
-        row = int(targets.row[far.argmax()])
+    is_far = (np.abs(stop) > MAX_STEPS).any(axis=1)
+    if is_far.any():
+        row = int(targets.row[is_far.argmax()])
         block = int(path.block[row])
         raise ProgramError(
             "a position is beyond all that the controller can count",
@@ -297,10 +299,10 @@ def blocks_from(
         )
     start = np.concatenate([begin, stop])
     begin, start = start[-1:], start[:-1]
-    way = stop - start
-    moves = np.flatnonzero(way.any(axis=1))
-    columns = targets.row[moves], moves, start[moves], way[moves]
-    return Blocks(*(column.astype(np.int32) for column in columns)), begin, len(way)
+    travel = stop - start
+    moves = np.flatnonzero(travel.any(axis=1))
+    columns = targets.row[moves], moves, start[moves], travel[moves]
+    return Blocks(*(column.astype(np.int32) for column in columns)), begin, len(travel)
 
 
 def _nearest_steps(mm: Singles, machine: _Machine) -> Ints:
@@ -335,22 +337,22 @@ def speeds_of(
     acceleration = axis_limits(machine, "acceleration_mm_s2")
     lengths_mm, speeds, along, corners = (np.empty(len(blocks)) for _ in range(4))
     for low in range(0, len(blocks), BLOCKS_AT_ONCE):
-        at = slice(low, low + BLOCKS_AT_ONCE)
-        ways = blocks.way[max(low - 1, 0) : at.stop] * step_mm
-        lengths = np.sqrt((ways**2).sum(axis=1))
-        units = ways / lengths[:, None]
+        batch = slice(low, low + BLOCKS_AT_ONCE)
+        travels = blocks.way[max(low - 1, 0) : batch.stop] * step_mm
+        lengths = np.sqrt((travels**2).sum(axis=1))
+        units = travels / lengths[:, None]
         turn = np.diff(units, axis=0, prepend=units[: 1 if low == 0 else 0])
         earlier = 0 if low == 0 else 1
         length, unit = lengths[earlier:], units[earlier:]
         highest = max_along(rate, unit)
-        row = blocks.row[at]
+        row = blocks.row[batch]
         cuts = (path.kind[row] >= Kind.LINE) & (path.kind[row] <= Kind.ARC_CCW)
         feed = np.where(cuts, path.feed[row], np.inf) / 60.0
         speed = np.maximum(np.minimum(feed, highest), MIN_SPEED_MM_S)
-        events = np.abs(blocks.way[at]).max(axis=1, initial=0)
+        events = np.abs(blocks.way[batch]).max(axis=1, initial=0)
         speed = np.maximum(speed, controller.least_step_hz * length / events)
-        lengths_mm[at], speeds[at] = length, speed
-        along[at] = max_along(acceleration, unit)
+        lengths_mm[batch], speeds[batch] = length, speed
+        along[batch] = max_along(acceleration, unit)
         across = np.sqrt((turn**2).sum(axis=1))
         cosine = 0.5 * across**2 - 1.0  # of the angle between the way back and the way on
         half_sine = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0))
@@ -360,7 +362,7 @@ def speeds_of(
             square = allowed * controller.junction_deviation_mm * half_sine / (1.0 - half_sine)
         corner = np.sqrt(np.where(cosine < -STRAIGHT_COS, np.inf, square))
         corner[cosine > STRAIGHT_COS] = 0.0
-        corners[at] = corner
+        corners[batch] = corner
     corners[stops.before(blocks)] = 0.0
     return SpeedPlan(lengths_mm[first:], speeds[first:], along[first:], corners[first:], before)
 
@@ -395,8 +397,8 @@ def stops_of(path: Toolpath, controller: GrblController) -> Stops:
     spindle = np.flatnonzero(np.isin(path.kind, SPINDLE))
     kind = np.append(Kind.SPINDLE_OFF, path.kind[spindle])
     speed = np.nan_to_num(np.append(0.0, path.value[spindle]))
-    same = (kind[1:] == Kind.SPINDLE_OFF) | (speed[1:] == speed[:-1]) | controller.laser_mode
-    rows[spindle[same & (kind[1:] == kind[:-1])]] = False
+    same_power = (kind[1:] == Kind.SPINDLE_OFF) | (speed[1:] == speed[:-1]) | controller.laser_mode
+    rows[spindle[same_power & (kind[1:] == kind[:-1])]] = False
     if not controller.laser_mode:
         return Stops(rows, None)
     index = np.searchsorted(spindle, np.arange(len(path)), side="right")
@@ -461,20 +463,22 @@ def as_read(values: Floats, machine: _Machine) -> Singles:
     it belongs, each time rounded. How many decimals were written `dialect.decimals` says; a
     number that has others is taken as the nearest float.
     """
-    nearest = values.astype(np.float32)
+    nearest_single = values.astype(np.float32)
     decimals = machine.dialect.decimals
     scaled = np.abs(values) * 10.0**decimals
     digits = np.rint(scaled)
-    whole = np.maximum(np.floor(np.log10(np.maximum(np.trunc(np.abs(values)), 1.0))), 0.0) + 1.0
-    dropped = np.clip(whole + decimals - MAX_DIGITS, 0, decimals).astype(np.int64)
-    made = np.floor(digits / 10.0**dropped).astype(np.float32)
-    left = decimals - dropped
+    digits_before = (
+        np.maximum(np.floor(np.log10(np.maximum(np.trunc(np.abs(values)), 1.0))), 0.0) + 1.0
+    )
+    dropped = np.clip(digits_before + decimals - MAX_DIGITS, 0, decimals).astype(np.int64)
+    read_values = np.floor(digits / 10.0**dropped).astype(np.float32)
+    remaining = decimals - dropped
     for _ in range(decimals // 2):
-        made = np.where(left >= 2, made * np.float32(0.01), made)
-        left = np.where(left >= 2, left - 2, left)
-    made = np.where(left == 1, made * np.float32(0.1), made)
+        read_values = np.where(remaining >= 2, read_values * np.float32(0.01), read_values)
+        remaining = np.where(remaining >= 2, remaining - 2, remaining)
+    read_values = np.where(remaining == 1, read_values * np.float32(0.1), read_values)
     written = np.abs(scaled - digits) <= DECIMAL_EPS
-    return np.asarray(np.where(written, np.copysign(made, nearest), nearest))
+    return np.asarray(np.where(written, np.copysign(read_values, nearest_single), nearest_single))
 
 
 class _Chords:
@@ -491,22 +495,22 @@ class _Chords:
         rx, ry = -offset[:, 0], -offset[:, 1]
         tx, ty = end[:, 0] - self._centre[:, 0], end[:, 1] - self._centre[:, 1]
         turn = np.arctan2(rx * ty - ry * tx, rx * tx + ry * ty)
-        full = np.float32(2.0 * np.pi)
+        full_turn = np.float32(2.0 * np.pi)
         clockwise = path.kind[arcs] == Kind.ARC_CW
-        down = np.where(turn >= -FULL_TURN_RAD, turn - full, turn)
-        up = np.where(turn <= FULL_TURN_RAD, turn + full, turn)
-        self._turn = np.where(clockwise, down, up)
+        downward = np.where(turn >= -FULL_TURN_RAD, turn - full_turn, turn)
+        upward = np.where(turn <= FULL_TURN_RAD, turn + full_turn, turn)
+        self._turn = np.where(clockwise, downward, upward)
 
     def segments(self, controller: GrblController) -> Ints:
         """(J,) chords of each: ⌊|½ φ r| / √(δ (2r − δ))⌋, δ the arc tolerance; at least the one
         to the end."""
         tolerance = np.float32(controller.arc_tolerance_mm)
         half = tolerance * (np.float32(2.0) * self._radius - tolerance)
-        way = np.abs(np.float32(0.5) * self._turn * self._radius)
+        arc_length = np.abs(np.float32(0.5) * self._turn * self._radius)
         with np.errstate(invalid="ignore", divide="ignore"):
-            count = np.floor(way / np.sqrt(half))
-        counted = np.where(np.isfinite(count), count, 0.0).astype(np.int64) % MAX_SEGMENTS
-        return np.maximum(counted, 1)
+            count = np.floor(arc_length / np.sqrt(half))
+        truncated = np.where(np.isfinite(count), count, 0.0).astype(np.int64) % MAX_SEGMENTS
+        return np.maximum(truncated, 1)
 
     def points(self, segments: Ints, first: Ints, correction: int) -> tuple[Ints, Singles]:
         """Return the indices (P,) of the targets inside arcs, and their positions (P, 3) mm.
@@ -519,19 +523,19 @@ class _Chords:
         number = np.arange(len(arc)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
         theta = (self._turn / segments.astype(np.float32))[arc]
         x0, y0 = -self._offset[arc, 0], -self._offset[arc, 1]
-        turned = number % (correction + 1)
-        angle = (number - turned).astype(np.float32) * theta
+        since_correction = number % (correction + 1)
+        angle = (number - since_correction).astype(np.float32) * theta
         cos_i, sin_i = np.cos(angle), np.sin(angle)
-        anew = number >= turned + 1
+        anew = number >= since_correction + 1
         x = np.where(anew, x0 * cos_i - y0 * sin_i, x0)
         y = np.where(anew, x0 * sin_i + y0 * cos_i, y0)
         cos_t = np.float32(2.0) - theta * theta
         sin_t = theta * np.float32(0.16666667) * (cos_t + np.float32(4.0))
         cos_t = cos_t * np.float32(0.5)
         for step in range(1, correction + 1):
-            on = np.flatnonzero(turned >= step)
-            c, s, u, v = cos_t[on], sin_t[on], x[on], y[on]
-            x[on], y[on] = u * c - v * s, u * s + v * c
+            corrected = np.flatnonzero(since_correction >= step)
+            c, s, u, v = cos_t[corrected], sin_t[corrected], x[corrected], y[corrected]
+            x[corrected], y[corrected] = u * c - v * s, u * s + v * c
         points = np.empty((len(arc), 3), dtype=np.float32)
         points[:, 0] = self._centre[arc, 0] + x
         points[:, 1] = self._centre[arc, 1] + y
@@ -542,10 +546,13 @@ class _Chords:
         """Z of the chords' ends within the arcs: an equal rise added each time."""
         z: Singles = self._begin[arc, 2].copy()
         rise = (self._end[:, 2] - self._begin[:, 2]) / segments.astype(np.float32)
-        behind = np.cumsum(segments - 1)
-        for which in np.flatnonzero((rise != 0.0) & (segments > 1)).tolist():
-            low, high = int(behind[which] - segments[which] + 1), int(behind[which])
-            z[low] += rise[which]
-            z[low + 1 : high] = rise[which]
+        last_targets = np.cumsum(segments - 1)
+        for arc_index in np.flatnonzero((rise != 0.0) & (segments > 1)).tolist():
+            low, high = (
+                int(last_targets[arc_index] - segments[arc_index] + 1),
+                int(last_targets[arc_index]),
+            )
+            z[low] += rise[arc_index]
+            z[low + 1 : high] = rise[arc_index]
             z[low:high] = np.add.accumulate(z[low:high])
         return z

@@ -99,9 +99,9 @@ VALUES: Final = frozenset("FIJKLNPRSTXYZ")
 SPINDLE: Final = {3: Kind.SPINDLE_CW, 4: Kind.SPINDLE_CCW, 5: None}
 
 
-def error(number: int, at: int | str | None, what: str = "", mend: str = "") -> LineFault:
+def error(number: int, place: int | str | None, subject: str = "", mend: str = "") -> LineFault:
     """A line that grbl answers with this error."""
-    return LineFault(f"{WHY[number].format(what)} (error:{number})", at, mend)
+    return LineFault(f"{WHY[number].format(subject)} (error:{number})", place, mend)
 
 
 class ParserModes(Struct):
@@ -192,20 +192,20 @@ class GrblParser:
     def reads_columns(self) -> bool:
         """True if blocks of plain moves may now be read by columns."""
         modes = self.modes
-        known = modes.motion in (0, 1, 2, 3, 80) and modes.plane == 17 and modes.absolute
+        is_plain = modes.motion in (0, 1, 2, 3, 80) and modes.plane == 17 and modes.absolute
         shift = any(self._frames[modes.frame]) or any(self._offset) or self._length
-        return known and modes.feed_mode == 94 and not shift and self.moves.is_part_frame
+        return is_plain and modes.feed_mode == 94 and not shift and self.moves.is_part_frame
 
     def continue_from(
-        self, motion: int | None, feed: float, at: tuple[float, float, float]
+        self, motion: int | None, feed: float, place: tuple[float, float, float]
     ) -> None:
         """Adopt motion, feed and position behind blocks of plain moves that were read by
         columns."""
         self.modes.motion = self.modes.motion if motion is None else motion
         self.feed = feed
-        if at != tuple(self.position):
+        if place != tuple(self.position):
             self._note_motion()
-        self.position[:] = at
+        self.position[:] = place
 
     def rewind(self) -> None:
         """M2 and M30 set most modes back; units, feed and offsets stay (`gc_execute_line`)."""
@@ -223,82 +223,84 @@ class GrblParser:
         block = GrblBlock(replace(self.modes))
         if jogs:
             block.modes.motion, block.modes.feed_mode = 1, 94
-        at = 3 if jogs else 0
-        while at < len(text):
-            letter = text[at]
+        position = 3 if jogs else 0
+        while position < len(text):
+            letter = text[position]
             if not "A" <= letter <= "Z":
-                raise error(1, at, SIGNS.get(letter, repr(letter)))
-            found = NUMBER.match(text, at + 1)
-            if found is None:
-                raise error(2, at, letter)
-            self._word(block, letter, _number(found[0]), found[0], at)
-            at = found.end()
+                raise error(1, position, SIGNS.get(letter, repr(letter)))
+            match = NUMBER.match(text, position + 1)
+            if match is None:
+                raise error(2, position, letter)
+            self._word(block, letter, _number(match[0]), match[0], position)
+            position = match.end()
         if any(axis in block.numbers for axis in "XYZ") and block.uses == NONE:
             block.uses = MOTION
         self._check_and_execute(block, jogs=jogs)
 
-    def _word(self, block: GrblBlock, letter: str, value: float, said: str, at: int) -> None:
-        whole = math.trunc(value) % 256 if abs(value) < MAX_CODE else 255
-        hundredths = round(100.0 * (value - whole)) % 65536
-        name = f"{letter}{said}"
+    def _word(self, block: GrblBlock, letter: str, value: float, digits: str, column: int) -> None:
+        number = math.trunc(value) % 256 if abs(value) < MAX_CODE else 255
+        hundredths = round(100.0 * (value - number)) % 65536
+        name = f"{letter}{digits}"
         if letter == "G":
-            group = self._g_word(block, whole, hundredths, name, at)
+            group = self._g_word(block, number, hundredths, name, column)
             if group in block.groups:
-                raise error(21, at, group)
+                raise error(21, column, group)
             block.groups.add(group)
         elif letter == "M":
             if hundredths > 0:
-                raise error(23, at, name)
-            group = self._m_word(block, whole, name, at)
+                raise error(23, column, name)
+            group = self._m_word(block, number, name, column)
             if group in block.groups:
-                raise error(21, at, group)
+                raise error(21, column, group)
             block.groups.add(group)
         else:
             if letter not in VALUES:
-                raise error(20, at, f"the letter {letter}")
+                raise error(20, column, f"the letter {letter}")
             if letter == "T" and value > MAX_TOOL:
-                raise error(38, at)
+                raise error(38, column)
             if letter in block.numbers:
-                raise error(25, at, letter)
+                raise error(25, column, letter)
             if letter in NEVER_NEGATIVE and value < 0.0:
-                raise error(4, at, NEVER_NEGATIVE[letter])
+                raise error(4, column, NEVER_NEGATIVE[letter])
             if letter in "LT":
-                value = float(whole)
+                value = float(number)
             block.numbers[letter] = float(math.trunc(value)) if letter == "N" else value
-            block.at[letter] = at
+            block.at[letter] = column
             return
-        block.at[letter] = at
+        block.at[letter] = column
 
-    def _g_word(self, block: GrblBlock, whole: int, hundredths: int, name: str, at: int) -> str:
+    def _g_word(
+        self, block: GrblBlock, number: int, hundredths: int, name: str, column: int
+    ) -> str:
         """Set what a G word says; its group."""
         modes = block.modes
-        if whole in (10, 28, 30, 92) and hundredths == 0:
-            self._use(block, NON_MODAL, at)
-        if whole in (28, 30, 92):
+        if number in (10, 28, 30, 92) and hundredths == 0:
+            self._use(block, NON_MODAL, column)
+        if number in (28, 30, 92):
             if hundredths not in (0, 10):
-                raise error(20, at, name)
-            block.once = f"G{whole}" + (".1" if hundredths else "")
+                raise error(20, column, name)
+            block.once = f"G{number}" + (".1" if hundredths else "")
             return "one block"
-        if whole == 38:
-            self._use(block, MOTION, at)
+        if number == 38:
+            self._use(block, MOTION, column)
             if hundredths not in (20, 30, 40, 50):
-                raise error(20, at, name)
-            return self._probe_word(block, hundredths, at)
-        if whole in (43, 49):
-            self._use(block, LENGTH, at)
-            if whole == 43 and hundredths != 10:
-                raise error(20, at, name)
-            block.length = "set" if whole == 43 else "cancel"
+                raise error(20, column, name)
+            return self._probe_word(block, hundredths, column)
+        if number in (43, 49):
+            self._use(block, LENGTH, column)
+            if number == 43 and hundredths != 10:
+                raise error(20, column, name)
+            block.length = "set" if number == 43 else "cancel"
             return "tool length"
-        if whole in (90, 91) and hundredths:
-            if hundredths != 10 or whole == 90:
-                raise error(20, at, name)
+        if number in (90, 91) and hundredths:
+            if hundredths != 10 or number == 90:
+                raise error(20, column, name)
             return "arc distance"
-        group, value = self._plain_g_word(block, whole, name, at)
-        if whole == 61 and hundredths:
-            raise error(20, at, name)
+        group, value = self._plain_g_word(block, number, name, column)
+        if number == 61 and hundredths:
+            raise error(20, column, name)
         if hundredths > 0:
-            raise error(23, at, name)
+            raise error(23, column, name)
         if group == "plane":
             modes.plane = value
         elif group == "distance":
@@ -311,34 +313,36 @@ class GrblParser:
             modes.frame = value
         return group
 
-    def _probe_word(self, block: GrblBlock, hundredths: int, at: int) -> str:
+    def _probe_word(self, block: GrblBlock, hundredths: int, column: int) -> str:
         """Set what G38.2 to G38.5 say; its group."""
-        raise LineFault("G38 probes, which cannot be simulated", at)
+        raise LineFault("G38 probes, which cannot be simulated", column)
 
-    def _plain_g_word(self, block: GrblBlock, whole: int, name: str, at: int) -> tuple[str, int]:
+    def _plain_g_word(
+        self, block: GrblBlock, number: int, name: str, column: int
+    ) -> tuple[str, int]:
         """The group of a G word without decimals, and what it sets."""
-        if whole in (4, 10, 53):
-            block.once = f"G{whole}"
-            return "one block", whole
-        if whole in (0, 1, 2, 3, 80):
-            if whole != 80:
-                self._use(block, MOTION, at)
-            block.modes.motion = whole
-            return "motion", whole
-        if whole in (90, 91):
-            return "distance", whole
-        if whole == 61:
-            return "path", whole
-        if whole not in MODAL:
-            raise error(20, at, name)
-        return MODAL[whole]
+        if number in (4, 10, 53):
+            block.once = f"G{number}"
+            return "one block", number
+        if number in (0, 1, 2, 3, 80):
+            if number != 80:
+                self._use(block, MOTION, column)
+            block.modes.motion = number
+            return "motion", number
+        if number in (90, 91):
+            return "distance", number
+        if number == 61:
+            return "path", number
+        if number not in MODAL:
+            raise error(20, column, name)
+        return MODAL[number]
 
-    def _use(self, block: GrblBlock, what: int, at: int) -> None:
+    def _use(self, block: GrblBlock, use: int, column: int) -> None:
         if block.uses != NONE:
-            raise error(24, at)
-        block.uses = what
+            raise error(24, column)
+        block.uses = use
 
-    def _m_word(self, block: GrblBlock, code: int, name: str, at: int) -> str:
+    def _m_word(self, block: GrblBlock, code: int, name: str, column: int) -> str:
         if code in (0, 1, 2, 30):
             block.flow = code
             return "stop"
@@ -349,7 +353,7 @@ class GrblParser:
             block.modes.mist = code == 7 or (block.modes.mist and code != 9)
             block.modes.flood = code == 8 or (block.modes.flood and code != 9)
             return "coolant"
-        raise error(20, at, name)
+        raise error(20, column, name)
 
     # Step 3: checks
 
@@ -399,8 +403,8 @@ class GrblParser:
     def _words(self, block: GrblBlock) -> dict[int, float]:
         """Return the coordinates of a block by axis, mm."""
         mm = MM_PER_INCH if block.modes.inches else 1.0
-        said = block.numbers
-        return {k: said[axis] * mm for k, axis in enumerate("XYZ") if axis in said}
+        coordinates = block.numbers
+        return {k: coordinates[axis] * mm for k, axis in enumerate("XYZ") if axis in coordinates}
 
     def _check_probe(self, target: list[float], axes: list[int]) -> None:
         if not axes:
@@ -447,15 +451,15 @@ class GrblParser:
         return target
 
     def _check_g10(self, block: GrblBlock, words: dict[int, float]) -> None:
-        numbers, at = block.numbers, block.at["G"]
+        numbers, columns = block.numbers, block.at["G"]
         if not words:
-            raise error(26, at, "G10")
+            raise error(26, columns, "G10")
         if "P" not in numbers and "L" not in numbers:
-            raise error(28, at, "G10 without P or L")
+            raise error(28, columns, "G10 without P or L")
         if math.trunc(numbers.get("P", 0.0)) > MAX_FRAMES:
             raise error(29, block.at["P"])
         if numbers.get("L") not in (2, 20) or (numbers["L"] == 2 and "R" in numbers):
-            raise error(20, at, f"G10 L{numbers.get('L', 0.0):g}")
+            raise error(20, columns, f"G10 L{numbers.get('L', 0.0):g}")
 
     def _arc(
         self, block: GrblBlock, target: list[float], axes: list[int], mm: float, unused: set[str]
@@ -487,29 +491,33 @@ class GrblParser:
     ) -> tuple[float, float]:
         """The offset of the centre: on the left of the chord for a counter-clockwise arc of at
         most half a turn, on the other side for a negative R."""
-        at = block.at["R"]
+        column = block.at["R"]
         if target == self.position:
-            raise error(33, at, "an arc by its radius that ends where it starts")
+            raise error(33, column, "an arc by its radius that ends where it starts")
         chord = math.hypot(x, y)
         inside = 4.0 * radius * radius - chord * chord
         if inside < 0.0:
-            raise error(34, at)
+            raise error(34, column)
         if chord == 0.0:
             message = "an arc by its radius that ends above where it starts: grbl finds no centre"
-            raise LineFault(message, at)
-        aside = math.sqrt(inside) / chord
+            raise LineFault(message, column)
+        half_height = math.sqrt(inside) / chord
         if (block.modes.motion == 2) == (radius > 0.0):
-            aside = -aside
-        return 0.5 * (x - y * aside), 0.5 * (y + x * aside)
+            half_height = -half_height
+        return 0.5 * (x - y * half_height), 0.5 * (y + x * half_height)
 
-    def _check_radii(self, offset: tuple[float, float], end: tuple[float, float], at: int) -> None:
+    def _check_radii(
+        self, offset: tuple[float, float], end: tuple[float, float], column: int
+    ) -> None:
         """The radii at both ends are nearly the same."""
         dialect = self._dialect
         r1, r2 = math.hypot(*offset), math.dist(end, offset)
         gap = abs(r1 - r2)
         wide = gap > dialect.arc_difference_mm and gap > dialect.arc_difference_part * r1
         if r1 <= dialect.arc_least_radius_mm or gap > dialect.arc_most_difference_mm or wide:
-            raise error(33, at, f"the radius is {r1:.4f} mm at the start, {r2:.4f} mm at the end")
+            raise error(
+                33, column, f"the radius is {r1:.4f} mm at the start, {r2:.4f} mm at the end"
+            )
 
     # Step 4: execution
 
@@ -563,18 +571,18 @@ class GrblParser:
         """Spindle or laser. In laser mode another power goes with the move of its block; in a
         block that moves nothing grbl waits, and sets it at once."""
         speed = block.numbers.get("S", self._speed)
-        changed = (speed or 0.0) != (self._speed or 0.0)
+        has_changed = (speed or 0.0) != (self._speed or 0.0)
         self._speed = speed
-        now, said = block.modes.spindle, "spindle" in block.groups
-        stays = now is not None and now == before.spindle and block.uses != MOTION
-        if self.laser and stays and (changed or self._relights(block, before)):
+        direction, has_word = block.modes.spindle, "spindle" in block.groups
+        stays = direction is not None and direction == before.spindle and block.uses != MOTION
+        if self.laser and stays and (has_changed or self._relights(block, before)):
             self._come_to_rest()
-        if said and now is None:
+        if has_word and direction is None:
             self._path.event(Kind.SPINDLE_OFF)
-        elif now is not None and (said or changed):
+        elif direction is not None and (has_word or has_changed):
             if speed is None:
                 self.notes.speedless.append(self.index)
-            self._path.event(now, speed)
+            self._path.event(direction, speed)
 
     @staticmethod
     def _relights(block: GrblBlock, before: ParserModes) -> bool:
@@ -586,13 +594,13 @@ class GrblParser:
         )
 
     def _switch_coolant(self, before: ParserModes) -> None:
-        kind, now = _coolant_kind(before), _coolant_kind(self.modes)
-        changed = (before.mist, before.flood) != (self.modes.mist, self.modes.flood)
+        kind, new_kind = _coolant_kind(before), _coolant_kind(self.modes)
+        has_changed = (before.mist, before.flood) != (self.modes.mist, self.modes.flood)
         if not self._coolant.kinds:
             self.notes.coolant.append(self.index)
         else:
-            self._path.event(now)
-        if changed and (kind == now or not self._coolant.kinds):
+            self._path.event(new_kind)
+        if has_changed and (kind == new_kind or not self._coolant.kinds):
             self._come_to_rest()
 
     def _change_length(self, length: float) -> None:
@@ -612,27 +620,27 @@ class GrblParser:
         self._come_to_rest()
         self._use_frame()
         frame = self.modes.frame
-        known = {self._first_frame, frame} <= self._placed
-        if self._first_frame not in (None, frame) and not known:
+        is_known = {self._first_frame, frame} <= self._placed
+        if self._first_frame not in (None, frame) and not is_known:
             self.notes.frames.setdefault(f"G{54 + frame}", self.index)
 
     def _do_once(self, block: GrblBlock, target: list[float]) -> None:
-        words, once = self._words(block), block.once
-        if once in ("G10", "G28.1", "G30.1", "G92", "G92.1"):  # it writes to its memory
+        words, action = self._words(block), block.once
+        if action in ("G10", "G28.1", "G30.1", "G92", "G92.1"):  # it writes to its memory
             self._come_to_rest()
-        if once == "G10":
+        if action == "G10":
             self._set_frame(block, words)
-        elif once in ("G28", "G30"):
-            self._go_home(once, words, target)
-        elif once in ("G28.1", "G30.1"):
-            self._homes[once[:3]] = list(self.position)
-        elif once == "G92":
+        elif action in ("G28", "G30"):
+            self._go_home(action, words, target)
+        elif action in ("G28.1", "G30.1"):
+            self._homes[action[:3]] = list(self.position)
+        elif action == "G92":
             frame = self._frames[self.modes.frame]
             for k, value in words.items():
                 length = self._length if k == 2 else 0.0
                 self._offset[k] = self.position[k] - frame[k] - value - length
             self._use_frame()
-        elif once == "G92.1":
+        elif action == "G92.1":
             self._offset = [0.0, 0.0, 0.0]
             self._use_frame()
 
@@ -641,32 +649,32 @@ class GrblParser:
         number = math.trunc(block.numbers.get("P", 0.0))
         frame = number - 1 if number > 0 else self.modes.frame
         place = self._frames[frame]
-        here = block.numbers["L"] == 20
+        from_here = block.numbers["L"] == 20
         for k, value in words.items():
             length = self._length if k == 2 else 0.0
-            if here:
+            if from_here:
                 place[k] = self.position[k] - self._offset[k] - value - length
             else:
                 place[k] = value + self._zero[k]
         if len(words) == len(place):
             self._placed.add(frame)
-            if here and self._first_frame is not None:
+            if from_here and self._first_frame is not None:
                 self._placed.add(self._first_frame)
         self._use_frame()
 
-    def _go_home(self, once: str, words: dict[int, float], target: list[float]) -> None:
+    def _go_home(self, action: str, words: dict[int, float], target: list[float]) -> None:
         """Move by way of the coordinates to the stored place, in the axes that are named."""
-        home = self._home_of(once)
+        home = self._home_of(action)
         if words:
             self._go(Kind.RAPID, target, 0.0)
             home = [home[k] if k in words else target[k] for k in range(3)]
         self._go(Kind.RAPID, home, 0.0)
 
-    def _home_of(self, once: str) -> list[float]:
+    def _home_of(self, action: str) -> list[float]:
         """Return the stored place of G28 or G30, mm on the machine."""
-        if once not in self._homes:
-            self.notes.homes.setdefault(once, self.index)
-        return list(self._homes.get(once, self._zero))
+        if action not in self._homes:
+            self.notes.homes.setdefault(action, self.index)
+        return list(self._homes.get(action, self._zero))
 
     def _move(
         self,
@@ -686,9 +694,9 @@ class GrblParser:
         self._note_motion()
         axes = PLANES[block.modes.plane * 10]
         moves = self.moves
-        off = self._shift()
-        end = [target[axis] - off[axis] for axis in axes]
-        middle = centre[0] - off[axes[0]], centre[1] - off[axes[1]]
+        shift = self._shift()
+        end = [target[axis] - shift[axis] for axis in axes]
+        middle = centre[0] - shift[axes[0]], centre[1] - shift[axes[1]]
         if block.modes.feed_mode == 93:
             feed *= self._arc_length(axes, target, centre, ccw=motion == 3)
         moves.plane, moves.feed = block.modes.plane * 10, feed
@@ -703,14 +711,17 @@ class GrblParser:
         *,
         ccw: bool,
     ) -> float:
-        out = self.position[axes[0]] - centre[0], self.position[axes[1]] - centre[1]
-        back = target[axes[0]] - centre[0], target[axes[1]] - centre[1]
-        turn = math.atan2(out[0] * back[1] - out[1] * back[0], out[0] * back[0] + out[1] * back[1])
+        start_arm = self.position[axes[0]] - centre[0], self.position[axes[1]] - centre[1]
+        end_arm = target[axes[0]] - centre[0], target[axes[1]] - centre[1]
+        turn = math.atan2(
+            start_arm[0] * end_arm[1] - start_arm[1] * end_arm[0],
+            start_arm[0] * end_arm[0] + start_arm[1] * end_arm[1],
+        )
         turn = turn if ccw else -turn
         if turn <= self._dialect.arc_full_turn_rad:
             turn += 2.0 * math.pi
         rise = target[axes[2]] - self.position[axes[2]]
-        return math.hypot(math.hypot(*out) * turn, rise)
+        return math.hypot(math.hypot(*start_arm) * turn, rise)
 
     def _try_homing(self, block: GrblBlock, target: list[float]) -> bool:
         """Add the machine's homing event for G53 G0 to machine zero; True if the block is that."""
@@ -773,11 +784,11 @@ def _number(text: str) -> float:
     """A number as grbl reads it: its first eight digits count."""
     if len(text) <= MAX_DIGITS:
         return float(text)
-    digits, kept = 0, []
+    digits, digits_read = 0, []
     for sign in text:
         if sign.isdigit():
             digits += 1
-            kept.append(sign if digits <= MAX_DIGITS else "0")
+            digits_read.append(sign if digits <= MAX_DIGITS else "0")
         else:
-            kept.append(sign)
-    return float("".join(kept))
+            digits_read.append(sign)
+    return float("".join(digits_read))

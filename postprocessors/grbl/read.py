@@ -106,9 +106,9 @@ class _Reader:
         if not text:
             return
         if len(text) > self._most:
-            where = self._most
+            limit = self._most
             message = f"the line has more than {self._most} characters (error:11)"
-            self._fail(LineFault(message, where, "shorten it"), raw, number)
+            self._fail(LineFault(message, limit, "shorten it"), raw, number)
         self.parser.index = self.path.block = self._blocks
         is_block = has_words(raw)
         if is_block and self.parser.ended:
@@ -123,25 +123,25 @@ class _Reader:
 
     def _fail(self, fault: LineFault, raw: str, number: int) -> NoReturn:
         columns = _columns(raw)
-        at = fault.at
-        if not isinstance(at, int):  # the first word behind a block number
+        place = fault.at
+        if not isinstance(place, int):  # the first word behind a block number
             numbered = re.match(r"N[0-9.]*", "".join(raw[k] for k in columns).upper())
-            at = numbered.end() if numbered else 0
-        column = columns[at] + 1 if at < len(columns) else len(raw) + 1
+            place = numbered.end() if numbered else 0
+        column = columns[place] + 1 if place < len(columns) else len(raw) + 1
         where = f"block {self._blocks + 1}, line {number + 1}, column {column}"
         raise ProgramError(fault.message, where=where, mend=fault.mend) from None
 
-    def _decode_plain(self, plain: PlainBlocks) -> int:
+    def _decode_plain(self, blocks: PlainBlocks) -> int:
         """Add the rows of plain blocks, up to the first that is no move which grbl surely
         executes."""
         parser, path = self.parser, self.path
         motion = -1 if parser.modes.motion == 80 else 10 * parser.modes.motion
         mm = 25.4 if parser.modes.inches else 1.0
         x, y, z = parser.position
-        moves = PlainMoves(plain, PlainState(motion, parser.feed, mm, (x, y, z)), self._rule)
+        moves = PlainMoves(blocks, PlainState(motion, parser.feed, mm, (x, y, z)), self._rule)
         if moves.count:
-            moved = moves.add_to(path, self._fast)
-            parser.moves.moved = parser.moves.moved or moved
+            has_moved = moves.add_to(path, self._fast)
+            parser.moves.moved = parser.moves.moved or has_moved
             last, feed = moves.last
             parser.continue_from(None if last is None else last // 10, feed, path.position)
         return moves.count
@@ -201,19 +201,19 @@ def _too_slow(path: Toolpath, machine: GrblMachine) -> Iterator[Finding]:
         steps = (travel / step_mm).max(axis=1, initial=0.0)
         along = np.linalg.norm(travel, axis=1) / np.maximum(steps, 1.0)
         along = np.where(path.kind[rows] >= Kind.ARC_CW, step_mm[:2].min(), along)
-        least = 60.0 * least_hz * along
+        min_feed = 60.0 * least_hz * along
         cut, feed = (
             (path.kind[rows] >= Kind.LINE) & (path.kind[rows] <= Kind.ARC_CCW),
             path.feed[rows],
         )
         with np.errstate(invalid="ignore"):
-            slow = np.flatnonzero(cut & (feed < least * (1.0 - SLOW_GUARD)))
+            slow = np.flatnonzero(cut & (feed < min_feed * (1.0 - SLOW_GUARD)))
         count += len(slow)
         if len(slow):
-            part = feed[slow] / least[slow]
+            part = feed[slow] / min_feed[slow]
             if part.min() < least_part:
-                least_part, at = float(part.min()), int(slow[part.argmin()])
-                worst, limit = low + at, least[at]
+                least_part, worst_row = float(part.min()), int(slow[part.argmin()])
+                worst, limit = low + worst_row, min_feed[worst_row]
     if count:
         yield FEED_TOO_SLOW(
             where=f"block {int(path.block[worst]) + 1}",

@@ -59,35 +59,35 @@ _MORE = {
 def settings_of(text: str) -> list[ControllerSetting] | None:
     """The values of a machine file that a listing says, None for a text without settings;
     MachineError for a setting that is missing, doubled, or no number."""
-    said: dict[int, tuple[str, int]] = {}
+    values: dict[int, tuple[str, int]] = {}
     for line, row in enumerate(text.splitlines(), 1):
-        found = _SETTING.search(row)
-        if found is None:
+        match = _SETTING.search(row)
+        if match is None:
             continue
-        number = int(found[1])
-        if number in said:
+        number = int(match[1])
+        if number in values:
             raise MachineError(
-                f"is given twice, first in line {said[number][1]}",
+                f"is given twice, first in line {values[number][1]}",
                 where=f"line {line}, ${number}",
                 mend="keep one listing, that of now",
             )
-        said[number] = found[2], line
-    if not said:
+        values[number] = match[2], line
+    if not values:
         return None
-    missing = [f"${number}" for number in _KEYS.values() if number not in said]
+    missing = [f"${number}" for number in _KEYS.values() if number not in values]
     if missing:
         raise MachineError(
             f"the listing is not whole: {', '.join(missing)} {_verb(missing)} missing",
             mend="give all that grbl answers to $$",
         )
-    made = [
-        _setting(key, number, *said[number])
+    settings = [
+        _setting(key, number, *values[number])
         for key, number in (_KEYS | _MORE).items()
-        if number in said
+        if number in values
     ]
-    if not any(each.said == f"${LASER}" and each.value for each in made):
-        made = [replace(each, doubt=_doubt(each)) for each in made]
-    return made
+    if not any(each.said == f"${LASER}" and each.value for each in settings):
+        settings = [replace(each, doubt=_doubt(each)) for each in settings]
+    return settings
 
 
 def _doubt(setting: ControllerSetting) -> str:
@@ -98,18 +98,18 @@ def _doubt(setting: ControllerSetting) -> str:
 
 
 def _setting(key: str, number: int, text: str, line: int) -> ControllerSetting:
-    where = f"line {line}, ${number}"
+    place = f"line {line}, ${number}"
     try:
         value = float(text)
     except ValueError:
-        raise MachineError(f"{text!r} is no number", where=where) from None
+        raise MachineError(f"{text!r} is no number", where=place) from None
     if key.endswith("coded_step_mm"):
         if value <= 0.0:
-            raise MachineError(f"{text} steps/mm are none", where=where)
-        return ControllerSetting(key, 1.0 / value, f"${number} = {text} steps/mm", where)
+            raise MachineError(f"{text} steps/mm are none", where=place)
+        return ControllerSetting(key, 1.0 / value, f"${number} = {text} steps/mm", place)
     if number == LASER:
-        return ControllerSetting(key, value != 0.0, f"${number}", where)
-    return ControllerSetting(key, int(value) if value.is_integer() else value, f"${number}", where)
+        return ControllerSetting(key, value != 0.0, f"${number}", place)
+    return ControllerSetting(key, int(value) if value.is_integer() else value, f"${number}", place)
 
 
 # Comparing with the machine file, before a program is sent.
@@ -134,31 +134,31 @@ def differences(text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
     """Compare a listing of `$$` with the machine file. Return the differences that would spoil the
     part or leave the travel (steps, rates, travels, arcs, units of reports), and those that change
     only times. MachineError as `settings_of`."""
-    said = {each.said.split()[0]: each for each in settings_of(text) or ()}
-    if not said:
+    settings = {each.said.split()[0]: each for each in settings_of(text) or ()}
+    if not settings:
         raise MachineError("its answer to $$ has no settings")
     errors, remarks = list[str](), list[str]()
     for axis, letter in zip(machine.axes, "xyz", strict=True):
         offset = "xyz".index(letter)
-        wanted = {
+        expected = {
             "coded_step_mm": 1.0 / axis.coded_step_mm,
             "max_rate_mm_min": axis.max_rate_mm_min,
             "acceleration_mm_s2": axis.acceleration_mm_s2,
             "travel_mm": axis.travel_mm,
         }
-        for key, value in wanted.items():
-            found = said[f"${_AXES[key] + offset}"]
-            into = remarks if key == "acceleration_mm_s2" else errors
-            into += _difference(found, value, key == "coded_step_mm")
+        for key, value in expected.items():
+            setting = settings[f"${_AXES[key] + offset}"]
+            target_list = remarks if key == "acceleration_mm_s2" else errors
+            target_list += _difference(setting, value, key == "coded_step_mm")
     if isinstance(machine.controller, GrblController):
-        errors += _difference(said["$12"], machine.controller.arc_tolerance_mm)
-        remarks += _difference(said["$11"], machine.controller.junction_deviation_mm)
-        laser = said.get(f"${LASER}")
+        errors += _difference(settings["$12"], machine.controller.arc_tolerance_mm)
+        remarks += _difference(settings["$11"], machine.controller.junction_deviation_mm)
+        laser = settings.get(f"${LASER}")
         if laser is not None and laser.value != machine.controller.laser_mode:
             errors.append(LASER_IS if laser.value else LASER_IS_NOT)
-    full = said.get(f"${FULL_SPEED}")
-    if full is not None and machine.spindle.switched == "program":
-        errors += _difference(full, machine.spindle.max_rpm)
+    full_speed = settings.get(f"${FULL_SPEED}")
+    if full_speed is not None and machine.spindle.switched == "program":
+        errors += _difference(full_speed, machine.spindle.max_rpm)
     numbers = {int(number): value for number, value in _SETTING.findall(text)}
     if float(numbers.get(REPORT_INCHES, "0")) != 0.0:
         errors.append("$13 reports inches: set $13=0, so that places can be followed")
@@ -189,16 +189,16 @@ def beyond_travel(text: str, zero_mm: Place, reach_mm: tuple[Place, Place]) -> s
 
 
 def _difference(
-    found: ControllerSetting, wanted: float | None, inverse: bool = False
+    setting: ControllerSetting, expected: float | None, inverse: bool = False
 ) -> list[str]:
     """A sentence where a setting is not what the machine file says, if it says anything."""
-    value = float(found.value)
+    value = float(setting.value)
     shown = 1.0 / value if inverse else value
-    if wanted is None or abs(shown - wanted) <= LISTED_TOLERANCE:
+    if expected is None or abs(shown - expected) <= LISTED_TOLERANCE:
         return []
-    number = found.said.split()[0]
+    number = setting.said.split()[0]
     return [
-        f"{number} is {shown:.3f}, but {found.key} of the machine file means {wanted:.3f}: "
+        f"{number} is {shown:.3f}, but {setting.key} of the machine file means {expected:.3f}: "
         "change one of the two"
     ]
 
@@ -229,9 +229,9 @@ def ask_listing(port: str) -> str:
             line.write(b"$$\n")
             rows = _lines(line, ANSWER_S, "ok", "error")
     except (OSError, ValueError) as error:  # serial.SerialException is an OSError
-        why, mend = port_fault(error)
+        reason, mend = port_fault(error)
         raise MachineError(
-            f"the port cannot be used ({why})",
+            f"the port cannot be used ({reason})",
             where=f"--port {port}",
             mend=f"{mend}; or give the listing as a file",
         ) from error
@@ -249,12 +249,12 @@ def _lines(port: Any, patience_s: float, *ends: str) -> list[str]:
     so long."""
     rows, part, last = list[str](), b"", time.monotonic()
     while time.monotonic() - last < patience_s and len(rows) < MAX_LINES:
-        found = port.read(256)
-        if not found:
+        chunk = port.read(256)
+        if not chunk:
             continue
         last = time.monotonic()
-        *whole, part = (part + found).split(b"\n")
-        for each in whole:
+        *complete, part = (part + chunk).split(b"\n")
+        for each in complete:
             rows.append(each.decode("ascii", "replace").strip())
             if rows[-1].startswith(ends):
                 return rows

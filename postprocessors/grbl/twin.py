@@ -226,24 +226,26 @@ def _single(value: float | np.float32) -> float:
 def _float_text(value: float, decimals: int) -> str:
     """Format a float as `printFloat` (print.c) does."""
     single = np.float32
-    sign, rest = ("-", -single(value)) if value < 0.0 else ("", single(value))
+    sign, remainder = ("-", -single(value)) if value < 0.0 else ("", single(value))
     for factor in (100.0,) * (decimals // 2) + (10.0,) * (decimals % 2):
-        rest = single(rest * single(factor))
-    rest = single(rest + single(0.5))
-    digits = str(int(rest) % (1 << 32) if np.isfinite(rest) else 0).rjust(decimals + 1, "0")
+        remainder = single(remainder * single(factor))
+    remainder = single(remainder + single(0.5))
+    digits = str(int(remainder) % (1 << 32) if np.isfinite(remainder) else 0).rjust(
+        decimals + 1, "0"
+    )
     return sign + (f"{digits[:-decimals]}.{digits[-decimals:]}" if decimals else digits)
 
 
-def _read_float(text: str, at: int) -> tuple[float, int] | None:
+def _read_float(text: str, place: int) -> tuple[float, int] | None:
     """Parse a number at a place of a line as `read_float` (nuts_bolts.c) does; its value and its
     end."""
-    found = re.compile(r"([+-]?)(\d*)(\.?)(\d*)").match(text, at)
-    assert found is not None
-    whole, decimals = found[2], found[4]
-    if not whole and not decimals:
+    match = re.compile(r"([+-]?)(\d*)(\.?)(\d*)").match(text, place)
+    assert match is not None
+    whole_digits, decimals = match[2], match[4]
+    if not whole_digits and not decimals:
         return None
-    digits = (whole + decimals)[:8]
-    exponent = max(len(whole) - 8, 0) - min(len(decimals), max(8 - len(whole), 0))
+    digits = (whole_digits + decimals)[:8]
+    exponent = max(len(whole_digits) - 8, 0) - min(len(decimals), max(8 - len(whole_digits), 0))
     single = np.float32
     value = single(int(digits))
     while exponent <= -2:
@@ -252,7 +254,7 @@ def _read_float(text: str, at: int) -> tuple[float, int] | None:
         value = single(value * single(0.1))
     for _ in range(max(exponent, 0)):
         value = single(value * single(10.0))
-    return (-float(value) if found[1] == "-" else float(value)), found.end()
+    return (-float(value) if match[1] == "-" else float(value)), match.end()
 
 
 def _byte(value: float) -> int:
@@ -298,30 +300,30 @@ class _Memory:
             | {number: value for number, value in DEFAULTS.items() if number < 100}
         )
 
-    def load(self, which: int, line: bytearray) -> bool:
+    def load(self, number: int, line: bytearray) -> bool:
         """Load a text into the line buffer; False, and the text is emptied, if its checksum is
         wrong."""
-        line[:] = self._texts[which]
-        if self._sums[which] == _checksum(line):
+        line[:] = self._texts[number]
+        if self._sums[number] == _checksum(line):
             return True
         line[0] = 0
-        self.store(which, line)
+        self.store(number, line)
         return False
 
-    def store(self, which: int, line: bytearray) -> None:
+    def store(self, number: int, line: bytearray) -> None:
         """Store a text: all bytes of the line buffer, those behind its end too."""
-        self._texts[which][:] = line
-        self._sums[which] = _checksum(line)
+        self._texts[number][:] = line
+        self._sums[number] = _checksum(line)
 
-    def restore(self, what: str) -> None:
+    def restore(self, selection: str) -> None:
         """$RST: `$` settings, `#` frames and places, `*` all. Of the texts only two bytes become
         0, and not the one of their sum."""
-        if what in "$*":
+        if selection in "$*":
             self.settings = {n: _single(value) for n, value in sorted(self.defaults().items())}
-        if what in "#*":
+        if selection in "#*":
             for place in (*self.frames, *self.homes.values()):
                 place[:] = [0.0] * 3
-        if what == "*":
+        if selection == "*":
             for text in self._texts:
                 text[:2] = b"\0\0"
 
@@ -385,18 +387,18 @@ class _Parser(GrblParser):
         value = _single(self.places[axis] + self.offset[axis])
         return _single(value + self.length) if axis == 2 else value
 
-    def _word(self, block: GrblBlock, letter: str, value: float, said: str, at: int) -> None:
-        read = _read_float(said, 0)
-        super()._word(block, letter, value if read is None else read[0], said, at)
+    def _word(self, block: GrblBlock, letter: str, value: float, digits: str, column: int) -> None:
+        read = _read_float(digits, 0)
+        super()._word(block, letter, value if read is None else read[0], digits, column)
 
-    def _probe_word(self, block: GrblBlock, hundredths: int, at: int) -> str:
+    def _probe_word(self, block: GrblBlock, hundredths: int, column: int) -> str:
         block.modes.motion = PROBES + (hundredths - 20) // 10
         return "motion"
 
     def _words(self, block: GrblBlock) -> dict[int, float]:
         mm = MM_PER_INCH if block.modes.inches else 1.0
-        said = {k: block.numbers["XYZ"[k]] for k in range(3) if "XYZ"[k] in block.numbers}
-        return {k: _single(value * np.float32(mm)) for k, value in said.items()}
+        coordinates = {k: block.numbers["XYZ"[k]] for k in range(3) if "XYZ"[k] in block.numbers}
+        return {k: _single(value * np.float32(mm)) for k, value in coordinates.items()}
 
     def _frame_of(self, block: GrblBlock) -> list[float]:
         if block.modes.frame == self.modes.frame:
@@ -480,8 +482,8 @@ class _Parser(GrblParser):
     def _do_non_modal(
         self, block: GrblBlock, words: dict[int, float], target: list[float]
     ) -> None:
-        once, do = block.once, self.actions.append
-        if once == "G10":
+        action, do = block.once, self.actions.append
+        if action == "G10":
             number = math.trunc(block.numbers.get("P", 0.0))
             index = number - 1 if number > 0 else block.modes.frame
             values = list(self._memory.frames[index])
@@ -494,22 +496,22 @@ class _Parser(GrblParser):
             if block.modes.frame == index:
                 self.places = values
                 do(("offsets",))
-        elif once in ("G28", "G30"):
-            self._go_home(once, words, target)
-        elif once in ("G28.1", "G30.1"):
-            do(("store", self._memory.homes[once[:3]], list(self.position)))
-        elif once == "G92":
+        elif action in ("G28", "G30"):
+            self._go_home(action, words, target)
+        elif action in ("G28.1", "G30.1"):
+            do(("store", self._memory.homes[action[:3]], list(self.position)))
+        elif action == "G92":
             frame = self._frame_of(block)
             for k, value in words.items():
                 value = _single(_single(self.position[k] - frame[k]) - value)
                 self.offset[k] = _single(value - self.length) if k == 2 else value
             do(("offsets",))
-        elif once == "G92.1":
+        elif action == "G92.1":
             self.offset = [0.0, 0.0, 0.0]
             do(("offsets",))
 
-    def _home_of(self, once: str) -> list[float]:
-        return list(self._memory.homes[once])
+    def _home_of(self, action: str) -> list[float]:
+        return list(self._memory.homes[action])
 
     def rewind(self) -> None:
         """M2 and M30 set most modes back; in check mode the zero of the frame stays."""
@@ -570,15 +572,15 @@ class GrblTwin(Twin):
     def connect(self, now: float) -> bytes:
         """Reset the board by DTR, as if the power came on. The slides stay where they are, and
         their place there counts as the place at which the twin was made."""
-        sent = self.advance(now)
+        output = self.advance(now)
         if self._choices.opening == "nothing":
-            return sent
+            return output
         self.slides.stop(now)
         self._set_steps(self._first)
         self._greeted = True
         self._power_up()
         self._go_on()
-        return sent + self._take_output()
+        return output + self._take_output()
 
     def _slide_steps(self) -> Ints:
         return np.rint(self.slides.commanded_mm / self._slide_step_mm).astype(np.int64)
@@ -679,7 +681,7 @@ class GrblTwin(Twin):
         times = [self.slides.ends_s, self._motor_s, self._turn_at_s, *self._touches[:1]]
         if self._until_s > self.now:
             times.append(self._until_s)
-        return min((at for at in times if at is not None), default=None)
+        return min((time_s for time_s in times if time_s is not None), default=None)
 
     def _wake(self) -> None:
         if self._touches and self.now >= self._touches[0]:
@@ -806,10 +808,10 @@ class GrblTwin(Twin):
 
     def _execute(self, raw: bytes) -> Line:
         text = _strip(raw)
-        most = self._machine.dialect.line_chars
-        kept = text[:most].encode("latin-1")
-        self._line[: len(kept) + 1] = kept + b"\0"
-        if len(text) > most:
+        max_chars = self._machine.dialect.line_chars
+        line_bytes = text[:max_chars].encode("latin-1")
+        self._line[: len(line_bytes) + 1] = line_bytes + b"\0"
+        if len(text) > max_chars:
             return TOO_LONG
         if not text:
             if raw.strip():
@@ -826,8 +828,8 @@ class GrblTwin(Twin):
 
     def _startup(self) -> Wait:
         """Execute the startup lines, at the beginning and after homing."""
-        for which in range(START_LINES):
-            if not self._memory.load(which, self._line):
+        for number in range(START_LINES):
+            if not self._memory.load(number, self._line):
                 self._say(">:")
                 self._answer(READ_FAILED)
                 continue
@@ -876,9 +878,9 @@ class GrblTwin(Twin):
         if self._ring:
             self._flags.add("start")
 
-    def _dwell(self, seconds: float, *, held: bool = True) -> Wait:
+    def _dwell(self, seconds: float, *, can_hold: bool = True) -> Wait:
         for _ in range(round(dwell_s(seconds) / DWELL_STEP_S)):
-            if held:
+            if can_hold:
                 yield from self._realtime()
             else:
                 yield from self._system()
@@ -957,10 +959,10 @@ class GrblTwin(Twin):
                 self._state = "Idle"
             elif "retracted" in self._suspend:
                 self._suspend.add("restoring")
-        held = self._state == "Hold" and "held" in self._suspend
-        if self._state != "Idle" and not held:
+        is_held = self._state == "Hold" and "held" in self._suspend
+        if self._state != "Idle" and not is_held:
             return
-        if held and self._stop_override:
+        if is_held and self._stop_override:
             self._stop_override = "cycle"
             return
         self._holding = self._stopping = False
@@ -1008,19 +1010,19 @@ class GrblTwin(Twin):
         self._running = self._stale = self._stopping = False
 
     def _override_motion(self) -> None:
-        asked, self._motion_overrides = self._motion_overrides, set()
-        if not asked:
+        changes, self._motion_overrides = self._motion_overrides, set()
+        if not changes:
             return
-        feed, rapid = _percent(self._feed_percent, FEED_OVERRIDES, asked), self._rapid_percent
+        feed, rapid = _percent(self._feed_percent, FEED_OVERRIDES, changes), self._rapid_percent
         for octet, percent in RAPID_OVERRIDES.items():
-            rapid = percent if octet in asked else rapid
+            rapid = percent if octet in changes else rapid
         if (feed, rapid) != (self._feed_percent, self._rapid_percent):
             self._feed_percent, self._rapid_percent = feed, rapid
             self._ov_in, self._stale = 0, True
 
     def _override_others(self) -> None:
-        asked, self._other_overrides = self._other_overrides, set()
-        percent = _percent(self._spindle_percent, SPINDLE_OVERRIDES, asked)
+        changes, self._other_overrides = self._other_overrides, set()
+        percent = _percent(self._spindle_percent, SPINDLE_OVERRIDES, changes)
         if percent != self._spindle_percent:
             self._spindle_percent = percent
             if self._state == "Idle":
@@ -1028,12 +1030,12 @@ class GrblTwin(Twin):
             else:
                 self._fresh_rpm = True
             self._ov_in = 0
-        if SPINDLE_STOP in asked and self._state == "Hold":
+        if SPINDLE_STOP in changes and self._state == "Hold":
             if not self._stop_override:
                 self._stop_override = "begin"
             elif self._stop_override == "on":
                 self._stop_override = "restore"
-        toggled = asked & {TOGGLE_FLOOD, TOGGLE_MIST}
+        toggled = changes & {TOGGLE_FLOOD, TOGGLE_MIST}
         if toggled and self._state in ("Idle", "Run", "Hold", "Jog"):
             modes = self._parser.modes
             modes.flood ^= TOGGLE_FLOOD in toggled
@@ -1086,10 +1088,10 @@ class GrblTwin(Twin):
                 self._fresh_rpm = True
             else:
                 self._spin(spindle, rpm)
-                yield from self._dwell(DOOR_SPINDLE_S, held=False)
+                yield from self._dwell(DOOR_SPINDLE_S, can_hold=False)
         if any(_coolant_of(self._parser.modes)) and "again" not in self._suspend:
             self._cool(mist=cooled[0], flood=cooled[1])
-            yield from self._dwell(DOOR_COOLANT_S, held=False)
+            yield from self._dwell(DOOR_COOLANT_S, can_hold=False)
         if "again" not in self._suspend:
             self._suspend.add("restored")
             self._flags.add("start")
@@ -1121,14 +1123,14 @@ class GrblTwin(Twin):
     def _speed_of(self, rpm: float) -> tuple[float, bool]:
         """Return the speed that it reports, and whether its output is on
         (`spindle_compute_pwm_value`)."""
-        least, most = self._memory.settings[31], self._memory.settings[30]
+        min_rpm, max_rpm = self._memory.settings[31], self._memory.settings[30]
         percent = np.float32(0.010) * np.float32(self._spindle_percent)
-        asked = _single(np.float32(rpm) * percent)
-        if least >= most or asked >= most:
-            return most, True
-        if asked <= least:
-            return (0.0, False) if asked == 0.0 else (least, True)
-        return asked, True
+        rpm_wanted = _single(np.float32(rpm) * percent)
+        if min_rpm >= max_rpm or rpm_wanted >= max_rpm:
+            return max_rpm, True
+        if rpm_wanted <= min_rpm:
+            return (0.0, False) if rpm_wanted == 0.0 else (min_rpm, True)
+        return rpm_wanted, True
 
     def _spin(self, spindle: Kind | None, rpm: float) -> None:
         """Set the spindle at once (`spindle_set_state`)."""
@@ -1193,19 +1195,19 @@ class GrblTwin(Twin):
             yield from self._end_or_pause(flow)
         return OK
 
-    def _do_action(self, what: str, *values: Any) -> Wait:
+    def _do_action(self, action: str, *values: Any) -> Wait:
         """Carry out an action of a block other than motion."""
-        if what == "spindle":
+        if action == "spindle":
             yield from self._spin_at_rest(*values)
-        elif what == "coolant":
+        elif action == "coolant":
             if self._state != "Check":
                 yield from self._synchronise()
                 self._cool(mist=values[0], flood=values[1])
-        elif what == "dwell":
+        elif action == "dwell":
             if self._state != "Check":
                 yield from self._synchronise()
                 yield from self._dwell(values[0])
-        elif what == "store":
+        elif action == "store":
             place, written = values
             yield from self._synchronise()
             place[:] = written
@@ -1247,7 +1249,8 @@ class GrblTwin(Twin):
         """True if a place is beyond the travel, which begins at machine zero and goes down."""
         travel = [self._memory.settings[130 + k] for k in range(3)]
         return any(
-            value > 0.0 or value < -most for value, most in zip(target, travel, strict=True)
+            value > 0.0 or value < -travel_mm
+            for value, travel_mm in zip(target, travel, strict=True)
         )
 
     def _soft_check(self, target: Sequence[float]) -> Wait:
@@ -1276,22 +1279,26 @@ class GrblTwin(Twin):
         yield from self._realtime()
         machine, controller = self._machine, self._machine.controller
         rows = np.array([row])
-        own, self._planned, asked = blocks_from(self._planned, path, rows, machine, controller)
+        own_blocks, self._planned, target_count = blocks_from(
+            self._planned, path, rows, machine, controller
+        )
         spindle = self._parser.modes.spindle
-        if len(own) < asked and self._is_set(32) and spindle == Kind.SPINDLE_CW:
+        if len(own_blocks) < target_count and self._is_set(32) and spindle == Kind.SPINDLE_CW:
             yield from self._spin_at_rest(spindle, power)
-        if not len(own):
+        if not len(own_blocks):
             return
         last = self._last if self._ring or self._running else NO_BLOCKS
         last = replace(last, row=np.full(len(last), row, np.int32))
-        own = replace(own, row=np.full(len(own), row, np.int32))
+        own_blocks = replace(own_blocks, row=np.full(len(own_blocks), row, np.int32))
         stops = stops_of(path, controller)
-        plan = speeds_of(join_blocks([last, own]), path, machine, FROM_REST, len(last), stops)
-        ways = own.way * coded_steps_mm(machine)
-        units = ways / np.linalg.norm(ways, axis=1)[:, None]
+        plan = speeds_of(
+            join_blocks([last, own_blocks]), path, machine, FROM_REST, len(last), stops
+        )
+        travels = own_blocks.way * coded_steps_mm(machine)
+        units = travels / np.linalg.norm(travels, axis=1)[:, None]
         highest = max_along(axis_limits(machine, "max_rate_mm_min") / 60.0, units)
-        self._last = own.part(len(own) - 1, len(own))
-        for k in range(len(own)):
+        self._last = own_blocks.part(len(own_blocks) - 1, len(own_blocks))
+        for k in range(len(own_blocks)):
             while len(self._ring) >= controller.buffer_blocks - 1:
                 self._start_cycle()
                 yield from self._realtime()
@@ -1299,8 +1306,8 @@ class GrblTwin(Twin):
                     yield None
             self._ring.append(
                 _Planned(
-                    own.start[k].astype(np.int64),
-                    own.way[k].astype(np.int64),
+                    own_blocks.start[k].astype(np.int64),
+                    own_blocks.way[k].astype(np.int64),
                     float(plan.length_mm[k]),
                     float(path.feed[row]) / 60.0 if path.is_feed[row] else float(highest[k]),
                     float(plan.speed_mm_s[k]),
@@ -1400,8 +1407,8 @@ class GrblTwin(Twin):
     def _contact_times(self, commanded: Floats, seconds: Floats) -> list[float]:
         """Return the times at which the probe or a switch changes on a travel: the first time of
         each."""
-        here, found = self.slides.commanded_mm, list[float]()
-        path = np.concatenate([here[None, :], commanded])
+        start, times = self.slides.commanded_mm, list[float]()
+        path = np.concatenate([start[None, :], commanded])
         eps = 0.5 * self._slide_step_mm
         masks = list[Bools]()
         if self._probing is not None:
@@ -1411,42 +1418,42 @@ class GrblTwin(Twin):
             masks += list(self._beyond_switches(path, self._ends_mm).T)
         for mask in masks:
             changes = np.flatnonzero(mask[1:] != mask[:-1])
-            found += (self.now + seconds[changes]).tolist()
+            times += (self.now + seconds[changes]).tolist()
         self._closed_limits = self._limits()
-        return sorted(found)
+        return sorted(times)
 
     # Lines that begin with $ (`system_execute_line`).
 
     def _command(self, text: str) -> Line:
-        head, rest = text[1:2], text[2:]
+        head, argument = text[1:2], text[2:]
         if head == "":
             self._say(HELP)
         elif head == "J":
             if self._state not in ("Idle", "Jog"):
                 return NOT_IDLE
-            if not rest.startswith("="):
+            if not argument.startswith("="):
                 return BAD_STATEMENT
             return (yield from self._block(text, b""))
         elif head in "$GCX":
-            return self._show_or_switch(head) if not rest else BAD_STATEMENT
+            return self._show_or_switch(head) if not argument else BAD_STATEMENT
         elif self._state not in ("Idle", "Alarm"):
             return NOT_IDLE
         elif head == "#":
-            if rest:
+            if argument:
                 return BAD_STATEMENT
             self._say(self._frames())
         elif head == "H":
-            return (yield from self._home(rest))
+            return (yield from self._home(argument))
         elif head == "S":
-            if rest != "LP":
+            if argument != "LP":
                 return BAD_STATEMENT
             self._flags.add("sleep")
         elif head == "I":
-            return self._build(rest)
+            return self._build(argument)
         elif head == "R":
-            return (yield from self._restore(rest))
+            return (yield from self._restore(argument))
         elif head == "N":
-            return (yield from self._start_lines(rest))
+            return (yield from self._start_lines(argument))
         else:
             return self._assign(text)
         return OK
@@ -1490,12 +1497,12 @@ class GrblTwin(Twin):
         ]
         return " ".join(words)
 
-    def _build(self, rest: str) -> int:
+    def _build(self, argument: str) -> int:
         """Carry out `$I` and `$I=`."""
-        if rest and not rest.startswith("="):
+        if argument and not argument.startswith("="):
             return BAD_STATEMENT
-        if rest:
-            self._shift_line(rest[1:])
+        if argument:
+            self._shift_line(argument[1:])
             self._memory.store(START_LINES, self._line)
             return OK
         self._memory.load(START_LINES, self._line)
@@ -1508,34 +1515,34 @@ class GrblTwin(Twin):
         """Write the text to the start of the line buffer, followed by a zero byte."""
         self._line[: len(text) + 1] = text.encode("latin-1") + b"\0"
 
-    def _restore(self, rest: str) -> Line:
-        if rest[:3] != "ST=" or len(rest) != 4 or rest[3] not in "$#*":
+    def _restore(self, argument: str) -> Line:
+        if argument[:3] != "ST=" or len(argument) != 4 or argument[3] not in "$#*":
             return BAD_STATEMENT
         yield from self._synchronise()
-        self._memory.restore(rest[3])
+        self._memory.restore(argument[3])
         self._use_settings()
         self._message("Restoring defaults")
         self._kill()
         return OK
 
-    def _start_lines(self, rest: str) -> Line:
+    def _start_lines(self, argument: str) -> Line:
         """Carry out `$N` and `$Nx=`, which executes the line before it stores it."""
-        if not rest:
-            for which in range(START_LINES):
-                if self._memory.load(which, self._line):
-                    self._say(f"$N{which}={self._line_text()}\r\n")
+        if not argument:
+            for number in range(START_LINES):
+                if self._memory.load(number, self._line):
+                    self._say(f"$N{number}={self._line_text()}\r\n")
                 else:
                     self._answer(READ_FAILED)
             return OK
         if self._state != "Idle":
             return NOT_IDLE
-        found = _read_float(rest, 0)
-        if found is None:
+        parsed = _read_float(argument, 0)
+        if parsed is None:
             return BAD_NUMBER
-        value, end = found
-        if rest[end : end + 1] != "=":
+        value, end = parsed
+        if argument[end : end + 1] != "=":
             return BAD_STATEMENT
-        text = rest[end + 1 :]
+        text = argument[end + 1 :]
         self._shift_line(text)
         code = yield from self._block(text, None)
         if code:
@@ -1552,10 +1559,10 @@ class GrblTwin(Twin):
             return BAD_NUMBER
         if text[name[1] : name[1] + 1] != "=":
             return BAD_STATEMENT
-        given = _read_float(text, name[1] + 1)
-        if given is None:
+        parsed = _read_float(text, name[1] + 1)
+        if parsed is None:
             return BAD_NUMBER
-        value, end = given
+        value, end = parsed
         if end != len(text) or name[0] > 255.0:
             return BAD_STATEMENT
         if value < 0.0:
@@ -1589,17 +1596,17 @@ class GrblTwin(Twin):
         """Give the model the current `$` settings. Steps per mm and accelerations of 0, by which
         grbl would divide, are ignored."""
         settings, stood = self._memory.settings, self._steps
-        turned = [int(settings[3]) >> axis & 1 for axis in range(3)]
-        self._signs = 1 - 2 * np.array(turned, dtype=np.int64)  # as it was wired for $3=0
+        is_inverted = [int(settings[3]) >> axis & 1 for axis in range(3)]
+        self._signs = 1 - 2 * np.array(is_inverted, dtype=np.int64)  # as it was wired for $3=0
         self._set_steps(stood)
         axes: dict[str, Any] = {}
         for k, name in enumerate("xyz"):
-            given: dict[str, Any] = {"max_rate_mm_min": settings[110 + k]}
+            axis_values: dict[str, Any] = {"max_rate_mm_min": settings[110 + k]}
             if settings[100 + k] > 0.0:
-                given["coded_step_mm"] = 1.0 / settings[100 + k]
+                axis_values["coded_step_mm"] = 1.0 / settings[100 + k]
             if settings[120 + k] > 0.0:
-                given["acceleration_mm_s2"] = settings[120 + k]
-            axes[name] = replace(getattr(self._machine.axes, name), **given)
+                axis_values["acceleration_mm_s2"] = settings[120 + k]
+            axes[name] = replace(getattr(self._machine.axes, name), **axis_values)
         controller = replace(
             self._machine.controller,
             idle_delay_ms=int(settings[1]),
@@ -1612,11 +1619,11 @@ class GrblTwin(Twin):
 
     # Homing (`limits_go_home`).
 
-    def _home(self, rest: str) -> Line:
+    def _home(self, argument: str) -> Line:
         if not self._is_set(22):
             return NO_HOMING
         self._state = "Home"
-        if rest:
+        if argument:
             return BAD_STATEMENT  # and it stays in this state, as grbl does
         for axes in ([2], [0, 1]):
             yield from self._find_switches(axes)
@@ -1633,20 +1640,22 @@ class GrblTwin(Twin):
         sign = [-1 if int(settings[23]) >> axis & 1 else 1 for axis in range(3)]
         search = SEARCH * max(settings[130 + axis] for axis in axes)
         pull_off, seek, feed = settings[27], settings[25], settings[24]
-        there, back = (1, search, seek), (-1, pull_off, seek)
-        for turn, far, rate in (there, back, (1, LOCATE * pull_off, feed), back):
+        approach, retract = (1, search, seek), (-1, pull_off, seek)
+        for turn, distance, rate in (approach, retract, (1, LOCATE * pull_off, feed), retract):
             start = self._steps
             for axis in axes:
                 start[axis] = 0
             self._set_steps(start)
-            yield from self._home_to(axes, [turn * each for each in sign], far, rate, turn > 0)
+            yield from self._home_to(
+                axes, [turn * each for each in sign], distance, rate, turn > 0
+            )
             yield from self._delay(settings[26] / 1000.0)
-        placed = self._steps
+        position = self._steps
         for axis in axes:
             per_mm = settings[100 + axis]
             mm = -pull_off if sign[axis] > 0 else pull_off - settings[130 + axis]
-            placed[axis] = int(math.copysign(math.floor(abs(mm) * per_mm + 0.5), mm))
-        self._set_steps(placed)
+            position[axis] = int(math.copysign(math.floor(abs(mm) * per_mm + 0.5), mm))
+        self._set_steps(position)
 
     def _home_to(
         self, axes: list[int], sign: list[int], far_mm: float, rate: float, approaches: bool
@@ -1654,46 +1663,46 @@ class GrblTwin(Twin):
         """Move all axes alike; in an approach each until its switch closes."""
         step_mm = self._slide_step_mm
         counts = [round(far_mm * self._memory.settings[100 + axis]) for axis in axes]
-        whole = max(counts)
+        event_count = max(counts)
         speed = max(rate, 1.0) / 60.0
         ramps = [axis.acceleration_mm_s2 or 1.0 for axis in self._machine.axes]
         ramp = min(ramps[axis] for axis in axes)
-        events = np.arange(1, whole + 1)
-        begin, moved = self._slide_steps(), np.zeros((whole, 3), dtype=np.int64)
+        events = np.arange(1, event_count + 1)
+        begin, steps_by_event = self._slide_steps(), np.zeros((event_count, 3), dtype=np.int64)
         lasts = list[int]()
         for axis, count in zip(axes, counts, strict=True):
-            own = np.minimum(events, count)
+            axis_steps = np.minimum(events, count)
             until = self._steps_to_switch(axis, sign[axis], count) if approaches else None
             lasts.append(count if until is None else until)
-            moved[:, axis] = sign[axis] * np.minimum(own, lasts[-1])
+            steps_by_event[:, axis] = sign[axis] * np.minimum(axis_steps, lasts[-1])
             if approaches and until is None:
-                lasts[-1] = whole
-        missed = approaches and any(
+                lasts[-1] = event_count
+        is_missed = approaches and any(
             self._steps_to_switch(axis, sign[axis], count) is None
             for axis, count in zip(axes, counts, strict=True)
         )
         last = max(lasts)
         phases = _trapezoid(far_mm, 0.0, speed, ramp, 0.0)
-        at = far_mm * events[:last] / max(whole, 1)
-        seconds = _times_at(phases, at)
+        distances = far_mm * events[:last] / max(event_count, 1)
+        seconds = _times_at(phases, distances)
         total = float(seconds[-1]) if last else 0.0
         travel = Travel(
-            (begin + self._signs * moved[:last]) * step_mm, seconds, np.zeros(last), total
+            (begin + self._signs * steps_by_event[:last]) * step_mm, seconds, np.zeros(last), total
         )
         self.slides.begin(travel, self.now, -1)
-        if whole:
+        if event_count:
             # Its blocks have no spindle, so their segments stop it (`st_prep_buffer`); a startup
             # line with the same M3 and S as before does not start it again.
             self._rpm, self._lit, self._fresh_rpm = 0.0, False, False
         while self.slides.ends_s is not None and not self._flags & {"door", "reset"}:
             yield None
-        done = self.slides.done
+        done_events = self.slides.done
         self.slides.stop(self.now)
-        if missed or self._flags & {"door", "reset"}:
-            counted = self._steps
+        if is_missed or self._flags & {"door", "reset"}:
+            position = self._steps
             for axis, count in zip(axes, counts, strict=True):
-                counted[axis] = sign[axis] * min(done, count)
-            self._set_steps(counted)
+                position[axis] = sign[axis] * min(done_events, count)
+            self._set_steps(position)
         closed = self._limits()
         if "reset" in self._flags:
             self._alarm = HOMING_RESET
@@ -1701,7 +1710,7 @@ class GrblTwin(Twin):
             self._alarm = HOMING_DOOR
         if not approaches and any(closed[axis] for axis in axes):
             self._alarm = HOMING_STUCK
-        if missed and not self._alarm:
+        if is_missed and not self._alarm:
             self._alarm = HOMING_MISSED
         if self._alarm:
             self._kill()
@@ -1711,11 +1720,11 @@ class GrblTwin(Twin):
         """Return the steps after which the switch of an axis closes; None if it does not."""
         if self._ends_mm is None:
             return 0 if self._is_set(5) else None
-        way = int(self._signs[axis]) * sign
-        steps = self._slide_steps() + np.outer(way * np.arange(count + 1), np.eye(3)[axis])
+        direction = int(self._signs[axis]) * sign
+        steps = self._slide_steps() + np.outer(direction * np.arange(count + 1), np.eye(3)[axis])
         closed = self._beyond_switches(steps * self._slide_step_mm, self._ends_mm)[:, axis]
-        found = np.flatnonzero(closed != self._is_set(5))
-        return int(found[0]) if len(found) else None
+        closing = np.flatnonzero(closed != self._is_set(5))
+        return int(closing[0]) if len(closing) else None
 
     # Reports.
 
@@ -1745,17 +1754,19 @@ class GrblTwin(Twin):
         busy = self._state in ("Home", "Run", "Hold", "Jog", "Door")
         mask = int(self._memory.settings[10])
         offsets = [self._parser.zero_of(k) for k in range(3)]
-        here = self._mm(self._steps)
+        place = self._mm(self._steps)
         if not mask & 1:
-            here = [_single(a - b) for a, b in zip(here, offsets, strict=True)]
-        fields = [self.state, f"{'MPos' if mask & 1 else 'WPos'}:{self._lengths_text(here)}"]
+            place = [_single(a - b) for a, b in zip(place, offsets, strict=True)]
+        fields = [self.state, f"{'MPos' if mask & 1 else 'WPos'}:{self._lengths_text(place)}"]
         if mask & 2:
             blocks = self._machine.controller.buffer_blocks - 1 - len(self._ring)
             fields.append(f"Bf:{blocks},{RX_BYTES - len(self._rx)}")
         speed = self._speed_ahead() * 60.0 if self._running and self._phases and busy else 0.0
         fields.append(f"FS:{self._rate_text(speed)},{_float_text(self._rpm, 0)}")
         pins = "P" * self._touches_probe()
-        pins += "".join(axis for axis, on in zip("XYZ", self._limits(), strict=True) if on)
+        pins += "".join(
+            axis for axis, letters in zip("XYZ", self._limits(), strict=True) if letters
+        )
         fields += [f"Pn:{pins}"] if pins else []
         if self._wco_in > 0:
             self._wco_in -= 1
@@ -1769,9 +1780,9 @@ class GrblTwin(Twin):
             self._ov_in = 19 if busy else 9
             percents = self._feed_percent, self._rapid_percent, self._spindle_percent
             fields.append("Ov:" + ",".join(map(str, percents)))
-            on = ("C" if self._ccw else "S") * self._lit
-            on += "F" * self._flood + "M" * self._mist
-            fields += [f"A:{on}"] if on else []
+            letters = ("C" if self._ccw else "S") * self._lit
+            letters += "F" * self._flood + "M" * self._mist
+            fields += [f"A:{letters}"] if letters else []
         self._say(f"<{'|'.join(fields)}>\r\n")
 
     # The planner and the steps.
@@ -1786,17 +1797,17 @@ class GrblTwin(Twin):
     def _exit_speed(self) -> float:
         """Return the highest speed at the end of the current block from which the planned blocks
         behind it can still slow down."""
-        square, behind = 0.0, self._ring
-        for k in range(len(behind) - 1, 0, -1):
-            block = behind[k]
-            most = min(block.corner, self._nominal(block), self._nominal(behind[k - 1]))
-            square = min(most * most, square + 2.0 * block.acceleration * block.length)
+        square, ring = 0.0, self._ring
+        for k in range(len(ring) - 1, 0, -1):
+            block = ring[k]
+            max_speed = min(block.corner, self._nominal(block), self._nominal(ring[k - 1]))
+            square = min(max_speed * max_speed, square + 2.0 * block.acceleration * block.length)
         return float(np.sqrt(square))
 
     def _replan_later(self) -> None:
         """Schedule a new plan behind the pieces of the block that are fixed already."""
-        done = math.floor((self.now - self._piece_s) / SEGMENT_S + SEGMENT_S / 100.0)
-        self._turn_at_s = self._piece_s + (done + SEGMENTS) * SEGMENT_S
+        done_pieces = math.floor((self.now - self._piece_s) / SEGMENT_S + SEGMENT_S / 100.0)
+        self._turn_at_s = self._piece_s + (done_pieces + SEGMENTS) * SEGMENT_S
 
     def _plan_block(self) -> None:
         """Plan the rest of the current block from its present place and speed."""
@@ -1807,41 +1818,43 @@ class GrblTwin(Twin):
             self._events += self.slides.done
         else:
             self._piece_s = self.now
-        left = max(block.length - self._done_mm, 0.0)
+        remaining = max(block.length - self._done_mm, 0.0)
         a, v = block.acceleration, self._speed
         if self._stopping:
-            self._phases = _slow_down(left, v, a)
+            self._phases = _slow_down(remaining, v, a)
         else:
-            self._phases = _trapezoid(left, v, self._nominal(block), a, self._exit_speed())
+            self._phases = _trapezoid(remaining, v, self._nominal(block), a, self._exit_speed())
         self._begun_s = self.now
         count = block.events
         commanded = np.empty((count, 3))
-        start, way = self._origin + self._signs * block.start, self._signs * block.way
-        step_lines_fill((start[None, :], way[None, :]), (0, 0), self._slide_step_mm, commanded)
-        at = block.length * np.arange(1, count + 1) / count - self._done_mm
-        whole = sum(seconds for seconds, _, _ in self._phases)
-        reach = _distance(self._phases, whole)
-        over = reach >= left - LENGTH_EPS_MM
-        last = count if over else int(np.searchsorted(at, reach, side="right"))
-        at = at[self._events : last]
+        start, block_steps = self._origin + self._signs * block.start, self._signs * block.way
+        step_lines_fill(
+            (start[None, :], block_steps[None, :]), (0, 0), self._slide_step_mm, commanded
+        )
+        distances = block.length * np.arange(1, count + 1) / count - self._done_mm
+        total_s = sum(seconds for seconds, _, _ in self._phases)
+        reach = _distance(self._phases, total_s)
+        is_end = reach >= remaining - LENGTH_EPS_MM
+        last = count if is_end else int(np.searchsorted(distances, reach, side="right"))
+        distances = distances[self._events : last]
         travel = Travel(
             commanded[self._events : last],
-            _times_at(self._phases, at),
-            np.zeros(len(at)),
-            whole,
+            _times_at(self._phases, distances),
+            np.zeros(len(distances)),
+            total_s,
         )
         self.slides.begin(travel, self.now, block.block)
         self._touches = self._contact_times(travel.commanded, travel.seconds)
 
     def _progress(self, now: float) -> tuple[float, float]:
         """Return the distance done of the current block, mm, and its speed."""
-        since, done = now - self._begun_s, self._done_mm
+        elapsed, covered = now - self._begun_s, self._done_mm
         for seconds, v, a in self._phases:
-            t = min(seconds, since)
-            done, since = done + v * t + 0.5 * a * t * t, since - t
-            if since <= 0.0:
-                return done, max(v + a * t, 0.0)
-        return done, _end_speed(self._phases)
+            t = min(seconds, elapsed)
+            covered, elapsed = covered + v * t + 0.5 * a * t * t, elapsed - t
+            if elapsed <= 0.0:
+                return covered, max(v + a * t, 0.0)
+        return covered, _end_speed(self._phases)
 
     def _speed_ahead(self) -> float:
         """Return the speed that it reports: that at the end of the pieces that are fixed."""
@@ -1882,58 +1895,60 @@ def _strip(raw: bytes) -> str:
 
 def _code(fault: LineFault) -> int:
     """Return grbl's number of an error; 20, unsupported, for what only this twin refuses."""
-    found = re.search(r"\(error:(\d+)\)", fault.message)
-    return int(found[1]) if found else 20
+    match = re.search(r"\(error:(\d+)\)", fault.message)
+    return int(match[1]) if match else 20
 
 
 def _coolant_of(modes: ParserModes) -> tuple[bool, bool]:
     return modes.mist, modes.flood
 
 
-def _percent(now: int, changes: Mapping[int, int | None], asked: set[int]) -> int:
+def _percent(percent: int, changes: Mapping[int, int | None], changes_wanted: set[int]) -> int:
     """Return an override after the real-time bytes received."""
     for octet, change in changes.items():
-        if octet in asked:
-            now = 100 if change is None else now + change
-    return max(MIN_OVERRIDE, min(MAX_OVERRIDE, now))
+        if octet in changes_wanted:
+            percent = 100 if change is None else percent + change
+    return max(MIN_OVERRIDE, min(MAX_OVERRIDE, percent))
 
 
 # Speeds within a block: phases of one acceleration each.
 
 
-def _trapezoid(left: float, v: float, nominal: float, a: float, exit_speed: float) -> list[Phase]:
-    """Return the phases from the speed v over `left` mm: accelerate to `nominal`, and slow down to
-    `exit_speed` at the end, as far as the acceleration allows."""
-    if v * v - 2.0 * a * left >= exit_speed * exit_speed and v > exit_speed:
-        return _slow_down(left, v, a)
+def _trapezoid(
+    distance: float, v: float, nominal: float, a: float, exit_speed: float
+) -> list[Phase]:
+    """Return the phases from the speed v over `distance` mm: accelerate to `nominal`, and slow
+    down to `exit_speed` at the end, as far as the acceleration allows."""
+    if v * v - 2.0 * a * distance >= exit_speed * exit_speed and v > exit_speed:
+        return _slow_down(distance, v, a)
     phases: list[Phase] = []
     if v > nominal:
         phases.append(((v - nominal) / a, v, -a))
-        left -= (v * v - nominal * nominal) / (2.0 * a)
-        if left <= 0.0:
-            return _slow_down(left + (v * v - nominal * nominal) / (2.0 * a), v, a)
+        distance -= (v * v - nominal * nominal) / (2.0 * a)
+        if distance <= 0.0:
+            return _slow_down(distance + (v * v - nominal * nominal) / (2.0 * a), v, a)
         v = nominal
-    exit_speed = min(exit_speed, nominal, float(np.sqrt(v * v + 2.0 * a * left)))
-    peak = min(nominal, float(np.sqrt(a * left + 0.5 * (v * v + exit_speed * exit_speed))))
+    exit_speed = min(exit_speed, nominal, float(np.sqrt(v * v + 2.0 * a * distance)))
+    peak = min(nominal, float(np.sqrt(a * distance + 0.5 * (v * v + exit_speed * exit_speed))))
     ramps = (2.0 * peak * peak - v * v - exit_speed * exit_speed) / (2.0 * a)
     phases.append(((peak - v) / a, v, a))
-    phases.append((max(left - ramps, 0.0) / peak, peak, 0.0))
+    phases.append((max(distance - ramps, 0.0) / peak, peak, 0.0))
     phases.append(((peak - exit_speed) / a, peak, -a))
     return [phase for phase in phases if phase[0] > 0.0]
 
 
-def _slow_down(left: float, v: float, a: float) -> list[Phase]:
-    """Return the phases of slowing down all along, to rest or over `left` mm."""
-    end = float(np.sqrt(max(v * v - 2.0 * a * left, 0.0)))
+def _slow_down(distance: float, v: float, a: float) -> list[Phase]:
+    """Return the phases of slowing down all along, to rest or over `distance` mm."""
+    end = float(np.sqrt(max(v * v - 2.0 * a * distance, 0.0)))
     return [((v - end) / a, v, -a)] if v > 0.0 else []
 
 
 def _distance(phases: list[Phase], seconds: float) -> float:
-    done = 0.0
+    covered = 0.0
     for duration, v, a in phases:
         t = min(duration, seconds)
-        done, seconds = done + v * t + 0.5 * a * t * t, seconds - t
-    return done
+        covered, seconds = covered + v * t + 0.5 * a * t * t, seconds - t
+    return covered
 
 
 def _end_speed(phases: list[Phase]) -> float:
@@ -1947,18 +1962,18 @@ def _end_speed(phases: list[Phase]) -> float:
 SPEED_EPS_MM_S: Final = 1e-9
 
 
-def _times_at(phases: list[Phase], at: Floats) -> Floats:
-    """Return the times (K,) s at which `at` (K,) mm, ascending, are covered."""
-    times, begin, done = np.zeros(len(at)), 0.0, 0.0
+def _times_at(phases: list[Phase], distances: Floats) -> Floats:
+    """Return the times (K,) s at which `distances` (K,) mm, ascending, are covered."""
+    times, begin, covered = np.zeros(len(distances)), 0.0, 0.0
     for k, (seconds, v, a) in enumerate(phases):
-        way = v * seconds + 0.5 * a * seconds * seconds
+        length = v * seconds + 0.5 * a * seconds * seconds
         last = k == len(phases) - 1
-        here = (at > done) & ((at <= done + way) | last)
-        ahead = at[here] - done
+        in_phase = (distances > covered) & ((distances <= covered + length) | last)
+        distance = distances[in_phase] - covered
         if a == 0.0:
-            times[here] = begin + ahead / v
+            times[in_phase] = begin + distance / v
         else:
-            root = np.sqrt(np.maximum(v * v + 2.0 * a * ahead, 0.0))
-            times[here] = begin + np.minimum(2.0 * ahead / (v + root), seconds)
-        begin, done = begin + seconds, done + way
+            root = np.sqrt(np.maximum(v * v + 2.0 * a * distance, 0.0))
+            times[in_phase] = begin + np.minimum(2.0 * distance / (v + root), seconds)
+        begin, covered = begin + seconds, covered + length
     return np.maximum.accumulate(times)

@@ -281,8 +281,8 @@ class GrblConversation(Conversation):
         self._depth = blocks - 1 + SEGMENTS
         unlocking = (b"$X",) if manner.unlock else ()
         homing = (b"$H",) if manner.home else ()
-        asked = (b"$$",) if manner.checked and packets else ()
-        self._commands = deque(each + b"\n" for each in (*unlocking, *asked, *homing, *commands))
+        queries = (b"$$",) if manner.checked and packets else ()
+        self._commands = deque(each + b"\n" for each in (*unlocking, *queries, *homing, *commands))
         self._listing: list[str] = []
         self._rest = b""
         self._out_lines: deque[_Line] = deque()  # written, not answered
@@ -358,9 +358,9 @@ class GrblConversation(Conversation):
         if self.state is WireState.PAUSING:  # grbl passes over ~ until it stands
             self._resumes = True
         elif self.state in HALTS:
-            held = self.why != SINGLE
+            was_held = self.why != SINGLE
             self.state, self.why, self._idle, self._holds = WireState.SENDING, "", 0, 0
-            if held:
+            if was_held:
                 self._stale = self._due
                 self._write(RESUME)
             self._go_on(now, anew=True)
@@ -387,13 +387,13 @@ class GrblConversation(Conversation):
         if not self.is_over and not self._reset_sent:
             self._reset(now)
 
-    def _fail(self, why: str, now: float) -> None:
+    def _fail(self, reason: str, now: float) -> None:
         """Stop, and say why."""
         if not self.is_over and not self._failing:
-            self._failing = why
+            self._failing = reason
             self.stop(now)
         if self.state is WireState.STOPPED:
-            self._end(WireState.FAILED, why)
+            self._end(WireState.FAILED, reason)
 
     @property
     def _unattended(self) -> str:
@@ -411,14 +411,16 @@ class GrblConversation(Conversation):
             return
         patience = self.manner.patience_s
         if self.state is WireState.STOPPING:
-            since = now - self._halted
-            if self._reset_sent and since >= patience:
-                why = self._failing or "it was told to stop"
-                self._end(WireState.FAILED, f"{why}; it did not confirm the stop: switch it off")
+            elapsed = now - self._halted
+            if self._reset_sent and elapsed >= patience:
+                reason = self._failing or "it was told to stop"
+                self._end(
+                    WireState.FAILED, f"{reason}; it did not confirm the stop: switch it off"
+                )
                 return
             # One that homes since before the port was opened hears nothing else, and says nothing.
             homes = self._phase == "greeting" and self._answered <= self._halted
-            if not self._reset_sent and since >= (
+            if not self._reset_sent and elapsed >= (
                 SILENCE_FACTOR * self.manner.late_s if homes else patience
             ):
                 self._reset(now)
@@ -426,8 +428,8 @@ class GrblConversation(Conversation):
             self._end(WireState.FAILED, self._unknown())
             return
         elif self._phase == "greeting" and self._resets and now - self._begun >= patience:
-            said = "where its work zero is" if self._fresh else "that it has begun anew"
-            self._end(WireState.FAILED, f"it was reset, and does not say {said}")
+            missing_text = "where its work zero is" if self._fresh else "that it has begun anew"
+            self._end(WireState.FAILED, f"it was reset, and does not say {missing_text}")
             return
         elif self._phase != "greeting" and not self._homes and now - self._answered >= patience:
             self._fail("it does not answer any more", now)
@@ -526,11 +528,11 @@ class GrblConversation(Conversation):
             return
         if self._phase != "greeting" or self._fresh:
             self._startup.append(startup[1])
-            said = "it has run its startup line"
+            message = "it has run its startup line"
             if startup[3]:
                 meaning = ERRORS.get(int(startup[3]), "it says no more")
-                said = f"{startup[2]}, {meaning}, to its startup line"
-            self._tell(f"{said} {startup[1]}")
+                message = f"{startup[2]}, {meaning}, to its startup line"
+            self._tell(f"{message} {startup[1]}")
 
     def _unknown(self) -> str:
         """Why it fails where nothing was understood: what was heard, and what that may be."""
@@ -547,9 +549,9 @@ class GrblConversation(Conversation):
                 "that has hit a limit is silent until its reset button is pressed"
             )
         if 4 * strange > len(self._heard):
-            said = self._heard[:8].hex(" ")
+            heard = self._heard[:8].hex(" ")
             return (
-                f"what it says is no text ({said}): its rate may be another, give it with --baud"
+                f"what it says is no text ({heard}): its rate may be another, give it with --baud"
             )
         if re.search("marlin|echo:", text, re.IGNORECASE):
             return f"it says {text!r}, as Marlin does: that is another firmware than grbl"
@@ -558,10 +560,10 @@ class GrblConversation(Conversation):
     @property
     def _reasons(self) -> str:
         """Return the messages about the lock and the closed switches, as the end of a sentence."""
-        said = [f"it says {each!r}" for each in dict.fromkeys(self._messages)]
+        reasons = [f"it says {each!r}" for each in dict.fromkeys(self._messages)]
         if self._closed:
-            said.append(f"it reports closed switches: {_switches(self._closed)}")
-        return "".join(f"; {each}" for each in said)
+            reasons.append(f"it reports closed switches: {_switches(self._closed)}")
+        return "".join(f"; {each}" for each in reasons)
 
     def _advice(self) -> str:
         """Why it is locked and what to do, by its settings."""
@@ -582,14 +584,14 @@ class GrblConversation(Conversation):
         stale, self._stale = self._stale > 0, max(self._stale - 1, 0)
         self._due = max(self._due - 1, 0)
         self._holds = self._holds + 1 if state == "Hold:0" and not stale else 0
-        still = state == "Hold:0" or self._idle >= 2 or state.startswith("Door:1")
+        is_still = state == "Hold:0" or self._idle >= 2 or state.startswith("Door:1")
         if self.state is WireState.STOPPING:
             self._stopping(state, now)
         elif self._phase == "greeting":
             self._check_first_report(state, now)
         elif state == "Alarm" and not self._locked and not self._unlocks:
             self._end(WireState.FAILED, f"it is locked{self._reasons}: home it or unlock it")
-        elif self.state is WireState.PAUSING and still:
+        elif self.state is WireState.PAUSING and is_still:
             self.state, self._holds = WireState.PAUSED, 0
             if self._resumes:
                 self.resume(now)
@@ -627,16 +629,16 @@ class GrblConversation(Conversation):
     def _where(self, fields: str, now: float) -> None:
         """Store the position in the work frame from the fields of a status report, and whether the
         feed falls from one report to the next: the machine slows down."""
-        said = dict(field.split(":", 1) for field in fields.split("|") if field)
-        feed, before = said.get("FS", said.get("F", "")).partition(",")[0], self._feed
+        values = dict(field.split(":", 1) for field in fields.split("|") if field)
+        feed, before = values.get("FS", values.get("F", "")).partition(",")[0], self._feed
         self._feed = float(feed) if _FEED.fullmatch(feed) else 0.0
         self._slows = self._feed < before
-        closed = said.get("Pn", "")
+        closed = values.get("Pn", "")
         if closed and closed != self._closed and self._phase != "greeting":
             self._tell(f"it reports closed switches: {_switches(closed)}")
         self._closed = closed
         for name in ("WCO", "MPos", "WPos"):
-            text = said.get(name)
+            text = values.get(name)
             if text is None:
                 continue
             if not _PLACE.fullmatch(text):
@@ -696,16 +698,16 @@ class GrblConversation(Conversation):
     def _ready(self, now: float) -> None:
         """Begin, unless the program is to go on where the controller does not take it to stand."""
         if self._standing is not None:
-            at, said = self._machine_mm, self._standing.said_mm
-            place = _without(at, self._offset) if at and self._offset else None
-            why = self._standing.refusal(place, restarted=self._restarted)
-            if at is None or why:
-                self._end(WireState.FAILED, why or "it does not say where it stands")
+            place_said, stated_place = self._machine_mm, self._standing.said_mm
+            place = _without(place_said, self._offset) if place_said and self._offset else None
+            reason = self._standing.refusal(place, restarted=self._restarted)
+            if place_said is None or reason:
+                self._end(WireState.FAILED, reason or "it does not say where it stands")
                 return
-            if said is not None:  # until the next reset: what it remembers stays as it is
-                self._frame = _without(at, said)
+            if stated_place is not None:  # until the next reset: what it remembers stays as it is
+                self._frame = _without(place_said, stated_place)
                 words = "".join(
-                    f"{axis}{value:.4f}" for axis, value in zip("XYZ", said, strict=True)
+                    f"{axis}{value:.4f}" for axis, value in zip("XYZ", stated_place, strict=True)
                 )
                 self._commands.append(f"G21G92{words}\n".encode())
         self._phase, self.why, self._idle = "commands", "", 0
@@ -729,7 +731,7 @@ class GrblConversation(Conversation):
 
     def _compare_modes(self, line: str) -> None:
         """Refuse a program that would begin in other modes than it expects."""
-        said, unset = set(line[4:-1].split()), set(BEGINS_IN)
+        modes, unset = set(line[4:-1].split()), set(BEGINS_IN)
         for packet in self.packets:
             text = packet.data.decode("latin-1")
             words = {f"G{number}" for number in _WORD.findall(text)}
@@ -737,11 +739,11 @@ class GrblConversation(Conversation):
             if _AXIS.search(text):
                 break
         for group in MODES:
-            found = group & said
-            if found and group & unset and not found & unset:
+            active = group & modes
+            if active and group & unset and not active & unset:
                 self._end(
                     WireState.FAILED,
-                    f"its startup line leaves {next(iter(found))}, and the program does not say "
+                    f"its startup line leaves {next(iter(active))}, and the program does not say "
                     f"{next(iter(group & unset))} before it moves: write that there, or empty the "
                     "line ($N0= or $N1=)",
                 )
@@ -756,8 +758,8 @@ class GrblConversation(Conversation):
         head = self._out_lines[0]
         if line != "ok":
             meaning = ERRORS.get(int(line[6:]), "it says no more")
-            said = head.data.decode("latin-1").strip()
-            self._fail(f"{line} to {said}: {meaning}", now)
+            line_text = head.data.decode("latin-1").strip()
+            self._fail(f"{line} to {line_text}: {meaning}", now)
             return
         if head.is_probe and not head.seen:
             self._fail("an answer more than lines were sent", now)
@@ -835,8 +837,10 @@ class GrblConversation(Conversation):
             if self._since_probe >= PROBE_EVERY:
                 self._probe()
         # With no query under way, nothing would ever make room.
-        asked = self.sent < len(self.packets) and any(line.is_probe for line in self._out_lines)
-        if self._since_probe and not asked:
+        awaits_probe = self.sent < len(self.packets) and any(
+            line.is_probe for line in self._out_lines
+        )
+        if self._since_probe and not awaits_probe:
             self._probe()
 
     def _next_packet(self) -> None:
@@ -880,11 +884,11 @@ class GrblConversation(Conversation):
     def _dwell_s(self) -> float:
         """Return the total dwell, s, of the lines that are sent and not answered: the machine may
         report Idle for so long."""
-        out = {line.packet for line in self._out_lines}
+        packets_out = {line.packet for line in self._out_lines}
         return sum(
             packet.seconds
             for number, packet in enumerate(self.packets[: self.sent], 1)
-            if number in out and _DWELLS.search(packet.data.decode("latin-1"))
+            if number in packets_out and _DWELLS.search(packet.data.decode("latin-1"))
         )
 
     def _reset(self, now: float) -> None:
@@ -1022,20 +1026,20 @@ class GrblTerminal(Terminal):
             self.due, self._resets, self._homes, self.stands = 0, False, 0, True
         elif line in LAST_WORDS and self.due:
             self.failed = f"{line}, {ALARMS[int(line[6:])]}; it takes nothing more until a reset"
-        if found := re.fullmatch(r"(error|ALARM):(\d+)", line):
-            known = ERRORS if found[1] == "error" else ALARMS
-            return known.get(int(found[2]), "it says no more")
-        if found := re.fullmatch(r"\$(\d+)=.*", line):
-            number = int(found[1])
+        if match := re.fullmatch(r"(error|ALARM):(\d+)", line):
+            texts = ERRORS if match[1] == "error" else ALARMS
+            return texts.get(int(match[2]), "it says no more")
+        if match := re.fullmatch(r"\$(\d+)=.*", line):
+            number = int(match[1])
             first, axis = number - number % 10, number % 10
             if first in OF_AXES and axis < 3:
                 return f"{'XYZ'[axis]}: {OF_AXES[first]}"
             return SETTINGS.get(number, "")
-        if found := _STATUS.fullmatch(line):
-            self.stands = found[1] == "Idle" or found[1] in STANDING
-            fields = [each.split(":", 1) for each in found[2].split("|") if each]
-            said = [f"{FIELDS.get(name, name)} {value}" for name, value in fields]
-            return "; ".join([STATES[found[1]], *said])
+        if match := _STATUS.fullmatch(line):
+            self.stands = match[1] == "Idle" or match[1] in STANDING
+            fields = [each.split(":", 1) for each in match[2].split("|") if each]
+            sentences = [f"{FIELDS.get(name, name)} {value}" for name, value in fields]
+            return "; ".join([STATES[match[1]], *sentences])
         return ""
 
 

@@ -44,10 +44,10 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
         _check(toolpath, machine)
         count = toolpath.executed_rows
         times = PulseTimes(machine.dialect)
-        at = _in_steps(toolpath.start[None, :], machine)[0]
-        standing = LegProgram(at, waits_s(toolpath, count), float(times.periods_s[0]))
+        start_steps = _in_steps(toolpath.start[None, :], machine)[0]
+        leg_program = LegProgram(start_steps, waits_s(toolpath, count), float(times.periods_s[0]))
         blocks = _blocks(toolpath.first(count), machine, times)
-        return LegRun(standing, machine, options).run(blocks)
+        return LegRun(leg_program, machine, options).run(blocks)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The same with start and ends at their nearest steps; ProgramError for arcs, homing."""
@@ -83,7 +83,9 @@ def _check(toolpath: Toolpath, machine: _Machine) -> None:
 
 def _in_steps(points: Floats, machine: _Machine) -> Ints:
     """Points (N, 3) mm in steps."""
-    columns = [to_steps(points[:, at], axis.coded_step_mm) for at, axis in enumerate(machine.axes)]
+    columns = [
+        to_steps(points[:, column], axis.coded_step_mm) for column, axis in enumerate(machine.axes)
+    ]
     return np.column_stack(columns)
 
 
@@ -92,14 +94,14 @@ def _blocks(toolpath: Toolpath, machine: _Machine, times: PulseTimes) -> Iterato
     for low in range(0, len(toolpath), ROWS_AT_ONCE):
         part = toolpath.part(low, min(low + ROWS_AT_ONCE, len(toolpath)))
         points = np.concatenate([part.start[None, :], part.end])
-        moved = np.diff(_in_steps(points, machine), axis=0)
-        xy = moved[:, :2]
+        steps = np.diff(_in_steps(points, machine), axis=0)
+        xy = steps[:, :2]
         size, sense = np.abs(xy), np.sign(xy)
-        together = size.min(axis=1, keepdims=True)
-        way = np.zeros((len(moved), 3, 3), dtype=np.int64)
-        way[:, 0, :2] = sense * together
-        way[:, 1, :2] = sense * (size - together)
-        way[:, 2, 2] = moved[:, 2]
-        seconds = np.column_stack([times.legs_s(xy), times.alone_s(moved[:, 2])])
-        row, leg = np.nonzero(way.any(axis=2))
-        yield Legs(low + row, way[row, leg], seconds[row, leg])
+        diagonal = size.min(axis=1, keepdims=True)
+        leg_steps = np.zeros((len(steps), 3, 3), dtype=np.int64)
+        leg_steps[:, 0, :2] = sense * diagonal
+        leg_steps[:, 1, :2] = sense * (size - diagonal)
+        leg_steps[:, 2, 2] = steps[:, 2]
+        seconds = np.column_stack([times.legs_s(xy), times.alone_s(steps[:, 2])])
+        row, leg = np.nonzero(leg_steps.any(axis=2))
+        yield Legs(low + row, leg_steps[row, leg], seconds[row, leg])

@@ -114,11 +114,11 @@ def check(machine: I8751Machine) -> None:
             mend='write axes in the order x, y, z, such as "xz", or ""',
         )
     # Staying within half of the coarser step is possible for every line; see `dogleg`.
-    least = 0.5 * max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-    if dialect.tolerance_mm < least:
+    half_step = 0.5 * max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+    if dialect.tolerance_mm < half_step:
         raise MachineError(
             f"{dialect.tolerance_mm:g} mm is finer than the steps of the machine can be",
             file=name,
             where="table [dialect], key tolerance_mm",
-            mend=f"use {least:g} mm or more",
+            mend=f"use {half_step:g} mm or more",
         )

@@ -56,8 +56,8 @@ def reaches(steps: Ints, step_mm: tuple[float, float], tolerance_mm: float) -> I
 def elbows(steps: Ints) -> Ints:
     """(N,) b·d of lines of (N, 2) steps: what their elbow takes of the reach."""
     size = np.abs(steps)
-    short = size.min(axis=1, initial=np.iinfo(np.int64).max)
-    return np.asarray(short * (size.max(axis=1, initial=0) - short))
+    shorter = size.min(axis=1, initial=np.iinfo(np.int64).max)
+    return np.asarray(shorter * (size.max(axis=1, initial=0) - shorter))
 
 
 class StepLine(Struct, frozen=True):
@@ -67,48 +67,48 @@ class StepLine(Struct, frozen=True):
     dy: int
     reach: int = FREE
 
-    def pieces(self, most: int) -> list[tuple[int, int]]:
+    def pieces(self, max_steps: int) -> list[tuple[int, int]]:
         """Split the line into records and return the steps (dx, dy) of each, in order.
 
-        They add up to the whole line; none has more than `most` steps along an axis.
+        They add up to the whole line; none has more than `max_steps` steps along an axis.
         """
-        long, short = max(abs(self.dx), abs(self.dy)), min(abs(self.dx), abs(self.dy))
+        long, shorter = max(abs(self.dx), abs(self.dy)), min(abs(self.dx), abs(self.dy))
         x_is_long = abs(self.dx) >= abs(self.dy)
-        right, up = (1 if self.dx >= 0 else -1), (1 if self.dy >= 0 else -1)
+        right, y_sense = (1 if self.dx >= 0 else -1), (1 if self.dy >= 0 else -1)
         pieces = []
-        for diagonal, single in self._even_runs(short, long - short, most):
-            far = diagonal + single
-            x, y = (far, diagonal) if x_is_long else (diagonal, far)
-            pieces.append((right * x, up * y))
+        for diagonal, single in self._even_runs(shorter, long - shorter, max_steps):
+            long_steps = diagonal + single
+            x, y = (long_steps, diagonal) if x_is_long else (diagonal, long_steps)
+            pieces.append((right * x, y_sense * y))
         return pieces
 
-    def _even_runs(self, diagonals: int, singles: int, most: int) -> list[tuple[int, int]]:
+    def _even_runs(self, diagonals: int, singles: int, max_steps: int) -> list[tuple[int, int]]:
         """The fewest records that are found, as near to the line as so many can be."""
         if self.reach == FREE:
-            return _runs(diagonals, singles, diagonals * singles, most)
-        runs = _runs(diagonals, singles, self.reach, most)
+            return _runs(diagonals, singles, diagonals * singles, max_steps)
+        runs = _runs(diagonals, singles, self.reach, max_steps)
         # Whole steps waste up to a run's step, b or d, of each reach.
         waste = (diagonals + singles) // 2
         reach = diagonals * singles // (2 * len(runs) - 1) + waste
         if reach >= self.reach:
             return runs
-        nearer = _runs(diagonals, singles, reach, most)
+        nearer = _runs(diagonals, singles, reach, max_steps)
         return nearer if len(nearer) <= len(runs) else runs
 
 
-def _runs(diagonals: int, singles: int, reach: int, most: int) -> list[tuple[int, int]]:
+def _runs(diagonals: int, singles: int, reach: int, max_steps: int) -> list[tuple[int, int]]:
     """Records as (diagonal steps, single steps), each run as long as the reach allows."""
-    value, left, rest = 0, diagonals, singles
+    value, diagonals_left, singles_left = 0, diagonals, singles
     runs = []
-    while left or rest:
-        run = min(left, most)
+    while diagonals_left or singles_left:
+        run = min(diagonals_left, max_steps)
         if singles:
             run = min(run, (reach + value) // singles)
         value -= run * singles
-        on = min(rest, most - run)
+        singles_now = min(singles_left, max_steps - run)
         if diagonals:
-            on = min(on, (reach - value) // diagonals)
-        value += on * diagonals
-        left, rest = left - run, rest - on
-        runs.append((run, on))
+            singles_now = min(singles_now, (reach - value) // diagonals)
+        value += singles_now * diagonals
+        diagonals_left, singles_left = diagonals_left - run, singles_left - singles_now
+        runs.append((run, singles_now))
     return runs

@@ -91,13 +91,13 @@ class PulseTimes:
         pulses.
         """
         pulses = self._firmware.pulses(steps)
-        together, most = pulses.min(axis=1), pulses.max(axis=1)
-        both = self._run_s(together)
+        shorter, longer = pulses.min(axis=1), pulses.max(axis=1)
+        both_s = self._run_s(shorter)
         if self._firmware.elbow == "ramps":
-            return np.column_stack([both, self._run_s(most - together)])
-        whole = self._run_s(most)
-        both = whole * together / np.maximum(most, 1)
-        return np.column_stack([both, whole - both])
+            return np.column_stack([both_s, self._run_s(longer - shorter)])
+        longer_s = self._run_s(longer)
+        both_s = longer_s * shorter / np.maximum(longer, 1)
+        return np.column_stack([both_s, longer_s - both_s])
 
     def _run_s(self, pulses: Ints) -> Floats:
         """(N,) s for runs of pulses."""

@@ -78,11 +78,11 @@ def read_program(data: bytes, machine: I8751Machine) -> Toolpath:
     return _toolpath(decoded_records(data, machine), machine, np.zeros(3, dtype=np.int64))
 
 
-def read_packet(records: bytes, machine: I8751Machine, at: Ints) -> Toolpath:
-    """The moves of the records of one packet, of a machine that stands `at` (3,) steps from part
-    zero; ProgramError as `read_program`."""
-    whole = bytes([ACCESS]) + records + bytes([PACKET_END, DATA_END])
-    return _toolpath(_read_packets(whole, machine.dialect), machine, at)
+def read_packet(records: bytes, machine: I8751Machine, start_steps: Ints) -> Toolpath:
+    """The moves of the records of one packet, of a machine that stands `start_steps` (3,) steps
+    from part zero; ProgramError as `read_program`."""
+    stream = bytes([ACCESS]) + records + bytes([PACKET_END, DATA_END])
+    return _toolpath(_read_packets(stream, machine.dialect), machine, start_steps)
 
 
 def decoded_records(data: bytes, machine: I8751Machine) -> Decoded:
@@ -112,13 +112,13 @@ def _read_packets(data: bytes, dialect: I8751Dialect) -> Decoded:
         ) from None
 
 
-def _toolpath(decoded: Decoded, machine: I8751Machine, at: Ints) -> Toolpath:
-    """Rows of all records, then END; the first begins `at` (3,) steps from part zero."""
+def _toolpath(decoded: Decoded, machine: I8751Machine, start_steps: Ints) -> Toolpath:
+    """Rows of all records, then END; the first begins `start_steps` (3,) steps from part zero."""
     dialect = machine.dialect
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-    x, y, z = (at * step_mm).tolist()
+    x, y, z = (start_steps * step_mm).tolist()
     path, times = ToolpathBuilder(start=(x, y, z)), PulseTimes(dialect)
-    goes_below = bool((at[2] + np.cumsum(decoded.steps[:, 2]) < 0).any())
+    goes_below = bool((start_steps[2] + np.cumsum(decoded.steps[:, 2]) < 0).any())
     for low in range(0, len(decoded.steps), RECORDS_AT_ONCE):
         records = slice(low, low + RECORDS_AT_ONCE)
         steps, waits = decoded.steps[records].astype(np.int64), decoded.waits[records]
@@ -126,9 +126,9 @@ def _toolpath(decoded: Decoded, machine: I8751Machine, at: Ints) -> Toolpath:
         present = np.column_stack([moves_xy, waits[:, 0] > 0, moves_z, waits[:, 1] > 0])
         # Slots 0 to 3 of a record: X and Y, T1, Z, T2.
         record, slot = np.nonzero(present)
-        stands = at + np.cumsum(steps, axis=0)
-        at = stands[-1]
-        ends = stands[record]
+        places = start_steps + np.cumsum(steps, axis=0)
+        start_steps = places[-1]
+        ends = places[record]
         # X and Y have moved before Z does.
         before_z = slot < 2
         ends[before_z, 2] -= steps[record[before_z], 2]
@@ -176,22 +176,22 @@ def _two_ways(decoded: Decoded, dialect: I8751Dialect) -> Iterator[Finding]:
     """READ_TWO_WAYS: runs with a high byte, whose unit is 256 steps or 255."""
     if dialect.long_runs:
         return
-    count, record, most = 0, -1, np.zeros(3, dtype=np.int64)
+    count, record, totals = 0, -1, np.zeros(3, dtype=np.int64)
     for low in range(0, len(decoded.steps), RECORDS_AT_ONCE):
         steps = decoded.steps[low : low + RECORDS_AT_ONCE].astype(np.int64)
         pulses = dialect.pulses(steps)
         high = pulses // dialect.high_byte_steps
-        found = (high > 0).any(axis=1)
-        if found.any() and record < 0:
-            record = low + int(found.argmax())
+        has_high = (high > 0).any(axis=1)
+        if has_high.any() and record < 0:
+            record = low + int(has_high.argmax())
         count += int((high > 0).sum())
-        most += high.sum(axis=0)
+        totals += high.sum(axis=0)
     if count:
         yield READ_TWO_WAYS(
             where=f"record {record + 1}",
             measured=count,
             high_byte=dialect.high_byte,
-            steps=int(most.max()),
+            steps=int(totals.max()),
         )
 
 
@@ -260,10 +260,10 @@ class PacketReader:
             self._records += count
             check_count(self._records, "record")
 
-    def _peek(self, wanted: str) -> int:
+    def _peek(self, expected: str) -> int:
         """The byte here; a fault when there is none."""
         if self._at >= len(self._data):
-            raise self._fault(self._at, f"the program breaks off: wanted {wanted}")
+            raise self._fault(self._at, f"the program breaks off: wanted {expected}")
         return self._data[self._at]
 
     def _take_key(self) -> None:
@@ -298,46 +298,46 @@ class PacketReader:
         self._wait(self._motor(third, 3), "T2")
         return self._at, second, third
 
-    def _motor(self, at: int, number: int) -> int:
-        self._want(at, (number,), f"motor {number:02d}H")
-        self._want(at + 1, (3, 4, 5), f"the sense of motor {number}: 03H, 04H or 05H")
-        if self._data[at + 1] == STANDS:
-            return at + 2
-        self._want(at + 2, None, f"PH of motor {number}")
-        self._want(at + 3, None, f"PL of motor {number}")
-        return at + 4
+    def _motor(self, place: int, number: int) -> int:
+        self._want(place, (number,), f"motor {number:02d}H")
+        self._want(place + 1, (3, 4, 5), f"the sense of motor {number}: 03H, 04H or 05H")
+        if self._data[place + 1] == STANDS:
+            return place + 2
+        self._want(place + 2, None, f"PH of motor {number}")
+        self._want(place + 3, None, f"PL of motor {number}")
+        return place + 4
 
-    def _wait(self, at: int, name: str) -> int:
+    def _wait(self, place: int, name: str) -> int:
         mark = self._dialect.dwell_mark_byte
-        self._want(at, (mark,), f"{mark:02X}H before {name}")
-        self._want(at + 1, None, f"the seconds of {name}")
-        return at + 2
+        self._want(place, (mark,), f"{mark:02X}H before {name}")
+        self._want(place + 1, None, f"the seconds of {name}")
+        return place + 2
 
-    def _want(self, at: int, allowed: tuple[int, ...] | None, what: str) -> None:
-        if at >= len(self._data):
-            raise self._fault(at, f"the program breaks off: wanted {what}")
-        byte = self._data[at]
+    def _want(self, place: int, allowed: tuple[int, ...] | None, expected: str) -> None:
+        if place >= len(self._data):
+            raise self._fault(place, f"the program breaks off: wanted {expected}")
+        byte = self._data[place]
         if allowed is not None and byte not in allowed:
             mend = ""
             if {byte, *allowed} == {0x00, 0x30}:
                 mend = f"use --set dialect.dwell_mark={byte:02X}H"
-            raise self._fault(at, f"{byte:02X}H: wanted {what}", mend)
+            raise self._fault(place, f"{byte:02X}H: wanted {expected}", mend)
 
-    def _fault(self, at: int, message: str, mend: str = "") -> ByteFault:
-        return ByteFault(at, self._records, message, mend)
+    def _fault(self, place: int, message: str, mend: str = "") -> ByteFault:
+        return ByteFault(place, self._records, message, mend)
 
 
 def replies(data: bytes, decoded: Decoded, dialect: I8751Dialect) -> list[str]:
     """Return the expected reply of the controller to each byte of a decoded stream."""
     to_wait = dialect.dwell_replies
-    standing = [dialect.motor_reply, "M"]
+    still = [dialect.motor_reply, "M"]
     moving = [dialect.motor_reply, "M", "M", "M"]
     answers: list[str] = []
     for _ in range(len(decoded.steps)):
         if data[len(answers)] == ACCESS:
             answers.append("LISTO")
         for motor in range(3):
-            answers += standing if data[len(answers) + 1] == 5 else moving
+            answers += still if data[len(answers) + 1] == 5 else moving
             if motor:
                 answers += to_wait
         # A record begins with 01H, so that this cannot be the first byte of the next one.
@@ -388,18 +388,18 @@ class ListingReader:
         """All records of a listing."""
         check_count(_line_ends(data), "line")
         lines = text_lines(data)
-        ended = False
+        is_ended = False
         for self._line, line in enumerate(lines, 1):
             text = line.strip(" \t")
             if not text or text.startswith(";"):
                 continue
             indent = len(line) - len(line.lstrip(" \t"))
-            if ended:
+            if is_ended:
                 raise self._error(indent, f"{quote_line(text)} after END", "remove it")
-            ended = text == LAST_LINE
-            if not ended:
+            is_ended = text == LAST_LINE
+            if not is_ended:
                 self._record(text, indent)
-        if not ended:
+        if not is_ended:
             raise self._error(len(lines[-1]), "the listing breaks off", "its last line is END")
         if not self._numbers:
             raise ProgramError("the program is empty", mend="a listing has records before END")
@@ -428,10 +428,10 @@ class ListingReader:
             raise self._error(
                 column, f"{text} mm is more than {self._most} steps", "write it as two records"
             )
-        off = abs(exact - steps)
-        if off > WHOLE_STEP_TOLERANCE:
+        deviation = abs(exact - steps)
+        if deviation > WHOLE_STEP_TOLERANCE:
             self._rounded += 1
-            self._worst = max(self._worst, off)
+            self._worst = max(self._worst, deviation)
         return -steps if text[0] == "-" else steps
 
     def _wait(self, text: str, column: int) -> int:
@@ -446,17 +446,17 @@ class ListingReader:
 
     def _record_error(self, text: str, indent: int) -> ProgramError:
         """Return the error for the first word of a line that does not fit into a record."""
-        at, wanted = 0, "nothing more"
-        for number, (letter, value, what) in enumerate(_WORDS):
-            word = re.compile((_BETWEEN if number else "") + letter + value).match(text, at)
+        place, expected = 0, "nothing more"
+        for number, (letter, value, meaning) in enumerate(_WORDS):
+            word = re.compile((_BETWEEN if number else "") + letter + value).match(text, place)
             if word is None:
-                wanted = what
+                expected = meaning
                 break
-            at = word.end()
-        blanks = re.compile("[ \t]*").match(text, at)
-        column = blanks.end() if blanks else at
+            place = word.end()
+        blanks = re.compile("[ \t]*").match(text, place)
+        column = blanks.end() if blanks else place
         mend = "write a point, no comma" if "," in text[: column + SHOWN_AHEAD] else ""
-        return self._error(indent + column, f"{quote_line(text)}: wanted {wanted}", mend)
+        return self._error(indent + column, f"{quote_line(text)}: wanted {expected}", mend)
 
     def _error(self, column: int, message: str, mend: str) -> ProgramError:
         """ProgramError in the present line at a column from 0."""
@@ -518,8 +518,8 @@ def _runs(lines: list[str]) -> tuple[list[_Run], bytes]:
         if not line.strip() or line.lstrip().startswith(";"):
             continue
         match = _LINE.fullmatch(line)
-        found = _bytes(match[2]) if match else b""
-        if match is None or not found:
+        octets = _bytes(match[2]) if match else b""
+        if match is None or not octets:
             raise _line_error(number, line)
         if int(match[1], 16) != len(stream):
             raise ProgramError(
@@ -528,8 +528,8 @@ def _runs(lines: list[str]) -> tuple[list[_Run], bytes]:
                 mend="look for a line that is missing or doubled",
             )
         column = match.start(2) + 1
-        runs.append(_Run(number, len(stream), len(found), column, match[3] or ""))
-        stream += found
+        runs.append(_Run(number, len(stream), len(octets), column, match[3] or ""))
+        stream += octets
     return runs, bytes(stream)
 
 
@@ -547,8 +547,8 @@ def _line_error(number: int, line: str) -> ProgramError:
     offset = re.match(r"[0-9A-Fa-f]{4,8}(?=[ \t]|$)", line)
     column = 1
     if offset:
-        good = re.match(r"[ \t]*(?:[0-9A-Fa-f]{2}(?:[ \t]+|$))*", line[offset.end() :])
-        column = offset.end() + (good.end() if good else 0) + 1
+        valid_part = re.match(r"[ \t]*(?:[0-9A-Fa-f]{2}(?:[ \t]+|$))*", line[offset.end() :])
+        column = offset.end() + (valid_part.end() if valid_part else 0) + 1
     return ProgramError(
         f"{quote_line(line)} is no line of a hex dump: wanted an offset of four digits or more, "
         "bytes of two digits, and perhaps a comment behind a semicolon",
@@ -579,12 +579,12 @@ def _check_replies(runs: list[_Run], expected: list[str]) -> None:
         stated = _REPLIES.search(run.comment)
         if not stated:
             continue
-        wanted = expected[run.offset : run.offset + run.size]
-        given = stated[1].split()
-        unknown = [a if b == "?" else b for a, b in zip(wanted, given, strict=False)]
-        if len(given) != len(wanted) or unknown != wanted:
+        due = expected[run.offset : run.offset + run.size]
+        replies = stated[1].split()
+        unknown = [a if b == "?" else b for a, b in zip(due, replies, strict=False)]
+        if len(replies) != len(due) or unknown != due:
             raise ProgramError(
-                f"replies {quote_line(' '.join(given))}, expected {quote_line(' '.join(wanted))}",
+                f"replies {quote_line(' '.join(replies))}, expected {quote_line(' '.join(due))}",
                 where=f"offset {run.offset:04X}, line {run.line}",
                 mend="see dialect.motor_reply and dialect.dwell_reply, or leave out the replies",
             )

@@ -64,10 +64,10 @@ def _check_events(toolpath: Toolpath) -> None:
         "this machine has no stop for a tool change",
         "write a program for each tool (--split tool)",
     )
-    for refused, message in REFUSED.items():
+    for refused_kind, message in REFUSED.items():
         refuse(
             toolpath,
-            kind == refused,
+            kind == refused_kind,
             message,
             "leave it out, and do it by hand before the program",
         )
@@ -78,25 +78,25 @@ def _check_events(toolpath: Toolpath) -> None:
         "set it first, before any move",
     )
     with np.errstate(invalid="ignore"):
-        bad = (kind == Kind.DWELL) & ~((value >= 0.0) & (value <= MAX_DWELL_S))
+        is_bad = (kind == Kind.DWELL) & ~((value >= 0.0) & (value <= MAX_DWELL_S))
     refuse(
         toolpath,
-        bad,
+        is_bad,
         lambda row: f"a dwell of {value[row]:g} s does not fit into the program",
         f"use 0 to {MAX_DWELL_S:g} s",
     )
-    ended = np.cumsum(kind == Kind.END) - (kind == Kind.END)
+    ends_before = np.cumsum(kind == Kind.END) - (kind == Kind.END)
     refuse(
         toolpath,
-        ended > 0,
+        ends_before > 0,
         "something follows the end of the program",
         "end the program once, in its last row",
     )
 
 
 def _check_coordinates(toolpath: Toolpath, machine: I8751Machine) -> None:
-    for axis, (name, given) in enumerate(zip("XYZ", machine.axes, strict=True)):
-        most_mm = MAX_STEPS * given.coded_step_mm
+    for axis, (name, axis_settings) in enumerate(zip("XYZ", machine.axes, strict=True)):
+        most_mm = MAX_STEPS * axis_settings.coded_step_mm
         values = toolpath.end[:, axis]
         refuse(
             toolpath,
@@ -145,25 +145,25 @@ class Records(Struct, frozen=True, eq=False):
 def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect) -> Records:
     """The records of a checked toolpath; PostError when it moves nothing, or far too much."""
     counts = Counts()
-    lowered, row = _lower(toolpath, slope_step_mm(machine), dialect, counts)
+    path, row = _lower(toolpath, slope_step_mm(machine), dialect, counts)
     deltas = np.diff(
-        _nearest_steps(lowered, machine), axis=0, prepend=np.zeros((1, 3), dtype=np.int64)
+        _nearest_steps(path, machine), axis=0, prepend=np.zeros((1, 3), dtype=np.int64)
     )
     refuse(
-        lowered,
-        ~lowered.is_motion & deltas.any(axis=1),
-        lambda row: f"a {Kind(int(lowered.kind[row])).name} cannot move the tool",
+        path,
+        ~path.is_motion & deltas.any(axis=1),
+        lambda row: f"a {Kind(int(path.kind[row])).name} cannot move the tool",
         "give the row the position of the tool",
     )
-    pieces = _cut_rows(lowered, deltas, machine, dialect, counts)
+    pieces = _cut_rows(path, deltas, machine, dialect, counts)
     # Parts of slopes may be small: only whole rows are missed.
-    whole = np.bincount(row, minlength=len(toolpath))[row] == 1
-    counts.dropped = int((lowered.is_motion & ~deltas.any(axis=1) & whole).sum())
+    is_whole = np.bincount(row, minlength=len(toolpath))[row] == 1
+    counts.dropped = int((path.is_motion & ~deltas.any(axis=1) & is_whole).sum())
     counts.feeds = int(toolpath.is_feed.sum())
     each = np.where(deltas.any(axis=1), 1, 0)
     for index, parts in pieces.items():
         each[index] = len(parts)
-    owner = np.repeat(np.arange(len(lowered)), each)
+    owner = np.repeat(np.arange(len(path)), each)
     first = np.cumsum(each) - each
     steps = deltas[owner]
     del deltas
@@ -171,8 +171,8 @@ def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect)
         steps[first[index] : first[index] + len(parts)] = parts
     if dialect.z_alone == "with-step":
         steps = _with_x_steps(steps)
-    plain = _Plain(steps, owner, lowered, counts)
-    records = plain.with_waits(row, first)
+    without_waits = _Plain(steps, owner, path, counts)
+    records = without_waits.with_waits(row, first)
     if dialect.z_alone == "with-step" and not records.steps[:, :2].any(axis=1).all():
         raise PostError(
             "a dwell needs a record in which nothing moves, and this controller takes none",
@@ -185,16 +185,16 @@ def _lower(
     toolpath: Toolpath, step_mm: float, dialect: I8751Dialect, counts: Counts
 ) -> tuple[Toolpath, Ints]:
     """Return lines of XY or Z only, and the row of the toolpath that each came from."""
-    two = helices_to_steps(toolpath, step_mm)
+    two_lines = helices_to_steps(toolpath, step_mm)
     # A rapid in two parts is as good as one; a cut in steps is another cut.
-    cut = (np.bincount(two.row, minlength=len(toolpath)) > 1) & toolpath.is_feed
+    cut = (np.bincount(two_lines.row, minlength=len(toolpath)) > 1) & toolpath.is_feed
     counts.slopes, counts.slope_step_mm = int(cut.sum()), step_mm
     counts.slopes_place = toolpath.place(int(cut.argmax())) if counts.slopes else ""
-    arcs = two.toolpath.is_arc
-    lines = arcs_to_lines(two.toolpath, arcs, dialect.arc_tolerance_mm)
+    arcs = two_lines.toolpath.is_arc
+    lines = arcs_to_lines(two_lines.toolpath, arcs, dialect.arc_tolerance_mm)
     counts.arcs = int(arcs.sum())
-    counts.chords = counts.arcs + len(lines.toolpath) - len(two.toolpath)
-    return lines.toolpath, two.row[lines.row]
+    counts.chords = counts.arcs + len(lines.toolpath) - len(two_lines.toolpath)
+    return lines.toolpath, two_lines.row[lines.row]
 
 
 def _nearest_steps(toolpath: Toolpath, machine: I8751Machine) -> Ints:
@@ -209,23 +209,23 @@ def _cut_rows(
     """The rows that need more than one record, each with the steps (k, 3) of its records."""
     xy = deltas[:, :2]
     # A step aside (`_with_x_steps`) comes on top.
-    most = dialect.most_steps - (1 if dialect.z_alone == "with-step" else 0)
+    max_steps = dialect.most_steps - (1 if dialect.z_alone == "with-step" else 0)
     step_mm = (machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     reach = np.where(toolpath.is_feed, reaches(xy, step_mm, dialect.tolerance_mm), FREE)
     strays = (reach != FREE) & (elbows(xy) > reach)
-    far = np.abs(deltas).max(axis=1, initial=0) > most
-    counts.long_moves = int((far & ~strays).sum())
+    is_far = np.abs(deltas).max(axis=1, initial=0) > max_steps
+    counts.long_moves = int((is_far & ~strays).sum())
     counts.cut_lines = int(strays.sum())
     of_elbows = np.where(strays, elbows(xy) / (2.0 * np.maximum(reach, 1)), 0.0)
-    _refuse_too_many(np.abs(deltas).max(axis=1, initial=0) / most + of_elbows)
+    _refuse_too_many(np.abs(deltas).max(axis=1, initial=0) / max_steps + of_elbows)
     pieces = {}
-    for row in np.flatnonzero(strays | far).tolist():
+    for row in np.flatnonzero(strays | is_far).tolist():
         dx, dy, dz = deltas[row].tolist()
         if dz:
-            parts = [(0, 0, part) for part in _split_long(dz, most)]
+            parts = [(0, 0, part) for part in _split_long(dz, max_steps)]
         else:
             line = StepLine(dx, dy, int(reach[row]))
-            parts = [(*part, 0) for part in line.pieces(most)]
+            parts = [(*part, 0) for part in line.pieces(max_steps)]
         pieces[row] = np.array(parts, dtype=np.int64)
         counts.cut_pieces += len(parts) if strays[row] else 0
     return pieces
@@ -241,11 +241,11 @@ def _refuse_too_many(each: Floats) -> None:
         )
 
 
-def _split_long(steps: int, most: int) -> list[int]:
-    """Split `steps` into parts of at most `most`, the rest last."""
-    full, rest = divmod(abs(steps), most)
+def _split_long(steps: int, max_steps: int) -> list[int]:
+    """Split `steps` into parts of at most `max_steps`, the rest last."""
+    full_parts, last_part = divmod(abs(steps), max_steps)
     sign = 1 if steps > 0 else -1
-    return [sign * most] * full + ([sign * rest] if rest else [])
+    return [sign * max_steps] * full_parts + ([sign * last_part] if last_part else [])
 
 
 def _with_x_steps(steps: Ints) -> Ints:
@@ -255,17 +255,17 @@ def _with_x_steps(steps: Ints) -> Ints:
     Only for controllers that take no record in which both X and Y stand still (the thesis shows
     none). The step aside is taken back as soon as a record moves X or Y anyway, or at the end.
     """
-    out = steps.copy()
-    aside = 0
+    result = steps.copy()
+    x_offset = 0
     for record, (x, y, z) in enumerate(steps.tolist()):
         if not (x or y):
-            wanted = 1 - aside
+            next_offset = 1 - x_offset
         else:
             # A record that would stand still by going back leaves it to a later one.
-            wanted = aside if (x, y, z) == (aside, 0, 0) and aside else 0
-        out[record, 0] += wanted - aside
-        aside = wanted
-    return np.concatenate([out, [[-1, 0, 0]]]) if aside else out
+            next_offset = x_offset if (x, y, z) == (x_offset, 0, 0) and x_offset else 0
+        result[record, 0] += next_offset - x_offset
+        x_offset = next_offset
+    return np.concatenate([result, [[-1, 0, 0]]]) if x_offset else result
 
 
 class _Plain(Struct, frozen=True, eq=False):
@@ -288,24 +288,26 @@ class _Plain(Struct, frozen=True, eq=False):
                 mend="scale the drawing up",
             )
         # A step back at the end belongs to the last row that moved.
-        back = np.full(len(self.steps) - len(self.owner), self.owner[-1])
-        owner = np.concatenate([self.owner, back])
+        owner_of_return = np.full(len(self.steps) - len(self.owner), self.owner[-1])
+        owner = np.concatenate([self.owner, owner_of_return])
         waits = np.zeros((len(self.steps), 2), dtype=np.int64)
-        own: list[tuple[int, int, int]] = []
+        extra_records: list[tuple[int, int, int]] = []
         messages: list[tuple[int, str]] = []
         end_row = -1
         for index in np.flatnonzero(~self.lowered.is_motion).tolist():
             kind, record = Kind(int(self.lowered.kind[index])), int(first[index])
             if kind == Kind.DWELL:
-                left = self._whole_seconds(index)
-                if record and not (own and own[-1][0] == record):
-                    given = min(left, MAX_DWELL_BYTE_S - int(waits[record - 1, 1]))
-                    waits[record - 1, 1] += given
-                    left -= given
-                own += [(record, part, index) for part in _split_long(left, MAX_DWELL_BYTE_S)]
+                remaining_s = self._whole_seconds(index)
+                if record and not (extra_records and extra_records[-1][0] == record):
+                    wait_s = min(remaining_s, MAX_DWELL_BYTE_S - int(waits[record - 1, 1]))
+                    waits[record - 1, 1] += wait_s
+                    remaining_s -= wait_s
+                extra_records += [
+                    (record, part, index) for part in _split_long(remaining_s, MAX_DWELL_BYTE_S)
+                ]
             elif kind == Kind.MESSAGE:
                 text = self.lowered.texts[int(self.lowered.value[index])]
-                messages.append((record + len(own), text))
+                messages.append((record + len(extra_records), text))
             elif kind == Kind.END:
                 end_row = int(row[index])
             elif kind == Kind.TOOL_CHANGE:
@@ -313,11 +315,13 @@ class _Plain(Struct, frozen=True, eq=False):
             elif kind != Kind.SET_ZERO:
                 self._note_spindle(index)
         steps = self.steps
-        if own:
-            at = [record for record, _, _ in own]
-            steps = np.insert(steps, at, 0, axis=0)
-            waits = np.insert(waits, at, [[0, seconds] for _, seconds, _ in own], axis=0)
-            owner = np.insert(owner, at, [index for _, _, index in own])
+        if extra_records:
+            places = [record for record, _, _ in extra_records]
+            steps = np.insert(steps, places, 0, axis=0)
+            waits = np.insert(
+                waits, places, [[0, seconds] for _, seconds, _ in extra_records], axis=0
+            )
+            owner = np.insert(owner, places, [index for _, _, index in extra_records])
         return Records(
             steps=steps,
             waits=waits,

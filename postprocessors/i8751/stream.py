@@ -27,8 +27,11 @@ def listing(data: bytes, machine: I8751Machine) -> Listing:
     end = f"{END_OF_DATA:02X}"
     if not len(decoded.steps):
         return Listing((end,), binary=True)
-    table, used = byte_table(
+    table, is_used = byte_table(
         decoded.steps.astype(np.int64), decoded.waits.astype(np.int64), dialect
     )
-    lines = (row[sent].tobytes().hex(" ").upper() for row, sent in zip(table, used, strict=True))
+    lines = (
+        row[is_sent].tobytes().hex(" ").upper()
+        for row, is_sent in zip(table, is_used, strict=True)
+    )
     return Listing((*lines, end), binary=True)

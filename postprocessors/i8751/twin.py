@@ -76,10 +76,10 @@ class I8751Twin(Twin):
 
     def connect(self, now: float) -> bytes:
         """Open the line, which a controller at rest does not notice."""
-        sent = super().connect(now)
+        output = super().connect(now)
         if self._choices.opening == "reset" and self._executing is None:
             self._reset()
-        return sent
+        return output
 
     def _reset(self) -> None:
         self._dialogue = self._program()
@@ -101,9 +101,9 @@ class I8751Twin(Twin):
             yield from self._key((yield))
             yield from self._receive_one_of(1)
             yield from self._packet()
-            again = ACCESS if self._choices.key == "each-packet" else 1
+            expected_octet = ACCESS if self._choices.key == "each-packet" else 1
             while (octet := (yield)) != DATA_END:
-                if again == ACCESS:
+                if expected_octet == ACCESS:
                     yield from self._key(octet)
                     octet = yield from self._receive_one_of(1)
                 if octet == 1:
@@ -125,8 +125,8 @@ class I8751Twin(Twin):
         octet = 1
         while octet != PACKET_END:
             records.append((yield from self._record()))
-            full = len(records) == RECORDS_PER_PACKET
-            octet = yield from self._receive_one_of(PACKET_END, *(() if full else (1,)))
+            is_full = len(records) == RECORDS_PER_PACKET
+            octet = yield from self._receive_one_of(PACKET_END, *(() if is_full else (1,)))
         if self._choices.packet_end == "M F":
             self._out += STORED
         self._execute(records)
@@ -174,9 +174,9 @@ class I8751Twin(Twin):
     def _execute(self, records: list[bytes]) -> None:
         """Begin with the first record; nothing, not even F, comes of a motor that turns for 0
         steps."""
-        at = np.rint(self.slides.commanded_mm / self._step_mm).astype(np.int64)
+        start_steps = np.rint(self.slides.commanded_mm / self._step_mm).astype(np.int64)
         try:
-            path = read_packet(b"".join(records), self._machine, at)
+            path = read_packet(b"".join(records), self._machine, start_steps)
         except ProgramError:
             return
         block = len(self.decoded)

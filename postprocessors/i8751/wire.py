@@ -100,12 +100,12 @@ class I8751Wire(Wire):
         if action != "jog":
             return super().command(action, machine, values, manner)  # type: ignore[return-value]
         axes = zip("xyz", machine.axes, strict=True)
-        way = [round(values.get(letter, 0.0) / axis.coded_step_mm) for letter, axis in axes]
-        if not any(way):
+        travel = [round(values.get(letter, 0.0) / axis.coded_step_mm) for letter, axis in axes]
+        if not any(travel):
             raise MachineError("that is less than a step", mend="jog by more")
-        most = machine.dialect.most_steps
-        count = -(-max(map(abs, way)) // most)
-        ends = np.outer(np.arange(count + 1), way) // count
+        max_steps = machine.dialect.most_steps
+        count = -(-max(map(abs, travel)) // max_steps)
+        ends = np.outer(np.arange(count + 1), travel) // count
         steps = np.diff(ends, axis=0)
         times = PulseTimes(machine.dialect)
         seconds = float(times.legs_s(steps[:, :2]).sum() + times.alone_s(steps[:, 2]).sum())
@@ -169,10 +169,10 @@ def _parts(stream: bytes, machine: I8751Machine) -> Iterator[_Part]:
     """The packets of a stream that its reader accepts, or that the writer has made."""
     dialect: I8751Dialect = machine.dialect
     assert isinstance(machine.link, I8751Link)
-    begin = at = records = 0
+    begin = offset = records = 0
     replies: list[str] = []
-    while at < len(stream):
-        octet = stream[at]
+    while offset < len(stream):
+        octet = stream[offset]
         if octet == KEY:
             replies.append(READY)
         elif octet == END_OF_PACKET:
@@ -181,14 +181,14 @@ def _parts(stream: bytes, machine: I8751Machine) -> Iterator[_Part]:
             replies.append("A")
         elif octet in (1, 2, 3):
             records += octet == 1
-            data = 1 if stream[at + 1] == STOPPED else 3
+            data = 1 if stream[offset + 1] == STOPPED else 3
             replies += [dialect.motor_reply, *"M" * data]
         else:
             replies += dialect.dwell_replies
-        at = begin + len(replies)
+        offset = begin + len(replies)
         if octet in (END_OF_PACKET, END_OF_DATA):
-            yield _Part(stream[begin:at], tuple(replies), records)
-            begin, replies, records = at, [], 0
+            yield _Part(stream[begin:offset], tuple(replies), records)
+            begin, replies, records = offset, [], 0
 
 
 class I8751Conversation(PacketByPacket):
@@ -199,8 +199,8 @@ class I8751Conversation(PacketByPacket):
 
     def __init__(self, packets: Sequence[Packet], machine: I8751Machine, manner: Manner) -> None:
         super().__init__(packets, manner)
-        whole = b"".join(packet.data for packet in packets)
-        self._replies = [part.replies for part in _parts(whole, machine)]
+        stream = b"".join(packet.data for packet in packets)
+        self._replies = [part.replies for part in _parts(stream, machine)]
         self._known = machine.dialect.motor_reply + "M"
         self._at = 0  # the byte of the packet that is out
         self._said = ""

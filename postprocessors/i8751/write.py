@@ -129,9 +129,9 @@ def packet_bytes(steps: Ints, waits: Ints, dialect: I8751Dialect) -> bytes:
     parts = []
     for low in range(0, len(steps), RECORDS_AT_ONCE):
         rows = slice(low, low + RECORDS_AT_ONCE)
-        table, used = byte_table(steps[rows], waits[rows], dialect)
-        used[0, 0] &= low == 0 or dialect.key == "each-packet"
-        parts.append(table[used].tobytes())
+        table, is_used = byte_table(steps[rows], waits[rows], dialect)
+        is_used[0, 0] &= low == 0 or dialect.key == "each-packet"
+        parts.append(table[is_used].tobytes())
     return b"".join([*parts, bytes([END_OF_DATA])])
 
 
@@ -139,13 +139,13 @@ def byte_table(steps: Ints, waits: Ints, dialect: I8751Dialect) -> tuple[Bytes, 
     """(R, COLUMNS) bytes of records of steps (R, 3) and waits (R, 2), and which are sent."""
     count = len(steps)
     table = np.zeros((count, COLUMNS), dtype=np.uint8)
-    used = np.ones((count, COLUMNS), dtype=np.bool_)
+    is_used = np.ones((count, COLUMNS), dtype=np.bool_)
     in_packet = np.arange(count) % RECORDS_PER_PACKET
     table[:, 0] = KEY
-    used[:, 0] = in_packet == 0 if dialect.key == "each-packet" else np.arange(count) == 0
+    is_used[:, 0] = in_packet == 0 if dialect.key == "each-packet" else np.arange(count) == 0
     table[:, -1] = END_OF_PACKET
-    used[:, -1] = in_packet == RECORDS_PER_PACKET - 1
-    used[-1, -1] = True
+    is_used[:, -1] = in_packet == RECORDS_PER_PACKET - 1
+    is_used[-1, -1] = True
     for motor, column in enumerate(MOTOR_COLUMNS):
         turns = steps[:, motor]
         forward = turns * dialect.signs[motor] > 0
@@ -154,11 +154,11 @@ def byte_table(steps: Ints, waits: Ints, dialect: I8751Dialect) -> tuple[Bytes, 
         table[:, column + 1] = np.where(forward, FORWARD, BACKWARD)
         table[turns == 0, column + 1] = STOPPED
         table[:, column + 2], table[:, column + 3] = high, low
-        used[:, column + 2 : column + 4] = (turns != 0)[:, None]
+        is_used[:, column + 2 : column + 4] = (turns != 0)[:, None]
     for pair, column in enumerate(PAIR_COLUMNS):
         table[:, column] = dialect.dwell_mark_byte
         table[:, column + 1] = waits[:, pair]
-    return table, used
+    return table, is_used
 
 
 def _high_low(steps: Ints, dialect: I8751Dialect) -> tuple[Ints, Ints]:
@@ -177,8 +177,8 @@ def decimals_of(machine: I8751Machine) -> int:
 
 def safe_text(text: str) -> str:
     """A text from outside as part of a comment: printable ASCII, one line, short."""
-    plain = re.sub(r"[^A-Za-z0-9 _.,:+/#-]+", " ", text)
-    return " ".join(plain.split())[:MAX_MESSAGE_CHARS]
+    cleaned = re.sub(r"[^A-Za-z0-9 _.,:+/#-]+", " ", text)
+    return " ".join(cleaned.split())[:MAX_MESSAGE_CHARS]
 
 
 def listing_text(records: Records, machine: I8751Machine) -> str:

@@ -72,8 +72,8 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
         mend = "post the drawing for it: arcs become lines then"
         refuse(toolpath, toolpath.is_arc, "this machine has no arcs", mend)
         home = np.array(machine.controller.machine_zero_mm)
-        far = (np.abs(toolpath.end - home) > MAX_DISTANCE_UNITS * UNIT_MM).any(axis=1)
-        refuse(toolpath, far, "a position is beyond all that the controller can count")
+        is_far = (np.abs(toolpath.end - home) > MAX_DISTANCE_UNITS * UNIT_MM).any(axis=1)
+        refuse(toolpath, is_far, "a position is beyond all that the controller can count")
         end = with_event_positions(toolpath, home).end
         coded = [axis.coded_step_mm for axis in machine.axes]
         columns = [
@@ -135,16 +135,18 @@ class _Run:
         """The chunks of all rows up to the end of the program."""
         complete, finished = 0, False
         while not finished:
-            out = np.empty((self._samples, 3), dtype=np.int64)
+            positions = np.empty((self._samples, 3), dtype=np.int64)
             row = np.empty(self._samples, dtype=np.int64)
-            filled, finished = slaves_fill(self._program, self._state, self._account, out, row)
+            filled, finished = slaves_fill(
+                self._program, self._state, self._account, positions, row
+            )
             row = row[:filled]
             closed = int(self._state.clock[1])
             going = int(self._lines.orders[closed - 1, SECOND_ROW]) + 1 if closed else 0
             going = self._rows if finished else going
             last = max(going, int(row[-1]) + 1) if filled else going
             if filled or last > complete:
-                yield self._chunk((complete, going, last), row, out[:filled])
+                yield self._chunk((complete, going, last), row, positions[:filled])
             complete = going
 
     def _chunk(self, span: tuple[int, int, int], row: Ints, count: Ints) -> Chunk:
@@ -158,9 +160,9 @@ class _Run:
         slide, reversals = NO_SAMPLES, np.zeros((len(rows), 3), dtype=np.int64)
         if len(row):
             slide, reversals = self._mechanics.follow(commanded, offsets)
-        whole = (rows >= span[0]) & (rows < complete)
+        is_complete = (rows >= span[0]) & (rows < complete)
         seconds = np.where(
-            whole, self._account.ticks[rows] * TICK_S + self._lines.extra_s[rows], 0
+            is_complete, self._account.ticks[rows] * TICK_S + self._lines.extra_s[rows], 0
         )
         ledger = Ledger(
             row=rows,
@@ -169,7 +171,7 @@ class _Run:
             iterations=np.diff(offsets),
             steps=self._run_counts(count, offsets),
             reversals=reversals,
-            ended=~whole | self._account.ended[rows],
+            ended=~is_complete | self._account.ended[rows],
         )
         return Chunk(row, commanded, slide, ledger)
 
@@ -178,8 +180,8 @@ class _Run:
         ended."""
         along = np.concatenate([self._count[None, :], count])
         self._count = along[-1]
-        way = np.abs(np.diff(along, axis=0)).cumsum(axis=0)
-        total = np.concatenate([np.zeros((1, 3), dtype=np.int64), way])
+        travel = np.abs(np.diff(along, axis=0)).cumsum(axis=0)
+        total = np.concatenate([np.zeros((1, 3), dtype=np.int64), travel])
         return np.asarray(np.diff(total[offsets], axis=0))
 
 
@@ -260,18 +262,18 @@ def lines_of(path: Toolpath, rows: int, machine: _Machine) -> MasterOrders:
     orders = np.empty((len(first), PART_COUNT + 1), dtype=np.int32)
     header = ~straight[first]
     for low in range(0, len(first), LINES_AT_ONCE):
-        some = slice(low, low + LINES_AT_ONCE)
-        begin, end = first[some], second[some]
-        way = way_mm[begin]
-        way[begin != end] += way_mm[end[begin != end]]
+        batch = slice(low, low + LINES_AT_ONCE)
+        begin, end = first[batch], second[batch]
+        travel = way_mm[begin]
+        travel[begin != end] += way_mm[end[begin != end]]
         speeds = _speeds(path, way_mm, begin, machine)
-        ref = np.where(way < 0.0, -speeds, speeds)
-        amount = _axis_counts(way, router, machine)
-        amount = np.where(homes[begin][:, None] & (way != 0.0), HOME_AMOUNT, amount)
-        most = _patience(way, ref, amount, machine)
+        ref = np.where(travel < 0.0, -speeds, speeds)
+        amount = _axis_counts(travel, router, machine)
+        amount = np.where(homes[begin][:, None] & (travel != 0.0), HOME_AMOUNT, amount)
+        patience = _patience(travel, ref, amount, machine)
         part = _axis_beyond(path, begin, end, machine)
-        orders[some] = _to_int32(np.column_stack([amount, ref, begin, end, most, part]))
-        header[some] |= way[:, 2] != 0.0
+        orders[batch] = _to_int32(np.column_stack([amount, ref, begin, end, patience, part]))
+        header[batch] |= travel[:, 2] != 0.0
     extra = np.where(kind == Kind.DWELL, path.value[:rows], 0.0)
     ends = _ends(header, homes[first], machine)
     return MasterOrders(
@@ -296,34 +298,34 @@ def _check(path: Toolpath, rows: int) -> None:
     with np.errstate(invalid="ignore"):
         no_feed = path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
         no_time = (path.kind == Kind.DWELL) & ~((path.value >= 0.0) & np.isfinite(path.value))
-    away = (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
-    for bad, message in (
+    is_moved = (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
+    for is_bad, message in (
         (no_feed, "a cutting move without a feed above 0"),
         (no_time, "a dwell without its seconds"),
-        (away, "part zero is set away from part zero"),
+        (is_moved, "part zero is set away from part zero"),
     ):
-        refuse(path, bad & running, message)
+        refuse(path, is_bad & running, message)
 
 
 def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
     """Mask (R,) of the rows that go home: homing, and rapids that end there on all axes that
     move."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
-    off = np.abs(path.end[: len(way_mm)] - np.array(machine.controller.machine_zero_mm))
-    there = ((off <= ON_HOME_COUNTS * coded) | (way_mm == 0.0)).all(axis=1)
+    distance = np.abs(path.end[: len(way_mm)] - np.array(machine.controller.machine_zero_mm))
+    ends_home = ((distance <= ON_HOME_COUNTS * coded) | (way_mm == 0.0)).all(axis=1)
     kind = path.kind[: len(way_mm)]
     homing = (kind == Kind.HOME_XY) | (kind == Kind.HOME_Z)
-    return np.asarray(homing | ((kind == Kind.RAPID) & there & (way_mm <= 0.0).all(axis=1)))
+    return np.asarray(homing | ((kind == Kind.RAPID) & ends_home & (way_mm <= 0.0).all(axis=1)))
 
 
 def _are_tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
     """Mask (L,) of those of the rows `first` that continue the line before them: one axis of a
     line of the program goes on alone."""
-    block, way = path.block[first], way_mm[first]
-    flat = (path.kind[first] == Kind.LINE) & (way[:, 2] == 0.0)
+    block, travel = path.block[first], way_mm[first]
+    flat = (path.kind[first] == Kind.LINE) & (travel[:, 2] == 0.0)
     tail = np.zeros(len(first), dtype=np.bool_)
     tail[1:] = (block[1:] == block[:-1]) & (block[1:] >= 0) & flat[1:] & flat[:-1]
-    tail[1:] &= (np.diff(first) == 1) & ((way[1:] != 0.0).sum(axis=1) == 1)
+    tail[1:] &= (np.diff(first) == 1) & ((travel[1:] != 0.0).sum(axis=1) == 1)
     tail[2:] &= ~tail[1:-1]
     return tail
 
@@ -332,47 +334,49 @@ def _axis_beyond(path: Toolpath, first: Ints, second: Ints, machine: _Machine) -
     """Return (L, 2) the axis that goes on after the end of the first of two rows, and its count
     there; zeros for a single row."""
     part = np.zeros((len(first), 2), dtype=np.int64)
-    both = np.flatnonzero(first != second)
-    axis = np.abs(path.end[second] - path.end[first])[both, :2].argmax(axis=1)
+    pairs = np.flatnonzero(first != second)
+    axis = np.abs(path.end[second] - path.end[first])[pairs, :2].argmax(axis=1)
     home = np.array(machine.controller.machine_zero_mm)
     coded = np.array([each.coded_step_mm for each in machine.axes])
-    part[both, 0] = axis
-    part[both, 1] = np.rint((path.end[first[both], axis] - home[axis]) / coded[axis])
+    part[pairs, 0] = axis
+    part[pairs, 1] = np.rint((path.end[first[pairs], axis] - home[axis]) / coded[axis])
     return part
 
 
 def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: _Machine) -> Ints:
     """(L, 3) counts in a tick of the axes of the rows `first`."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
-    way = np.abs(way_mm[first])
+    travel = np.abs(way_mm[first])
     feed = path.feed[first] / (60.0 * TICKS_PER_S)
-    along = feed[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
+    along = feed[:, None] * travel / np.linalg.norm(travel, axis=1)[:, None]
     # No axis takes more than an int16, and none of the listing's programs sends as much.
-    wanted = np.minimum(np.where(np.isfinite(along), along / coded, 0.0), INT16)
-    sent = to_steps(wanted, 1.0)
-    slanted = np.flatnonzero((wanted[:, 0] > 0.0) & (wanted[:, 1] > 0.0) & (wanted[:, 2] == 0.0))
-    sent[slanted, :2] = _speed_pairs(wanted[slanted, :2])
+    speeds_wanted = np.minimum(np.where(np.isfinite(along), along / coded, 0.0), INT16)
+    speeds = to_steps(speeds_wanted, 1.0)
+    slanted = np.flatnonzero(
+        (speeds_wanted[:, 0] > 0.0) & (speeds_wanted[:, 1] > 0.0) & (speeds_wanted[:, 2] == 0.0)
+    )
+    speeds[slanted, :2] = _speed_pairs(speeds_wanted[slanted, :2])
     rapid_mm = machine.rapid_mm_min / (60.0 * TICKS_PER_S)
     rapid = to_steps(min(rapid_mm, INT16 * coded[0]), float(coded[0]))
-    return np.where((path.kind[first] == Kind.LINE)[:, None], sent, rapid)
+    return np.where((path.kind[first] == Kind.LINE)[:, None], speeds, rapid)
 
 
-def _speed_pairs(wanted: Floats) -> Ints:
-    """Return (K, 2) whole speeds whose squares have the same sum as those of `wanted` (K, 2), the
+def _speed_pairs(speeds: Floats) -> Ints:
+    """Return (K, 2) whole speeds whose squares have the same sum as those of `speeds` (K, 2), the
     nearest within `PAIR_COUNTS`; each rounded where there are none."""
-    total = np.rint((wanted**2).sum(axis=1))
-    rounded = to_steps(wanted, 1.0)
-    slow = wanted.argmin(axis=1)[:, None]
-    near = np.take_along_axis(rounded, slow, axis=1)
-    near = near + np.arange(-PAIR_COUNTS, PAIR_COUNTS + 1)
-    other = np.rint(np.sqrt(np.maximum(total[:, None] - near**2, 0.0))).astype(np.int64)
-    adds_up = (near >= 0) & (near**2 + other**2 == total[:, None])
-    off = np.abs(near - np.take_along_axis(wanted, slow, axis=1))
-    best = np.where(adds_up, off, np.inf).argmin(axis=1)[:, None]
+    total = np.rint((speeds**2).sum(axis=1))
+    rounded = to_steps(speeds, 1.0)
+    slow = speeds.argmin(axis=1)[:, None]
+    nearest_speeds = np.take_along_axis(rounded, slow, axis=1)
+    nearest_speeds = nearest_speeds + np.arange(-PAIR_COUNTS, PAIR_COUNTS + 1)
+    other = np.rint(np.sqrt(np.maximum(total[:, None] - nearest_speeds**2, 0.0))).astype(np.int64)
+    adds_up = (nearest_speeds >= 0) & (nearest_speeds**2 + other**2 == total[:, None])
+    errors = np.abs(nearest_speeds - np.take_along_axis(speeds, slow, axis=1))
+    best = np.where(adds_up, errors, np.inf).argmin(axis=1)[:, None]
     pair = np.empty_like(rounded)
-    np.put_along_axis(pair, slow, np.take_along_axis(near, best, axis=1), axis=1)
+    np.put_along_axis(pair, slow, np.take_along_axis(nearest_speeds, best, axis=1), axis=1)
     np.put_along_axis(pair, 1 - slow, np.take_along_axis(other, best, axis=1), axis=1)
-    exact = np.abs((wanted**2).sum(axis=1) - total) <= PAIR_TOLERANCE
+    exact = np.abs((speeds**2).sum(axis=1) - total) <= PAIR_TOLERANCE
     return np.asarray(np.where((adds_up.any(axis=1) & exact)[:, None], pair, rounded))
 
 
@@ -383,7 +387,7 @@ def _axis_counts(way_mm: Floats, router: MatlabRouterController, machine: _Machi
         return np.asarray(np.where(units > 0, ((units // 2 - 1) & INT16) + 1, 0))
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     counts = np.rint(np.abs(way_mm) / coded).astype(np.int64)
-    bounds = np.array([most for most, _ in TEXT_FACTORS])
+    bounds = np.array([bound for bound, _ in TEXT_FACTORS])
     parts = np.array([factor for _, factor in TEXT_FACTORS])[np.searchsorted(bounds, units)]
     return np.asarray(counts // parts * parts)
 
@@ -395,8 +399,8 @@ def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: _Machine) -> Int
     speed = np.where(amount < 0, np.array(router.home_counts), np.abs(ref))
     needed = np.abs(way_mm) / coded / np.maximum(speed, 1)
     needed = np.where(speed > 0, needed, 0.0)
-    most = PATIENCE * needed.max(axis=1, initial=0.0) + PATIENCE_TICKS
-    return np.asarray(np.ceil(most).astype(np.int64))
+    ticks = PATIENCE * needed.max(axis=1, initial=0.0) + PATIENCE_TICKS
+    return np.asarray(np.ceil(ticks).astype(np.int64))
 
 
 def _ends(header: Bools, homing: Bools, machine: _Machine) -> Bools:

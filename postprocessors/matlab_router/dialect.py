@@ -199,13 +199,13 @@ MatlabRouterMachine = Machine[SlideStart, MatlabRouterDialect]
 def dialect_of(machine: MatlabRouterMachine) -> ResolvedDialect:
     """Every choice that the machine's `[dialect]` makes; MachineError where it makes none."""
     table = machine.dialect
-    chosen = {
+    choices = {
         name: value
         for name, value in msgspec.structs.asdict(table).items()
         if name not in PROFILES["safe"] or value is not None
     }
-    chosen = {**PROFILES[table.profile], **chosen}
-    grid_mm = chosen.pop("grid_mm")
+    choices = {**PROFILES[table.profile], **choices}
+    grid_mm = choices.pop("grid_mm")
     units = round(grid_mm * UNITS_PER_MM)
     if not math.isclose(units, grid_mm * UNITS_PER_MM, rel_tol=0.0, abs_tol=GRID_TOLERANCE):
         raise MachineError(
@@ -214,7 +214,7 @@ def dialect_of(machine: MatlabRouterMachine) -> ResolvedDialect:
             where="table [dialect], key grid_mm",
             mend="use 0.2, the chunk that the slaves execute, or 0.1",
         )
-    return ResolvedDialect(grid_units=units, **chosen)
+    return ResolvedDialect(grid_units=units, **choices)
 
 
 def cut_z_mm(machine: MatlabRouterMachine, dialect: ResolvedDialect) -> float:

@@ -83,11 +83,11 @@ def fail(where: str, message: str, mend: str = "") -> NoReturn:
     raise ProgramError(message, where=where, mend=mend)
 
 
-def check_count(count: int, where: Where, dialect: ResolvedDialect) -> None:
+def check_count(count: int, place_of: Where, dialect: ResolvedDialect) -> None:
     """The master's arrays hold so many lines, and it does not look (L4625-4635)."""
     if not 1 <= count <= dialect.max_lines:
         fail(
-            where("size_of_array", 0, 0),
+            place_of("size_of_array", 0, 0),
             f"{count} lines: a job has 1 to {dialect.max_lines}",
             "post the drawing again: it is split into jobs then",
         )
@@ -116,11 +116,11 @@ def check_job(job: ReadJob, dialect: ResolvedDialect) -> None:
             )
 
 
-def _refuse(job: ReadJob, name: str, bad: Bools, what: str) -> None:
-    if bad.any():
-        column, row = (int(index) for index in np.argwhere(bad.T)[0])
+def _refuse(job: ReadJob, name: str, is_bad: Bools, complaint: str) -> None:
+    if is_bad.any():
+        column, row = (int(index) for index in np.argwhere(is_bad.T)[0])
         table = job.length if name == "lxy" else job.speed
-        fail(job.where(name, row, column), f"{int(table[row, column])} in {name} {what}")
+        fail(job.where(name, row, column), f"{int(table[row, column])} in {name} {complaint}")
 
 
 # The .m file: `name = numbers;` and nothing else. Numbers are read, nothing is ever run.
@@ -150,25 +150,25 @@ def read_text(data: bytes, dialect: ResolvedDialect) -> Iterator[ReadJob]:
     values: dict[str, _Value] = {}
     number = 0
     while not text.ended:
-        name, index, at = text.name()
+        name, index, offset = text.name()
         if name == "jobs" and index is not None:
             if values or int(index) != number:
-                text.fail(at, f"jobs{{{index}}} does not stand behind job {index}")
+                text.fail(offset, f"jobs{{{index}}} does not stand behind job {index}")
             text.listed()
             continue
         if index is not None or name not in NAMES:
             mend = f"a program sets {', '.join(NAMES)} to plain numbers; nothing is run"
-            text.fail(at, f"{name[:SHOWN_CHARS]!r} is none of the arrays", mend)
+            text.fail(offset, f"{name[:SHOWN_CHARS]!r} is none of the arrays", mend)
         if name in values:
-            missing = next(known for known in NAMES if known not in values)
-            text.fail(at, f"{name} is assigned twice", f"{missing} of this job is missing")
+            missing = next(expected for expected in NAMES if expected not in values)
+            text.fail(offset, f"{name} is assigned twice", f"{missing} of this job is missing")
         values[name] = text.table() if name in TABLES else text.scalar()
         if len(values) == len(NAMES):
             number += 1
             yield _job_of_arrays(text, number, values, dialect)
             values = {}
     if values:
-        missing = next(known for known in NAMES if known not in values)
+        missing = next(expected for expected in NAMES if expected not in values)
         text.fail(text.at, f"the program ends before {missing} of job {number + 1}")
     if number == 0:
         raise ProgramError("the program is empty", mend="a program sets xy, lxy, velxy, ...")
@@ -180,18 +180,18 @@ def _job_of_arrays(
     """The six values as one job, once they agree."""
     scalar = {name: int(values[name].table[0, 0]) for name in NAMES if name not in TABLES}
 
-    def where(name: str, row: int, column: int) -> str:
+    def place_of(name: str, row: int, column: int) -> str:
         return text.where_in(values[name], row, column)
 
     count = scalar["size_of_array"]
-    check_count(count, where, dialect)
+    check_count(count, place_of, dialect)
     for name in TABLES:
-        wanted = (2, count + 1 if name == "xy" else count)
-        if values[name].table.shape != wanted:
+        shape = (2, count + 1 if name == "xy" else count)
+        if values[name].table.shape != shape:
             rows, columns = values[name].table.shape
             text.fail(
                 values[name].offset,
-                f"{name} has {rows} rows of {columns} numbers, not {wanted[0]} of {wanted[1]}",
+                f"{name} has {rows} rows of {columns} numbers, not {shape[0]} of {shape[1]}",
                 f"size_of_array is {count}",
             )
     job = ReadJob(
@@ -199,7 +199,7 @@ def _job_of_arrays(
         np.array([scalar["first_pointx"], scalar["first_pointy"]]),
         values["lxy"].table,
         values["velxy"].table,
-        where,
+        place_of,
     )
     _check_repeats(job, values["xy"].table)
     check_job(job, dialect)
@@ -216,12 +216,12 @@ def _check_repeats(job: ReadJob, xy: Ints) -> None:
                 f"{name} is {int(job.first[axis])}, xy begins at {int(xy[axis, 0])}",
             )
     step = np.diff(xy, axis=1)
-    for name, table, bad in (
+    for name, table, is_bad in (
         ("lxy", job.length, np.abs(step) != job.length),
         ("velxy", job.speed, step * job.speed < 0),
     ):
-        if bad.any():
-            column, row = (int(index) for index in np.argwhere(bad.T)[0])
+        if is_bad.any():
+            column, row = (int(index) for index in np.argwhere(is_bad.T)[0])
             fail(
                 job.where(name, row, column),
                 f"{int(table[row, column])} in {name} does not fit xy, which goes by"
@@ -251,21 +251,21 @@ class _Text:
 
     def where_in(self, value: _Value, row: int, column: int) -> str:
         """Line and column of a number of a table."""
-        rest = row * value.table.shape[1] + column
+        number = row * value.table.shape[1] + column
         for index, match in enumerate(_TOKEN.finditer(self.text, value.offset)):
-            if index == rest:
+            if index == number:
                 return self._where(match.start())
         return self._where(value.offset)
 
     def name(self) -> tuple[str, str | None, int]:
         """`name =` or `name{1} =`: the name, the number in braces, and where it stood."""
-        at = self.at
-        match = _NAME.match(self.text, at)
+        offset = self.at
+        match = _NAME.match(self.text, offset)
         if match is None:
-            self.fail(at, f"{self._quoted(at)} is no `name = numbers;`", "remove it")
+            self.fail(offset, f"{self._quoted(offset)} is no `name = numbers;`", "remove it")
             raise AssertionError
         self.at = match.end()
-        return match[1], match[2], at
+        return match[1], match[2], offset
 
     def scalar(self) -> _Value:
         """Read one whole number and the end of its statement."""
@@ -375,8 +375,8 @@ def read_stream(data: bytes, dialect: ResolvedDialect) -> Iterator[ReadJob]:
         fail(f"byte {feed + 2}", "a line feed: the master takes it for part of the next number")
     words = data.split(b"\r")
     if words[-1]:
-        at = len(data) - len(words[-1]) + 1
-        fail(f"byte {at}", "the stream breaks off inside a number", "end it with a CR")
+        offset = len(data) - len(words[-1]) + 1
+        fail(f"byte {offset}", "the stream breaks off inside a number", "end it with a CR")
     words.pop()
     first = 0
     number = 0
@@ -397,7 +397,7 @@ def _job_of_words(
         byte = sum(map(len, words[: first + word])) + first + word + 1
         return f"job {number}, number {word + 1}, byte {byte}"
 
-    def where(name: str, row: int, column: int) -> str:
+    def place_of(name: str, row: int, column: int) -> str:
         if name in HEADER:
             return place(HEADER.index(name))
         return place(len(HEADER) + (BODY[name] + row) * count + column)
@@ -409,7 +409,7 @@ def _job_of_words(
         if _STREAM_NUMBER.fullmatch(head[index]) is None:
             _fail_number(head[index], place(index))
     count, x = int(head[0]), int(head[1])
-    check_count(count, where, dialect)
+    check_count(count, place_of, dialect)
     y = _first_y(head[2], place, dialect)
     begin = first + len(HEADER)
     body = words[begin : begin + 4 * count]
@@ -423,7 +423,7 @@ def _job_of_words(
             f"a job of {count} lines has four for each",
         )
     table = np.array(list(map(int, body)), dtype=np.int64).reshape(4, count)
-    return ReadJob(number, np.array([x, y]), table[:2], table[2:], where)
+    return ReadJob(number, np.array([x, y]), table[:2], table[2:], place_of)
 
 
 def _fail_number(word: bytes, where: str) -> NoReturn:
@@ -479,7 +479,7 @@ def listing(data: bytes, machine: MatlabRouterMachine) -> Listing:
 def _arrays(job: ReadJob) -> list[str]:
     """The first point, then a column of `xy`, `lxy` and `velxy` for each line."""
     x, y = job.first.tolist()
-    at = (job.first[:, None] + job.steps.cumsum(axis=1)).T.tolist()
+    points = (job.first[:, None] + job.steps.cumsum(axis=1)).T.tolist()
     lengths, speeds = job.length.T.tolist(), job.speed.T.tolist()
     return [
         f"xy(:,1) = [{x}; {y}]; first_pointx = {x}; first_pointy = {y};",
@@ -487,7 +487,9 @@ def _arrays(job: ReadJob) -> list[str]:
             f"xy(:,{column + 1}) = [{end[0]}; {end[1]}]; "
             f"lxy(:,{column}) = [{length[0]}; {length[1]}]; "
             f"velxy(:,{column}) = [{speed[0]}; {speed[1]}];"
-            for column, (end, length, speed) in enumerate(zip(at, lengths, speeds, strict=True), 1)
+            for column, (end, length, speed) in enumerate(
+                zip(points, lengths, speeds, strict=True), 1
+            )
         ),
     ]
 

@@ -127,43 +127,43 @@ class _Maker:
         than a chunk; PostError for those outside the area."""
         grid, count = self._dialect.grid_units, len(cuts.row)
         rows = np.concatenate([cuts.row, cuts.row])
-        wanted = (np.concatenate([cuts.start, cuts.end]) - self._zero) * UNITS_PER_MM
-        units = np.floor(wanted / grid + 0.5 + TIE_TOLERANCE) * grid
+        exact = (np.concatenate([cuts.start, cuts.end]) - self._zero) * UNITS_PER_MM
+        units = np.floor(exact / grid + 0.5 + TIE_TOLERANCE) * grid
         self._refuse_outside(rows, units)
         first = np.concatenate([np.diff(cuts.stroke, prepend=-1) != 0, np.zeros(count, np.bool_)])
         early = first & (units < CHUNK_UNITS).any(axis=1)
         units[early] = np.maximum(units[early], self._least)
         self.changes.late_starts += int(early.sum())
         if count:
-            moved = np.hypot(*(units - wanted).T)
-            row = int(rows[int(np.argmax(moved))])
-            self.changes.note_snap(float(moved.max()) * UNIT_MM, self._toolpath.place(row))
-        whole = units.astype(np.int64)
-        return SlaveLines(whole[:count], whole[count:], cuts.feed, cuts.row, cuts.stroke)
+            shift = np.hypot(*(units - exact).T)
+            row = int(rows[int(np.argmax(shift))])
+            self.changes.note_snap(float(shift.max()) * UNIT_MM, self._toolpath.place(row))
+        rounded = units.astype(np.int64)
+        return SlaveLines(rounded[:count], rounded[count:], cuts.feed, cuts.row, cuts.stroke)
 
     def _refuse_outside(self, rows: Ints, units: Floats) -> None:
         for axis, name in enumerate("XY"):
             travel = (self._machine.axes.x, self._machine.axes.y)[axis].travel_mm
-            most = MAX_NUMBER if travel is None else min(MAX_NUMBER, travel * UNITS_PER_MM)
-            bad = ~((units[:, axis] >= 0.0) & (units[:, axis] <= most + TIE_TOLERANCE))
-            if bad.any():
-                line = int(np.argmax(bad))
+            max_units = MAX_NUMBER if travel is None else min(MAX_NUMBER, travel * UNITS_PER_MM)
+            is_bad = ~((units[:, axis] >= 0.0) & (units[:, axis] <= max_units + TIE_TOLERANCE))
+            if is_bad.any():
+                line = int(np.argmax(is_bad))
                 raise PostError(
                     f"{name} {units[line, axis] * UNIT_MM:.1f} mm from home is outside of 0 to"
-                    f" {most * UNIT_MM:g} mm",
+                    f" {max_units * UNIT_MM:g} mm",
                     where=self._toolpath.place(int(rows[line])),
-                    mend=self._area_remedy(units, axis, most),
+                    mend=self._area_remedy(units, axis, max_units),
                 )
 
-    def _area_remedy(self, units: Floats, axis: int, most: float) -> str:
+    def _area_remedy(self, units: Floats, axis: int, max_units: float) -> str:
         """Return the remedy that brings everything into the travel of an axis: the place of home,
         or a smaller drawing."""
         low, high = float(units[:, axis].min()), float(units[:, axis].max())
-        if not high - low <= most:
+        if not high - low <= max_units:
             return "scale the drawing down"
         # Whole millimetres, and one to spare where there is room for it.
         zero = list(self._machine.controller.machine_zero_mm)
-        shift = min(math.ceil(-low * UNIT_MM) + 1.0, (most - high) * UNIT_MM)
+        shift = min(math.ceil(-low * UNIT_MM) + 1.0, (max_units - high) * UNIT_MM)
         zero[axis] -= shift
         place = ",".join(f"{value:g}" for value in zero)
         return f"use --origin lower-left, or --set controller.machine_zero_mm=[{place}]"
@@ -174,8 +174,8 @@ class _Maker:
             lines = self._without_ones(lines)
         keep = (lines.end != lines.start).any(axis=1)
         self.changes.dropped += int(len(keep) - keep.sum())
-        left = np.unique(lines.stroke[keep])
-        for stroke in np.setdiff1d(lines.stroke, left).tolist():
+        remaining = np.unique(lines.stroke[keep])
+        for stroke in np.setdiff1d(lines.stroke, remaining).tolist():
             row = int(lines.row[int(np.searchsorted(lines.stroke, stroke))])
             self.changes.note_loss(self._toolpath.place(row))
         return lines.chosen(keep)
@@ -199,27 +199,27 @@ class _Maker:
         larger = distance.max(axis=1).astype(np.float64)
         slant = np.hypot(*distance.T) / larger
         share = 1.0 / slant if self._dialect.speed == "path" else 1.0
-        wanted = np.minimum(lines.feed * share / self._unit, float(MAX_NUMBER))
-        counts = np.floor(wanted + 0.5).astype(np.int64)
+        exact = np.minimum(lines.feed * share / self._unit, float(MAX_NUMBER))
+        counts = np.floor(exact + 0.5).astype(np.int64)
         fast = counts > self._most_counts
         if self._dialect.too_fast == "limited":
             self.changes.limited = max(self.changes.limited, int(fast.sum()))
-            wanted = np.where(fast, self._most_counts, wanted)
+            exact = np.where(fast, self._most_counts, exact)
             counts = np.minimum(counts, self._most_counts)
         else:
             self._refuse_feed(lines, fast, "above what its axes run at")
         self._refuse_feed(lines, counts < 1, "below one count of the encoder in 5 ms")
-        off = np.abs(wanted - counts) * self._unit
-        self.changes.feed_off = max(self.changes.feed_off, float(off.max(initial=0.0)))
+        errors = np.abs(exact - counts) * self._unit
+        self.changes.feed_off = max(self.changes.feed_off, float(errors.max(initial=0.0)))
         if self._dialect.speed == "axis":
             self.changes.faster = max(self.changes.faster, float(slant.max(initial=1.0)))
         return distance, larger, counts
 
-    def _refuse_feed(self, lines: SlaveLines, bad: Bools, what: str) -> None:
-        if bad.any():
-            line = int(np.argmax(bad))
+    def _refuse_feed(self, lines: SlaveLines, is_bad: Bools, complaint: str) -> None:
+        if is_bad.any():
+            line = int(np.argmax(is_bad))
             raise PostError(
-                f"feed {lines.feed[line]:g} mm/min is {what}",
+                f"feed {lines.feed[line]:g} mm/min is {complaint}",
                 where=self._toolpath.place(int(lines.row[line])),
                 mend=f"an axis runs at {self._unit:g} to {self._most_counts * self._unit:g}"
                 " mm/min; --set dialect.too_fast=limited takes the highest",
@@ -242,24 +242,24 @@ class _Maker:
         limits = LineLimits(
             self._dialect.bend_tolerance_mm * UNITS_PER_MM, self._dialect.grid_units, self._least
         )
-        bad = np.flatnonzero(bends(larger, distance.min(axis=1), counts, limits.tolerance))
-        if len(bad) == 0:
+        bent_lines = np.flatnonzero(bends(larger, distance.min(axis=1), counts, limits.tolerance))
+        if len(bent_lines) == 0:
             return lines
-        self.changes.bent += len(bad)
-        starts, ends = lines.start[bad].tolist(), lines.end[bad].tolist()
+        self.changes.bent += len(bent_lines)
+        starts, ends = lines.start[bent_lines].tolist(), lines.end[bent_lines].tolist()
         pieces = [
             split_line(start, end, count, limits)
-            for start, end, count in zip(starts, ends, counts[bad].tolist(), strict=True)
+            for start, end, count in zip(starts, ends, counts[bent_lines].tolist(), strict=True)
         ]
         times = np.ones(len(larger), dtype=np.int64)
-        times[bad] = [len(part) for part in pieces]
+        times[bent_lines] = [len(part) for part in pieces]
         source = np.repeat(np.arange(len(times)), times)
-        inner = np.isin(source, bad)
+        inner = np.isin(source, bent_lines)
         end = lines.end[source]
         end[inner] = [point for part in pieces for point in part]
         start = lines.start[source]
-        again = np.diff(source, prepend=-1) == 0
-        start[again] = end[np.flatnonzero(again) - 1]
+        continues = np.diff(source, prepend=-1) == 0
+        start[continues] = end[np.flatnonzero(continues) - 1]
         return SlaveLines(start, end, lines.feed[source], lines.row[source], lines.stroke[source])
 
     def offsets(self, lines: SlaveLines) -> list[int]:
@@ -280,10 +280,10 @@ class _Maker:
     def _cut_at(self, lines: SlaveLines, first: int, last: int) -> int:
         """Return the end of the job that begins with this line: at most `max_lines` on, and at a
         vertex from which the next job can begin."""
-        most = first + self._dialect.max_lines
-        if most >= last:
+        max_end = first + self._dialect.max_lines
+        if max_end >= last:
             return last
-        usable = (lines.end[first:most] >= CHUNK_UNITS).all(axis=1)
+        usable = (lines.end[first:max_end] >= CHUNK_UNITS).all(axis=1)
         if not usable.any():
             raise PostError(
                 f"{self._dialect.max_lines} lines in a row have no vertex at which a job could "
@@ -318,39 +318,39 @@ class LineLimits(Struct, frozen=True):
 def bends(larger: Floats, smaller: Ints, counts: Ints, tolerance: float) -> Bools:
     """(n,) which lines stop (v = 0) or bend by more than the tolerance (units)."""
     slanted = smaller > 0
-    wanted = counts * smaller / larger
-    whole = np.floor(wanted + 0.5)
-    ratio = np.where(slanted, whole / np.where(slanted, wanted, 1.0), 1.0)
+    exact = counts * smaller / larger
+    rounded = np.floor(exact + 0.5)
+    ratio = np.where(slanted, rounded / np.where(slanted, exact, 1.0), 1.0)
     with np.errstate(divide="ignore"):
         bend = smaller * (1.0 - np.minimum(ratio, 1.0 / ratio))
-    return np.asarray(slanted & ((whole == 0.0) | (bend > tolerance)))
+    return np.asarray(slanted & ((rounded == 0.0) | (bend > tolerance)))
 
 
 def split_line(
     start: list[int], end: list[int], counts: int, limits: LineLimits
 ) -> list[list[int]]:
     """The ends of the pieces of one line from `start` to `end` (x, y), its own end last."""
-    way = (end[0] - start[0], end[1] - start[1])
-    major = 0 if abs(way[0]) >= abs(way[1]) else 1
-    at = list(start)
+    travel = (end[0] - start[0], end[1] - start[1])
+    major = 0 if abs(travel[0]) >= abs(travel[1]) else 1
+    place = list(start)
     ends = []
-    for along, across in _pieces(abs(way[major]), abs(way[1 - major]), counts, limits):
-        at[major] += along if way[major] > 0 else -along
-        at[1 - major] += across if way[1 - major] > 0 else -across
-        ends.append(list(at))
+    for along, across in _pieces(abs(travel[major]), abs(travel[1 - major]), counts, limits):
+        place[major] += along if travel[major] > 0 else -along
+        place[1 - major] += across if travel[1 - major] > 0 else -across
+        ends.append(list(place))
     return ends
 
 
 def _bend(longer: int, shorter: int, counts: int) -> float:
     """Return the deviation of one driven line from a straight one, units; inf if its slower axis
     would stop."""
-    wanted = counts * shorter / longer
-    whole = math.floor(wanted + 0.5)
+    exact = counts * shorter / longer
+    rounded = math.floor(exact + 0.5)
     if shorter == 0:
         return 0.0
-    if whole == 0:
+    if rounded == 0:
         return math.inf
-    return shorter * (1.0 - min(whole / wanted, wanted / whole))
+    return shorter * (1.0 - min(rounded / exact, exact / rounded))
 
 
 def _pieces(longer: int, shorter: int, counts: int, limits: LineLimits) -> list[tuple[int, int]]:
@@ -367,10 +367,10 @@ def _pieces(longer: int, shorter: int, counts: int, limits: LineLimits) -> list[
         ]
     if bend < math.inf:
         return [(longer, shorter)]
-    rest = longer - shorter * counts
-    before = rest // 2 // grid * grid
+    straight = longer - shorter * counts
+    before = straight // 2 // grid * grid
     before = before if before >= limits.least else 0
-    parts = [(before, 0), (shorter * counts, shorter), (rest - before, 0)]
+    parts = [(before, 0), (shorter * counts, shorter), (straight - before, 0)]
     return [part for part in parts if part != (0, 0)]
 
 

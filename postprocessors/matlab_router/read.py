@@ -99,19 +99,19 @@ class _Moves:
         """The rows of one job."""
         lines = job.length.shape[1]
         check_count(self._blocks + lines + 1, "block")
-        done = execute(job, self._dialect)
-        self._findings.add(job, done)
+        result = execute(job, self._dialect)
+        self._findings.add(job, result)
         path = self._path
         path.block = self._blocks
         self._go_home()
-        x, y = (self._home[:2] + done.points[0] / UNITS_PER_MM).tolist()
+        x, y = (self._home[:2] + result.points[0] / UNITS_PER_MM).tolist()
         self._rapid(x=x)
         self._rapid(y=y)
-        down = cut_z_mm(self._machine, self._dialect)
-        path.line(z=down, feed=self._dialect.plunge_mm_min)
+        depth = cut_z_mm(self._machine, self._dialect)
+        path.line(z=depth, feed=self._dialect.plunge_mm_min)
         if self._dialect.spindle_rpm is not None:
             path.event(Kind.SPINDLE_CW, self._dialect.spindle_rpm)
-        self._lines(job, done, down)
+        self._lines(job, result, depth)
         self._blocks += lines + 1
         path.block = self._blocks - 1
         if self._dialect.spindle_rpm is not None:
@@ -124,13 +124,13 @@ class _Moves:
         self._path.block = max(0, self._blocks - 1)
         return self._path.event(Kind.END).finish(self._findings.findings())
 
-    def _lines(self, job: ReadJob, done: Executed, z: float) -> None:
+    def _lines(self, job: ReadJob, result: Executed, z: float) -> None:
         """Add one row for each line at height `z`.
 
         Two rows, up to a kink and after it, where the axes do not arrive together and the path is
         thereby off the straight line by more than the tolerance.
         """
-        run = DrivenLines(done.points, np.abs(job.speed.T), self._dialect.bend_tolerance_mm)
+        run = DrivenLines(result.points, np.abs(job.speed.T), self._dialect.bend_tolerance_mm)
         self._findings.bent.add(
             run.bent, run.most_bend * UNIT_MM, f"job {job.number}, line {run.first_bent + 1}"
         )
@@ -152,11 +152,11 @@ class _Moves:
         self._rapid(x=x)
         self._rapid(y=y)
 
-    def _rapid(self, **to: float) -> None:
+    def _rapid(self, **target: float) -> None:
         """To a place along one axis, unless the tool is there."""
         before = dict(zip("xyz", self._path.position, strict=True))
-        if before | to != before:
-            self._path.rapid(**to)
+        if before | target != before:
+            self._path.rapid(**target)
 
 
 class Executed(Struct, frozen=True, eq=False):
@@ -168,7 +168,7 @@ class Executed(Struct, frozen=True, eq=False):
 
 def execute(job: ReadJob, dialect: ResolvedDialect) -> Executed:
     """Compute where the slaves and the listed master really bring the tool."""
-    asked = _along(job.first, job.steps)
+    listed = _along(job.first, job.steps)
     first = job.first.copy()
     if dialect.master_y == "fixed":
         first[1] = FIXED_Y_UNITS
@@ -176,7 +176,7 @@ def execute(job: ReadJob, dialect: ResolvedDialect) -> Executed:
     if dialect.odd == "truncated":
         first = first // CHUNK_UNITS * CHUNK_UNITS
         steps = np.sign(steps) * (np.abs(steps) // CHUNK_UNITS * CHUNK_UNITS)
-    return Executed(_along(first, steps), asked)
+    return Executed(_along(first, steps), listed)
 
 
 def _along(first: Ints, steps: Ints) -> Ints:
@@ -200,33 +200,35 @@ class DrivenLines:
     """
 
     def __init__(self, points: Ints, speed: Ints, tolerance_mm: float) -> None:
-        way = np.diff(points, axis=0).astype(np.float64)
-        distance = np.abs(way)
+        travel = np.diff(points, axis=0).astype(np.float64)
+        distance = np.abs(travel)
         moving = distance > 0
         with np.errstate(divide="ignore", invalid="ignore"):
             took = np.where(moving, distance / speed, 0.0)
             last = took.max(axis=1)
-            both = moving.all(axis=1)
-            share = np.where(both, took.min(axis=1) / last, 1.0)
+            moves_both = moving.all(axis=1)
+            share = np.where(moves_both, took.min(axis=1) / last, 1.0)
         along = np.hypot(*np.where(moving, speed, 0).T.astype(np.float64))
-        lag = np.where(both, _lag(distance, took, share), 0.0)
+        lag = np.where(moves_both, _lag(distance, took, share), 0.0)
         bent = lag > tolerance_mm * UNITS_PER_MM
         self.bent = int(bent.sum())
         self.most_bend = float(lag.max(initial=0.0))
         self.first_bent = int(np.argmax(bent)) if self.bent else 0
         keep = moving.any(axis=1)
-        parted = bent | (both & (_speed_errors(distance, speed, along) > MAX_SPEED_ERROR_COUNTS))
+        parted = bent | (
+            moves_both & (_speed_errors(distance, speed, along) > MAX_SPEED_ERROR_COUNTS)
+        )
         times = np.where(keep, np.where(parted, 2, 1), 0)
-        self.line = np.repeat(np.arange(len(way)), times)
+        self.line = np.repeat(np.arange(len(travel)), times)
         self.end = points[1:][self.line].astype(np.float64)
         self.speed = along[self.line]
         if parted.any():
-            self._bend(points, way, speed, took, parted, times)
+            self._bend(points, travel, speed, took, parted, times)
 
     def _bend(
         self,
         points: Ints,
-        way: Floats,
+        travel: Floats,
         speed: Ints,
         took: Floats,
         bent: Bools,
@@ -236,8 +238,8 @@ class DrivenLines:
         rows = np.flatnonzero(bent)
         first = (np.cumsum(times) - times)[rows]
         soon = took[rows].min(axis=1)[:, None]
-        part = np.minimum(soon * speed[rows], np.abs(way[rows]))
-        self.end[first] = points[:-1][rows] + np.sign(way[rows]) * part
+        part = np.minimum(soon * speed[rows], np.abs(travel[rows]))
+        self.end[first] = points[:-1][rows] + np.sign(travel[rows]) * part
         self.speed[first] = np.hypot(*speed[rows].T)
         later = took[rows].argmax(axis=1)
         self.speed[first + 1] = speed[rows, later]
@@ -246,10 +248,10 @@ class DrivenLines:
 def _lag(distance: Floats, took: Floats, share: Floats) -> Floats:
     """(n,) units by which a line bends: what is left of the later axis, seen across the line."""
     later = took.argmax(axis=1)
-    left = distance[np.arange(len(distance)), later] * (1.0 - share)
+    remaining = distance[np.arange(len(distance)), later] * (1.0 - share)
     other = distance[np.arange(len(distance)), 1 - later]
     length = np.hypot(*distance.T)
-    return np.asarray(left * other / np.where(length > 0.0, length, 1.0))
+    return np.asarray(remaining * other / np.where(length > 0.0, length, 1.0))
 
 
 def _speed_errors(distance: Floats, speed: Ints, along: Floats) -> Floats:
@@ -266,12 +268,12 @@ class Worst(Struct):
     most: float = 0.0
     first: str = ""
 
-    def add(self, count: int, most: float, place: str) -> None:
+    def add(self, count: int, max_value: float, place: str) -> None:
         """So many more, which begin at `place`."""
         if count:
             self.first = self.first or place
             self.count += count
-            self.most = max(self.most, most)
+            self.most = max(self.most, max_value)
 
     def finding(self, sentence: Sentence, start: float = 0.0) -> list[Finding]:
         """Return the finding; none if nothing exceeded the limit."""
@@ -292,42 +294,42 @@ class JobFindings(Struct):
     fixed_y: Worst = field(default_factory=Worst)
     bent: Worst = field(default_factory=Worst)
 
-    def add(self, job: ReadJob, done: Executed) -> None:
+    def add(self, job: ReadJob, result: Executed) -> None:
         """Count what the machine does otherwise, or cannot do, in one job."""
         place = f"job {job.number}"
         odd = int((job.length % 2).sum() + (job.first % 2).sum())
         if self.dialect.odd == "truncated" and odd:
-            drift = done.points - done.asked
+            drift = result.points - result.asked
             if self.dialect.master_y == "fixed":
                 drift[:, 1] -= drift[0, 1]
             self.odd.add(odd, float(np.abs(drift).max()) * UNIT_MM, place)
         if self.dialect.master_y == "fixed" and int(job.first[1]) != FIXED_Y_UNITS:
-            off = abs(int(job.first[1]) - FIXED_Y_UNITS) * UNIT_MM
-            self.fixed_y.add(1, off, place)
-        empty = (np.diff(done.points, axis=0) == 0).all(axis=1)
+            offset = abs(int(job.first[1]) - FIXED_Y_UNITS) * UNIT_MM
+            self.fixed_y.add(1, offset, place)
+        empty = (np.diff(result.points, axis=0) == 0).all(axis=1)
         line = int(np.argmax(empty)) + 1
         self.empty.add(int(empty.sum()), 0.0, f"{place}, line {line}")
         self._fast(job, place)
-        self._outside(done, place)
+        self._outside(result, place)
 
     def _fast(self, job: ReadJob, place: str) -> None:
         limit = self.machine.max_feed_mm_min / self.machine.feed.unit_mm_min
         speed = np.where(job.length > 0, np.abs(job.speed), 0)
         fast = speed > limit + FEED_GUARD
         line = int(np.argmax(fast.any(axis=0))) + 1
-        most = float(speed.max()) * self.machine.feed.unit_mm_min
-        self.fast.add(int(fast.sum()), most, f"{place}, line {line}")
+        max_feed = float(speed.max()) * self.machine.feed.unit_mm_min
+        self.fast.add(int(fast.sum()), max_feed, f"{place}, line {line}")
 
-    def _outside(self, done: Executed, place: str) -> None:
+    def _outside(self, result: Executed, place: str) -> None:
         axes = self.machine.axes
         for axis, travel in enumerate((axes.x.travel_mm, axes.y.travel_mm)):
-            at = done.points[:, axis]
-            bad = at < 0
+            places = result.points[:, axis]
+            is_bad = places < 0
             if travel is not None:
-                bad = bad | (at > travel * UNITS_PER_MM + TRAVEL_GUARD)
-            most = float(np.abs(at).max()) * UNIT_MM
-            line = max(1, int(np.argmax(bad)))
-            self.outside.add(int(bad.sum()), most, f"{place}, line {line}")
+                is_bad = is_bad | (places > travel * UNITS_PER_MM + TRAVEL_GUARD)
+            max_mm = float(np.abs(places).max()) * UNIT_MM
+            line = max(1, int(np.argmax(is_bad)))
+            self.outside.add(int(is_bad.sum()), max_mm, f"{place}, line {line}")
 
     def findings(self) -> list[Finding]:
         """Return one finding for each kind of deviation."""

@@ -45,18 +45,18 @@ def cuts_of(
 ) -> tuple[CutLines, list[Finding]]:
     """The strokes of a toolpath, and what had to be changed to have them."""
     findings = _events(toolpath)
-    apart = xy_then_z(toolpath)
-    lowered = arcs_to_lines(apart.toolpath, apart.toolpath.is_arc, dialect.arc_tolerance_mm).after(
-        apart
-    )
-    if split := len(apart.row) - len(toolpath):
-        first = int(np.argmax(np.bincount(apart.row) > 1))
+    flat_and_deep = xy_then_z(toolpath)
+    lowered_path = arcs_to_lines(
+        flat_and_deep.toolpath, flat_and_deep.toolpath.is_arc, dialect.arc_tolerance_mm
+    ).after(flat_and_deep)
+    if split := len(flat_and_deep.row) - len(toolpath):
+        first = int(np.argmax(np.bincount(flat_and_deep.row) > 1))
         findings.append(MOVE_SPLIT(where=toolpath.place(first), measured=split))
-    path = lowered.toolpath
+    path = lowered_path.toolpath
     below = np.asarray(path.end[:, 2] < -POSITION_EPS_MM)
     moves = path.is_motion & (path.end[:, :2] != path.starts[:, :2]).any(axis=1)
     cut = moves & below
-    rows = lowered.row
+    rows = lowered_path.row
     _refuse_moves(toolpath, path, cut, rows)
     _refuse_depths(toolpath, path.end[:, 2], cut, rows, machine, dialect)
     # Each time the tool is above the stock, another stroke begins.
@@ -73,13 +73,15 @@ def _refuse_moves(toolpath: Toolpath, path: Toolpath, cut: Bools, rows: Ints) ->
         toolpath, rapid, "a rapid below the top of the stock", "raise the tool first", rows=rows
     )
     with np.errstate(invalid="ignore"):
-        still = cut & ~((path.feed > 0.0) & np.isfinite(path.feed))
-    refuse(toolpath, still, "a cut without a feed above 0", "give each cut a feed", rows=rows)
+        has_no_feed = cut & ~((path.feed > 0.0) & np.isfinite(path.feed))
+    refuse(
+        toolpath, has_no_feed, "a cut without a feed above 0", "give each cut a feed", rows=rows
+    )
     homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
     under = homing & (path.end != path.starts)[:, :2].any(axis=1) & (path.end[:, 2] < 0.0)
     refuse(toolpath, under, "X and Y go home below the top of the stock", rows=rows)
-    ended = np.cumsum(path.kind == Kind.END) > 0
-    after = ended & (path.kind != Kind.END)
+    is_ended = np.cumsum(path.kind == Kind.END) > 0
+    after = is_ended & (path.kind != Kind.END)
     refuse(toolpath, after, "rows follow the end of the program", rows=rows)
 
 
@@ -99,24 +101,24 @@ def _refuse_depths(
             f" {dialect.plunge_mm:g} mm does not reach it",
             mend="set the third number of controller.machine_zero_mm: plunge less depth",
         )
-    bad = cut & ~(np.abs(z - depth) <= DEPTH_TOLERANCE_MM)
+    is_bad = cut & ~(np.abs(z - depth) <= DEPTH_TOLERANCE_MM)
     slopes = toolpath.is_feed & (toolpath.end != toolpath.starts)[:, 2]
     slopes &= (toolpath.end != toolpath.starts)[:, :2].any(axis=1) | toolpath.is_arc
     refuse(
         toolpath,
-        bad & slopes[rows],
+        is_bad & slopes[rows],
         f"a slope in the stock: this machine only cuts at Z {depth:g} mm",
         "enter by a plunge, without tabs, and cut in one pass",
         rows=rows,
     )
-    if bad.any():
-        wanted = float(z[int(np.argmax(bad))])
+    if is_bad.any():
+        z_mm = float(z[int(np.argmax(is_bad))])
         x, y, _ = machine.controller.machine_zero_mm
-        home = wanted + dialect.plunge_mm
+        home = z_mm + dialect.plunge_mm
         refuse(
             toolpath,
-            bad,
-            f"a cut at Z {wanted:g} mm: this machine always plunges {dialect.plunge_mm:g} mm from"
+            is_bad,
+            f"a cut at Z {z_mm:g} mm: this machine always plunges {dialect.plunge_mm:g} mm from"
             f" home, to Z {depth:g} mm",
             f"place the stock {home:g} mm below the raised tool and use "
             f"--set controller.machine_zero_mm=[{x:g},{y:g},{home:g}]",
@@ -141,10 +143,10 @@ def _events(toolpath: Toolpath) -> list[Finding]:
     kind = toolpath.kind
     message = "the spindle of this machine turns one way only"
     refuse(toolpath, kind == Kind.SPINDLE_CCW, message, "turn it clockwise")
-    moved = (toolpath.end != 0.0).any(axis=1)
+    is_moved = (toolpath.end != 0.0).any(axis=1)
     refuse(
         toolpath,
-        (kind == Kind.SET_ZERO) & moved,
+        (kind == Kind.SET_ZERO) & is_moved,
         "part zero can only be set at part zero",
         "set it first, before any move",
     )

@@ -79,10 +79,10 @@ class MatlabRouterTwin(Twin):
 
     def connect(self, now: float) -> bytes:
         """Open the port."""
-        sent = super().connect(now)
+        output = super().connect(now)
         if self._choices.reset == "opening" and not self.is_moving:
             self._reset()
-        return sent
+        return output
 
     def _reset(self) -> None:
         self._numbers: list[int] = []
@@ -131,25 +131,25 @@ class MatlabRouterTwin(Twin):
             check_count(job.length.shape[1], job.where, self._dialect)
             check_job(job, self._dialect)
             path = path_of([*self._jobs, job], self._machine)
-            whole = travel_of(self._model.run(path, self._machine, COMMANDED))
+            job_travel = travel_of(self._model.run(path, self._machine, COMMANDED))
         except ProgramError:
             return
         self._jobs.append(job)
         self.decoded.append(bytes(self._raw))
         travel = replace(
-            whole,
-            commanded=whole.commanded[self._outputs :],
-            seconds=whole.seconds[self._outputs :] - self._seconds,
-            added_s=whole.added_s[self._outputs :],
-            total_s=whole.total_s - self._seconds,
+            job_travel,
+            commanded=job_travel.commanded[self._outputs :],
+            seconds=job_travel.seconds[self._outputs :] - self._seconds,
+            added_s=job_travel.added_s[self._outputs :],
+            total_s=job_travel.total_s - self._seconds,
         )
-        self._outputs, self._seconds = len(whole), whole.total_s
+        self._outputs, self._seconds = len(job_travel), job_travel.total_s
         self.slides.begin(travel, self.now, len(self.decoded) - 1)
 
 
 def _number(word: bytes) -> int:
     """Parse a word as the firmware's atol does, into a signed int16; 0 if it does not begin with a
     number."""
-    found = NUMBER.match(word)
-    value = int(found[0]) if found else 0
+    match = NUMBER.match(word)
+    value = int(match[0]) if match else 0
     return (value + INT16 // 2) % INT16 - INT16 // 2

@@ -135,20 +135,20 @@ def rest_of(data: bytes, machine: MatlabRouterMachine, first: int) -> tuple[byte
     job has one for going home, to its first point and down, and one for each line."""
     dialect, jobs = dialect_of(machine), list(read_jobs(data, machine))
     begins = np.cumsum([0, *(job.length.shape[1] + 1 for job in jobs)])
-    at = int(np.searchsorted(begins, first, side="right")) - 1
-    line = max(first - int(begins[at]) - 1, 0)
-    place = execute(jobs[at], dialect).points[line]
+    job_index = int(np.searchsorted(begins, first, side="right")) - 1
+    line = max(first - int(begins[job_index]) - 1, 0)
+    place = execute(jobs[job_index], dialect).points[line]
     if dialect.master_y == "fixed" and line and int(place[1]) != FIXED_Y_UNITS:
         raise PostError(
             "the master begins each job at one Y, so that no job can begin at a line of another",
-            mend=f"begin with block {int(begins[at]) + 1}, which is the job's first",
+            mend=f"begin with block {int(begins[job_index]) + 1}, which is the job's first",
         )
-    start = place if line else jobs[at].first
+    start = place if line else jobs[job_index].first
     numbers = [
-        _numbers(jobs[at], start, line),
-        *(_numbers(job, job.first, 0) for job in jobs[at + 1 :]),
+        _numbers(jobs[job_index], start, line),
+        *(_numbers(job, job.first, 0) for job in jobs[job_index + 1 :]),
     ]
-    return program_of(numbers, len(numbers), dialect), 1 if first > begins[at] else 0
+    return program_of(numbers, len(numbers), dialect), 1 if first > begins[job_index] else 0
 
 
 class MatlabRouterConversation(PacketByPacket):
@@ -214,8 +214,8 @@ class MatlabRouterConversation(PacketByPacket):
         if self.is_over or not text:
             return
         if not self._echo.startswith(text):
-            sent = f", where {self._echo_text} was to come back" if self._echo else " unasked"
-            self._fail(f"it says {text[:20]!r}{sent}; {self._remedy}", now)
+            surplus = f", where {self._echo_text} was to come back" if self._echo else " unasked"
+            self._fail(f"it says {text[:20]!r}{surplus}; {self._remedy}", now)
             return
         self._echoes, self._echo = True, self._echo[len(text) :]
         if not self._echo:

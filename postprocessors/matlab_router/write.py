@@ -38,21 +38,21 @@ def write_program(toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
     """The program; PostError for the first thing that this machine cannot do."""
     dialect = dialect_of(machine)
     cuts, findings = cuts_of(toolpath, machine, dialect)
-    made, changes = jobs_of(cuts, toolpath, machine, dialect)
-    if len(made.lines.row) == 0:
+    jobs, changes = jobs_of(cuts, toolpath, machine, dialect)
+    if len(jobs.lines.row) == 0:
         raise PostError(
             "nothing is left to cut"
             + (f" on a grid of {dialect.grid_units * UNIT_MM:g} mm" if len(cuts.row) else ""),
             mend="scale the drawing up" if len(cuts.row) else "cut below the stock's top, Z < 0",
         )
-    refuse_too_long(len(made.lines.row) + len(made.offsets) - 1, "block")
+    refuse_too_long(len(jobs.lines.row) + len(jobs.offsets) - 1, "block")
     stream = dialect.format == "stream"
-    heads = np.array(made.offsets[:-1])
+    heads = np.array(jobs.offsets[:-1])
     return Program(
-        data=program_of(_numbers_of(made), len(heads), dialect),
+        data=program_of(_numbers_of(jobs), len(heads), dialect),
         extension=STREAM_EXTENSION if stream else machine.target.extension,
         target=machine.target.name,
-        row_of_block=np.insert(made.lines.row, heads, -1).astype(np.int32),
+        row_of_block=np.insert(jobs.lines.row, heads, -1).astype(np.int32),
         findings=(*findings, *changes.findings(dialect)),
     )
 

@@ -145,11 +145,11 @@ def _without_stop(fill: Filler) -> Filler:
     """Wrap a filler so that it does not stop at the end, which may be passed on an earlier
     turn."""
 
-    def on(buffer: Ints) -> tuple[int, int, bool]:
+    def is_on(buffer: Ints) -> tuple[int, int, bool]:
         filled, passes, _ = fill(buffer)
         return filled, passes, False
 
-    return on
+    return is_on
 
 
 class PicMmhRun:
@@ -190,12 +190,12 @@ class PicMmhRun:
         """The chunks of all rows up to the end of the program."""
         for row, number in enumerate(self._toolpath.kind.tolist()):
             kind = Kind(number)
-            still, moved = self._rest_chunk(row, kind, self._position), False
+            rest_chunk, has_moved = self._rest_chunk(row, kind, self._position), False
             for chunk in self._motion_chunks(row, kind):
-                moved = True
+                has_moved = True
                 yield chunk
-            if not moved:
-                yield still
+            if not has_moved:
+                yield rest_chunk
             if kind == Kind.END:
                 return
 
@@ -234,12 +234,12 @@ class PicMmhRun:
         moves[toolpath.kind == Kind.ARC_CCW] = 2
         moves[toolpath.kind == Kind.ARC_CW] = 3
         ends = np.where(homes[:, None], self._home[:2], self._ends[:, :2])
-        how = (
+        options = (
             METHODS[self._options.interpolator or controller.arcs],
             controller.initial_error == "rounded-radius",
             loops.READINGS[controller.arc_end],
         )
-        loops.run_on(moves, self._position[:2].copy(), ends, self._centres, how, stops)
+        loops.run_on(moves, self._position[:2].copy(), ends, self._centres, options, stops)
         self._ends[:, :2] = np.where(toolpath.is_motion[:, None], ends, self._ends[:, :2])
         return stops
 
@@ -260,8 +260,8 @@ class PicMmhRun:
         kind, feed = self._toolpath.kind, self._toolpath.feed
         with np.errstate(invalid="ignore"):
             no_feed = self._toolpath.is_feed & ~((feed > 0.0) & np.isfinite(feed))
-        away = (kind == Kind.SET_ZERO) & places[:-1].any(axis=1)
-        return np.asarray(no_feed | away | (kind == Kind.DWELL))
+        is_moved = (kind == Kind.SET_ZERO) & places[:-1].any(axis=1)
+        return np.asarray(no_feed | is_moved | (kind == Kind.DWELL))
 
     def _check(self, row: int, position: Ints) -> None:
         """ProgramError for a row that cannot be followed from `position` (3,) steps."""
@@ -305,14 +305,14 @@ class PicMmhRun:
 
     def _line(self, axes: tuple[int, ...], target: Ints, period_s: float) -> _Leg:
         """A DDA line of one or two axes from here to `target`."""
-        way = [int(target[axis] - self._position[axis]) for axis in axes]
-        a, b = abs(way[0]), abs(way[1]) if len(way) > 1 else 0
+        travel = [int(target[axis] - self._position[axis]) for axis in axes]
+        a, b = abs(travel[0]), abs(travel[1]) if len(travel) > 1 else 0
         return _Leg(
             fill=line_filler(a, b),
             samples=a + b,
             columns=axes,
             origin=tuple(int(self._position[axis]) for axis in axes),
-            sign=tuple(-1 if part < 0 else 1 for part in way),
+            sign=tuple(-1 if part < 0 else 1 for part in travel),
             period_s=period_s,
         )
 
@@ -333,27 +333,27 @@ class PicMmhRun:
         if self._stops[row] >= 0:
             samples = int(self._stops[row])
             return _Leg(_without_stop(fill), samples, (0, 1), origin, sign, period_s)
-        samples, met = arc_reach(arc, arc_filler(arc, method, rounded=rounded))
-        return _Leg(fill, samples, (0, 1), origin, sign, period_s, ended=met)
+        samples, is_met = arc_reach(arc, arc_filler(arc, method, rounded=rounded))
+        return _Leg(fill, samples, (0, 1), origin, sign, period_s, ended=is_met)
 
     def _emit(self, row: int, leg: _Leg) -> Iterator[Chunk]:
         """The samples of a leg in chunks; an empty one when it has none and never ends."""
-        left, done = leg.samples, leg.samples == 0
-        if done and not leg.ended:
+        remaining, is_done = leg.samples, leg.samples == 0
+        if is_done and not leg.ended:
             yield one_row(row, NO_SAMPLES, NO_SAMPLES, ended=False)
-        while not done:
-            filled, passes, done = leg.fill(self._buffer[:left])
-            left -= filled
-            done = done or left == 0
+        while not is_done:
+            filled, passes, is_done = leg.fill(self._buffer[:remaining])
+            remaining -= filled
+            is_done = is_done or remaining == 0
             steps = np.empty((filled, 3), dtype=np.int64)
             steps[:] = self._position
             for index, column in enumerate(leg.columns):
                 steps[:, column] = (
                     leg.origin[index] + leg.sign[index] * self._buffer[:filled, index]
                 )
-            yield self._chunk(row, leg, steps, passes, leg.ended or not done)
+            yield self._chunk(row, leg, steps, passes, leg.ended or not is_done)
 
-    def _chunk(self, row: int, leg: _Leg, steps: Ints, passes: int, ended: bool) -> Chunk:
+    def _chunk(self, row: int, leg: _Leg, steps: Ints, passes: int, is_ended: bool) -> Chunk:
         travelled = np.abs(np.diff(steps, axis=0, prepend=self._position[None, :])).sum(axis=0)
         self._position = steps[-1]
         commanded = steps * self._coded_mm
@@ -370,7 +370,7 @@ class PicMmhRun:
             iterations=passes,
             steps=travelled,
             reversals=reversals[0],
-            ended=ended,
+            ended=is_ended,
         )
 
     def _rest_chunk(self, row: int, kind: Kind, position: Ints) -> Chunk:
@@ -380,8 +380,8 @@ class PicMmhRun:
         if kind == Kind.DWELL:
             seconds = float(self._toolpath.value[row])
             if not (math.isfinite(seconds) and seconds >= 0.0):
-                where = block_of(self._toolpath, row)
-                raise ProgramError("a dwell without its seconds", where=where)
+                place = block_of(self._toolpath, row)
+                raise ProgramError("a dwell without its seconds", where=place)
         elif kind == Kind.SET_ZERO and position.any():
             raise ProgramError(
                 "part zero is set away from part zero",
@@ -395,18 +395,18 @@ class PicMmhRun:
         toolpath = self._toolpath
         if not toolpath.is_arc.any():
             return np.broadcast_to(np.int64(0), (len(toolpath), 2))
-        bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
-        refuse(toolpath, bad, "an arc without a centre")
+        is_bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
+        refuse(toolpath, is_bad, "an arc without a centre")
         return self._steps(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), range(2))
 
     def _steps(self, points: Floats, axes: range, *, named: bool = True) -> Ints:
         """(N, len(axes)) steps of points in mm; ProgramError beyond `MAX_STEPS`."""
         coded_mm = self._coded_mm[list(axes)]
-        far = (np.abs(points) > MAX_STEPS * coded_mm).any(axis=1)
-        if far.any():
+        is_far = (np.abs(points) > MAX_STEPS * coded_mm).any(axis=1)
+        if is_far.any():
             raise ProgramError(
                 "a position is beyond all that the controller can count",
-                where=block_of(self._toolpath, int(far.argmax())) if named else None,
+                where=block_of(self._toolpath, int(is_far.argmax())) if named else None,
             )
         columns = [to_steps(points[:, axis], float(coded_mm[axis])) for axis in axes]
         return np.column_stack(columns)
@@ -438,8 +438,8 @@ def line_filler(a: int, b: int) -> Filler:
     registers, counters = np.zeros(2), np.zeros(2, dtype=np.int64)
 
     def fill(buffer: Ints) -> tuple[int, int, bool]:
-        filled, passes, done = dda_line_fill(a, b, registers, counters, buffer)
-        return filled, passes, done
+        filled, passes, is_done = dda_line_fill(a, b, registers, counters, buffer)
+        return filled, passes, is_done
 
     return fill
 
@@ -452,8 +452,8 @@ def arc_filler(arc: StepArc, method: str, *, rounded: bool) -> Filler:
         state = dda_arc_start(arc.x, arc.y, arc.clockwise)
 
         def fill(buffer: Ints) -> tuple[int, int, bool]:
-            filled, passes, met = dda_arc_fill(state, arc.end_x, arc.end_y, buffer)
-            return filled, passes, met
+            filled, passes, is_met = dda_arc_fill(state, arc.end_x, arc.end_y, buffer)
+            return filled, passes, is_met
 
         return fill
     start, run = {
@@ -464,8 +464,8 @@ def arc_filler(arc: StepArc, method: str, *, rounded: bool) -> Filler:
     state = start(arc.x, arc.y, arc.clockwise, error)
 
     def fill_each(buffer: Ints) -> tuple[int, int, bool]:
-        filled, met = run(state, arc.end_x, arc.end_y, buffer)
-        return filled, filled, met
+        filled, is_met = run(state, arc.end_x, arc.end_y, buffer)
+        return filled, filled, is_met
 
     return fill_each
 
@@ -485,13 +485,13 @@ def arc_reach(arc: StepArc, fill: Filler) -> tuple[int, bool]:
     turn = 8 * (max(abs(arc.x), abs(arc.y)) + 1)
     buffer = np.empty((min(SEARCH_ROWS, turn), 2), dtype=np.int64)
     while True:
-        filled, _, met = fill(buffer)
+        filled, _, is_met = fill(buffer)
         approach_scan(buffer[:filled], end, tracker, low, high)
-        entered, seen, nearest = int(tracker[2]), int(tracker[3]), int(tracker[4])
+        entered, passed_at, nearest_position = int(tracker[2]), int(tracker[3]), int(tracker[4])
         if entered > high:
-            return nearest, False
-        if met:
-            return seen, True
+            return nearest_position, False
+        if is_met:
+            return passed_at, True
 
 
 # What each reading of the controller's stop test does to the arcs of a program.
@@ -505,11 +505,11 @@ def arc_end_findings(toolpath: Toolpath, machine: _Machine, arcs: Ints) -> tuple
     """Return one ARC_END_UNSURE for those of the legs `arcs` (L, 14), each from the end of the row
     before it, that do not stop at their end under every reading of the thesis."""
     arcs = arcs[(arcs[:, [loops.A, loops.B]] != 0).any(axis=1)]
-    met = [_stops(arcs, rounded, loops.EQUAL)[:, loops.MET] != 0 for rounded in (False, True)]
-    unsure = ~(met[0] & met[1])
+    is_met = [_stops(arcs, rounded, loops.EQUAL)[:, loops.MET] != 0 for rounded in (False, True)]
+    unsure = ~(is_met[0] & is_met[1])
     if not unsure.any():
         return ()
-    apart = {
+    distances = {
         name: max(
             float(_end_distances(arcs[unsure], rounded, number).max()) for rounded in (False, True)
         )
@@ -517,27 +517,27 @@ def arc_end_findings(toolpath: Toolpath, machine: _Machine, arcs: Ints) -> tuple
         if number != loops.EQUAL
     }
     row = int(arcs[unsure][0, loops.ROW])
-    taken = machine.controller.arc_end
+    reading = machine.controller.arc_end
     return (
         ARC_END_UNSURE(
             where=block_of(toolpath, row),
             measured=int(unsure.sum()),
             limit=0.0,
             arcs=len(arcs),
-            missed=int((~met[0]).sum()),
-            missed_rounded=int((~met[1]).sum()),
-            final_quadrant=apart["final-quadrant"],
-            nearest=apart["nearest"],
-            taken=taken,
+            missed=int((~is_met[0]).sum()),
+            missed_rounded=int((~is_met[1]).sum()),
+            final_quadrant=distances["final-quadrant"],
+            nearest=distances["nearest"],
+            taken=reading,
         ),
     )
 
 
 def _stops(arcs: Ints, rounded: bool, reading: int) -> Ints:
     """(L, 4) of `steps`, by direct search."""
-    out = np.empty((len(arcs), loops.STOP_COLUMNS), dtype=np.int64)
-    loops.arc_stops(np.ascontiguousarray(arcs), (loops.DSM, rounded, reading), out)
-    return out
+    stops = np.empty((len(arcs), loops.STOP_COLUMNS), dtype=np.int64)
+    loops.arc_stops(np.ascontiguousarray(arcs), (loops.DSM, rounded, reading), stops)
+    return stops
 
 
 def _end_distances(arcs: Ints, rounded: bool, reading: int) -> Floats:

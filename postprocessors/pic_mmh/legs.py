@@ -32,12 +32,12 @@ def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
     places = np.empty((count + 1, 3), dtype=np.int64)
     for axis, homing in enumerate((Kind.HOME_XY, Kind.HOME_XY, Kind.HOME_Z)):
         goes, homes = toolpath.is_motion, kind == homing
-        given = np.concatenate(
+        given_places = np.concatenate(
             [start[axis : axis + 1], np.where(homes, home[axis], ends[:, axis])]
         )
         latest = np.where(goes | homes, np.arange(1, count + 1), 0)
         latest = np.concatenate([[0], np.maximum.accumulate(latest)])
-        places[:, axis] = given[latest]
+        places[:, axis] = given_places[latest]
     return places
 
 
@@ -54,30 +54,30 @@ class CommandedPath(Struct, frozen=True, eq=False):
         """(L, 14) legs of `steps` of the rows low:high."""
         places, centres = self.places[low : high + 1], self.centres[low:high]
         kind = self.toolpath.kind[low:high]
-        begin, way = places[:-1], np.diff(places, axis=0)
+        begin, travel = places[:-1], np.diff(places, axis=0)
         flat = np.zeros((len(kind), loops.LEG_COLUMNS), dtype=np.int64)
         flat[:, loops.ROW] = np.arange(low, low + len(kind))
         flat[:, [loops.FROM_X, loops.FROM_Y]] = begin[:, :2]
-        deep = flat.copy()
+        deep_legs = flat.copy()
         arc = are_arcs(kind)
         flat[:, loops.KIND] = np.where(arc, loops.ARC, loops.LINE)
-        about = np.where(arc[:, None], centres, begin[:, :2])
-        flat[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = about
-        sign = np.where((way[:, :2] < 0) & ~arc[:, None], -1, 1)
+        centres_or_begins = np.where(arc[:, None], centres, begin[:, :2])
+        flat[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = centres_or_begins
+        sign = np.where((travel[:, :2] < 0) & ~arc[:, None], -1, 1)
         flat[:, [loops.SIGN_X, loops.SIGN_Y]] = sign
         spoke = begin[:, :2] - centres
-        flat[:, [loops.A, loops.B]] = np.where(arc[:, None], spoke, np.abs(way[:, :2]))
-        flat[:, [loops.END_X, loops.END_Y]] = places[1:, :2] - about
+        flat[:, [loops.A, loops.B]] = np.where(arc[:, None], spoke, np.abs(travel[:, :2]))
+        flat[:, [loops.END_X, loops.END_Y]] = places[1:, :2] - centres_or_begins
         flat[:, loops.CW] = kind == Kind.ARC_CW
         flat[:, loops.STOP] = self.stops[low:high]
-        deep[:, loops.KIND] = loops.DEPTH
-        deep[:, [loops.FROM_X, loops.FROM_Y]] = places[1:, :2]  # XY first, then Z
-        deep[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = places[1:, :2]
-        deep[:, loops.A] = np.abs(way[:, 2])
-        deep[:, loops.CW] = np.sign(way[:, 2])
-        both = np.stack([flat, deep], axis=1).reshape(-1, loops.LEG_COLUMNS)
-        moves = np.column_stack([arc | way[:, :2].any(axis=1), way[:, 2] != 0]).reshape(-1)
-        return np.ascontiguousarray(both[moves])
+        deep_legs[:, loops.KIND] = loops.DEPTH
+        deep_legs[:, [loops.FROM_X, loops.FROM_Y]] = places[1:, :2]  # XY first, then Z
+        deep_legs[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = places[1:, :2]
+        deep_legs[:, loops.A] = np.abs(travel[:, 2])
+        deep_legs[:, loops.CW] = np.sign(travel[:, 2])
+        legs = np.stack([flat, deep_legs], axis=1).reshape(-1, loops.LEG_COLUMNS)
+        moves = np.column_stack([arc | travel[:, :2].any(axis=1), travel[:, 2] != 0]).reshape(-1)
+        return np.ascontiguousarray(legs[moves])
 
 
 class Periods(Struct, frozen=True, eq=False):
@@ -106,14 +106,14 @@ class FusedLegs:
         course: CommandedPath,
         rows: int,
         periods: Periods,
-        how: tuple[str, bool, bool, float],
+        options: tuple[str, bool, bool, float],
         mechanics: Mechanics,
     ) -> None:
-        """The first `rows` rows of the course. `how`: the method of arcs, whether their error
+        """The first `rows` rows of the course. `options`: the method of arcs, whether their error
         starts as that of the rounded radius, whether only outputs take time, mm of a step.
         `mechanics` is plain."""
         self._course, self._rows, self._periods = course, rows, periods
-        self._how, self._mechanics = how, mechanics
+        self._how, self._mechanics = options, mechanics
 
     @property
     def rows(self) -> int:
@@ -130,14 +130,14 @@ class FusedLegs:
         mechanics = self._mechanics.axes, self._mechanics.states
         loops.judge_legs(legs, (number, rounded), step_mm, mechanics, counts, task, sums)
         row = legs[:, loops.ROW] - low
-        deep = (legs[:, loops.KIND] == loops.DEPTH).astype(np.int64)
+        is_deep = (legs[:, loops.KIND] == loops.DEPTH).astype(np.int64)
         reversals = counts[:, loops.REVERSALS : loops.REVERSALS + 3]
         added = reversals @ self._mechanics.compensation_steps
         outputs = counts[:, loops.SAMPLES if by_event else loops.PASSES]
         count, toolpath = high - low, self._course.toolpath
-        period_s = self._periods.of(toolpath, low, high)[row, deep]
+        period_s = self._periods.of(toolpath, low, high)[row, is_deep]
         waits = toolpath.kind[low:high] == Kind.DWELL
-        missed = np.bincount(row[counts[:, loops.ENDED] == 0], minlength=count)
+        unended = np.bincount(row[counts[:, loops.ENDED] == 0], minlength=count)
         steps = counts[:, loops.STEPS : loops.STEPS + 3]
         return Ledger(
             row=np.arange(low, high),
@@ -147,7 +147,7 @@ class FusedLegs:
             iterations=_sums_by_row(row, counts[:, loops.PASSES : loops.PASSES + 1], count)[:, 0],
             steps=_sums_by_row(row, steps, count),
             reversals=_sums_by_row(row, reversals, count),
-            ended=missed == 0,
+            ended=unended == 0,
         )
 
 

@@ -203,10 +203,10 @@ def _feed_units(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[Ints, Findi
     (L3196-3199); F00 would make the controller divide by 0.
     """
     unit = machine.feed.unit_mm_min
-    most = min(MAX_FEED_UNITS, math.floor(machine.max_feed_mm_min / unit + FEED_TOLERANCE))
-    mend = f"the highest feed is {most * unit:g} mm/min, the lowest {unit:g} mm/min"
-    used = toolpath.is_feed
-    feed = np.where(used, toolpath.feed, unit)
+    max_units = min(MAX_FEED_UNITS, math.floor(machine.max_feed_mm_min / unit + FEED_TOLERANCE))
+    mend = f"the highest feed is {max_units * unit:g} mm/min, the lowest {unit:g} mm/min"
+    is_cut = toolpath.is_feed
+    feed = np.where(is_cut, toolpath.feed, unit)
     highest = min(machine.max_feed_mm_min, MAX_FEED_UNITS * unit)
     refuse(toolpath, ~(feed > 0.0), lambda row: f"a feed of {feed[row]:g} mm/min", mend)
     refuse(
@@ -217,15 +217,15 @@ def _feed_units(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[Ints, Findi
     )
     units = np.floor(feed / unit + FEED_TOLERANCE).astype(np.int64)
     refuse(toolpath, units < 1, lambda row: f"feed {feed[row]:g} mm/min would be F00", mend)
-    lost = feed - units * unit
-    rounded = lost > FEED_TOLERANCE * unit
-    units = np.where(used, units, 0)
+    excess = feed - units * unit
+    rounded = excess > FEED_TOLERANCE * unit
+    units = np.where(is_cut, units, 0)
     if not rounded.any():
         return units, None
-    row = int(np.argmax(lost))
+    row = int(np.argmax(excess))
     return units, FEED_ROUNDED(
         where=toolpath.place(row),
-        measured=lost[row],
+        measured=excess[row],
         limit=unit,
         count=int(rounded.sum()),
         feed=feed[row],
@@ -242,7 +242,7 @@ def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
     kind, value = Kind(int(toolpath.kind[row])), float(toolpath.value[row])
     if kind == Kind.SPINDLE_OFF:
         return ["M05;"], False
-    name, most = {
+    name, max_value = {
         Kind.DWELL: ("dwell", MAX_DWELL_S),
         Kind.SPINDLE_CW: ("spindle speed", MAX_SPINDLE),
         Kind.SPINDLE_CCW: ("spindle speed", MAX_SPINDLE),
@@ -254,17 +254,19 @@ def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
             where=toolpath.place(row),
             mend="give the speed: --spindle, or S in the program",
         )
-    whole = kind != Kind.TOOL_CHANGE or value == math.floor(value)
-    if not (0.0 <= value <= most and whole):
+    is_whole = kind != Kind.TOOL_CHANGE or value == math.floor(value)
+    if not (0.0 <= value <= max_value and is_whole):
         raise PostError(
             f"{name} {value:g} does not fit into a block",
             where=toolpath.place(row),
-            mend=f"use a whole number from 0 to {most:g}",
+            mend=f"use a whole number from 0 to {max_value:g}",
         )
     number = math.ceil(value) if kind == Kind.DWELL else round(value)
     if kind == Kind.DWELL:
-        full, rest = divmod(number, DWELL_DIGITS_S)
-        blocks = [f"G04P{DWELL_DIGITS_S:02d};"] * full + ([f"G04P{rest:02d};"] if rest else [])
+        full_blocks, remainder = divmod(number, DWELL_DIGITS_S)
+        blocks = [f"G04P{DWELL_DIGITS_S:02d};"] * full_blocks + (
+            [f"G04P{remainder:02d};"] if remainder else []
+        )
     elif kind == Kind.TOOL_CHANGE:
         blocks = [f"M06T{number:02d};"]
     else:

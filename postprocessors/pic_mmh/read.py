@@ -96,22 +96,22 @@ def read_program(data: bytes, machine: PicMmhMachine) -> Toolpath:
     _check_bytes(data)
     reader = _Reader(machine)
     octets = np.frombuffer(data, dtype=np.uint8)
-    plain = np.zeros((BLOCKS_AT_ONCE, blocks.COLUMNS), dtype=np.int64)
+    columns = np.zeros((BLOCKS_AT_ONCE, blocks.COLUMNS), dtype=np.int64)
     annex = machine.dialect.form == "annex"
-    index, at = 0, 0
-    while (end := data.find(b";", at)) >= 0:
+    index, offset = 0, 0
+    while (end := data.find(b";", offset)) >= 0:
         # Python objects for each of thousands of moves in a row would be most of the time.
-        count, behind = blocks.moves_in_a_row(octets, at, annex, plain)
+        count, next_offset = blocks.moves_in_a_row(octets, offset, annex, columns)
         if count >= MIN_RUN and not reader.ended:
-            reader.moves(index, plain[:count])
-            index, at = index + count, behind
+            reader.moves(index, columns[:count])
+            index, offset = index + count, next_offset
             continue
         for _ in range(count + 1):
             if end >= 0:
-                reader.block(index, data[at:end].decode("ascii").strip(BLANKS))
-                index, at = index + 1, end + 1
-                end = data.find(b";", at)
-    tail = data[at:].decode("ascii").strip(BLANKS)
+                reader.block(index, data[offset:end].decode("ascii").strip(BLANKS))
+                index, offset = index + 1, end + 1
+                end = data.find(b";", offset)
+    tail = data[offset:].decode("ascii").strip(BLANKS)
     if tail:
         _fail(index, len(tail), "the program breaks off inside a block", "end it with ;")
     if index == 0:
@@ -129,18 +129,18 @@ def _check_bytes(data: bytes) -> None:
     odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
     if odd:
         before = data[: odd.start()]
-        begun = before[before.rfind(b";") + 1 :].lstrip(BLANKS.encode())
+        block_begun = before[before.rfind(b";") + 1 :].lstrip(BLANKS.encode())
         _fail(
             before.count(b";"),
-            len(begun) + 1,
+            len(block_begun) + 1,
             f"the byte 0x{data[odd.start()]:02x} belongs to no program",
             "give a pic-mmh program",
         )
 
 
-def _mm(whole: str, decimals: str) -> float:
+def _mm(whole_digits: str, decimals: str) -> float:
     """µm as text, in mm by a single division, so the nearest float; `-00000.00` is 0."""
-    return int(whole + decimals) / UNITS_PER_MM["example" if decimals else "annex"]
+    return int(whole_digits + decimals) / UNITS_PER_MM["example" if decimals else "annex"]
 
 
 class _Excess(Struct):
@@ -192,24 +192,24 @@ class _Reader:
         fault = fault_of(text, self._form)
         _fail(index, fault.column, fault.message, fault.mend)
 
-    def moves(self, first: int, plain: Ints) -> None:
+    def moves(self, first: int, columns: Ints) -> None:
         """Moves in a row (K, 9) of `blocks`, by columns; `first`: the index of the first."""
         if self._buffer_chars is not None:
-            for at in np.flatnonzero(plain[:, blocks.LENGTH] >= self._buffer_chars).tolist():
-                self._long.add(first + at, int(plain[at, blocks.LENGTH]) + 1)
-        kind, deep = plain[:, blocks.CODE].copy(), plain[:, blocks.DEEP] != 0
+            for index in np.flatnonzero(columns[:, blocks.LENGTH] >= self._buffer_chars).tolist():
+                self._long.add(first + index, int(columns[index, blocks.LENGTH]) + 1)
+        kind, is_deep = columns[:, blocks.CODE].copy(), columns[:, blocks.DEEP] != 0
         cut, arc = kind >= Kind.LINE, kind >= Kind.ARC_CW
-        feed = np.where(cut, plain[:, blocks.FEED] / self._feeds_per_mm_min, np.nan)
-        for at in np.flatnonzero(cut & exceeds(feed, self._max_feed)).tolist():
-            self._fast.add(first + at, float(feed[at]))
-        mm = plain[:, : blocks.CENTRE_Y + 1] / self._units_per_mm
+        feed = np.where(cut, columns[:, blocks.FEED] / self._feeds_per_mm_min, np.nan)
+        for index in np.flatnonzero(cut & exceeds(feed, self._max_feed)).tolist():
+            self._fast.add(first + index, float(feed[index]))
+        mm = columns[:, : blocks.CENTRE_Y + 1] / self._units_per_mm
         self.path.moves(
             kind=kind,
             end=np.column_stack(
                 [
-                    fill_forward(given, mm[:, column], before)
-                    for given, column, before in zip(
-                        (~deep, ~deep, deep),
+                    fill_forward(has_word, mm[:, column], before)
+                    for has_word, column, before in zip(
+                        (~is_deep, ~is_deep, is_deep),
                         (blocks.X, blocks.Y, blocks.Z),
                         self.path.position,
                         strict=True,
@@ -218,7 +218,7 @@ class _Reader:
             ),
             centre=np.where(arc[:, None], mm[:, blocks.CENTRE_X :], np.nan),
             feed=feed,
-            block=np.arange(first, first + len(plain)),
+            block=np.arange(first, first + len(columns)),
         )
 
     def findings(self) -> Iterator[Finding]:
@@ -319,9 +319,11 @@ def fault_of(text: str, form: str) -> BlockFault:
         return BlockFault(
             1, f"{text!r} is an interactive command, not part of a program", "remove it"
         )
-    if small := re.search("[a-z]", text[: SHOWN_CHARS * 2]):
+    if letter_match := re.search("[a-z]", text[: SHOWN_CHARS * 2]):
         return BlockFault(
-            small.start() + 1, "this controller takes no small letters", "write capital letters"
+            letter_match.start() + 1,
+            "this controller takes no small letters",
+            "write capital letters",
         )
     if text[0] not in "GM":
         return BlockFault(1, f"{_quoted(text)} is no block: it begins with neither G nor M")
@@ -329,8 +331,8 @@ def fault_of(text: str, form: str) -> BlockFault:
         return BlockFault(2, f"{_quoted(text)}: wanted two digits after {text[0]}")
     shapes = SHAPES.get(text[:3])
     if shapes is None:
-        known = " ".join(SHAPES)
-        return BlockFault(1, f"this controller does not know {text[:3]}", f"it knows {known}")
+        codes = " ".join(SHAPES)
+        return BlockFault(1, f"this controller does not know {text[:3]}", f"it knows {codes}")
     for other in _COORDINATES:
         if any(pattern.fullmatch(text, 3) for _, pattern in patterns(other)[text[:3]]):
             return BlockFault(
@@ -345,15 +347,15 @@ def _value(kind: str, form: str) -> str:
 
 def _walk(text: str, shape: Shape, form: str) -> BlockFault:
     """The first word of the shape that the block does not have."""
-    at = 3
+    offset = 3
     for letter, kind in shape:
-        match = re.compile(letter + _value(kind, form)).match(text, at)
+        match = re.compile(letter + _value(kind, form)).match(text, offset)
         if match is None:
-            at += text.startswith(letter, at)
+            offset += text.startswith(letter, offset)
             words = _COORDINATE_WORDS[form] if kind == "c" else _VALUE_WORDS[kind]
-            return BlockFault(at + 1, f"{_quoted(text)}: wanted {letter} with {words}")
-        at = match.end()
-    return BlockFault(at + 1, f"{_quoted(text)}: wanted ; after the last word of {text[:3]}")
+            return BlockFault(offset + 1, f"{_quoted(text)}: wanted {letter} with {words}")
+        offset = match.end()
+    return BlockFault(offset + 1, f"{_quoted(text)}: wanted ; after the last word of {text[:3]}")
 
 
 def _quoted(text: str) -> str:

@@ -136,8 +136,8 @@ class PicMmhTwin(Twin):
         if kind <= Kind.ARC_CCW:
             unsaid = [0, 1] if b"Z" in string else [2]
             end[unsaid] = self._said[unsaid]
-            said, self._said = self._said, end.copy()
-            if kind <= Kind.LINE and (end[:2] == said[:2]).all():
+            last_end, self._said = self._said, end.copy()
+            if kind <= Kind.LINE and (end[:2] == last_end[:2]).all():
                 end[:2] = start[:2]  # what is to stay where it is stays where an arc has left it
         else:
             at_home = [kind == Kind.HOME_XY] * 2 + [kind == Kind.HOME_Z]
@@ -156,10 +156,10 @@ class PicMmhTwin(Twin):
         """Part zero is here. Machine zero stays where it is."""
         self._zero = self.slides.commanded_mm.copy()
         self._said = np.zeros(3)
-        given = self._given.controller
-        home = np.array(given.machine_zero_mm) - self._zero
-        moved = replace(given, machine_zero_mm=tuple(home.tolist()))
-        self._machine = replace(self._given, controller=moved)
+        controller = self._given.controller
+        home = np.array(controller.machine_zero_mm) - self._zero
+        moved_controller = replace(controller, machine_zero_mm=tuple(home.tolist()))
+        self._machine = replace(self._given, controller=moved_controller)
 
     # The other strings.
 
@@ -173,13 +173,13 @@ class PicMmhTwin(Twin):
             self._set_zero()
         elif text in (b"W", b"V"):
             self._joystick_hz *= JOYSTICK_FACTOR if text == b"W" else 1.0 / JOYSTICK_FACTOR
-        elif found := COMPENSATION.fullmatch(text):
-            self.slides.compensate(b"XYZ".index(found[1]), int(found[2]) / 1000.0)
-        elif found := STEPS.fullmatch(text):
-            way = _senses(found[1] + found[2]) * int(found[3])
-            self.slides.begin(self._steps(way, JOYSTICK_HZ), self.now, -1)
-        elif (found := RATE.fullmatch(text)) and int(found[3]):
-            self._run_on(_senses(found[1] + found[2]), float(found[3]))
+        elif match := COMPENSATION.fullmatch(text):
+            self.slides.compensate(b"XYZ".index(match[1]), int(match[2]) / 1000.0)
+        elif match := STEPS.fullmatch(text):
+            travel = _senses(match[1] + match[2]) * int(match[3])
+            self.slides.begin(self._steps(travel, JOYSTICK_HZ), self.now, -1)
+        elif (match := RATE.fullmatch(text)) and int(match[3]):
+            self._run_on(_senses(match[1] + match[2]), float(match[3]))
         elif JOYSTICK.fullmatch(text):
             self._run_on(_senses(text[1:]), self._joystick_hz)
         else:
@@ -194,26 +194,26 @@ class PicMmhTwin(Twin):
     def _home(self) -> None:
         """Z, then X, then Y to their switches, and each back from it to machine zero."""
         home = np.array(self._machine.controller.machine_zero_mm) + self._zero
-        to = np.rint((home - self.slides.commanded_mm) / self._step_mm).astype(np.int64)
+        target = np.rint((home - self.slides.commanded_mm) / self._step_mm).astype(np.int64)
         legs = []
         for axis in (2, 0, 1):
-            way = np.zeros(3, dtype=np.int64)
-            way[axis] = to[axis] - RETREAT_STEPS
-            legs.append(way)
-        back = np.eye(3, dtype=np.int64)[[2, 0, 1]] * RETREAT_STEPS
-        travel = self._steps(np.array([*legs, *back]), JOYSTICK_HZ)
+            approach = np.zeros(3, dtype=np.int64)
+            approach[axis] = target[axis] - RETREAT_STEPS
+            legs.append(approach)
+        retreats = np.eye(3, dtype=np.int64)[[2, 0, 1]] * RETREAT_STEPS
+        travel = self._steps(np.array([*legs, *retreats]), JOYSTICK_HZ)
         self.slides.begin(travel, self.now, -1)
         self._said = home - self._zero
 
-    def _steps(self, ways: Ints, hz: float) -> Travel:
+    def _steps(self, travels: Ints, hz: float) -> Travel:
         """Travels (L, 3) or (3,) in steps, one after the other, each an output a period."""
         most_hz = self._machine.limits.max_step_rate_hz
         period = 1.0 / min(hz, hz if most_hz is None else most_hz)
         parts = [self.slides.commanded_mm[None, :]]
-        for way in np.atleast_2d(ways):
-            counts = np.arange(1, np.abs(way).max(initial=0) + 1)
-            moved = np.sign(way) * np.minimum(counts[:, None], np.abs(way))
-            parts.append(parts[-1][-1] + moved * self._step_mm)
+        for travel in np.atleast_2d(travels):
+            counts = np.arange(1, np.abs(travel).max(initial=0) + 1)
+            steps = np.sign(travel) * np.minimum(counts[:, None], np.abs(travel))
+            parts.append(parts[-1][-1] + steps * self._step_mm)
         commanded = np.concatenate(parts)[1:]
         seconds = period * np.arange(1.0, len(commanded) + 1.0)
         added = np.full(len(commanded), period)
@@ -228,9 +228,9 @@ class PicMmhTwin(Twin):
             return
         if self._choices.compensation == "reported" and added.any():
             rows = []
-            for step, more in zip(steps, added, strict=True):
-                alone = np.diag(np.sign(step))
-                rows += [np.repeat(alone, more, axis=0), step[None, :]]
+            for step, extra in zip(steps, added, strict=True):
+                single_axes = np.diag(np.sign(step))
+                rows += [np.repeat(single_axes, extra, axis=0), step[None, :]]
             steps = np.concatenate(rows)
         negative = steps < 0
         if self._choices.step_byte == "bits":

@@ -140,7 +140,7 @@ def _reverses_s(machine: PicMmhMachine) -> float:
 
 def _compensations(machine: PicMmhMachine) -> list[bytes]:
     """`BX204;` `BY178;`: what the simulation reckons with, in µm."""
-    found = []
+    commands = []
     for letter, axis in zip("XY", machine.axes, strict=False):
         um = round(axis.compensation_mm * 1000.0)
         if abs(um - axis.compensation_mm * 1000.0) > 1e-6 or um > MAX_COMPENSATION_UM:
@@ -148,8 +148,8 @@ def _compensations(machine: PicMmhMachine) -> list[bytes]:
                 f"the controller takes a compensation in whole µm, up to {MAX_COMPENSATION_UM}",
                 where=f"axes.{letter.lower()}.compensation_mm",
             )
-        found.append(f"B{letter}{um:03d};".encode())
-    return found
+        commands.append(f"B{letter}{um:03d};".encode())
+    return commands
 
 
 def _reports(forecast: Forecast, block: int, machine: PicMmhMachine) -> int:
@@ -170,8 +170,10 @@ def _reports(forecast: Forecast, block: int, machine: PicMmhMachine) -> int:
 
 def _steps(letter: str, way_mm: float, step_mm: float) -> list[tuple[bytes, int]]:
     """The strings that move an axis, each with its steps."""
-    left, sense = round(abs(way_mm) / step_mm), "-" if way_mm < 0.0 else "+"
-    parts = [MAX_STEPS] * (left // MAX_STEPS) + [left % MAX_STEPS] * (left % MAX_STEPS > 0)
+    remaining, sense = round(abs(way_mm) / step_mm), "-" if way_mm < 0.0 else "+"
+    parts = [MAX_STEPS] * (remaining // MAX_STEPS) + [remaining % MAX_STEPS] * (
+        remaining % MAX_STEPS > 0
+    )
     return [(f"P{letter.upper()}{sense}{part:04d};".encode(), part) for part in parts]
 
 
@@ -235,9 +237,9 @@ class PicMmhConversation(PacketByPacket):
     def _silent(self, now: float) -> None:
         """Nothing has come for long: done, if all can be that was reported."""
         packet, reports = self.packets[self.sent - 1], self._link.step_byte != "none"
-        least = packet.counts[1]
-        if reports and self._count < least:
-            self._fail(f"it has reported {self._count} of {least} steps", now)
+        min_count = packet.counts[1]
+        if reports and self._count < min_count:
+            self._fail(f"it has reported {self._count} of {min_count} steps", now)
         elif not reports and not packet.seconds:
             self._end(
                 WireState.FAILED, "nothing says when it stands, since link.step_byte is none"
@@ -249,8 +251,8 @@ class PicMmhConversation(PacketByPacket):
 
     def _count_on(self, now: float) -> None:
         """Done when all has been reported and its time is over."""
-        wanted = self.packets[self.sent - 1].counts
-        missing = (wanted[0] if wanted else 0) - self._count
+        counts = self.packets[self.sent - 1].counts
+        missing = (counts[0] if counts else 0) - self._count
         if missing < 0:
             self._fail(f"it has reported {-missing} steps too many", now)
         elif missing:
@@ -281,8 +283,8 @@ class PicMmhConversation(PacketByPacket):
         packet = self.packets[self.sent - 1]
         count = min(len(self._echo), len(data))
         if data[:count] != self._echo[:count]:
-            sent = packet.data.decode("latin-1")
-            self._fail(f"the echo of {sent} is another: {data[:count]!r}{self._rate}", now)
+            block_text = packet.data.decode("latin-1")
+            self._fail(f"the echo of {block_text} is another: {data[:count]!r}{self._rate}", now)
             return
         begins = bool(self._echo) and count == len(self._echo)
         self._echo, steps = self._echo[count:], data[count:]
@@ -319,8 +321,10 @@ class PicMmhConversation(PacketByPacket):
             elif self._link.echo == "none":
                 self._stopped("it was told to stop (A;); it does not say whether it stands")
             else:
-                why = self._failing or "it was told to stop"
-                self._end(WireState.FAILED, f"{why}; it did not confirm the stop: switch it off")
+                reason = self._failing or "it was told to stop"
+                self._end(
+                    WireState.FAILED, f"{reason}; it did not confirm the stop: switch it off"
+                )
             return
         if not self._busy:
             self.next_s = now + self.manner.patience_s
@@ -376,15 +380,15 @@ class PicMmhTerminal(Terminal):
             data += self.end
         self._echo = data if self._link.echo == "echo" else b""
         self._ends, self.runs_on = 0, data[:1] in (b"J", b"&", b"F")
-        found, reports = _STEPS.fullmatch(data), self._link.step_byte != "none"
-        self._left = int(found[1]) if found and reports else 0
+        match, reports = _STEPS.fullmatch(data), self._link.step_byte != "none"
+        self._left = int(match[1]) if match and reports else 0
         self.due = int(self._left > 0)
         # In front of steps in the other sense there are those of compensation.
         self.rests_s = self._reverses_s if data[:1] in (b"G", b"H", b"P") else 0.0
-        if found and reports:
+        if match and reports:
             self.rests_s = 0.0
-        elif found:
-            self.rests_s += int(found[1]) / self._hz
+        elif match:
+            self.rests_s += int(match[1]) / self._hz
         return data
 
     def halt(self) -> bytes:
@@ -401,7 +405,7 @@ class PicMmhTerminal(Terminal):
 
     def decode(self, data: bytes) -> list[str]:
         """Return the echo as it is, and outputs counted, as many as have come together."""
-        said: list[str] = []
+        lines: list[str] = []
         for octet in data:
             echoed = self._echo[:1] == bytes([octet])
             self._echo = self._echo[1:] if echoed else self._echo
@@ -416,11 +420,11 @@ class PicMmhTerminal(Terminal):
             elif step:
                 self._steps.append((step, 1))
             else:
-                said += self._step_summary()
+                lines += self._step_summary()
                 self._rest += bytes([octet])
                 if octet == ord(";"):
-                    said += super().flush()
-        return said
+                    lines += super().flush()
+        return lines
 
     def flush(self) -> list[str]:
         """Return the counted outputs and the unfinished line."""

@@ -57,11 +57,11 @@ def write_program(toolpath: Toolpath, machine: PicMmhMachine) -> Program:
     return Program.of_text(data, machine, rows, writer.findings(data))
 
 
-def _refuse_chords(where: str) -> NoReturn:
+def _refuse_chords(place: str) -> NoReturn:
     """PostError for an arc that passes where no coordinate can be written."""
     raise PostError(
         "an arc that has to be written as lines leaves the five digits of a coordinate",
-        where=where,
+        where=place,
         mend="keep every coordinate within ±99.999 mm",
     )
 
@@ -77,14 +77,14 @@ class _Writer:
         self._changes = WriterChanges()
         check_motion(toolpath, machine)
         # Refuses by the numbers of the rows that were given, before these are lowered.
-        given = numbers_of(toolpath, machine, dialect)
-        self._feed_finding, grid = given.feed_finding, given.grids[0]
-        del given  # as large as the toolpath
-        lowered = self._lower(grid)
-        self._toolpath, self._row = lowered.toolpath, lowered.row
-        self._numbers = numbers_of(lowered.toolpath, machine, dialect)
-        self._split = np.bincount(lowered.row, minlength=len(toolpath)) > 1
-        kind = lowered.toolpath.kind
+        numbers = numbers_of(toolpath, machine, dialect)
+        self._feed_finding, grid = numbers.feed_finding, numbers.grids[0]
+        del numbers  # as large as the toolpath
+        lowered_path = self._lower(grid)
+        self._toolpath, self._row = lowered_path.toolpath, lowered_path.row
+        self._numbers = numbers_of(lowered_path.toolpath, machine, dialect)
+        self._split = np.bincount(lowered_path.row, minlength=len(toolpath)) > 1
+        kind = lowered_path.toolpath.kind
         # A program read back begins with the SET_ZERO of its own header.
         self._first = 1 if len(kind) and kind[0] == Kind.SET_ZERO else 0
         self._ended = len(kind) > 0 and kind[-1] == Kind.END
@@ -96,21 +96,21 @@ class _Writer:
         """Lower arcs whose centre cannot be written to lines, and slopes to steps; both are
         counted."""
         toolpath, changes = self._wanted, self._changes
-        far = far_arcs(toolpath, self._machine, self._dialect)
-        changes.far = int(far.sum())
-        changes.far_place = toolpath.place(int(far.argmax())) if changes.far else ""
-        straight = arcs_to_lines(toolpath, far, LINE_SAGITTA * grid.resolution_mm)
+        is_far = far_arcs(toolpath, self._machine, self._dialect)
+        changes.far = int(is_far.sum())
+        changes.far_place = toolpath.place(int(is_far.argmax())) if changes.far else ""
+        straight = arcs_to_lines(toolpath, is_far, LINE_SAGITTA * grid.resolution_mm)
         changes.split_step_mm = slope_step_mm(self._machine)
         stepped = helices_to_steps(straight.toolpath, changes.split_step_mm)
         steps = np.bincount(stepped.row, minlength=len(straight.toolpath)) > 1
         slopes = np.unique(straight.row[steps & straight.toolpath.is_feed])
         changes.split = len(slopes)
         changes.split_place = toolpath.place(int(slopes[0])) if changes.split else ""
-        lowered = stepped.after(straight)
-        beyond = ~grid.fits(lowered.toolpath.end[:, :2]).all(axis=1)
-        if beyond.any():
-            _refuse_chords(toolpath.place(int(lowered.row[beyond.argmax()])))
-        return lowered
+        lowered_path = stepped.after(straight)
+        is_outside = ~grid.fits(lowered_path.toolpath.end[:, :2]).all(axis=1)
+        if is_outside.any():
+            _refuse_chords(toolpath.place(int(lowered_path.row[is_outside.argmax()])))
+        return lowered_path
 
     @property
     def _grid(self) -> UnitGrid:
@@ -122,21 +122,21 @@ class _Writer:
         own."""
         points = self._points()
         events = self._events(points)
-        sent = points.sent
-        refuse_too_long(int(np.count_nonzero(sent)) + len(events) + 3, "block")  # G54 G90 M30
+        is_sent = points.sent
+        refuse_too_long(int(np.count_nonzero(is_sent)) + len(events) + 3, "block")  # G54 G90 M30
         texts = texts_of(self._words(points), end=";\n")
-        rows = self._row[points.row[sent]]
+        rows = self._row[points.row[is_sent]]
         starts = [(0, "G54;", self._row[0] if self._first else -1), (0, "G90;", -1)]
-        upto = np.concatenate([[0], np.cumsum(sent)])
-        between = [
+        upto = np.concatenate([[0], np.cumsum(is_sent)])
+        between_blocks = [
             (int(np.searchsorted(points.row, row)), block, int(self._row[row]))
             for row, block in events
         ]
         ending = (len(points.row), "M30;", int(self._row[-1]) if self._ended else -1)
-        others = [*starts, *between, ending]
-        data = texts.with_lines((at, block) for at, block, _ in others)
-        places = [int(upto[at]) for at, _, _ in others]
-        return data, np.insert(rows, places, [row for _, _, row in others])
+        other_blocks = [*starts, *between_blocks, ending]
+        data = texts.with_lines((index, block) for index, block, _ in other_blocks)
+        places = [int(upto[index]) for index, _, _ in other_blocks]
+        return data, np.insert(rows, places, [row for _, _, row in other_blocks])
 
     def findings(self, data: bytes) -> Iterator[Finding]:
         """Yield one finding for each kind of change that the writer made."""
@@ -152,8 +152,8 @@ class _Writer:
 
     def _words(self, points: Points) -> list[WordColumn]:
         """The words of all points, none where nothing is sent."""
-        row, sent = points.row, points.sent
-        flat = sent & ~points.deep
+        row, is_sent = points.row, points.sent
+        flat = is_sent & ~points.deep
         arc = flat & points.is_arc
         annex = self._dialect.form == "annex"
         decimals = 0 if annex else 2
@@ -166,13 +166,13 @@ class _Writer:
         centre = self._numbers.centre_units[row]
         feed = self._numbers.feed_units[row]
         return [
-            WordColumn("G", code, sent, digits=2),
+            WordColumn("G", code, is_sent, digits=2),
             coordinate("X", points.units[:, 0], flat),
             coordinate("Y", points.units[:, 1], flat),
-            coordinate("Z", self._numbers.end_units[row, 2], sent & points.deep),
+            coordinate("Z", self._numbers.end_units[row, 2], is_sent & points.deep),
             coordinate("I", centre[:, 0], arc),
             coordinate("J", centre[:, 1], arc),
-            WordColumn("F", feed, sent & (feed > 0), digits=2),
+            WordColumn("F", feed, is_sent & (feed > 0), digits=2),
         ]
 
     # Where blocks may bring the tool.
@@ -182,13 +182,13 @@ class _Writer:
         step, and so may the number that an arc starts from, whose landing may then be no landing:
         as many passes as it takes until none is."""
         arcs = self._arcs()
-        refused = np.zeros(len(arcs.row), dtype=np.bool_)
+        is_refused = np.zeros(len(arcs.row), dtype=np.bool_)
         while True:
-            points = self._points_of(arcs, refused)
-            now = self._refused_landings(arcs, points)
-            if (now == refused).all():
+            points = self._points_of(arcs, is_refused)
+            newly_refused = self._refused_landings(arcs, points)
+            if (newly_refused == is_refused).all():
                 break
-            refused = now
+            is_refused = newly_refused
         self._check_ends(arcs, points)
         self._count(arcs, points)
         return points
@@ -196,30 +196,30 @@ class _Writer:
     def _arcs(self) -> StepArcs:
         """The arcs as this controller takes them from where it stands, and their landings."""
         numbers, path = self._numbers, self._toolpath
-        deep = numbers.end_steps[:, 2] != self._before[:, 2]
-        rows = np.flatnonzero(path.is_arc & ~deep)
+        is_deep = numbers.end_steps[:, 2] != self._before[:, 2]
+        rows = np.flatnonzero(path.is_arc & ~is_deep)
         centre = numbers.centre_steps[rows]
         start = self._before[rows, :2] - centre
         end = numbers.end_steps[rows, :2] - centre
         sweep = path.sweeps()[rows]
         # As an arc it would become a full circle.
-        nothing = (start == end).all(axis=1) & (np.abs(sweep) <= math.pi)
+        is_empty = (start == end).all(axis=1) & (np.abs(sweep) <= math.pi)
         clockwise = path.kind[rows] == Kind.ARC_CW
-        table = np.column_stack([start, end, centre, clockwise])[~nothing].astype(np.int64)
+        table = np.column_stack([start, end, centre, clockwise])[~is_empty].astype(np.int64)
         grid = self._grid
         landing = land(
             table,
-            np.abs(sweep[~nothing]),
+            np.abs(sweep[~is_empty]),
             grid.units_per_mm * grid.step_mm,
             grid.most_units,
             LINE_SAGITTA * grid.resolution_mm / grid.step_mm,
         )
-        return StepArcs(rows[~nothing], table, sweep[~nothing], landing, rows[nothing])
+        return StepArcs(rows[~is_empty], table, sweep[~is_empty], landing, rows[is_empty])
 
-    def _points_of(self, arcs: StepArcs, refused: Bools) -> Points:
-        """All points when the landings of `refused` (J,) are none."""
+    def _points_of(self, arcs: StepArcs, is_refused: Bools) -> Points:
+        """All points when the landings of `is_refused` (J,) are none."""
         numbers, path, grid = self._numbers, self._toolpath, self._grid
-        landed = arcs.landed & ~refused
+        landed = arcs.landed & ~is_refused
         chords = self._chords(arcs, landed)
         count = np.ones(len(path), dtype=np.int64)
         count[arcs.nothing] = 0
@@ -243,25 +243,25 @@ class _Writer:
         home = path.kind[row] == Kind.HOME_XY
         steps[home], units[home] = self._home((0, 1))
         steps[row < self._first] = 0
-        deep = motion & (numbers.end_steps[row, 2] != self._before[row, 2])
+        is_deep = motion & (numbers.end_steps[row, 2] != self._before[row, 2])
         earlier = np.concatenate([np.zeros((1, 2), dtype=np.int64), steps])[: len(steps)]
-        flat = motion & ~deep
-        sent = deep | is_arc | (flat & (steps != earlier).any(axis=1))
+        flat = motion & ~is_deep
+        is_sent = is_deep | is_arc | (flat & (steps != earlier).any(axis=1))
         outside = (row < self._first) | (path.kind[row] == Kind.END)
         # The very numbers of the start, so that it reads as a full circle.
-        back = np.zeros(len(row), dtype=np.bool_)
-        back[at_arc] = arcs.at_start[landed]
-        new = home | (sent & ~deep & ~back)
+        returns = np.zeros(len(row), dtype=np.bool_)
+        returns[at_arc] = arcs.at_start[landed]
+        new = home | (is_sent & ~is_deep & ~returns)
         latest = np.maximum.accumulate(np.where(new & ~outside, np.arange(1, len(row) + 1), 0))
-        known = np.concatenate([np.zeros((1, 2), dtype=np.int64), units])
-        units = known[latest]
+        known_units = np.concatenate([np.zeros((1, 2), dtype=np.int64), units])
+        units = known_units[latest]
         misfit = arcs.row[chords.arc[~fits]]
         return Points(
             row=row,
             units=units,
-            before=np.concatenate([known[:1], units])[first[arcs.row]],
-            sent=sent & ~outside,
-            deep=deep,
+            before=np.concatenate([known_units[:1], units])[first[arcs.row]],
+            sent=is_sent & ~outside,
+            deep=is_deep,
             is_arc=is_arc,
             misfit=int(misfit[0]) if len(misfit) else len(path),
         )
@@ -284,23 +284,23 @@ class _Writer:
         """Lines along the rest of each arc from its landing, or along all of it."""
         path, grid = self._toolpath, self._grid
         centre = path.centre[arcs.row]
-        at = np.where(landed[:, None], arcs.stop * grid.step_mm, path.starts[arcs.row, :2])
-        turn = turned_rad(path.starts[arcs.row, :2] - centre, at - centre, arcs.clockwise)
+        places = np.where(landed[:, None], arcs.stop * grid.step_mm, path.starts[arcs.row, :2])
+        turn = turned_rad(path.starts[arcs.row, :2] - centre, places - centre, arcs.clockwise)
         turn += _TURN * full_turns(turn, arcs.expected_rad)
-        left = np.maximum(np.abs(arcs.sweep_rad) - turn, 0.0)
-        sweep = np.where(landed, np.where(arcs.clockwise, -left, left), arcs.sweep_rad)
-        ends = chord_ends(at, centre, sweep, LINE_SAGITTA * grid.resolution_mm)
+        remaining = np.maximum(np.abs(arcs.sweep_rad) - turn, 0.0)
+        sweep = np.where(landed, np.where(arcs.clockwise, -remaining, remaining), arcs.sweep_rad)
+        ends = chord_ends(places, centre, sweep, LINE_SAGITTA * grid.resolution_mm)
         return ends.without(landed & arcs.at_end)
 
     def _check_ends(self, arcs: StepArcs, points: Points) -> None:
         """The numbers of each arc, taken as the controller takes them, must be its landing."""
-        at = np.flatnonzero(points.is_arc & points.sent)
-        of = np.searchsorted(arcs.row, points.row[at])
-        wrong = (self._grid.steps(points.units[at]) != arcs.stop[of]).any(axis=1)
-        if wrong.any() and points.row[at[wrong.argmax()]] < points.misfit:
+        rows = np.flatnonzero(points.is_arc & points.sent)
+        arc_rows = np.searchsorted(arcs.row, points.row[rows])
+        is_wrong = (self._grid.steps(points.units[rows]) != arcs.stop[arc_rows]).any(axis=1)
+        if is_wrong.any() and points.row[rows[is_wrong.argmax()]] < points.misfit:
             raise PostError(
                 "internal fault: the arc as written would not end where it was planned to",
-                where=self._place(int(points.row[at[wrong.argmax()]])),
+                where=self._place(int(points.row[rows[is_wrong.argmax()]])),
             )
 
     def _count(self, arcs: StepArcs, points: Points) -> None:
@@ -310,33 +310,33 @@ class _Writer:
         landed = np.zeros(len(arcs.row), dtype=np.bool_)
         landed[np.searchsorted(arcs.row, points.row[points.is_arc])] = True
         changes.arcs_as_lines = int((~landed).sum())
-        still = path.is_motion[points.row] & ~points.sent & ~path.is_arc[points.row]
+        is_still = path.is_motion[points.row] & ~points.sent & ~path.is_arc[points.row]
         # Parts of slopes and of far arcs may be small.
-        still &= ~self._split[self._row[points.row]]
-        changes.dropped = int(still.sum()) + len(arcs.nothing)
+        is_still &= ~self._split[self._row[points.row]]
+        changes.dropped = int(is_still.sum()) + len(arcs.nothing)
         mended = np.flatnonzero(landed & ~arcs.at_end)
         changes.mended = len(mended)
         if len(mended):
             gap = (arcs.end - arcs.stop)[mended].astype(np.float64)
-            rest = np.hypot(gap[:, 0], gap[:, 1]) * self._grid.step_mm * 1000.0
-            changes.remainder_um = float(rest.max())
-            changes.remainder_place = self._place(int(arcs.row[mended[rest.argmax()]]))
+            gaps_um = np.hypot(gap[:, 0], gap[:, 1]) * self._grid.step_mm * 1000.0
+            changes.remainder_um = float(gaps_um.max())
+            changes.remainder_place = self._place(int(arcs.row[mended[gaps_um.argmax()]]))
 
     # Events, of which there are few.
 
     def _events(self, points: Points) -> list[tuple[int, str]]:
         """The blocks of all events, each with its row; PostError for the first row that cannot be
         sent. Messages have no word in the dialect and are not sent."""
-        found = []
+        blocks = []
         last = len(self._toolpath) - (1 if self._ended else 0)
         for row in np.flatnonzero(~self._toolpath.is_motion).tolist():
             if row > points.misfit:
                 break
             if self._first <= row < last:
-                found += [(row, block) for block in self._event(row)]
+                blocks += [(row, block) for block in self._event(row)]
         if points.misfit < len(self._toolpath):
             _refuse_chords(self._place(points.misfit))
-        return found
+        return blocks
 
     def _event(self, row: int) -> list[str]:
         """The blocks of one event."""
@@ -456,17 +456,17 @@ class Chords(Struct, frozen=True, eq=False):
 
     def without(self, arcs: Bools) -> Chords:
         """Return the chords without those of these arcs (J,)."""
-        kept = ~arcs[self.arc]
+        is_kept = ~arcs[self.arc]
         return Chords(
-            np.where(arcs, 0, self.count), self.end[kept], self.arc[kept], self.part[kept]
+            np.where(arcs, 0, self.count), self.end[is_kept], self.arc[is_kept], self.part[is_kept]
         )
 
 
-def turned_rad(out: Floats | Ints, now: Floats | Ints, clockwise: Bools) -> Floats:
-    """(J,) the sweep from the arms `out` to the arms `now` ((J, 2) each), in (0, 2π]; a full turn
-    when the two are one."""
-    cross = out[:, 0] * now[:, 1] - out[:, 1] * now[:, 0]
-    dot = out[:, 0] * now[:, 0] + out[:, 1] * now[:, 1]
+def turned_rad(start_arm: Floats | Ints, end_arm: Floats | Ints, clockwise: Bools) -> Floats:
+    """(J,) the sweep from the arms `start_arm` to the arms `end_arm` ((J, 2) each), in (0, 2π]; a
+    full turn when the two are one."""
+    cross = start_arm[:, 0] * end_arm[:, 1] - start_arm[:, 1] * end_arm[:, 0]
+    dot = start_arm[:, 0] * end_arm[:, 0] + start_arm[:, 1] * end_arm[:, 1]
     angle = np.mod(np.arctan2(np.where(clockwise, -cross, cross), dot), _TURN)
     return np.where(angle == 0.0, _TURN, angle)
 
@@ -482,15 +482,15 @@ def chord_ends(start: Floats, centre: Floats, sweep_rad: Floats, sagitta_mm: flo
     `start`, `centre` (J, 2) mm; signed sweeps (J,). A chord over the angle a strays by
     R (1 − cos(a/2)); no chord turns by more than a right angle.
     """
-    out = start - centre
-    radius = np.hypot(out[:, 0], out[:, 1])
+    arms = start - centre
+    radius = np.hypot(arms[:, 0], arms[:, 1])
     with np.errstate(divide="ignore"):
         ratio = np.minimum(1.0, sagitta_mm / radius)
     widest = np.minimum(math.pi / 2.0, 2.0 * np.arccos(1.0 - ratio))
     count = np.maximum(np.ceil(np.abs(sweep_rad) / widest), 1.0).astype(np.int64)
     arc = np.repeat(np.arange(len(count)), count - 1)
     part = np.arange(len(arc)) - np.repeat(np.cumsum(count - 1) - (count - 1), count - 1)
-    angle = np.arctan2(out[:, 1], out[:, 0])[arc] + sweep_rad[arc] * (part + 1) / count[arc]
+    angle = np.arctan2(arms[:, 1], arms[:, 0])[arc] + sweep_rad[arc] * (part + 1) / count[arc]
     spoke = radius[arc, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     return Chords(count, centre[arc] + spoke, arc, part)
 

@@ -80,16 +80,16 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
         step_mm = coded_steps_mm(machine)
         start = pieces.in_steps(toolpath.start) * step_mm
         end = toolpath.by_parts(lambda part: pieces.in_steps(part.end) * step_mm)
-        whole = replace(toolpath, start=start, end=read_only(end))
+        rounded = replace(toolpath, start=start, end=read_only(end))
         # Arcs of less than a step: their ends may have become one point, and they a circle.
         arcs = np.flatnonzero(toolpath.is_arc)
-        closed = (whole.end[arcs] == whole.starts_of(arcs))[:, :2].all(axis=1)
-        lost = arcs[closed & (np.abs(toolpath.sweeps_of(arcs)) < np.pi)]
-        if len(lost):
-            kind, centre = whole.kind.copy(), whole.centre.copy()
-            kind[lost], centre[lost] = Kind.LINE, np.nan
-            whole = replace(whole, kind=kind, centre=centre)
-        return round_to_steps(whole, machine)
+        closed = (rounded.end[arcs] == rounded.starts_of(arcs))[:, :2].all(axis=1)
+        vanished = arcs[closed & (np.abs(toolpath.sweeps_of(arcs)) < np.pi)]
+        if len(vanished):
+            kind, centre = rounded.kind.copy(), rounded.centre.copy()
+            kind[vanished], centre[vanished] = Kind.LINE, np.nan
+            rounded = replace(rounded, kind=kind, centre=centre)
+        return round_to_steps(rounded, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """Lines by the counter, arcs by lines."""
@@ -98,10 +98,10 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
         """Return the assumptions behind the times and the path, as sentences for the report."""
         controller = machine.controller
-        between = _Pieces(toolpath, machine).between_steps()
+        midways = _Pieces(toolpath, machine).between_steps()
         midway = "midway between two steps" if controller.rounding == "nearest" else "on a step"
         open_ends = (
-            f"{between} coordinates lie {midway}: its compiler's binary fractions decide whether "
+            f"{midways} coordinates lie {midway}: its compiler's binary fractions decide whether "
             "such an end is one step less (not said, L1226)"
         )
         pieces = f"pieces of {controller.arc_segment_mm:g} mm (controller.arc_segment_mm)"
@@ -112,7 +112,7 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
             "rest (controller.step_rate_hz): no ramps, no steps lost",
             f"arcs are drawn in {pieces}",
             "the controller's own arithmetic takes no time",
-            *((open_ends,) if between else ()),
+            *((open_ends,) if midways else ()),
         )
 
 
@@ -130,8 +130,8 @@ def _run(
 ) -> Iterator[Chunk]:
     period_s = 1.0 / machine.controller.step_rate_hz
     waits = waits_s(toolpath, toolpath.executed_rows)
-    standing = LegProgram(pieces.drawn.steps, waits, period_s)
-    return LegRun(standing, machine, options).run(pieces.legs())
+    leg_program = LegProgram(pieces.drawn.steps, waits, period_s)
+    return LegRun(leg_program, machine, options).run(pieces.legs())
 
 
 class _Pieces:
@@ -158,7 +158,7 @@ class _Pieces:
     def in_steps(self, points: Floats) -> Ints:
         """Coordinates, or differences of them, (..., 3) mm in steps."""
         if self._controller.rounding == "nearest":
-            columns = [to_steps(points[..., at], self._step_mm[at]) for at in range(3)]
+            columns = [to_steps(points[..., axis], self._step_mm[axis]) for axis in range(3)]
             return np.stack(columns, axis=-1)
         return np.asarray(np.trunc(points / self._step_mm + self._guard(points)).astype(np.int64))
 
@@ -167,26 +167,26 @@ class _Pieces:
         changes, within `HALF_STEP_GUARD` of a step."""
         turns_at = 0.5 if self._controller.rounding == "nearest" else 0.0
         points = np.unique(self._end, axis=0) / self._step_mm
-        off = points - turns_at
-        near = np.abs(off - np.rint(off)) <= HALF_STEP_GUARD
-        return int((near & (points != 0.0)).sum())
+        offsets = points - turns_at
+        is_near = np.abs(offsets - np.rint(offsets)) <= HALF_STEP_GUARD
+        return int((is_near & (points != 0.0)).sum())
 
     def legs(self) -> Iterator[Legs]:
         """The legs, some thousands at a time."""
         period_s = 1.0 / self._controller.step_rate_hz
-        before, at = self.drawn.point[None, :], self.drawn.steps[None, :]
+        before, places_before = self.drawn.point[None, :], self.drawn.steps[None, :]
         for low in range(0, int(self._first[-1]), PIECES_AT_ONCE):
             row, points = self._points(low, min(low + PIECES_AT_ONCE, int(self._first[-1])))
             if self._controller.counting == "coordinates":
-                places = np.concatenate([at, self.in_steps(points)])
-                way = np.diff(places, axis=0)
+                places = np.concatenate([places_before, self.in_steps(points)])
+                travel = np.diff(places, axis=0)
             else:
-                way = self.in_steps(np.diff(np.concatenate([before, points]), axis=0))
-            before, at = points[-1:], at + way.sum(axis=0)
-            self.drawn = DrawingProgress(before[0], at[0])
-            passes = np.abs(way).max(axis=1)
+                travel = self.in_steps(np.diff(np.concatenate([before, points]), axis=0))
+            before, places_before = points[-1:], places_before + travel.sum(axis=0)
+            self.drawn = DrawingProgress(before[0], places_before[0])
+            passes = np.abs(travel).max(axis=1)
             moves = np.flatnonzero(passes)
-            yield Legs(row[moves], way[moves], passes[moves] * period_s)
+            yield Legs(row[moves], travel[moves], passes[moves] * period_s)
 
     def _points(self, low: int, high: int) -> tuple[Ints, Floats]:
         """Row (J,) and end (J, 3) mm of the pieces low:high."""
@@ -220,11 +220,11 @@ class _Pieces:
         offset = np.where(turn[:, None] != 0, toolpath.centre[:count] - ends[:-1, :2], 0.0)
         computed = self._controller.arc_end == "computed"
         begin = self.drawn.point[:2].copy()
-        bad = int(arc_angles(turn, begin, ends[:, :2].copy(), offset, computed, angles))
-        if bad >= 0:
+        bad_row = int(arc_angles(turn, begin, ends[:, :2].copy(), offset, computed, angles))
+        if bad_row >= 0:
             raise ProgramError(
                 "an arc about its own start, or with a chord longer than its diameter",
-                where=block_of(toolpath, bad),
+                where=block_of(toolpath, bad_row),
                 mend="give I and J from the start to the centre",
             )
         return angles[self._arc_rows]
@@ -238,13 +238,13 @@ class _Pieces:
             countable = (reach <= MAX_STEPS * self._step_mm[:2]).all(axis=1)
         rises = toolpath.end[rows, 2] != starts[:, 2]
         unequal = np.full(len(rows), self._step_mm[0] != self._step_mm[1])
-        for bad, message in (
+        for is_bad, message in (
             (~countable, "an arc without a centre, or farther than the controller can count"),
             (rises, "Z moves along with an arc"),
             (unequal, "on axes of unequal steps an arc is an ellipse"),
         ):
-            if bad.any():
-                raise ProgramError(message, where=block_of(toolpath, int(rows[bad.argmax()])))
+            if is_bad.any():
+                raise ProgramError(message, where=block_of(toolpath, int(rows[is_bad.argmax()])))
 
     def _parts(self, arcs: Floats) -> Ints:
         """(J,) pieces of arcs (J, 5)."""

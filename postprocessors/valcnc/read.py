@@ -52,10 +52,10 @@ def read_program(data: bytes, machine: ValcncMachine) -> Toolpath:
     return reader.path.finish(reader.findings())
 
 
-def read_block(data: bytes, machine: ValcncMachine, at: Point) -> tuple[Toolpath, Point]:
-    """The moves of one block that follows others, which ended `at` a place in the program's
+def read_block(data: bytes, machine: ValcncMachine, start: Point) -> tuple[Toolpath, Point]:
+    """The moves of one block that follows others, which ended `start` a place in the program's
     units; and where it ends. ProgramError when it is none."""
-    reader = _Reader(machine, at)
+    reader = _Reader(machine, start)
     reader.read(data)
     return reader.path.finish(), reader.at
 
@@ -72,19 +72,19 @@ class _Missed(Struct):
 class _Reader:
     """Blocks in, rows out, in mm."""
 
-    def __init__(self, machine: ValcncMachine, at: Point = (0.0, 0.0, 0.0)) -> None:
+    def __init__(self, machine: ValcncMachine, start: Point = (0.0, 0.0, 0.0)) -> None:
         self._dialect = machine.dialect
         scale_x, scale_y, scale_z = scales_of(machine, self._dialect).tolist()
         self._scales = (scale_x, scale_y, scale_z)
         self._alike = abs(scale_x - scale_y) <= SCALE_GUARD * scale_x
         self._feed = machine.max_feed_mm_min
         self._step_mm = machine.axes.x.coded_step_mm
-        self.at = at
+        self.at = start
         self._missed = _Missed()
         self.lexing = Lexing(
             letters="GXYZIJ", blanks="anywhere", line_chars=self._dialect.block_chars
         )
-        self.path = ToolpathBuilder(start=self._mm(*at))
+        self.path = ToolpathBuilder(start=self._mm(*start))
         self.blocks = 0
 
     def read(self, data: bytes) -> None:
@@ -104,8 +104,10 @@ class _Reader:
             self._check_words(block, letters)
         values = {letter: float(text) for letter, text in block.words[1:]}
         if not max(map(abs, values.values()), default=0.0) <= MAX_UNITS:
-            at = next(at for at, value in enumerate(values.values(), 1) if abs(value) > MAX_UNITS)
-            block.fail(f"a number beyond ±{MAX_UNITS:g}", word=at, mend="check the units")
+            word = next(
+                word for word, value in enumerate(values.values(), 1) if abs(value) > MAX_UNITS
+            )
+            block.fail(f"a number beyond ±{MAX_UNITS:g}", word=word, mend="check the units")
         self.path.block = block.index
         if letters.startswith("GXYZ"):
             end = values["X"], values["Y"], values["Z"]
@@ -117,7 +119,7 @@ class _Reader:
             self._line(block, code, values, end)
         self.at = end
 
-    def take(self, plain: PlainBlocks) -> int:
+    def take(self, blocks: PlainBlocks) -> int:
         """Decode the first plain blocks at once, as columns, and return how many were decoded.
 
         It stops at the first block for which `block` might return something else. A block is sure
@@ -125,33 +127,33 @@ class _Reader:
         or Y, and if the ends of its arc are equally far from the centre, and nearer to each other
         than `NEARLY_DIAMETER`.
         """
-        numbers, form = plain.numbers, plain.facts[:, words.FORM]
+        numbers, form = blocks.numbers, blocks.facts[:, words.FORM]
         line, arc = form == form_of("GXYZ"), form == form_of("GXYZIJ")
         kind = np.where(line | arc, numbers[:, words.G_WORD], 0.0).astype(np.int64)
-        sure = (line & (kind <= Kind.LINE)) | (arc & (kind >= Kind.ARC_CW) & self._alike)
-        sure &= plain.facts[:, words.TWO_DIGITS] == 1
+        is_sure = (line & (kind <= Kind.LINE)) | (arc & (kind >= Kind.ARC_CW) & self._alike)
+        is_sure &= blocks.facts[:, words.TWO_DIGITS] == 1
         ends, offset = (
             numbers[:, words.X_WORD : words.Z_WORD + 1],
             numbers[:, words.I_WORD :][:, :2],
         )
-        sure &= (np.abs(ends) <= MAX_UNITS).all(axis=1)
-        sure &= line | (np.abs(offset) <= MAX_UNITS).all(axis=1)
+        is_sure &= (np.abs(ends) <= MAX_UNITS).all(axis=1)
+        is_sure &= line | (np.abs(offset) <= MAX_UNITS).all(axis=1)
         start = np.concatenate([[self.at], ends[:-1]])
         travel = ends - start
-        flat, deep = (travel[:, :2] != 0.0).any(axis=1), travel[:, 2] != 0.0
-        sure &= ~deep | (line & (~flat | (self._dialect.z_order == "together")))
+        flat, has_z = (travel[:, :2] != 0.0).any(axis=1), travel[:, 2] != 0.0
+        is_sure &= ~has_z | (line & (~flat | (self._dialect.z_order == "together")))
         radius, length = np.hypot(*offset.T), np.hypot(*travel[:, :2].T)
         spread = np.abs(radius - np.hypot(*(travel[:, :2] - offset).T)) / self._scales[0]
         fine = (length > 0.0) & (length <= SURE_PART * NEARLY_DIAMETER * 2.0 * radius)
-        sure &= line | (fine & (spread <= SURE_PART * self._dialect.arc_spread_mm))
-        count = len(sure) if sure.all() else int(sure.argmin())
+        is_sure &= line | (fine & (spread <= SURE_PART * self._dialect.arc_spread_mm))
+        count = len(is_sure) if is_sure.all() else int(is_sure.argmin())
         if count:
-            self._send(plain, kind, count)
+            self._send(blocks, kind, count)
         return count
 
-    def _send(self, plain: PlainBlocks, kind: Ints, count: int) -> None:
+    def _send(self, blocks: PlainBlocks, kind: Ints, count: int) -> None:
         """The moves of the first so many blocks."""
-        numbers, kind = plain.numbers[:count], kind[:count]
+        numbers, kind = blocks.numbers[:count], kind[:count]
         end = numbers[:, words.X_WORD : words.Z_WORD + 1]
         self.at = end[-1, 0].item(), end[-1, 1].item(), end[-1, 2].item()
         end = end / self._scales + 0.0
@@ -164,24 +166,24 @@ class _Reader:
             end=end,
             centre=start + offset / self._scales[:2],
             feed=np.where(kind == Kind.RAPID, np.nan, self._feed),
-            block=np.arange(plain.first, plain.first + count),
+            block=np.arange(blocks.first, blocks.first + count),
         )
 
     def _check_words(self, block: WordBlock, letters: str) -> None:
         """ProgramError for an unknown code, for a word that stands twice, and for tabs."""
         first = "".join(block.words[0])
         if letters[0] != "G" or block.words[0][1] not in CODES:
-            known = " ".join(f"G{code}" for code in CODES)
+            codes = " ".join(f"G{code}" for code in CODES)
             block.fail(
-                f"{first} is not a code of this controller", mend=f"begin with one of {known}"
+                f"{first} is not a code of this controller", mend=f"begin with one of {codes}"
             )
         if "\t" in block.text:
             block.fail("a tab: only spaces are dropped", mend="use spaces")
-        for at, letter in enumerate(letters):
-            if letter in letters[:at]:
+        for index, letter in enumerate(letters):
+            if letter in letters[:index]:
                 block.fail(
                     f"a second {letter}, which the controller ignores",
-                    word=at,
+                    word=index,
                     mend="write one block a line",
                 )
 
@@ -219,8 +221,8 @@ class _Reader:
     def _line(self, block: WordBlock, code: str, values: dict[str, float], end: Point) -> None:
         """A line; in two where the option puts Z before or after X and Y."""
         if "I" in values or "J" in values:
-            at, letter = next((at, one) for at, one in enumerate(values, 1) if one in "IJ")
-            block.fail(f"{letter} in a G{code}, which is no arc", word=at, mend="remove it")
+            word, letter = next((word, one) for word, one in enumerate(values, 1) if one in "IJ")
+            block.fail(f"{letter} in a G{code}, which is no arc", word=word, mend="remove it")
         first = self._in_order(block, end)
         for point in (first, end) if first else (end,):
             x, y, z = self._mm(*point)
@@ -276,10 +278,10 @@ class _Reader:
         other = math.hypot(chord[0] - i, chord[1] - j)
         if radius == 0.0:
             _fail_at_i(block, "an arc about its own start", "give I and J from the start")
-        spread, most = abs(radius - other) / self._scales[0], self._dialect.arc_spread_mm
-        if spread > most:
+        spread, max_spread = abs(radius - other) / self._scales[0], self._dialect.arc_spread_mm
+        if spread > max_spread:
             message = f"the radii at the arc's start and end differ by {spread:.4g} mm"
-            _fail_at_i(block, message, f"they may differ by {most:g} mm")
+            _fail_at_i(block, message, f"they may differ by {max_spread:g} mm")
         length = math.hypot(*chord)
         if length == 0.0:
             if self._dialect.full_circles == "refused":
@@ -302,13 +304,16 @@ class _Reader:
         self, block: WordBlock, offset: tuple[float, float], chord: tuple[float, float]
     ) -> None:
         """Compare 2·arcsin(C/2R), or 2π less it, with the angle between the two arms."""
-        out = -offset[0], -offset[1]
-        back = chord[0] - offset[0], chord[1] - offset[1]
-        cross, dot = out[0] * back[1] - out[1] * back[0], out[0] * back[0] + out[1] * back[1]
+        start_arm = -offset[0], -offset[1]
+        end_arm = chord[0] - offset[0], chord[1] - offset[1]
+        cross, dot = (
+            start_arm[0] * end_arm[1] - start_arm[1] * end_arm[0],
+            start_arm[0] * end_arm[0] + start_arm[1] * end_arm[1],
+        )
         angle = abs(math.atan2(cross, dot))
         radius = math.hypot(*offset)
-        taken = 2.0 * math.asin(min(1.0, math.hypot(*chord) / (2.0 * radius)))
-        miss_mm = abs(taken - angle) * radius / self._scales[0]
+        computed_angle = 2.0 * math.asin(min(1.0, math.hypot(*chord) / (2.0 * radius)))
+        miss_mm = abs(computed_angle - angle) * radius / self._scales[0]
         if miss_mm > self._step_mm:
             self._missed.count += 1
             if miss_mm > self._missed.most_mm:
@@ -318,5 +323,5 @@ class _Reader:
 
 def _fail_at_i(block: WordBlock, message: str, mend: str) -> NoReturn:
     """ProgramError at the I word of an arc."""
-    at = next(index for index, (letter, _) in enumerate(block.words) if letter == "I")
-    block.fail(message, word=at, mend=mend)
+    word = next(index for index, (letter, _) in enumerate(block.words) if letter == "I")
+    block.fail(message, word=word, mend=mend)

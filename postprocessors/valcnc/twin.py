@@ -54,10 +54,10 @@ def _with_all_defined(
     controller does something all the same. What ours does is in the page of its wire."""
     dialect = machine.dialect
     meant = {"z_order": "before", "missing_words": "keep", "full_circles": "whole"}
-    given: dict[str, Any] = {
+    defined: dict[str, Any] = {
         key: value for key, value in meant.items() if getattr(dialect, key) == "refused"
     }
-    dialect = replace(dialect, **given)
+    dialect = replace(dialect, **defined)
     return replace(machine, dialect=dialect)
 
 
@@ -110,10 +110,10 @@ class ValcncTwin(Twin):
     def _block(self, line: bytes) -> None:
         """Draw it, if it is one."""
         try:
-            path, at = read_block(line, self._machine, self._at)
+            path, end_place = read_block(line, self._machine, self._at)
             chunks, drawn = self._model.run_on(self._drawn, path, self._machine, COMMANDED)
         except ProgramError:
             return
-        self._at, self._drawn, self._drawing = at, drawn, True
+        self._at, self._drawn, self._drawing = end_place, drawn, True
         self.decoded.append(line + b"\n")
         self.slides.begin(travel_of(chunks), self.now, len(self.decoded) - 1)

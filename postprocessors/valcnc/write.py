@@ -58,15 +58,15 @@ def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
     check_plain(toolpath, machine)
     _check_tools(toolpath)
     scales = scales_of(machine, dialect)
-    lowered, split = split_z(toolpath, machine)
-    lowered, squeezed = _lower_arcs(lowered, scales, machine, dialect)
+    lowered_path, split = split_z(toolpath, machine)
+    lowered_path, squeezed = _lower_arcs(lowered_path, scales, machine, dialect)
     rules = ArcRules(dialect.decimals, "halves", MAX_UNITS, chord_fits=True)
-    rows = plain_rows(_in_units(lowered.toolpath, scales), rules)
-    of_row = lowered.row[rows.row]
+    rows = plain_rows(_in_units(lowered_path.toolpath, scales), rules)
+    of_row = lowered_path.row[rows.row]
     refuse_too_long(int(np.count_nonzero(rows.moves)), "line")
     data = _text(rows, dialect)
     check_length(data, dialect.block_chars, "block", "use fewer decimals, or check the units")
-    first = toolpath.place(int(lowered.row[rows.first])) if rows.first >= 0 else ""
+    first = toolpath.place(int(lowered_path.row[rows.first])) if rows.first >= 0 else ""
     return Program.of_text(
         data,
         machine,
@@ -93,19 +93,19 @@ def _check_tools(toolpath: Toolpath) -> None:
 
 
 def _lower_arcs(
-    lowered: LoweredToolpath, scales: Floats, machine: ValcncMachine, dialect: ValcncDialect
+    lowered_path: LoweredToolpath, scales: Floats, machine: ValcncMachine, dialect: ValcncDialect
 ) -> tuple[LoweredToolpath, list[Finding]]:
     """Split arcs at the dialect's longest sweep; turn them into lines where X and Y are scaled
     differently."""
-    path = lowered.toolpath
+    path = lowered_path.toolpath
     count = int(path.is_arc.sum())
     if scales[0] == scales[1] or not count:
-        short = arcs_within(path, math.radians(dialect.max_sweep_deg))
-        return short.after(lowered), []
+        shortened = arcs_within(path, math.radians(dialect.max_sweep_deg))
+        return shortened.after(lowered_path), []
     tolerance = machine.defaults.fit_tolerance_mm
     chords = arcs_to_lines(path, path.is_arc, tolerance)
     finding = ARC_MENDED(measured=count, tolerance=tolerance)
-    return chords.after(lowered), [finding]
+    return chords.after(lowered_path), [finding]
 
 
 def _in_units(toolpath: Toolpath, scales: Floats) -> Toolpath:
@@ -121,12 +121,18 @@ def _in_units(toolpath: Toolpath, scales: Floats) -> Toolpath:
 def _text(rows: PlainRows, dialect: ValcncDialect) -> bytes:
     """The blocks of all rows that move."""
     style = NumberStyle(dialect.decimals)
-    sent = rows.moves
-    arc = sent & rows.is_arc
+    is_sent = rows.moves
+    arc = is_sent & rows.is_arc
     columns = [
-        WordColumn("G", rows.kind, sent, digits=2),
-        *(word_of(axis, rows.end[:, at], sent, style) for at, axis in enumerate("XYZ")),
-        *(word_of(axis, rows.offset[:, at], arc, style) for at, axis in enumerate("IJ")),
+        WordColumn("G", rows.kind, is_sent, digits=2),
+        *(
+            word_of(axis, rows.end[:, axis_index], is_sent, style)
+            for axis_index, axis in enumerate("XYZ")
+        ),
+        *(
+            word_of(axis, rows.offset[:, axis_index], arc, style)
+            for axis_index, axis in enumerate("IJ")
+        ),
     ]
     return texts_of(columns, blanks=True).data
 
