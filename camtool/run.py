@@ -122,7 +122,7 @@ class Run(Shown):
             machine=self.target.machine,
             listing=self.listing,
             tabs=() if self.wanted is None else self.wanted.tabs_mm,
-            wanted=self.wanted,
+            wanted_path=self.wanted,
             target=self.target,
         )
 

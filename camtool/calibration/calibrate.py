@@ -100,47 +100,49 @@ def solve(model: Model, start: Floats) -> Solution:
     """Fit the parameters of the model to its readings by least squares, from the values `start`
     (P,)."""
     uncertain_mm = [reading.uncertainty_mm or np.nan for reading in model.readings]
-    known = bool(np.isfinite(uncertain_mm).all())
-    weights = 1.0 / np.array(uncertain_mm) if known else np.ones(len(uncertain_mm))
+    has_uncertainty = bool(np.isfinite(uncertain_mm).all())
+    weights = 1.0 / np.array(uncertain_mm) if has_uncertainty else np.ones(len(uncertain_mm))
     measured = np.array([reading.measured_mm for reading in model.readings])
     values = start.copy()
-    free, fixed = _identifiable(model.parameters, model.slopes(values) * weights[:, None])
+    is_free, fixed = _identifiable(model.parameters, model.slopes(values) * weights[:, None])
     for _ in range(ROUNDS):
-        matrix = model.slopes(values)[:, free] * weights[:, None]
+        matrix = model.slopes(values)[:, is_free] * weights[:, None]
         residual = (measured - model.predict(values)) * weights
         change = np.linalg.lstsq(matrix, residual, rcond=None)[0]
-        values[free] += change
+        values[is_free] += change
         if not len(change) or np.abs(change).max() < SETTLED:
             break
     predicted = model.predict(values)
-    matrix = model.slopes(values)[:, free] * weights[:, None]
+    matrix = model.slopes(values)[:, is_free] * weights[:, None]
     residual = (measured - predicted) * weights
-    freedom = len(measured) - int(free.sum())
+    freedom = len(measured) - int(is_free.sum())
     spread = float(np.sqrt(residual @ residual / freedom)) if freedom > 0 else np.nan
-    unit = np.fmax(spread, 1.0) if known else spread
+    unit = np.fmax(spread, 1.0) if has_uncertainty else spread
     inverse = np.linalg.pinv(matrix)
     covariance = np.full((len(values), len(values)), np.nan)
-    covariance[np.ix_(free, free)] = unit**2 * inverse @ inverse.T
+    covariance[np.ix_(is_free, is_free)] = unit**2 * inverse @ inverse.T
     leverage = np.einsum("ij,ji->i", matrix, inverse)
-    sigma = _sigma(residual, leverage, freedom, known=known) / weights
-    return Solution(values, covariance, predicted, sigma, free, fixed, freedom, spread)
+    sigma = _sigma(residual, leverage, freedom, has_uncertainty=has_uncertainty) / weights
+    return Solution(values, covariance, predicted, sigma, is_free, fixed, freedom, spread)
 
 
-def _sigma(residual: Floats, leverage: Floats, freedom: int, *, known: bool) -> Floats:
+def _sigma(residual: Floats, leverage: Floats, freedom: int, *, has_uncertainty: bool) -> Floats:
     """Compute the standard deviation (n,) of each weighted residual, estimated from the other
     readings.
 
     Without reading i the sum of squares is smaller by r_i² / (1 − h_i), h the leverage. A reading
     that alone determines a parameter (h = 1) has no residual.
     """
-    rest = np.clip(1.0 - leverage, 0.0, 1.0)
-    judged = rest > SINGULAR
-    others = np.full(len(residual), 1.0 if known else np.nan)
+    redundancy = np.clip(1.0 - leverage, 0.0, 1.0)
+    is_testable = redundancy > SINGULAR
+    sigmas = np.full(len(residual), 1.0 if has_uncertainty else np.nan)
     if freedom - 1 >= OUTLIER_FREEDOM:
-        share = np.divide(residual**2, rest, out=np.zeros_like(rest), where=judged)
+        share = np.divide(
+            residual**2, redundancy, out=np.zeros_like(redundancy), where=is_testable
+        )
         squares = np.clip(residual @ residual - share, 0.0, None)
-        others = np.fmax(np.sqrt(squares / (freedom - 1)), 1.0 if known else 0.0)
-    return np.where(judged, others * np.sqrt(rest), np.nan)
+        sigmas = np.fmax(np.sqrt(squares / (freedom - 1)), 1.0 if has_uncertainty else 0.0)
+    return np.where(is_testable, sigmas * np.sqrt(redundancy), np.nan)
 
 
 def _identifiable(
@@ -148,26 +150,30 @@ def _identifiable(
 ) -> tuple[Bools, tuple[FixedParameter, ...]]:
     """Mask (P,) of the parameters that the readings determine, and the others with the reason."""
     size = np.linalg.norm(matrix, axis=0)
-    free = size > 0.0
-    touched = free.copy()
-    while free.any():
-        index = np.flatnonzero(free)
+    is_free = size > 0.0
+    touched = is_free.copy()
+    while is_free.any():
+        index = np.flatnonzero(is_free)
         _, singular, rows = np.linalg.svd(matrix[:, index] / size[index])
         rank = int((singular > SINGULAR * singular[0]).sum())
         if rank == len(index):
             break
-        together = index[np.abs(rows[rank:]).max(axis=0) > INVOLVED]
-        free[max(together, key=lambda column: (_fixing_order(parameters[column]), column))] = False
+        involved = index[np.abs(rows[rank:]).max(axis=0) > INVOLVED]
+        is_free[max(involved, key=lambda column: (_fixing_order(parameters[column]), column))] = (
+            False
+        )
     fixed: list[FixedParameter] = []
-    for column in np.flatnonzero(~free).tolist():
-        why = "no reading depends on it"
+    for column in np.flatnonzero(~is_free).tolist():
+        reason = "no reading depends on it"
         if touched[column]:
-            parts = np.linalg.lstsq(matrix[:, free], matrix[:, column], rcond=None)[0]
-            shares = np.abs(parts) * size[free] > INVOLVED * size[column]
-            others = [str(parameters[other]) for other in np.flatnonzero(free)[shares].tolist()]
-            why = f"the readings cannot distinguish it from {' and '.join(others)}"
-        fixed.append(FixedParameter(parameters[column], why))
-    return free, tuple(fixed)
+            parts = np.linalg.lstsq(matrix[:, is_free], matrix[:, column], rcond=None)[0]
+            shares = np.abs(parts) * size[is_free] > INVOLVED * size[column]
+            partners = [
+                str(parameters[other]) for other in np.flatnonzero(is_free)[shares].tolist()
+            ]
+            reason = f"the readings cannot distinguish it from {' and '.join(partners)}"
+        fixed.append(FixedParameter(parameters[column], reason))
+    return is_free, tuple(fixed)
 
 
 def _fixing_order(parameter: Parameter) -> int:
@@ -250,10 +256,10 @@ class Calibration:
     uncertainty_mm: float | None
     known: Uncertainty
 
-    def estimate(self, what: str, axis: str = "", region: str = "") -> Estimate | None:
+    def estimate(self, quantity: str, axis: str = "", region: str = "") -> Estimate | None:
         """Return the estimate of this value, or None."""
         for each in self.estimates:
-            if (each.what, each.axis, each.region) == (what, axis, region):
+            if (each.what, each.axis, each.region) == (quantity, axis, region):
                 return each
         return None
 
@@ -275,7 +281,7 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
     estimates = (*_estimates(model, solution, machine), *_mean_backlash(model, solution, machine))
     for estimate in estimates:
         _refuse_negative_backlash(estimate, machine, measurements.file)
-    known = [reading.uncertainty_mm for reading in readings if reading.uncertainty_mm]
+    uncertainties = [reading.uncertainty_mm for reading in readings if reading.uncertainty_mm]
     predicted = solution.predicted.tolist()
     residuals = [r.measured_mm - p for r, p in zip(readings, predicted, strict=True)]
     freedom = solution.freedom
@@ -294,8 +300,8 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
         ),
         freedom=freedom,
         spread_mm=_norm(residuals) / math.sqrt(freedom) if freedom > 0 else None,
-        uncertainty_mm=_norm(known) / math.sqrt(len(known))
-        if len(known) == len(readings)
+        uncertainty_mm=_norm(uncertainties) / math.sqrt(len(uncertainties))
+        if len(uncertainties) == len(readings)
         else None,
         known=_known(model, solution),
     )
@@ -315,30 +321,36 @@ def _estimates(model: Model, solution: Solution, machine: Machine) -> list[Estim
     """Return the estimated parameters in the units of the machine."""
     start = model.start(machine)
     depends = model.depends(solution.values)
-    found = []
+    estimates = []
     for column, parameter in enumerate(model.parameters):
         if not solution.free[column]:
             continue
         before, value = float(start[column]), float(solution.values[column])
-        sure = solution.uncertainty([column])
-        what = parameter.what
+        deviation = solution.uncertainty([column])
+        quantity = parameter.what
         if parameter == SQUARENESS:
-            before, value, sure = math.atan(before), math.atan(value), sure / (1.0 + value**2)
-        elif what == "scale":
+            before, value, deviation = (
+                math.atan(before),
+                math.atan(value),
+                deviation / (1.0 + value**2),
+            )
+        elif quantity == "scale":
             axis: Axis = getattr(machine.axes, parameter.axis)
-            coded, what = axis.coded_step_mm, "step"
-            before, value, sure = axis.real_step_mm, value * coded, sure * coded
+            coded, quantity = axis.coded_step_mm, "step"
+            before, value, deviation = axis.real_step_mm, value * coded, deviation * coded
         count = int(depends[:, column].sum())
-        known = sure if math.isfinite(sure) else None
-        found.append(Estimate(what, parameter.axis, parameter.region, before, value, known, count))
-    return found
+        stated = deviation if math.isfinite(deviation) else None
+        estimates.append(
+            Estimate(quantity, parameter.axis, parameter.region, before, value, stated, count)
+        )
+    return estimates
 
 
 def _mean_backlash(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
     """Return the mean backlash of axes measured in regions, if that of all regions is
     estimated."""
     depends = model.depends(solution.values)
-    found = []
+    estimates = []
     for axis in ("x", "y"):
         columns = [
             column
@@ -347,12 +359,14 @@ def _mean_backlash(model: Model, solution: Solution, machine: Machine) -> list[E
         ]
         if columns and all(solution.free[column] for column in columns):
             count = int(depends[:, columns].any(axis=1).sum())
-            sure = solution.uncertainty(columns)
-            said: Axis = getattr(machine.axes, axis)
+            deviation = solution.uncertainty(columns)
+            axis_record: Axis = getattr(machine.axes, axis)
             value = float(solution.values[columns].mean())
-            known = sure if math.isfinite(sure) else None
-            found.append(Estimate("play", axis, "", said.backlash_mm, value, known, count))
-    return found
+            stated = deviation if math.isfinite(deviation) else None
+            estimates.append(
+                Estimate("play", axis, "", axis_record.backlash_mm, value, stated, count)
+            )
+    return estimates
 
 
 def _known(model: Model, solution: Solution) -> Uncertainty:
@@ -403,11 +417,11 @@ def _known(model: Model, solution: Solution) -> Uncertainty:
 def _rows(model: Model, values: Floats) -> Iterator[tuple[str, Floats]]:
     """(key of `[uncertainty]`, (P,) derivatives of its value by the parameters)."""
     for axis in "xy":
-        for what, key in (("play", "backlash_mm"), ("scale", "scale")):
-            own = [each.what == what and each.axis == axis for each in model.parameters]
-            if any(own):
-                by = np.where(own, values, 1.0) if what == "scale" else 1.0
-                yield f"{axis}.{key}", np.array(own) / (sum(own) * by)
+        for quantity, key in (("play", "backlash_mm"), ("scale", "scale")):
+            is_own = [each.what == quantity and each.axis == axis for each in model.parameters]
+            if any(is_own):
+                divisor = np.where(is_own, values, 1.0) if quantity == "scale" else 1.0
+                yield f"{axis}.{key}", np.array(is_own) / (sum(is_own) * divisor)
     lean = np.array([each == SQUARENESS for each in model.parameters])
     yield "squareness_rad", lean / (1.0 + values**2)
 
@@ -510,9 +524,11 @@ def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[
     for axis in ("x", "y", "z"):
         play, step = calibration.estimate("play", axis), calibration.estimate("step", axis)
         if play is not None:
-            said: Axis = getattr(machine.axes, axis)
-            steps = round(max(play.value, 0.0) / (step.value if step else said.real_step_mm))
-            yield axis, steps * said.coded_step_mm, steps
+            axis_record: Axis = getattr(machine.axes, axis)
+            steps = round(
+                max(play.value, 0.0) / (step.value if step else axis_record.real_step_mm)
+            )
+            yield axis, steps * axis_record.coded_step_mm, steps
 
 
 def outliers(calibration: Calibration) -> list[str]:
@@ -531,11 +547,11 @@ def _text(calibration: Calibration, machine: Machine) -> Iterator[str]:
     for unknown in calibration.not_estimated:
         yield f"not estimated: {unknown.name}: {unknown.why}"
     for axis, mm, steps in compensations(calibration, machine):
-        said: Axis = getattr(machine.axes, axis)
-        if said.compensation_mm > 0.0:
+        axis_record: Axis = getattr(machine.axes, axis)
+        if axis_record.compensation_mm > 0.0:
             yield (
                 f"compensation of {axis} that takes up this play: {mm:.4f} mm, {steps} steps "
-                f"(the machine's file says {said.compensation_mm:g} mm)"
+                f"(the machine's file says {axis_record.compensation_mm:g} mm)"
             )
     yield ""
     yield from _columns(
@@ -549,9 +565,9 @@ def _text(calibration: Calibration, machine: Machine) -> Iterator[str]:
 
 
 def _row(each: Estimate) -> tuple[str, ...]:
-    sure = "not known" if each.uncertainty is None else f"{each.uncertainty:.2g}"
+    deviation = "not known" if each.uncertainty is None else f"{each.uncertainty:.2g}"
     before, value = f"{each.before:.6g}", f"{each.value:.6g}"
-    return each.name, before, value, sure, _unit(each), str(each.readings)
+    return each.name, before, value, deviation, _unit(each), str(each.readings)
 
 
 def _fit(each: Fitted) -> tuple[str, ...]:

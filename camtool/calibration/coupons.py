@@ -137,17 +137,19 @@ def grid_of(side: float, machine: Machine | None) -> CouponGrid:
     finest = max((axis.resolution_mm or 0.0 for axis in axes), default=0.0)
     if finest > 0.0:
         unit = finest * max(1, math.floor(unit / finest + SAME))
-    lost = max((max(axis.backlash_mm, axis.compensation_mm) for axis in axes), default=0.0)
-    run_up = unit * max(RUN_UP_UNITS, math.ceil(RUN_UP_PLAYS * lost / unit - SAME))
+    backlash = max((max(axis.backlash_mm, axis.compensation_mm) for axis in axes), default=0.0)
+    run_up = unit * max(RUN_UP_UNITS, math.ceil(RUN_UP_PLAYS * backlash / unit - SAME))
     return CouponGrid(unit, run_up)
 
 
-def _on_grid(value: float, unit: float, how: Callable[[float], float]) -> float:
-    """Return the value in whole units, rounded by `how`; rounding errors do not change the
+def _on_grid(value: float, unit: float, rounding: Callable[[float], float]) -> float:
+    """Return the value in whole units, rounded by `rounding`; rounding errors do not change the
     number."""
     units = value / unit
-    near = round(units)
-    return (near if abs(units - near) < SAME * max(1.0, abs(near)) else how(units)) * unit
+    nearest = round(units)
+    return (
+        nearest if abs(units - nearest) < SAME * max(1.0, abs(nearest)) else rounding(units)
+    ) * unit
 
 
 def clean(value: float) -> float:
@@ -209,11 +211,11 @@ def sheet(
     if kind != "lines" and regions != (1, 1):
         raise OptionError(f"{kind} have no regions", mend="leave --regions out")
     grid = grid_of(min(size[0] / regions[0], size[1] / regions[1]), machine)
-    made = {"lines": _lines, "squares": _squares, "circles": _circles, "steps": _steps}
+    layouts = {"lines": _lines, "squares": _squares, "circles": _circles, "steps": _steps}
     paths: list[SheetPath] = []
     tables: list[tuple[str, dict[str, Any]]] = []
     for name, cell in cells_of(size, regions, grid.unit):
-        for path, table in made[kind](cell, grid):
+        for path, table in layouts[kind](cell, grid):
             paths.append(path)
             region = {"region": name} if name else {}
             tables.append((kind, {**region, **table}))
@@ -269,10 +271,16 @@ def _ruler(axis: str, corner: Point, end: float, grid: CouponGrid) -> Coupon:
     zero = along + run_up
     pitch = grid.down((end - run_up - zero) / STEPS)
     marks = [zero + k * pitch for k in range(STEPS + 1)]
-    there = [(along, across), *_wave(marks, (across, across + tall))]
-    far = marks[-1] + run_up
-    back = _wave(marks[::-1], (across + 2 * tall, across + 3 * tall))
-    points = [*there, (far, there[-1][1]), (far, back[0][1]), *back, (along, back[-1][1])]
+    outward = [(along, across), *_wave(marks, (across, across + tall))]
+    far_end = marks[-1] + run_up
+    return_wave = _wave(marks[::-1], (across + 2 * tall, across + 3 * tall))
+    points = [
+        *outward,
+        (far_end, outward[-1][1]),
+        (far_end, return_wave[0][1]),
+        *return_wave,
+        (along, return_wave[-1][1]),
+    ]
     table = {
         "axis": axis,
         "nominal_mm": [clean(k * pitch) for k in range(1, STEPS + 1)],
@@ -295,9 +303,9 @@ def _wave(marks: Sequence[float], levels: Point) -> list[Point]:
 def _squares(cell: CouponCell, grid: CouponGrid) -> Made:
     """Lay out squares about the middle of the cell, one inside the other."""
     hook = grid.run_up
-    x, y, most = grid.middle(cell)
+    x, y, room = grid.middle(cell)
     for part in SQUARES:
-        half = grid.down(part * (most - hook))
+        half = grid.down(part * (room - hook))
         left, right, low, high = x - half, x + half, y - half, y + half
         stop = right - grid.unit
         points = [
@@ -319,9 +327,9 @@ def _squares(cell: CouponCell, grid: CouponGrid) -> Made:
 
 def _circles(cell: CouponCell, grid: CouponGrid) -> Made:
     """Lay out circles about the middle of the cell, each of two half circles, CCW from +X."""
-    x, y, most = grid.middle(cell)
+    x, y, size = grid.middle(cell)
     for part in CIRCLES:
-        radius = grid.down(part * most)
+        radius = grid.down(part * size)
         halves = ((clean(x + radius), y, 1.0), (clean(x - radius), y, 1.0))
         yield (
             SheetPath("CIRCLES", halves, closed=True),
@@ -401,12 +409,12 @@ def _path(path: SheetPath) -> str:
     x, y, _ = ring[0]
     parts = [f"M {_number(x)} {_number(y)}"]
     for (x1, y1, bulge), (x2, y2, _) in pairwise(ring):
-        to = f"{_number(x2)} {_number(y2)}"
+        target = f"{_number(x2)} {_number(y2)}"
         if not bulge:
-            parts.append(f"L {to}")
+            parts.append(f"L {target}")
             continue
         radius = math.dist((x1, y1), (x2, y2)) * (1.0 + bulge**2) / (4.0 * abs(bulge))
-        parts.append(f"A {_number(radius)} {_number(radius)} 0 0 {int(bulge > 0.0)} {to}")
+        parts.append(f"A {_number(radius)} {_number(radius)} 0 0 {int(bulge > 0.0)} {target}")
     return " ".join([*parts, "Z"] if path.closed else parts)
 
 

@@ -27,34 +27,34 @@ UNCERTAINTY_DIGITS = 3
 
 
 def machine_file(
-    calibration: Calibration, measurements: Measurements, machine: Machine, own: Table
+    calibration: Calibration, measurements: Measurements, machine: Machine, user_table: Table
 ) -> str:
     """Return the TOML text of a machine file. `machine` has the values before the calibration;
-    `own` is the table of the user's file, or one with only the key `extends`."""
-    said: Table = json.loads(json.dumps(own))  # a copy, tables and all
+    `user_table` is the table of the user's file, or one with only the key `extends`."""
+    table: Table = json.loads(json.dumps(user_table))  # a copy, tables and all
     notes: dict[str, str] = {}
     for axis in ("x", "y", "z"):
-        for what, key in (("step", "real_step_mm"), ("play", "backlash_mm")):
-            estimate = calibration.estimate(what, axis)
+        for quantity, key in (("step", "real_step_mm"), ("play", "backlash_mm")):
+            estimate = calibration.estimate(quantity, axis)
             if estimate is not None:
-                _set(said, f"axes.{axis}.{key}", _rounded(estimate))
+                _set(table, f"axes.{axis}.{key}", _rounded(estimate))
                 notes[f"axes.{axis}.{key}"] = _note(estimate, calibration)
     squareness = calibration.estimate("squareness")
     if squareness is not None:
-        _set(said, "mechanics.squareness_rad", _rounded(squareness))
+        _set(table, "mechanics.squareness_rad", _rounded(squareness))
         notes["mechanics.squareness_rad"] = _note(squareness, calibration)
-    _set_map(said, notes, calibration, measurements, machine)
-    _set_uncertainty(said, notes, calibration)
+    _set_map(table, notes, calibration, measurements, machine)
+    _set_uncertainty(table, notes, calibration)
     head = (
         f"# {machine.target.name}, calibrated from {_plain(calibration.file)}.",
         "# ± is the standard uncertainty.",
         "",
     )
-    return "\n".join([*head, *toml_lines(said, notes)]) + "\n"
+    return "\n".join([*head, *toml_lines(table, notes)]) + "\n"
 
 
 def _set_map(
-    said: Table,
+    table: Table,
     notes: dict[str, str],
     calibration: Calibration,
     measurements: Measurements,
@@ -64,58 +64,58 @@ def _set_map(
     an axis whose backlash was measured as a whole."""
     for axis in ("x", "y"):
         cells: Regions | None = getattr(measurements.regions, axis)
-        whole = calibration.estimate("play", axis)
-        if cells is not None and whole is not None:
+        unmapped = calibration.estimate("play", axis)
+        if cells is not None and unmapped is not None:
             plays = {name: calibration.estimate("play", axis, name) for name in cells.every}
             rows = [[_rounded(plays[name]) for name in row] for row in cells.names]
-            _set(said, "play_map.use", True)
-            _set(said, f"play_map.{axis}.x_mm", list(cells.x_mm))
-            _set(said, f"play_map.{axis}.y_mm", list(cells.y_mm))
-            _set(said, f"play_map.{axis}.play_mm", rows)
+            _set(table, "play_map.use", True)
+            _set(table, f"play_map.{axis}.x_mm", list(cells.x_mm))
+            _set(table, f"play_map.{axis}.y_mm", list(cells.y_mm))
+            _set(table, f"play_map.{axis}.play_mm", rows)
             worst = max(
                 filter(None, (each.uncertainty for each in plays.values() if each)), default=None
             )
             notes[f"play_map.{axis}.play_mm"] = f"{_within(worst)}, {_plain(calibration.file)}"
-        elif whole is not None and machine.play_map.use and getattr(machine.play_map, axis):
-            _set(said, "play_map.use", False)
+        elif unmapped is not None and machine.play_map.use and getattr(machine.play_map, axis):
+            _set(table, "play_map.use", False)
             notes["play_map.use"] = f"the play of {axis} was measured as a whole since"
 
 
-def _set_uncertainty(said: Table, notes: dict[str, str], calibration: Calibration) -> None:
+def _set_uncertainty(file_table: Table, notes: dict[str, str], calibration: Calibration) -> None:
     """Set the uncertainties of the measured values; those in an older file for the same values are
     removed, and the rest of it is kept."""
     measured = [
         f"{axis}.{key}"
         for axis in ("x", "y")
-        for what, key in (("step", "scale"), ("play", "backlash_mm"))
-        if calibration.estimate(what, axis) is not None
+        for quantity, key in (("step", "scale"), ("play", "backlash_mm"))
+        if calibration.estimate(quantity, axis) is not None
     ]
     if calibration.estimate("squareness") is not None:
         measured.append("squareness_rad")
-    known, own = calibration.known, said.get("uncertainty", {})
+    uncertainty, earlier = calibration.known, file_table.get("uncertainty", {})
     for key in measured:
         table, _, name = f"uncertainty.{key}".rpartition(".")
-        _table(said, table).pop(name, None)
-        standard = known.standard(key)
+        _table(file_table, table).pop(name, None)
+        standard = uncertainty.standard(key)
         if standard is not None:
-            _set(said, f"uncertainty.{key}", float(f"{standard:.{UNCERTAINTY_DIGITS}g}"))
+            _set(file_table, f"uncertainty.{key}", float(f"{standard:.{UNCERTAINTY_DIGITS}g}"))
             notes[f"uncertainty.{key}"] = _plain(calibration.file)
     for axis in ("x", "y"):
-        if known.standard(f"{axis}.compensation_mm") is not None:
-            _set(said, f"uncertainty.{axis}.compensation_mm", 0.0)
+        if uncertainty.standard(f"{axis}.compensation_mm") is not None:
+            _set(file_table, f"uncertainty.{axis}.compensation_mm", 0.0)
             notes[f"uncertainty.{axis}.compensation_mm"] = "what it errs by is in the backlash"
-    older = [row for row in own.get("correlations", []) if not {*row[:2]} & {*measured}]
-    if older or known.correlations:
-        _set(said, "uncertainty.correlations", [*older, *known.correlations])
-    elif "correlations" in own:
-        del own["correlations"]
+    older = [row for row in earlier.get("correlations", []) if not {*row[:2]} & {*measured}]
+    if older or uncertainty.correlations:
+        _set(file_table, "uncertainty.correlations", [*older, *uncertainty.correlations])
+    elif "correlations" in earlier:
+        del earlier["correlations"]
 
 
-def _table(said: Table, path: str) -> Table:
+def _table(table: Table, path: str) -> Table:
     """Return the table at this path; a new one if there is none."""
     for name in path.split("."):
-        said = said.get(name, {})
-    return said
+        table = table.get(name, {})
+    return table
 
 
 def _rounded(estimate: Estimate | None) -> float:

@@ -346,8 +346,8 @@ def _check_regions(regions: RegionsOf, coupons: list[tuple[str, Coupon]], file: 
                 file=file,
                 where=f"table [regions.{axis}], key names",
             )
-        there = {coupon.region for _, coupon in coupons if axis in coupon.axes}
-        for name in sorted(cells.every - there):
+        measured = {coupon.region for _, coupon in coupons if axis in coupon.axes}
+        for name in sorted(cells.every - measured):
             raise InputError(
                 f"no coupon of {axis} was measured in the region {name!r}",
                 file=file,
@@ -362,8 +362,8 @@ def _coupon(values: dict[str, Any], kind: type[Coupon], file: str, name: str) ->
         coupon = convert(values, kind, file)
     except MachineError as error:
         raise _as_input(error, file, f"[[{kind.kind}]] {name.split()[1]}, {error.where}") from None
-    for key, wrong, mend in coupon.faults():
-        raise InputError(wrong, file=file, where=_where(name, key), mend=mend)
+    for key, complaint, mend in coupon.faults():
+        raise InputError(complaint, file=file, where=_where(name, key), mend=mend)
     for key, measured, nominal in coupon.lengths():
         times = measured / nominal
         if not 1.0 / MAX_RATIO < times < MAX_RATIO:
@@ -390,5 +390,5 @@ def _unit_meant(times: float) -> str:
     return "look at the nominal length too: it is what the program commanded, in mm"
 
 
-def _as_input(error: MachineError, file: str, where: str | None) -> InputError:
-    return InputError(error.message, file=file, where=where, mend=error.mend)
+def _as_input(error: MachineError, file: str, place: str | None) -> InputError:
+    return InputError(error.message, file=file, where=place, mend=error.mend)

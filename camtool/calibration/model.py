@@ -82,8 +82,8 @@ class Parameter(Struct, frozen=True):
     region: str = ""
 
     def __str__(self) -> str:
-        at = f" in {self.region}" if self.region else ""
-        return f"{self.what} of {self.axis}{at}" if self.axis else self.what
+        region = f" in {self.region}" if self.region else ""
+        return f"{self.what} of {self.axis}{region}" if self.axis else self.what
 
 
 SQUARENESS = Parameter("squareness", "")
@@ -112,9 +112,9 @@ class ParameterValues:
     def lost(self, course: CutAxis) -> Any:
         """Return B − k·C of an axis, mm. If its backlash is measured in regions, coupons without a
         region use the mean of all regions."""
-        own = self._columns.get(Parameter("play", course.axis, course.region))
-        if own is not None:
-            play = self._values[own]
+        own_column = self._columns.get(Parameter("play", course.axis, course.region))
+        if own_column is not None:
+            play = self._values[own_column]
         else:
             each = [
                 self._values[column]
@@ -151,8 +151,8 @@ class AxisDistance(Struct, frozen=True):
         return (self.course,)
 
     def predict(self, trial: ParameterValues) -> Any:
-        own = trial.scale(self.course) * self.nominal_mm + self.turned * trial.lost(self.course)
-        return own + trial.tangent * self.aside_mm
+        length = trial.scale(self.course) * self.nominal_mm + self.turned * trial.lost(self.course)
+        return length + trial.tangent * self.aside_mm
 
 
 class Diagonal(Struct, frozen=True):
@@ -166,9 +166,9 @@ class Diagonal(Struct, frozen=True):
         return self.x.course, self.y.course
 
     def predict(self, trial: ParameterValues) -> Any:
-        up = self.y.predict(trial)
-        across = self.x.predict(trial) + trial.tangent * up
-        return (across * across + up * up) ** 0.5
+        vertical = self.y.predict(trial)
+        across = self.x.predict(trial) + trial.tangent * vertical
+        return (across * across + vertical * vertical) ** 0.5
 
 
 class Diameter(Struct, frozen=True):
@@ -202,10 +202,11 @@ class Diameter(Struct, frozen=True):
         turn = 1.0 if self.ccw else -1.0
         runs_back = -turn * u[1].real < 0.0, turn * u[0].real < 0.0
         s_x, s_y = (
-            0.5 * part if back else -0.5 * part for part, back in zip(e, runs_back, strict=True)
+            0.5 * part if is_backward else -0.5 * part
+            for part, is_backward in zip(e, runs_back, strict=True)
         )
-        aside = u[0] * s_y - u[1] * s_x
-        quarter = u[0] * s_x + u[1] * s_y + (self.radius_mm**2 - aside * aside) ** 0.5
+        offset = u[0] * s_y - u[1] * s_x
+        quarter = u[0] * s_x + u[1] * s_y + (self.radius_mm**2 - offset * offset) ** 0.5
         reversed_axis = 0 if (u[0].real * u[1].real > 0.0) == self.ccw else 1
         part = u[reversed_axis]
         extreme = (self.radius_mm - 0.5 * e[reversed_axis]) / (part if part.real > 0.0 else -part)
@@ -285,7 +286,7 @@ def _said(parameter: Parameter, machine: Machine) -> float:
 
 def readings_of(measurements: Measurements, machine: Machine) -> list[MeasuredLength]:
     """Return all measured lengths, in the order of the file."""
-    found: list[MeasuredLength] = []
+    lengths: list[MeasuredLength] = []
     for name, coupon in measurements.coupons:
         courses = {
             axis: CutAxis(
@@ -296,11 +297,11 @@ def readings_of(measurements: Measurements, machine: Machine) -> list[MeasuredLe
             for axis in ("x", "y", "z")
         }
         uncertainty_mm = coupon.uncertainty_mm or measurements.uncertainty_mm
-        found += [
-            MeasuredLength(name, called, length_mm, uncertainty_mm, measure, coupon.source)
-            for called, length_mm, measure in _measures(coupon, courses)
+        lengths += [
+            MeasuredLength(name, quantity, length_mm, uncertainty_mm, measure, coupon.source)
+            for quantity, length_mm, measure in _measures(coupon, courses)
         ]
-    return found
+    return lengths
 
 
 Measured = Iterator[tuple[str, float, Measure]]
@@ -334,16 +335,16 @@ def _lines(lines: LinesCoupon, course: CutAxis) -> Measured:
 
 def _square(square: SquareCoupon, x: CutAxis, y: CutAxis) -> Measured:
     width, height = square.nominal_mm
-    across, up = AxisDistance(x, width, -1), AxisDistance(y, height, -1)
+    across, vertical = AxisDistance(x, width, -1), AxisDistance(y, height, -1)
     if square.dx_mm:
         yield "Dx", square.dx_mm, across
     if square.dy_mm:
-        yield "Dy", square.dy_mm, up
+        yield "Dy", square.dy_mm, vertical
     rising, falling = square.diagonals_mm or (0.0, 0.0)
     if rising:
-        yield "rising diagonal", rising, Diagonal(across, up)
+        yield "rising diagonal", rising, Diagonal(across, vertical)
     if falling:
-        yield "falling diagonal", falling, Diagonal(AxisDistance(x, -width, 1), up)
+        yield "falling diagonal", falling, Diagonal(AxisDistance(x, -width, 1), vertical)
 
 
 def _circle(circle: CircleCoupon, x: CutAxis, y: CutAxis) -> Measured:
@@ -356,24 +357,24 @@ def _circle(circle: CircleCoupon, x: CutAxis, y: CutAxis) -> Measured:
 
 def _steps(steps: StepsCoupon, course: CutAxis) -> Measured:
     aside_mm = steps.rows_apart_mm if steps.axis == "x" else 0.0
-    for called, values, turned, aside in (
+    for quantity, values, turns, offset in (
         ("forward", steps.forward_mm, 0, 0.0),
         ("backward", steps.backward_mm, 1, aside_mm),
     ):
         for nominal, value in zip(steps.nominal_mm, values or (), strict=False):
             if value:
                 yield (
-                    f"{called} at {nominal:g} mm",
+                    f"{quantity} at {nominal:g} mm",
                     value,
-                    AxisDistance(course, nominal, turned, aside),
+                    AxisDistance(course, nominal, turns, offset),
                 )
 
 
 def _added_mm(axis: str, machine: Axis, coupon: Coupon, measurements: Measurements) -> float:
     """Return the compensation that the controller added at reversals of the axis, in its own mm:
     whole steps."""
-    said = coupon.compensation_mm or Added()
-    for value in (getattr(said, axis), getattr(measurements.compensation_mm, axis)):
+    added = coupon.compensation_mm or Added()
+    for value in (getattr(added, axis), getattr(measurements.compensation_mm, axis)):
         if value is not None:
             return _whole_steps(value, machine)
     return _whole_steps(machine.compensation_mm, machine)

@@ -85,10 +85,10 @@ def draw_beside(scenes: Sequence[Scene], options: PictureOptions = AS_USUAL) -> 
     grid, views = _views(contents, options)
     view, ticks = views[0], ticks_of(views[0])
     panels = [
-        panel(content, PageLayout(head, own, ticks, [], 0.0, 0.0, 0.0))
-        for content, head, own in zip(contents, grid.heads, views, strict=True)
+        panel(content, PageLayout(head, own_view, ticks, [], 0.0, 0.0, 0.0))
+        for content, head, own_view in zip(contents, grid.heads, views, strict=True)
     ]
-    plots = grid.around([own.box for own in views])
+    plots = grid.around([own_view.box for own_view in views])
     table, bar_y = table_of(_entries(contents, view), view, plots)
     legend_y = plots.bottom + LEGEND_DROP
     top_um = _top_um(contents)
@@ -109,8 +109,8 @@ def _views(contents: Sequence[Content], options: PictureOptions) -> tuple[PanelG
     The fit runs twice, since the width of the colour bar follows from the height of the plots.
     """
     window, top_um = contents[0].window, _top_um(contents)
-    across, down = (window[:, 1] - window[:, 0]).tolist()
-    columns = columns_of(len(contents), wide=down < WIDE * across)
+    across, height = (window[:, 1] - window[:, 0]).tolist()
+    columns = columns_of(len(contents), wide=height < WIDE * across)
     page = page_units(columns, options)
     shapes = (WIDEST, columns * TALLEST) if options.crop_mm is None else CROP_SHAPES
     heads = [(content.scene.title, content.notes) for content in contents]
@@ -140,32 +140,32 @@ def _alike(contents: Sequence[Content]) -> list[Content]:
         pale = group.colour == DRAWING
         return group if pale else replace(group, colour=strong[group.name])
 
-    found = []
+    alike = []
     for one in contents:
         trace = one.trace
         if trace is not None and top_um is not None:
             trace = replace(trace, top_um=top_um)
         groups = tuple(coloured(group) for group in one.groups)
         shown = one.window if window is None else window
-        found.append(replace(one, window=shown, trace=trace, groups=groups))
-    return found
+        alike.append(replace(one, window=shown, trace=trace, groups=groups))
+    return alike
 
 
 def _entries(contents: Sequence[Content], view: View) -> list[LegendEntry]:
     """The legend of all, each entry once, with the layers of all drawings."""
     groups = {(group.name, group.colour): group for one in contents for group in one.groups}
     every = tuple(groups.values())
-    found = [entry for one in contents for entry in legend_of(replace(one, groups=every), view)]
-    return list(dict.fromkeys(found))
+    entries = [entry for one in contents for entry in legend_of(replace(one, groups=every), view)]
+    return list(dict.fromkeys(entries))
 
 
 def _title(scenes: Sequence[Scene]) -> str:
     return ", ".join(scene.title for scene in scenes if scene.title)
 
 
-def _polars(scenes: Sequence[Scene], which: int, options: PictureOptions) -> str:
+def _polars(scenes: Sequence[Scene], number: int, options: PictureOptions) -> str:
     """The same circle of each scene, all magnified alike."""
-    plots = [polar.circle_pair(scene, which) for scene in scenes]
+    plots = [polar.circle_pair(scene, number) for scene in scenes]
     columns = columns_of(len(plots), wide=False)
     page = page_units(columns, options)
     width = panel_width(columns, page)
@@ -177,8 +177,8 @@ def _polars(scenes: Sequence[Scene], which: int, options: PictureOptions) -> str
     ]
     grid = grid_of(heads, columns, page).with_bodies(2.0 * (dial.outer + ROOM))
     panels = [
-        [head, *plot(shown, dial.centred_below(down, width))]
-        for shown, head, down in zip(errors, grid.heads, grid.downs, strict=True)
+        [head, *plot(shown, dial.centred_below(top, width))]
+        for shown, head, top in zip(errors, grid.heads, grid.downs, strict=True)
     ]
     entries = list(dict.fromkeys(entry for circles in plots for entry in polar.entries(circles)))
     below, foot = legend_below(entries, grid.rows[-1], page)
@@ -217,8 +217,8 @@ class PanelGrid(Struct, frozen=True):
     def with_bodies(self, height: float) -> PanelGrid:
         """The grid with its rows, whose panels have this height below their heads."""
         rows = [0.0]
-        for down in self.downs[:: self.columns]:
-            rows.append(rows[-1] + down + height)
+        for top in self.downs[:: self.columns]:
+            rows.append(rows[-1] + top + height)
         return replace(self, rows=tuple(rows))
 
     def corner(self, index: int) -> tuple[float, float]:
@@ -233,12 +233,12 @@ class PanelGrid(Struct, frozen=True):
 
     def around(self, boxes: Sequence[PageBox]) -> PageBox:
         """The box round the boxes of all panels, on the page."""
-        moved = [self.moved(index, box) for index, box in enumerate(boxes)]
+        boxes_moved = [self.moved(index, box) for index, box in enumerate(boxes)]
         return PageBox(
-            min(box.left for box in moved),
-            min(box.top for box in moved),
-            max(box.right for box in moved),
-            max(box.bottom for box in moved),
+            min(box.left for box in boxes_moved),
+            min(box.top for box in boxes_moved),
+            max(box.right for box in boxes_moved),
+            max(box.bottom for box in boxes_moved),
         )
 
     def place_panels(self, panels: Sequence[Sequence[str]]) -> list[str]:
@@ -247,9 +247,9 @@ class PanelGrid(Struct, frozen=True):
         for index, parts in enumerate(panels):
             name = f"panel-{index + 1}"
             x, y = self.corner(index)
-            where = f"translate({number(x)} {number(y)})"
+            shift = f"translate({number(x)} {number(y)})"
             inner = [_NAME.sub(rf"\g<1>{name}-", part) for part in parts]
-            groups.append(element("g", {"id": name, "transform": where}, *inner))
+            groups.append(element("g", {"id": name, "transform": shift}, *inner))
         return groups
 
 
@@ -273,6 +273,6 @@ def grid_of(heads: Sequence[Head], columns: int, page: float, bar: float = 0.0) 
     """The grid for panels of these titles and notes; a width of `bar` stays free."""
     width = panel_width(columns, page - bar)
     drawn = [title_and_notes(title, notes, width, lines=TITLE_LINES) for title, notes in heads]
-    downs = [down for _, down in drawn]
+    downs = [bottom for _, bottom in drawn]
     lowest = [max(downs[k - k % columns :][:columns]) for k in range(len(downs))]
     return PanelGrid(columns, page, width, tuple(head for head, _ in drawn), tuple(lowest))

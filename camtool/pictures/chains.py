@@ -97,7 +97,7 @@ class MoveChains(Struct, frozen=True, eq=False):
 
 def moves_of(toolpath: Toolpath) -> MoveChains:
     """The moves of a toolpath, sorted by how they are drawn."""
-    cuts, slopes, rapid, down = toolpath.by_parts(_how_drawn).T
+    cuts, slopes, rapid, is_downward = toolpath.by_parts(_how_drawn).T
     # A step straight down within a cut, as from one pass to the next, is not drawn as a plunge.
     follows = _follows(cuts, cuts | (toolpath.kind == Kind.RAPID))
     rapids, begins = np.flatnonzero(rapid), np.flatnonzero(cuts & ~follows)
@@ -105,7 +105,7 @@ def moves_of(toolpath: Toolpath) -> MoveChains:
         feeds=_chains(toolpath, cuts & ~slopes),
         ramps=_chains(toolpath, slopes),
         rapids=_once(toolpath.starts_of(rapids)[:, :2], toolpath.end[rapids, :2]),
-        plunges=_places(toolpath.end[down & ~follows, :2]),
+        plunges=_places(toolpath.end[is_downward & ~follows, :2]),
         starts=_places(toolpath.starts_of(begins)[:, :2]),
         begin=toolpath.start[:2],
     )
@@ -119,20 +119,20 @@ def _how_drawn(toolpath: Toolpath) -> Bools:
     cuts = toolpath.is_feed & (across | toolpath.is_arc)
     slopes = cuts & (np.abs(step[:, 2]) > POSITION_EPS_MM)
     rapid = (toolpath.kind == Kind.RAPID) & across
-    down = toolpath.is_feed & ~cuts & (step[:, 2] < -POSITION_EPS_MM)
-    return np.column_stack([cuts, slopes, rapid, down])
+    is_downward = toolpath.is_feed & ~cuts & (step[:, 2] < -POSITION_EPS_MM)
+    return np.column_stack([cuts, slopes, rapid, is_downward])
 
 
-def _follows(cuts: Bools, counted: Bools) -> Bools:
-    """(N,) true where, of the rows that are `counted`, the last one before a row is one of the
+def _follows(cuts: Bools, is_counted: Bools) -> Bools:
+    """(N,) true where, of the rows that are `is_counted`, the last one before a row is one of the
     `cuts`."""
-    rows = np.flatnonzero(counted)
-    behind = np.zeros(len(cuts), dtype=np.int8)
+    rows = np.flatnonzero(is_counted)
+    marks = np.zeros(len(cuts), dtype=np.int8)
     # What a row that is counted says holds from the next one on.
-    said = np.flatnonzero(np.diff(cuts[rows], prepend=False))
-    behind[rows[said]] = np.where(cuts[rows[said]], 1, -1)
+    changes = np.flatnonzero(np.diff(cuts[rows], prepend=False))
+    marks[rows[changes]] = np.where(cuts[rows[changes]], 1, -1)
     follows = np.zeros(len(cuts), dtype=np.bool_)
-    follows[1:] = np.cumsum(behind[:-1], dtype=np.int8) > 0
+    follows[1:] = np.cumsum(marks[:-1], dtype=np.int8) > 0
     return follows
 
 
@@ -142,10 +142,10 @@ def _places(points: Floats) -> Floats:
     return points[np.sort(first)]
 
 
-def _chains(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
+def _chains(toolpath: Toolpath, is_chosen: Bools) -> tuple[Chain, ...]:
     """Runs of the chosen rows, each line or arc once: passes at several depths, and a line there
     and back, look the same. No move in XY lies between the rows of a run."""
-    rows = np.flatnonzero(chosen)
+    rows = np.flatnonzero(is_chosen)
     if not len(rows):
         return ()
     rows = rows[_first_times(toolpath, rows)]
@@ -174,11 +174,13 @@ def _first_times(toolpath: Toolpath, rows: Ints) -> Ints:
     """Indices, ascending, of those of the moves (J,) that are the first along their line or arc,
     in either direction."""
     begin, end = toolpath.starts_of(rows)[:, :2], toolpath.end[rows, :2]
-    back = (begin[:, 0] > end[:, 0]) | ((begin[:, 0] == end[:, 0]) & (begin[:, 1] > end[:, 1]))
+    is_backward = (begin[:, 0] > end[:, 0]) | (
+        (begin[:, 0] == end[:, 0]) & (begin[:, 1] > end[:, 1])
+    )
     turn, arcs = np.zeros(len(rows)), np.flatnonzero(toolpath.is_arc[rows])
-    sweep, full = toolpath.sweeps_of(rows[arcs]), (begin[arcs] == end[arcs]).all(axis=1)
-    turn[arcs] = np.where(full, np.abs(sweep), np.where(back[arcs], -sweep, sweep))
-    begin[back], end[back] = end[back], begin[back]
+    sweep, is_full = toolpath.sweeps_of(rows[arcs]), (begin[arcs] == end[arcs]).all(axis=1)
+    turn[arcs] = np.where(is_full, np.abs(sweep), np.where(is_backward[arcs], -sweep, sweep))
+    begin[is_backward], end[is_backward] = end[is_backward], begin[is_backward]
     columns = [*begin.T, *end.T, turn]
     order = np.lexsort(columns[::-1])
     first = np.zeros(len(rows), dtype=np.bool_)
@@ -190,11 +192,11 @@ def _first_times(toolpath: Toolpath, rows: Ints) -> Ints:
 
 def _once(begin: Floats, end: Floats) -> tuple[Chain, ...]:
     """Straight moves, each once in either direction: dashes over dashes would look like a line."""
-    found: dict[tuple[tuple[float, ...], ...], Chain] = {}
+    chains: dict[tuple[tuple[float, ...], ...], Chain] = {}
     for a, b in zip(begin, end, strict=True):
         chain = Chain(np.array([a, b]), np.full((1, 2), np.nan), np.zeros(1))
-        found.setdefault(tuple(sorted([tuple(a.tolist()), tuple(b.tolist())])), chain)
-    return tuple(found.values())
+        chains.setdefault(tuple(sorted([tuple(a.tolist()), tuple(b.tolist())])), chain)
+    return tuple(chains.values())
 
 
 def chains_of(lines: Polylines) -> tuple[Chain, ...]:
@@ -215,8 +217,8 @@ def chains_between(segments: Segments) -> tuple[Chain, ...]:
     """Lines and arcs as chains: a chain goes on while each begins where the one before ended."""
     if not len(segments):
         return ()
-    apart = np.hypot(*(segments.start[1:] - segments.end[:-1]).T) > POSITION_EPS_MM
-    bounds = [0, *(np.flatnonzero(apart) + 1).tolist(), len(segments)]
+    is_break = np.hypot(*(segments.start[1:] - segments.end[:-1]).T) > POSITION_EPS_MM
+    bounds = [0, *(np.flatnonzero(is_break) + 1).tolist(), len(segments)]
     return tuple(
         Chain(
             np.concatenate([segments.start[low : low + 1], segments.end[low:high]]),
@@ -270,8 +272,8 @@ def chains_box(chains: Sequence[Chain]) -> Floats | None:
     if not chains:
         return None
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for some in _lots(chains):
-        boxes = segment_boxes(_halved(some))
+    for lot in _lots(chains):
+        boxes = segment_boxes(_halved(lot))
         low = np.minimum(low, boxes[:, :2].min(axis=0))
         high = np.maximum(high, boxes[:, 2:].max(axis=0))
     return np.column_stack([low, high])
@@ -279,17 +281,17 @@ def chains_box(chains: Sequence[Chain]) -> Floats | None:
 
 def _lots(chains: Iterable[Chain]) -> Iterator[list[Chain]]:
     """All moves of the chains, some thousand at a time, as open chains."""
-    some: list[Chain] = []
+    lot: list[Chain] = []
     count = 0
     for chain in chains:
         for _, part in chain.parts():
-            some.append(part)
+            lot.append(part)
             count += len(part.sweep)
             if count >= MOVES_AT_ONCE:
-                yield some
-                some, count = [], 0
-    if some:
-        yield some
+                yield lot
+                lot, count = [], 0
+    if lot:
+        yield lot
 
 
 def _halved(chains: Sequence[Chain]) -> Segments:
@@ -302,8 +304,8 @@ def _halved(chains: Sequence[Chain]) -> Segments:
     begin_arc, end_arc, turn = begin[is_arc], end[is_arc], sweep[is_arc] / 2.0
     spoke = begin_arc - centre[is_arc]
     cos, sin = np.cos(turn), np.sin(turn)
-    turned = [cos * spoke[:, 0] - sin * spoke[:, 1], sin * spoke[:, 0] + cos * spoke[:, 1]]
-    middle = centre[is_arc] + np.column_stack(turned)
+    rotated = [cos * spoke[:, 0] - sin * spoke[:, 1], sin * spoke[:, 0] + cos * spoke[:, 1]]
+    middle = centre[is_arc] + np.column_stack(rotated)
     bulge = np.tan(turn / 4.0)
     return Segments.between(
         np.concatenate([begin[~is_arc], begin_arc, middle]),
@@ -337,16 +339,16 @@ class _Pieces(Struct, frozen=True, eq=False):
 def reversals_of(toolpath: Toolpath) -> Floats:
     """(R, 2) mm: the places of reversals, in order; both axes may reverse at one."""
     pieces = _pieces(toolpath)
-    turned = _turned(pieces.signs[:, 0]) | _turned(pieces.signs[:, 1])
-    return np.asarray(pieces.begin[turned & toolpath.is_feed[pieces.row]])
+    is_reversal = _turned(pieces.signs[:, 0]) | _turned(pieces.signs[:, 1])
+    return np.asarray(pieces.begin[is_reversal & toolpath.is_feed[pieces.row]])
 
 
 def _turned(signs: Ints) -> Bools:
     """(P,) whether the sign differs from the last one before it that was not 0."""
-    found: Bools = np.zeros(len(signs), dtype=np.bool_)
+    changes: Bools = np.zeros(len(signs), dtype=np.bool_)
     moving = np.flatnonzero(signs)
-    found[moving[1:]] = signs[moving[1:]] != signs[moving[:-1]]
-    return found
+    changes[moving[1:]] = signs[moving[1:]] != signs[moving[:-1]]
+    return changes
 
 
 def _pieces(toolpath: Toolpath) -> _Pieces:
@@ -359,23 +361,23 @@ def _pieces(toolpath: Toolpath) -> _Pieces:
     angle = np.arctan2(spoke[:, 1], spoke[:, 0])
     first, inside = _quarters(angle, sweep)
     # A row of n inner quarters has the pieces 0 … n; piece k > 0 begins at the k-th of them.
-    of = np.repeat(np.arange(len(rows)), inside + 1)
-    k = np.arange(len(of)) - np.repeat(np.cumsum(inside + 1) - (inside + 1), inside + 1)
-    sense = np.where(sweep[of] < 0.0, -1.0, 1.0)
-    quarter = (first[of] + sense * (k - 1)) * QUARTER_RAD
-    low = np.where(k == 0, angle[of], quarter)
-    high = np.where(k == inside[of], (angle + sweep)[of], quarter + sense * QUARTER_RAD)
-    radius = np.hypot(spoke[:, 0], spoke[:, 1])[of]
-    turned = np.where(is_arc, toolpath.centre[rows].T, 0.0).T[of]
-    turned = turned + radius[:, None] * np.column_stack([np.cos(low), np.sin(low)])
+    owners = np.repeat(np.arange(len(rows)), inside + 1)
+    k = np.arange(len(owners)) - np.repeat(np.cumsum(inside + 1) - (inside + 1), inside + 1)
+    sense = np.where(sweep[owners] < 0.0, -1.0, 1.0)
+    quarter = (first[owners] + sense * (k - 1)) * QUARTER_RAD
+    low = np.where(k == 0, angle[owners], quarter)
+    high = np.where(k == inside[owners], (angle + sweep)[owners], quarter + sense * QUARTER_RAD)
+    radius = np.hypot(spoke[:, 0], spoke[:, 1])[owners]
+    origins = np.where(is_arc, toolpath.centre[rows].T, 0.0).T[owners]
+    origins = origins + radius[:, None] * np.column_stack([np.cos(low), np.sin(low)])
     middle = 0.5 * (low + high)
     bent = np.column_stack([-sense * np.sin(middle), sense * np.cos(middle)])
-    straight = (ends - starts)[rows][of]
-    arcs = is_arc[of, None]
+    straight = (ends - starts)[rows][owners]
+    arcs = is_arc[owners, None]
     return _Pieces(
-        np.where(arcs & (k > 0)[:, None], turned, starts[rows][of]),
+        np.where(arcs & (k > 0)[:, None], origins, starts[rows][owners]),
         _signs(np.where(arcs, bent, straight)),
-        rows[of],
+        rows[owners],
     )
 
 
@@ -384,34 +386,36 @@ def _quarters(begin: Floats, sweep: Floats) -> tuple[Floats, Ints]:
     many there are. Lines, of sweep 0, have none."""
     low = np.minimum(begin, begin + sweep) + MIN_PIECE_RAD
     high = np.maximum(begin, begin + sweep) - MIN_PIECE_RAD
-    least, most = np.ceil(low / QUARTER_RAD), np.floor(high / QUARTER_RAD)
-    inside = np.where(sweep == 0.0, 0, np.maximum(most - least + 1.0, 0.0)).astype(np.int64)
-    return np.where(sweep < 0.0, most, least), inside
+    low_quarter, high_quarter = np.ceil(low / QUARTER_RAD), np.floor(high / QUARTER_RAD)
+    inside = np.where(sweep == 0.0, 0, np.maximum(high_quarter - low_quarter + 1.0, 0.0)).astype(
+        np.int64
+    )
+    return np.where(sweep < 0.0, high_quarter, low_quarter), inside
 
 
 def _signs(lengths: Floats) -> Ints:
-    up, down = lengths > POSITION_EPS_MM, lengths < -POSITION_EPS_MM
-    return up.astype(np.int64) - down.astype(np.int64)
+    is_upward, is_downward = lengths > POSITION_EPS_MM, lengths < -POSITION_EPS_MM
+    return is_upward.astype(np.int64) - is_downward.astype(np.int64)
 
 
-def cuts_of(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
+def cuts_of(toolpath: Toolpath, is_chosen: Bools) -> tuple[Chain, ...]:
     """The chosen ones of the rows (N,) that cut in XY, each line or arc once."""
-    return _chains(toolpath, chosen & toolpath.by_parts(_how_drawn)[:, 0])
+    return _chains(toolpath, is_chosen & toolpath.by_parts(_how_drawn)[:, 0])
 
 
 def tapers(
-    toolpath: Toolpath, radius_at: Callable[[float], float], chosen: Bools | None = None
+    toolpath: Toolpath, radius_at: Callable[[float], float], is_chosen: Bools | None = None
 ) -> tuple[Chain, ...]:
     """Return the outline, CCW, of each cut at the surface for feeds below the stock top (of the
-    `chosen` rows (N,) alone), with a tool of `radius_at(depth)` mm: the hull of the discs at its
-    ends. () for more moves than MAX_TAPERS."""
+    `is_chosen` rows (N,) alone), with a tool of `radius_at(depth)` mm: the hull of the discs at
+    its ends. () for more moves than MAX_TAPERS."""
     below = toolpath.is_feed & (np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2]) < 0.0)
-    rows = np.flatnonzero(below if chosen is None else below & chosen)
+    rows = np.flatnonzero(below if is_chosen is None else below & is_chosen)
     if len(rows) > MAX_TAPERS:
         return ()
     starts, ends = toolpath.starts_of(rows), toolpath.end[rows]
     sweeps = np.where(toolpath.is_arc[rows], toolpath.sweeps_of(rows), 0.0)
-    found = []
+    hulls = []
     for start, end, centre, sweep in zip(
         starts, ends, toolpath.centre[rows], sweeps.tolist(), strict=True
     ):
@@ -420,8 +424,8 @@ def tapers(
         for k in range(len(places) - 1):
             hull = _hull(places[k, :2], radii[k], places[k + 1, :2], radii[k + 1])
             if hull is not None:
-                found.append(hull)
-    return tuple(found)
+                hulls.append(hull)
+    return tuple(hulls)
 
 
 def _places_along(start: Floats, end: Floats, centre: Floats, sweep: float) -> Floats:
@@ -443,15 +447,15 @@ def _hull(one: Floats, radius: float, other: Floats, last: float) -> Chain | Non
     """
     if max(radius, last) < MIN_TAPER_MM:
         return None
-    ahead = other - one
-    distance = float(np.hypot(ahead[0], ahead[1]))
+    gap = other - one
+    distance = float(np.hypot(gap[0], gap[1]))
     if distance <= abs(radius - last) + MIN_TAPER_MM:
         centre, wide = (one, radius) if radius >= last else (other, last)
         return _round([(centre, wide, 0.0, 2.0 * math.pi)])
-    angle = math.atan2(float(ahead[1]), float(ahead[0]))
+    angle = math.atan2(float(gap[1]), float(gap[0]))
     touch = math.acos((radius - last) / distance)
-    behind = (one, radius, angle + touch, 2.0 * (math.pi - touch))
-    return _round([behind, (other, last, angle - touch, 2.0 * touch)])
+    start_disc = (one, radius, angle + touch, 2.0 * (math.pi - touch))
+    return _round([start_disc, (other, last, angle - touch, 2.0 * touch)])
 
 
 def _round(arcs: Sequence[tuple[Floats, float, float, float]]) -> Chain:

@@ -118,29 +118,29 @@ class Content(Struct, frozen=True, eq=False, dict=True):
         """The numbers of contours, from 1, and where these begin; of many contours only some."""
         starts: list[Place] = self.moves.starts.tolist()
         step = 1 if len(starts) <= MAX_NUMBERED else round(round_step(len(starts) / MAX_NUMBERED))
-        chosen = [k for k in range(len(starts)) if k == 0 or (k + 1) % step == 0]
-        return [str(k + 1) for k in chosen], [starts[k] for k in chosen]
+        numbers = [k for k in range(len(starts)) if k == 0 or (k + 1) % step == 0]
+        return [str(k + 1) for k in numbers], [starts[k] for k in numbers]
 
     @cached_property
     def swept(self) -> tuple[SweptCut, ...]:
         """The cuts, each as wide as its tool cuts at the surface, where that is known."""
         scene, toolpath = self.scene, self.scene.toolpath
-        found: list[SweptCut] = []
+        swept: list[SweptCut] = []
         if scene.tool_mm:
-            found.append(SweptCut(scene.tool_mm, (*self.moves.feeds, *self.moves.ramps)))
+            swept.append(SweptCut(scene.tool_mm, (*self.moves.feeds, *self.moves.ramps)))
         elif toolpath is not None and scene.nose is not None:
-            found.append(SweptCut(None, tapers(toolpath, scene.nose.radius_at)))
+            swept.append(SweptCut(None, tapers(toolpath, scene.nose.radius_at)))
         elif toolpath is not None and scene.turns:
             begins = [row for row, _ in scene.turns]
             turn = np.searchsorted(begins, np.arange(len(toolpath)), side="right") - 1
             for tool in dict.fromkeys(tool for _, tool in scene.turns):
-                mine = [k for k, (_, each) in enumerate(scene.turns) if each == tool]
-                chosen = np.isin(turn.clip(min=0), mine)
+                own_turns = [k for k, (_, each) in enumerate(scene.turns) if each == tool]
+                is_chosen = np.isin(turn.clip(min=0), own_turns)
                 if tool.nose_mm or tool.kind in ("v", "drill"):
-                    found.append(SweptCut(None, tapers(toolpath, tool.radius_at, chosen)))
+                    swept.append(SweptCut(None, tapers(toolpath, tool.radius_at, is_chosen)))
                 elif tool.diameter_mm:
-                    found.append(SweptCut(tool.diameter_mm, cuts_of(toolpath, chosen)))
-        return tuple(each for each in found if each.chains)
+                    swept.append(SweptCut(tool.diameter_mm, cuts_of(toolpath, is_chosen)))
+        return tuple(each for each in swept if each.chains)
 
     @property
     def stock(self) -> tuple[Chain, ...]:
@@ -195,8 +195,8 @@ def content_of(scene: Scene, options: PictureOptions = AS_USUAL) -> Content:
     places = Places(NOWHERE, NOWHERE, NOWHERE)
     if scene.drawing is not None:
         outlines = chains_of(scene.drawing.paths)
-        alone = scene.toolpath is None and trace is None
-        groups = _groups(scene.drawing, outlines, alone=alone)
+        is_alone = scene.toolpath is None and trace is None
+        groups = _groups(scene.drawing, outlines, is_alone=is_alone)
         places = _places(scene.drawing)
     shown = options.layers
     # Layers that are not shown do not change the window.
@@ -221,7 +221,7 @@ def content_of(scene: Scene, options: PictureOptions = AS_USUAL) -> Content:
     )
 
 
-def _groups(drawing: Drawing, chains: Sequence[Chain], *, alone: bool) -> tuple[Group, ...]:
+def _groups(drawing: Drawing, chains: Sequence[Chain], *, is_alone: bool) -> tuple[Group, ...]:
     """The layers in the order of their first paths: pale below a toolpath, in strong colours when
     the drawing is alone."""
     names = tuple(dict.fromkeys(drawing.layers))
@@ -231,7 +231,7 @@ def _groups(drawing: Drawing, chains: Sequence[Chain], *, alone: bool) -> tuple[
     return tuple(
         Group(
             name,
-            LAYER_COLOURS[index % len(LAYER_COLOURS)] if alone else DRAWING,
+            LAYER_COLOURS[index % len(LAYER_COLOURS)] if is_alone else DRAWING,
             tuple(members[name]),
         )
         for index, name in enumerate(names)
@@ -267,18 +267,18 @@ def _window(
     part = [chains_box(outlines), points_box(points)]
     if stock_mm is not None:
         part.append(points_box(np.array(stock_mm).reshape(2, 2)))
-    around = [points_box(np.zeros((1, 2)))]
+    boxes = [points_box(np.zeros((1, 2)))]
     if trace is not None:
         part.append(points_box(trace.points[trace.cutting]))
     if moves is not NO_MOVES:
         cuts = union([chains_box(moves.feeds), chains_box(moves.ramps)])
         reach = 0.5 * (tool_mm or 0.0) * np.array([-1.0, 1.0])
         part += [None if cuts is None else cuts + reach, points_box(moves.plunges)]
-        around += [chains_box(moves.rapids), points_box(moves.begin[None, :])]
-    whole = union(part)
-    if whole is None and moves is NO_MOVES:
+        boxes += [chains_box(moves.rapids), points_box(moves.begin[None, :])]
+    box = union(part)
+    if box is None and moves is NO_MOVES:
         return window(None, None)
-    return window(whole, union(around))
+    return window(box, union(boxes))
 
 
 def _grid(points: Floats) -> list[list[float]]:

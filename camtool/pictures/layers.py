@@ -250,8 +250,8 @@ def _body(content: Content, plot: Plot) -> str:
 
 def _drawing(content: Content, plot: Plot) -> str:
     """The lines of the drawing, a group for each of its layers."""
-    alone = content.is_drawing_alone
-    width = plot.pen(ALONE_PEN if alone else DRAWING_PEN, content.outlines)
+    is_alone = content.is_drawing_alone
+    width = plot.pen(ALONE_PEN if is_alone else DRAWING_PEN, content.outlines)
     groups = [
         element("g", {"stroke": group.colour}, title(group.name), plot.path(group.chains))
         for group in content.groups
@@ -269,8 +269,8 @@ def _drawing_legend(content: Content, view: View) -> Iterator[LegendEntry]:
     else:
         for group in content.groups[:MAX_LAYERS_NAMED]:
             yield LegendEntry(line_swatch(group.colour, 2.8), group.name or "(no layer)")
-        if more := len(content.groups[MAX_LAYERS_NAMED:]):
-            yield LegendEntry("", f"and {more} more layers")
+        if extra := len(content.groups[MAX_LAYERS_NAMED:]):
+            yield LegendEntry("", f"and {extra} more layers")
 
 
 def _noted(content: Content) -> list[Part]:
@@ -397,9 +397,9 @@ def _inspected(content: Content) -> list[Part]:
     """A line from end to end of each dimension, in the colour of its verdict."""
     parts: list[Part] = []
     for verdict, colour in VERDICTS.items():
-        mine = [each for each in content.scene.inspected if each.verdict == verdict]
+        own_dimensions = [each for each in content.scene.inspected if each.verdict == verdict]
         look: Look = {"stroke": colour, "stroke-width": INSPECTED_PEN}
-        chains = content.straight([each.places_mm for each in mine])
+        chains = content.straight([each.places_mm for each in own_dimensions])
         parts.append(LineGroup(f"dimensions-{verdict}", f"dimension: {verdict}", chains, look))
     return parts
 
@@ -433,8 +433,8 @@ def _size_words(item: InspectedReport) -> str:
 
 
 def _zero(content: Content, plot: Plot) -> str:
-    at = plot.view.page(0.0, 0.0)
-    return _cross(at, 13.0, {"id": "part-zero"}) if plot.view.shows(0.0, 0.0) else ""
+    place = plot.view.page(0.0, 0.0)
+    return _cross(place, 13.0, {"id": "part-zero"}) if plot.view.shows(0.0, 0.0) else ""
 
 
 def _zero_legend(content: Content, view: View) -> Iterator[LegendEntry]:
@@ -442,14 +442,14 @@ def _zero_legend(content: Content, view: View) -> Iterator[LegendEntry]:
         yield LegendEntry(_cross((SWATCH / 2.0, 0.0), 9.0, {}), "part zero")
 
 
-def _cross(at: tuple[float, float], size: float, name: Look) -> str:
+def _cross(place: tuple[float, float], size: float, name: Look) -> str:
     """A cross with a ring."""
     data = PathData()
     for dx, dy in ((size, 0.0), (0.0, size)):
-        data.move(at[0] - dx, at[1] - dy)
-        data.line(at[0] + dx, at[1] + dy)
+        data.move(place[0] - dx, place[1] - dy)
+        data.line(place[0] + dx, place[1] + dy)
     line: Look = {"fill": "none", "stroke": INK, "stroke-width": 1.8}
-    ring: Look = {"cx": number(at[0]), "cy": number(at[1]), "r": 0.5 * size}
+    ring: Look = {"cx": number(place[0]), "cy": number(place[1]), "r": 0.5 * size}
     lines = element("path", {"d": str(data)})
     return element("g", {**name, **line}, element("circle", ring), lines)
 
@@ -626,21 +626,21 @@ def usual_layers() -> frozenset[str]:
     return frozenset(layer.name for layer in LAYERS if layer.usual)
 
 
-def chosen(names: Iterable[str], without: Iterable[str]) -> frozenset[str]:
-    """The layers `names` (none: the usual ones) except those `without`; OptionError for unknown
+def chosen(names: Iterable[str], excluded: Iterable[str]) -> frozenset[str]:
+    """The layers `names` (none: the usual ones) except those `excluded`; OptionError for unknown
     names, and when no layer is left."""
-    shown, left_out = set(names), set(without)
-    known = layer_names()
+    shown, left_out = set(names), set(excluded)
+    available = layer_names()
     for name in sorted(shown | left_out):
-        if name not in known:
+        if name not in available:
             raise OptionError(
                 f"there is no layer {name!r}",
-                mend=f"{guess(name, known)}The layers are {', '.join(known)}",
+                mend=f"{guess(name, available)}The layers are {', '.join(available)}",
             )
-    left = frozenset(shown or usual_layers()) - left_out
-    if not left:
+    remaining = frozenset(shown or usual_layers()) - left_out
+    if not remaining:
         raise OptionError("no layer is left to show", mend="name others, or leave out fewer")
-    return left
+    return remaining
 
 
 def from_the_ground_up() -> list[Layer]:
@@ -655,16 +655,16 @@ def layers_in(content: Content) -> list[str]:
 
 def legend_of(content: Content, view: View) -> list[LegendEntry]:
     """The legend of the layers that are in the picture."""
-    there = (layer for layer in LAYERS if layer.is_in(content))
-    placed = sorted(there, key=lambda layer: layer.place)
-    return [entry for layer in placed for entry in layer.entries(content, view)]
+    present = (layer for layer in LAYERS if layer.is_in(content))
+    ordered = sorted(present, key=lambda layer: layer.place)
+    return [entry for layer in ordered for entry in layer.entries(content, view)]
 
 
 def draw_layers(content: Content, plot: Plot) -> list[str]:
     """Draw the layers as SVG, the lowest first: a group of all layers in mm, then the others."""
-    there = [layer for layer in from_the_ground_up() if layer.is_in(content)]
-    lines = [layer.ground(content, plot) for layer in there if layer.ground is not None]
-    lines += [layer.svg(content, plot) for layer in there if layer.in_mm]
+    present = [layer for layer in from_the_ground_up() if layer.is_in(content)]
+    lines = [layer.ground(content, plot) for layer in present if layer.ground is not None]
+    lines += [layer.svg(content, plot) for layer in present if layer.in_mm]
     lines = [line for line in lines if line]
     group = element("g", {"id": "mm", "transform": plot.view.matrix()}, *lines) if lines else ""
-    return [group, *(layer.svg(content, plot) for layer in there if not layer.in_mm)]
+    return [group, *(layer.svg(content, plot) for layer in present if not layer.in_mm)]

@@ -47,12 +47,12 @@ def draw_limits(scene: Scene, options: PictureOptions) -> str:
     shown = every
     if len(every) > MAX_ROWS:
         shown = sorted(every, key=lambda each: _ORDER[each.verdict])[:MAX_ROWS]
-    more = len(every) - len(shown)
+    extra = len(every) - len(shown)
     notes = ["limits, all drawn equally wide, and what is predicted"]
-    notes += [f"{more} more dimensions are in the table"] if more else []
-    head, down = title_and_notes(scene.title, notes, width)
-    rows = [_row(each, down + (k + 1) * ROW, width) for k, each in enumerate(shown)]
-    bottom = down + (len(shown) + 1) * ROW
+    notes += [f"{extra} more dimensions are in the table"] if extra else []
+    head, top = title_and_notes(scene.title, notes, width)
+    rows = [_row(each, top + (k + 1) * ROW, width) for k, each in enumerate(shown)]
+    bottom = top + (len(shown) + 1) * ROW
     below, foot = legend_below(_entries(shown), bottom, width)
     return sheet(scene.title, (width, foot), options, head, *rows, below)
 
@@ -65,33 +65,33 @@ def _row(item: InspectedReport, y: float, width: float) -> str:
     lower = 0.0 if item.lower_mm is None else item.lower_mm
     zone = max(item.upper_mm - lower, 1e-9)
 
-    def at(size_mm: float) -> float:
+    def x_of(size_mm: float) -> float:
         share = ZONE * (1.0 + (size_mm - lower) / zone)
         return left + axis * min(max(share, 0.0), 1.0)
 
     colour = VERDICTS[item.verdict]
     spread = (item.expanded_um or 0.0) / UM_PER_MM
-    limits: Look = {"x": at(lower), "y": y - 0.36 * ROW, "height": 0.72 * ROW, "fill": SWEPT}
+    limits: Look = {"x": x_of(lower), "y": y - 0.36 * ROW, "height": 0.72 * ROW, "fill": SWEPT}
     ends: Look = {"fill": "none", "stroke": FRAME, "stroke-width": 1.0}
     thin: Look = {"fill": "none", "stroke": colour, "stroke-width": 1.6}
     thick: Look = {**thin, "stroke-width": 5.0, "stroke-linecap": "round"}
-    middle = at(0.5 * (lower + item.upper_mm))
+    middle = x_of(0.5 * (lower + item.upper_mm))
     base = y + 0.5 * CAP
     style = TextStyle(cap=CAP, colour=INK)
     name = text.shortened(item.name, CAP, NAMES * room - 12.0)
     size = f"{item.fit_mm:.4f}" + (f" ± {spread:.4f}" if spread else "")
     words = text.shortened(f"{size} {item.verdict}", CAP, SIZES * room - 12.0)
-    reach = at(item.low_mm - spread), at(item.high_mm + spread)
+    reach = x_of(item.low_mm - spread), x_of(item.high_mm + spread)
     return element(
         "g",
         {"class": "dimension"},
         title(f"{item.name}: {item.verdict}"),
-        element("rect", {**limits, "width": at(item.upper_mm) - at(lower)}),
+        element("rect", {**limits, "width": x_of(item.upper_mm) - x_of(lower)}),
         element("path", {"d": _line(middle, y - 0.36 * ROW, middle, y + 0.36 * ROW), **ends}),
         element("path", {"d": _bar(*reach, y), **thin}),
-        element("path", {"d": _line(at(item.low_mm), y, at(item.high_mm), y), **thick}),
-        element("circle", {"cx": at(item.fit_mm), "cy": y, "r": 4.0, "fill": colour}),
-        text.label(name, (MARGIN, base), style, full=item.name),
+        element("path", {"d": _line(x_of(item.low_mm), y, x_of(item.high_mm), y), **thick}),
+        element("circle", {"cx": x_of(item.fit_mm), "cy": y, "r": 4.0, "fill": colour}),
+        text.label(name, (MARGIN, base), style, full_text=item.name),
         text.label(words, (right + 12.0, base), TextStyle(cap=CAP, colour=QUIET)),
     )
 
@@ -115,11 +115,11 @@ def _bar(x0: float, x1: float, y: float) -> str:
 
 
 def _entries(shown: Sequence[InspectedReport]) -> list[LegendEntry]:
-    found = {each.verdict for each in shown}
+    verdicts = {each.verdict for each in shown}
     entries = [
         LegendEntry(line_swatch(colour, 5.0), verdict)
         for verdict, colour in VERDICTS.items()
-        if verdict in found
+        if verdict in verdicts
     ]
     entries.append(LegendEntry(line_swatch(QUIET, 1.6), f"uncertainty, expanded by {COVERAGE:g}"))
     entries.append(LegendEntry(line_swatch(SWEPT, 12.0), "limits"))

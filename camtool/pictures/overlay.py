@@ -61,10 +61,10 @@ def draw_overlay(overlay: Overlay, options: PictureOptions = AS_USUAL) -> str:
     """The paths as SVG text; equal input gives equal bytes."""
     size_px = options.size_px or SVG_WIDTH_PX
     page = page_width(size_px)
-    head, down = title_and_notes(overlay.title, overlay.notes, page)
+    head, top = title_and_notes(overlay.title, overlay.notes, page)
     window = overlay.window if options.crop_mm is None else cropped(*options.crop_mm)
     shapes = (WIDEST, TALLEST) if options.crop_mm is None else CROP_SHAPES
-    view, ticks = fitted(window, down + HEAD_GAP, page, shapes)
+    view, ticks = fitted(window, top + HEAD_GAP, page, shapes)
     table, bar_y = table_of(_entries(overlay), view, view.box)
     legend_y = view.box.bottom + LEGEND_DROP
     sizes = (page, foot_of(table, legend_y))
@@ -87,8 +87,8 @@ def _colour(index: int) -> str:
 
 
 def _entries(overlay: Overlay) -> list[LegendEntry]:
-    wanted = LegendEntry(line_swatch(FEED_PALE, WANTED_PEN), "wanted")
-    return [wanted] + [
+    wanted_entry = LegendEntry(line_swatch(FEED_PALE, WANTED_PEN), "wanted")
+    return [wanted_entry] + [
         LegendEntry(line_swatch(_colour(index), RUN_PEN), name)
         for index, (name, _) in enumerate(overlay.runs)
     ]

@@ -72,8 +72,8 @@ class PageLayout(Struct, frozen=True, eq=False):
 
 def page_of(content: Content, width: float = PAGE) -> PageLayout:
     """The page of a picture of one scene."""
-    head, down = title_and_notes(content.scene.title, content.notes, width)
-    top = down + HEAD_GAP
+    head, head_end = title_and_notes(content.scene.title, content.notes, width)
+    top = head_end + HEAD_GAP
     shapes = (WIDEST, TALLEST) if content.crop_mm is None else CROP_SHAPES
 
     def bar(view: View) -> float:
@@ -100,16 +100,17 @@ def fitted(
     top: float,
     width: float,
     shapes: tuple[float, float],
-    beside: Callable[[View], float] = lambda view: 0.0,
+    margin_of: Callable[[View], float] = lambda view: 0.0,
 ) -> tuple[View, Ticks]:
-    """The view of a window on a page of this width, and its ticks; `beside` gives the width that a
-    view needs right of it. Fitted `FITS` times: the room for numbers follows from the scale."""
+    """The view of a window on a page of this width, and its ticks; `margin_of` gives the width
+    that a view needs right of it. Fitted `FITS` times: the room for numbers follows from the
+    scale."""
     left, right = MARGIN + GUESSED_LEFT, width - MARGIN
     for _ in range(FITS):
         view = fit(window, left, top, right, shapes)
         ticks = ticks_of(view)
         left = MARGIN + ticks.left_width + TICK + LABEL_GAP
-        right = width - MARGIN - beside(view)
+        right = width - MARGIN - margin_of(view)
     return view, ticks
 
 
@@ -185,26 +186,26 @@ def title_and_notes(
     """The SVG of title, on at most `lines` lines, and notes at the top of a page of this width,
     and the height at which they end."""
     room = page - 2.0 * MARGIN
-    down = MARGIN
+    y = MARGIN
     parts = []
     for index, line in enumerate(_title_lines(name, room, lines)):
-        down += TITLE.cap if index == 0 else TITLE_STEP
-        full = name if index == 0 else line
-        parts.append(text.label(line, (MARGIN, down), TITLE, full=full))
+        y += TITLE.cap if index == 0 else TITLE_STEP
+        full_text = name if index == 0 else line
+        parts.append(text.label(line, (MARGIN, y), TITLE, full_text=full_text))
     if parts:
-        down += 6.0
+        y += 6.0
     for note in notes:
         for line in text.wrapped(note, NOTE.cap, room):
-            down += NOTE_STEP
-            parts.append(text.label(line, (MARGIN, down), NOTE))
-    return element("g", {"id": "head"}, *parts), down + 6.0
+            y += NOTE_STEP
+            parts.append(text.label(line, (MARGIN, y), NOTE))
+    return element("g", {"id": "head"}, *parts), y + 6.0
 
 
-def _title_lines(name: str, room: float, most: int) -> list[str]:
-    """The title broken at blanks into at most `most` lines, the last one shortened."""
+def _title_lines(name: str, room: float, max_lines: int) -> list[str]:
+    """The title broken at blanks into at most `max_lines` lines, the last one shortened."""
     words = one_line(name).split()
     lines: list[str] = []
-    while words and len(lines) < most - 1:
+    while words and len(lines) < max_lines - 1:
         count = 1
         while count < len(words) and text.width(" ".join(words[: count + 1]), TITLE.cap) <= room:
             count += 1
@@ -218,18 +219,18 @@ def _title_lines(name: str, room: float, most: int) -> list[str]:
 def rows_of(entries: Sequence[LegendEntry], first: float, room: float) -> list[list[LegendEntry]]:
     """The entries in rows: the first row no wider than `first`, the others than `room`; the first
     row stays empty when no entry fits into it."""
-    found: list[list[LegendEntry]] = []
+    rows: list[list[LegendEntry]] = []
     if entries and _width(entries[0]) - ENTRY_GAP > first:
-        found.append([])
-    used = math.inf
+        rows.append([])
+    used_width = math.inf
     for entry in entries:
-        limit = first if len(found) <= 1 else room
-        if used + _width(entry) - ENTRY_GAP > limit:
-            found.append([])
-            used = 0.0
-        found[-1].append(entry)
-        used += _width(entry)
-    return found
+        limit = first if len(rows) <= 1 else room
+        if used_width + _width(entry) - ENTRY_GAP > limit:
+            rows.append([])
+            used_width = 0.0
+        rows[-1].append(entry)
+        used_width += _width(entry)
+    return rows
 
 
 def rows_beside(
@@ -240,11 +241,11 @@ def rows_beside(
     first = room - bar
     if not entries or _width(entries[0]) - ENTRY_GAP <= first:
         return rows_of(entries, first, room), 0
-    found = rows_of(entries, room, room)
-    for row in reversed(range(len(found))):
-        if sum(_width(entry) for entry in found[row]) - ENTRY_GAP <= first:
-            return found, row
-    return [[], *found], 0
+    rows = rows_of(entries, room, room)
+    for row in reversed(range(len(rows))):
+        if sum(_width(entry) for entry in rows[row]) - ENTRY_GAP <= first:
+            return rows, row
+    return [[], *rows], 0
 
 
 def legend_rows(table: Sequence[Sequence[LegendEntry]], left: float, middle: float) -> str:
@@ -254,9 +255,9 @@ def legend_rows(table: Sequence[Sequence[LegendEntry]], left: float, middle: flo
         across, height = left, middle + index * ROW_STEP
         for entry in row:
             move = f"translate({number(across)} {number(height)})"
-            at = (across + SWATCH + SWATCH_GAP, height + ENTRY.cap / 2.0)
+            place = (across + SWATCH + SWATCH_GAP, height + ENTRY.cap / 2.0)
             parts.append(element("g", {"transform": move}, entry.swatch))
-            parts.append(text.label(_name(entry), at, ENTRY, full=entry.name))
+            parts.append(text.label(_name(entry), place, ENTRY, full_text=entry.name))
             across += _width(entry)
     return element("g", {"id": "legend"}, *parts) if parts else ""
 
@@ -297,14 +298,14 @@ def colour_bar(top_um: float, box: PageBox) -> str:
     parts = []
     for index, colour in reversed(list(enumerate(bin_colours()))):
         # Each step reaches down to the foot and is covered by the lower ones: no seams.
-        down = round(box.bottom - (index + 1) * step, 2)
-        piece: Look = {"x": left, "y": number(down), "width": BAR_WIDTH}
+        y = round(box.bottom - (index + 1) * step, 2)
+        piece: Look = {"x": left, "y": number(y), "width": BAR_WIDTH}
         parts.append(
             element(
                 "rect",
                 {
                     **piece,
-                    "height": box.bottom - down,
+                    "height": box.bottom - y,
                     "fill": colour,
                     "shape-rendering": "crispEdges",
                 },
@@ -314,11 +315,11 @@ def colour_bar(top_um: float, box: PageBox) -> str:
     parts.append(element("rect", {**edge, "fill": "none", "stroke": FRAME, "stroke-width": 1.4}))
     ticks = PathData()
     for value, name in colour_bar_labels(top_um, box.height):
-        down = box.bottom - value / top_um * box.height
-        ticks.move(left + BAR_WIDTH, down)
-        ticks.line(left + BAR_WIDTH + 5.0, down)
-        at = (left + BAR_WIDTH + 12.0, down + TICK_CAP / 2.0)
-        parts.append(text.label(name, at, TextStyle(TICK_CAP, QUIET)))
+        y = box.bottom - value / top_um * box.height
+        ticks.move(left + BAR_WIDTH, y)
+        ticks.line(left + BAR_WIDTH + 5.0, y)
+        place = (left + BAR_WIDTH + 12.0, y + TICK_CAP / 2.0)
+        parts.append(text.label(name, place, TextStyle(TICK_CAP, QUIET)))
     line: Look = {"d": str(ticks), "fill": "none", "stroke": FRAME, "stroke-width": 1.4}
     parts.append(element("path", line))
     parts.append(text.label(BAR_TITLE, (left, box.top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))
@@ -404,10 +405,10 @@ def axes_around(view: View, ticks: Ticks) -> str:
             centred = TextStyle(TICK_CAP, QUIET, "middle")
             labels.append(text.label(ticks.text(x), (across, base), centred))
     for y in ticks.y:
-        down = view.page(0.0, y)[1]
-        _tick(marks, (box.left, down), (-TICK, 0.0))
-        at = (box.left - TICK - LABEL_GAP, down + TICK_CAP / 2.0)
-        labels.append(text.label(ticks.text(y), at, TextStyle(TICK_CAP, QUIET, "end")))
+        tick_y = view.page(0.0, y)[1]
+        _tick(marks, (box.left, tick_y), (-TICK, 0.0))
+        place = (box.left - TICK - LABEL_GAP, tick_y + TICK_CAP / 2.0)
+        labels.append(text.label(ticks.text(y), place, TextStyle(TICK_CAP, QUIET, "end")))
     _minor(marks, view, ticks)
     labels.append(text.label("X (mm)", (box.right, base), TextStyle(TICK_CAP, QUIET, "end")))
     labels.append(text.label("Y (mm)", (box.left, box.top - NAME_LIFT), NUMBERS))
@@ -422,9 +423,9 @@ def axes_around(view: View, ticks: Ticks) -> str:
     )
 
 
-def _tick(marks: PathData, at: tuple[float, float], by: tuple[float, float]) -> None:
-    marks.move(*at)
-    marks.line(at[0] + by[0], at[1] + by[1])
+def _tick(marks: PathData, place: tuple[float, float], step: tuple[float, float]) -> None:
+    marks.move(*place)
+    marks.line(place[0] + step[0], place[1] + step[1])
 
 
 def _minor(marks: PathData, view: View, ticks: Ticks) -> None:

@@ -68,7 +68,7 @@ MIN_SHARE = 0.02
 def closeups(scene: Scene, options: PictureOptions) -> Iterator[tuple[str, PictureOptions]]:
     """Caption and options of each close-up; none where nothing was predicted. Size and ground are
     those of `options`, the rest is as usual."""
-    plain = PictureOptions(size_px=options.size_px, dark=options.dark)
+    usual = PictureOptions(size_px=options.size_px, dark=options.dark)
     points, errors = scene.trace_points, scene.trace_error_mm
     if points is not None and errors is not None and scene.worst and len(points):
         size = float(np.ptp(points, axis=0).max())
@@ -77,15 +77,15 @@ def closeups(scene: Scene, options: PictureOptions) -> Iterator[tuple[str, Pictu
         if 0.0 < side < 0.5 * size:
             x, y = scene.worst[0]
             shown = (x - 0.5 * side, y - 0.5 * side, side, side)
-            yield f"The largest error, near ({x:.3f}, {y:.3f}) mm", replace(plain, crop_mm=shown)
-    known = [one.circular_mm for one in scene.rounds if math.isfinite(one.circular_mm)]
-    if known:
-        worst = max(known)
+            yield f"The largest error, near ({x:.3f}, {y:.3f}) mm", replace(usual, crop_mm=shown)
+    errors_mm = [one.circular_mm for one in scene.rounds if math.isfinite(one.circular_mm)]
+    if errors_mm:
+        worst = max(errors_mm)
         number = next(k for k, one in enumerate(scene.rounds, 1) if one.circular_mm == worst)
         caption = (
             f"Circle {number}, that of the largest circular error, {worst * UM_PER_MM:.2f} µm"
         )
-        yield caption, replace(plain, polar=number)
+        yield caption, replace(usual, polar=number)
 
 
 LAID = frozenset({"drawing", "stock", "zero"})

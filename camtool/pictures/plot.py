@@ -75,13 +75,13 @@ class Plot(Struct, frozen=True):
         length, but no more than the window's diagonal."""
         low, high = np.array([self.view.x_range, self.view.y_range]).T
         lengths = chain.lengths()
-        near = np.empty(len(lengths), dtype=np.bool_)
+        is_near = np.empty(len(lengths), dtype=np.bool_)
         for first, part in chain.parts():
             begin, end = part.points[:-1], part.points[1:]
-            meets = (np.minimum(begin, end) <= high) & (np.maximum(begin, end) >= low)
-            near[first : first + len(meets)] = meets.all(axis=1)
+            overlaps = (np.minimum(begin, end) <= high) & (np.maximum(begin, end) >= low)
+            is_near[first : first + len(overlaps)] = overlaps.all(axis=1)
         np.minimum(lengths, math.hypot(*(high - low)), out=lengths)
-        return float(lengths[near].sum())
+        return float(lengths[is_near].sum())
 
     def round_pen(self, width: float) -> Look:
         """A pen of a width on the page."""
@@ -140,15 +140,17 @@ class Plot(Struct, frozen=True):
         view = self.view
         lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
         long = [index for index, length in enumerate(lengths) if length >= MIN_LENGTH_WITH_ARROW]
-        data, taken = PathData(), list[Place]()
+        data, arrows = PathData(), list[Place]()
         for index in long[:: 1 + len(long) // MAX_WITH_ARROW]:
-            wanted = min(1 + int(lengths[index] / ARROW_EVERY), MAX_ON_ONE)
-            for place in range(wanted):
-                point, heading = _along(chains[index], place / wanted, (place + 1) / wanted)
-                at = view.page(*point)
-                if view.shows(*point) and all(math.dist(at, one) >= ARROWS_APART for one in taken):
-                    _arrow(data, at, -heading)
-                    taken.append(at)
+            count = min(1 + int(lengths[index] / ARROW_EVERY), MAX_ON_ONE)
+            for place in range(count):
+                point, heading = _along(chains[index], place / count, (place + 1) / count)
+                page_place = view.page(*point)
+                if view.shows(*point) and all(
+                    math.dist(page_place, one) >= ARROWS_APART for one in arrows
+                ):
+                    _arrow(data, page_place, -heading)
+                    arrows.append(page_place)
         if not data:
             return ""
         return element("g", {"id": "arrows"}, element("path", {"d": str(data), "fill": FEED}))
@@ -164,8 +166,8 @@ class Plot(Struct, frozen=True):
         labels = labels_beside(ranks, places, self.view)
         rings = []
         for label in labels:
-            at: Look = {"cx": number(label.at[0]), "cy": number(label.at[1])}
-            rings.append(element("circle", {**at, **look}))
+            circle: Look = {"cx": number(label.at[0]), "cy": number(label.at[1])}
+            rings.append(element("circle", {**circle, **look}))
         return _group(name, [*rings, *(_written(label, str(look["stroke"])) for label in labels)])
 
 
@@ -182,13 +184,13 @@ def _along(chain: Chain, low: float, high: float) -> tuple[tuple[float, float], 
     return chain.at(index, float((middle - begins[index]) / (ends[index] - begins[index])))
 
 
-def _arrow(data: PathData, at: tuple[float, float], heading: float) -> None:
-    """A slim arrowhead with its middle at `at`; heading in page directions (Y down)."""
+def _arrow(data: PathData, place: tuple[float, float], heading: float) -> None:
+    """A slim arrowhead with its middle at `place`; heading in page directions (Y down)."""
     cos, sin = math.cos(heading), math.sin(heading)
     half = ARROW_LENGTH / 2.0
     corners = ((half, 0.0), (-half, ARROW_WIDTH), (-half / 2.0, 0.0), (-half, -ARROW_WIDTH))
     for index, (along, across) in enumerate(corners):
-        x, y = at[0] + along * cos - across * sin, at[1] + along * sin + across * cos
+        x, y = place[0] + along * cos - across * sin, place[1] + along * sin + across * cos
         (data.line if index else data.move)(x, y)
     data.close()
 
@@ -204,26 +206,26 @@ class Label(Struct, frozen=True):
 
 def labels_beside(texts: Sequence[str], places: Sequence[Place], view: View) -> list[Label]:
     """Texts beside their places in mm, none over another: one that finds no room is left out."""
-    found: list[Label] = []
+    labels: list[Label] = []
     for words, place in list(zip(texts, places, strict=True))[:MAX_LABELS]:
         if not view.shows(*place):
             continue
-        at = view.page(*place)
+        page_place = view.page(*place)
         for direction in DIRECTIONS:
-            box = _beside(words, at, direction)
-            if _inside(box, view) and not any(_touch(box, label.box) for label in found):
-                found.append(Label(words, at, box))
+            box = _beside(words, page_place, direction)
+            if _inside(box, view) and not any(_touch(box, label.box) for label in labels):
+                labels.append(Label(words, page_place, box))
                 break
-    return found
+    return labels
 
 
 def _beside(
-    words: str, at: tuple[float, float], direction: tuple[float, float]
+    words: str, place: tuple[float, float], direction: tuple[float, float]
 ) -> tuple[float, float, float, float]:
     """The box of a text to the right or left of a place, and below or above it."""
     wide = text.width(words, CAP)
-    left = at[0] + AWAY if direction[0] > 0.0 else at[0] - AWAY - wide
-    top = at[1] + 0.5 * AWAY if direction[1] > 0.0 else at[1] - 0.5 * AWAY - CAP
+    left = place[0] + AWAY if direction[0] > 0.0 else place[0] - AWAY - wide
+    top = place[1] + 0.5 * AWAY if direction[1] > 0.0 else place[1] - 0.5 * AWAY - CAP
     return left, top, left + wide, top + CAP
 
 
@@ -235,8 +237,8 @@ def _inside(box: tuple[float, float, float, float], view: View) -> bool:
 
 
 def _touch(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
-    beside = a[2] + CLEAR <= b[0] or b[2] + CLEAR <= a[0]
-    return not (beside or a[3] + CLEAR <= b[1] or b[3] + CLEAR <= a[1])
+    is_apart = a[2] + CLEAR <= b[0] or b[2] + CLEAR <= a[0]
+    return not (is_apart or a[3] + CLEAR <= b[1] or b[3] + CLEAR <= a[1])
 
 
 def _group(name: str, parts: list[str]) -> str:
@@ -244,7 +246,7 @@ def _group(name: str, parts: list[str]) -> str:
 
 
 def _written(label: Label, colour: str) -> str:
-    style, at = TextStyle(CAP, colour), (label.box[0], label.box[3])
+    style, place = TextStyle(CAP, colour), (label.box[0], label.box[3])
     halo: Look = {**text.stroke_of(style), "stroke": PLOT, "stroke-width": HALO}
-    below = element("path", {"d": text.strokes(label.text, at, style), **halo})
-    return below + "\n" + text.label(label.text, at, style)
+    below = element("path", {"d": text.strokes(label.text, place, style), **halo})
+    return below + "\n" + text.label(label.text, place, style)

@@ -38,32 +38,33 @@ class CircleErrors(Struct, frozen=True, eq=False):
         return "counterclockwise" if self.one.ccw else "clockwise"
 
 
-def circle_pair(scene: Scene, which: int) -> tuple[CircleErrors, ...]:
-    """Return the `which`-th circle of the scene, from 1, and the same circle cut in the other
-    direction, if there is one, counterclockwise first. OptionError if there is no such circle."""
-    if not 1 <= which <= len(scene.rounds):
-        many = len(scene.rounds)
+def circle_pair(scene: Scene, circle_number: int) -> tuple[CircleErrors, ...]:
+    """Return the `circle_number`-th circle of the scene, from 1, and the same circle cut in the
+    other direction, if there is one, counterclockwise first. OptionError if there is no such
+    circle."""
+    if not 1 <= circle_number <= len(scene.rounds):
+        count = len(scene.rounds)
         raise OptionError(
-            f"there is no circle {which}" + (f" in {scene.title}" if scene.title else ""),
+            f"there is no circle {circle_number}" + (f" in {scene.title}" if scene.title else ""),
             where="--polar",
-            mend=f"take 1 to {many}" if many else "the path goes round no full circle",
+            mend=f"take 1 to {count}" if count else "the path goes round no full circle",
         )
-    partner = scene.rounds[which - 1].partner
-    numbers = [which] if partner is None else [which, partner]
+    partner = scene.rounds[circle_number - 1].partner
+    numbers = [circle_number] if partner is None else [circle_number, partner]
     rounds = [(number, scene.rounds[number - 1]) for number in numbers]
     rounds.sort(key=lambda found: not found[1].ccw)
     return tuple(CircleErrors(number, one, one.errors() * UM_PER_MM) for number, one in rounds)
 
 
-def draw_polar(scene: Scene, which: int, options: PictureOptions) -> str:
-    """SVG text of the plot of the `which`-th circle of the scene, from 1; OptionError when there
+def draw_polar(scene: Scene, number: int, options: PictureOptions) -> str:
+    """SVG text of the plot of the `number`-th circle of the scene, from 1; OptionError when there
     is none."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
-    circles = circle_pair(scene, which)
+    circles = circle_pair(scene, number)
     errors = [circle.errors_um for circle in circles]
     dial = dial_of(errors, width)
-    head, down = title_and_notes(scene.title, notes(circles, dial), width)
-    dial = dial.centred_below(down, width)
+    head, top = title_and_notes(scene.title, notes(circles, dial), width)
+    dial = dial.centred_below(top, width)
     foot = dial.middle[1] + dial.outer + ROOM
     below, foot = legend_below(entries(circles), foot, width)
     return sheet(scene.title, (width, foot), options, head, *plot(errors, dial), below)
@@ -88,22 +89,22 @@ def notes(circles: Sequence[CircleErrors], dial: Dial) -> tuple[str, ...]:
     scale = f"radial error × {times}; from ring to ring {dial.step_um:g} µm"
     place = f"radius {first.radius_mm:.4g} mm about ({x:.4g}, {y:.4g}) mm"
     if len(circles) == 1:
-        about = f"circle {circles[0].which}: {place}, {circles[0].direction}"
+        title = f"circle {circles[0].which}: {place}, {circles[0].direction}"
         figures = f"{_iso(first)} (µm)", f"reversal values {_reversal(first)} (µm)"
-        return (about, *figures, scale)
+        return (title, *figures, scale)
     each = [
         f"{circle.direction}: {_iso(circle.one)}, {_reversal(circle.one)} (µm)"
         for circle in circles
     ]
-    both = f"both ways together: G(b) {_um(first.both_circular_mm).lstrip('+')} (µm)"
+    both_text = f"both ways together: G(b) {_um(first.both_circular_mm).lstrip('+')} (µm)"
     names = " and ".join(str(circle.which) for circle in circles)
-    return (f"circles {names}: {place}, both ways round", *each, both, scale)
+    return (f"circles {names}: {place}, both ways round", *each, both_text, scale)
 
 
 def _iso(one: Round) -> str:
-    largest, least, mean = one.radial_mm
+    largest, smallest, mean = one.radial_mm
     circular = _um(one.circular_mm).lstrip("+")
-    return f"G {circular}, F max {_um(largest)}, F min {_um(least)}, mean {_um(mean)}"
+    return f"G {circular}, F max {_um(largest)}, F min {_um(smallest)}, mean {_um(mean)}"
 
 
 def _reversal(one: Round) -> str:
@@ -173,13 +174,13 @@ def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
     largest error of all, outward or inward, just fits."""
     outer = 0.5 * width - MARGIN - ROOM
     errors = np.concatenate([each.ravel() for each in errors_um])
-    seen = errors[np.isfinite(errors)]
-    out = max(float(seen.max(initial=0.0)), 0.0)
-    into = max(-float(seen.min(initial=0.0)), 0.0)
-    largest = max(out, into, MIN_RANGE_UM)
+    finite = errors[np.isfinite(errors)]
+    outward = max(float(finite.max(initial=0.0)), 0.0)
+    inward = max(-float(finite.min(initial=0.0)), 0.0)
+    largest = max(outward, inward, MIN_RANGE_UM)
     step = round_step(largest / MIN_RINGS / 2.0)
     reach = step * math.ceil(largest / step)
-    share = (1.0 - BASE_SHARE) if out >= into else 0.5
+    share = (1.0 - BASE_SHARE) if outward >= inward else 0.5
     base = (1.0 - share) * outer
     return Dial((0.0, 0.0), outer, base, min(share * outer, 0.9 * base) / reach, step)
 
@@ -222,8 +223,8 @@ def _quadrants(dial: Dial) -> str:
         cos, sin = round(math.cos(index * math.pi / 2)), round(math.sin(index * math.pi / 2))
         data.move(x, y)
         data.line(x + outer * cos, y - outer * sin)
-        away = outer + 0.5 * ROOM
-        labels.append(text.label(name, (x + away * cos, y - away * sin + 0.5 * CAP), style))
+        radius = outer + 0.5 * ROOM
+        labels.append(text.label(name, (x + radius * cos, y - radius * sin + 0.5 * CAP), style))
     line: Look = {"d": str(data), "fill": "none", "stroke": FRAME, "stroke-width": 1.4}
     return element("g", {"id": "quadrants"}, element("path", line), *labels)
 
@@ -256,16 +257,16 @@ def _stroke(data: PathData, points: list[tuple[float, float]]) -> None:
         (data.line if index else data.move)(*point)
 
 
-def _runs(seen: np.ndarray) -> list[list[int]]:
+def _runs(has_error: np.ndarray) -> list[list[int]]:
     """Runs of consecutive bins, once round; a whole circle ends where it begins."""
-    count = len(seen)
-    if seen.all():
+    count = len(has_error)
+    if has_error.all():
         return [list(range(count + 1))]
-    if not seen.any():
+    if not has_error.any():
         return []
-    first = int(np.flatnonzero(~seen)[0])
-    turned = np.roll(seen, -first)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], turned, [False]]).astype(np.int8)))
+    first = int(np.flatnonzero(~has_error)[0])
+    rolled = np.roll(has_error, -first)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rolled, [False]]).astype(np.int8)))
     return [
         list(range(first + low, first + high))
         for low, high in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
@@ -283,10 +284,10 @@ def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
     best = max(range(len(clear)), key=lambda index: len(clear[index]))
     shown = clear[best] if len(clear[best]) >= MIN_LABELS else numbers[best]
     style, parts = TextStyle(LABEL_CAP, QUIET), []
-    for name, at, _ in shown:
+    for name, place, _ in shown:
         halo: Look = {**text.stroke_of(style), "stroke": PLOT, "stroke-width": 2.0 * HALO}
-        parts.append(element("path", {"d": text.strokes(name, at, style), **halo}))
-        parts.append(text.label(name, at, style))
+        parts.append(element("path", {"d": text.strokes(name, place, style), **halo}))
+        parts.append(text.label(name, place, style))
     return element("g", {"id": "ring-labels"}, *parts)
 
 
@@ -304,7 +305,7 @@ def _numbers(dial: Dial, angle: float) -> list[tuple[str, tuple[float, float], P
     """(number, where its baseline begins, its box) of each ring with a number."""
     every = max(1, math.ceil(2.2 * CAP / (dial.step_um * dial.per_um)))
     shown = [e for e in _ring_errors(dial) if round(e / dial.step_um) % every == 0]
-    found = []
+    numbers = []
     for error in shown:
         if dial.base + error * dial.per_um < FIRST_LABEL:
             continue
@@ -313,9 +314,9 @@ def _numbers(dial: Dial, angle: float) -> list[tuple[str, tuple[float, float], P
         half, base = 0.5 * text.width(name, LABEL_CAP), y + 0.5 * LABEL_CAP
         name += " µm" if error == shown[-1] else ""
         left, right = x - half, x - half + text.width(name, LABEL_CAP)
-        around = PageBox(left - HALO, base - LABEL_CAP - HALO, right + HALO, base + HALO)
-        found.append((name, (left, base), around))
-    return found
+        box = PageBox(left - HALO, base - LABEL_CAP - HALO, right + HALO, base + HALO)
+        numbers.append((name, (left, base), box))
+    return numbers
 
 
 def _hides(box: PageBox, places: Floats) -> bool:

@@ -77,8 +77,8 @@ class Camera(Struct, frozen=True):
     @property
     def light(self) -> tuple[float, float, float]:
         """Direction to the lamp, of length 1."""
-        (fx, fy), (right, away) = self.away, self.lamp
-        x, y = right * fy + away * fx, away * fy - right * fx
+        (fx, fy), (right, distance) = self.away, self.lamp
+        x, y = right * fy + distance * fx, distance * fy - right * fx
         size = math.sqrt((x * x + y * y) * (1.0 + self.rise * self.rise))
         return x / size, y / size, self.rise / math.sqrt(1.0 + self.rise * self.rise)
 
@@ -116,38 +116,41 @@ class Stage(Struct, frozen=True, eq=False):
 
 
 def stage_of(
-    found: HeightMap, thickness_mm: float, moves: StockMoves | None, margin: float
+    height_map: HeightMap, thickness_mm: float, moves: StockMoves | None, margin: float
 ) -> Stage:
     """The map on a board, with `margin` (a share of its longer side) of the board around it."""
     bottom = -thickness_mm
-    heights = np.where(found.heights <= bottom + THROUGH_MM, bottom, found.heights)
+    heights = np.where(height_map.heights <= bottom + THROUGH_MM, bottom, height_map.heights)
     rows, columns = heights.shape
     pad = math.ceil(margin * max(rows, columns))
     marks = None
-    if moves is not None and found.owner is not None:
-        marks = np.pad(_marks(found, moves), ((pad, pad), (pad, pad)))
+    if moves is not None and height_map.owner is not None:
+        marks = np.pad(_marks(height_map, moves), ((pad, pad), (pad, pad)))
     return Stage(
         np.pad(heights, pad, constant_values=bottom).astype(np.float32),
-        (found.corner_mm[0] - pad * found.cell_mm, found.corner_mm[1] - pad * found.cell_mm),
-        found.cell_mm,
+        (
+            height_map.corner_mm[0] - pad * height_map.cell_mm,
+            height_map.corner_mm[1] - pad * height_map.cell_mm,
+        ),
+        height_map.cell_mm,
         bottom,
-        float(found.heights.min(initial=0.0)),
+        float(height_map.heights.min(initial=0.0)),
         pad,
         marks,
     )
 
 
-def _marks(found: HeightMap, moves: StockMoves) -> Heights:
+def _marks(height_map: HeightMap, moves: StockMoves) -> Heights:
     """Return how much the marks of the tool catch the light (NY, NX), −1 … 1: the cosine of twice
     the angle between the cut and the diagonal; 0 where nothing cut, or straight down."""
-    way = moves.end[:, :2] - moves.start[:, :2]
-    square = way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]
+    travel = moves.end[:, :2] - moves.start[:, :2]
+    square = travel[:, 0] * travel[:, 0] + travel[:, 1] * travel[:, 1]
     catch = np.where(
-        square > 0.0, 2.0 * way[:, 0] * way[:, 1] / np.where(square > 0.0, square, 1.0), 0.0
+        square > 0.0, 2.0 * travel[:, 0] * travel[:, 1] / np.where(square > 0.0, square, 1.0), 0.0
     )
     table = np.append(catch, 0.0).astype(np.float32)
-    assert found.owner is not None
-    return np.asarray(table[found.owner])
+    assert height_map.owner is not None
+    return np.asarray(table[height_map.owner])
 
 
 def light_of(colour: str) -> Floats:
@@ -194,7 +197,7 @@ def picture_of(
         level,
     )
     lit = _lit(stage, camera)
-    out = np.empty((sizes[1], sizes[0], 3), dtype=np.uint8)
+    pixels = np.empty((sizes[1], sizes[0], 3), dtype=np.uint8)
     for first in range(0, sizes[1], ROWS_AT_ONCE):
         rows = slice(first * SAMPLES, (first + ROWS_AT_ONCE) * SAMPLES)
         colours = _colours(lit, cell[rows], level[rows], light_of(ground))
@@ -203,8 +206,8 @@ def picture_of(
             colours[i::SAMPLES, j::SAMPLES] for i in range(SAMPLES) for j in range(SAMPLES)
         ) / np.float32(SAMPLES * SAMPLES)
         last = sizes[1] - first
-        out[max(last - ROWS_AT_ONCE, 0) : last] = (np.sqrt(mean) * 255.0 + 0.5)[::-1]
-    return out
+        pixels[max(last - ROWS_AT_ONCE, 0) : last] = (np.sqrt(mean) * 255.0 + 0.5)[::-1]
+    return pixels
 
 
 class _LitStage(Struct, frozen=True, eq=False):
@@ -238,8 +241,8 @@ def _colours(
 ) -> Heights:
     """The light (H, W, 3) of each pixel."""
     stage, size = lit.stage, lit.stage.size_mm
-    beside = cell == -1
-    wall = (cell < 0) & ~beside
+    is_ground = cell == -1
+    wall = (cell < 0) & ~is_ground
     number = np.where(wall, ~cell, np.maximum(cell, 0))
     facing = np.where(wall, lit.steep.ravel()[number], lit.flat.ravel()[number])
     shade = lit.shade.ravel()[number]
@@ -247,8 +250,8 @@ def _colours(
     open_sky = lit.open_sky.ravel()[number]
     # A wall is as open as its foot below, and as the top above.
     foot = stage.heights.ravel()[number]
-    deep = np.clip((level - foot) / np.float32(0.06 * size), 0.0, 1.0)
-    open_sky = open_sky + np.where(wall, (1.0 - open_sky) * deep, 0.0)
+    depth = np.clip((level - foot) / np.float32(0.06 * size), 0.0, 1.0)
+    open_sky = open_sky + np.where(wall, (1.0 - open_sky) * depth, 0.0)
     light = AMBIENT * open_sky + SKY * open_sky * open_sky + KEY * facing * clear
     share = np.clip(level / np.float32(min(stage.deep_mm, -1e-6)), 0.0, 1.0)[..., None]
     top, low, side = (light_of(each).astype(np.float32) for each in (TOP, DEEP, SIDE))
@@ -265,9 +268,9 @@ def _colours(
     light = np.where(board, faded, light)
     paper = ground.astype(np.float32) / np.float32(lit.open_board)
     material = np.where(board[..., None], paper, material)
-    out = material * light[..., None].astype(np.float32)
-    out[beside] = ground
-    return np.asarray(np.clip(out, 0.0, 1.0), dtype=np.float32)
+    colours = material * light[..., None].astype(np.float32)
+    colours[is_ground] = ground
+    return np.asarray(np.clip(colours, 0.0, 1.0), dtype=np.float32)
 
 
 def _facing(stage: Stage, camera: Camera) -> tuple[Heights, Heights]:
@@ -291,11 +294,13 @@ def _lesser(heights: Heights, axis: int) -> Heights:
     """The lesser of the steps to both neighbours, 0 where they differ in sign: floors beside walls
     stay level."""
     step = np.diff(heights, axis=axis)
-    none = np.zeros_like(heights.take([0], axis=axis))
-    behind = np.concatenate([none, step], axis=axis)
-    ahead = np.concatenate([step, none], axis=axis)
-    least = np.minimum(np.abs(behind), np.abs(ahead))
-    return np.asarray(np.where(behind * ahead > 0.0, np.where(ahead > 0.0, least, -least), 0.0))
+    zeros = np.zeros_like(heights.take([0], axis=axis))
+    step_behind = np.concatenate([zeros, step], axis=axis)
+    step_ahead = np.concatenate([step, zeros], axis=axis)
+    lesser = np.minimum(np.abs(step_behind), np.abs(step_ahead))
+    return np.asarray(
+        np.where(step_behind * step_ahead > 0.0, np.where(step_ahead > 0.0, lesser, -lesser), 0.0)
+    )
 
 
 def _central(heights: Heights, axis: int) -> Heights:
@@ -325,21 +330,21 @@ def _shadows(heights: Heights, light: tuple[float, float, float], cell_mm: float
     order = range(len(heights)) if y < 0.0 else range(len(heights) - 1, -1, -1)
     shift = x / abs(y)
     drop = np.float32(z / abs(y) * cell_mm)
-    whole = math.floor(shift)
-    part = np.float32(shift - whole)
+    whole_cells = math.floor(shift)
+    part = np.float32(shift - whole_cells)
     count = heights.shape[1]
-    index = np.clip(np.arange(count) + whole, 0, count - 1)
-    beyond = np.clip(index + 1, 0, count - 1)
-    out = np.empty_like(heights)
+    index = np.clip(np.arange(count) + whole_cells, 0, count - 1)
+    next_index = np.clip(index + 1, 0, count - 1)
+    shadows = np.empty_like(heights)
     before = np.full(count, -np.inf, dtype=np.float32)
     first = True
     for row in order:
         if not first:
-            before = (before[index] * (1.0 - part) + before[beyond] * part) - drop
-        out[row] = before if not first else heights[row]
-        before = np.maximum(out[row], heights[row])
+            before = (before[index] * (1.0 - part) + before[next_index] * part) - drop
+        shadows[row] = before if not first else heights[row]
+        before = np.maximum(shadows[row], heights[row])
         first = False
-    return out
+    return shadows
 
 
 def _openness(stage: Stage, size_mm: float) -> Heights:
@@ -353,9 +358,9 @@ def _openness(stage: Stage, size_mm: float) -> Heights:
         reach = max(1, round(reach_mm / (stage.cell_mm * step)))
         for _ in range(2):
             thin = _mean(_mean(thin, reach, 0), reach, 1)
-        around = _enlarged(thin, step, heights.shape)
-        taken = np.clip((around - heights) / np.float32(0.5 * reach_mm), 0.0, 1.0)
-        open_sky *= 1.0 - np.float32(weight) * taken
+        neighbours = _enlarged(thin, step, heights.shape)
+        covered = np.clip((neighbours - heights) / np.float32(0.5 * reach_mm), 0.0, 1.0)
+        open_sky *= 1.0 - np.float32(weight) * covered
     return open_sky
 
 
@@ -385,9 +390,9 @@ def png_of(pixels: Octets) -> bytes:
     rows = np.zeros((high, 1 + 3 * wide), dtype=np.uint8)
     # Each row as differences from the row above (filter 2 of the format): half as many bytes.
     rows[:, 0] = 2
-    plain = pixels.reshape(high, -1)
-    rows[0, 1:] = plain[0]
-    rows[1:, 1:] = plain[1:] - plain[:-1]
+    flat_rows = pixels.reshape(high, -1)
+    rows[0, 1:] = flat_rows[0]
+    rows[1:, 1:] = flat_rows[1:] - flat_rows[:-1]
     parts = [
         (b"IHDR", struct.pack(">IIBBBBB", wide, high, 8, 2, 0, 0, 0)),
         (b"IDAT", zlib.compress(rows.tobytes(), 6)),

@@ -128,16 +128,16 @@ class Round(Struct, frozen=True, eq=False):
     def errors(self) -> Floats:
         """(B, 3) mm: least, mean and largest radial error of each bin; NaN where the slides never
         were."""
-        seen = self.bins[:, 0] > 0.0
-        found = np.full((len(self.bins), 3), np.nan)
-        bins = self.bins[seen]
+        has_samples = self.bins[:, 0] > 0.0
+        errors = np.full((len(self.bins), 3), np.nan)
+        bins = self.bins[has_samples]
         mean = bins[:, 1:3] / bins[:, :1]
         # The mean of points along an arc of angle w lies at sin(w/2)/(w/2) of the radius.
         half = np.pi / len(self.bins)
-        found[seen, 0] = np.sqrt(bins[:, 3])
-        found[seen, 1] = np.hypot(mean[:, 0], mean[:, 1]) * (half / np.sin(half))
-        found[seen, 2] = np.sqrt(bins[:, 6])
-        return found - self.radius_mm
+        errors[has_samples, 0] = np.sqrt(bins[:, 3])
+        errors[has_samples, 1] = np.hypot(mean[:, 0], mean[:, 1]) * (half / np.sin(half))
+        errors[has_samples, 2] = np.sqrt(bins[:, 6])
+        return errors - self.radius_mm
 
 
 class StockPair(Struct, frozen=True, eq=False):
@@ -206,14 +206,14 @@ def by_feed(toolpath: Toolpath, rapid_mm_min: float) -> Playback:
     """
     seconds = np.zeros(len(toolpath))
     if len(toolpath):
-        away = toolpath.end - toolpath.starts
-        flat = np.hypot(away[:, 0], away[:, 1])
+        travel = toolpath.end - toolpath.starts
+        flat = np.hypot(travel[:, 0], travel[:, 1])
         spoke = toolpath.starts[:, :2] - toolpath.centre
         along = np.abs(toolpath.sweeps()) * np.hypot(spoke[:, 0], spoke[:, 1])
-        length = np.hypot(np.where(toolpath.is_arc, along, flat), away[:, 2])
+        length = np.hypot(np.where(toolpath.is_arc, along, flat), travel[:, 2])
         feed = np.where(toolpath.kind == Kind.RAPID, rapid_mm_min, toolpath.feed)
-        known = toolpath.is_motion & np.isfinite(feed) & (feed > 0.0)
-        seconds[known] = length[known] / feed[known] * 60.0
+        has_time = toolpath.is_motion & np.isfinite(feed) & (feed > 0.0)
+        seconds[has_time] = length[has_time] / feed[has_time] * 60.0
         dwell = toolpath.kind == Kind.DWELL
         seconds[dwell] = np.nan_to_num(toolpath.value[dwell])
     return Playback(seconds, np.full(len(toolpath), np.nan), np.empty(0, dtype=np.int64))
@@ -238,14 +238,14 @@ def scene_of(
     machine: Machine | None = None,
     listing: Callable[[], Listing | None] | None = None,
     tabs: tuple[tuple[float, float], ...] = (),
-    wanted: Toolpath | None = None,
+    wanted_path: Toolpath | None = None,
     target: LoadedTarget | None = None,
 ) -> Scene:
     """The scene of what is given; with a verification, of the predicted path as well.
 
     `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer;
-    `tabs` are the places (x, y) mm of tabs. `wanted` are the moves that the program should make.
-    With a verification and a `target` the simulated slides cut the stock.
+    `tabs` are the places (x, y) mm of tabs. `wanted_path` are the moves that the program should
+    make. With a verification and a `target` the simulated slides cut the stock.
     """
     if drawing is not None and toolpath is None:
         return scene_of_drawing(drawing, title)
@@ -286,9 +286,9 @@ def scene_of(
         cut=_stock_pair(
             toolpath,
             job,
-            wanted,
+            wanted_path,
             target if verification is not None else None,
-            _bands(drawn, job, wanted, machine),
+            _bands(drawn, job, wanted_path, machine),
         ),
     )
 
@@ -313,7 +313,7 @@ def _as_planned(path: Toolpath, job: Job | None) -> StockMoves:
 def _stock_pair(
     toolpath: Toolpath | None,
     job: Job | None,
-    wanted: Toolpath | None,
+    wanted_path: Toolpath | None,
     target: LoadedTarget | None,
     bands: Callable[[float], Callable[[Floats], Floats]] | None,
 ) -> Callable[[], StockPair] | None:
@@ -325,7 +325,7 @@ def _stock_pair(
         from camtool.stock.moves import stock_moves_of_toolpath
         from camtool.stock.slides import slide_moves, tools_of_rows
 
-        plan = None if wanted is None else wanted.operations
+        plan = None if wanted_path is None else wanted_path.operations
         tools = tools_of_rows(toolpath, job, plan)
         if target is not None:
             moves = slide_moves(toolpath, target, tools)
@@ -333,10 +333,10 @@ def _stock_pair(
             moves = stock_moves_of_toolpath(toolpath, tools.index, tools.cutters)
         stock = None if job is None else job.stock
         box = None if stock is None else stock.box_mm
-        made = stock_pair(moves, box, None if stock is None else stock.thickness_mm)
-        other = wanted is not None and wanted is not toolpath
-        beside = _as_planned(wanted, job) if other and wanted is not None else None
-        return replace(made, wanted=beside, bands=bands)
+        pair = stock_pair(moves, box, None if stock is None else stock.thickness_mm)
+        other = wanted_path is not None and wanted_path is not toolpath
+        wanted_moves = _as_planned(wanted_path, job) if other and wanted_path is not None else None
+        return replace(pair, wanted=wanted_moves, bands=bands)
 
     return pair
 
@@ -354,19 +354,19 @@ def stock_pair(
         depth = max(-(1.0 + BELOW_SHARE) * float(moves.end[:, 2].min()), 0.0)
     if box is None:
         left, bottom, right, top = cut_box(moves)
-        by = max(BESIDE_SHARE * max(right - left, top - bottom), MIN_BESIDE_MM)
-        box = left - by, bottom - by, right + by, top + by
+        margin = max(BESIDE_SHARE * max(right - left, top - bottom), MIN_BESIDE_MM)
+        box = left - margin, bottom - margin, right + margin, top + margin
     return StockPair(moves, None, box, depth or 1.0, box_mm is not None)
 
 
 def _bands(
-    drawing: Drawing | None, job: Job | None, wanted: Toolpath | None, machine: Machine | None
+    drawing: Drawing | None, job: Job | None, wanted_path: Toolpath | None, machine: Machine | None
 ) -> Callable[[float], Callable[[Floats], Floats]] | None:
     """The function that gives the heights which a drawing and its job allow, as `StockPair` has
     it; None where the wanted moves are not those of a plan of them."""
     if drawing is None or job is None or machine is None:
         return None
-    if wanted is None or wanted.operations is None:
+    if wanted_path is None or wanted_path.operations is None:
         return None
 
     def bands(wall_mm: float) -> Callable[[Floats], Floats]:
@@ -383,16 +383,16 @@ def rounds_of(verification: Verification) -> tuple[Round, ...]:
     other direction."""
     from camtool.verification.circles import CirclePairs
 
-    seen = verification.circles
-    pairs = CirclePairs([one.circle for one in seen])
+    circles = verification.circles
+    pairs = CirclePairs([one.circle for one in circles])
     both_mm: dict[int | None, float] = {}
-    for index, one in enumerate(seen):
-        for both in pairs.add(index, one.bins):
-            both_mm[index] = both_mm[pairs.partner(index)] = both.circular_mm
-    found = []
-    for index, one in enumerate(seen):
+    for index, one in enumerate(circles):
+        for pair in pairs.add(index, one.bins):
+            both_mm[index] = both_mm[pairs.partner(index)] = pair.circular_mm
+    rounds = []
+    for index, one in enumerate(circles):
         partner, figures = pairs.partner(index), one.figures
-        found.append(
+        rounds.append(
             Round(
                 one.circle.centre_mm,
                 one.circle.radius_mm,
@@ -405,7 +405,7 @@ def rounds_of(verification: Verification) -> tuple[Round, ...]:
                 both_mm.get(index, math.nan),
             )
         )
-    return tuple(found)
+    return tuple(rounds)
 
 
 def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
@@ -441,10 +441,10 @@ def _turns(job: Job, toolpath: Toolpath) -> tuple[tuple[int, Tool], ...]:
     if toolpath.operations is None:
         numbers = {each.tool.number: each.tool for each in reversed(job.operations)}
         changes = np.flatnonzero(toolpath.kind == Kind.TOOL_CHANGE)
-        called = [int(number) for number in toolpath.value[changes].tolist()]
-        if first is None or not called or not {*called} <= {*numbers}:
+        tool_numbers = [int(number) for number in toolpath.value[changes].tolist()]
+        if first is None or not tool_numbers or not {*tool_numbers} <= {*numbers}:
             return ()
-        mounted = [first, *(numbers[number] for number in called)]
+        mounted = [first, *(numbers[number] for number in tool_numbers)]
         return tuple(zip([0, *changes.tolist()], mounted, strict=True))
     tools = {tool_note(each.tool): each.tool for each in job.operations}
     notes = [note.tool for note in toolpath.operations.notes]
@@ -479,16 +479,20 @@ def _playback(
 
     def playback() -> Playback:
         if verification is None:
-            made = by_feed(toolpath, machine.rapid_mm_min)
+            playback = by_feed(toolpath, machine.rapid_mm_min)
         else:
-            made = Playback(
+            playback = Playback(
                 seconds=verification.rows.seconds,
                 error_mm=verification.rows.total,
                 trace_row=verification.trace.row,
                 tables=tuple(_tables(verification.report)),
             )
         lines = None if listing is None else listing()
-        return made if lines is None else replace(made, blocks=lines.blocks, binary=lines.binary)
+        return (
+            playback
+            if lines is None
+            else replace(playback, blocks=lines.blocks, binary=lines.binary)
+        )
 
     return playback
 
@@ -499,20 +503,20 @@ def _tables(report: Report) -> Iterator[ReportTable]:
     lines = report.to_text(findings=False).splitlines()
     facts = [(line[:NAME_WIDTH].strip(), line[NAME_WIDTH:].strip()) for line in lines]
     yield ReportTable("Report", (), tuple(map(TableLine, facts)))
-    for title, columns, found in (
+    for title, columns, rows in (
         _findings(report),
         _worst(report),
         _contours(report),
         _dimensions(report),
     ):
-        if found:
-            yield ReportTable(title, columns, tuple(found[:LINES_SHOWN]))
+        if rows:
+            yield ReportTable(title, columns, tuple(rows[:LINES_SHOWN]))
 
 
 def _place_in(words: str) -> tuple[float, float] | None:
     """Return the place that a finding names, mm."""
-    found = _WHERE.search(words)
-    return None if found is None else (float(found[1]), float(found[2]))
+    match = _WHERE.search(words)
+    return None if match is None else (float(match[1]), float(match[2]))
 
 
 def _faults(report: Report) -> tuple[tuple[float, float], ...]:

@@ -100,18 +100,18 @@ def section_svg(title: str, section: StockSection, options: PictureOptions = AS_
     notes[0] += f"; cut {number(deepest, 4)} mm deep" if deepest > 0.0 else "; not cut"
     if factor != 1.0:
         notes.append(f"heights are drawn {factor:g} times as large")
-    head, down = title_and_notes(title, notes, width)
+    head, top = title_and_notes(title, notes, width)
     pad = 0.03 * (high - low)
-    deep = 0.12 * -foot * factor
-    window = np.array([[low - pad, high + pad], [foot * factor - deep, deep]])
-    view = fit(window, MARGIN + LEFT_ROOM, down + HEAD_GAP, width - MARGIN, SHAPES)
+    ground_mm = 0.12 * -foot * factor
+    window = np.array([[low - pad, high + pad], [foot * factor - ground_mm, ground_mm]])
+    view = fit(window, MARGIN + LEFT_ROOM, top + HEAD_GAP, width - MARGIN, SHAPES)
     entries = [LegendEntry(line_swatch(INK, 2.2), "stock")]
     if section.wanted is not None:
         entries.append(LegendEntry(line_swatch(FEED, 2.0, WANTED_DASHES), "wanted heights"))
     table, bar_y = table_of(entries, view, view.box)
     legend_y = view.box.bottom + LEGEND_DROP
     sizes = (width, foot_of(table, legend_y))
-    grid, around = _axes(section, view, factor)
+    grid, frame = _axes(section, view, factor)
     return sheet(
         title,
         sizes,
@@ -120,7 +120,7 @@ def section_svg(title: str, section: StockSection, options: PictureOptions = AS_
         *_lines(section, view, factor),
         mat(view.box, *sizes),
         head,
-        around,
+        frame,
         legend_rows(table, view.box.left, legend_y),
         scale_bar(view, view.box.right, bar_y),
     )
@@ -129,8 +129,8 @@ def section_svg(title: str, section: StockSection, options: PictureOptions = AS_
 def height_factor(length_mm: float, height_mm: float) -> float:
     """Return the round number by which heights are drawn larger, so that the section is no flatter
     than a plot may be."""
-    wanted = SHAPES[0] * length_mm / (1.3 * height_mm)
-    return 1.0 if wanted <= 1.0 else min(round_step(wanted), MAX_FACTOR)
+    factor = SHAPES[0] * length_mm / (1.3 * height_mm)
+    return 1.0 if factor <= 1.0 else min(round_step(factor), MAX_FACTOR)
 
 
 def _lines(section: StockSection, view: View, factor: float) -> list[str]:
@@ -150,11 +150,11 @@ def _lines(section: StockSection, view: View, factor: float) -> list[str]:
         element("path", {"id": "material", "d": str(body), **fill}),
         element("path", {"id": "surface", "d": str(surface), **pen}),
     ]
-    wanted = _wanted(section, view, factor)
-    if wanted:
+    wanted_line = _wanted(section, view, factor)
+    if wanted_line:
         dashed: Look = {**pen, "stroke": FEED, "stroke-width": 2.0}
         dashed["stroke-dasharray"] = WANTED_DASHES
-        parts.append(element("path", {"id": "wanted", "d": wanted, **dashed}))
+        parts.append(element("path", {"id": "wanted", "d": wanted_line, **dashed}))
     return parts
 
 
@@ -194,9 +194,9 @@ def _axes(section: StockSection, view: View, factor: float) -> tuple[str, str]:
         y = view.page(0.0, z * factor)[1]
         _line(grid, (box.left, y), (box.right, y))
         _line(marks, (box.left - TICK, y), (box.left, y))
-        at = (box.left - TICK - LABEL_GAP, y + TICK_CAP / 2.0)
+        label_place = (box.left - TICK - LABEL_GAP, y + TICK_CAP / 2.0)
         name = number(z, decimals_of(level))
-        labels.append(text.label(name, at, TextStyle(TICK_CAP, NUMBERS.colour, "end")))
+        labels.append(text.label(name, label_place, TextStyle(TICK_CAP, NUMBERS.colour, "end")))
     end = TextStyle(TICK_CAP, NUMBERS.colour, "end")
     labels.append(text.label(f"{section.along} (mm)", (box.right, base), end))
     labels.append(text.label("Z (mm)", (box.left, box.top - NAME_LIFT), NUMBERS))

@@ -150,10 +150,10 @@ def draw_solid(scene: Scene, options: PictureOptions) -> str:
     width = page_width(options.size_px or SVG_WIDTH_PX)
     window = _window(pair, options)
     solid = _solid(pair, window, options)
-    head, down = title_and_notes(scene.title, _notes(solid, options), width)
+    head, top = title_and_notes(scene.title, _notes(solid, options), width)
     if options.view in FROM_ABOVE:
-        return _from_above(scene, solid, options, head, down)
-    return _from_outside(scene, solid, options, head, down)
+        return _from_above(scene, solid, options, head, top)
+    return _from_outside(scene, solid, options, head, top)
 
 
 def _window(pair: StockPair, options: PictureOptions) -> Box:
@@ -170,8 +170,8 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
     """The map of the part of the stock in a window, as fine as the picture."""
     side = max(window[2] - window[0], window[3] - window[1])
     # From above, what lies beside the window throws shadows into it.
-    by = 0.1 * side if options.view in FROM_ABOVE else 0.0
-    low, high = np.array(window[:2]) - by, np.array(window[2:]) + by
+    margin = 0.1 * side if options.view in FROM_ABOVE else 0.0
+    low, high = np.array(window[:2]) - margin, np.array(window[2:]) + margin
     box = (*np.maximum(low, pair.box_mm[:2]).tolist(), *np.minimum(high, pair.box_mm[2:]).tolist())
     if box[0] >= box[2] or box[1] >= box[3]:
         raise OptionError(
@@ -183,37 +183,43 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
     pixels = min(options.size_px or SVG_WIDTH_PX, MAX_RASTER_PX) * SAMPLES
     cells = MAP_CELLS if options.view not in BAR_NAMES else MAX_COMPARED
     cell = max(side / pixels, cell_for(box, cells))
-    found = height_map(pair.moves, box, cell, owners=True)
+    map_found = height_map(pair.moves, box, cell, owners=True)
     if options.view not in BAR_NAMES:
-        return Solid(pair, found, box[2:])
-    least, most = _wanted(pair, found, box, options)
-    heights = found.heights.clip(-pair.thickness_mm)
-    off = heights - most if options.view == "leftover" else least - heights
-    return Solid(pair, found, box[2:], off.astype(np.float64))
+        return Solid(pair, map_found, box[2:])
+    lowest, highest = _wanted(pair, map_found, box, options)
+    heights = map_found.heights.clip(-pair.thickness_mm)
+    deviations = heights - highest if options.view == "leftover" else lowest - heights
+    return Solid(pair, map_found, box[2:], deviations.astype(np.float64))
 
 
 def _wanted(
-    pair: StockPair, found: HeightMap, box: Box, options: PictureOptions
+    pair: StockPair, stock_map: HeightMap, box: Box, options: PictureOptions
 ) -> tuple[Floats, Floats]:
     """The least and the greatest height (NY, NX) mm that are wanted in each cell."""
     if pair.bands is not None:
-        bands = pair.bands(WALL_CELLS * found.cell_mm)
+        bands = pair.bands(WALL_CELLS * stock_map.cell_mm)
         rows = [
-            bands(np.column_stack([found.x, np.full(len(found.x), y)])) for y in found.y.tolist()
+            bands(np.column_stack([stock_map.x, np.full(len(stock_map.x), y)]))
+            for y in stock_map.y.tolist()
         ]
-        both = np.stack(rows).clip(-pair.thickness_mm, 0.0)
-        return both[..., 0], both[..., 1]
+        stacked = np.stack(rows).clip(-pair.thickness_mm, 0.0)
+        return stacked[..., 0], stacked[..., 1]
     if pair.wanted is None:
         raise OptionError(
             f"the view {options.view} compares the stock with the wanted one, which is not known",
             mend="give the drawing and its job (verify --against), or use --view top",
         )
-    others = height_map(pair.wanted, box, found.cell_mm).heights.clip(-pair.thickness_mm)
-    low, high = (_extreme(others, of).astype(np.float64) for of in (np.minimum, np.maximum))
+    wanted_heights = height_map(pair.wanted, box, stock_map.cell_mm).heights.clip(
+        -pair.thickness_mm
+    )
+    low, high = (
+        _extreme(wanted_heights, extreme).astype(np.float64)
+        for extreme in (np.minimum, np.maximum)
+    )
     return low, high
 
 
-def _extreme(heights: np.ndarray, of: np.ufunc) -> np.ndarray:
+def _extreme(heights: np.ndarray, extreme: np.ufunc) -> np.ndarray:
     """The greatest or the least height within BESIDE_CELLS of each cell."""
     for axis in (0, 1):
         pad = [(0, 0), (0, 0)]
@@ -221,7 +227,7 @@ def _extreme(heights: np.ndarray, of: np.ufunc) -> np.ndarray:
         wide, count = np.pad(heights, pad, mode="edge"), heights.shape[axis]
         for step in range(2 * BESIDE_CELLS + 1):
             part = wide.take(range(step, step + count), axis)
-            heights = part if step == 0 else of(heights, part)
+            heights = part if step == 0 else extreme(heights, part)
     return heights
 
 
@@ -229,27 +235,29 @@ def _notes(solid: Solid, options: PictureOptions) -> tuple[str, ...]:
     """The size of the stock, the deepest cut, and the greatest difference."""
     left, bottom, right, top = solid.pair.box_mm
     sizes = (right - left, top - bottom, solid.pair.thickness_mm)
-    said = " × ".join(number(size, 2) for size in sizes)
+    size_text = " × ".join(number(size, 2) for size in sizes)
     guessed = "" if solid.pair.known else ", as large as the cuts need"
-    deep = number(-float(solid.found.heights.min(initial=0.0)), 3)
-    through = solid.pair.known and solid.deepest_mm >= solid.pair.thickness_mm
-    notes = [f"stock {said} mm{guessed}; cut {deep} mm deep{', through it' if through else ''}"]
+    depth = number(-float(solid.found.heights.min(initial=0.0)), 3)
+    is_through = solid.pair.known and solid.deepest_mm >= solid.pair.thickness_mm
+    notes = [
+        f"stock {size_text} mm{guessed}; cut {depth} mm deep{', through it' if is_through else ''}"
+    ]
     if solid.off_mm is not None:
-        most = float(solid.off_mm.max(initial=0.0))
-        how = "higher" if options.view == "leftover" else "lower"
-        which = f"nowhere more than {number(MIN_SHOWN_MM, 3)} mm {how} than {solid.pair.against}"
-        if most > MIN_SHOWN_MM:
+        max_mm = float(solid.off_mm.max(initial=0.0))
+        word = "higher" if options.view == "leftover" else "lower"
+        extent = f"nowhere more than {number(MIN_SHOWN_MM, 3)} mm {word} than {solid.pair.against}"
+        if max_mm > MIN_SHOWN_MM:
             row, column = divmod(int(solid.off_mm.argmax()), solid.off_mm.shape[1])
             x, y = solid.found.x[column], solid.found.y[row]
-            than = f"{number(most, 3)} mm {how} than {solid.pair.against}"
-            which = f"up to {than}, at ({x:.2f}, {y:.2f}) mm"
+            than = f"{number(max_mm, 3)} mm {word} than {solid.pair.against}"
+            extent = f"up to {than}, at ({x:.2f}, {y:.2f}) mm"
         cell = number(solid.found.cell_mm, 3)
-        notes.append(f"{which}; walls beside their place by less than {cell} mm are not shown")
+        notes.append(f"{extent}; walls beside their place by less than {cell} mm are not shown")
     return tuple(notes)
 
 
 def _from_above(
-    scene: Scene, solid: Solid, options: PictureOptions, head: str, down: float
+    scene: Scene, solid: Solid, options: PictureOptions, head: str, head_end: float
 ) -> str:
     """The page of a view with axes."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
@@ -257,7 +265,7 @@ def _from_above(
     shapes = (WIDEST, TALLEST) if options.crop_mm is None else CROP_SHAPES
     bar = _bar_of(solid, options)
     shown = np.array([[left, right], [bottom, top]])
-    view, ticks = fitted(shown, down + HEAD_GAP, width, shapes, lambda _: bar.width)
+    view, ticks = fitted(shown, head_end + HEAD_GAP, width, shapes, lambda _: bar.width)
     faults = faults_of(scene)
     entries = [*_entries(scene, options), *faults.entries(view)]
     table, bar_y = table_of(entries, view, view.box)
@@ -280,7 +288,7 @@ def _from_above(
 
 
 def _from_outside(
-    scene: Scene, solid: Solid, options: PictureOptions, head: str, down: float
+    scene: Scene, solid: Solid, options: PictureOptions, head: str, top: float
 ) -> str:
     """The page of a view of the block with its sizes."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
@@ -292,8 +300,8 @@ def _from_outside(
     thick = text.width(_thickness(solid), TICK_CAP) + 8.0
     room = LABEL_ROOM * float(high[0] - low[0]) / (box_right - MARGIN - thick)
     shown = np.column_stack([low - np.array([0.0, room]), high + np.array([0.0, 0.5 * room])])
-    view = fit(shown, MARGIN, down + 20.0, box_right - thick, (0.2, 0.8))
-    all_across = PageBox(0.0, down, width, view.box.bottom + 20.0)
+    view = fit(shown, MARGIN, top + 20.0, box_right - thick, (0.2, 0.8))
+    all_across = PageBox(0.0, top, width, view.box.bottom + 20.0)
     entries = _entries(scene, options)
     along = replace(view, scale=view.scale * ISO_SCALE) if options.view == "iso" else view
     table, bar_y = table_of(entries, along, view.box)
@@ -441,8 +449,10 @@ def _sizes(solid: Solid, camera: Camera, view: View) -> str:
         slope = (other[1] - one[1]) / (other[0] - one[0])
         anchor = "middle" if abs(slope) < 0.1 else ("start" if slope < 0.0 else "end")
         x, y = 0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1])
-        by = {"middle": (0.0, 26.0), "start": (10.0, 20.0), "end": (-10.0, 20.0)}[anchor]
-        labels.append(text.label(name, (x + by[0], y + by[1]), TextStyle(TICK_CAP, QUIET, anchor)))
+        shift = {"middle": (0.0, 26.0), "start": (10.0, 20.0), "end": (-10.0, 20.0)}[anchor]
+        labels.append(
+            text.label(name, (x + shift[0], y + shift[1]), TextStyle(TICK_CAP, QUIET, anchor))
+        )
     x = corners[right][0] + 8.0
     y = 0.5 * (corners[right][1] + corners[right + 4][1]) + 0.5 * TICK_CAP
     labels.append(text.label(_thickness(solid), (x, y), TextStyle(TICK_CAP, QUIET)))
@@ -492,8 +502,8 @@ class MmBar(Struct, frozen=True, eq=False):
             y = top + share * height
             ticks.move(left + BAR_WIDTH, y)
             ticks.line(left + BAR_WIDTH + 5.0, y)
-            at = (left + BAR_WIDTH + 12.0, y + TICK_CAP / 2.0)
-            parts.append(text.label(name, at, TextStyle(TICK_CAP, QUIET)))
+            place = (left + BAR_WIDTH + 12.0, y + TICK_CAP / 2.0)
+            parts.append(text.label(name, place, TextStyle(TICK_CAP, QUIET)))
         pen: Look = {"fill": "none", "stroke": FRAME, "stroke-width": 1.4}
         parts += [element("rect", {**sides, **pen}), element("path", {"d": str(ticks), **pen})]
         parts.append(text.label(self.name, (left, top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))

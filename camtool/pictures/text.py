@@ -47,8 +47,8 @@ def shortened(text: str, cap: float, limit: float) -> str:
     advances = accumulate(
         (_glyph_or_box(letter).advance for letter in text), initial=_glyph_or_box("…").advance
     )
-    kept = sum(advance * cap / CAP_UNITS <= limit for advance in advances)
-    return text[: max(kept - 1, 0)].rstrip() + "…"
+    count = sum(advance * cap / CAP_UNITS <= limit for advance in advances)
+    return text[: max(count - 1, 0)].rstrip() + "…"
 
 
 def wrapped(text: str, cap: float, limit: float) -> list[str]:
@@ -64,10 +64,13 @@ def wrapped(text: str, cap: float, limit: float) -> list[str]:
     return lines
 
 
-def label(text: str, at: tuple[float, float], style: TextStyle, *, full: str | None = None) -> str:
-    """The strokes of `text` with its baseline at `at`; `full` is the text for screen readers."""
-    data = strokes(text, at, style)
-    spoken = text if full is None else full
+def label(
+    text: str, place: tuple[float, float], style: TextStyle, *, full_text: str | None = None
+) -> str:
+    """The strokes of `text` with its baseline at `place`; `full_text` is the text for screen
+    readers."""
+    data = strokes(text, place, style)
+    spoken = text if full_text is None else full_text
     return element(
         "g",
         {"role": "img", "aria-label": spoken},
@@ -76,18 +79,20 @@ def label(text: str, at: tuple[float, float], style: TextStyle, *, full: str | N
     )
 
 
-def strokes(text: str, at: tuple[float, float], style: TextStyle) -> str:
+def strokes(text: str, place: tuple[float, float], style: TextStyle) -> str:
     """The path data of a label; empty when there is nothing to see."""
     shown = one_line(text)
     scale = style.cap / CAP_UNITS
-    x = at[0] - {"start": 0.0, "middle": 0.5, "end": 1.0}[style.anchor] * width(shown, style.cap)
+    x = place[0] - {"start": 0.0, "middle": 0.5, "end": 1.0}[style.anchor] * width(
+        shown, style.cap
+    )
     data = PathData()
     for letter in shown:
         drawn = _glyph_or_box(letter)
         for stroke in drawn.strokes:
             for index, (dx, dy) in enumerate(stroke):
-                to = (x + dx * scale, at[1] + (dy - BASELINE) * scale)
-                (data.line if index else data.move)(*to)
+                target = (x + dx * scale, place[1] + (dy - BASELINE) * scale)
+                (data.line if index else data.move)(*target)
         x += drawn.advance * scale
     return str(data)
 

@@ -58,9 +58,9 @@ def trace_of(scene: Scene, times: float = 1.0) -> ErrorTrace | None:
         return ErrorTrace(points, error_um, cutting, top_um)
     # The point before a cut is where the cut begins.
     drawn = cutting | np.append(cutting[1:], False)
-    moved = points.copy()
-    moved[drawn] = exaggerated(points[drawn], scene.wanted, times)
-    return ErrorTrace(moved, error_um, cutting, top_um, times)
+    shifted = points.copy()
+    shifted[drawn] = exaggerated(points[drawn], scene.wanted, times)
+    return ErrorTrace(shifted, error_um, cutting, top_um, times)
 
 
 def bins_of(trace: ErrorTrace) -> Ints:
@@ -74,18 +74,18 @@ def bins_of(trace: ErrorTrace) -> Ints:
 def lines_by_step(trace: ErrorTrace, window_mm: float) -> list[list[Floats]]:
     """For each step of the map, its lines: arrays (n, 2) of points, n ≥ 2."""
     keep = _kept(trace, MERGED_SHARE * window_mm)
-    chosen = ErrorTrace(
+    drawn_part = ErrorTrace(
         trace.points[keep], _worst_between(trace, keep), trace.cutting[keep], trace.top_um
     )
-    bins = bins_of(chosen)
-    found: list[list[Floats]] = [[] for _ in range(BINS)]
+    bins = bins_of(drawn_part)
+    lines: list[list[Floats]] = [[] for _ in range(BINS)]
     edges = np.flatnonzero(np.diff(bins)) + 1
     for begin, end in zip(
         np.concatenate([[0], edges]), np.concatenate([edges, [len(bins)]]), strict=True
     ):
         if end > begin and bins[begin] >= 0:
-            found[int(bins[begin])].append(chosen.points[begin : end + 1])
-    return found
+            lines[int(bins[begin])].append(drawn_part.points[begin : end + 1])
+    return lines
 
 
 def _kept(trace: ErrorTrace, apart_mm: float) -> Ints:
@@ -94,14 +94,14 @@ def _kept(trace: ErrorTrace, apart_mm: float) -> Ints:
     cutting = trace.cutting
     ends = np.ones(len(cutting), dtype=np.bool_)
     ends[1:-1] = (cutting[1:-1] != cutting[:-2]) | (cutting[1:-1] != cutting[2:])
-    kept, (last_x, last_y) = [], (math.inf, math.inf)
+    kept_rows, (last_x, last_y) = [], (math.inf, math.inf)
     for index, ((x, y), is_end) in enumerate(
         zip(trace.points.tolist(), ends.tolist(), strict=True)
     ):
         if is_end or math.hypot(x - last_x, y - last_y) >= apart_mm:
-            kept.append(index)
+            kept_rows.append(index)
             last_x, last_y = x, y
-    return np.array(kept, dtype=np.int64)
+    return np.array(kept_rows, dtype=np.int64)
 
 
 def _worst_between(trace: ErrorTrace, keep: Ints) -> Floats:
@@ -139,42 +139,43 @@ def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
 # path jumps too.
 
 
-def exaggerated(points: Floats, wanted: Segments, times: float) -> Floats:
-    """(T, 2) mm: points (T, 2) mm moved `times` as far from the nearest point of `wanted`."""
-    if not len(points) or not len(wanted):
+def exaggerated(points: Floats, wanted_path: Segments, times: float) -> Floats:
+    """(T, 2) mm: points (T, 2) mm moved `times` as far from the nearest point of `wanted_path`."""
+    if not len(points) or not len(wanted_path):
         return points
-    foot = nearest_points(points, wanted)
+    foot = nearest_points(points, wanted_path)
     return np.asarray(foot + times * (points - foot))
 
 
-def nearest_points(points: Floats, wanted: Segments) -> Floats:
-    """(T, 2) mm: of the lines and arcs of `wanted`, the point nearest to each of the points."""
+def nearest_points(points: Floats, wanted_path: Segments) -> Floats:
+    """(T, 2) mm: of the lines and arcs of `wanted_path`, the point nearest to each of the
+    points."""
     from camtool.kernels.fits import nearest_rows
 
-    boxes = segment_boxes(wanted)
-    bulge = np.ascontiguousarray(wanted.bulge)  # of lines alone one number, seen as many
-    row = nearest_rows(points, wanted.start, wanted.end, bulge, boxes)
-    begin, end, sweep = wanted.start[row], wanted.end[row], wanted.sweep[row]
+    boxes = segment_boxes(wanted_path)
+    bulge = np.ascontiguousarray(wanted_path.bulge)  # of lines alone one number, seen as many
+    row = nearest_rows(points, wanted_path.start, wanted_path.end, bulge, boxes)
+    begin, end, sweep = wanted_path.start[row], wanted_path.end[row], wanted_path.sweep[row]
     chord = end - begin
     square = (chord**2).sum(axis=1)
     share = ((points - begin) * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0)
     foot = begin + np.clip(share, 0.0, 1.0)[:, None] * chord
     is_arc = sweep != 0.0
-    foot[is_arc] = _project_on_arcs(points[is_arc], wanted, row[is_arc])
+    foot[is_arc] = _project_on_arcs(points[is_arc], wanted_path, row[is_arc])
     return np.asarray(foot)
 
 
-def _project_on_arcs(points: Floats, wanted: Segments, row: Ints) -> Floats:
+def _project_on_arcs(points: Floats, wanted_path: Segments, row: Ints) -> Floats:
     """Project points on arcs along the ray from the centre; off the arc, take its nearer end."""
-    spoke = points - wanted.centre[row]
+    spoke = points - wanted_path.centre[row]
     length = np.hypot(spoke[:, 0], spoke[:, 1])
     along = spoke / np.where(length > 0.0, length, 1.0)[:, None]
-    foot = wanted.centre[row] + wanted.radius[row, None] * along
-    sweep = wanted.sweep[row]
-    angle = np.arctan2(spoke[:, 1], spoke[:, 0]) - wanted.start_angle[row]
-    turned = np.mod(np.sign(sweep) * angle, 2.0 * np.pi)
-    begin, end = wanted.start[row], wanted.end[row]
+    foot = wanted_path.centre[row] + wanted_path.radius[row, None] * along
+    sweep = wanted_path.sweep[row]
+    angle = np.arctan2(spoke[:, 1], spoke[:, 0]) - wanted_path.start_angle[row]
+    turn = np.mod(np.sign(sweep) * angle, 2.0 * np.pi)
+    begin, end = wanted_path.start[row], wanted_path.end[row]
     first = np.hypot(*(points - begin).T) <= np.hypot(*(points - end).T)
     ends = np.where(first[:, None], begin, end)
-    within = (turned <= np.abs(sweep)) & (length > 0.0)
-    return np.where(within[:, None], foot, ends)
+    is_within = (turn <= np.abs(sweep)) & (length > 0.0)
+    return np.where(is_within[:, None], foot, ends)

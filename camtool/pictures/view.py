@@ -70,10 +70,10 @@ class View(Struct, frozen=True):
     def page(self, x: float, y: float) -> tuple[float, float]:
         """Page place of a point in mm: Y is up in mm and down on the page."""
         across = (self.box.left + self.box.right) / 2.0
-        down = (self.box.top + self.box.bottom) / 2.0
+        middle_y = (self.box.top + self.box.bottom) / 2.0
         return (
             across + (x - self.centre[0]) * self.scale,
-            down - (y - self.centre[1]) * self.scale,
+            middle_y - (y - self.centre[1]) * self.scale,
         )
 
     def matrix(self) -> str:
@@ -128,17 +128,17 @@ def points_box(points: Floats) -> Floats | None:
     return np.column_stack([points.min(axis=0), points.max(axis=0)])
 
 
-def window(part: Floats | None, around: Floats | None) -> Floats:
+def window(part: Floats | None, surroundings: Floats | None) -> Floats:
     """The window, mm: the part, with what is around it unless that is far away."""
-    both = union([part, around])
-    if both is None:
+    joined = union([part, surroundings])
+    if joined is None:
         half = EMPTY_WINDOW_MM / 2.0
         return np.array([[-half, half], [-half / 2.0, half / 2.0]])
-    if part is not None and _larger(part) > 0.0 and _larger(both) > LOOK_AROUND * _larger(part):
-        both = part
-    size = max(_larger(both), MIN_WINDOW_MM)
-    pad = PADDING * size if _larger(both) > 0.0 else 0.5 * size
-    return np.asarray(both + np.array([-pad, pad]))
+    if part is not None and _larger(part) > 0.0 and _larger(joined) > LOOK_AROUND * _larger(part):
+        joined = part
+    size = max(_larger(joined), MIN_WINDOW_MM)
+    pad = PADDING * size if _larger(joined) > 0.0 else 0.5 * size
+    return np.asarray(joined + np.array([-pad, pad]))
 
 
 def fit(
@@ -168,16 +168,16 @@ def _larger(box: Floats) -> float:
     return float(np.max(box[:, 1] - box[:, 0]))
 
 
-def round_step(least: float) -> float:
-    """The smallest of 1, 2, 5 × 10ⁿ that is not below `least`."""
-    power = 10.0 ** math.floor(math.log10(least))
-    return next(step * power for step in ROUND_STEPS if step * power >= least)
+def round_step(min_step: float) -> float:
+    """The smallest of 1, 2, 5 × 10ⁿ that is not below `min_step`."""
+    power = 10.0 ** math.floor(math.log10(min_step))
+    return next(step * power for step in ROUND_STEPS if step * power >= min_step)
 
 
-def round_length(most: float) -> float:
-    """The largest of 1, 2, 5 × 10ⁿ that is not above `most`."""
-    power = 10.0 ** math.floor(math.log10(most))
-    return max(step * power for step in ROUND_STEPS if step * power <= most)
+def round_length(max_length: float) -> float:
+    """The largest of 1, 2, 5 × 10ⁿ that is not above `max_length`."""
+    power = 10.0 ** math.floor(math.log10(max_length))
+    return max(step * power for step in ROUND_STEPS if step * power <= max_length)
 
 
 def decimals_of(step: float) -> int:

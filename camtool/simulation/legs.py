@@ -43,10 +43,10 @@ class LegProgram(Struct, frozen=True, eq=False):
 class LegRun:
     """A run of legs on a machine."""
 
-    def __init__(self, standing: LegProgram, machine: Machine, options: Options) -> None:
-        self._standing, self._position = standing, standing.start
+    def __init__(self, program: LegProgram, machine: Machine, options: Options) -> None:
+        self._standing, self._position = program, program.start
         self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-        self._mechanics = Mechanics(machine, standing.start * self._step_mm, options.effects)
+        self._mechanics = Mechanics(machine, program.start * self._step_mm, options.effects)
         self._chunk_steps = options.chunk_steps
         self._row = -1  # the last row in a ledger
 
@@ -71,8 +71,8 @@ class LegRun:
         for low in range(0, int(first[-1]), self._chunk_steps):
             high = min(low + self._chunk_steps, int(first[-1]))
             share, commanded = _Share(first, low, high), np.empty((high - low, 3))
-            at, steps = begin[share.legs], legs.steps[share.legs]
-            legs_fill(share.done, at, steps, self._step_mm, commanded)
+            begins, steps = begin[share.legs], legs.steps[share.legs]
+            legs_fill(share.done, begins, steps, self._step_mm, commanded)
             yield self._chunk(legs, share, commanded)
         self._position = self._position + legs.steps.sum(axis=0)
 
@@ -86,13 +86,13 @@ class LegRun:
         rows = np.arange(self._row + (0 if moving[0] == self._row else 1), moving[-1] + 1)
         self._row = int(moving[-1])
         ledger = self._still(rows)
-        here = moving - rows[0]
+        positions = moving - rows[0]
         added = reversals @ self._mechanics.compensation_steps * self._standing.compensation_s
-        ledger.compensation_s[here] = added
-        ledger.duration_s[here] = np.add.reduceat(share.part(legs.seconds), turn) + added
-        ledger.iterations[here] = np.diff(offsets)
-        ledger.steps[here] = np.add.reduceat(share.steps(legs.steps), turn, axis=0)
-        ledger.reversals[here] = reversals
+        ledger.compensation_s[positions] = added
+        ledger.duration_s[positions] = np.add.reduceat(share.part(legs.seconds), turn) + added
+        ledger.iterations[positions] = np.diff(offsets)
+        ledger.steps[positions] = np.add.reduceat(share.steps(legs.steps), turn, axis=0)
+        ledger.reversals[positions] = reversals
         return Chunk(np.repeat(moving, np.diff(offsets)), commanded, slide, ledger)
 
 
@@ -118,8 +118,10 @@ class _Share:
 
     def steps(self, steps: Ints) -> Ints:
         """Return (J, 3) steps within the window, from those of all legs (L, 3); see the kernel."""
-        size, whole = np.abs(steps[self.legs]), self._whole[:, None]
-        return np.asarray(self._to[:, None] * size // whole - self._from[:, None] * size // whole)
+        size, leg_sizes = np.abs(steps[self.legs]), self._whole[:, None]
+        return np.asarray(
+            self._to[:, None] * size // leg_sizes - self._from[:, None] * size // leg_sizes
+        )
 
 
 # Checks of the rows of a toolpath for controllers that count whole steps.
@@ -140,7 +142,7 @@ def check_rows(toolpath: Toolpath, machine: Machine) -> None:
     kind, step_mm = toolpath.kind, coded_steps_mm(machine)
     with np.errstate(invalid="ignore"):
         endless = (kind == Kind.DWELL) & ~((toolpath.value >= 0.0) & np.isfinite(toolpath.value))
-    for bad, message, mend in (
+    for is_bad, message, mend in (
         (
             toolpath.by_parts(
                 lambda part: np.asarray((np.abs(part.end) > MAX_STEPS * step_mm).any(axis=1))
@@ -167,7 +169,7 @@ def check_rows(toolpath: Toolpath, machine: Machine) -> None:
             "",
         ),
     ):
-        refuse(toolpath, np.asarray(bad)[: toolpath.executed_rows], message, mend)
+        refuse(toolpath, np.asarray(is_bad)[: toolpath.executed_rows], message, mend)
 
 
 def waits_s(toolpath: Toolpath, rows: int) -> Floats:

@@ -95,13 +95,13 @@ class Mechanics:
         offsets[r]:offsets[r+1] of them."""
         slide = np.empty(commanded_mm.shape)
         reversals = np.zeros((len(offsets) - 1, 3), dtype=np.int64)
-        given = commanded_mm, offsets, self.axes, self.states
+        arguments = commanded_mm, offsets, self.axes, self.states
         if self._varied is None:
-            play_fill(*given, slide, reversals)
+            play_fill(*arguments, slide, reversals)
         else:
             v = self._varied
             backlash = v.at(commanded_mm)
-            play_varied_fill(*given, backlash, v.shares, v.scatter, v.seed, slide, reversals)
+            play_varied_fill(*arguments, backlash, v.shares, v.scatter, v.seed, slide, reversals)
         if self._lean:
             slide[:, 0] += slide[:, 1] * self._lean
         return slide, reversals

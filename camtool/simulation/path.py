@@ -122,9 +122,9 @@ def _durations(path: Toolpath, machine: Machine) -> Floats:
     travel = np.abs(path.end - path.starts) if len(path) else np.zeros((0, 3))
     for index, axis in enumerate(machine.axes):
         if axis.max_rate_mm_min is not None:
-            least = 60.0 * travel[:, index] / axis.max_rate_mm_min
+            min_seconds = 60.0 * travel[:, index] / axis.max_rate_mm_min
             turns = path.is_arc & (index < 2)  # Z of a helix moves evenly
-            seconds = np.where(turns, seconds, np.maximum(seconds, least))
+            seconds = np.where(turns, seconds, np.maximum(seconds, min_seconds))
     return np.where(path.kind == Kind.DWELL, path.value, seconds)
 
 
@@ -143,18 +143,20 @@ def round_to_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
     end = exact.by_parts(lambda part: _on_grid(part.end, machine))
     arcs = np.flatnonzero(exact.is_arc)
     sweeps = exact.sweeps_of(arcs)
-    made = _centre_arcs(with_ends(exact, start, end), arcs, np.abs(sweeps), machine)
+    rounded = _centre_arcs(with_ends(exact, start, end), arcs, np.abs(sweeps), machine)
     while True:
-        bent = made.is_arc[arcs]
+        bent = rounded.is_arc[arcs]
         arcs, sweeps = arcs[bent], sweeps[bent]
-        inside_out = np.abs(made.sweeps_of(arcs) - sweeps) > np.pi
+        inside_out = np.abs(rounded.sweeps_of(arcs) - sweeps) > np.pi
         if not inside_out.any():
-            return made
-        short = np.abs(sweeps[inside_out]) < np.pi
-        made = with_event_positions(_restore_turned_arcs(made, arcs[inside_out], short), home)
+            return rounded
+        is_small = np.abs(sweeps[inside_out]) < np.pi
+        rounded = with_event_positions(
+            _restore_turned_arcs(rounded, arcs[inside_out], is_small), home
+        )
 
 
-def _centre_arcs(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:
+def _centre_arcs(rounded: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:
     """Move the centres of the rows `arcs` (J,), which turn by `sweep` (J,) rad, to the same
     distance from their rounded ends and starts.
 
@@ -164,29 +166,33 @@ def _centre_arcs(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) ->
     far to one side: for more than half a turn the chord must therefore be at least the radius.
     """
     step = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-    begin, end, centre = made.starts_of(arcs)[:, :2], made.end[arcs, :2], made.centre[arcs]
-    chord, out, back = end - begin, begin - centre, end - centre
-    length, radius = np.hypot(chord[:, 0], chord[:, 1]), np.hypot(out[:, 0], out[:, 1])
-    spread = np.abs(radius - np.hypot(back[:, 0], back[:, 1]))
+    begin, end, centre = (
+        rounded.starts_of(arcs)[:, :2],
+        rounded.end[arcs, :2],
+        rounded.centre[arcs],
+    )
+    chord, start_arm, end_arm = end - begin, begin - centre, end - centre
+    length, radius = np.hypot(chord[:, 0], chord[:, 1]), np.hypot(start_arm[:, 0], start_arm[:, 1])
+    spread = np.abs(radius - np.hypot(end_arm[:, 0], end_arm[:, 1]))
     apt = (length >= MIN_CHORD_STEPS * step) & (spread <= SPREAD_STEPS * step)
     apt &= (sweep <= np.pi) | (length >= radius)
     if not apt.any():
-        return made
+        return rounded
     u = chord[apt] / length[apt, None]
-    off = ((centre[apt] - 0.5 * (begin + end)[apt]) * u).sum(axis=1)
-    new = made.centre.copy()
-    new[arcs[apt]] -= off[:, None] * u
-    return replace(made, centre=read_only(new))
+    offsets = ((centre[apt] - 0.5 * (begin + end)[apt]) * u).sum(axis=1)
+    new = rounded.centre.copy()
+    new[arcs[apt]] -= offsets[:, None] * u
+    return replace(rounded, centre=read_only(new))
 
 
-def _restore_turned_arcs(made: Toolpath, inside_out: Ints, short: Bools) -> Toolpath:
-    """Replace arcs that rounding has turned inside out: `short` ones (J,) by lines, the others by
-    full circles."""
-    lines, full = inside_out[short], inside_out[~short]
-    end, kind, centre = made.end.copy(), made.kind.copy(), made.centre.copy()
-    end[full, :2] = made.starts_of(full)[:, :2]
+def _restore_turned_arcs(rounded: Toolpath, inside_out: Ints, is_small: Bools) -> Toolpath:
+    """Replace arcs that rounding has turned inside out: `is_small` ones (J,) by lines, the others
+    by full circles."""
+    lines, circles = inside_out[is_small], inside_out[~is_small]
+    end, kind, centre = rounded.end.copy(), rounded.kind.copy(), rounded.centre.copy()
+    end[circles, :2] = rounded.starts_of(circles)[:, :2]
     kind[lines], centre[lines] = Kind.LINE, np.nan
-    return replace(made, kind=kind, centre=centre, end=end)
+    return replace(rounded, kind=kind, centre=centre, end=end)
 
 
 def _on_grid(points: Floats, machine: Machine) -> Floats:

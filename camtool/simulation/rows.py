@@ -27,8 +27,8 @@ def with_event_positions(toolpath: Toolpath, home: Floats) -> Toolpath:
     end = toolpath.end.copy()
     for axis, homing in ((0, Kind.HOME_XY), (1, Kind.HOME_XY), (2, Kind.HOME_Z)):
         end[kind == homing, axis] = home[axis]
-        known = np.where(toolpath.is_motion | (kind == homing), np.arange(count), -1)
-        latest = np.maximum.accumulate(known)
+        event_rows = np.where(toolpath.is_motion | (kind == homing), np.arange(count), -1)
+        latest = np.maximum.accumulate(event_rows)
         end[:, axis] = np.where(latest < 0, toolpath.start[axis], end[latest, axis])
     return with_ends(toolpath, toolpath.start, end)
 
@@ -44,18 +44,18 @@ def with_ends(toolpath: Toolpath, start: Floats, end: Floats) -> Toolpath:
 def check_positions(toolpath: Toolpath, machine: Machine) -> None:
     """Raise ProgramError for an arc without a centre or a position that cannot be counted."""
     arcs = np.flatnonzero(toolpath.is_arc)
-    bad = np.zeros(len(toolpath), dtype=np.bool_)
-    bad[arcs] = ~np.isfinite(toolpath.centre[arcs]).all(axis=1)
-    refuse(toolpath, bad, "an arc without a centre")
-    most = MAX_PATH_STEPS * np.array([axis.coded_step_mm for axis in machine.axes])
+    is_bad = np.zeros(len(toolpath), dtype=np.bool_)
+    is_bad[arcs] = ~np.isfinite(toolpath.centre[arcs]).all(axis=1)
+    refuse(toolpath, is_bad, "an arc without a centre")
+    limits = MAX_PATH_STEPS * np.array([axis.coded_step_mm for axis in machine.axes])
 
-    def far(part: Toolpath) -> Bools:
+    def is_beyond(part: Toolpath) -> Bools:
         centre = np.where(part.is_arc[:, None], np.abs(part.centre), 0.0)
-        beyond = np.column_stack([np.abs(part.end) > most, centre > most[:2]])
-        return np.asarray(beyond.any(axis=1))
+        is_outside = np.column_stack([np.abs(part.end) > limits, centre > limits[:2]])
+        return np.asarray(is_outside.any(axis=1))
 
     message = "a position is beyond all that the controller can count"
-    refuse(toolpath, toolpath.by_parts(far), message)
+    refuse(toolpath, toolpath.by_parts(is_beyond), message)
 
 
 def check_rows(path: Toolpath, rows: int) -> None:
@@ -65,18 +65,18 @@ def check_rows(path: Toolpath, rows: int) -> None:
     with np.errstate(invalid="ignore"):
         no_feed = path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
         no_time = (path.kind == Kind.DWELL) & ~((path.value >= 0.0) & np.isfinite(path.value))
-    away = (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
-    for bad, message, mend in (
+    is_moved = (path.kind == Kind.SET_ZERO) & path.end.any(axis=1)
+    for is_bad, message, mend in (
         (no_feed, "a move at a feed without a feed above 0", "give it one (F)"),
         (no_time, "a dwell without its seconds", ""),
-        (away, "part zero is set away from part zero", "set it once, before any move"),
+        (is_moved, "part zero is set away from part zero", "set it once, before any move"),
     ):
-        refuse(path, running & bad, message, mend)
+        refuse(path, running & is_bad, message, mend)
 
 
-def refuse(toolpath: Toolpath, bad: npt.ArrayLike, message: str, mend: str = "") -> None:
-    """Raise ProgramError for the first row that is `bad` (N,), if there is one."""
-    rows = np.flatnonzero(bad)
+def refuse(toolpath: Toolpath, is_bad: npt.ArrayLike, message: str, mend: str = "") -> None:
+    """Raise ProgramError for the first row that is `is_bad` (N,), if there is one."""
+    rows = np.flatnonzero(is_bad)
     if len(rows):
         raise ProgramError(message, where=block_of(toolpath, int(rows[0])), mend=mend)
 
@@ -84,7 +84,7 @@ def refuse(toolpath: Toolpath, bad: npt.ArrayLike, message: str, mend: str = "")
 def block_of(toolpath: Toolpath, row: int) -> str:
     """Return the block (from 1) from which a row was read, and what called it; the row where none
     was read."""
-    block, called = int(toolpath.block[row]), toolpath.text(row)
+    block, caller = int(toolpath.block[row]), toolpath.text(row)
     if block < 0:
         return f"move {row}"
-    return f"block {block + 1} ({called})" if called else f"block {block + 1}"
+    return f"block {block + 1} ({caller})" if caller else f"block {block + 1}"

@@ -86,30 +86,30 @@ def row_chunks(
 def _chunks(block: SampledRows, mechanics: Mechanics, chunk_steps: int) -> Iterator[Chunk]:
     first = block.samples.first[block.low - block.base : block.high - block.base + 1]
     rows, end = len(first) - 1, int(first[-1])
-    done = 0  # rows whose ledger is complete
+    done_rows = 0  # rows whose ledger is complete
     for low in range(int(first[0]), end, chunk_steps):
         high = min(low + chunk_steps, end)
         row, commanded = block.samples.window(low, high)
         row += block.base - block.low
         last = int(row[-1])
-        whole = rows if high == end else last + int(high == first[last + 1])
-        listed = np.arange(done, max(whole, last + 1))
+        complete = rows if high == end else last + int(high == first[last + 1])
+        listed = np.arange(done_rows, max(complete, last + 1))
         offsets = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [len(row)]])
         ledger = still_ledger(block.low + listed)
-        moved = row[offsets[:-1]] - done
-        slide, ledger.reversals[moved] = mechanics.follow(commanded, offsets)
-        ledger.steps[moved] = block.samples.steps(low + offsets)
-        here = np.zeros(len(listed), dtype=np.int64)
-        here[moved] = np.diff(offsets)
-        own = (first[1:] - first[:-1])[listed]
+        moving_rows = row[offsets[:-1]] - done_rows
+        slide, ledger.reversals[moving_rows] = mechanics.follow(commanded, offsets)
+        ledger.steps[moving_rows] = block.samples.steps(low + offsets)
+        counts = np.zeros(len(listed), dtype=np.int64)
+        counts[moving_rows] = np.diff(offsets)
+        own_samples = (first[1:] - first[:-1])[listed]
         ledger.duration_s[:] = block.seconds[listed] * np.where(
-            own > 0, here / np.maximum(own, 1), 1.0
+            own_samples > 0, counts / np.maximum(own_samples, 1), 1.0
         )
         if block.iterates:
-            ledger.iterations[:] = here
+            ledger.iterations[:] = counts
         yield Chunk(block.low + row, commanded, slide, ledger)
-        done = whole
-    if done < rows:
+        done_rows = complete
+    if done_rows < rows:
         ledger = still_ledger(np.arange(block.low, block.high))
         ledger.duration_s[:] = block.seconds
         yield Chunk(np.empty(0, np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
@@ -182,18 +182,18 @@ class PathSamples:
     def places(self, low: int, high: int) -> tuple[Ints, Floats]:
         """Return row (K,) and share (K,) of its length, in (0, 1], of the samples low:high."""
         first = int(np.searchsorted(self._offsets, low, side="right")) - 1
-        here = slice(first, int(np.searchsorted(self._offsets, high)))
-        many = np.diff(np.clip(self._offsets[here.start : here.stop + 1], low, high))
-        parts = np.repeat(self._parts[here], many)
-        part = np.arange(low + 1, high + 1) - np.repeat(self._offsets[here], many)
+        pieces = slice(first, int(np.searchsorted(self._offsets, high)))
+        sample_counts = np.diff(np.clip(self._offsets[pieces.start : pieces.stop + 1], low, high))
+        parts = np.repeat(self._parts[pieces], sample_counts)
+        part = np.arange(low + 1, high + 1) - np.repeat(self._offsets[pieces], sample_counts)
         share = part / parts
-        of_arc = np.flatnonzero(np.repeat(self._pieces.divide[here], many))
+        of_arc = np.flatnonzero(np.repeat(self._pieces.divide[pieces], sample_counts))
         if len(of_arc):
-            piece = np.repeat(np.arange(here.start, here.stop), many)[of_arc]
+            piece = np.repeat(np.arange(pieces.start, pieces.stop), sample_counts)[of_arc]
             begin, end = self._pieces.begin[piece], self._pieces.end[piece]
             last = part[of_arc] == parts[of_arc]
             share[of_arc] = np.where(last, end, begin + (end - begin) * share[of_arc])
-        return np.repeat(self._pieces.row[here], many), share
+        return np.repeat(self._pieces.row[pieces], sample_counts), share
 
     def points(self, row: Ints, share: Floats) -> Floats:
         """Return (K, 3) mm: the points at shares (K,) of the lengths of rows (K,)."""
@@ -264,15 +264,15 @@ def _arc_pieces(arms: PolarArcs) -> _Pieces:
     ones are k = ⌊σa/(π/2)⌋ + 1, + 2, ...
     """
     quarter = 0.5 * np.pi
-    ahead = np.sign(arms.sweep) * arms.angle
-    next_turn = np.floor(ahead / quarter)[:, None] + np.arange(1, TURNS_OF_ARC + 1)
-    turn = next_turn * quarter - ahead[:, None]
+    progress = np.sign(arms.sweep) * arms.angle
+    next_turn = np.floor(progress / quarter)[:, None] + np.arange(1, TURNS_OF_ARC + 1)
+    turn = next_turn * quarter - progress[:, None]
     sweep = np.abs(arms.sweep)[:, None]
     inside = (turn > TURN_EPS_RAD) & (turn < sweep - TURN_EPS_RAD)
     ends = np.ones((len(sweep), 1), dtype=np.bool_)
-    kept = np.concatenate([ends, inside, ends], axis=1)
+    has_place = np.concatenate([ends, inside, ends], axis=1)
     bounds = np.concatenate([0.0 * sweep, turn / sweep, sweep / sweep], axis=1)
-    which, _ = np.nonzero(kept)
-    bound = bounds[kept]
-    inner = np.flatnonzero(np.diff(which) == 0)
-    return _Pieces(arms.row[which[inner]], bound[inner], bound[inner + 1])
+    owners, _ = np.nonzero(has_place)
+    bound = bounds[has_place]
+    inner = np.flatnonzero(np.diff(owners) == 0)
+    return _Pieces(arms.row[owners[inner]], bound[inner], bound[inner + 1])

@@ -49,9 +49,9 @@ class SpeedPlan(Struct, frozen=True, eq=False):
         np.minimum(highest, self.speed_mm_s, out=highest)
         np.minimum(highest, self.corner_mm_s, out=highest)
         np.square(highest, out=highest)
-        found = np.zeros(len(self.length_mm) + 1)
-        entry_speeds(self._gains(), highest, window, self.before.square, found[:-1])
-        return found
+        squares = np.zeros(len(self.length_mm) + 1)
+        entry_speeds(self._gains(), highest, window, self.before.square, squares[:-1])
+        return squares
 
     def seconds(self, squares: Floats) -> Floats:
         """Return (N,) s: the time of each block, with the `squares` (N + 1,) of its method."""

@@ -60,7 +60,7 @@ JOB = Job((Operation(tool=Tool(4.0)),), stock=Stock(5.0, (0.0, 0.0), (40.0, 40.0
 
 
 def scene(deep: float = -2.0, job: Job | None = JOB) -> Scene:
-    return scene_of(title="plate", job=job, toolpath=plate(deep), wanted=plate())
+    return scene_of(title="plate", job=job, toolpath=plate(deep), wanted_path=plate())
 
 
 def raster(svg: str) -> Pixels:
@@ -159,7 +159,7 @@ def test_a_fault_of_the_plan_is_seen_too() -> None:
         faulty = replace(good, end=end)
         for moves, said in ((good, "nowhere more than"), (faulty, f"up to {abs(by)} mm")):
             seen = scene_of(
-                title="", drawing=drawing, job=job, toolpath=moves, machine=machine, wanted=moves
+                title="", drawing=drawing, job=job, toolpath=moves, machine=machine, wanted_path=moves
             )
             text = spoken(draw(seen, PictureOptions(size_px=200, view=view)))
             assert said in text[-1]

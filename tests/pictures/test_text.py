@@ -59,7 +59,7 @@ def test_accents_lie_above_their_letters() -> None:
 
 
 def test_the_full_text_stays_when_the_shown_one_is_cut() -> None:
-    svg = text.label("long…", (0.0, 0.0), TextStyle(), full="long name")
+    svg = text.label("long…", (0.0, 0.0), TextStyle(), full_text="long name")
     assert 'aria-label="long name"' in svg
 
 

@@ -44,7 +44,7 @@ def test_a_straight_line_keeps_its_ends_alone() -> None:
 def test_there_are_never_more_than_most(colours: int) -> None:
     points = wandering(5, 4000)
     bins = np.arange(4000) % colours
-    kept = thinned(points, bins, 0.005, most=500)
+    kept = thinned(points, bins, 0.005, max_points=500)
     assert 50 < len(kept) <= 500
     assert (np.diff(kept) > 0).all()
 

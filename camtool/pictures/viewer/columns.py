@@ -109,10 +109,10 @@ def goal_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
         heights = HeightMap(np.zeros((upwards, across), dtype=np.float32), cell, corner)
         add_moves(heights, pair.wanted)
         shares = np.rint(heights.heights.ravel() * (GOAL_COUNTS / -stock.bottom))
-        whole = np.maximum(shares, -GOAL_COUNTS).astype(INT)
-        begins = np.concatenate([[0], np.flatnonzero(np.diff(whole)) + 1])
-        values = whole[begins]
-        counts = np.diff(np.append(begins, whole.size)).astype(INT)
+        rounded = np.maximum(shares, -GOAL_COUNTS).astype(INT)
+        begins = np.concatenate([[0], np.flatnonzero(np.diff(rounded)) + 1])
+        values = rounded[begins]
+        counts = np.diff(np.append(begins, rounded.size)).astype(INT)
     return {"goal_height": values, "goal_count": counts}
 
 
@@ -122,17 +122,19 @@ def slide_columns(pair: StockPair | None, rows: int, cell_mm: float) -> Columns:
     more than a share of `cell_mm` are one; there are MAX_POINTS at most, if need be coarser."""
     moves = None if pair is None else pair.moves
     if moves is None or not len(moves):
-        none = np.empty(0, dtype=INT)
-        return {"slide_at": CountColumn(none, SLIDE_UNIT_MM, 3), "slide_count": none}
-    kept, near_mm = np.arange(len(moves)), max(moves.beside_mm, THIN_CELLS * cell_mm)
+        no_counts = np.empty(0, dtype=INT)
+        return {"slide_at": CountColumn(no_counts, SLIDE_UNIT_MM, 3), "slide_count": no_counts}
+    kept_rows, near_mm = np.arange(len(moves)), max(moves.beside_mm, THIN_CELLS * cell_mm)
     while True:
-        kept = kept[thinned_moves(moves.end[kept], moves.row[kept], moves.start[0], near_mm)]
-        if len(kept) <= MAX_POINTS or near_mm > np.ptp(moves.end, axis=0).max():
+        kept_rows = kept_rows[
+            thinned_moves(moves.end[kept_rows], moves.row[kept_rows], moves.start[0], near_mm)
+        ]
+        if len(kept_rows) <= MAX_POINTS or near_mm > np.ptp(moves.end, axis=0).max():
             break
         near_mm *= COARSER
-    places = np.concatenate([moves.start[:1], moves.end[kept]])
+    places = np.concatenate([moves.start[:1], moves.end[kept_rows]])
     counts = np.rint(places / SLIDE_UNIT_MM).astype(np.int64)
-    of_rows = np.bincount(moves.row[kept], minlength=rows)
+    of_rows = np.bincount(moves.row[kept_rows], minlength=rows)
     return {"slide_at": CountColumn(counts, SLIDE_UNIT_MM, 3), "slide_count": of_rows.astype(INT)}
 
 
@@ -143,22 +145,24 @@ def packed(columns: Columns) -> tuple[Named, bytes]:
     """({name: (type, byte offset, count)}, all bytes); a column of counts has its unit besides."""
     named: Named = {}
     parts: list[bytes] = []
-    at = 0
+    offset = 0
     for name, column in columns.items():
         if isinstance(column, np.ndarray) and column.dtype != INT:
-            named[name] = (column.dtype.str.lstrip("<|"), at, column.size)
+            named[name] = (column.dtype.str.lstrip("<|"), offset, column.size)
             data = column.tobytes()
         else:
-            known = (
+            counts = (
                 column if isinstance(column, CountColumn) else CountColumn(column.astype(np.int64))
             )
-            kind = f"v{known.stride}"
-            size = known.counts.size
-            named[name] = (kind, at, size) if known.unit == 1.0 else (kind, at, size, known.unit)
-            data = stepped(known.counts, known.stride)
+            kind = f"v{counts.stride}"
+            size = counts.counts.size
+            named[name] = (
+                (kind, offset, size) if counts.unit == 1.0 else (kind, offset, size, counts.unit)
+            )
+            data = stepped(counts.counts, counts.stride)
         data += bytes(-len(data) % ALIGN_BYTES)
         parts.append(data)
-        at += len(data)
+        offset += len(data)
     return named, b"".join(parts)
 
 
@@ -167,15 +171,15 @@ def stepped(numbers: npt.NDArray[np.integer], stride: int) -> bytes:
     needs: 7 bits a byte, the lowest first; the highest bit says that more follow."""
     flat = numbers.ravel().astype(np.int64)
     steps = flat - np.concatenate([np.zeros(stride, dtype=np.int64), flat[:-stride]])[: len(flat)]
-    rest = (steps << 1) ^ (steps >> 63)
-    found = np.zeros((len(rest), MAX_NUMBER_BYTES), dtype=BYTE)
-    size = np.ones(len(rest), dtype=np.int64)
+    zigzag = (steps << 1) ^ (steps >> 63)
+    octets = np.zeros((len(zigzag), MAX_NUMBER_BYTES), dtype=BYTE)
+    size = np.ones(len(zigzag), dtype=np.int64)
     for k in range(MAX_NUMBER_BYTES):
-        found[:, k] = rest & 0x7F
-        rest = rest >> 7
-        found[:, k] |= np.where(rest > 0, 0x80, 0).astype(BYTE)
-        size += rest > 0
-    return found[np.arange(MAX_NUMBER_BYTES) < size[:, None]].tobytes()
+        octets[:, k] = zigzag & 0x7F
+        zigzag = zigzag >> 7
+        octets[:, k] |= np.where(zigzag > 0, 0x80, 0).astype(BYTE)
+        size += zigzag > 0
+    return octets[np.arange(MAX_NUMBER_BYTES) < size[:, None]].tobytes()
 
 
 def drawing_layers(drawing: Drawing) -> list[str]:
@@ -185,11 +189,11 @@ def drawing_layers(drawing: Drawing) -> list[str]:
 
 def _drawing(drawing: Drawing | None) -> Columns:
     if drawing is None:
-        none = np.empty(0)
+        zeros = np.empty(0)
         return {
-            **_arc_columns("drawn", none.astype(np.bool_), none.reshape(0, 2), none),
-            **{name: none.astype(FLOAT) for name in ("drawn_from", "drawn_to", "mark_at")},
-            **{name: none.astype(INT) for name in ("drawn_path", "drawn_layer", "mark_layer")},
+            **_arc_columns("drawn", zeros.astype(np.bool_), zeros.reshape(0, 2), zeros),
+            **{name: zeros.astype(FLOAT) for name in ("drawn_from", "drawn_to", "mark_at")},
+            **{name: zeros.astype(INT) for name in ("drawn_path", "drawn_layer", "mark_layer")},
         }
     segments, names = Segments.of(drawing.paths), drawing_layers(drawing)
     number = {name: index for index, name in enumerate(names)}
@@ -209,22 +213,22 @@ def _drawing(drawing: Drawing | None) -> Columns:
 def _moves(scene: Scene, run: Playback | None) -> Columns:
     toolpath = scene.toolpath
     if toolpath is None or run is None:
-        none = np.empty(0)
+        zeros = np.empty(0)
         floats = (
             *("move_start", "move_end", "feed_value", "move_seconds", "move_error"),
             "move_wide",
         )
         return {
-            **_arc_columns("move", none.astype(np.bool_), none.reshape(0, 2), none),
-            **{name: none.astype(FLOAT) for name in floats},
-            **{name: none.astype(INT) for name in ("feed_count", "move_block", "move_source")},
-            **{name: none.astype(BYTE) for name in ("move_kind", "move_sort")},
+            **_arc_columns("move", zeros.astype(np.bool_), zeros.reshape(0, 2), zeros),
+            **{name: zeros.astype(FLOAT) for name in floats},
+            **{name: zeros.astype(INT) for name in ("feed_count", "move_block", "move_source")},
+            **{name: zeros.astype(BYTE) for name in ("move_kind", "move_sort")},
         }
     if len(run.seconds) != len(toolpath):
         raise ValueError("the playback is that of another toolpath")
     feed = toolpath.feed.astype(FLOAT)
-    known = np.nan_to_num(feed, nan=-1.0)
-    begins = np.flatnonzero(np.diff(known, prepend=np.inf))
+    feeds = np.nan_to_num(feed, nan=-1.0)
+    begins = np.flatnonzero(np.diff(feeds, prepend=np.inf))
     return {
         **_arc_columns("move", toolpath.is_arc, toolpath.centre, toolpath.sweeps()),
         "move_start": toolpath.start.astype(FLOAT),
@@ -251,9 +255,9 @@ def _wide(scene: Scene, toolpath: Toolpath) -> npt.NDArray[np.generic]:
     ends = [row for row, _ in turns[1:]] + [len(toolpath)]
     for (begin, tool), end in zip(turns, ends, strict=True):
         rows = begin + np.flatnonzero(toolpath.is_feed[begin:end])
-        deep: Floats = -np.column_stack([toolpath.starts_of(rows)[:, 2], toolpath.end[rows, 2]])
+        depths: Floats = -np.column_stack([toolpath.starts_of(rows)[:, 2], toolpath.end[rows, 2]])
         # What lies above the stock cuts nothing.
-        for row, ends_mm in zip(rows.tolist(), deep.tolist(), strict=True):
+        for row, ends_mm in zip(rows.tolist(), depths.tolist(), strict=True):
             if max(ends_mm) > 0.0:
                 wide[row] = [tool.radius_at(max(each, 0.0)) for each in ends_mm]
     return wide.astype(FLOAT)
@@ -268,23 +272,23 @@ def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
     return np.where(toolpath.is_motion, sorts, 0).astype(BYTE)
 
 
-def _wanted(wanted: Segments | None) -> Columns:
+def _wanted(wanted_path: Segments | None) -> Columns:
     """The wanted path: where each line or arc ends, and where those begin that do not begin at the
     end of the one before."""
-    if wanted is None or not len(wanted):
-        none = np.empty(0)
+    if wanted_path is None or not len(wanted_path):
+        zeros = np.empty(0)
         return {
-            **_arc_columns("wanted", none.astype(np.bool_), none.reshape(0, 2), none),
-            "wanted_to": none.astype(FLOAT),
-            "wanted_begin": none.astype(FLOAT),
-            "wanted_break": none.astype(INT),
+            **_arc_columns("wanted", zeros.astype(np.bool_), zeros.reshape(0, 2), zeros),
+            "wanted_to": zeros.astype(FLOAT),
+            "wanted_begin": zeros.astype(FLOAT),
+            "wanted_break": zeros.astype(INT),
         }
-    apart = np.hypot(*(wanted.start[1:] - wanted.end[:-1]).T) > POSITION_EPS_MM
-    breaks = np.concatenate([[0], np.flatnonzero(apart) + 1])
+    is_break = np.hypot(*(wanted_path.start[1:] - wanted_path.end[:-1]).T) > POSITION_EPS_MM
+    breaks = np.concatenate([[0], np.flatnonzero(is_break) + 1])
     return {
-        **_arc_columns("wanted", wanted.bulge != 0.0, wanted.centre, wanted.sweep),
-        "wanted_to": wanted.end.astype(FLOAT),
-        "wanted_begin": wanted.start[breaks].astype(FLOAT),
+        **_arc_columns("wanted", wanted_path.bulge != 0.0, wanted_path.centre, wanted_path.sweep),
+        "wanted_to": wanted_path.end.astype(FLOAT),
+        "wanted_begin": wanted_path.start[breaks].astype(FLOAT),
         "wanted_break": breaks.astype(INT),
     }
 
@@ -326,35 +330,35 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
     worst = np.array(scene.worst, dtype=np.float64).reshape(-1, 2)
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or run is None or not len(run.trace_row):
-        none = np.empty(0)
-        nothing = _columns(none.reshape(0, 2), none.astype(np.int64), none, none, FINEST_MM)
-        return Traced(nothing, 0.0, np.zeros_like(worst))
+        zeros = np.empty(0)
+        no_columns = _columns(zeros.reshape(0, 2), zeros.astype(np.int64), zeros, zeros, FINEST_MM)
+        return Traced(no_columns, 0.0, np.zeros_like(worst))
     if len(run.trace_row) != len(points):
         raise ValueError("the playback does not have a row for each point of the trace")
     error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
     steps = bins_of(ErrorTrace(points, error_um, cutting, top_um))
     bins = np.concatenate([[BINS], np.where(steps < 0, BINS, steps)])
     largest_mm = float(error_um.max(initial=0.0)) / UM_PER_MM
-    kept = thinned(points, bins, largest_mm)
+    kept_rows = thinned(points, bins, largest_mm)
     # A cut begins at the point before its first one.
-    drawn = (cutting | np.append(cutting[1:], False))[kept]
-    points, bins, row = points[kept], bins[kept], run.trace_row[kept]
-    off = _off(points, drawn, scene.wanted)
-    largest = float(np.abs(off).max(initial=0.0))
+    drawn = (cutting | np.append(cutting[1:], False))[kept_rows]
+    points, bins, row = points[kept_rows], bins[kept_rows], run.trace_row[kept_rows]
+    offsets = _off(points, drawn, scene.wanted)
+    largest = float(np.abs(offsets).max(initial=0.0))
     count_mm = largest / MAX_COUNTS if scene.wanted is not None and largest > 0.0 else 0.0
-    counts = np.rint(off / count_mm) if count_mm else np.zeros_like(off)
-    ever = np.ones(len(worst), dtype=np.bool_)
+    counts = np.rint(offsets / count_mm) if count_mm else np.zeros_like(offsets)
+    all_points = np.ones(len(worst), dtype=np.bool_)
     columns = _columns(points, bins, row, counts, finest_mm(largest_mm))
-    return Traced(columns, count_mm, _off(worst, ever, scene.wanted))
+    return Traced(columns, count_mm, _off(worst, all_points, scene.wanted))
 
 
-def _off(points: Floats, chosen: np.ndarray, wanted: Segments | None) -> Floats:
+def _off(points: Floats, is_chosen: np.ndarray, wanted_path: Segments | None) -> Floats:
     """(T, 2) mm: the vector from the nearest point of the wanted path to each chosen point, else
     0."""
-    off = np.zeros_like(points)
-    if wanted is not None and len(wanted) and chosen.any():
-        off[chosen] = points[chosen] - nearest_points(points[chosen], wanted)
-    return off
+    offsets = np.zeros_like(points)
+    if wanted_path is not None and len(wanted_path) and is_chosen.any():
+        offsets[is_chosen] = points[is_chosen] - nearest_points(points[is_chosen], wanted_path)
+    return offsets
 
 
 def _columns(
@@ -391,19 +395,19 @@ COARSER = 4.0
 """... and the distance grows by this factor while there are too many points."""
 
 
-def thinned(points: Floats, bins: Ints, largest_mm: float, most: int = MAX_POINTS) -> Ints:
+def thinned(points: Floats, bins: Ints, largest_mm: float, max_points: int = MAX_POINTS) -> Ints:
     """Ascending rows of the points (T, 2) mm, with their colours (T,), that are kept: among them
-    the ends of all pieces of one colour, unless these alone are more than `most`."""
-    kept = np.arange(len(points))
+    the ends of all pieces of one colour, unless these alone are more than `max_points`."""
+    kept_rows = np.arange(len(points))
     near_mm = finest_mm(largest_mm)
     while True:
-        fewer = _halved(points, bins, kept, near_mm)
-        if len(fewer) < len(kept):
-            kept = fewer
-        elif len(kept) <= most:
-            return kept
+        fewer = _halved(points, bins, kept_rows, near_mm)
+        if len(fewer) < len(kept_rows):
+            kept_rows = fewer
+        elif len(kept_rows) <= max_points:
+            return kept_rows
         elif near_mm > np.ptp(points, axis=0).max():
-            return kept[:: -(-len(kept) // most)]
+            return kept_rows[:: -(-len(kept_rows) // max_points)]
         else:
             near_mm *= COARSER
 
@@ -414,22 +418,22 @@ def finest_mm(largest_mm: float) -> float:
     return max(min(FINEST_MM, FINEST_SHARE * largest_mm), MIN_UNIT_MM)
 
 
-def _halved(points: Floats, bins: Ints, kept: Ints, near_mm: float) -> Ints:
+def _halved(points: Floats, bins: Ints, kept_rows: Ints, near_mm: float) -> Ints:
     """The rows without those of the 2nd, 4th, … points that may be left out; the first and the
     last one stay."""
-    middle = np.arange(1, len(kept) - 1, 2)
-    before, at, after = kept[middle - 1], kept[middle], kept[middle + 1]
+    middle = np.arange(1, len(kept_rows) - 1, 2)
+    before, point, after = kept_rows[middle - 1], kept_rows[middle], kept_rows[middle + 1]
     # The colour of a piece is that of the point that it leads to.
-    same = bins[at] == bins[after]
-    goes = same & (_from_chord(points[before], points[at], points[after]) <= near_mm)
-    stays = np.ones(len(kept), dtype=np.bool_)
+    same_bin = bins[point] == bins[after]
+    goes = same_bin & (_from_chord(points[before], points[point], points[after]) <= near_mm)
+    stays = np.ones(len(kept_rows), dtype=np.bool_)
     stays[middle[goes]] = False
-    return kept[stays]
+    return kept_rows[stays]
 
 
 def _from_chord(begin: Floats, point: Floats, end: Floats) -> Floats:
-    chord, out = end - begin, point - begin
+    chord, arm = end - begin, point - begin
     square = (chord**2).sum(axis=1)
-    share = (out * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0)
-    away = out - np.clip(share, 0.0, 1.0)[:, None] * chord
-    return np.asarray(np.hypot(away[:, 0], away[:, 1]))
+    share = (arm * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0)
+    offsets = arm - np.clip(share, 0.0, 1.0)[:, None] * chord
+    return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))

@@ -152,8 +152,8 @@ def _head(content: Content, run: Playback | None, traced: Traced) -> dict[str, o
         "tables": [] if run is None else [_table(table) for table in run.tables],
         "off_mm": traced.count_mm,
         "worst": [
-            {"at": place, "off": off}
-            for place, off in zip(scene.worst, traced.worst_off.tolist(), strict=True)
+            {"at": place, "off": offset}
+            for place, offset in zip(scene.worst, traced.worst_off.tolist(), strict=True)
         ],
         "travel_mm": scene.travel_mm,
         "ambiguous": [] if drawing is None else _ambiguous(drawing),
@@ -207,8 +207,8 @@ def _stock_of(scene: Scene) -> StockPair | None:
     if scene.cut is not None:
         with suppress(OptionError):
             return scene.cut()
-    nothing = (CutterProfile(0.0, 0.0),)
-    moves = stock_moves_of_toolpath(toolpath, np.zeros(len(toolpath), dtype=np.int64), nothing)
+    points = (CutterProfile(0.0, 0.0),)
+    moves = stock_moves_of_toolpath(toolpath, np.zeros(len(toolpath), dtype=np.int64), points)
     return stock_pair(moves, scene.stock_mm, scene.thickness_mm)
 
 
@@ -217,9 +217,9 @@ def _box_of(pair: StockPair) -> StockBox:
     box = pair.box_mm
     across, upwards = box[2] - box[0], box[3] - box[1]
     finest = max(math.sqrt(across * upwards / MAX_HEIGHTS), MIN_STEP_MM)
-    most = max(int(across / finest), 2)
+    max_rows = max(int(across / finest), 2)
     # Of the grids that end at the right edge, the one that ends nearest to the upper edge.
-    tries = np.arange(max(2, int(0.9 * most)), most + 1)
+    tries = np.arange(max(2, int(0.9 * max_rows)), max_rows + 1)
     steps = upwards / (across / tries)
     count = int(tries[np.argmin(np.abs(steps - np.rint(steps)))])
     rows = max(1, round(upwards * count / across))
@@ -357,34 +357,34 @@ def circles_of(scene: Scene) -> str:
     """The HTML of the plots in the order of the report; empty without a full circle."""
     # The same circle in the other direction is in the plot of the first one.
     first = [
-        which
-        for which, one in enumerate(scene.rounds, 1)
-        if one.partner is None or one.partner > which
+        number
+        for number, one in enumerate(scene.rounds, 1)
+        if one.partner is None or one.partner > number
     ]
-    chosen = sorted(sorted(first, key=lambda which: -_size(scene, which))[:MAX_PLOTS])
-    if not chosen:
+    numbers = sorted(sorted(first, key=lambda which: -_size(scene, which))[:MAX_PLOTS])
+    if not numbers:
         return ""
     heading = "Full circles"
-    if len(chosen) < len(first):
-        heading += f": the {len(chosen)} of {len(first)} with the largest circular error"
-    figures = "\n".join(_figure(scene, which) for which in chosen)
+    if len(numbers) < len(first):
+        heading += f": the {len(numbers)} of {len(first)} with the largest circular error"
+    figures = "\n".join(_figure(scene, number) for number in numbers)
     return f'<h2>{heading}</h2>\n<div class="plots">\n{figures}\n</div>\n'
 
 
-def _size(scene: Scene, which: int) -> float:
-    error = scene.rounds[which - 1].circular_mm
+def _size(scene: Scene, number: int) -> float:
+    error = scene.rounds[number - 1].circular_mm
     return error if math.isfinite(error) else 0.0
 
 
-def _figure(scene: Scene, which: int) -> str:
-    circles = circle_pair(scene, which)
+def _figure(scene: Scene, circle_number: int) -> str:
+    circles = circle_pair(scene, circle_number)
     errors = [_joined(circle.errors_um) for circle in circles]
     dial = dial_of(errors, WIDTH)
     dial = dial.centred_below(0.0, WIDTH)
     side = 2.0 * (dial.outer + ROOM)
     box = " ".join(map(number, (0.5 * (WIDTH - side), 0.0, side, side)))
-    about = f"radial error of circle {which}"
-    look: Look = {"viewBox": box, "role": "img", "aria-label": about}
+    title = f"radial error of circle {circle_number}"
+    look: Look = {"viewBox": box, "role": "img", "aria-label": title}
     svg = element("svg", look, *plot(errors, dial))
     svg = _PAINT.sub(lambda found: f'{found[1]}="var(--{NAMES[found[2]]})"', _ID.sub("", svg))
     svg = _SHAPE.sub(lambda found: _DECIMAL.sub(r"\1", found[0]), svg)
@@ -394,14 +394,14 @@ def _figure(scene: Scene, which: int) -> str:
 
 def _joined(errors_um: Floats) -> Floats:
     """(B, 3) least, mean and largest error of neighbours joined; NaN where all of them are."""
-    together = max(1, math.ceil(len(errors_um) / BINS_SHOWN))
-    if len(errors_um) % together:
+    joined_count = max(1, math.ceil(len(errors_um) / BINS_SHOWN))
+    if len(errors_um) % joined_count:
         return errors_um
-    groups = errors_um.reshape(-1, together, 3)
-    seen = np.isfinite(groups)
-    count = seen.sum(axis=1)
-    least = np.where(seen, groups, np.inf)[:, :, 0].min(axis=1)
-    largest = np.where(seen, groups, -np.inf)[:, :, 2].max(axis=1)
-    mean = np.where(seen, groups, 0.0)[:, :, 1].sum(axis=1) / np.maximum(count[:, 1], 1)
-    joined = np.column_stack([least, mean, largest])
+    groups = errors_um.reshape(-1, joined_count, 3)
+    is_finite = np.isfinite(groups)
+    count = is_finite.sum(axis=1)
+    smallest = np.where(is_finite, groups, np.inf)[:, :, 0].min(axis=1)
+    largest = np.where(is_finite, groups, -np.inf)[:, :, 2].max(axis=1)
+    mean = np.where(is_finite, groups, 0.0)[:, :, 1].sum(axis=1) / np.maximum(count[:, 1], 1)
+    joined = np.column_stack([smallest, mean, largest])
     return np.asarray(np.where(count > 0, joined, np.nan))
