@@ -164,10 +164,10 @@ def say_summary(outcomes: Sequence[Outcome], seconds: float, *, quiet: bool) -> 
     parts = [f"{counts[state]} {state.value}" for state in OutcomeState if counts[state]]
     codes = Counter(each.code for each in failed if each.code).most_common(CODES)
     if codes:
-        why = ", ".join(f"{number} {code}" for code, number in codes)
-        parts = [f"{part} ({why})" if part.endswith(" failed") else part for part in parts]
-    made = counts[OutcomeState.MADE]
-    rate = f", {made / seconds:.1f} made a second" if made and seconds > 0.0 else ""
+        reasons = ", ".join(f"{number} {code}" for code, number in codes)
+        parts = [f"{part} ({reasons})" if part.endswith(" failed") else part for part in parts]
+    made_count = counts[OutcomeState.MADE]
+    rate = f", {made_count / seconds:.1f} made a second" if made_count and seconds > 0.0 else ""
     warnings = f"; {len(warned)} with warnings (-v shows them)" if warned else ""
     verdicts = _verdict_words(verdicts_of(outcomes))
     say(
@@ -186,7 +186,7 @@ def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> by
         row["state"] = outcome.state.value
         del row["stem"]
         rows.append(row)
-    whole = {
+    content = {
         "camtool": __version__,
         "target": target,
         "seconds": round(seconds, 3),
@@ -194,7 +194,7 @@ def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> by
         "verdicts": dict(verdicts_of(outcomes)),
         "drawings": rows,
     }
-    return to_json(whole).encode()
+    return to_json(content).encode()
 
 
 def _line(outcome: Outcome) -> str:
@@ -204,8 +204,8 @@ def _line(outcome: Outcome) -> str:
     figure = "" if error is None else f", error {error:.3g} µm"
     warned = f", {_count_words(outcome.warnings, 'warning')}" if outcome.warnings else ""
     verdicts = _verdict_words(outcome.verdicts)
-    told = f", dimensions: {verdicts}" if verdicts else ""
-    return f"made: {outcome.source} → {', '.join(outcome.files)}{figure}{warned}{told}"
+    verdict_text = f", dimensions: {verdicts}" if verdicts else ""
+    return f"made: {outcome.source} → {', '.join(outcome.files)}{figure}{warned}{verdict_text}"
 
 
 def verdicts_of(outcomes: Sequence[Outcome]) -> Counter[str]:
@@ -254,15 +254,15 @@ def _table(rows: Sequence[Outcome], outcomes: Sequence[Outcome]) -> None:
     table.add_column("why", ratio=2, overflow="fold")
     for each in rows[:LISTED]:
         failed = each.state is OutcomeState.FAILED
-        what = "failed" if failed else _count_words(each.warnings, "warning")
+        status = "failed" if failed else _count_words(each.warnings, "warning")
         name = PurePath(each.source).relative_to(base) if base else each.source
         # Errors are shown in full, warnings on one line each: there may be many alike.
-        why = (
+        reason = (
             Text(_reason(each))
             if failed
             else Text(_reason(each), no_wrap=True, overflow="ellipsis")
         )
-        table.add_row(Text(one_line(str(name))), what, why, style=COLOUR[each.state])
+        table.add_row(Text(one_line(str(name))), status, reason, style=COLOUR[each.state])
     Console(stderr=True).print(table)
     _say_more(len(rows))
 
@@ -283,9 +283,9 @@ def _say_more(rows: int) -> None:
 def _reason(outcome: Outcome) -> str:
     """Return the error, or else the first remark, without the name of the drawing, which stands
     before it."""
-    why = one_line(outcome.error or next(iter(outcome.remarks), ""))
-    why = why.removeprefix(f"{one_line(outcome.source)}: ")
-    return why.removeprefix("error " if outcome.code else "warning ")
+    reason = one_line(outcome.error or next(iter(outcome.remarks), ""))
+    reason = reason.removeprefix(f"{one_line(outcome.source)}: ")
+    return reason.removeprefix("error " if outcome.code else "warning ")
 
 
 def _progress() -> Progress:

@@ -124,46 +124,46 @@ class BatchRun:
         `reads` are files that are read besides drawings and jobs.
         """
         try:
-            ended, number = self._run(sources, flags, reads)
+            batch_end, number = self._run(sources, flags, reads)
         except KeyboardInterrupt:  # before the first drawing, or for the second time
-            ended, number = EndedBatch((), None), int(signal.SIGINT)
+            batch_end, number = EndedBatch((), None), int(signal.SIGINT)
         if number is not None:
             text = "interrupted; written files are complete, and the same command continues"
             say(f"camtool: {text}", quiet=False)
             return EXIT_SIGNAL + number
-        if ended.error is not None:
-            raise ended.error
-        return int(any(outcome.error is not None for outcome in ended.outcomes))
+        if batch_end.error is not None:
+            raise batch_end.error
+        return int(any(outcome.error is not None for outcome in batch_end.outcomes))
 
     def _run(
         self, sources: Sequence[str], flags: BatchFlags, reads: Sequence[str]
     ) -> tuple[EndedBatch, int | None]:
         """Return the outcomes, and the signal that stopped the run."""
         begin = time.monotonic()
-        made = Manifest(self.out).outputs()
-        tasks = find_tasks(sources, self.out, made)
+        earlier_outputs = Manifest(self.out).outputs()
+        tasks = find_tasks(sources, self.out, earlier_outputs)
         with record_signals() as stop:
             ordered = self._order_tasks(tasks, flags)
             reads = [*reads, *flags.job.files(), *flags.inspection.files(), *ordered.reads]
-            self._refuse_overwriting(ordered, reads, made)
+            self._refuse_overwriting(ordered, reads, earlier_outputs)
             _make_folder(self.out)
             with lock_folder(self.out) as locked:
                 if not locked:
                     text = "warning: --out has no locks: see that no other batch writes there"
                     self._note(text)
                 manifest = Manifest(self.out)  # again: another batch may have written it until now
-                ended = self._made(ordered, manifest, stop)
-                self._end(ended.outcomes, manifest, time.monotonic() - begin)
-        return ended, stop.signal
+                batch_end = self._made(ordered, manifest, stop)
+                self._end(batch_end.outcomes, manifest, time.monotonic() - begin)
+        return batch_end, stop.signal
 
     def _refuse_overwriting(
-        self, ordered: OrderedTasks, reads: Sequence[str], made: Collection[Path]
+        self, ordered: OrderedTasks, reads: Sequence[str], earlier_outputs: Collection[Path]
     ) -> None:
         """Raise OutputError when an output would replace a file that is read or another output, or
-        a picture would replace a file that no batch wrote (`made`)."""
-        own = {task.order.file for task in ordered.tasks} - {None}
-        jobs = chain.from_iterable(JobFlags(file).files() for file in sorted(own))
-        ours = [str(self.out / name) for name in (MANIFEST, LOCK)]
+        a picture would replace a file that no batch wrote (`earlier_outputs`)."""
+        job_files = {task.order.file for task in ordered.tasks} - {None}
+        jobs = chain.from_iterable(JobFlags(file).files() for file in sorted(job_files))
+        own_files = [str(self.out / name) for name in (MANIFEST, LOCK)]
         makes = [
             str(self.out / f"{task.stem}{extension}")
             for task in ordered.tasks
@@ -171,11 +171,11 @@ class BatchRun:
         ]
         sources = [task.source for task in ordered.tasks]
         sources += [failed.source for failed in ordered.failed]
-        refuse_same([*sources, *reads, *jobs], [*ours, self.summary, *makes])
+        refuse_same([*sources, *reads, *jobs], [*own_files, self.summary, *makes])
         places = RealPaths()
         for task in ordered.tasks if self.work.preview == SVG else ():
             picture = self.out / f"{task.stem}{SVG}"
-            if is_foreign(picture, task.stem) and places.of(picture) not in made:
+            if is_foreign(picture, task.stem) and places.of(picture) not in earlier_outputs:
                 raise OutputError(
                     f"is there, and is no picture of {task.source}",
                     file=str(picture),
@@ -196,13 +196,13 @@ class BatchRun:
             job = own_job(task.path) if flags.own else None
             limits = own_tolerances(task.path) if flags.own and flags.inspects else None
             ordered.reads.extend(str(each) for each in (job, limits) if each is not None)
-            wanted = None if job is not None else common_job()
-            asked = None if limits is not None else common_limits()
+            common = None if job is not None else common_job()
+            requested = None if limits is not None else common_limits()
             try:
-                if wanted is None:
-                    wanted = _order(replace(flags.job, file=str(job)), self.work)
+                if common is None:
+                    common = _order(replace(flags.job, file=str(job)), self.work)
                 if limits is not None:
-                    asked = _read_tolerances_file([str(limits)])
+                    requested = _read_tolerances_file([str(limits)])
             except CamtoolError as error:
                 text = f"{task.source}: {error}"
                 ordered.failed.append(
@@ -210,13 +210,13 @@ class BatchRun:
                 )
             else:
                 inspects = limits is not None or flags.inspection.tolerances is not None
-                wanted = replace(wanted, asked=asked, inspects=inspects)
-                ordered.tasks.append(replace(task, order=wanted))
-                ordered.own[task.stem] = repr(replace(wanted, file=None))
+                common = replace(common, asked=requested, inspects=inspects)
+                ordered.tasks.append(replace(task, order=common))
+                ordered.own[task.stem] = repr(replace(common, file=None))
         return ordered
 
     def _made(self, ordered: OrderedTasks, manifest: Manifest, stop: Stop) -> EndedBatch:
-        done: dict[str, Outcome] = {}
+        outcomes_by_stem: dict[str, Outcome] = {}
         fault: CamtoolError | None = None
         total = len(ordered.tasks) + len(ordered.failed)
         with (
@@ -225,13 +225,15 @@ class BatchRun:
         ):
             try:
                 for outcome in outcomes:
-                    done[outcome.stem] = outcome
+                    outcomes_by_stem[outcome.stem] = outcome
                     shown.add(outcome)
             except CamtoolError as error:
                 fault = error
         for task in ordered.tasks:
-            done.setdefault(task.stem, Outcome(task.source, task.stem, OutcomeState.NOT_RUN))
-        return EndedBatch([done[stem] for stem in sorted(done)], fault)
+            outcomes_by_stem.setdefault(
+                task.stem, Outcome(task.source, task.stem, OutcomeState.NOT_RUN)
+            )
+        return EndedBatch([outcomes_by_stem[stem] for stem in sorted(outcomes_by_stem)], fault)
 
     def _outcomes(
         self, ordered: OrderedTasks, manifest: Manifest, stop: Stop, shown: Display
@@ -290,12 +292,12 @@ def _read_tolerances_file(files: Sequence[str]) -> Asked | None:
     return read_tolerances(Path(files[0]))
 
 
-def _make_folder(out: Path) -> None:
+def _make_folder(folder: Path) -> None:
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
-            f"cannot be made ({error.strerror})", file=str(out), mend="choose another --out"
+            f"cannot be made ({error.strerror})", file=str(folder), mend="choose another --out"
         ) from error
 
 

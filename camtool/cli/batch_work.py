@@ -67,8 +67,8 @@ class PostWork:
     @property
     def extensions(self) -> tuple[str, ...]:
         """Extensions of its outputs."""
-        made = (self.target.machine.target.extension, self.preview, ".json" * self.reports)
-        return tuple(each for each in made if each)
+        extensions = (self.target.machine.target.extension, self.preview, ".json" * self.reports)
+        return tuple(each for each in extensions if each)
 
     def warm(self) -> None:
         """Load the modules that every drawing needs."""
@@ -99,11 +99,11 @@ class PostWork:
                 trace_points=None if self.preview else 0,
             )
             run = self._inspected(run, order)
-        made = _result_of(task, run)
-        if made.error is not None:
-            return made
+        outputs = _result_of(task, run)
+        if outputs.error is not None:
+            return outputs
         files = dict(self._files(task, run))
-        return replace(made, content=content_digest(data), files=files, figures=_figures(run))
+        return replace(outputs, content=content_digest(data), files=files, figures=_figures(run))
 
     def digest(self) -> str:
         """Return the digest of everything that outputs depend on except drawing and job."""
@@ -160,13 +160,13 @@ def _result_of(task: DrawingTask, run: Run) -> Outputs:
     )
     report = run.report
     verdicts = Counter(each.verdict for each in report.inspection) if report else {}
-    made = Outputs(remarks=remarks, warnings=len(warnings), verdicts=dict(verdicts))
+    outputs = Outputs(remarks=remarks, warnings=len(warnings), verdicts=dict(verdicts))
     if not run.failed and run.program is not None:
-        return made
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+        return outputs
+    suffix = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
     if not errors:
-        return replace(made, error=f"{task.source}: no program")
-    return replace(made, error=f"{remarks[0]}{more}", code=errors[0].code.name)
+        return replace(outputs, error=f"{task.source}: no program")
+    return replace(outputs, error=f"{remarks[0]}{suffix}", code=errors[0].code.name)
 
 
 def _figures(run: Run) -> dict[str, float]:

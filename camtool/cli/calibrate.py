@@ -46,20 +46,20 @@ def calibrate(
     check_places([measurements, *(flags.files() if flags else ())], [output, report])
     measured = read_measurements(Path(measurements))
     flags = flags or MachineFlags.of(measured.target or None, None, ())
-    known = flags.load().machine
+    machine_used = flags.load().machine
     progress().begin("estimating")
-    found = estimated(measured, known)
+    result = estimated(measured, machine_used)
     files: dict[str, bytes] = {}
     if output is not None:
-        own = _own_table(flags.machine, str(flags.name()))
-        files[output] = machine_file(found, measured, known, own).encode()
+        own_table = _own_table(flags.machine, str(flags.name()))
+        files[output] = machine_file(result, measured, machine_used, own_table).encode()
     if report is not None:
-        files[report] = to_json(to_data(found, known)).encode()
+        files[report] = to_json(to_data(result, machine_used)).encode()
     write_all(files)
     if STDOUT not in files and not quiet:
-        for line in to_text(found, known).splitlines():
+        for line in to_text(result, machine_used).splitlines():
             show_text(one_line(line))
-    for line in outliers(found):
+    for line in outliers(result):
         say(f"camtool: warning: outlier: {one_line(line)}", quiet=quiet)
     if output is not None:
         say(f"written: {'stdout' if output == STDOUT else output}", quiet=quiet)

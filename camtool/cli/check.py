@@ -102,7 +102,7 @@ def _facts(drawing: Drawing) -> dict[str, Any]:
     """Return the facts about a drawing in the order of display; lengths in mm."""
     from camtool.geometry.facts import drawing_extents, drawing_facts
 
-    (left, right), (bottom, top) = drawing_extents(drawing).tolist()
+    (left_x, right), (bottom, top) = drawing_extents(drawing).tolist()
     return {
         "file": drawing.file,
         "units": {
@@ -110,8 +110,8 @@ def _facts(drawing: Drawing) -> dict[str, Any]:
             "mm_per_unit": drawing.units.mm_per_unit,
             "why": drawing.units.why,
         },
-        "size_mm": [right - left, top - bottom],
-        "extents_mm": {"x": [left, right], "y": [bottom, top]},
+        "size_mm": [right - left_x, top - bottom],
+        "extents_mm": {"x": [left_x, right], "y": [bottom, top]},
         **drawing_facts(drawing),
         "fit_um": {"max": drawing.fit.max_mm * 1000.0, "rms": drawing.fit.rms_mm * 1000.0},
         "entities_used": drawing.used,
@@ -176,10 +176,13 @@ def _head(facts: dict[str, Any]) -> _Rows:
             yield "taken", finding["message"]
     if facts["fit_um"]["max"] > 0.0:
         yield "fitted", f"curves within {facts['fit_um']['max']:.3g} µm"
-    for name, found in facts["smallest"].items():
-        if found is not None:
-            x, y = found["at_mm"]
-            yield "smallest", f"{_SIZE_WORDS[name]} {found['size_mm']:.4g} mm at {x:.4f}, {y:.4f}"
+    for name, smallest in facts["smallest"].items():
+        if smallest is not None:
+            x, y = smallest["at_mm"]
+            yield (
+                "smallest",
+                f"{_SIZE_WORDS[name]} {smallest['size_mm']:.4g} mm at {x:.4f}, {y:.4f}",
+            )
 
 
 _SIZE_WORDS = {
@@ -196,25 +199,28 @@ def _layers(facts: dict[str, Any], max_rows: int | None) -> _Rows:
         points = f", {layer['marks']} points" if layer["marks"] else ""
         yield "layer", f"{name}: {layer['closed']} closed, {layer['open']} open{points}"
     yield from _more("layer", facts["layers"], max_rows)
-    for key, name, none in (("colours", "colour", "none"), ("line_types", "line type", "plain")):
+    for key, name, no_word in (
+        ("colours", "colour", "none"),
+        ("line_types", "line type", "plain"),
+    ):
         if len(facts[key]) > 1:
             counts = list(facts[key].items())
             listed = ", ".join(
-                f"{count} {word or none}" for word, count in _first(counts, max_rows)
+                f"{count} {word or no_word}" for word, count in _first(counts, max_rows)
             )
             yield name, listed + (" …" if max_rows is not None and len(counts) > max_rows else "")
 
 
 def _entities(facts: dict[str, Any]) -> _Rows:
     """Yield the counts of entities used, not used, and repaired."""
-    used = ", ".join(f"{count} {kind}" for kind, count in facts["entities_used"].items())
-    yield "entities", used or "none"
+    used_text = ", ".join(f"{count} {kind}" for kind, count in facts["entities_used"].items())
+    yield "entities", used_text or "none"
     for item in facts["entities_not_used"]:
         yield "not used", f"{item['count']} {item['kind']}: {item['reason']}"
-    for key, what in (("duplicates", "drawn twice"), ("overlaps", "parts lying on others")):
+    for key, reason in (("duplicates", "drawn twice"), ("overlaps", "parts lying on others")):
         if facts[key]["count"]:
             length = facts[key]["length_mm"]
-            yield "left out", f"{facts[key]['count']} {what}, {length:.4g} mm"
+            yield "left out", f"{facts[key]['count']} {reason}, {length:.4g} mm"
     if facts["tiny_merged"]:
         yield "merged", f"{facts['tiny_merged']} tiny segments"
     if facts["arcs_recognised"]:
@@ -223,9 +229,9 @@ def _entities(facts: dict[str, Any]) -> _Rows:
 
 def _places(facts: dict[str, Any], max_rows: int | None) -> _Rows:
     """Yield gaps, branches, crossings and open ends, with their places."""
-    for key, what in (("gaps", "stays open"), ("closed_gaps", "was closed")):
+    for key, state in (("gaps", "stays open"), ("closed_gaps", "was closed")):
         for gap in _first(facts[key], max_rows):
-            yield "gap", f"{gap['size_mm']:.4g} mm at {_at(gap)} on {gap['layer']}, {what}"
+            yield "gap", f"{gap['size_mm']:.4g} mm at {_at(gap)} on {gap['layer']}, {state}"
         yield from _more("gap", facts[key], max_rows)
     for item in _first(facts["branches"], max_rows):
         yield "branch", f"{item['ends']} ends at {_at(item)} on {item['layer']}"

@@ -264,8 +264,8 @@ def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """Return the layers of the drawing that the line names before, if it is a DXF of text."""
     # What stands before a flag that still lacks its value has not been given its place.
     named = [*(ctx.params.get(key) or () for key in _DRAWINGS), tuple(ctx.args)]
-    given = [Path(name) for names in named for name in _several(names)]
-    for name in sorted({layer for file in given for layer in dxf_layers(file)}):
+    names_given = [Path(name) for names in named for name in _several(names)]
+    for name in sorted({layer for file in names_given for layer in dxf_layers(file)}):
         if name.casefold().startswith(incomplete.casefold()):
             yield CompletionItem(name.replace("[", "[[]"))  # a layer is given by a pattern
 

@@ -83,10 +83,10 @@ def console(
     from camtool.sending.line import opened_line
     from camtool.sending.prepare import port_of, wire_of
 
-    loaded = MachineFlags.of(target if machine is None else None, machine, settings).load()
-    wire = wire_of(loaded)
-    terminal = wire.terminal(loaded.machine)
-    with opened_line(port_of(port, baud, wire, loaded)) as line:
+    loaded_target = MachineFlags.of(target if machine is None else None, machine, settings).load()
+    wire = wire_of(loaded_target)
+    terminal = wire.terminal(loaded_target.machine)
+    with opened_line(port_of(port, baud, wire, loaded_target)) as line:
         return _Talk(terminal, line, wait_s, quiet=quiet).run()
 
 
@@ -144,11 +144,11 @@ class _Talk:
         """Listen for a moment, then handle requests; return the exit code at the end."""
         terminal, line = self._terminal, self._line
         data = line.read(TICK_S)
-        now = time.monotonic()
+        time_s = time.monotonic()
         if data:
-            self._heard, self._answered = now, True
+            self._heard, self._answered = time_s, True
             self._show(terminal.decode(data))
-        elif now - self._heard > QUIET_S:
+        elif time_s - self._heard > QUIET_S:
             self._show(terminal.flush())
         wish = wishes()
         if wish is not None:
@@ -156,14 +156,14 @@ class _Talk:
         if not self._shows and self._code is None:
             return self._halt(1)
         if self._told is not None:
-            over = self._stopped(now, self._told)
-            if over or self._code is not None:
-                return self._code if over else None
+            end_code = self._stopped(time_s, self._told)
+            if end_code or self._code is not None:
+                return self._code if end_code else None
         if not self._next:
             with suppress(queue.Empty):
                 self._next.append(self._lines.get_nowait())
         if not self._at_terminal:
-            code = self._awaits(now)
+            code = self._awaits(time_s)
             if code is not None:
                 return code if code >= 0 else None
         if not self._next:
@@ -180,7 +180,7 @@ class _Talk:
         data = terminal.encode(text)
         if data:
             line.write(data)
-            self._asked, self._spoke, self._answered = text, now, False
+            self._asked, self._spoke, self._answered = text, time_s, False
             self._stops = False
         return None
 
@@ -200,32 +200,32 @@ class _Talk:
             self._say("nothing stops it over its line: its switch does")
             return code or 0
         self._line.write(stop)
-        more = "; Ctrl-C again ends" if code is None else ""
-        self._say(f"the machine is told to stop{more}")
+        suffix = "; Ctrl-C again ends" if code is None else ""
+        self._say(f"the machine is told to stop{suffix}")
         self._told = self._knocked = time.monotonic()
         self._stops, self._code = True, code
         self._line.write(self._terminal.asks)
         return None
 
-    def _stopped(self, now: float, told: float) -> bool:
+    def _stopped(self, time_s: float, told_s: float) -> bool:
         """True when the machine stands, or its state is unknown."""
         terminal = self._terminal
-        silent = now - max(told, self._heard) >= CONFIRMS_S
+        silent = time_s - max(told_s, self._heard) >= CONFIRMS_S
         if terminal.stands:
             self._say("it says that it stands")
             if self._code is not None:
                 self._line.write(terminal.leaves)
-        elif silent or now - told >= SLOWS_S:
+        elif silent or time_s - told_s >= SLOWS_S:
             self._say("it was told to stop, and does not say that it stands")
         else:
-            if now - self._knocked >= KNOCK_S:
+            if time_s - self._knocked >= KNOCK_S:
                 self._line.write(terminal.asks or terminal.stop)
-                self._knocked = now
+                self._knocked = time_s
             return False
         self._told = None
         return True
 
-    def _awaits(self, now: float) -> int | None:
+    def _awaits(self, time_s: float) -> int | None:
         """Return −1 while a line from a pipe has to wait, the exit code if it waits in vain, and
         None when it may go out."""
         terminal = self._terminal
@@ -234,18 +234,18 @@ class _Talk:
         if terminal.failed:
             return _unanswered(self._asked, terminal.failed)
         if not terminal.ready:
-            if now - self._opened >= min(WAKES_S, self._wait_s):
+            if time_s - self._opened >= min(WAKES_S, self._wait_s):
                 return _unanswered("", "is it switched on, and is --baud its rate?")
-            if now - self._knocked >= KNOCK_S:
+            if time_s - self._knocked >= KNOCK_S:
                 self._line.write(terminal.knock)
-                self._knocked = now
+                self._knocked = time_s
             return -1
         awaits = terminal.due or (terminal.answers and not self._answered)
-        since = now - max(self._heard, self._spoke)
-        if awaits and since >= self._wait_s:
+        silence_s = time_s - max(self._heard, self._spoke)
+        if awaits and silence_s >= self._wait_s:
             return _unanswered(self._asked, f"none came within {self._wait_s:g} s (--wait)")
         quiet_s = QUIET_S if self._answered else SILENT_S
-        if awaits or (since < quiet_s + terminal.rests_s and not terminal.runs_on):
+        if awaits or (silence_s < quiet_s + terminal.rests_s and not terminal.runs_on):
             return -1
         return None
 
@@ -262,8 +262,8 @@ class _Talk:
                 self._shows = False
 
 
-def _unanswered(asked: str, why: str) -> int:
+def _unanswered(request: str, reason: str) -> int:
     """Report that a line has no answer; return the exit code."""
-    what = f"no answer to {asked!r}" if asked else "the controller does not answer"
-    say(f"camtool: error: {what}: {why}; what follows was not sent", quiet=False)
+    subject = f"no answer to {request!r}" if request else "the controller does not answer"
+    say(f"camtool: error: {subject}: {reason}; what follows was not sent", quiet=False)
     return 1

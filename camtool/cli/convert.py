@@ -72,8 +72,8 @@ def convert(
     after = MachineFlags(target, machine, settings).load()
     reads = [program, str(before.file), str(after.file)]
     reads += [file for file in (from_machine, machine) if file is not None]
-    asked = RequestedOutputs(program, output, outputs, reads)
-    asked.check(after.machine.target.extension, verified=not no_verify)
+    requested = RequestedOutputs(program, output, outputs, reads)
+    requested.check(after.machine.target.extension, verified=not no_verify)
 
     from camtool.pipeline import convert_program
 
@@ -87,4 +87,4 @@ def convert(
         progress=progress(),
     )
     painter = picture.painter(lambda: [run.scene()], quiet=quiet)
-    return finish(run, asked, picture=painter, quiet=quiet, verbose=verbose)
+    return finish(run, requested, picture=painter, quiet=quiet, verbose=verbose)

@@ -98,15 +98,15 @@ def coupon(
     check_places(machine.files(), [output, measurements])
     if measurements is not None:
         check_new(measurements)
-    known = machine.load().machine if machine.name() is not None else None
-    made = sheet(cast("Kind", kind), size or _travel(known), regions, known)
+    machine_used = machine.load().machine if machine.name() is not None else None
+    sheet_made = sheet(cast("Kind", kind), size or _travel(machine_used), regions, machine_used)
     draw = coupons.svg if output.lower().endswith(".svg") else coupons.dxf
     progress().begin("drawing the coupons")
-    files = {output: draw(made)}
+    files = {output: draw(sheet_made)}
     if not named:
         check_ours(output, lambda old: old == files[output])
     if measurements is not None:
-        files[measurements] = skeleton(made, known).encode()
+        files[measurements] = skeleton(sheet_made, machine_used).encode()
     write_all(files)
     for name in files:
         say(f"written: {'stdout' if name == STDOUT else name}", quiet=quiet)

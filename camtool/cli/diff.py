@@ -117,26 +117,26 @@ def diff(
             return 1
         stocks.append(stock)
     progress().begin("comparing")
-    found = difference_of(stocks[0], stocks[1], limit_mm)
-    differs = found.distance_mm > limit_mm * (1.0 + 1e-9)
+    difference = difference_of(stocks[0], stocks[1], limit_mm)
+    differs = difference.distance_mm > limit_mm * (1.0 + 1e-9)
     names = [side.name for side in sides]
     files: dict[str, bytes] = {}
     if report is not None:
-        facts = _facts(found, stocks, limit_mm, differs=differs)
+        facts = _facts(difference, stocks, limit_mm, differs=differs)
         files[report] = (json.dumps(facts, indent=2) + "\n").encode()
     if preview is not None:
         pair = (stocks[0], stocks[1])
         if is_viewer(preview):
-            files[preview] = _page(pair, names, _text(found, names)).encode()
+            files[preview] = _page(pair, names, _text(difference, names)).encode()
         else:
-            files[preview] = _picture(pair, found, names, preview)
+            files[preview] = _picture(pair, difference, names, preview)
     write_all(files)
     if not quiet and STDOUT not in files:
-        show_text(_text(found, names))
+        show_text(_text(difference, names))
     if differs:
-        proved = max(found.deeper.low, found.shallower.low) > limit_mm
-        how = "differ by" if proved else "may differ by"
-        say(f"camtool: the two {how} more than {limit_mm:g} mm", quiet=quiet)
+        proved = max(difference.deeper.low, difference.shallower.low) > limit_mm
+        verb = "differ by" if proved else "may differ by"
+        say(f"camtool: the two {verb} more than {limit_mm:g} mm", quiet=quiet)
     return int(differs)
 
 
@@ -179,7 +179,7 @@ class _Side:
 
 
 def _facts(
-    found: StockDifference, stocks: Sequence[CutStock], limit_mm: float, *, differs: bool
+    difference: StockDifference, stocks: Sequence[CutStock], limit_mm: float, *, differs: bool
 ) -> dict[str, Any]:
     """Return the figures as JSON."""
 
@@ -192,53 +192,53 @@ def _facts(
     return {
         "differs": differs,
         "limit_mm": limit_mm,
-        "deeper": bracket(found.deeper),
-        "shallower": bracket(found.shallower),
-        "more_mm3": [round(found.more_mm3.low, 6), round(found.more_mm3.high, 6)],
-        "less_mm3": [round(found.less_mm3.low, 6), round(found.less_mm3.high, 6)],
+        "deeper": bracket(difference.deeper),
+        "shallower": bracket(difference.shallower),
+        "more_mm3": [round(difference.more_mm3.low, 6), round(difference.more_mm3.high, 6)],
+        "less_mm3": [round(difference.less_mm3.low, 6), round(difference.less_mm3.high, 6)],
         "beside_um": [round(UM_PER_MM * stock.moves.beside_mm, 3) for stock in stocks],
     }
 
 
-def _text(found: StockDifference, names: Sequence[str]) -> str:
+def _text(difference: StockDifference, names: Sequence[str]) -> str:
     """Return the figures for people."""
     lines = [f"A  {names[0]}", f"B  {names[1]}"]
     for words, one, volume in (
-        ("B cuts more", found.deeper, found.more_mm3),
-        ("B cuts less", found.shallower, found.less_mm3),
+        ("B cuts more", difference.deeper, difference.more_mm3),
+        ("B cuts less", difference.shallower, difference.less_mm3),
     ):
         if one.low <= 0.0:
             lines.append(f"{words}: nowhere by more than {one.high:.4f} mm")
             continue
         x, y = one.at_mm
-        far = f"{one.value:.4f} mm (proved to ±{one.margin:.4f})"
-        much = f"{volume.low:.4g} to {volume.high:.4g} mm³"
-        lines.append(f"{words}: by {far} near X {x:.3f} Y {y:.3f}, {much}")
+        distance = f"{one.value:.4f} mm (proved to ±{one.margin:.4f})"
+        volume_text = f"{volume.low:.4g} to {volume.high:.4g} mm³"
+        lines.append(f"{words}: by {distance} near X {x:.3f} Y {y:.3f}, {volume_text}")
     return "\n".join(lines)
 
 
-def _scene(cut: CutStock, other: CutStock, title: str, against: str = "wanted") -> Scene:
+def _scene(cut: CutStock, other: CutStock, title: str, reference: str = "wanted") -> Scene:
     """Return the scene of a stock, beside another one."""
     from camtool.pictures.scene import Scene, StockPair
     from camtool.stock.cut import box_around
 
     box = box_around(cut.box_mm, other.box_mm)
     lowest = [float(each.moves.end[:, 2].min(initial=0.0)) for each in (cut, other)]
-    known = cut.bottom_mm is not None
+    is_known = cut.bottom_mm is not None
     thickness = -cut.bottom_mm if cut.bottom_mm is not None else -1.25 * min(*lowest, -1e-3)
-    pair = StockPair(cut.moves, other.moves, box, thickness, known, against)
+    pair = StockPair(cut.moves, other.moves, box, thickness, is_known, reference)
     return Scene(title, cut=lambda: pair)
 
 
 def _picture(
-    stocks: tuple[CutStock, CutStock], found: StockDifference, names: Sequence[str], file: str
+    stocks: tuple[CutStock, CutStock], difference: StockDifference, names: Sequence[str], file: str
 ) -> bytes:
     """Return the picture of the greater of the two differences."""
     from camtool.pictures.draw import render
 
-    more = found.deeper.high >= found.shallower.high
+    cuts_more = difference.deeper.high >= difference.shallower.high
     scene = _scene(stocks[1], stocks[0], f"{names[1]} against {names[0]}", "A")
-    return render(scene, file, PictureOptions(view="gouge" if more else "leftover"))
+    return render(scene, file, PictureOptions(view="gouge" if cuts_more else "leftover"))
 
 
 def _page(stocks: tuple[CutStock, CutStock], names: Sequence[str], text: str) -> str:

@@ -69,23 +69,23 @@ def refuse_same(reads: Iterable[str | None], writes: Iterable[str | None]) -> No
     also through symbolic and hard links."""
     sources = {file_identity(name): name for name in reads if name is not None}
     sources.pop(None, None)
-    taken: dict[Hashable, str] = {}
+    places_used: dict[Hashable, str] = {}
     for name in writes:
         if name is None:
             continue
         place = _place_identity(name)
         if place in sources:
             read = sources[place]
-            called = "" if read in (name, STDOUT) else f" ({read})"
+            alias = "" if read in (name, STDOUT) else f" ({read})"
             raise OutputError(
-                f"is the input itself{called}", file=name, mend="choose another place"
+                f"is the input itself{alias}", file=name, mend="choose another place"
             )
-        if place in taken:
+        if place in places_used:
             twice = "is asked for twice"
-            if taken[place] != name:
-                twice = f"is asked for twice, also as {taken[place]}"
+            if places_used[place] != name:
+                twice = f"is asked for twice, also as {places_used[place]}"
             raise OutputError(twice, file=name, mend="give each output its own name")
-        taken[place] = name
+        places_used[place] = name
 
 
 def check_new(name: str, mend: str = "give another name") -> None:
@@ -100,10 +100,10 @@ def check_ours(name: str, is_ours: Callable[[bytes], bool]) -> None:
     if name == STDOUT or not os.path.lexists(name) or _is_stream(name):
         return
     try:
-        ours = is_ours(Path(name).read_bytes())
+        own_file = is_ours(Path(name).read_bytes())
     except OSError:  # nobody can know
-        ours = False
-    if not ours:
+        own_file = False
+    if not own_file:
         raise OutputError(
             "is there, and camtool did not write it", file=name, mend=f"-o {name} replaces it"
         )
@@ -142,10 +142,10 @@ def _exists(place: Path) -> bool:
 def file_identity(name: str) -> Hashable:
     """Return the identity of a file that is read; None for one that no output can replace."""
     try:
-        found = os.fstat(sys.stdin.fileno()) if name == STDOUT else Path(name).stat()
+        status = os.fstat(sys.stdin.fileno()) if name == STDOUT else Path(name).stat()
     except (OSError, ValueError, AttributeError):  # nothing there, or no file of the system's
         return None
-    return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
+    return (status.st_dev, status.st_ino) if stat.S_ISREG(status.st_mode) else None
 
 
 def _place_identity(name: str) -> Hashable:
@@ -155,17 +155,17 @@ def _place_identity(name: str) -> Hashable:
     file on other computers, and programs travel.
     """
     try:
-        found = os.fstat(sys.stdout.fileno()) if name == STDOUT else Path(name).stat()
+        status = os.fstat(sys.stdout.fileno()) if name == STDOUT else Path(name).stat()
     except (io.UnsupportedOperation, AttributeError):  # a stdout that is no file of the system's
         return name
     except OSError:
         folder, base = os.path.split(os.path.realpath(name))
         base = unicodedata.normalize("NFC", unicodedata.normalize("NFC", base).casefold())
         with suppress(OSError):
-            found = Path(folder).stat()
-            return found.st_dev, found.st_ino, base
+            status = Path(folder).stat()
+            return status.st_dev, status.st_ino, base
         return folder, base
-    return found.st_dev, found.st_ino
+    return status.st_dev, status.st_ino
 
 
 def _is_stream(name: str) -> bool:

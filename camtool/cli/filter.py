@@ -40,8 +40,8 @@ def filter(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
     if posting.machine.by_default or posting.machine.name() is None:
         from camtool.target.registry import filter_target
 
-        own = MachineFlags(filter_target(), None, posting.machine.settings)
-        posting = replace(posting, machine=own)
+        machine = MachineFlags(filter_target(), None, posting.machine.settings)
+        posting = replace(posting, machine=machine)
     _progress(BEGUN)
     target = posting.load()
     posting = posting.of(source)

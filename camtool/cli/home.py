@@ -55,8 +55,8 @@ def act(
     if conversation.state is WireState.FINISHED:
         say(f"camtool: {action}: done", quiet=quiet)
         return 0
-    why = str(driver.trouble or conversation.why or conversation.state.value)
-    say(f"camtool: error: {action}: {why}", quiet=False)
+    reason = str(driver.trouble or conversation.why or conversation.state.value)
+    say(f"camtool: error: {action}: {reason}", quiet=False)
     return 1
 
 

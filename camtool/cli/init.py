@@ -70,10 +70,10 @@ def axis_settings(flag: str, text: str) -> list[ControllerSetting]:
         raise OptionError(
             f"{text!r} is neither one value nor three", mend="write 300x180x45, for X, Y and Z"
         )
-    said = FLAG.format(flag)
+    origin = FLAG.format(flag)
     values = values * 3 if len(values) == 1 else values
     return [
-        ControllerSetting(f"axes.{axis}.{key}", value, said, f"--{flag} {text}")
+        ControllerSetting(f"axes.{axis}.{key}", value, origin, f"--{flag} {text}")
         for axis, value in zip("xyz", values, strict=True)
     ]
 
@@ -82,10 +82,10 @@ def spindle_setting(text: str) -> ControllerSetting:
     """Parse `10000`, `hand` or `none`."""
     from camtool.target.contract import ControllerSetting
 
-    said, where = FLAG.format("spindle"), f"--spindle {text}"
+    origin, place = FLAG.format("spindle"), f"--spindle {text}"
     if text in ("hand", "none"):
-        return ControllerSetting("spindle.switched", text, said, where)
-    return ControllerSetting("spindle.default_rpm", _number(text), said, where)
+        return ControllerSetting("spindle.switched", text, origin, place)
+    return ControllerSetting("spindle.default_rpm", _number(text), origin, place)
 
 
 def proposals(target: str, *, switches: bool) -> list[ControllerSetting]:
@@ -178,44 +178,44 @@ def init(
         name = questions.ask("Name of the machine", PROPOSED)
     if name is None:
         raise click.UsageError("NAME is missing, such as my-3018")
-    target, said = _controller_settings(target, settings, port, questions)
-    given = {each.key: each for each in said}
+    target, reported = _controller_settings(target, settings, port, questions)
+    settings_by_key = {each.key: each for each in reported}
     for flag, (key, _, meaning) in AXES.items():
         text = axes[flag.replace("-", "_")]
-        if text is None and any(f"axes.{axis}.{key}" not in given for axis in "xyz"):
+        if text is None and any(f"axes.{axis}.{key}" not in settings_by_key for axis in "xyz"):
             text = questions.ask_axes(flag, f"{meaning} (such as 300x180x45)")
         if text is not None:
-            given |= {each.key: each for each in axis_settings(flag, text)}
+            settings_by_key |= {each.key: each for each in axis_settings(flag, text)}
     if spindle is None:
         spindle = questions.ask("Speed of the spindle, rev/min; hand; none; Enter: not known")
     if spindle is not None:
-        given |= {each.key: each for each in (spindle_setting(spindle),)}
-    switched = given.get("spindle.switched")
+        settings_by_key |= {each.key: each for each in (spindle_setting(spindle),)}
+    switched = settings_by_key.get("spindle.switched")
     proposed = proposals(target, switches=switched is None or switched.value == "program")
-    given = {each.key: each for each in proposed} | given
-    text = machine_text(name, target, list(given.values()), settings or "")
+    settings_by_key = {each.key: each for each in proposed} | settings_by_key
+    text = machine_text(name, target, list(settings_by_key.values()), settings or "")
     place = _place(name, output, project=project)
     files, names = {str(place): text.encode()}, Path() if project else user_folder()
     # That of a project always names it, the user's where it names none.
     default = output is None and (project or not names_machine(names / FILE))
     if default:
         files[str(names / FILE)] = text_naming_machine(names / FILE, name).encode()
-    kept = _write(files, settings, is_replaced=replace)
+    old_file = _write(files, settings, is_replaced=replace)
     say(f"written: {display_name(str(place))}", quiet=quiet)
-    if kept is not None:
-        say(f"the machine that it replaces is kept: {display_name(kept)}", quiet=quiet)
-    for each in given.values():
+    if old_file is not None:
+        say(f"the machine that it replaces is kept: {display_name(old_file)}", quiet=quiet)
+    for each in settings_by_key.values():
         if each.doubt:
             value = f"{each.key} = {each.value} ({each.said})"
             say(f"{value} is not taken, but a comment in it: {each.doubt}", quiet=quiet)
-    missing = [flag for flag, (key, *_) in AXES.items() if f"axes.x.{key}" not in given]
+    missing = [flag for flag, (key, *_) in AXES.items() if f"axes.x.{key}" not in settings_by_key]
     if missing:
         say(f"not known, and a comment in it: {', '.join(missing)}", quiet=quiet)
     if "backlash" in missing:
         say("to measure the backlash: camtool coupon lines, then camtool calibrate", quiet=quiet)
     if output is None:
-        which = "" if default else f" --machine {name}"
-        say(f"to use it: camtool post drawing.dxf{which}", quiet=quiet)
+        machine_flag = "" if default else f" --machine {name}"
+        say(f"to use it: camtool post drawing.dxf{machine_flag}", quiet=quiet)
 
 
 class Questions:
@@ -294,25 +294,27 @@ def _controller_settings(
         settings, text = "what was pasted", questions.ask_lines(listing) if listing else ""
         if not text:
             return target, ()
-    found = each_target(find_target) if target is None else ((target, find_target(target)),)
-    known = []
-    for name, (each, _) in found:
-        known.append(f"{each.settings_listing} for {name}") if each.settings_listing else None
+    targets = each_target(find_target) if target is None else ((target, find_target(target)),)
+    listings = []
+    for name, (each, _) in targets:
+        listings.append(f"{each.settings_listing} for {name}") if each.settings_listing else None
         try:
-            said = each.settings_from(text)
+            reported = each.settings_from(text)
         except MachineError as error:
             error.file = error.file or settings
             raise
-        if said is not None:
-            return name, said
+        if reported is not None:
+            return name, reported
     raise MachineError(
         "says nothing of a machine",
         file=settings,
-        mend=f"give {' or '.join(known)}" if known else f"{target} has no settings to read",
+        mend=f"give {' or '.join(listings)}" if listings else f"{target} has no settings to read",
     )
 
 
-def machine_text(name: str, target: str, given: Sequence[ControllerSetting], source: str) -> str:
+def machine_text(
+    name: str, target: str, given_settings: Sequence[ControllerSetting], source: str
+) -> str:
     """Return the text of the machine file. MachineError, which names the source of the value, for
     a value out of range."""
     from camtool.tables import parse_table
@@ -320,17 +322,17 @@ def machine_text(name: str, target: str, given: Sequence[ControllerSetting], sou
     from camtool.target.template import machine_template
 
     base = list_target(target)
-    whole = base.file.read_text(encoding="utf-8")
-    text = machine_template(name, target, whole, base.needs, given)
+    base_text = base.file.read_text(encoding="utf-8")
+    text = machine_template(name, target, base_text, base.needs, given_settings)
     try:
         loaded_target(target, (parse_table(text), f"{name}.toml"))
     except MachineError as error:
-        wrong = next((each for each in given if _is_about(error, each.key)), None)
-        if wrong is not None:
+        culprit = next((each for each in given_settings if _is_about(error, each.key)), None)
+        if culprit is not None:
             raise MachineError(
-                f"{error.message} ({wrong.key})",
+                f"{error.message} ({culprit.key})",
                 file=source or None,
-                where=wrong.where,
+                where=culprit.where,
                 mend=error.mend,
             ) from None
         if not base.needs:
@@ -364,10 +366,10 @@ def _write(files: dict[str, bytes], settings: str | None, *, is_replaced: bool) 
     """Write the machine file, which must be new, and the `camtool.toml` that names it. One that
     `is_replaced` is kept under another name, which is returned: its numbers may have been
     measured."""
-    place, kept = next(iter(files)), None
+    place, old_file = next(iter(files)), None
     if is_replaced and Path(place).is_file():
-        kept = f"{place}.old"
-        files = {kept: read_bytes(place), **files}
+        old_file = f"{place}.old"
+        files = {old_file: read_bytes(place), **files}
     else:
         check_new(place, "give another name, or --replace, which replaces it")
     if place != STDOUT:
@@ -375,4 +377,4 @@ def _write(files: dict[str, bytes], settings: str | None, *, is_replaced: bool) 
             Path(name).parent.mkdir(parents=True, exist_ok=True)
     check_places([settings], files)
     write_all(files)
-    return kept
+    return old_file

@@ -95,11 +95,15 @@ def new(
         raise click.UsageError("--material is for the presets of a tool: give --tool too")
     proposal = Proposal(tool_diameter or 0.0, thickness or 0.0)
     if tool is not None:
-        given = {"tool": tool} if material is None else {"tool": tool, "material": material}
-        named = JobFlags(given=given, project=project_of(Path.cwd())).job(drawing)
-        known = named.operations[0].tool
+        named_values = {"tool": tool} if material is None else {"tool": tool, "material": material}
+        named = JobFlags(given=named_values, project=project_of(Path.cwd())).job(drawing)
+        first_tool = named.operations[0].tool
         proposal = Proposal(
-            known.diameter_mm, proposal.thickness_mm, tool, known.materials, material or ""
+            first_tool.diameter_mm,
+            proposal.thickness_mm,
+            tool,
+            first_tool.materials,
+            material or "",
         )
     proposal = _with_library(proposal)
     if ask and (source == STDOUT or not sys.stdin.isatty()):
@@ -118,16 +122,16 @@ def new(
         parts = [part for each in parts if (part := _asked(each)) is not None]
         if not parts:
             raise OptionError("nothing is left to cut", mend="let one operation cut something")
-    made = job_template(read, target, proposal, parts, text if has_text else "")
-    write_all({output: made.encode()})
+    job_text = job_template(read, target, proposal, parts, text if has_text else "")
+    write_all({output: job_text.encode()})
     say_findings(read.findings, quiet=quiet, verbose=verbose)
     for each in parts:
         if each.part.why:
             say(
                 one_line(f"{each.part.name}: {each.part.kind}, since {each.part.why}"), quiet=quiet
             )
-    where = "stdout" if output == STDOUT else output
-    say(f"written: {where}; look at the kinds, the tool and the depth", quiet=quiet)
+    place = "stdout" if output == STDOUT else output
+    say(f"written: {place}; look at the kinds, the tool and the depth", quiet=quiet)
 
 
 def _asked(each: Proposed) -> Proposed | None:
@@ -154,9 +158,11 @@ def _with_library(proposal: Proposal) -> Proposal:
             **{name: tool_of(name, each) for name, each in read_library(file).items()},
             **every,
         }
-    said = proposal.material
+    material = proposal.material
     library = tuple(
-        tool for tool in every.values() if not said or not tool.materials or said in tool.materials
+        tool
+        for tool in every.values()
+        if not material or not tool.materials or material in tool.materials
     )
     if not proposal.tool_mm and not proposal.tool:
         mill = next((tool for tool in library if tool.kind == "flat" and tool.diameter_mm), None)
@@ -243,8 +249,8 @@ def _summary(facts: dict[str, Any]) -> Iterator[str]:
             )
             yield from _sides(operation["contours"])
     if "stock_mm" in facts:
-        known = [f"{size:g}" for size in facts["stock_mm"]["size"] if size is not None]
-        yield f"stock      {' by '.join(known)} mm{' thick' if len(known) == 1 else ''}"
+        sizes = [f"{size:g}" for size in facts["stock_mm"]["size"] if size is not None]
+        yield f"stock      {' by '.join(sizes)} mm{' thick' if len(sizes) == 1 else ''}"
 
 
 def _sides(groups: list[dict[str, Any]]) -> Iterator[str]:
@@ -265,20 +271,19 @@ def _place(mm: float) -> str:
 
 def _does(operation: dict[str, Any]) -> str:
     tool = operation["tool"]
-    called = f" ({tool['name']})" if tool["name"] else ""
+    name = f" ({tool['name']})" if tool["name"] else ""
     depth, step = operation["depth_mm"], operation["step_down_mm"]
     deep = "" if depth is None else f", {depth:g} mm deep"
-    by = "" if step is None else f" by {step:g} mm"
+    step_text = "" if step is None else f" by {step:g} mm"
     below = operation["below_stock_mm"]
-    through = "" if below is None else f", through the stock and {below:.4g} mm below"
-    left = operation["allowance_mm"]
-    left_on = f", leaves {left:g} mm on the wall" if left > 0.0 else ""
-    if left < 0.0:
-        left_on = f", cuts {-left:g} mm beyond the line"
+    below_text = "" if below is None else f", through the stock and {below:.4g} mm below"
+    allowance = operation["allowance_mm"]
+    left_on = f", leaves {allowance:g} mm on the wall" if allowance > 0.0 else ""
+    if allowance < 0.0:
+        left_on = f", cuts {-allowance:g} mm beyond the line"
     if operation["stage"] == "finish":
         left_on += ", along the wall at the full depth"
     if operation["rest"]:
         left_on += f", what {operation['rest']!r} leaves"
-    return (
-        f"{operation['kind']}, tool {tool['diameter_mm']:g} mm{called}{deep}{by}{through}{left_on}"
-    )
+    cut = f"{deep}{step_text}{below_text}{left_on}"
+    return f"{operation['kind']}, tool {tool['diameter_mm']:g} mm{name}{cut}"

@@ -56,19 +56,19 @@ class LifeSigns:
     @contextmanager
     def hidden(self) -> Iterator[None]:
         """Show nothing within the block, in which the user is asked."""
-        begun, self._begun = self._begun, None
+        begin, self._begun = self._begun, None
         self.hide()
         try:
             yield
         finally:
-            self._begun = begun
+            self._begun = begin
 
     def show(self) -> None:
         """Write the line, once the command takes long."""
-        begun, progress = self._begun, self.progress
-        if begun is None:
+        begin, progress = self._begun, self.progress
+        if begin is None:
             return
-        seconds = time.monotonic() - begun
+        seconds = time.monotonic() - begin
         share = "" if progress.share is None else f"{progress.share:.0%}".replace("%", " %")
         parts = (progress.stage, share, f"{seconds:.0f} s")
         line = one_line(f"camtool: {', '.join(filter(None, parts))}")
@@ -95,10 +95,10 @@ def life_signs(stream: TextIO | None, words: Sequence[str]) -> Iterator[LifeSign
     if stream is None or not _are_wanted(stream, words):
         yield LifeSigns(None, Progress())
         return
-    signs, done = LifeSigns(stream, Progress()), threading.Event()
+    signs, ended = LifeSigns(stream, Progress()), threading.Event()
 
     def tell() -> None:
-        while not done.wait(EVERY_S):
+        while not ended.wait(EVERY_S):
             signs.show()
 
     teller = threading.Thread(target=tell, daemon=True)
@@ -106,7 +106,7 @@ def life_signs(stream: TextIO | None, words: Sequence[str]) -> Iterator[LifeSign
     try:
         yield signs
     finally:
-        done.set()
+        ended.set()
         teller.join()
         signs.hide()
 
@@ -122,8 +122,8 @@ def _are_wanted(stream: TextIO, words: Sequence[str]) -> bool:
 def signs_of_command() -> LifeSigns:
     """Return the status line of the running command, an invisible one without a command."""
     context = click.get_current_context(silent=True)
-    found = None if context is None else context.find_object(LifeSigns)
-    return LifeSigns(None, Progress()) if found is None else found
+    signs = None if context is None else context.find_object(LifeSigns)
+    return LifeSigns(None, Progress()) if signs is None else signs
 
 
 def progress() -> Progress:

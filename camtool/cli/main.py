@@ -228,13 +228,13 @@ def _flush(stream: TextIO | None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _repeat_interrupt(lost: sys.UnraisableHookArgs) -> None:
+def _repeat_interrupt(hook_args: sys.UnraisableHookArgs) -> None:
     """Repeat a Ctrl-C that came where Python cannot raise it (while an object is deleted)."""
-    if issubclass(lost.exc_type, KeyboardInterrupt):
+    if issubclass(hook_args.exc_type, KeyboardInterrupt):
         # Not in here: it would be lost as well.
         threading.Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)).start()
     else:
-        sys.__unraisablehook__(lost)
+        sys.__unraisablehook__(hook_args)
 
 
 def _collect_seldom() -> None:

@@ -114,13 +114,13 @@ def measure(
     from camtool.stock.cut import cut_stock
 
     target = machine.load()
-    wanted = job.job(drawing)
+    job_used = job.job(drawing)
     with job.name_job_file():
         run = read_program(read_bytes(program), target, source=display_name(program))
         assert run.decoded is not None
-        stock = cut_stock(run.decoded, target, wanted)
+        stock = cut_stock(run.decoded, target, job_used)
     say_findings(run.findings, quiet=quiet, verbose=verbose)
-    profiles = [(axis, at, stock.section(axis, at)) for axis, at in sections]
+    profiles = [(axis, value, stock.section(axis, value)) for axis, value in sections]
     files: dict[str, bytes] = {}
     if report is not None:
         facts = _facts(stock, points, profiles, with_volume=volume)
@@ -155,12 +155,12 @@ def _facts(
 
     facts: dict[str, Any] = {"beside_um": round(stock.moves.beside_mm * UM_PER_MM, 3)}
     if points:
-        at = np.array(points)
+        places = np.array(points)
         rows = zip(
             points,
-            stock.heights(at).tolist(),
-            stock.bounds(at).tolist(),
-            stock.rows_at(at).tolist(),
+            stock.heights(places).tolist(),
+            stock.bounds(places).tolist(),
+            stock.rows_at(places).tolist(),
             strict=True,
         )
         facts["points"] = [
@@ -174,8 +174,8 @@ def _facts(
         ]
     if profiles:
         facts["sections"] = [
-            {"axis": axis, "at_mm": at, "profile_mm": np.round(rows, 6).tolist()}
-            for axis, at, rows in profiles
+            {"axis": axis, "at_mm": places, "profile_mm": np.round(rows, 6).tolist()}
+            for axis, places, rows in profiles
         ]
     if with_volume:
         removed, lowest = stock.removed_mm3(), stock.lowest
@@ -200,8 +200,8 @@ def _table(profiles: Profiles) -> str:
     """Return sections as comma-separated values: the axis, its value, the place along the section
     and the height, mm."""
     lines = ["axis,at_mm,along_mm,z_mm"]
-    for axis, at, rows in profiles:
-        lines += [f"{axis},{at:g},{place:.6f},{z:.6f}" for place, z in rows.tolist()]
+    for axis, value, rows in profiles:
+        lines += [f"{axis},{value:g},{place:.6f},{z:.6f}" for place, z in rows.tolist()]
     return "\n".join(lines) + "\n"
 
 
@@ -217,22 +217,22 @@ def _text(
 
     lines = []
     if points:
-        at = np.array(points)
+        places = np.array(points)
         for (x, y), z, (low, high) in zip(
-            points, stock.heights(at).tolist(), stock.bounds(at).tolist(), strict=True
+            points, stock.heights(places).tolist(), stock.bounds(places).tolist(), strict=True
         ):
             lines.append(f"X {x:g} Y {y:g}: Z {z:.4f} mm, between {low:.4f} and {high:.4f}")
     for axis, place, rows in profiles:
         other = "Y" if axis == "x" else "X"
-        deep = rows[int(np.argmin(rows[:, 1]))]
+        deepest = rows[int(np.argmin(rows[:, 1]))]
         lines.append(
-            f"section {axis.upper()} {place:g}: {len(rows)} points, deepest Z {deep[1]:.4f} mm at"
-            f" {other} {deep[0]:.3f}"
+            f"section {axis.upper()} {place:g}: {len(rows)} points, deepest Z {deepest[1]:.4f} mm at"
+            f" {other} {deepest[0]:.3f}"
         )
     if with_volume:
         removed, lowest = stock.removed_mm3(), stock.lowest
         x, y = lowest.at_mm
         lines.append(f"cut away: between {removed.low:.4g} and {removed.high:.4g} mm³")
-        deep = f"deepest: {lowest.low:.4f} mm at X {x:.3f} Y {y:.3f}"
-        lines.append(deep if lowest.high > 0.0 else "nothing is cut")
+        deepest = f"deepest: {lowest.low:.4f} mm at X {x:.3f} Y {y:.3f}"
+        lines.append(deepest if lowest.high > 0.0 else "nothing is cut")
     return "\n".join(lines)

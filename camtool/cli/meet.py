@@ -78,42 +78,42 @@ def meet(
     check_places([source, tolerances, *machine.files(), *job.files()], [output, report])
     target = machine.load()
     place = Path(output) if output != STDOUT else Path("job.toml")
-    wanted, tables, job_of = job.as_file(drawing, place)
+    job_used, tables, job_of = job.as_file(drawing, place)
     with job.name_job_file():
-        read = drawing.read(source, target.machine, wanted)
+        read = drawing.read(source, target.machine, job_used)
         dimensions, findings = dimensions_of(read, file)
-        asked = Tolerances(dimensions, findings)
+        limits = Tolerances(dimensions, findings)
         say_findings((*read.findings, *findings), quiet=quiet, verbose=verbose)
-        found = met(
-            MeetingCase(read, target, tables, job_of, asked), most or DEFAULT_TRIALS, progress()
+        result = met(
+            MeetingCase(read, target, tables, job_of, limits), most or DEFAULT_TRIALS, progress()
         )
-    files = {output: found.text.encode()} if found.changed else {}
+    files = {output: result.text.encode()} if result.changed else {}
     if files and not named:
         check_ours(output, is_proposal)
     if report is not None:
-        files[report] = to_json(to_data(found)).encode()
+        files[report] = to_json(to_data(result)).encode()
     write_all(files)
-    left_out = [each for each in found.run.findings if each.code in NOT_INSPECTED]
+    left_out = [each for each in result.run.findings if each.code in NOT_INSPECTED]
     say_findings(left_out, quiet=quiet, verbose=verbose)
     if not quiet:
-        for line in to_text(found).splitlines():
+        for line in to_text(result).splitlines():
             show_text(one_line(line), err=True)
-    _say_end(found, source, output, quiet=quiet)
-    return 0 if found.holds else 1
+    _say_end(result, source, output, quiet=quiet)
+    return 0 if result.holds else 1
 
 
-def _say_end(found: Meeting, source: str, output: str, *, quiet: bool) -> None:
+def _say_end(result: Meeting, source: str, output: str, *, quiet: bool) -> None:
     """Report the written file, and whether its job holds."""
-    where = "stdout" if output == STDOUT else output
-    if found.holds and not found.changed:
+    place = "stdout" if output == STDOUT else output
+    if result.holds and not result.changed:
         say("every dimension holds as it is: no job was written", quiet=quiet)
-    elif found.holds:
-        say(f"written: {where}, a job with which every dimension holds", quiet=quiet)
+    elif result.holds:
+        say(f"written: {place}, a job with which every dimension holds", quiet=quiet)
     else:
-        count = len(found.after.short) + found.after.missing
-        more = f"; {where} is better, and not enough" if found.changed else ""
+        count = len(result.after.short) + result.after.missing
+        suffix = f"; {place} is better, and not enough" if result.changed else ""
         say(
             f"camtool: error: {source}: no job was found with which every dimension holds:"
-            f" {count} would not{more}",
+            f" {count} would not{suffix}",
             quiet=False,
         )

@@ -89,13 +89,15 @@ def tint(text: str) -> str:
 def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> None:
     """Show errors always, warnings unless quiet, remarks when verbose: one line each, and one line
     for many alike, unless verbose."""
-    least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
-    shown = [finding for finding in findings if finding.severity >= least]
-    for finding, more in [(each, 0) for each in shown] if verbose else summarise_findings(shown):
+    min_severity = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
+    shown = [finding for finding in findings if finding.severity >= min_severity]
+    for finding, alike_count in (
+        [(each, 0) for each in shown] if verbose else summarise_findings(shown)
+    ):
         say(f"camtool: {finding}", quiet=False)
-        if more:
+        if alike_count:
             name = f"{finding.severity.name.lower()} {finding.code.name}"
-            say(f"camtool: {name}: and {more} more (-v shows all)", quiet=False)
+            say(f"camtool: {name}: and {alike_count} more (-v shows all)", quiet=False)
 
 
 # Summaries and tables: names are bold, values that exceed a limit are coloured.
@@ -120,24 +122,26 @@ _LINES = {
 """The line of the summary that a limit, or else a finding, is about."""
 
 
-def show_facts(plain: str, name_width: int, marks: Marks, *, err: bool = False) -> None:
+def show_facts(text: str, name_width: int, marks: Marks, *, err: bool = False) -> None:
     """Show lines of a name and a value; the names are `name_width` wide."""
     if in_colour(sys.stderr if err else sys.stdout):
         columns = shutil.get_terminal_size().columns
-        lines = plain.split("\n")
-        plain = "\n".join(_line(line, name_width, marks, columns) for line in lines)
-    show_text(plain, err=err)
+        lines = text.split("\n")
+        text = "\n".join(_line(line, name_width, marks, columns) for line in lines)
+    show_text(text, err=err)
 
 
-def show_compared(plain: str, rows: Sequence[ContrastRow]) -> None:
+def show_compared(text: str, rows: Sequence[ContrastRow]) -> None:
     """Show the table of `--compare`: the variant with the least error green, endless ones red."""
     if in_colour(sys.stdout):
-        head, *lines = plain.split("\n")
+        head, *lines = text.split("\n")
         ends = [row.total_max_um for row in rows if not row.endless]
-        least = min((error for error in ends if error is not None), default=None)
-        shown = [_variant_line(line, row, least) for line, row in zip(lines, rows, strict=True)]
-        plain = "\n".join([click.style(head, bold=True), *shown])
-    show_text(plain)
+        min_error = min((error for error in ends if error is not None), default=None)
+        shown = [
+            _variant_line(line, row, min_error) for line, row in zip(lines, rows, strict=True)
+        ]
+        text = "\n".join([click.style(head, bold=True), *shown])
+    show_text(text)
 
 
 def report_marks(findings: Iterable[Finding]) -> dict[str, str]:
@@ -161,8 +165,8 @@ def _line(line: str, name_width: int, marks: Marks, columns: int) -> str:
     return f"{click.style(name.rstrip(), bold=True, fg=colour)}{name[len(name.rstrip()) :]}{value}"
 
 
-def _variant_line(line: str, row: ContrastRow, least: float | None) -> str:
+def _variant_line(line: str, row: ContrastRow, min_error: float | None) -> str:
     if row.endless:
         return click.style(line, fg="red")
-    best = least is not None and row.total_max_um == least
+    best = min_error is not None and row.total_max_um == min_error
     return click.style(line, fg="green") if best else line

@@ -99,14 +99,14 @@ def gather(
         body = getattr(command, "__wrapped__", command) if len(groups) > 1 else command
 
         @functools.wraps(body)
-        def called(**arguments: Any) -> Any:
+        def renamed(**arguments: Any) -> Any:
             for each, (record_of, flags) in reversed(groups.items()):
                 arguments[each] = record_of(**{flag: arguments.pop(flag) for flag in flags})
             return body(**arguments)
 
-        vars(called).update(vars(command))
-        setattr(called, _GROUPS, groups)
-        return cast("Command", called)
+        vars(renamed).update(vars(command))
+        setattr(renamed, _GROUPS, groups)
+        return cast("Command", renamed)
 
     return wrap
 
@@ -179,12 +179,17 @@ class MachineFlags:
         if machine is not None:
             return cls(target, str(project.machine_named(machine)), settings)
         if target is None:
-            own = project.machine
-            by_default = own is not None or project.target is not None
-            return cls(project.target, None if own is None else str(own), settings, by_default)
-        own = project.find(target)
-        if own is not None and target not in target_names():
-            return cls(None, str(own), settings)
+            own_machine = project.machine
+            by_default = own_machine is not None or project.target is not None
+            return cls(
+                project.target,
+                None if own_machine is None else str(own_machine),
+                settings,
+                by_default,
+            )
+        own_machine = project.find(target)
+        if own_machine is not None and target not in target_names():
+            return cls(None, str(own_machine), settings)
         return cls(target, None, settings)
 
     def load(self) -> LoadedTarget:
@@ -433,8 +438,8 @@ class DrawingFlags:
         from camtool.importers.read import content, read_bytes
         from camtool.jobs.drawing import read_for_job
 
-        said = {"text": job.text} if job is not None and job.text else {}
-        options = options_of({**said, **self.given}, machine)
+        job_options = {"text": job.text} if job is not None and job.text else {}
+        options = options_of({**job_options, **self.given}, machine)
         progress().begin(f"reading {Path(name).name}")
         data, file = content(Path(name)) if data is None else (data, name)
         if job is None:
@@ -465,7 +470,7 @@ class DrawingFlags:
 def drawing_options(command: Command) -> Command:
     """Add `drawing: DrawingFlags`."""
 
-    def made(**values: Any) -> DrawingFlags:
+    def options_type(**values: Any) -> DrawingFlags:
         named = ((name.removeprefix(_OF_READING), value) for name, value in values.items())
         return DrawingFlags({name: value for name, value in named if value not in (None, ())})
 
@@ -476,7 +481,7 @@ def drawing_options(command: Command) -> Command:
     ]
     options = [_read_flag(section, name, flag, kind) for section, name, flag, kind in rows]
     return decorate(
-        gather("drawing", made, [_OF_READING + row[1] for row in rows])(command), options
+        gather("drawing", options_type, [_OF_READING + row[1] for row in rows])(command), options
     )
 
 
@@ -517,9 +522,11 @@ class JobFlags:
     @property
     def is_given(self) -> bool:
         """True if a flag sets anything of the job."""
-        own = None if self.project is None or self.project.job is None else str(self.project.job)
-        chosen = self.operations or self.setup is not None
-        return bool(chosen or self.given) or self.file not in (None, own)
+        own_file = (
+            None if self.project is None or self.project.job is None else str(self.project.job)
+        )
+        has_operation = self.operations or self.setup is not None
+        return bool(has_operation or self.given) or self.file not in (None, own_file)
 
     def job(self, drawing: DrawingFlags) -> Job:
         """Return the job of the file, with the given flags over it.
@@ -550,18 +557,18 @@ class JobFlags:
         if self.operations or self.setup is not None:
             flag = "--operation" if self.operations else "--setup"
             raise click.UsageError(f"{flag} leaves a part of the job; this needs all of it")
-        wanted = self.job(drawing)
+        job_used = self.job(drawing)
         file = (
             JobTables()
             if self.file is None
             else read_job_file(Path(self.file), self._piped_content)
         )
         tables = together(file, tables_of_flags(self.given), place.parent)
-        if drawing.layers and len(wanted.operations) == 1:
+        if drawing.layers and len(job_used.operations) == 1:
             tables["operations"][0]["layers"] = list(drawing.layers)
         read = functools.partial(job_of_tables, place=place, shop=self._tools_and_defaults())
-        assert read(tables) == wanted, "a job is not what its file says"
-        return wanted, tables, read
+        assert read(tables) == job_used, "a job is not what its file says"
+        return job_used, tables, read
 
     def _tools_and_defaults(self) -> Shop:
         """Return the tools that the job may name, and the defaults of the project and the user."""
@@ -569,12 +576,12 @@ class JobFlags:
 
         if self.project is None:
             return Shop()
-        said = {key: self.project.value_of(key) for key in ("tool", "material")}
-        given = {
+        defaults = {key: self.project.value_of(key) for key in ("tool", "material")}
+        shop_values = {
             key: None if each is None else Given(each[0], f"key {key}", str(each[1]))
-            for key, each in said.items()
+            for key, each in defaults.items()
         }
-        return Shop(self.project.libraries, **given)
+        return Shop(self.project.libraries, **shop_values)
 
     def beyond(self, names: Collection[str]) -> list[str]:
         """Return the flags of a job that are given beside the keys of these names: `--job` and
@@ -585,8 +592,8 @@ class JobFlags:
     def files(self) -> list[str]:
         """Job file, its library of tools, and its tool table."""
         named = (self.file, self._named_file("tool_library"), self._named_file("tool_table"))
-        found = () if self.project is None else self.project.libraries
-        return [*(file for file in named if file is not None), *map(str, found)]
+        libraries = () if self.project is None else self.project.libraries
+        return [*(file for file in named if file is not None), *map(str, libraries)]
 
     def _named_file(self, key: str) -> str | None:
         """Return the file that a flag or a key of the job file names; None without one, and if the
@@ -607,8 +614,8 @@ class JobFlags:
         """Return the content of a job file that can be read only once, such as `<(...)`; None for
         others."""
         file = Path(str(self.file))
-        whole = not file.exists() or file.is_file() or file.is_dir()
-        return None if whole else file.read_bytes()
+        is_readable = not file.exists() or file.is_file() or file.is_dir()
+        return None if is_readable else file.read_bytes()
 
     @contextmanager
     def name_job_file(self) -> Iterator[None]:
@@ -629,8 +636,8 @@ def own_job(drawing: Path) -> Path | None:
     """Return the job file beside a drawing; None without one."""
     if not drawing.name:  # the folder ., which is an error later
         return None
-    beside = drawing.with_suffix(OWN_JOB)
-    return beside if beside.is_file() else None
+    job_file = drawing.with_suffix(OWN_JOB)
+    return job_file if job_file.is_file() else None
 
 
 OWN_TOLERANCES = ".tolerances.toml"
@@ -639,23 +646,23 @@ OWN_TOLERANCES = ".tolerances.toml"
 
 def own_tolerances(drawing: Path) -> Path | None:
     """Return the file of tolerances beside a drawing; None without one."""
-    beside = drawing.parent / f"{drawing.stem}{OWN_TOLERANCES}"
-    return beside if beside.is_file() else None
+    tolerances_file = drawing.parent / f"{drawing.stem}{OWN_TOLERANCES}"
+    return tolerances_file if tolerances_file.is_file() else None
 
 
 def job_options(command: Command) -> Command:
     """Add `job: JobFlags`."""
 
-    def made(
+    def make_flags(
         job: str | None, operation: tuple[str, ...], setup: str | None, **keys: Any
     ) -> JobFlags:
         from camtool.project import project_of
 
-        given = {name: value for name, value in keys.items() if value is not None}
+        given_keys = {name: value for name, value in keys.items() if value is not None}
         project = project_of(Path.cwd())
         default = project.job if job is None else None
         file = job if default is None else str(default)
-        return JobFlags(file, operation, given, project, setup)
+        return JobFlags(file, operation, given_keys, project, setup)
 
     names = ["job", "operation", "setup", *(name for keys in FLAGS.values() for name in keys)]
     of_job = next(iter(FLAGS))
@@ -675,7 +682,7 @@ def job_options(command: Command) -> Command:
             for name, key in keys.items()
         ),
     ]
-    return decorate(gather("job", made, names)(command), options)
+    return decorate(gather("job", make_flags, names)(command), options)
 
 
 def _key_flag(section: str, name: str, key: Key) -> Option:

@@ -127,8 +127,8 @@ class PictureFlags:
         if self.layers is not None and not self.named:
             raise click.UsageError("--layers names no layer")
         if not canvas.layered and not {*self.given} <= {*OF_ALL}:
-            others = ", ".join(flag for flag in self.given if flag not in OF_ALL)
-            raise click.UsageError(f"{others}: not for this picture; {canvas.more}")
+            other_flags = ", ".join(flag for flag in self.given if flag not in OF_ALL)
+            raise click.UsageError(f"{other_flags}: not for this picture; {canvas.more}")
         self._check_errors(canvas)
         self._check_layers(canvas, self.options())
 
@@ -138,11 +138,13 @@ class PictureFlags:
         for flag in ("--exaggerate", "--polar"):
             if flag in self.given and not canvas.predicted:
                 raise click.UsageError(f"{flag} needs the predicted path; {canvas.more}")
-        others = ", ".join(
+        other_flags = ", ".join(
             flag for flag in self.given if flag not in ("--polar", "--size", "--dark")
         )
-        if self.polar is not None and others:
-            raise click.UsageError(f"{others}: --polar plots a circle alone; drop one of them")
+        if self.polar is not None and other_flags:
+            raise click.UsageError(
+                f"{other_flags}: --polar plots a circle alone; drop one of them"
+            )
 
     def _check_layers(self, canvas: Canvas, options: PictureOptions) -> None:
         shown = layer_names() if options.layers is None else options.layers
@@ -309,8 +311,12 @@ class Painter:
         from camtool.pictures.draw import render
         from camtool.pictures.picture import on_stock
 
-        found = on_stock(self.scenes[-1], swept_mm)
-        return None if found is None else render(found[0], CLOSEUP, found[1])
+        scene_and_options = on_stock(self.scenes[-1], swept_mm)
+        return (
+            None
+            if scene_and_options is None
+            else render(scene_and_options[0], CLOSEUP, scene_and_options[1])
+        )
 
     def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
         """Yield warnings about empty layers, and about errors if nothing could be judged."""
@@ -327,8 +333,10 @@ class Painter:
         from camtool.pictures.content import content_of
 
         options = self.flags.options()
-        held = {name for scene in scenes for name in layers_in(content_of(scene, options))}
-        return [name for name in named if name not in held]
+        present_layers = {
+            name for scene in scenes for name in layers_in(content_of(scene, options))
+        }
+        return [name for name in named if name not in present_layers]
 
 
 def _judged(scenes: Sequence[Scene]) -> bool:

@@ -108,12 +108,12 @@ class Posting:
         read."""
         from camtool.pipeline import post_drawing
 
-        wanted = self.job.job(self.drawing)
-        read = self.drawing.read(source, target.machine, wanted)
+        job_used = self.job.job(self.drawing)
+        read = self.drawing.read(source, target.machine, job_used)
         if on_read is not None:
             on_read()
         with self.job.name_job_file():
-            run = post_drawing(read, wanted, target, **self._settings(pictures))
+            run = post_drawing(read, job_used, target, **self._settings(pictures))
         return self.inspection.inspect_run(run)
 
     def make_parts(
@@ -150,8 +150,10 @@ class Posting:
     def of(self, source: str) -> Posting:
         """Return these flags with the drawing's own job file, if it has one, in place of `--job`;
         flags override either."""
-        own = own_job(Path(source))
-        return self if own is None else replace(self, job=replace(self.job, file=str(own)))
+        own_file = own_job(Path(source))
+        return (
+            self if own_file is None else replace(self, job=replace(self.job, file=str(own_file)))
+        )
 
 
 def posting_options(command: Command) -> Command:
@@ -226,11 +228,11 @@ def post(
             raise click.UsageError("--before-after needs the predicted path; drop --no-verify")
         check_beside("--before-after", outputs.pictures)
 
-    def once() -> int:
+    def run_once() -> int:
         target = posting.load()
         reads = [*posting.files(source), str(target.file)]
-        asked = RequestedOutputs(source, output, outputs, reads)
-        asked.check(target.machine.target.extension, verified=not posting.no_verify)
+        requested = RequestedOutputs(source, output, outputs, reads)
+        requested.check(target.machine.target.extension, verified=not posting.no_verify)
         job = posting.job.job(posting.drawing)
         if job.setups:
             _refuse_beside_setups(posting, split, (output or source, preview, page), job)
@@ -242,20 +244,20 @@ def post(
                 picture.painter(lambda run=run: scenes_of(run, before=before_after), quiet=quiet)  # type: ignore[misc]
                 for run in runs
             ]
-            return finish_parts(runs, asked, painters, quiet=quiet, verbose=verbose)
+            return finish_parts(runs, requested, painters, quiet=quiet, verbose=verbose)
         run = posting.make(source, target, pictures=outputs.pictures)
         painter = picture.painter(lambda: scenes_of(run, before=before_after), quiet=quiet)
-        return finish(run, asked, picture=painter, quiet=quiet, verbose=verbose)
+        return finish(run, requested, picture=painter, quiet=quiet, verbose=verbose)
 
-    return watch(once, lambda: posting.files(source), quiet=quiet) if watching else once()
+    return watch(run_once, lambda: posting.files(source), quiet=quiet) if watching else run_once()
 
 
 def _refuse_beside_setups(
     posting: Posting, split: str | None, names: Sequence[str | None], job: Job
 ) -> None:
     """Refuse what programs of several set-ups cannot have."""
-    known = ", ".join(each.name for each in job.setups)
-    one = f"name one of them with --setup: {known}"
+    setup_names = ", ".join(each.name for each in job.setups)
+    one = f"name one of them with --setup: {setup_names}"
     if split is not None:
         raise click.UsageError(f"--split is for the tools of one set-up; {one}")
     if STDOUT in names:
@@ -296,8 +298,8 @@ class RequestedOutputs:
 
     def places(self) -> list[str | None]:
         """Files of a program whose name is known."""
-        made = self.outputs
-        return [self.output, made.preview, made.report, made.page, made.beside]
+        outputs = self.outputs
+        return [self.output, outputs.preview, outputs.report, outputs.page, outputs.beside]
 
     def program(self, extension: str) -> str:
         """Return the name of the program; by default that of the source, in this folder; for stdin
@@ -308,27 +310,27 @@ class RequestedOutputs:
 
 
 def finish(
-    run: Run, asked: RequestedOutputs, *, picture: Painter, quiet: bool, verbose: bool
+    run: Run, requested: RequestedOutputs, *, picture: Painter, quiet: bool, verbose: bool
 ) -> int:
     """Write the requested files, and report them; return the exit code. `picture` draws the
     pictures.
 
     With an error, only the page of `--report` is written: it shows what is wrong.
     """
-    outputs = asked.outputs
+    outputs = requested.outputs
     say_findings(run.findings, quiet=quiet, verbose=verbose)
     if run.failed or run.program is None:
         write_all(_page_alone(run, outputs, picture))
         no = "nothing" if outputs.page is None else "no program"
         say(
-            f"camtool: error: {asked.source}: {no} was written; fix the errors above",
+            f"camtool: error: {requested.source}: {no} was written; fix the errors above",
             quiet=False,
         )
         return 1
     # A dialect of several forms (binary, listing) says only now which extension it takes.
-    asked.check(run.program.extension, verified=True)
-    output = asked.program(run.program.extension)
-    if asked.output is None:
+    requested.check(run.program.extension, verified=True)
+    output = requested.program(run.program.extension)
+    if requested.output is None:
         _check_ours(run, output)
     write_all({output: run.program.data, **outputs.files(run, picture)})
     _say_written(run, output, quiet=quiet)
@@ -352,13 +354,13 @@ def _say_written(run: Run, output: str, *, quiet: bool) -> None:
         if run.target.placeholders:
             summary += f"\n{'machine':<10} {_placeholder_words(run.target.placeholders)}"
         show_facts(summary, REPORT_NAMES, report_marks(run.findings), err=True)
-    where = "stdout" if output == STDOUT else output
-    say(f"written: {where} ({len(run.program.data)} bytes)", quiet=quiet)
+    place = "stdout" if output == STDOUT else output
+    say(f"written: {place} ({len(run.program.data)} bytes)", quiet=quiet)
 
 
 def finish_parts(
     runs: Sequence[Run],
-    asked: RequestedOutputs,
+    requested: RequestedOutputs,
     pictures: Sequence[Painter],
     *,
     quiet: bool,
@@ -368,10 +370,10 @@ def finish_parts(
     files or none. The JSON is one, and lists the programs."""
     findings = dict.fromkeys(finding for run in runs for finding in run.findings)
     say_findings(findings, quiet=quiet, verbose=verbose)
-    parts = [_part(run, asked, number, len(runs)) for number, run in enumerate(runs, 1)]
-    report, names = asked.outputs.report, [str(part.output) for part in parts]
+    parts = [_part(run, requested, number, len(runs)) for number, run in enumerate(runs, 1)]
+    report, names = requested.outputs.report, [str(part.output) for part in parts]
     every = [name for part in parts for name in part.places()]
-    check_places(asked.reads, [*every, report])
+    check_places(requested.reads, [*every, report])
     for part in parts:
         part.outputs.check(())
     files: dict[str, bytes] = {}
@@ -381,7 +383,7 @@ def finish_parts(
         write_all(files)
         no = "no program" if files else "nothing"
         say(
-            f"camtool: error: {asked.source}: {no} was written; fix the errors above",
+            f"camtool: error: {requested.source}: {no} was written; fix the errors above",
             quiet=False,
         )
         return 1
@@ -399,16 +401,20 @@ def finish_parts(
 
 def _placeholder_words(names: Sequence[str]) -> str:
     """Return the note about unknown numbers of the machine."""
-    *most, last = names
-    said = f"{', '.join(most)} and {last} are placeholders" if most else f"{last} is a placeholder"
+    *first_names, last = names
+    sentence = (
+        f"{', '.join(first_names)} and {last} are placeholders"
+        if first_names
+        else f"{last} is a placeholder"
+    )
     if names == ("backlash",):
-        return f"{said}: camtool coupon lines, then camtool calibrate, give yours"
+        return f"{sentence}: camtool coupon lines, then camtool calibrate, give yours"
     if len(names) <= MAX_PLACEHOLDERS:
-        return f"{said}: give them in your machine's file"
-    return f"{said}: camtool init makes your machine's file"
+        return f"{sentence}: give them in your machine's file"
+    return f"{sentence}: camtool init makes your machine's file"
 
 
-def _part(run: Run, asked: RequestedOutputs, number: int, count: int) -> RequestedOutputs:
+def _part(run: Run, requested: RequestedOutputs, number: int, count: int) -> RequestedOutputs:
     """Return the outputs of one program of `count`: all names with its number, and its set-up or
     its tool, which sort in the order of the runs."""
     from camtool.planning.naming import setup_name
@@ -416,20 +422,22 @@ def _part(run: Run, asked: RequestedOutputs, number: int, count: int) -> Request
     tool = _tool(run)
     kind = "tool" if tool is None else tool.name or SHORT.get(tool.kind, tool.kind)
     kind = (run.job and setup_name(run.job)) or kind
-    plain = re.sub(r"[^A-Za-z0-9_]+", "-", kind).strip("-")[:MAX_NAME_CHARS] or "tool"
-    mark = f"-{number:0{len(str(count))}}-{plain}"
+    plain_name = re.sub(r"[^A-Za-z0-9_]+", "-", kind).strip("-")[:MAX_NAME_CHARS] or "tool"
+    mark = f"-{number:0{len(str(count))}}-{plain_name}"
 
     def marked(name: str | None) -> str | None:
         path = None if name is None else PurePath(name)
         return None if path is None else str(path.with_name(f"{path.stem}{mark}{path.suffix}"))
 
     machine = run.target.machine.target
-    program = asked.program(machine.extension if run.program is None else run.program.extension)
-    outputs = asked.outputs
-    made = replace(
+    program = requested.program(
+        machine.extension if run.program is None else run.program.extension
+    )
+    outputs = requested.outputs
+    part_outputs = replace(
         outputs, preview=marked(outputs.preview), page=marked(outputs.page), report=None
     )
-    return RequestedOutputs(asked.source, marked(program), made, asked.reads)
+    return RequestedOutputs(requested.source, marked(program), part_outputs, requested.reads)
 
 
 def _tool(run: Run) -> ToolNote | None:
@@ -479,51 +487,57 @@ Digests = dict[str, bytes | None]
 
 
 def watch(
-    again: Callable[[], int],
+    action: Callable[[], int],
     files: Files,
     *,
     quiet: bool,
     wait: Callable[[float], None] = time.sleep,
 ) -> int:
-    """Call `again` now and after each change of the `files`, until Ctrl-C; then 0.
+    """Call `action` now and after each change of the `files`, until Ctrl-C; then 0.
 
     The list of files may change with their content: a job file names a tool table.
     An error is shown on one line, and watching goes on: the next save may fix it.
     """
     try:
-        seen = _digests(files)
-        say(f"camtool: watching {', '.join(seen)}; Ctrl-C ends", quiet=quiet)
-        _try_once(again)
+        seen_digests = _digests(files)
+        say(f"camtool: watching {', '.join(seen_digests)}; Ctrl-C ends", quiet=quiet)
+        _try_once(action)
         while True:
             wait(POLL_S)
-            now = _wait_until_stable(files, seen, wait)
-            changed = [file for file in now if file not in seen or now[file] != seen[file]]
-            seen = now
-            if changed:
-                say(f"camtool: changed: {', '.join(changed)}", quiet=quiet)
-                _try_once(again)
+            digests = _wait_until_stable(files, seen_digests, wait)
+            changed_files = [
+                file
+                for file in digests
+                if file not in seen_digests or digests[file] != seen_digests[file]
+            ]
+            seen_digests = digests
+            if changed_files:
+                say(f"camtool: changed: {', '.join(changed_files)}", quiet=quiet)
+                _try_once(action)
     except KeyboardInterrupt:
         say("camtool: watching ended", quiet=quiet)
         return 0
 
 
-def _try_once(again: Callable[[], int]) -> None:
+def _try_once(action: Callable[[], int]) -> None:
     try:
         with signs_of_command().counting():
-            again()
+            action()
     except CamtoolError as error:
         say_error(error)
 
 
-def _wait_until_stable(files: Files, seen: Digests, wait: Callable[[float], None]) -> Digests:
+def _wait_until_stable(
+    files: Files, seen_digests: Digests, wait: Callable[[float], None]
+) -> Digests:
     """Return the content of the files as digests; after a change, once it no longer changes."""
-    now = _digests(files)
-    while now != seen:
+    digests = _digests(files)
+    while digests != seen_digests:
         wait(SETTLED_S)
-        before, now = now, _digests(files)
-        if now == before:
+        before, digests = digests, _digests(files)
+        if digests == before:
             break
-    return now
+    return digests
 
 
 def _digests(files: Files) -> Digests:

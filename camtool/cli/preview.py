@@ -92,11 +92,11 @@ def preview(
     # A viewer plays the program, which needs the times of the machine's model.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
-    seen = SceneSource(machine, simulate, asks_for_path, job, drawing, output)
-    found = [seen.scene(name) for name in sources]
-    painted = picture.painter(lambda: [scene for scene, _ in found], quiet=quiet)
+    scene_source = SceneSource(machine, simulate, asks_for_path, job, drawing, output)
+    scenes = [scene_source.scene(name) for name in sources]
+    painted = picture.painter(lambda: [scene for scene, _ in scenes], quiet=quiet)
     write_all({output: painted(output)})
-    for _, findings in found:
+    for _, findings in scenes:
         say_findings(findings, quiet=quiet, verbose=verbose)
     say(f"written: {output}", quiet=quiet)
     return 0

@@ -80,14 +80,14 @@ class ReportOutputs:
     @property
     def pictures(self) -> list[str]:
         """Pictures to draw, by names of their kind."""
-        held = self.page is not None and self.page.lower().endswith(".html")
-        names = (self.preview, self.beside, EMBEDDED if held else None)
+        is_html = self.page is not None and self.page.lower().endswith(".html")
+        names = (self.preview, self.beside, EMBEDDED if is_html else None)
         return [each for each in names if each is not None]
 
-    def check(self, reads: Iterable[str | None], *others: str) -> None:
-        """Raise OutputError, before any work is done, when a place of these or of `others` cannot
-        be written, is one of `reads`, or holds a picture that the page did not write."""
-        names = [*others, self.preview, self.report, self.page, self.beside]
+    def check(self, reads: Iterable[str | None], *other_names: str) -> None:
+        """Raise OutputError, before any work is done, when a place of these or of `other_names`
+        cannot be written, is one of `reads`, or holds a picture that the page did not write."""
+        names = [*other_names, self.preview, self.report, self.page, self.beside]
         check_places(reads, names)
         if self.beside is not None and is_foreign(self.beside, str(self.page)):
             raise OutputError(
@@ -117,8 +117,8 @@ class ReportOutputs:
         if name != STDOUT and suffix == ".html":
             pictures = ((_CAPTION, picture(EMBEDDED)), *picture.closeups())
             shown = tuple((caption, _embedded_address(data)) for caption, data in pictures)
-            planned = None if run.report is None else run.report.planned
-            stock = picture.stock(None if planned is None else planned.swept_mm)
+            plan = None if run.report is None else run.report.planned
+            stock = picture.stock(None if plan is None else plan.swept_mm)
             page = _page(run, shown, "" if stock is None else _embedded_address(stock))
             return {name: page_html(page).encode()}
         links = () if self.linked is None else ((_CAPTION, _relative_address(name, self.linked)),)
@@ -165,12 +165,12 @@ def _flags_given() -> tuple[tuple[str, str], ...]:
     """Return the given flags of the running command that affect how a program is made or
     judged."""
     context = click.get_current_context()
-    given = click.core.ParameterSource.COMMANDLINE
+    from_line = click.core.ParameterSource.COMMANDLINE
     return tuple(
         (param.opts[0], _value(context, str(param.name)))
         for param in context.command.params
         if param.name not in _NOT_LISTED
-        and context.get_parameter_source(str(param.name)) is given
+        and context.get_parameter_source(str(param.name)) is from_line
         and isinstance(param, click.Option)
     )
 

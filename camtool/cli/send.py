@@ -98,20 +98,20 @@ def send(
     target, data = machine.load(), read_bytes(program)
     place = Path(journal or f"{program}.journal")
     refuse_same([program, *machine.files()], [str(place), live])
-    left = _read_state(place, data, target) if resume else _find_unfinished(place, data)
-    begin = left.block if left and resume else (first or 1) - 1
+    state = _read_state(place, data, target) if resume else _find_unfinished(place, data)
+    begin = state.block if state and resume else (first or 1) - 1
     if first is None and not resume:
         if tool_at:
             raise click.UsageError("--tool-at is for a program that goes on: give --resume")
-        if left is not None and left.last >= 0 and not quiet:
+        if state is not None and state.last >= 0 and not quiet:
             say(
-                f"camtool: {place} is of this program, of which {left.block} blocks are done: "
+                f"camtool: {place} is of this program, of which {state.block} blocks are done: "
                 "--resume would go on there, and this begins anew",
                 quiet=False,
             )
-        left = None
-    elif left is not None:
-        tool_at = _tool_at(wire_of(target), left, tool_at, target)
+        state = None
+    elif state is not None:
+        tool_at = _tool_at(wire_of(target), state, tool_at, target)
     elif tool_at:
         raise OptionError(
             "no journal says where this program was left",
@@ -123,7 +123,7 @@ def send(
         target,
         source=display_name(program),
         first=begin,
-        left=left,
+        left=state,
         tool_at=tool_at,
         progress=progress(),
     )
@@ -156,22 +156,24 @@ def _find_unfinished(place: Path, data: bytes) -> JournalState | None:
     from camtool.sending.prepare import digest
 
     with suppress(InputError):
-        found = read_journal(place)
-        if found.sha256 == digest(data) and not found.finished:
-            return found
+        state = read_journal(place)
+        if state.sha256 == digest(data) and not state.finished:
+            return state
     return None
 
 
-def _tool_at(wire: Wire, left: JournalState, said: ToolAt, target: LoadedTarget) -> ToolAt:
+def _tool_at(wire: Wire, state: JournalState, tool_said: ToolAt, target: LoadedTarget) -> ToolAt:
     """Return where the tool is; ask the user if the machine does not say it."""
     from camtool.sending.prepare import tool_at_of
 
-    tool_at, asked = tool_at_of(wire, left, said, target.machine.target.name)
-    if not asked:
+    tool_at, is_asked = tool_at_of(wire, state, tool_said, target.machine.target.name)
+    if not is_asked:
         return tool_at
     if sys.stdin.isatty():
         with signs_of_command().hidden():
-            agreed = click.confirm(f"{asked[0].upper()}{asked[1:]}?", err=True, default=False)
+            agreed = click.confirm(
+                f"{is_asked[0].upper()}{is_asked[1:]}?", err=True, default=False
+            )
         if agreed:
             return tool_at
     mend = "bring the tool there, and give --tool-at zero"
@@ -180,7 +182,7 @@ def _tool_at(wire: Wire, left: JournalState, said: ToolAt, target: LoadedTarget)
             "give --tool-at journal if it has stayed there; else bring it to part zero, and give "
             "--tool-at zero"
         )
-    raise OptionError(asked.partition(": ")[0], where="--resume", mend=mend)
+    raise OptionError(is_asked.partition(": ")[0], where="--resume", mend=mend)
 
 
 def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
@@ -192,20 +194,20 @@ def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
     from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
 
-    found = read_journal(place)
-    if found.sha256 != digest(data):
+    state = read_journal(place)
+    if state.sha256 != digest(data):
         raise InputError(
             "is the journal of another program, or this one was changed since",
             file=str(place),
             mend="give the journal of this program with --journal, or begin with --from",
         )
-    if found.machine != target.machine.digest:
+    if state.machine != target.machine.digest:
         raise InputError(
             "the machine file has changed since", file=str(place), mend="begin with --from"
         )
-    if found.finished:
+    if state.finished:
         raise OptionError("the program was finished", where="--resume", mend="leave it out")
-    return found
+    return state
 
 
 def _refuse_waiting(one: Consignment, *, single: bool) -> None:
@@ -221,9 +223,9 @@ def _refuse_waiting(one: Consignment, *, single: bool) -> None:
             f"block {one.block_of(packet.block) + 1} ({packet.data.strip().decode('latin-1')})"
             for packet in stops[:MAX_NAMED]
         )
-        more = f" and {len(stops) - MAX_NAMED} more" if len(stops) > MAX_NAMED else ""
+        suffix = f" and {len(stops) - MAX_NAMED} more" if len(stops) > MAX_NAMED else ""
         raise click.UsageError(
-            f"the program stops until somebody lets it go on, in {named}{more}: run it at a "
+            f"the program stops until somebody lets it go on, in {named}{suffix}: run it at a "
             "terminal, or take the stops out"
         )
 
@@ -270,11 +272,11 @@ class _Sending:
         from camtool.target.wire import LATE_S, WireState
 
         one = self.one
-        left = 0.0
+        remaining_s = 0.0
         for packet in reversed(one.packets):
-            self._left.append(left)
-            left += packet.seconds
-        self._left = [left, *reversed(self._left)]
+            self._left.append(remaining_s)
+            remaining_s += packet.seconds
+        self._left = [remaining_s, *reversed(self._left)]
         if self.live is not None:
             listing = one.run.listing if one.rest is None else None
             decoded = one.forecast.decoded
@@ -329,10 +331,15 @@ class _Sending:
             return 0
         block = one.block_of(conversation.block) if conversation.block >= 0 else -1
         block = max(block, one.first - 1)
-        done = f"block {block + 1} is the last that is done" if block >= 0 else "no block is done"
+        done_text = (
+            f"block {block + 1} is the last that is done" if block >= 0 else "no block is done"
+        )
         ends = conversation.why or conversation.state.value
-        why = f"{driver.trouble}; {ends}" if driver.trouble else ends
-        say(f"camtool: error: {one.run.source}: {why}; {done}; --resume goes on", quiet=False)
+        reason = f"{driver.trouble}; {ends}" if driver.trouble else ends
+        say(
+            f"camtool: error: {one.run.source}: {reason}; {done_text}; --resume goes on",
+            quiet=False,
+        )
         return 1
 
     def _program_file(self) -> str:
@@ -370,26 +377,28 @@ class _Sending:
             if (conversation.acknowledged)
             else -1
         )
-        left = self._left[conversation.acknowledged]
-        now = {
+        remaining_s = self._left[conversation.acknowledged]
+        facts = {
             "state": conversation.state.value,
             "packet": conversation.acknowledged,
             "packets": len(self.one.packets),
             "block": block + 1,
             "place_mm": conversation.place_mm,
-            "left_s": round(left, 1),
+            "left_s": round(remaining_s, 1),
             "why": conversation.why,
         }
-        self._show_page(conversation, left)
-        if now == self._shown or (self.as_json and not takes_more(sys.stdout)):
+        self._show_page(conversation, remaining_s)
+        if facts == self._shown or (self.as_json and not takes_more(sys.stdout)):
             return
-        before, self._shown = self._shown, now
+        before, self._shown = self._shown, facts
         if self.as_json:
-            show_text(json.dumps(now))
+            show_text(json.dumps(facts))
         place = conversation.place_mm
-        where = "" if place is None else " X{:.3f} Y{:.3f} Z{:.3f}".format(*place)
+        place_text = "" if place is None else " X{:.3f} Y{:.3f} Z{:.3f}".format(*place)
         signs = progress()
-        signs.stage = f"{conversation.state.value}, block {block + 1}{where}, {clock(left)} left"
+        signs.stage = (
+            f"{conversation.state.value}, block {block + 1}{place_text}, {clock(remaining_s)} left"
+        )
         signs.done = conversation.acknowledged
         if conversation.state.value == "waiting" and before.get("state") != "waiting":
             self._tell(f"waiting: {conversation.why} (r goes on)")
@@ -399,14 +408,14 @@ class _Sending:
         written is given up: the machine is not stopped for it."""
         from camtool.verification.report import clock
 
-        state, now = conversation.state.value, time.monotonic()
+        state, time_s = conversation.state.value, time.monotonic()
         if self._page is None:
             return
-        if now - self._paged[0] < self._page.every_s and state == self._paged[1]:
+        if time_s - self._paged[0] < self._page.every_s and state == self._paged[1]:
             return
-        self._paged = now, state
-        done = self.one.packets[: conversation.acknowledged]
-        block = done[-1].block if done else -1
+        self._paged = time_s, state
+        done_packets = self.one.packets[: conversation.acknowledged]
+        block = done_packets[-1].block if done_packets else -1
         place = conversation.place_mm
         facts = {
             "block": f"{self.one.block_of(block) + 1} of {self.one.blocks}",
@@ -416,8 +425,8 @@ class _Sending:
         total_s = self._left[0]
         share = 1.0 - left_s / total_s if total_s else float(state == "finished")
         try:
-            why = conversation.why
-            page = self._page.html(state, facts, block, place, share=share, why=why)
+            reason = conversation.why
+            page = self._page.html(state, facts, block, place, share=share, why=reason)
             self._page.write(page)
         except OSError as error:
             self._tell(f"{self.live} cannot be written ({error.strerror})")

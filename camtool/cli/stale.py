@@ -51,9 +51,11 @@ def stale(
     """
     target = posting.load()
     posting = replace(posting, no_verify=not posting.gates.given)
-    found = named_drawings(files) if programs is None else drawings_of(files, Path(programs))
+    drawings_by_name = (
+        named_drawings(files) if programs is None else drawings_of(files, Path(programs))
+    )
     worst = 0
-    for name, drawings in found.items():
+    for name, drawings in drawings_by_name.items():
         if not missing and not _has_program(name):
             say(f"camtool: {name}: has no program", quiet=not verbose)
             continue
@@ -86,8 +88,8 @@ def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
     may have several; the likeliest is first. InputError for what is not there.
     """
     names = dict.fromkeys(name for file in files for name in _names(Path(file)))
-    found = {name: _ordered(_files_named(name)) for name in names}
-    return {name: drawings for name, drawings in found.items() if drawings}
+    drawings_by_name = {name: _ordered(_files_named(name)) for name in names}
+    return {name: drawings for name, drawings in drawings_by_name.items() if drawings}
 
 
 def drawings_of(files: Sequence[str], programs: Path) -> dict[Path, list[Path]]:

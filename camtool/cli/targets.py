@@ -91,8 +91,8 @@ def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool)
     check_places([str(base.file)], [output])
     check_new(output)
     write_all({output: text.encode()})
-    where = "stdout" if output == STDOUT else output
-    say(f"written: {where}; take the # away from what differs", quiet=quiet)
+    place = "stdout" if output == STDOUT else output
+    say(f"written: {place}; take the # away from what differs", quiet=quiet)
 
 
 def target_items(incomplete: str) -> Iterator[CompletionItem]:
@@ -117,22 +117,22 @@ def _list(as_json: bool) -> None:
         target = listed.target
         row = {"name": name, "title": target.title, "extension": target.extension}
         rows.append({**row, "needs": list(listed.needs)})
-    own = list(_own_machines(broken))
+    machines = list(_own_machines(broken))
     for error in broken:
         say(f"camtool: warning: {error}", quiet=False)
     if as_json:
-        write_all({STDOUT: to_json({"targets": rows, "machines": own}).encode()})
+        write_all({STDOUT: to_json({"targets": rows, "machines": machines}).encode()})
         return
     if in_colour(sys.stdout):
-        _table(rows, own)
+        _table(rows, machines)
         return
-    width = max((len(row["name"]) for row in [*rows, *own]), default=0)
+    width = max((len(row["name"]) for row in [*rows, *machines]), default=0)
     for row in rows:
         needs = f" (needs --machine FILE: {', '.join(row['needs'])})" if row["needs"] else ""
         show_text(
             one_line(f"{row['name']:<{width}}  {row['extension']:<6}  {row['title']}{needs}")
         )
-    for row in own:
+    for row in machines:
         default = ", the default" if row["default"] else ""
         show_text(
             one_line(f"{row['name']:<{width}}  yours{default}, on {row['extends']}: {row['file']}")
@@ -155,7 +155,7 @@ def _own_machines(broken: list[CamtoolError]) -> Iterator[dict[str, Any]]:
         yield {**row, "default": file == default}
 
 
-def _table(rows: list[dict[str, Any]], own: list[dict[str, Any]]) -> None:
+def _table(rows: list[dict[str, Any]], machines: list[dict[str, Any]]) -> None:
     """Format the list as a table, for terminals."""
     from rich.console import Console
     from rich.table import Table
@@ -166,9 +166,9 @@ def _table(rows: list[dict[str, Any]], own: list[dict[str, Any]]) -> None:
         table.add_column(heading)
     for row in rows:
         # Titles and keys come from files: they are text, no markup.
-        name, rest = Text(row["name"], style="bold"), (row["extension"], one_line(row["title"]))
-        table.add_row(name, *map(Text, (*rest, ", ".join(row["needs"]))))
-    for row in own:
+        name, cells = Text(row["name"], style="bold"), (row["extension"], one_line(row["title"]))
+        table.add_row(name, *map(Text, (*cells, ", ".join(row["needs"]))))
+    for row in machines:
         name, default = Text(row["name"], style="bold"), ", the default" if row["default"] else ""
         table.add_row(
             name, "", Text(one_line(f"yours{default}, on {row['extends']}: {row['file']}"))
@@ -177,29 +177,34 @@ def _table(rows: list[dict[str, Any]], own: list[dict[str, Any]]) -> None:
 
 
 def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bool) -> None:
-    loaded = MachineFlags.of(name, machine, settings).load()
-    values = loaded.values()
+    loaded_target = MachineFlags.of(name, machine, settings).load()
+    values = loaded_target.values()
     if as_json:
         write_all({STDOUT: to_json(values).encode()})
         return
     for key, value in flat_lines("", values):
         show_text(f"{key} = {to_json(value, indent=0)}".rstrip("\n"))
-    for name, cells in (("x", loaded.machine.play_map.x), ("y", loaded.machine.play_map.y)):
+    for name, cells in (
+        ("x", loaded_target.machine.play_map.x),
+        ("y", loaded_target.machine.play_map.y),
+    ):
         if cells is not None:
-            show_text("\n" + "\n".join(_backlash_table(name, cells, loaded.machine)), err=True)
+            show_text(
+                "\n" + "\n".join(_backlash_table(name, cells, loaded_target.machine)), err=True
+            )
     unknown = [key for key, value in flat_lines("", values["uncertainty"]) if value is None]
     if unknown:
         show_text(f"\nuncertainties that are not known: {', '.join(unknown)}", err=True)
-    for code in loaded.target.codes:
+    for code in loaded_target.target.codes:
         grave = " or ".join(severity.name.lower() for severity in code.severities)
         show_text(f"\n{code.name} ({grave}): {code.means}; to fix it: {code.mend}", err=True)
     show_text(
-        f"\nhighest feed {_speed(loaded.machine.max_feed_mm_min)}, "
-        f"rapids {_speed(loaded.machine.rapid_mm_min)}; "
+        f"\nhighest feed {_speed(loaded_target.machine.max_feed_mm_min)}, "
+        f"rapids {_speed(loaded_target.machine.rapid_mm_min)}; "
         "every number's source is in the target's own file:",
         err=True,
     )
-    say(f"{loaded.file}", quiet=False)
+    say(f"{loaded_target.file}", quiet=False)
 
 
 def _backlash_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[str]:

@@ -87,10 +87,10 @@ def new(
     say_findings((*_relevant_findings(read.findings), *findings), quiet=quiet, verbose=verbose)
     for fault in faults:
         say(f"camtool: warning: {fault}", quiet=quiet)
-    where = "stdout" if output == STDOUT else output
+    place = "stdout" if output == STDOUT else output
     count = sum(line == "[[dimension]]" for line in text.splitlines())
-    said = f"{count} dimension{'s' if count != 1 else ''}"
-    say(f"written: {where}, {said}; put in the limits that matter", quiet=quiet)
+    count_text = f"{count} dimension{'s' if count != 1 else ''}"
+    say(f"written: {place}, {count_text}; put in the limits that matter", quiet=quiet)
     if any(each.severity == Severity.ERROR for each in findings):
         raise click.exceptions.Exit(1)
 
@@ -123,16 +123,16 @@ def show(
     findings: tuple[Finding, ...] = ()
     if against is not None:
         read = drawing.read(against)
-        dimensions, found = dimensions_of(read, Path(file))
+        dimensions, remarks = dimensions_of(read, Path(file))
         findings = (
             *_relevant_findings(read.findings),
-            *found,
+            *remarks,
             *unbound_findings(read, dimensions),
         )
     if report is not None:
         rows = [_facts(each) for each in dimensions]
-        said = msgspec.to_builtins(finding_reports(findings))
-        write_all({report: to_json({"dimensions": rows, "findings": said}).encode()})
+        reports = msgspec.to_builtins(finding_reports(findings))
+        write_all({report: to_json({"dimensions": rows, "findings": reports}).encode()})
     if not quiet and report != STDOUT:
         for line in _lines(dimensions):
             show_text(one_line(line).rstrip())
@@ -187,5 +187,5 @@ def _cells(each: Dimension) -> tuple[str, ...]:
             sizes = f"{each.nominal_mm + lower:.7g} … {each.nominal_mm + upper:.7g} mm"
     elif each.limits is not None:
         nominal, limits = "", f"{each.limits.upper_mm:g} mm"
-    by = zone if zone != limits else ""
-    return each.name, each.kind, nominal, limits, sizes, by, each.source
+    tolerance = zone if zone != limits else ""
+    return each.name, each.kind, nominal, limits, sizes, tolerance, each.source

@@ -75,8 +75,8 @@ def show(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> N
     """Everything about one tool."""
     name, every = str(context.info_name), _all_tools()
     if name not in every:
-        known = f"known are {', '.join(every)}" if every else "camtool tools new begins a library"
-        raise OptionError(f"there is no tool {name!r}", mend=guess(name, every) + known)
+        names = f"known are {', '.join(every)}" if every else "camtool tools new begins a library"
+        raise OptionError(f"there is no tool {name!r}", mend=guess(name, every) + names)
     described, file = every[name]
     row = _row(name, described, file)
     if as_json:
@@ -111,8 +111,8 @@ def new(project: bool, output: str | None, quiet: bool, verbose: bool) -> None:
         Path(place).parent.mkdir(parents=True, exist_ok=True)
     check_places([], files)
     write_all(files)
-    where = "stdout" if place == STDOUT else place
-    say(f"written: {where}; put in the tools that you have", quiet=quiet)
+    place_name = "stdout" if place == STDOUT else place
+    say(f"written: {place_name}; put in the tools that you have", quiet=quiet)
 
 
 def _all_tools() -> dict[str, tuple[Described, Path]]:
@@ -122,8 +122,8 @@ def _all_tools() -> dict[str, tuple[Described, Path]]:
 
     every: dict[str, tuple[Described, Path]] = {}
     for file in project_of(Path.cwd()).libraries:
-        found = {name: (each, file) for name, each in read_library(file).items()}
-        every = {**found, **every}
+        tools = {name: (each, file) for name, each in read_library(file).items()}
+        every = {**tools, **every}
     return dict(sorted(every.items()))
 
 
@@ -138,12 +138,12 @@ def _items(incomplete: str) -> Iterator[CompletionItem]:
 def _row(name: str, described: Described, file: Path) -> dict[str, Any]:
     """Return a tool as data for JSON: the values of its keys in mm, rad, mm/min, rev/min and
     m/min."""
-    given = described.keys.given
+    given_keys = described.keys.given
     presets = {}
     for material, preset in described.presets.items():
         values = {PRESET[key].field: PRESET[key].read(each) for key, each in preset.given.items()}
         presets[material] = {**values, **_derived(_tool(name, described), values)}
-    values = {TOOL[key].field: TOOL[key].read(each) for key, each in given.items()}
+    values = {TOOL[key].field: TOOL[key].read(each) for key, each in given_keys.items()}
     return {"name": name, "file": str(file), **values, "presets": presets}
 
 
@@ -156,11 +156,11 @@ def _tool(name: str, described: Described) -> Tool:
 def _derived(tool: Tool, preset: Mapping[str, Any]) -> dict[str, float]:
     """Compute the feed per tooth, mm, and the cutting speed, m/min, that follow from a preset."""
     feed, rpm = preset.get("feed_mm_min"), preset.get("spindle_rpm")
-    found = {
+    figures = {
         "feed_per_tooth_mm": None if feed is None else tool.feed_per_tooth_mm(feed, rpm),
         "edge_m_min": tool.edge_speed_m_min(rpm),
     }
-    return {key: value for key, value in found.items() if value is not None}
+    return {key: value for key, value in figures.items() if value is not None}
 
 
 def _summary(name: str, described: Described) -> str:
@@ -187,5 +187,5 @@ _WORDS = {
 
 
 def _preset_words(preset: Mapping[str, Any]) -> str:
-    said = [words.format(preset[key]) for key, words in _WORDS.items() if key in preset]
-    return ", ".join(said).replace(", (", " (")
+    texts = [words.format(preset[key]) for key, words in _WORDS.items() if key in preset]
+    return ", ".join(texts).replace(", (", " (")

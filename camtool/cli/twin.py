@@ -97,15 +97,15 @@ def twin(
     from camtool.sending.twin import Clock, PseudoTerminal, TcpPort, TwinPort, serve
 
     name = target if machine is None else None
-    loaded = MachineFlags.of(name, machine, settings).load()
-    virtual = loaded.twin(assume)
+    loaded_target = MachineFlags.of(name, machine, settings).load()
+    virtual = loaded_target.twin(assume)
     factor, faults = parse_speed(speed), Faults.of(fault)
     wired = WiredTwin(virtual, faults, faults, seed=seed, paced=factor is not None)
     file = None if trace is None else _opened(trace)
     port: TwinPort = PseudoTerminal() if tcp is None else TcpPort(*parse_address(tcp))
     journal = _TraceWriter(virtual, file, verbose=verbose)
     show_text(port.name)
-    say(f"camtool: {loaded.target.name} ({virtual.wire}); Ctrl-C ends it", quiet=quiet)
+    say(f"camtool: {loaded_target.target.name} ({virtual.wire}); Ctrl-C ends it", quiet=quiet)
     before = signal.signal(signal.SIGTERM, _interrupted)
     try:
         with suppress(KeyboardInterrupt):
@@ -117,8 +117,8 @@ def twin(
         if file is not None:
             file.close()
     x, y, z = virtual.slides.commanded_mm.tolist()
-    done = f"{len(virtual.decoded)} blocks in {virtual.now:.3f} s"
-    say(f"camtool: {done}; at X{x:.3f} Y{y:.3f} Z{z:.3f}", quiet=quiet)
+    summary = f"{len(virtual.decoded)} blocks in {virtual.now:.3f} s"
+    say(f"camtool: {summary}; at X{x:.3f} Y{y:.3f} Z{z:.3f}", quiet=quiet)
     return 0
 
 
@@ -145,9 +145,9 @@ class _TraceWriter:
 
     def note(self) -> None:
         """Write and show everything since the last call."""
-        done = self._twin.slides.drain()
-        if self._file is not None and len(done):
-            self._file.write(rows(done))
+        samples = self._twin.slides.drain()
+        if self._file is not None and len(samples):
+            self._file.write(rows(samples))
         for block in self._twin.decoded[self._shown :] if self._verbose else ():
             say(f"camtool: {self._twin.now:.3f} s: {block.decode('latin-1')}", quiet=False)
         self._shown = len(self._twin.decoded)

@@ -166,9 +166,9 @@ def verify(
         align=align,
     )
     target = machine.load()
-    wanted = job.job(drawing)
-    read = drawing.read(against, target.machine, wanted) if against else None
-    case = VerifySettings(target, judging, read, wanted, finding)
+    job_used = job.job(drawing)
+    read = drawing.read(against, target.machine, job_used) if against else None
+    case = VerifySettings(target, judging, read, job_used, finding)
     with job.name_job_file():
         if compare is not None:
             return _compare(program, _variants(compare, machine, judging), case, wishes)
@@ -178,26 +178,26 @@ def verify(
 def _finds_contours(job: JobFlags, against: str | None, *, align: bool, comparing: bool) -> bool:
     """True if no flag says how the program cuts, so that this is found from it; a usage error if
     that contradicts `--align`."""
-    said = job.beyond({*PLACE, "tool_diameter"})
+    is_described = job.beyond({*PLACE, "tool_diameter"})
     if align and against is None:
         raise click.UsageError("--align needs --against DRAWING")
     if align and comparing:
         raise click.UsageError("--align is for a single variant; drop --compare")
-    if align and said:
+    if align and is_described:
         raise click.UsageError(
-            f"--align finds how the program cuts; drop {', '.join(said)}, or --align"
+            f"--align finds how the program cuts; drop {', '.join(is_described)}, or --align"
         )
     if align and "origin" in job.given:
         raise click.UsageError("--align finds the place; drop --origin, or --align")
-    return against is not None and not said
+    return against is not None and not is_described
 
 
 def _variants(spec: str, machine: MachineFlags, judging: Judging) -> list[ProgramVariant]:
     """Return the variants that `--compare SPEC` names; OptionError if it names none."""
     from camtool.comparison import variants_of
 
-    def load(more: Sequence[str]) -> LoadedTarget:
-        return replace(machine, settings=(*machine.settings, *more)).load()
+    def load(extra: Sequence[str]) -> LoadedTarget:
+        return replace(machine, settings=(*machine.settings, *extra)).load()
 
     return variants_of(spec, load, judging)
 
@@ -290,7 +290,7 @@ def _compare(
     from camtool.comparison import compare_program
     from camtool.verification.contrast import to_json
 
-    found = compare_program(
+    comparison = compare_program(
         read_bytes(file),
         variants,
         source=display_name(file),
@@ -303,11 +303,11 @@ def _compare(
         from camtool.pictures.overlay import render_overlay
 
         files[wishes.outputs.preview] = render_overlay(
-            found.scene(), wishes.outputs.preview, wishes.looks.options()
+            comparison.scene(), wishes.outputs.preview, wishes.looks.options()
         )
     if wishes.outputs.report is not None:
-        files[wishes.outputs.report] = to_json(found.rows).encode()
+        files[wishes.outputs.report] = to_json(comparison.rows).encode()
     write_all(files)
     if wishes.outputs.report != STDOUT and not wishes.quiet:
-        show_compared(str(found), found.rows)
+        show_compared(str(comparison), comparison.rows)
     return 0

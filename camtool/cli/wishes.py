@@ -97,10 +97,10 @@ class UserRequests:
             self._suspends += 1
             return
         if name in BY_HAND:
-            now, last = time.monotonic(), self._interrupted
-            self._interrupted = now
+            time_s, last = time.monotonic(), self._interrupted
+            self._interrupted = time_s
             if last is not None:
-                self._closes += now - last >= self._one_s
+                self._closes += time_s - last >= self._one_s
                 return
         else:
             self._ended = True
@@ -147,11 +147,11 @@ class Messages:
         while self._waiting and takes_more(sys.stderr):
             self.rest(1)
 
-    def rest(self, most: int | None = None) -> None:
+    def rest(self, max_count: int | None = None) -> None:
         """Write the messages that were kept."""
-        for each in self._waiting[:most]:
+        for each in self._waiting[:max_count]:
             say(f"camtool: {one_line(each)}", quiet=self._quiet)
-        del self._waiting[:most]
+        del self._waiting[:max_count]
 
 
 @contextmanager
@@ -168,8 +168,8 @@ def keys_of_terminal() -> Iterator[Callable[[], str]]:
     before = termios.tcgetattr(handle)
 
     def key() -> str:
-        ready, _, _ = select.select([handle], [], [], 0)
-        if not ready:
+        readable, _, _ = select.select([handle], [], [], 0)
+        if not readable:
             return ""
         pressed = os.read(handle, 1)
         if not pressed:

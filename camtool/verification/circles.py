@@ -84,11 +84,11 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[FullCircle]:
     first = np.concatenate([[0], np.flatnonzero(breaks) + 1])
     last = np.concatenate([first[1:], [len(arcs)]]) - 1
     length = np.abs(np.add.reduceat(toolpath.sweeps_of(arcs), first)) * radius[first]
-    full = np.flatnonzero(length >= 2.0 * np.pi * radius[first] - gap_mm)
+    full_turns = np.flatnonzero(length >= 2.0 * np.pi * radius[first] - gap_mm)
     return _deepest(
         [
             _circle(toolpath, arcs[first[run] : last[run] + 1], float(radius[first[run]]))
-            for run in full
+            for run in full_turns
         ],
         gap_mm,
     )
@@ -123,23 +123,23 @@ def _circle(toolpath: Toolpath, run: Ints, radius: float) -> FullCircle:
 
 def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
     """Return G, F max, F min and D of the bins (720, 9) of `camtool.kernels.judging`."""
-    seen = bins[bins[:, 0] > 0.0]
-    if len(seen) < MIN_BINS:
+    filled = bins[bins[:, 0] > 0.0]
+    if len(filled) < MIN_BINS:
         return NO_FIGURES
-    least, largest = np.sqrt(seen[:, 3]), np.sqrt(seen[:, 6])
+    smallest, largest = np.sqrt(filled[:, 3]), np.sqrt(filled[:, 6])
     # The points of a bin that does not reach from edge to edge make a shorter arc.
-    mean = np.clip(mean_radii(bins)[bins[:, 0] > 0.0], least, largest)
+    mean = np.clip(mean_radii(bins)[bins[:, 0] > 0.0], smallest, largest)
     return CircleFigures(
-        circular_mm=circular_error(seen),
+        circular_mm=circular_error(filled),
         radial_max_mm=float(largest.max()) - radius_mm,
-        radial_min_mm=float(least.min()) - radius_mm,
+        radial_min_mm=float(smallest.min()) - radius_mm,
         radial_mean_mm=float(mean.mean()) - radius_mm,
     )
 
 
-def mean_points(seen: Floats) -> Floats:
+def mean_points(filled: Floats) -> Floats:
     """Return (J, 2) mean points about the programmed centre, of bins (J, 9) that are not empty."""
-    return np.asarray(seen[:, 1:3] / seen[:, :1])
+    return np.asarray(filled[:, 1:3] / filled[:, :1])
 
 
 def mean_radii(bins: Floats) -> Floats:
@@ -151,14 +151,14 @@ def mean_radii(bins: Floats) -> Floats:
         return np.asarray(np.hypot(mean[:, 0], mean[:, 1]) * (half / math.sin(half)))
 
 
-def circular_error(seen: Floats) -> float:
+def circular_error(filled: Floats) -> float:
     """Return G from bins (J, 9) that are not empty, J ≥ 1; NaN where they do not surround the
     centre."""
-    mean = mean_points(seen)
+    mean = mean_points(filled)
     if not _surrounds(mean):
         return math.nan
     centre = least_squares_centre(mean)
-    inner, outer = seen[:, 4:6] - centre, seen[:, 7:9] - centre
+    inner, outer = filled[:, 4:6] - centre, filled[:, 7:9] - centre
     return float(np.hypot(*outer.T).max() - np.hypot(*inner.T).min())
 
 
@@ -242,8 +242,8 @@ def reversal_figures(bins: Floats, ccw: bool) -> ReversalFigures:
     """Return the reversals of one circle from its bins (B, 9) about the programmed centre."""
     radius = mean_radii(bins)
     with np.errstate(invalid="ignore"):
-        least, largest = np.sqrt(bins[:, 3]), np.sqrt(bins[:, 6])
-    steps, spikes = _steps(radius, least, largest, 1 if ccw else -1)
+        smallest, largest = np.sqrt(bins[:, 3]), np.sqrt(bins[:, 6])
+    steps, spikes = _steps(radius, smallest, largest, 1 if ccw else -1)
     return ReversalFigures(
         (steps[0], steps[1], steps[2], steps[3]),
         (spikes[0], spikes[1], spikes[2], spikes[3]),
@@ -252,37 +252,37 @@ def reversal_figures(bins: Floats, ccw: bool) -> ReversalFigures:
 
 
 def _steps(
-    radius: Floats, least: Floats, largest: Floats, turn: int
+    radius: Floats, smallest: Floats, largest: Floats, turn: int
 ) -> tuple[list[float], list[float]]:
     """Return steps and spikes at the lower edges of the bins at `QUADRANTS_DEG`; `turn` is +1 for
     growing angles."""
     count = len(radius)
-    at = (np.array(QUADRANTS_DEG) * count // 360)[:, None]
+    edge_bins = (np.array(QUADRANTS_DEG) * count // 360)[:, None]
     reach = np.arange(NEAR_BINS, FAR_BINS)
     # The line through the bins of a side by least squares, at the edge, which is a sum of them.
-    away = reach + 0.5 - (reach + 0.5).mean()
-    weights = 1.0 / len(away) - (reach + 0.5).mean() * away / (away * away).sum()
+    centred = reach + 0.5 - (reach + 0.5).mean()
+    weights = 1.0 / len(centred) - (reach + 0.5).mean() * centred / (centred * centred).sum()
     high, low = (
-        (radius[(at + rows) % count] * weights).sum(axis=1) for rows in (reach, -1 - reach)
+        (radius[(edge_bins + rows) % count] * weights).sum(axis=1) for rows in (reach, -1 - reach)
     )
-    near = (at + np.arange(-NEAR_BINS, NEAR_BINS)) % count
-    seen = np.isfinite(largest[near])
-    out = np.where(seen, largest[near], -np.inf).max(axis=1) - np.maximum(high, low)
-    into = np.minimum(high, low) - np.where(seen, least[near], np.inf).min(axis=1)
-    spike = np.where(out >= into, np.maximum(out, 0.0), -np.maximum(into, 0.0))
-    known = np.isfinite(high) & np.isfinite(low)
-    step = np.where(known, turn * (high - low), np.nan)
-    return step.tolist(), np.where(known, spike, np.nan).tolist()
+    near_bins = (edge_bins + np.arange(-NEAR_BINS, NEAR_BINS)) % count
+    is_filled = np.isfinite(largest[near_bins])
+    outward = np.where(is_filled, largest[near_bins], -np.inf).max(axis=1) - np.maximum(high, low)
+    inward = np.minimum(high, low) - np.where(is_filled, smallest[near_bins], np.inf).min(axis=1)
+    spike = np.where(outward >= inward, np.maximum(outward, 0.0), -np.maximum(inward, 0.0))
+    is_finite = np.isfinite(high) & np.isfinite(low)
+    step = np.where(is_finite, turn * (high - low), np.nan)
+    return step.tolist(), np.where(is_finite, spike, np.nan).tolist()
 
 
 def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
     """Return B of X and of Y by least squares; NaN when less than half of the bins are filled."""
-    seen = np.isfinite(radius)
-    if seen.sum() < len(radius) // 2:
+    is_filled = np.isfinite(radius)
+    if is_filled.sum() < len(radius) // 2:
         return math.nan, math.nan
     table = _terms(len(radius), 1.0 if ccw else -1.0)
-    found = np.linalg.lstsq(table[seen], radius[seen], rcond=None)[0]
-    return float(found[3]), float(found[4])
+    solution = np.linalg.lstsq(table[is_filled], radius[is_filled], rcond=None)[0]
+    return float(solution[3]), float(solution[4])
 
 
 @cache
@@ -311,12 +311,14 @@ class CirclePairs:
         if not circles:
             return
         table = np.array([(*one.centre_mm, one.radius_mm) for one in circles])
-        free = np.array([not one.ccw for one in circles])
+        is_free = np.array([not one.ccw for one in circles])
         for first, one in enumerate(circles):
-            if one.ccw and free.any():
-                apart = np.abs(table - table[first]).max(axis=1)
-                for second in np.flatnonzero(free & (apart <= SAME_SHARE * one.radius_mm))[:1]:
-                    free[second] = False
+            if one.ccw and is_free.any():
+                differences = np.abs(table - table[first]).max(axis=1)
+                for second in np.flatnonzero(
+                    is_free & (differences <= SAME_SHARE * one.radius_mm)
+                )[:1]:
+                    is_free[second] = False
                     self._partner[first], self._partner[int(second)] = int(second), first
 
     def partner(self, circle: int) -> int | None:
@@ -341,8 +343,10 @@ class CirclePairs:
 def bidirectional_figures(circle: FullCircle, bins: Floats) -> BidirectionalFigures:
     """Return the figures of a circle from the bins (2 B, 9) of both directions; NaN without
     points."""
-    seen = bins[bins[:, 0] > 0.0]
-    if len(seen) == 0:
+    filled = bins[bins[:, 0] > 0.0]
+    if len(filled) == 0:
         return BidirectionalFigures(circle, math.nan, math.nan)
-    about = np.hypot(*mean_points(seen).T).mean()
-    return BidirectionalFigures(circle, circular_error(seen), float(about) - circle.radius_mm)
+    mean_radius = np.hypot(*mean_points(filled).T).mean()
+    return BidirectionalFigures(
+        circle, circular_error(filled), float(mean_radius) - circle.radius_mm
+    )

@@ -88,23 +88,23 @@ class Conformance(Struct, frozen=True, eq=False):
 
 
 def conformance_of(
-    decoded: Toolpath, asked: ProgramRequest, *, flat_cuts: bool, sample_mm: float
+    decoded: Toolpath, request: ProgramRequest, *, flat_cuts: bool, sample_mm: float
 ) -> Conformance:
     """Compare the moves of a program with those that the job asks for."""
-    mine = Side.of(decoded.first(decoded.executed_rows), flat_cuts=flat_cuts)
-    count = len(mine.cuts.rows)
-    if _equal_toolpaths(decoded, asked.written):
+    decoded_side = Side.of(decoded.first(decoded.executed_rows), flat_cuts=flat_cuts)
+    count = len(decoded_side.cuts.rows)
+    if _equal_toolpaths(decoded, request.written):
         return Conformance(moves=count, alike=count)
-    other = Side.of(asked.written.first(asked.written.executed_rows), flat_cuts=flat_cuts)
-    wanted = Side.of(asked.wanted.first(asked.wanted.executed_rows), flat_cuts=flat_cuts)
-    alike = MatchingMoves.of(mine.toolpath, other.toolpath)
-    place = compare_places(mine, other, wanted, alike, asked, sample_mm)
-    settings = compare_settings(mine, other, alike, place.pairs, asked)
+    other = Side.of(request.written.first(request.written.executed_rows), flat_cuts=flat_cuts)
+    wanted_side = Side.of(request.wanted.first(request.wanted.executed_rows), flat_cuts=flat_cuts)
+    matching = MatchingMoves.of(decoded_side.toolpath, other.toolpath)
+    place = compare_places(decoded_side, other, wanted_side, matching, request, sample_mm)
+    settings = compare_settings(decoded_side, other, matching, place.pairs, request)
     return Conformance(
         place=place.findings,
         settings=settings,
         moves=count,
-        alike=int((alike.in_written & mine.cuts.is_cut).sum()),
+        alike=int((matching.in_written & decoded_side.cuts.is_cut).sum()),
         off_mm=place.off_mm,
     )
 
@@ -160,8 +160,8 @@ class MatchingMoves(Struct, frozen=True, eq=False):
     def of(cls, decoded: Toolpath, written: Toolpath) -> MatchingMoves:
         """Number the moves of both sides; points are the same within rounding
         (POSITION_EPS_MM)."""
-        both = np.concatenate([_numbers(decoded), _numbers(written)])
-        number = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
+        numbers = np.concatenate([_numbers(decoded), _numbers(written)])
+        number = np.unique(numbers, axis=0, return_inverse=True)[1].reshape(-1)
         return cls(number[: len(decoded)], number[len(decoded) :])
 
     @property
@@ -180,8 +180,8 @@ def _numbers(toolpath: Toolpath) -> Ints:
     POSITION_EPS_MM."""
     centre = np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0)
     places = np.concatenate([toolpath.starts, toolpath.end, centre], axis=1)
-    whole = np.rint(places / POSITION_EPS_MM).astype(np.int64)
-    return np.concatenate([toolpath.kind[:, None], whole], axis=1)
+    rounded = np.rint(places / POSITION_EPS_MM).astype(np.int64)
+    return np.concatenate([toolpath.kind[:, None], rounded], axis=1)
 
 
 # Where a program cuts, against where it was asked to cut, at the resolution of its dialect.
@@ -202,35 +202,41 @@ class PlaceComparison(Struct, frozen=True, eq=False):
 
 
 def compare_places(
-    mine: Side,
+    decoded: Side,
     other: Side,
     wanted: Side,
-    alike: MatchingMoves,
-    asked: ProgramRequest,
+    matching: MatchingMoves,
+    request: ProgramRequest,
     sample_mm: float,
 ) -> PlaceComparison:
-    """Compare `mine`, the decoded side, with `other`, the written side, and the reverse."""
-    limits = asked.limits_mm
-    holes = compare_holes(mine, other, limits)
-    there = near_pairs(mine.cuts, ~alike.in_written, other.moves, limits, sample_mm)
-    back = near_pairs(other.cuts, ~alike.in_decoded, mine.moves, limits, sample_mm)
-    _near_wanted(there, wanted.moves, limits)
-    _written_from_cut(back, wanted.moves, mine.moves, limits)
+    """Compare `decoded`, the decoded side, with `other`, the written side, and the reverse."""
+    limits = request.limits_mm
+    holes = compare_holes(decoded, other, limits)
+    from_decoded = near_pairs(decoded.cuts, ~matching.in_written, other.moves, limits, sample_mm)
+    from_written = near_pairs(other.cuts, ~matching.in_decoded, decoded.moves, limits, sample_mm)
+    _near_wanted(from_decoded, wanted.moves, limits)
+    _written_from_cut(from_written, wanted.moves, decoded.moves, limits)
     trips = encloses_area(other.cuts, limits[0])
-    written = other.moves.contour_of(there.move)
-    turns = reversed_samples(there, trips[written], limits)
-    written = other.moves.contour_of(back.samples.segment[back.point])
-    turns_back = reversed_samples(back, trips[written], limits)
+    written = other.moves.contour_of(from_decoded.move)
+    turns = reversed_samples(from_decoded, trips[written], limits)
+    written = other.moves.contour_of(from_written.samples.segment[from_written.point])
+    turns_back = reversed_samples(from_written, trips[written], limits)
     findings = (
-        *_missing_findings(back, holes.undrilled, limits),
-        *_extra_findings(there, holes.drilled, limits),
+        *_missing_findings(from_written, holes.undrilled, limits),
+        *_extra_findings(from_decoded, holes.drilled, limits),
         *holes.findings,
-        *_plunge_findings(mine, (other, wanted), alike, limits),
-        *_repeated_cuts(mine, other, alike, limits),
-        *(reversal_findings(there, turns) if len(turns) else reversal_findings(back, turns_back)),
+        *_plunge_findings(decoded, (other, wanted), matching, limits),
+        *_repeated_cuts(decoded, other, matching, limits),
+        *(
+            reversal_findings(from_decoded, turns)
+            if len(turns)
+            else reversal_findings(from_written, turns_back)
+        ),
     )
-    findings = findings or tuple(_changed_ends(mine.toolpath, other.toolpath))
-    return PlaceComparison(findings, max(there.off_mm, back.off_mm), there.rows_along())
+    findings = findings or tuple(_changed_ends(decoded.toolpath, other.toolpath))
+    return PlaceComparison(
+        findings, max(from_decoded.off_mm, from_written.off_mm), from_decoded.rows_along()
+    )
 
 
 def _changed_ends(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
@@ -238,141 +244,141 @@ def _changed_ends(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
     elsewhere."""
     if not np.array_equal(decoded.kind, written.kind):
         return
-    off = np.linalg.norm(decoded.end - written.end, axis=1)
+    distances = np.linalg.norm(decoded.end - written.end, axis=1)
     arcs = np.flatnonzero(decoded.is_arc)
-    off[arcs] += np.linalg.norm(decoded.centre[arcs] - written.centre[arcs], axis=1)
-    rows = np.flatnonzero(decoded.is_motion & (off > POSITION_EPS_MM))
+    distances[arcs] += np.linalg.norm(decoded.centre[arcs] - written.centre[arcs], axis=1)
+    rows = np.flatnonzero(decoded.is_motion & (distances > POSITION_EPS_MM))
     if len(rows):
         yield MOVES_CHANGED(
             where=block_name(decoded, int(rows[0])),
-            measured=float(off[rows].max()),
+            measured=float(distances[rows].max()),
             moves=len(rows),
         )
 
 
-def _near_wanted(there: NearPairs, wanted: MoveIndex, limits: Limits) -> None:
+def _near_wanted(pairs: NearPairs, wanted_moves: MoveIndex, limits: Limits) -> None:
     """Mark samples near a wanted move as near, even where the writer would move otherwise."""
-    rest = np.flatnonzero(np.isinf(there.distance))
-    point, _, distance = wanted.pairs_within(
-        there.samples.points[rest], there.samples.z[rest], limits
+    unmatched = np.flatnonzero(np.isinf(pairs.distance))
+    point, _, distance = wanted_moves.pairs_within(
+        pairs.samples.points[unmatched], pairs.samples.z[unmatched], limits
     )
-    np.minimum.at(there.distance, rest[point], distance)
+    np.minimum.at(pairs.distance, unmatched[point], distance)
 
 
 def _written_from_cut(
-    back: NearPairs, wanted: MoveIndex, decoded: MoveIndex, limits: Limits
+    pairs: NearPairs, wanted_moves: MoveIndex, decoded: MoveIndex, limits: Limits
 ) -> None:
     """Mark written samples as near where the program cuts the wanted move behind them."""
-    rest = np.flatnonzero(np.isinf(back.distance))
-    part = back.samples.of(rest)
-    found, wrong_depth = nearest_at_height(part, None, wanted, limits)
-    known = np.flatnonzero((found.segment >= 0) & ~wrong_depth)
-    rest, move = rest[known], found.segment[known]
-    share = wanted.shares(part.points[known], move)
-    begin, end = wanted.cuts.heights(move).T
-    places = point_at(wanted.cuts.segments, move, share)
+    unmatched = np.flatnonzero(np.isinf(pairs.distance))
+    part = pairs.samples.of(unmatched)
+    nearest, wrong_depth = nearest_at_height(part, None, wanted_moves, limits)
+    is_at_height = np.flatnonzero((nearest.segment >= 0) & ~wrong_depth)
+    unmatched, move = unmatched[is_at_height], nearest.segment[is_at_height]
+    share = wanted_moves.shares(part.points[is_at_height], move)
+    begin, end = wanted_moves.cuts.heights(move).T
+    places = point_at(wanted_moves.cuts.segments, move, share)
     point, _, distance = decoded.pairs_within(places, begin + share * (end - begin), limits)
-    np.minimum.at(back.distance, rest[point], distance)
+    np.minimum.at(pairs.distance, unmatched[point], distance)
 
 
 _MISSING = CONTOUR_MISSING_ELSEWHERE, CONTOUR_MISSING_OTHER_DEPTH, CONTOUR_MISSING_NOTHING_CUT
 _EXTRA = EXTRA_CUT_ELSEWHERE, EXTRA_CUT_OTHER_DEPTH, EXTRA_CUT_NOTHING_ASKED
 
 
-def _missing_findings(back: NearPairs, undrilled: Bools, limits: Limits) -> Iterator[Finding]:
+def _missing_findings(pairs: NearPairs, undrilled: Bools, limits: Limits) -> Iterator[Finding]:
     """Yield CONTOUR_MISSING for written contours, at the block that cuts nearest."""
-    decoded = back.others.cuts
+    decoded = pairs.others.cuts
 
     def block(part: UncoveredContour) -> str:
-        known = part.nearest >= 0
-        return block_name(decoded.toolpath, int(decoded.row[part.nearest])) if known else ""
+        has_nearest = part.nearest >= 0
+        return block_name(decoded.toolpath, int(decoded.row[part.nearest])) if has_nearest else ""
 
-    return _uncovered_findings(back, undrilled, limits, _MISSING, block)
+    return _uncovered_findings(pairs, undrilled, limits, _MISSING, block)
 
 
-def _extra_findings(there: NearPairs, drilled: Bools, limits: Limits) -> Iterator[Finding]:
+def _extra_findings(pairs: NearPairs, drilled: Bools, limits: Limits) -> Iterator[Finding]:
     """Yield EXTRA_CUT for contours of the program, at their own blocks."""
 
     def block(part: UncoveredContour) -> str:
-        return block_name(there.cuts.toolpath, part.row)
+        return block_name(pairs.cuts.toolpath, part.row)
 
-    return _uncovered_findings(there, drilled, limits, _EXTRA, block)
+    return _uncovered_findings(pairs, drilled, limits, _EXTRA, block)
 
 
 def _uncovered_findings(
-    found: NearPairs,
+    pairs: NearPairs,
     drilled: Bools,
     limits: Limits,
     sentences: PlaceSentences,
     place: Callable[[UncoveredContour], str],
 ) -> Iterator[Finding]:
     """Yield a finding for each contour of which a sample is near nothing on the other side."""
-    samples = found.samples.of(np.flatnonzero(np.isinf(found.distance)))
-    nearest = nearest_at_height(samples, None, found.others, limits)
-    parts = list(uncovered_contours(found.cuts, samples, nearest, drilled, limits))
-    return uncovered_findings(parts, found.cuts, limits[0], sentences, place)
+    samples = pairs.samples.of(np.flatnonzero(np.isinf(pairs.distance)))
+    nearest_moves = nearest_at_height(samples, None, pairs.others, limits)
+    parts = list(uncovered_contours(pairs.cuts, samples, nearest_moves, drilled, limits))
+    return uncovered_findings(parts, pairs.cuts, limits[0], sentences, place)
 
 
 def _plunge_findings(
-    mine: Side, others: tuple[Side, Side], alike: MatchingMoves, limits: Limits
+    side: Side, other_sides: tuple[Side, Side], matching: MatchingMoves, limits: Limits
 ) -> Iterator[Finding]:
     """Yield EXTRA_CUT for feeds straight down to where no cut was asked for, except holes, which
     are compared by `hole_findings`."""
-    toolpath = mine.toolpath
-    rows = np.flatnonzero(mine.plunges & ~alike.in_written)
-    rows = rows[~_is_at_place(toolpath.end[rows, :2], mine.holes.at)]
+    toolpath = side.toolpath
+    rows = np.flatnonzero(side.plunges & ~matching.in_written)
+    rows = rows[~_is_at_place(toolpath.end[rows, :2], side.holes.at)]
     fine = np.zeros(len(rows), dtype=np.bool_)
-    for other in others:
+    for other in other_sides:
         ends = toolpath.end[rows]
         fine[other.moves.pairs_within(ends[:, :2], ends[:, 2], limits)[0]] = True
-        deep = other.toolpath.end[other.plunges]
-        one, plunge = near_points(ends[:, :2], deep[:, :2], limits[0])
-        fine[one[deep[plunge, 2] <= ends[one, 2] + limits[1]]] = True
-    bad = rows[~fine]
-    for row, more in first_items(bad.tolist()):
+        plunge_ends = other.toolpath.end[other.plunges]
+        one, plunge = near_points(ends[:, :2], plunge_ends[:, :2], limits[0])
+        fine[one[plunge_ends[plunge, 2] <= ends[one, 2] + limits[1]]] = True
+    unexplained = rows[~fine]
+    for row, other_count in first_items(unexplained.tolist()):
         yield EXTRA_CUT_PLUNGE(
             where=f"{block_name(toolpath, row)} at {at_point(toolpath.end[row])}",
             measured=toolpath.end[row, 2],
-            more=more,
+            more=other_count,
         )
 
 
 def _is_at_place(points: Floats, places: Floats) -> Bools:
     """Return (J,) true for points (J, 2) that are one of the places (K, 2)."""
-    known = {tuple(place) for place in np.rint(places / POSITION_EPS_MM).astype(int).tolist()}
-    mine = np.rint(points / POSITION_EPS_MM).astype(int).tolist()
-    return np.array([tuple(point) in known for point in mine], dtype=np.bool_)
+    place_set = {tuple(place) for place in np.rint(places / POSITION_EPS_MM).astype(int).tolist()}
+    rounded = np.rint(points / POSITION_EPS_MM).astype(int).tolist()
+    return np.array([tuple(point) in place_set for point in rounded], dtype=np.bool_)
 
 
 def _repeated_cuts(
-    mine: Side, other: Side, alike: MatchingMoves, limits: Limits
+    side: Side, other: Side, matching: MatchingMoves, limits: Limits
 ) -> Iterator[Finding]:
     """Yield EXTRA_CUT for moves that are cut more often than the job asks."""
-    cutting = np.flatnonzero(mine.cuts.is_cut)
+    cutting = np.flatnonzero(side.cuts.is_cut)
     number, first, counts = np.unique(
-        alike.decoded[cutting], return_index=True, return_counts=True
+        matching.decoded[cutting], return_index=True, return_counts=True
     )
-    asked = np.bincount(
-        alike.written[other.cuts.is_cut], minlength=int(number.max(initial=-1)) + 1
+    wanted_counts = np.bincount(
+        matching.written[other.cuts.is_cut], minlength=int(number.max(initial=-1)) + 1
     )[number]
-    more_often = np.flatnonzero((counts > 1) & (counts > asked))
+    more_often = np.flatnonzero((counts > 1) & (counts > wanted_counts))
     rows = cutting[first[more_often]]
-    segment = mine.cuts.first[rows].astype(np.int64)
+    segment = side.cuts.first[rows].astype(np.int64)
     half = np.full(len(rows), 0.5)
-    middle = point_at(mine.cuts.segments, segment, half)
-    z = mine.cuts.heights(segment).mean(axis=1)
+    middle = point_at(side.cuts.segments, segment, half)
+    z = side.cuts.heights(segment).mean(axis=1)
     point, move, _ = other.moves.pairs_within(middle, z, limits)
     moves = np.column_stack([point, other.cuts.row[move]])
     lie = np.bincount(np.unique(moves, axis=0)[:, 0], minlength=len(rows))
-    bad = np.flatnonzero(counts[more_often] > np.maximum(lie, 1))
-    for place, more in first_items(bad.tolist()):
+    repeated = np.flatnonzero(counts[more_often] > np.maximum(lie, 1))
+    for place, other_count in first_items(repeated.tolist()):
         row = int(rows[place])
         times, limit = int(counts[more_often][place]), max(int(lie[place]), 1)
         yield EXTRA_CUT_AGAIN(
-            where=f"{block_name(mine.toolpath, row)} near {at_point(middle[place])}",
+            where=f"{block_name(side.toolpath, row)} near {at_point(middle[place])}",
             measured=times,
             limit=limit,
-            more=more,
+            more=other_count,
         )
 
 
@@ -393,21 +399,21 @@ COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
 
 
 def compare_settings(
-    mine: Side, other: Side, alike: MatchingMoves, pairs: Ints, asked: ProgramRequest
+    side: Side, other: Side, matching: MatchingMoves, pairs: Ints, request: ProgramRequest
 ) -> tuple[Finding, ...]:
     """Compare feeds, spindle, tool, coolant, corners, dwells, clearance and end; `pairs` (P, 2)
     are rows of both sides that lie on each other, besides those that are alike."""
-    both = _SettingPairs.of(mine, other, alike, pairs, asked.limits_mm)
+    setting_pairs = _SettingPairs.of(side, other, matching, pairs, request.limits_mm)
     return (
-        *_feed_findings(both, asked),
-        *_air_feed_findings(mine.toolpath, other.toolpath),
-        *_spindle_findings(both),
-        *_tool_findings(both),
-        *_coolant_findings(both),
-        *_corner_findings(both),
-        *_dwell_findings(mine.toolpath, other.toolpath, asked),
-        *_clearance_findings(mine, other, alike, asked),
-        *_end_findings(mine.toolpath, other.toolpath, asked),
+        *_feed_findings(setting_pairs, request),
+        *_air_feed_findings(side.toolpath, other.toolpath),
+        *_spindle_findings(setting_pairs),
+        *_tool_findings(setting_pairs),
+        *_coolant_findings(setting_pairs),
+        *_corner_findings(setting_pairs),
+        *_dwell_findings(side.toolpath, other.toolpath, request),
+        *_clearance_findings(side, other, matching, request),
+        *_end_findings(side.toolpath, other.toolpath, request),
     )
 
 
@@ -422,45 +428,49 @@ class _SettingPairs(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(
-        cls, mine: Side, other: Side, alike: MatchingMoves, pairs: Ints, limits: Limits
+        cls, side: Side, other: Side, matching: MatchingMoves, pairs: Ints, limits: Limits
     ) -> _SettingPairs:
         """Pair rows: the given pairs, all rows that are alike, each plunge that is not alike with
         every written plunge, and each cut without any of these with the written moves at its
         middle, whatever their direction."""
-        at_work, there = mine.cuts.is_cut | mine.plunges, other.cuts.is_cut | other.plunges
-        rows, written = np.flatnonzero(at_work), np.flatnonzero(there)
+        at_work, other_at_work = side.cuts.is_cut | side.plunges, other.cuts.is_cut | other.plunges
+        rows, written = np.flatnonzero(at_work), np.flatnonzero(other_at_work)
         # One of several written rows that are alike, with the same settings, is enough.
-        states = np.column_stack([alike.written, *_settings(other.toolpath)])[written]
+        states = np.column_stack([matching.written, *_settings(other.toolpath)])[written]
         written = written[np.unique(states, axis=0, return_index=True)[1]]
-        order = written[np.argsort(alike.written[written], kind="stable")]
-        number = alike.written[order]
-        low = np.searchsorted(number, alike.decoded[rows], side="left")
-        high = np.searchsorted(number, alike.decoded[rows], side="right")
+        order = written[np.argsort(matching.written[written], kind="stable")]
+        number = matching.written[order]
+        low = np.searchsorted(number, matching.decoded[rows], side="left")
+        high = np.searchsorted(number, matching.decoded[rows], side="right")
         count = high - low
         begin = np.repeat(low - (np.cumsum(count) - count), count)
-        same = np.column_stack([np.repeat(rows, count), order[begin + np.arange(count.sum())]])
-        lone = rows[(count == 0) & mine.plunges[rows]]
+        alike_pairs = np.column_stack(
+            [np.repeat(rows, count), order[begin + np.arange(count.sum())]]
+        )
+        lone = rows[(count == 0) & side.plunges[rows]]
         plunges = written[other.plunges[written]]
         feeds = plunges[np.unique(other.toolpath.feed[plunges], return_index=True)[1]]
         entered = np.column_stack([np.repeat(lone, len(feeds)), np.tile(feeds, len(lone))])
-        paired = np.concatenate([same, pairs, entered])
-        alone = np.flatnonzero(mine.cuts.is_cut & ~np.isin(np.arange(len(at_work)), paired[:, 0]))
-        segment = mine.cuts.first[alone].astype(np.int64)
-        middle = point_at(mine.cuts.segments, segment, np.full(len(alone), 0.5))
-        z = mine.cuts.heights(segment).mean(axis=1)
+        paired = np.concatenate([alike_pairs, pairs, entered])
+        unpaired = np.flatnonzero(
+            side.cuts.is_cut & ~np.isin(np.arange(len(at_work)), paired[:, 0])
+        )
+        segment = side.cuts.first[unpaired].astype(np.int64)
+        middle = point_at(side.cuts.segments, segment, np.full(len(unpaired), 0.5))
+        z = side.cuts.heights(segment).mean(axis=1)
         point, move, _ = other.moves.pairs_within(middle, z, limits)
-        beside = np.column_stack([alone[point], other.cuts.row[move]])
-        every = np.concatenate([paired, np.unique(beside, axis=0)])
-        return cls(mine.toolpath, other.toolpath, rows, every)
+        nearby_pairs = np.column_stack([unpaired[point], other.cuts.row[move]])
+        every = np.concatenate([paired, np.unique(nearby_pairs, axis=0)])
+        return cls(side.toolpath, other.toolpath, rows, every)
 
-    def differing(self, same: Bools) -> tuple[Ints, Ints]:
-        """Return (R,) rows without a pair that is equal, `same` (P,), and the written row of one
-        pair of each."""
+    def differing(self, is_equal: Bools) -> tuple[Ints, Ints]:
+        """Return (R,) rows without a pair that is equal, `is_equal` (P,), and the written row of
+        one pair of each."""
         fine = np.zeros(len(self.decoded), dtype=np.bool_)
-        fine[self.pairs[same, 0]] = True
+        fine[self.pairs[is_equal, 0]] = True
         rows, first = np.unique(self.pairs[:, 0], return_index=True)
-        bad = ~fine[rows]
-        return rows[bad], self.pairs[first[bad], 1]
+        is_unequal = ~fine[rows]
+        return rows[is_unequal], self.pairs[first[is_unequal], 1]
 
 
 def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats, Ints]:
@@ -471,23 +481,25 @@ def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats, Ints]:
     spindle = (kind >= Kind.SPINDLE_CW) & (kind <= Kind.SPINDLE_OFF)
     turns = _last_value(spindle, np.where(kind == Kind.SPINDLE_OFF, SPINDLE_OFF, turning))
     tool = _last_value(kind == Kind.TOOL_CHANGE, toolpath.value)
-    off = _last_row(kind == Kind.COOLANT_OFF)
-    mist, flood = (_last_row(kind == one) > off for one in (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD))
+    off_row = _last_row(kind == Kind.COOLANT_OFF)
+    mist, flood = (
+        _last_row(kind == one) > off_row for one in (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD)
+    )
     return toolpath.feed, turns, tool, mist + 2 * flood
 
 
-def _last_row(given: Bools) -> Ints:
-    """Return (N,) the last row up to each where it is `given`, −1 before the first."""
-    return np.asarray(np.maximum.accumulate(np.where(given, np.arange(len(given)), -1)))
+def _last_row(is_given: Bools) -> Ints:
+    """Return (N,) the last row up to each where it is `is_given`, −1 before the first."""
+    return np.asarray(np.maximum.accumulate(np.where(is_given, np.arange(len(is_given)), -1)))
 
 
-def _last_value(given: Bools, values: Floats) -> Floats:
-    """Return (N,) the last `given` value up to each row, 0 before the first."""
-    last = _last_row(given)
+def _last_value(is_given: Bools, values: Floats) -> Floats:
+    """Return (N,) the last `is_given` value up to each row, 0 before the first."""
+    last = _last_row(is_given)
     return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), 0.0)
 
 
-def _feed_findings(both: _SettingPairs, asked: ProgramRequest) -> Iterator[Finding]:
+def _feed_findings(setting_pairs: _SettingPairs, request: ProgramRequest) -> Iterator[Finding]:
     """Yield FEED_DIFFERS: an error for feeds that the job names, a remark for those it leaves to
     the machine.
 
@@ -496,31 +508,46 @@ def _feed_findings(both: _SettingPairs, asked: ProgramRequest) -> Iterator[Findi
     lines: the difference that follows from the directions is allowed, and twice the rounding, as
     both feeds are rounded.
     """
-    is_, wanted = both.decoded.feed[both.pairs[:, 0]], both.written.feed[both.pairs[:, 1]]
-    slant, other = (
-        _speed_ratios(both.decoded)[both.pairs[:, 0]],
-        _speed_ratios(both.written)[both.pairs[:, 1]],
+    decoded_feed, written_feed = (
+        setting_pairs.decoded.feed[setting_pairs.pairs[:, 0]],
+        setting_pairs.written.feed[setting_pairs.pairs[:, 1]],
     )
-    turned = np.abs(slant / other - 1.0)
-    share = np.where(turned > 0.0, 2.0 * FEED_SHARE, FEED_SHARE)
-    off = np.abs(is_ - wanted) > share * asked.feed_unit_mm_min + wanted * turned
-    rows, of = both.differing(~off)
-    for is_asked, row, other_row, moves in _by_severity(rows, of, asked.feed_named[of]):
+    slant, other = (
+        _speed_ratios(setting_pairs.decoded)[setting_pairs.pairs[:, 0]],
+        _speed_ratios(setting_pairs.written)[setting_pairs.pairs[:, 1]],
+    )
+    slant_change = np.abs(slant / other - 1.0)
+    share = np.where(slant_change > 0.0, 2.0 * FEED_SHARE, FEED_SHARE)
+    differs = (
+        np.abs(decoded_feed - written_feed)
+        > share * request.feed_unit_mm_min + written_feed * slant_change
+    )
+    rows, written_rows = setting_pairs.differing(~differs)
+    for is_asked, row, other_row, moves in _by_severity(
+        rows, written_rows, request.feed_named[written_rows]
+    ):
         yield (FEED_DIFFERS if is_asked else FEED_DIFFERS_OWN)(
-            where=block_name(both.decoded, row),
-            measured=both.decoded.feed[row],
-            limit=both.written.feed[other_row],
+            where=block_name(setting_pairs.decoded, row),
+            measured=setting_pairs.decoded.feed[row],
+            limit=setting_pairs.written.feed[other_row],
             moves=moves,
         )
 
 
-def _by_severity(rows: Ints, of: Ints, asked: Bools) -> Iterator[tuple[bool, int, int, int]]:
-    """Divide rows (R,), compared with written rows `of` (R,), into those whose setting the job
-    asks for, `asked` (R,), and the others: yield for each part that has any whether it is asked
-    for, its first row, the written row of that, and the number of its rows."""
-    for is_asked, which in ((True, asked), (False, ~asked)):
-        if which.any():
-            yield is_asked, int(rows[which][0]), int(of[which][0]), int(which.sum())
+def _by_severity(
+    rows: Ints, written_rows: Ints, is_requested: Bools
+) -> Iterator[tuple[bool, int, int, int]]:
+    """Divide rows (R,), compared with written rows `written_rows` (R,), into those whose setting
+    the job asks for, `is_requested` (R,), and the others: yield for each part that has any whether
+    it is asked for, its first row, the written row of that, and the number of its rows."""
+    for is_asked, is_part in ((True, is_requested), (False, ~is_requested)):
+        if is_part.any():
+            yield (
+                is_asked,
+                int(rows[is_part][0]),
+                int(written_rows[is_part][0]),
+                int(is_part.sum()),
+            )
 
 
 def _air_feed_findings(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
@@ -528,10 +555,12 @@ def _air_feed_findings(decoded: Toolpath, written: Toolpath) -> Iterator[Finding
     rapids = np.flatnonzero(written.kind == Kind.RAPID)
     feeds = np.flatnonzero(written.is_feed)
     lines = np.flatnonzero(decoded.is_feed & ~decoded.is_arc)
-    both = [(written, rapids), (written, feeds), (decoded, lines)]
-    places = [np.column_stack([each.starts_of(rows), each.end[rows]]) for each, rows in both]
-    whole = np.rint(np.concatenate(places) / POSITION_EPS_MM).astype(np.int64)
-    number = np.unique(whole, axis=0, return_inverse=True)[1].reshape(-1)
+    sides_and_rows = [(written, rapids), (written, feeds), (decoded, lines)]
+    places = [
+        np.column_stack([each.starts_of(rows), each.end[rows]]) for each, rows in sides_and_rows
+    ]
+    rounded = np.rint(np.concatenate(places) / POSITION_EPS_MM).astype(np.int64)
+    number = np.unique(rounded, axis=0, return_inverse=True)[1].reshape(-1)
     rapid, feed, line = np.split(number, np.cumsum([len(rapids), len(feeds)]))
     rows = lines[np.isin(line, np.setdiff1d(rapid, feed))]
     if len(rows):
@@ -551,18 +580,25 @@ def _speed_ratios(toolpath: Toolpath) -> Floats:
     return np.asarray(np.where(line, np.hypot(*run.T) / np.where(line, faster, 1.0), 1.0))
 
 
-def _spindle_findings(both: _SettingPairs) -> Iterator[Finding]:
+def _spindle_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
     """Yield SPINDLE_DIFFERS: an error where the job starts the spindle, otherwise a remark."""
-    is_, wanted = _settings(both.decoded)[1], _settings(both.written)[1]
-    rows, of = both.differing(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
-    for is_asked, row, other_row, moves in _by_severity(rows, of, wanted[of] != SPINDLE_OFF):
+    decoded_speed, written_speed = (
+        _settings(setting_pairs.decoded)[1],
+        _settings(setting_pairs.written)[1],
+    )
+    rows, written_rows = setting_pairs.differing(
+        decoded_speed[setting_pairs.pairs[:, 0]] == written_speed[setting_pairs.pairs[:, 1]]
+    )
+    for is_asked, row, other_row, moves in _by_severity(
+        rows, written_rows, written_speed[written_rows] != SPINDLE_OFF
+    ):
         yield (SPINDLE_DIFFERS if is_asked else SPINDLE_DIFFERS_UNASKED)(
-            where=block_name(both.decoded, row),
-            measured=is_[row],
-            limit=wanted[other_row],
+            where=block_name(setting_pairs.decoded, row),
+            measured=decoded_speed[row],
+            limit=written_speed[other_row],
             moves=moves,
-            turning=_spindle_words(float(is_[row])),
-            wanted=_spindle_words(float(wanted[other_row])),
+            turning=_spindle_words(float(decoded_speed[row])),
+            wanted=_spindle_words(float(written_speed[other_row])),
         )
 
 
@@ -572,46 +608,65 @@ def _spindle_words(turns: float) -> str:
     return f"the spindle at {abs(turns):g} rev/min {'CW' if turns > SPINDLE_OFF else 'CCW'}"
 
 
-def _tool_findings(both: _SettingPairs) -> Iterator[Finding]:
+def _tool_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for cuts with another tool than in the written program."""
-    is_, wanted = _settings(both.decoded)[2], _settings(both.written)[2]
-    rows, of = both.differing(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
-    for is_asked, row, other_row, moves in _by_severity(rows, of, wanted[of] != NO_TOOL):
+    decoded_tool, written_tool = (
+        _settings(setting_pairs.decoded)[2],
+        _settings(setting_pairs.written)[2],
+    )
+    rows, written_rows = setting_pairs.differing(
+        decoded_tool[setting_pairs.pairs[:, 0]] == written_tool[setting_pairs.pairs[:, 1]]
+    )
+    for is_asked, row, other_row, moves in _by_severity(
+        rows, written_rows, written_tool[written_rows] != NO_TOOL
+    ):
         yield (SETTING_DIFFERS_TOOL if is_asked else SETTING_DIFFERS_TOOL_UNASKED)(
-            where=block_name(both.decoded, row),
-            measured=is_[row],
-            limit=wanted[other_row],
+            where=block_name(setting_pairs.decoded, row),
+            measured=decoded_tool[row],
+            limit=written_tool[other_row],
             moves=moves,
         )
 
 
-def _coolant_findings(both: _SettingPairs) -> Iterator[Finding]:
+def _coolant_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for cuts with other coolant than in the written program."""
-    is_, wanted = _settings(both.decoded)[3], _settings(both.written)[3]
-    rows, of = both.differing(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
-    for is_asked, row, other_row, moves in _by_severity(rows, of, wanted[of] != 0):
+    decoded_coolant, written_coolant = (
+        _settings(setting_pairs.decoded)[3],
+        _settings(setting_pairs.written)[3],
+    )
+    rows, written_rows = setting_pairs.differing(
+        decoded_coolant[setting_pairs.pairs[:, 0]] == written_coolant[setting_pairs.pairs[:, 1]]
+    )
+    for is_asked, row, other_row, moves in _by_severity(
+        rows, written_rows, written_coolant[written_rows] != 0
+    ):
         yield (SETTING_DIFFERS_COOLANT if is_asked else SETTING_DIFFERS_COOLANT_UNASKED)(
-            where=block_name(both.decoded, row),
+            where=block_name(setting_pairs.decoded, row),
             moves=moves,
-            coolant=COOLANTS[int(is_[row])],
-            wanted=COOLANTS[int(wanted[other_row])],
+            coolant=COOLANTS[int(decoded_coolant[row])],
+            wanted=COOLANTS[int(written_coolant[other_row])],
         )
 
 
-def _corner_findings(both: _SettingPairs) -> Iterator[Finding]:
+def _corner_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for moves whose corners the controller may round farther than in the
     written program. A program without a mode leaves corners to the machine and is not compared."""
-    is_, wanted = _corner_tolerances(both.decoded), _corner_tolerances(both.written)
-    looser = is_[both.pairs[:, 0]] > wanted[both.pairs[:, 1]]
-    rows, of = both.differing(~looser)
+    decoded_limit, written_limit = (
+        _corner_tolerances(setting_pairs.decoded),
+        _corner_tolerances(setting_pairs.written),
+    )
+    looser = decoded_limit[setting_pairs.pairs[:, 0]] > written_limit[setting_pairs.pairs[:, 1]]
+    rows, written_rows = setting_pairs.differing(~looser)
     if len(rows):
-        row, limit = int(rows[0]), float(wanted[of][0])
+        row, limit = int(rows[0]), float(written_limit[written_rows][0])
         yield (SETTING_DIFFERS_CORNERS if limit else SETTING_DIFFERS_NO_CORNERS)(
-            where=block_name(both.decoded, row),
-            measured=is_[row] if np.isfinite(is_[row]) else None,
+            where=block_name(setting_pairs.decoded, row),
+            measured=decoded_limit[row] if np.isfinite(decoded_limit[row]) else None,
             limit=limit,
             moves=len(rows),
-            room="as far as the moves allow" if np.isinf(is_[row]) else f"within {is_[row]:g} mm",
+            room="as far as the moves allow"
+            if np.isinf(decoded_limit[row])
+            else f"within {decoded_limit[row]:g} mm",
         )
 
 
@@ -626,67 +681,73 @@ def _corner_tolerances(toolpath: Toolpath) -> Floats:
 
 
 def _dwell_findings(
-    decoded: Toolpath, written: Toolpath, asked: ProgramRequest
+    decoded: Toolpath, written: Toolpath, request: ProgramRequest
 ) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS where the tool dwells for less than was asked, and where it dwells for
     longer: a warning in the stock, where it rubs, else a remark."""
-    wanted, found = (np.flatnonzero(each.kind == Kind.DWELL) for each in (written, decoded))
-    limits = np.array([asked.limits_mm[0], asked.limits_mm[0], asked.limits_mm[1]])
-    short = []
-    for row in wanted.tolist():
-        here = (np.abs(decoded.end[found] - written.end[row]) <= limits).all(axis=1)
-        waited = float(decoded.value[found[here]].sum())
+    written_dwells, decoded_dwells = (
+        np.flatnonzero(each.kind == Kind.DWELL) for each in (written, decoded)
+    )
+    limits = np.array([request.limits_mm[0], request.limits_mm[0], request.limits_mm[1]])
+    short_dwells = []
+    for row in written_dwells.tolist():
+        is_here = (np.abs(decoded.end[decoded_dwells] - written.end[row]) <= limits).all(axis=1)
+        waited = float(decoded.value[decoded_dwells[is_here]].sum())
         if waited < float(written.value[row]) - DWELL_S:
-            short.append((row, waited))
-    if short:
-        row, waited = short[0]
+            short_dwells.append((row, waited))
+    if short_dwells:
+        row, waited = short_dwells[0]
         yield SETTING_DIFFERS_DWELL(
             where=f"at {at_point(written.end[row])}",
             measured=waited,
             limit=written.value[row],
-            places=len(short),
+            places=len(short_dwells),
         )
-    yield from _long_dwell_findings(decoded, written, found, wanted, limits)
+    yield from _long_dwell_findings(decoded, written, decoded_dwells, written_dwells, limits)
 
 
 def _long_dwell_findings(
-    decoded: Toolpath, written: Toolpath, found: Ints, wanted: Ints, limits: Floats
+    decoded: Toolpath,
+    written: Toolpath,
+    decoded_dwells: Ints,
+    written_dwells: Ints,
+    limits: Floats,
 ) -> Iterator[Finding]:
-    """Yield SETTING_DIFFERS where the tool dwells for longer than was asked; `found` and `wanted`
-    are the rows of dwells."""
-    one, other = found, wanted
+    """Yield SETTING_DIFFERS where the tool dwells for longer than was asked; `decoded_dwells` and
+    `written_dwells` are the rows of dwells."""
+    one, other = decoded_dwells, written_dwells
     longer: dict[bool, list[tuple[int, float, float]]] = {True: [], False: []}
-    seen: set[int] = set()
+    visited: set[int] = set()
     for row in one.tolist():
-        if row in seen:
+        if row in visited:
             continue
-        here = one[(np.abs(decoded.end[one] - decoded.end[row]) <= limits).all(axis=1)]
-        seen.update(here.tolist())
-        waited = float(decoded.value[here].sum())
-        near = (np.abs(written.end[other] - decoded.end[row]) <= limits).all(axis=1)
-        asked = float(written.value[other[near]].sum())
-        if waited > asked + DWELL_S:
-            deep = bool(decoded.end[row, 2] < STOCK_TOP_MM - limits[2])
-            longer[deep].append((row, waited, asked))
-    for deep, places in longer.items():
+        rows_here = one[(np.abs(decoded.end[one] - decoded.end[row]) <= limits).all(axis=1)]
+        visited.update(rows_here.tolist())
+        waited = float(decoded.value[rows_here].sum())
+        is_near = (np.abs(written.end[other] - decoded.end[row]) <= limits).all(axis=1)
+        wanted_s = float(written.value[other[is_near]].sum())
+        if waited > wanted_s + DWELL_S:
+            is_deep = bool(decoded.end[row, 2] < STOCK_TOP_MM - limits[2])
+            longer[is_deep].append((row, waited, wanted_s))
+    for is_deep, places in longer.items():
         if places:
-            row, waited, asked = places[0]
+            row, waited, wanted_s = places[0]
             yield SETTING_DIFFERS_WAIT(
-                severity=Severity.WARNING if deep else Severity.INFO,
+                severity=Severity.WARNING if is_deep else Severity.INFO,
                 where=f"{block_name(decoded, row)} at {at_point(decoded.end[row])}",
                 measured=waited,
-                limit=asked,
+                limit=wanted_s,
                 places=len(places),
-                where_it="in the stock" if deep else "in the air",
+                where_it="in the stock" if is_deep else "in the air",
             )
 
 
 def _clearance_findings(
-    mine: Side, other: Side, alike: MatchingMoves, asked: ProgramRequest
+    side: Side, other: Side, matching: MatchingMoves, request: ProgramRequest
 ) -> Iterator[Finding]:
     """Yield CLEARANCE_LOW for rapids in XY below the height asked for, except rapids in
     `written`."""
-    toolpath = mine.toolpath
+    toolpath = side.toolpath
     if is_flat(other.toolpath):
         return
     start, end = toolpath.starts, toolpath.end
@@ -695,28 +756,28 @@ def _clearance_findings(
     # The program does not choose the height at which it begins: only that of its first end counts.
     rising = (start[:, 2] == toolpath.start[2]) & (np.cumsum(toolpath.is_motion) == 1)
     low = np.where(rising, end[:, 2], low)
-    least = asked.safe_z_mm - asked.limits_mm[1]
-    bad = np.flatnonzero(goes & ~alike.in_written & (low < least))
-    if len(bad) == 0:
+    min_z = request.safe_z_mm - request.limits_mm[1]
+    low_rows = np.flatnonzero(goes & ~matching.in_written & (low < min_z))
+    if len(low_rows) == 0:
         return
-    row = int(bad[np.argmin(low[bad])])
-    yield (CLEARANCE_LOW if asked.safe_z_named else CLEARANCE_LOW_OWN)(
-        severity=_severity(float(low[row]), asked),
+    row = int(low_rows[np.argmin(low[low_rows])])
+    yield (CLEARANCE_LOW if request.safe_z_named else CLEARANCE_LOW_OWN)(
+        severity=_severity(float(low[row]), request),
         where=f"{block_name(toolpath, row)} near {at_point(end[row])}",
         measured=low[row],
-        limit=asked.safe_z_mm,
-        rapids=len(bad),
+        limit=request.safe_z_mm,
+        rapids=len(low_rows),
     )
 
 
-def _severity(low_mm: float, asked: ProgramRequest) -> Severity:
+def _severity(low_mm: float, request: ProgramRequest) -> Severity:
     """Return ERROR where the tool touches the stock or the job names the height, else WARNING."""
-    touching = low_mm <= STOCK_TOP_MM + asked.limits_mm[1]
-    return Severity.ERROR if touching or asked.safe_z_named else Severity.WARNING
+    touching = low_mm <= STOCK_TOP_MM + request.limits_mm[1]
+    return Severity.ERROR if touching or request.safe_z_named else Severity.WARNING
 
 
 def _end_findings(
-    decoded: Toolpath, written: Toolpath, asked: ProgramRequest
+    decoded: Toolpath, written: Toolpath, request: ProgramRequest
 ) -> Iterator[Finding]:
     """Yield END_DIFFERS for a program without END, and for one whose tool ends lower or elsewhere
     than asked."""
@@ -725,14 +786,14 @@ def _end_findings(
             where=block_name(decoded, len(decoded) - 1) if len(decoded) else ""
         )
     last, goal = _last_position(decoded), _last_position(written)
-    if last[2] < min(goal[2], asked.safe_z_mm) - asked.limits_mm[1]:
+    if last[2] < min(goal[2], request.safe_z_mm) - request.limits_mm[1]:
         yield END_DIFFERS(
-            severity=_severity(float(last[2]), asked),
+            severity=_severity(float(last[2]), request),
             where=f"at {at_point(last)}",
             measured=last[2],
             limit=goal[2],
         )
-    elif np.hypot(*(last - goal)[:2]) > asked.limits_mm[0]:
+    elif np.hypot(*(last - goal)[:2]) > request.limits_mm[0]:
         yield END_DIFFERS_PLACE(end=at_point(last), wanted=at_point(goal))
 
 

@@ -108,15 +108,17 @@ def paths_within(
         points = (chunk.commanded if commanded else chunk.slide)[:, :2]
         inside = ((points >= window[:, 0]) & (points <= window[:, 1])).all(axis=1)
         inside &= cutting[chunk.row]
-        which = np.flatnonzero(inside)[: MAX_SHOWN_SAMPLES - shown]
+        indices = np.flatnonzero(inside)[: MAX_SHOWN_SAMPLES - shown]
         line = np.concatenate([before, points])  # each polyline begins with the sample before it
-        for run in np.split(which, np.flatnonzero(np.diff(which) > 1) + 1) if len(which) else []:
+        for run in (
+            np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1) if len(indices) else []
+        ):
             first, end = int(run[0]) + len(before), int(run[-1]) + len(before) + 1
             if open_end and run[0] == 0:
                 paths[-1] = np.concatenate([paths[-1], line[first:end]])
             else:
                 paths.append(line[max(first - 1, 0) : end])
-        shown += len(which)
+        shown += len(indices)
         if len(points):
             open_end, before = bool(inside[-1]), points[-1:]
         if shown >= MAX_SHOWN_SAMPLES:

@@ -106,9 +106,9 @@ class Side(Struct, frozen=True, eq=False, dict=True):
     def plunges(self) -> Bools:
         """(N,) true for feeds straight down that end below the stock top."""
         start, end = self.toolpath.starts, self.toolpath.end
-        still = (start[:, :2] == end[:, :2]).all(axis=1) & ~self.toolpath.is_arc
-        deep = (end[:, 2] < start[:, 2]) & (end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
-        return np.asarray(self.toolpath.is_feed & still & deep)
+        stays = (start[:, :2] == end[:, :2]).all(axis=1) & ~self.toolpath.is_arc
+        goes_down = (end[:, 2] < start[:, 2]) & (end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
+        return np.asarray(self.toolpath.is_feed & stays & goes_down)
 
 
 def cover(
@@ -130,40 +130,54 @@ def cover(
     (docs/decisions/0037-own-rows-first.md).
     """
     cuts, limits = decoded.cuts, (goal.limit_mm, goal.depth_mm)
-    own, became = _contours_from(cuts, wanted.cuts, row_from)
+    own_contour, became = _contours_from(cuts, wanted.cuts, row_from)
     holes = compare_holes(decoded, wanted, limits)
     match, rounding, extra = empty_match(len(cuts.contour)), Figure(), list[UncoveredContour]()
-    beside = _rows_alike(cuts, wanted.cuts, limits, row_from)
+    alike_rows = _rows_alike(cuts, wanted.cuts, limits, row_from)
     for samples in samples_by_parts(
-        cuts, spacing_mm, cuts.is_cut, SAMPLES_AT_ONCE, _judged_together(cuts, own, beside)
+        cuts,
+        spacing_mm,
+        cuts.is_cut,
+        SAMPLES_AT_ONCE,
+        _judged_together(cuts, own_contour, alike_rows),
     ):
-        found, belongs = _nearest_in_own_contour(cuts, samples, own, goal)
+        nearest_wanted, belongs = _nearest_in_own_contour(cuts, samples, own_contour, goal)
         other = np.flatnonzero(belongs == ANY_CONTOUR)
-        some, wrong = nearest_at_height(samples.of(other), None, wanted.moves, limits)
-        wrong_depth = np.zeros(len(found.distance), dtype=np.bool_)
-        wrong_depth[other] = wrong
-        found.distance[other], found.segment[other] = some.distance, some.segment
-        extra += uncovered_contours(cuts, samples, (found, wrong_depth), holes.drilled, limits)
-        belongs[other] = match_contours(cuts, samples.of(other), some, goal)
-        found.distance[other], found.segment[other] = some.distance, some.segment
-        real = np.isfinite(found.distance)
+        nearest_other, is_wrong = nearest_at_height(samples.of(other), None, wanted.moves, limits)
+        wrong_depth = np.zeros(len(nearest_wanted.distance), dtype=np.bool_)
+        wrong_depth[other] = is_wrong
+        nearest_wanted.distance[other], nearest_wanted.segment[other] = (
+            nearest_other.distance,
+            nearest_other.segment,
+        )
+        extra += uncovered_contours(
+            cuts, samples, (nearest_wanted, wrong_depth), holes.drilled, limits
+        )
+        belongs[other] = match_contours(cuts, samples.of(other), nearest_other, goal)
+        nearest_wanted.distance[other], nearest_wanted.segment[other] = (
+            nearest_other.distance,
+            nearest_other.segment,
+        )
+        real = np.isfinite(nearest_wanted.distance)
         rows = cuts.row[samples.segment]
-        rounding.add(found.distance[real], samples.points[real], rows[real])
-        match_rows(match, cuts, samples, belongs, found, goal)
+        rounding.add(nearest_wanted.distance[real], samples.points[real], rows[real])
+        match_rows(match, cuts, samples, belongs, nearest_wanted, goal)
     match = with_neighbours(match)
     if not is_judged:
         return Coverage(match, rounding, ())
-    alike = _contours_alike(wanted.cuts, beside, row_from)
-    became = np.where(alike, ANY_CONTOUR, became)
+    is_alike = _contours_alike(wanted.cuts, alike_rows, row_from)
+    became = np.where(is_alike, ANY_CONTOUR, became)
     cut = np.append(
-        alike | _fits_contour(wanted.cuts, became, decoded.moves, limits, spacing_mm), True
+        is_alike | _fits_contour(wanted.cuts, became, decoded.moves, limits, spacing_mm), True
     )
     missing = list[UncoveredContour]()
-    for rest in samples_by_parts(
+    for remaining in samples_by_parts(
         wanted.cuts, spacing_mm, ~cut[wanted.cuts.contour], SAMPLES_AT_ONCE, wanted.cuts.contour
     ):
-        nearest = nearest_at_height(rest, None, decoded.moves, limits)
-        missing += uncovered_contours(wanted.cuts, rest, nearest, holes.undrilled, limits)
+        nearest_decoded = nearest_at_height(remaining, None, decoded.moves, limits)
+        missing += uncovered_contours(
+            wanted.cuts, remaining, nearest_decoded, holes.undrilled, limits
+        )
 
     def block(part: UncoveredContour) -> str:
         return block_name(cuts.toolpath, part.row)
@@ -185,66 +199,75 @@ def _contours_from(
     """Return (C,) the wanted contour from which all rows of each decoded contour were written, and
     (W,) the only decoded contour with rows of each wanted contour; ANY_CONTOUR where there is
     none."""
-    mine = np.full(cuts.contour_count, ANY_CONTOUR, dtype=np.int64)
-    theirs = np.full(wanted.contour_count, ANY_CONTOUR, dtype=np.int64)
-    if row_from is not None and len(theirs):
+    of_decoded = np.full(cuts.contour_count, ANY_CONTOUR, dtype=np.int64)
+    of_wanted = np.full(wanted.contour_count, ANY_CONTOUR, dtype=np.int64)
+    if row_from is not None and len(of_wanted):
         rows = cuts.rows
-        of = np.where(row_from[rows] >= 0, wanted.contour[row_from[rows]], ANY_CONTOUR)
-        many = len(theirs) + 1  # contours follow one another: pairs as numbers are mostly in order
-        pair = cuts.contour[rows].astype(np.int64) * many + (of - ANY_CONTOUR)
+        wanted_contour = np.where(row_from[rows] >= 0, wanted.contour[row_from[rows]], ANY_CONTOUR)
+        pair_base = (
+            len(of_wanted) + 1
+        )  # contours follow one another: pairs as numbers are mostly in order
+        pair = cuts.contour[rows].astype(np.int64) * pair_base + (wanted_contour - ANY_CONTOUR)
         changes = np.flatnonzero(np.diff(pair, prepend=-1))
-        here, there = np.divmod(np.unique(pair[changes]), many)
-        there += ANY_CONTOUR
-        for one, other, found in ((here, there, mine), (there, here, theirs)):
-            known, first, count = np.unique(one, return_index=True, return_counts=True)
-            alone = (count == 1) & (known != ANY_CONTOUR)
-            found[known[alone]] = other[first[alone]]
-    return mine, theirs
+        decoded_contours, wanted_contours = np.divmod(np.unique(pair[changes]), pair_base)
+        wanted_contours += ANY_CONTOUR
+        for one, other, partners in (
+            (decoded_contours, wanted_contours, of_decoded),
+            (wanted_contours, decoded_contours, of_wanted),
+        ):
+            contours, first, count = np.unique(one, return_index=True, return_counts=True)
+            is_single = (count == 1) & (contours != ANY_CONTOUR)
+            partners[contours[is_single]] = other[first[is_single]]
+    return of_decoded, of_wanted
 
 
 def _nearest_in_own_contour(
-    cuts: CutMoves, samples: CutSamples, own: Ints, goal: Goal
+    cuts: CutMoves, samples: CutSamples, own_contour: Ints, goal: Goal
 ) -> tuple[NearestMoves, Ints]:
-    """Return the nearest move of the `own` wanted contour (C,) to each sample (S,), and that
-    contour; ANY_CONTOUR for the samples of contours that have none, or do not lie within the
+    """Return the nearest move of the `own_contour` wanted contour (C,) to each sample (S,), and
+    that contour; ANY_CONTOUR for the samples of contours that have none, or do not lie within the
     limits of it."""
-    count, fit = len(samples.points), np.asarray(own != ANY_CONTOUR)
-    found = NearestMoves(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
-    mine = cuts.contour[cuts.row[samples.segment]]
-    some = np.flatnonzero(fit[mine])
+    count, fit = len(samples.points), np.asarray(own_contour != ANY_CONTOUR)
+    nearest = NearestMoves(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
+    contours = cuts.contour[cuts.row[samples.segment]]
+    with_contour = np.flatnonzero(fit[contours])
     limits = max(goal.limit_mm, MIN_LIMIT_MM), goal.depth_mm
-    for low in range(0, len(some), SAMPLES_AT_ONCE):
-        part = some[low : low + SAMPLES_AT_ONCE]
-        near = goal.moves.nearest(
-            samples.points.take(part, axis=0), samples.z[part], own[mine[part]], limits
+    for low in range(0, len(with_contour), SAMPLES_AT_ONCE):
+        part = with_contour[low : low + SAMPLES_AT_ONCE]
+        batch_nearest = goal.moves.nearest(
+            samples.points.take(part, axis=0), samples.z[part], own_contour[contours[part]], limits
         )
-        found.distance[part], found.segment[part] = near.distance, near.segment
-        fit[mine[part[near.distance > goal.limit_mm]]] = False
-    return found, np.where(fit[mine], own[mine], ANY_CONTOUR)
+        nearest.distance[part], nearest.segment[part] = (
+            batch_nearest.distance,
+            batch_nearest.segment,
+        )
+        fit[contours[part[batch_nearest.distance > goal.limit_mm]]] = False
+    return nearest, np.where(fit[contours], own_contour[contours], ANY_CONTOUR)
 
 
-def _judged_together(cuts: CutMoves, own: Ints, beside: Ints) -> Indices:
+def _judged_together(cuts: CutMoves, own_contour: Ints, alike_rows: Ints) -> Indices:
     """Return (N,) a group number of each row: rows of one contour are judged together, but those
-    of contours all of whose rows lie `beside` rows of their `own` contour are judged one by
-    one."""
-    alike, every = (
-        np.bincount(cuts.contour[rows], minlength=len(own)) for rows in (beside, cuts.rows)
+    of contours all of whose rows lie `alike_rows` rows of their `own_contour` contour are judged
+    one by one."""
+    alike_counts, every = (
+        np.bincount(cuts.contour[rows], minlength=len(own_contour))
+        for rows in (alike_rows, cuts.rows)
     )
-    apart = (own != ANY_CONTOUR) & (alike == every)
+    is_separate = (own_contour != ANY_CONTOUR) & (alike_counts == every)
     rows = np.arange(len(cuts.contour), dtype=np.int32)
-    return np.where(np.append(apart, False)[cuts.contour], rows, cuts.contour)
+    return np.where(np.append(is_separate, False)[cuts.contour], rows, cuts.contour)
 
 
-def _contours_alike(wanted: CutMoves, beside: Ints, row_from: Indices | None) -> Bools:
+def _contours_alike(wanted: CutMoves, alike_rows: Ints, row_from: Indices | None) -> Bools:
     """Return (C,) true for wanted contours from each of whose rows one was written that lies
-    `beside` it."""
-    alike = np.zeros(wanted.contour_count, dtype=np.bool_)
+    `alike_rows` it."""
+    is_alike = np.zeros(wanted.contour_count, dtype=np.bool_)
     if row_from is not None:
-        there = np.zeros(len(wanted.contour), dtype=np.bool_)
-        there[row_from[beside]] = True
-        alike[:] = True
-        alike[wanted.contour[wanted.rows[~there[wanted.rows]]]] = False
-    return alike
+        has_copy = np.zeros(len(wanted.contour), dtype=np.bool_)
+        has_copy[row_from[alike_rows]] = True
+        is_alike[:] = True
+        is_alike[wanted.contour[wanted.rows[~has_copy[wanted.rows]]]] = False
+    return is_alike
 
 
 def _rows_alike(
@@ -261,50 +284,60 @@ def _rows_alike(
     if row_from is None:
         return np.empty(0, dtype=np.int64)
     limit_mm, depth_mm = limits
-    rows, mine, theirs = cuts.rows[row_from[cuts.rows] >= 0], cuts.toolpath, wanted.toolpath
-    once = np.bincount(row_from[rows], minlength=len(theirs)) == 1
-    near = np.empty(len(rows), dtype=np.bool_)
+    rows, decoded, sources = cuts.rows[row_from[cuts.rows] >= 0], cuts.toolpath, wanted.toolpath
+    is_unique = np.bincount(row_from[rows], minlength=len(sources)) == 1
+    is_near = np.empty(len(rows), dtype=np.bool_)
     for low in range(0, len(rows), ROWS_AT_ONCE):
-        some = rows[low : low + ROWS_AT_ONCE]
-        came = row_from[some]
-        fit = (mine.kind[some] == theirs.kind[came]) & once[came]
-        room_mm = np.full(len(some), limit_mm)
-        arcs = np.flatnonzero(fit & are_arcs(mine.kind[some]))
+        batch = rows[low : low + ROWS_AT_ONCE]
+        source_rows = row_from[batch]
+        fit = (decoded.kind[batch] == sources.kind[source_rows]) & is_unique[source_rows]
+        room_mm = np.full(len(batch), limit_mm)
+        arcs = np.flatnonzero(fit & are_arcs(decoded.kind[batch]))
         if len(arcs):
-            here, there = some[arcs], came[arcs]
-            room_mm[arcs] -= 2.0 * np.hypot(*(mine.centre[here] - theirs.centre[there]).T)
-            room_mm[arcs] -= _radius_differences(mine, here) + _radius_differences(theirs, there)
-            fit[arcs] &= np.abs(mine.sweeps_of(here) - theirs.sweeps_of(there)) < np.pi
-        starts = mine.starts_of(some) - theirs.starts_of(came)
-        ends = mine.end.take(some, axis=0) - theirs.end.take(came, axis=0)
-        for off in (starts, ends):
-            fit &= (np.hypot(off[:, 0], off[:, 1]) <= room_mm) & (np.abs(off[:, 2]) <= depth_mm)
-        near[low : low + len(some)] = fit
-    return np.asarray(rows[near])
+            decoded_arcs, source_arcs = batch[arcs], source_rows[arcs]
+            room_mm[arcs] -= 2.0 * np.hypot(
+                *(decoded.centre[decoded_arcs] - sources.centre[source_arcs]).T
+            )
+            room_mm[arcs] -= _radius_differences(decoded, decoded_arcs) + _radius_differences(
+                sources, source_arcs
+            )
+            fit[arcs] &= (
+                np.abs(decoded.sweeps_of(decoded_arcs) - sources.sweeps_of(source_arcs)) < np.pi
+            )
+        starts = decoded.starts_of(batch) - sources.starts_of(source_rows)
+        ends = decoded.end.take(batch, axis=0) - sources.end.take(source_rows, axis=0)
+        for differences in (starts, ends):
+            fit &= (np.hypot(differences[:, 0], differences[:, 1]) <= room_mm) & (
+                np.abs(differences[:, 2]) <= depth_mm
+            )
+        is_near[low : low + len(batch)] = fit
+    return np.asarray(rows[is_near])
 
 
 def _radius_differences(toolpath: Toolpath, arcs: Ints | Indices) -> Floats:
     """Return (J,) mm: the distance of the end of each arc from the circle through its start."""
     centre = toolpath.centre[arcs]
-    out, back = (
+    start_radius, end_radius = (
         np.hypot(*(points[:, :2] - centre).T)
         for points in (toolpath.starts_of(arcs), toolpath.end[arcs])
     )
-    return np.asarray(np.abs(out - back))
+    return np.asarray(np.abs(start_radius - end_radius))
 
 
 def _fits_contour(
-    cuts: CutMoves, own: Ints, others: MoveIndex, limits: Limits, spacing_mm: float
+    cuts: CutMoves, own_contour: Ints, other_moves: MoveIndex, limits: Limits, spacing_mm: float
 ) -> Bools:
-    """Return (C,) true for the contours of one side that lie within the limits of their `own`
-    contour (C,) of the other side, where they have one."""
-    fit = np.asarray(own != ANY_CONTOUR)
+    """Return (C,) true for the contours of one side that lie within the limits of their
+    `own_contour` contour (C,) of the other side, where they have one."""
+    fit = np.asarray(own_contour != ANY_CONTOUR)
     limit_mm, depth_mm = limits
     for samples in samples_by_parts(cuts, spacing_mm, np.append(fit, False)[cuts.contour]):
-        mine = cuts.contour[cuts.row[samples.segment]]
+        contours = cuts.contour[cuts.row[samples.segment]]
         near_mm = max(limit_mm, MIN_LIMIT_MM)
-        found = others.nearest(samples.points, samples.z, own[mine], (near_mm, depth_mm))
-        fit[mine[found.distance > limit_mm]] = False
+        nearest = other_moves.nearest(
+            samples.points, samples.z, own_contour[contours], (near_mm, depth_mm)
+        )
+        fit[contours[nearest.distance > limit_mm]] = False
     return fit
 
 
@@ -336,39 +369,39 @@ class UncoveredContour(Struct, frozen=True):
 def uncovered_contours(
     cuts: CutMoves,
     samples: CutSamples,
-    nearest: tuple[NearestMoves, Bools],
+    nearest_found: tuple[NearestMoves, Bools],
     drilled: Bools,
     limits: Limits,
 ) -> Iterator[UncoveredContour]:
     """Yield the contours of which a part is not cut by the other side, by all samples of each.
 
-    `nearest` is the result of `nearest_at_height` for the samples, `drilled` (C,) the contours
-    that are holes on the other side. Slopes within the tolerance of the stock top are excepted:
-    they may be flat moves on it, which cut nothing.
+    `nearest_found` is the result of `nearest_at_height` for the samples, `drilled` (C,) the
+    contours that are holes on the other side. Slopes within the tolerance of the stock top are
+    excepted: they may be flat moves on it, which cut nothing.
     """
-    found, wrong_depth = nearest
+    nearest_moves, wrong_depth = nearest_found
     rows = cuts.row[samples.segment]
     contour = cuts.contour[rows]
     sloping = cuts.slopes(samples.segment)
-    judged = ~sloping | (samples.z < STOCK_TOP_MM - limits[1])
-    judged &= ~drilled[contour]
-    bad = np.flatnonzero(judged & (wrong_depth | (found.distance > limits[0])))
-    if len(bad) == 0:
+    is_judged = ~sloping | (samples.z < STOCK_TOP_MM - limits[1])
+    is_judged &= ~drilled[contour]
+    failing = np.flatnonzero(is_judged & (wrong_depth | (nearest_moves.distance > limits[0])))
+    if len(failing) == 0:
         return
     sample_counts = np.bincount(contour)
-    order = bad[np.lexsort((bad, -found.distance[bad], contour[bad]))]
+    order = failing[np.lexsort((failing, -nearest_moves.distance[failing], contour[failing]))]
     first = np.flatnonzero(np.diff(contour[order], prepend=-1))
     counts = np.diff(np.append(first, len(order)))
     for worst, count in zip(order[first].tolist(), counts.tolist(), strict=True):
-        which = int(contour[worst])
+        contour_number = int(contour[worst])
         yield UncoveredContour(
-            which,
+            contour_number,
             int(rows[worst]),
             samples.points[worst],
-            float(found.distance[worst]),
-            int(found.segment[worst]),
+            float(nearest_moves.distance[worst]),
+            int(nearest_moves.segment[worst]),
             bool(wrong_depth[worst]),
-            float(count / sample_counts[which]),
+            float(count / sample_counts[contour_number]),
         )
 
 
@@ -380,17 +413,17 @@ def uncovered_findings(
     place: Callable[[UncoveredContour], str],
 ) -> Iterator[Finding]:
     """Yield a finding for each of these contours of `cuts`; `place` names the block or contour."""
-    elsewhere, other_depth, nothing = sentences
-    for part, more in first_items(parts):
-        known = np.isfinite(part.distance)
-        sentence = (other_depth if part.wrong_depth else elsewhere) if known else nothing
+    elsewhere, other_depth, nothing_near = sentences
+    for part, other_count in first_items(parts):
+        is_finite = np.isfinite(part.distance)
+        sentence = (other_depth if part.wrong_depth else elsewhere) if is_finite else nothing_near
         yield sentence(
             where=f"{place(part)} near {at_point(part.at_mm)}".strip(),
-            measured=part.distance if known else None,
+            measured=part.distance if is_finite else None,
             limit=limit_mm,
             share=part.share,
             contour=_contour_name(cuts, part),
-            more=more,
+            more=other_count,
         )
 
 
@@ -430,8 +463,8 @@ def holes_of(toolpath: Toolpath) -> Holes:
     cut = np.zeros(len(movers) + 2, dtype=np.bool_)
     cut[1:-1] = cutting[movers]
     running = np.cumsum(toolpath.kind == Kind.END) == 0
-    down = toolpath.is_feed & ~flat & (toolpath.end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
-    rows = np.flatnonzero(down & running & ~cut[stay] & ~cut[stay + 1])
+    drills = toolpath.is_feed & ~flat & (toolpath.end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
+    rows = np.flatnonzero(drills & running & ~cut[stay] & ~cut[stay + 1])
     order = rows[np.lexsort((rows, toolpath.end[rows, 2], stay[rows]))]
     deepest = order[np.flatnonzero(np.diff(stay[order], prepend=-1))]
     return Holes(toolpath, toolpath.end[deepest, :2], toolpath.end[deepest, 2], deepest)
@@ -444,9 +477,9 @@ def contours_drilled(cuts: CutMoves, holes: Holes, limits_mm: Limits) -> tuple[B
     A contour smaller than the resolution of a dialect becomes a plunge, which cuts the same.
     """
     drilled = np.zeros(cuts.contour_count, dtype=np.bool_)
-    stands = np.zeros(len(holes), dtype=np.bool_)
+    is_contour = np.zeros(len(holes), dtype=np.bool_)
     if not len(holes) or not len(drilled):
-        return drilled, stands
+        return drilled, is_contour
     contour = cuts.contour[cuts.row]
     begin = np.flatnonzero(np.diff(contour, prepend=-1))
     boxes = segment_boxes(cuts.segments)
@@ -456,10 +489,10 @@ def contours_drilled(cuts: CutMoves, holes: Holes, limits_mm: Limits) -> tuple[B
     room = limits_mm[0] - 0.5 * np.hypot(*(high - low).T)
     tiny = np.flatnonzero(room >= 0.0)
     one, hole = near_points(0.5 * (low + high)[tiny], holes.at, room[tiny])
-    same = np.abs(bottom[tiny[one]] - holes.bottom_mm[hole]) <= limits_mm[1]
-    drilled[contour[begin[tiny[one[same]]]]] = True
-    stands[hole[same]] = True
-    return drilled, stands
+    same_depth = np.abs(bottom[tiny[one]] - holes.bottom_mm[hole]) <= limits_mm[1]
+    drilled[contour[begin[tiny[one[same_depth]]]]] = True
+    is_contour[hole[same_depth]] = True
+    return drilled, is_contour
 
 
 _MISSING_HOLES = CONTOUR_MISSING_HOLE, CONTOUR_MISSING_HOLE_DEPTH
@@ -490,34 +523,39 @@ def compare_holes(decoded: Side, wanted: Side, limits: Limits) -> HoleComparison
 
 def _unpaired_findings(
     holes: Holes,
-    others: Holes,
+    other_holes: Holes,
     limits_mm: Limits,
     stand: Bools,
     sentences: tuple[Sentence, Sentence],
 ) -> Iterator[Finding]:
     """Yield a finding for each hole that the other side lacks; `sentences`: for no hole at its
     position, and for one of another depth."""
-    none, other_depth = sentences
-    here, paired = _has_hole(holes, others, limits_mm)
-    alone = np.flatnonzero(~paired & ~stand).tolist()
-    for hole, more in first_items(alone):
+    no_hole, other_depth = sentences
+    has_position, paired = _has_hole(holes, other_holes, limits_mm)
+    unpaired = np.flatnonzero(~paired & ~stand).tolist()
+    for hole, other_count in first_items(unpaired):
         row = int(holes.row[hole])
-        yield (other_depth if here[hole] else none)(
+        yield (other_depth if has_position[hole] else no_hole)(
             where=f"{block_name(holes.toolpath, row)} at {at_point(holes.at[hole])}",
             measured=STOCK_TOP_MM - holes.bottom_mm[hole],
-            more=more,
+            more=other_count,
         )
 
 
-def _has_hole(holes: Holes, others: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
+def _has_hole(holes: Holes, other_holes: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
     """Return (H,) true for holes with one of the others at their position, and (H,) for those with
     one that is as deep."""
-    here, same = np.zeros(len(holes), dtype=np.bool_), np.zeros(len(holes), dtype=np.bool_)
-    mine, theirs = near_points(holes.at, others.at, limits_mm[0])
-    here[mine] = True
-    deep = np.abs(holes.bottom_mm[mine] - others.bottom_mm[theirs]) <= limits_mm[1]
-    same[mine[deep]] = True
-    return here, same
+    has_position, is_paired = (
+        np.zeros(len(holes), dtype=np.bool_),
+        np.zeros(len(holes), dtype=np.bool_),
+    )
+    hole_rows, other_rows = near_points(holes.at, other_holes.at, limits_mm[0])
+    has_position[hole_rows] = True
+    is_same_depth = (
+        np.abs(holes.bottom_mm[hole_rows] - other_holes.bottom_mm[other_rows]) <= limits_mm[1]
+    )
+    is_paired[hole_rows[is_same_depth]] = True
+    return has_position, is_paired
 
 
 # The direction in which a program cuts, wherever its moves lie on those it is compared with.
@@ -552,57 +590,65 @@ def direction_findings(
     compared with everything.
     """
     cuts = decoded.cuts
-    rest = cuts.is_cut
+    is_open = cuts.is_cut
     if row_from is not None:
-        alike = _rows_alike(cuts, source.cuts, limits, row_from)
-        rest[alike] = ~_same_direction(cuts, source.cuts, alike, row_from)
-    rows = np.flatnonzero(rest)
+        alike_rows = _rows_alike(cuts, source.cuts, limits, row_from)
+        is_open[alike_rows] = ~_same_direction(cuts, source.cuts, alike_rows, row_from)
+    rows = np.flatnonzero(is_open)
     if len(rows) == 0:
         return
-    here, half = cuts.first[rows].astype(np.int64), np.full(len(rows), 0.5)
-    z = cuts.heights(here).mean(axis=1)
-    middles = CutSamples(point_at(cuts.segments, here, half), here, z, half)
-    own = _contours_from(cuts, source.cuts, row_from)[0][cuts.contour[rows]]
-    known = np.flatnonzero(own != ANY_CONTOUR)
-    near = source.nearest(middles.points[known], z[known], own[known], limits)
-    rest = np.ones(len(rows), dtype=np.bool_)
-    rest[known[_cosines(cuts, middles.of(known), source, near) > MIN_SAME_COSINE]] = False
-    rows, middles = rows[rest], middles.of(np.flatnonzero(rest))
-    nearest = nearest_at_height(middles, None, source, limits)[0]
+    segments, half = cuts.first[rows].astype(np.int64), np.full(len(rows), 0.5)
+    z = cuts.heights(segments).mean(axis=1)
+    middles = CutSamples(point_at(cuts.segments, segments, half), segments, z, half)
+    own_contour = _contours_from(cuts, source.cuts, row_from)[0][cuts.contour[rows]]
+    with_contour = np.flatnonzero(own_contour != ANY_CONTOUR)
+    own_nearest = source.nearest(
+        middles.points[with_contour], z[with_contour], own_contour[with_contour], limits
+    )
+    is_open = np.ones(len(rows), dtype=np.bool_)
+    is_open[
+        with_contour[
+            _cosines(cuts, middles.of(with_contour), source, own_nearest) > MIN_SAME_COSINE
+        ]
+    ] = False
+    rows, middles = rows[is_open], middles.of(np.flatnonzero(is_open))
+    all_nearest = nearest_at_height(middles, None, source, limits)[0]
     suspect = np.zeros(len(cuts.contour), dtype=np.bool_)
-    suspect[rows[_cosines(cuts, middles, source, nearest) < -MIN_SAME_COSINE]] = True
+    suspect[rows[_cosines(cuts, middles, source, all_nearest) < -MIN_SAME_COSINE]] = True
     if suspect.any():
-        found = near_pairs(cuts, suspect, source, limits, sample_mm)
-        trips = encloses_area(source.cuts, limits[0])[source.contour_of(found.move)]
-        yield from reversal_findings(found, reversed_samples(found, trips, limits))
+        pairs = near_pairs(cuts, suspect, source, limits, sample_mm)
+        trips = encloses_area(source.cuts, limits[0])[source.contour_of(pairs.move)]
+        yield from reversal_findings(pairs, reversed_samples(pairs, trips, limits))
 
 
 def _same_direction(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indices) -> Bools:
     """Return (J,) true where the chords of these rows have the direction of those of the rows they
     came from; false for full circles."""
-    same = np.empty(len(rows), dtype=np.bool_)
+    is_same = np.empty(len(rows), dtype=np.bool_)
     for low in range(0, len(rows), ROWS_AT_ONCE):
-        some = rows[low : low + ROWS_AT_ONCE]
-        way, other = (
-            (path.end.take(of, axis=0) - path.starts_of(of))[:, :2]
-            for path, of in ((cuts.toolpath, some), (source.toolpath, row_from[some]))
+        batch = rows[low : low + ROWS_AT_ONCE]
+        chords, other = (
+            (path.end.take(side_rows, axis=0) - path.starts_of(side_rows))[:, :2]
+            for path, side_rows in ((cuts.toolpath, batch), (source.toolpath, row_from[batch]))
         )
-        lengths = np.hypot(*way.T) * np.hypot(*other.T)
-        same[low : low + len(some)] = (way * other).sum(axis=1) > MIN_SAME_COSINE * lengths
-    return same
+        lengths = np.hypot(*chords.T) * np.hypot(*other.T)
+        is_same[low : low + len(batch)] = (chords * other).sum(axis=1) > MIN_SAME_COSINE * lengths
+    return is_same
 
 
 def _cosines(
-    cuts: CutMoves, samples: CutSamples, others: MoveIndex, found: NearestMoves
+    cuts: CutMoves, samples: CutSamples, other_moves: MoveIndex, nearest: NearestMoves
 ) -> Floats:
     """Return (S,) cosine of the angle between the move of each sample and the move of the other
     side that was found; 0 where none was."""
     cosine = np.zeros(len(samples.points))
-    known = np.flatnonzero(found.segment >= 0)
-    part, there = samples.of(known), found.segment[known]
-    here = headings(cuts.segments, part.segment, part.share)
-    share = others.shares(part.points, there)
-    cosine[known] = (here * headings(others.cuts.segments, there, share)).sum(axis=1)
+    with_move = np.flatnonzero(nearest.segment >= 0)
+    part, segments = samples.of(with_move), nearest.segment[with_move]
+    heading = headings(cuts.segments, part.segment, part.share)
+    share = other_moves.shares(part.points, segments)
+    cosine[with_move] = (heading * headings(other_moves.cuts.segments, segments, share)).sum(
+        axis=1
+    )
     return cosine
 
 
@@ -637,19 +683,19 @@ class NearPairs(Struct, eq=False):
 
 
 def near_pairs(
-    cuts: CutMoves, rows: Bools, others: MoveIndex, limits: Limits, sample_mm: float
+    cuts: CutMoves, rows: Bools, other_moves: MoveIndex, limits: Limits, sample_mm: float
 ) -> NearPairs:
     """Pair samples on these rows (N,) of one side, about `sample_mm` apart, with all moves of the
     other side within the limits."""
     samples = _with_ends(cuts, sample_cuts(cuts, sample_mm, np.flatnonzero(rows[cuts.row])))
-    point, move, distance = others.pairs_within(samples.points, samples.z, limits)
-    nearest = np.full(len(samples.points), np.inf)
-    np.minimum.at(nearest, point, distance)
-    here = headings(cuts.segments, samples.segment[point], samples.share[point])
-    share = others.shares(samples.points[point], move)
-    there = headings(others.cuts.segments, move, share)
-    cosine = (here * there).sum(axis=1)
-    return NearPairs(cuts, others, samples, point, move, cosine, nearest)
+    point, move, distance = other_moves.pairs_within(samples.points, samples.z, limits)
+    nearest_mm = np.full(len(samples.points), np.inf)
+    np.minimum.at(nearest_mm, point, distance)
+    heading = headings(cuts.segments, samples.segment[point], samples.share[point])
+    share = other_moves.shares(samples.points[point], move)
+    other_heading = headings(other_moves.cuts.segments, move, share)
+    cosine = (heading * other_heading).sum(axis=1)
+    return NearPairs(cuts, other_moves, samples, point, move, cosine, nearest_mm)
 
 
 def _with_ends(cuts: CutMoves, samples: CutSamples) -> CutSamples:
@@ -661,11 +707,12 @@ def _with_ends(cuts: CutMoves, samples: CutSamples) -> CutSamples:
     return replace(samples, points=points)
 
 
-def headings(segments: Segments, which: Ints, share: Floats) -> Floats:
-    """Return (J, 2) unit directions of the segments `which` at parts `share` of their lengths."""
-    chord = (segments.end - segments.start)[which]
+def headings(segments: Segments, indices: Ints, share: Floats) -> Floats:
+    """Return (J, 2) unit directions of the segments `indices` at parts `share` of their
+    lengths."""
+    chord = (segments.end - segments.start)[indices]
     # The tangent turns evenly from half the sweep before the chord to half the sweep behind it.
-    turn = (share - 0.5) * segments.sweep[which]
+    turn = (share - 0.5) * segments.sweep[indices]
     angle = np.arctan2(chord[:, 1], chord[:, 0]) + turn
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
@@ -674,26 +721,30 @@ def reversed_samples(compared: NearPairs, round_trip: Bools, limits: Limits) -> 
     """Return the samples on moves that the other side cuts only in the opposite direction; only
     contours that enclose an area count (`round_trip` (P,) of each pair)."""
     cuts, samples, count = compared.cuts, compared.samples, len(compared.distance)
-    same = np.zeros(count, dtype=np.bool_)
-    same[compared.point[compared.cosine > MIN_SAME_COSINE]] = True
+    is_along = np.zeros(count, dtype=np.bool_)
+    is_along[compared.point[compared.cosine > MIN_SAME_COSINE]] = True
     long = MIN_DIRECTION_LIMITS * limits[0]
-    there = segment_lengths(compared.others.cuts.segments)[compared.move] > long
-    against = np.zeros(count, dtype=np.bool_)
-    against[compared.point[(compared.cosine < -MIN_SAME_COSINE) & round_trip & there]] = True
-    here = segment_lengths(cuts.segments)[samples.segment] > long
-    sure = here & (samples.share > 0.0) & (samples.share < 1.0)
-    return np.flatnonzero(against & ~same & sure)
+    is_other_long = segment_lengths(compared.others.cuts.segments)[compared.move] > long
+    is_against = np.zeros(count, dtype=np.bool_)
+    is_against[
+        compared.point[(compared.cosine < -MIN_SAME_COSINE) & round_trip & is_other_long]
+    ] = True
+    is_long = segment_lengths(cuts.segments)[samples.segment] > long
+    is_inner = is_long & (samples.share > 0.0) & (samples.share < 1.0)
+    return np.flatnonzero(is_against & ~is_along & is_inner)
 
 
-def reversal_findings(compared: NearPairs, turned: Ints) -> Iterator[Finding]:
+def reversal_findings(compared: NearPairs, reversed_rows: Ints) -> Iterator[Finding]:
     """Yield a CUT_OTHER_WAY finding for each contour that is cut in the opposite direction."""
     cuts = compared.cuts
-    rows = compared.rows[turned]
+    rows = compared.rows[reversed_rows]
     first = np.unique(cuts.contour[rows], return_index=True)[1]
-    for place, more in first_items(first.tolist()):
+    for place, other_count in first_items(first.tolist()):
         row = int(rows[place])
-        at = at_point(compared.samples.points[turned[place]])
-        yield CUT_OTHER_WAY(where=f"{block_name(cuts.toolpath, row)} near {at}", more=more)
+        place_words = at_point(compared.samples.points[reversed_rows[place]])
+        yield CUT_OTHER_WAY(
+            where=f"{block_name(cuts.toolpath, row)} near {place_words}", more=other_count
+        )
 
 
 # Points and blocks as findings name them, and how many findings are listed.

@@ -47,37 +47,37 @@ class CutMoves(Struct, frozen=True, eq=False):
     first: Indices
     contour: Indices
 
-    def heights(self, which: Ints | Indices) -> Floats:
+    def heights(self, indices: Ints | Indices) -> Floats:
         """Return (J, 2) mm: the heights of the starts and ends of these segments, between which
         their height changes evenly: the segments of a row are equal parts of it."""
-        row = self.row[which]
+        row = self.row[indices]
         begin, end = self.toolpath.starts_of(row)[:, 2], self.toolpath.end[row, 2]
-        of = self.first[row + 1] - self.first[row]
-        part = which - self.first[row]
+        part_counts = self.first[row + 1] - self.first[row]
+        part = indices - self.first[row]
         rise = (end - begin)[:, None] * np.column_stack([part, part + 1])
         # Level moves stay level exactly.
         level = (begin == end)[:, None]
-        return np.where(level, begin[:, None], begin[:, None] + rise / of[:, None])
+        return np.where(level, begin[:, None], begin[:, None] + rise / part_counts[:, None])
 
     @property
     def ends_z(self) -> Floats:
         """(K, 2) mm: heights of each segment's start and end; one row, seen as many, where all are
         at one height."""
-        found = np.empty((len(self.segments), 2))
-        for low in range(0, len(found), ROWS_AT_ONCE):
-            some = np.arange(low, min(low + ROWS_AT_ONCE, len(found)))
-            found[some] = self.heights(some)
-        level = len(found) and (found == found[0, 0]).all()
-        return np.broadcast_to(found[:1].copy(), found.shape) if level else found
+        heights_mm = np.empty((len(self.segments), 2))
+        for low in range(0, len(heights_mm), ROWS_AT_ONCE):
+            batch = np.arange(low, min(low + ROWS_AT_ONCE, len(heights_mm)))
+            heights_mm[batch] = self.heights(batch)
+        level = len(heights_mm) and (heights_mm == heights_mm[0, 0]).all()
+        return np.broadcast_to(heights_mm[:1].copy(), heights_mm.shape) if level else heights_mm
 
     @property
     def z(self) -> Floats:
         """(K, 2) mm: lowest and highest point of each segment."""
         return np.sort(self.ends_z, axis=1)
 
-    def slopes(self, which: Ints) -> Bools:
+    def slopes(self, indices: Ints) -> Bools:
         """Return (J,) true where the height changes along these segments."""
-        begin, end = self.heights(which).T
+        begin, end = self.heights(indices).T
         return np.asarray(begin != end)
 
     @property
@@ -181,9 +181,11 @@ def _segments(
     if len(arcs[0]):
         bulge = np.zeros(len(row))
         bent = np.flatnonzero(toolpath.is_arc[row])
-        of, begin, centre = row[bent], start[bent], toolpath.centre[row[bent]]
-        turn: Floats = arcs[1][np.searchsorted(arcs[0], of)] / (first[of + 1] - first[of])
-        part = bent - first[of]
+        rows_bent, begin, centre = row[bent], start[bent], toolpath.centre[row[bent]]
+        turn: Floats = arcs[1][np.searchsorted(arcs[0], rows_bent)] / (
+            first[rows_bent + 1] - first[rows_bent]
+        )
+        part = bent - first[rows_bent]
         inner = np.flatnonzero(part)
         start[bent[inner]] = _rotate(begin, centre, part * turn)[inner]
         end[bent] = _rotate(begin, centre, (part + 1) * turn)
@@ -231,10 +233,10 @@ class CutSamples(Struct, frozen=True, eq=False):
     z: Floats
     share: Floats
 
-    def of(self, which: Ints) -> CutSamples:
+    def of(self, indices: Ints) -> CutSamples:
         """Return the samples with these indices."""
         return CutSamples(
-            self.points[which], self.segment[which], self.z[which], self.share[which]
+            self.points[indices], self.segment[indices], self.z[indices], self.share[indices]
         )
 
 
@@ -242,10 +244,10 @@ def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> 
     """Return points on the true lines and arcs, about `spacing_mm` apart; with `only`, on those
     segments alone. The spacing is wider where there would be more than `MAX_SAMPLES` points, but
     each segment has at least `MIN_PARTS` parts."""
-    which = np.arange(len(cuts.segments)) if only is None else only
-    lengths = segment_lengths(cuts.segments[which])
+    indices = np.arange(len(cuts.segments)) if only is None else only
+    lengths = segment_lengths(cuts.segments[indices])
     spacing = max(spacing_mm, float(lengths.sum()) / MAX_SAMPLES)
-    return _samples(cuts, which, _parts(lengths, spacing))
+    return _samples(cuts, indices, _parts(lengths, spacing))
 
 
 def samples_by_parts(
@@ -253,32 +255,38 @@ def samples_by_parts(
     spacing_mm: float,
     rows: Bools,
     at_once: int = MAX_SAMPLES,
-    whole: Indices | None = None,
+    group: Indices | None = None,
 ) -> Iterator[CutSamples]:
     """Yield the samples of `sample_cuts` on the rows (N,) that are true, in parts of whole rows,
-    or of rows (N,) with one number `whole`, with about `at_once` samples each, so that memory does
+    or of rows (N,) with one number `group`, with about `at_once` samples each, so that memory does
     not grow with the program. The spacing is that of all cuts."""
-    taken, parts, ends = _sample_batches(cuts, spacing_mm, rows, at_once, whole)
-    for low, high in pairwise([0, *ends, len(taken)]):
+    segments, parts, ends = _sample_batches(cuts, spacing_mm, rows, at_once, group)
+    for low, high in pairwise([0, *ends, len(segments)]):
         if low < high:
-            yield _samples(cuts, taken[low:high], parts[low:high].astype(np.int64))
+            yield _samples(cuts, segments[low:high], parts[low:high].astype(np.int64))
 
 
 def _sample_batches(
-    cuts: CutMoves, spacing_mm: float, rows: Bools, at_once: int, whole: Indices | None
+    cuts: CutMoves, spacing_mm: float, rows: Bools, at_once: int, group: Indices | None
 ) -> tuple[Ints, Indices, list[int]]:
     """Return for `samples_by_parts` the segments (T,), the number of parts of each (T,), and the
     indices at which all batches but the last end."""
     lengths = segment_lengths(cuts.segments)
     spacing = max(spacing_mm, float(lengths.sum()) / MAX_SAMPLES)
-    taken = np.flatnonzero(rows[cuts.row])
-    parts = _parts(lengths[taken], spacing).astype(np.int32)
+    segments = np.flatnonzero(rows[cuts.row])
+    parts = _parts(lengths[segments], spacing).astype(np.int32)
     del lengths
     # What is whole ends where its last segment does.
-    of = cuts.row[taken]
-    last = np.append(np.diff(of if whole is None else whole[of]) != 0, True)[: len(of)]
-    many = np.cumsum(parts + 1, dtype=np.int64)[last] // at_once
-    return taken, parts, (np.flatnonzero(last)[np.flatnonzero(np.diff(many))] + 1).tolist()
+    rows_of_segments = cuts.row[segments]
+    last = np.append(
+        np.diff(rows_of_segments if group is None else group[rows_of_segments]) != 0, True
+    )[: len(rows_of_segments)]
+    batch_numbers = np.cumsum(parts + 1, dtype=np.int64)[last] // at_once
+    return (
+        segments,
+        parts,
+        (np.flatnonzero(last)[np.flatnonzero(np.diff(batch_numbers))] + 1).tolist(),
+    )
 
 
 def _parts(lengths: Floats, spacing_mm: float) -> Ints:
@@ -286,12 +294,12 @@ def _parts(lengths: Floats, spacing_mm: float) -> Ints:
     return np.maximum(np.ceil(lengths / spacing_mm).astype(np.int64), MIN_PARTS)
 
 
-def _samples(cuts: CutMoves, which: Ints, parts: Ints) -> CutSamples:
-    """Return the ends of the equal parts of the segments `which`."""
+def _samples(cuts: CutMoves, indices: Ints, parts: Ints) -> CutSamples:
+    """Return the ends of the equal parts of the segments `indices`."""
     owner = np.repeat(np.arange(len(parts)), parts + 1)
-    within = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
-    share, segment = within / parts[owner], which[owner]
-    begin, end = cuts.heights(which)[owner].T
+    steps = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
+    share, segment = steps / parts[owner], indices[owner]
+    begin, end = cuts.heights(indices)[owner].T
     # Level moves stay level exactly: rounding must not turn them into slopes.
     z = np.where(begin == end, begin, begin + share * (end - begin))
     return CutSamples(point_at(cuts.segments, segment, share), segment, z, share)
@@ -315,10 +323,10 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     """Return (C, 2) first and last row of the loop of each contour, NO_LOOP where it has none.
     Points within `gap_mm` of each other count as one."""
     begin, finish = cuts.contour_ends()
-    found = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
-    whole = cuts.is_closed(gap_mm) & _is_level(cuts)
-    found[whole] = np.column_stack([begin, finish])[whole]
-    rows = np.flatnonzero(cuts.is_cut & ~np.append(whole, True)[cuts.contour]).astype(np.int32)
+    contour_loops = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
+    is_whole = cuts.is_closed(gap_mm) & _is_level(cuts)
+    contour_loops[is_whole] = np.column_stack([begin, finish])[is_whole]
+    rows = np.flatnonzero(cuts.is_cut & ~np.append(is_whole, True)[cuts.contour]).astype(np.int32)
     begins = np.flatnonzero(np.diff(cuts.contour[rows], prepend=-1))
     toolpath = cuts.toolpath
     # Of each contour the places where it begins and where its rows end; sizes stand at the latter.
@@ -326,10 +334,10 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     places, sums = np.empty((offsets[-1], 2)), np.zeros((offsets[-1], 2))
     places[offsets[:-1]] = toolpath.starts_of(rows[begins])[:, :2]
     for low in range(0, len(rows), ROWS_AT_ONCE):
-        some = np.arange(low, min(low + ROWS_AT_ONCE, len(rows)))
-        at = some + np.searchsorted(begins, some, side="right")
-        places[at] = toolpath.end[rows[some], :2]
-        sums[at] = _lengths_and_areas(toolpath, rows[some])
+        batch = np.arange(low, min(low + ROWS_AT_ONCE, len(rows)))
+        end_rows = batch + np.searchsorted(begins, batch, side="right")
+        places[end_rows] = toolpath.end[rows[batch], :2]
+        sums[end_rows] = _lengths_and_areas(toolpath, rows[batch])
     latest = latest_near(places, offsets, gap_mm)
     # Most contours without a loop are lines that come back nowhere.
     for run in np.flatnonzero(np.maximum.reduceat(latest, offsets[:-1]) >= 0).tolist():
@@ -337,14 +345,17 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
         np.cumsum(sums[low:high], axis=0, out=sums[low:high])
         loop = _longest_loop(sums[low:high], places[low:high], latest[low:high] - low, gap_mm)
         if loop is not None:
-            mine = rows[low - run : high - run - 1]
-            found[cuts.contour[mine[0]]] = mine[loop[0]], mine[loop[1]]
-    return found
+            contour_rows = rows[low - run : high - run - 1]
+            contour_loops[cuts.contour[contour_rows[0]]] = (
+                contour_rows[loop[0]],
+                contour_rows[loop[1]],
+            )
+    return contour_loops
 
 
-def is_in_loop(cuts: CutMoves, found: Ints) -> Bools:
+def is_in_loop(cuts: CutMoves, contour_loops: Ints) -> Bools:
     """Return (N,) true for the cutting rows that belong to the loop of their contour."""
-    first, last = found[found[:, 0] != NO_LOOP].T
+    first, last = contour_loops[contour_loops[:, 0] != NO_LOOP].T
     inside = np.zeros(len(cuts.contour) + 1, dtype=np.int8)
     inside[first] += 1
     inside[last + 1] -= 1
@@ -355,8 +366,8 @@ def _is_level(cuts: CutMoves) -> Bools:
     """Return (C,) true for contours at one height."""
     low, high = np.full(cuts.contour_count, np.inf), np.full(cuts.contour_count, -np.inf)
     for begin in range(0, len(cuts.segments), ROWS_AT_ONCE):
-        which = np.arange(begin, min(begin + ROWS_AT_ONCE, len(cuts.segments)))
-        contour, z = cuts.contour[cuts.row[which]], cuts.heights(which)
+        batch = np.arange(begin, min(begin + ROWS_AT_ONCE, len(cuts.segments)))
+        contour, z = cuts.contour[cuts.row[batch]], cuts.heights(batch)
         np.minimum.at(low, contour, z.min(axis=1))
         np.maximum.at(high, contour, z.max(axis=1))
     return np.asarray(low == high)
@@ -386,16 +397,16 @@ def _longest_loop(
     end at `places` (R + 1, 2); `sums` (R + 1, 2) of what `_lengths_and_areas` gives for the rows
     before each place, and `latest` (R + 1,) the latest place before each that is the same, below 0
     for none."""
-    best, most = None, 0.0
+    best, max_length = None, 0.0
     for first in range(0, len(places), ROWS_AT_ONCE):
         high = first + np.flatnonzero(latest[first : first + ROWS_AT_ONCE] >= 0)
         low = latest[high]
         (ax, ay), (bx, by) = places[high].T, places[low].T
         long, area = (sums[high] - sums[low]).T
-        around = np.abs(area + 0.5 * (ax * by - ay * bx)) > gap_mm * gap_mm
+        has_area = np.abs(area + 0.5 * (ax * by - ay * bx)) > gap_mm * gap_mm
         for begin, end, length in zip(
-            low[around].tolist(), high[around].tolist(), long[around].tolist(), strict=True
+            low[has_area].tolist(), high[has_area].tolist(), long[has_area].tolist(), strict=True
         ):
-            if length >= MIN_LOOP_SHARE * most:
-                best, most = (begin, end - 1), max(most, length)
+            if length >= MIN_LOOP_SHARE * max_length:
+                best, max_length = (begin, end - 1), max(max_length, length)
     return best

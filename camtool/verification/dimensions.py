@@ -72,9 +72,9 @@ class SlideExtents:
         self._counts = np.zeros(len(contour), dtype=np.bool_)
         self._begins = self._counts.copy()
         self._contour = contour
-        mine = _sized_rows(decoded, goal, match)
-        self._counts[mine] = True
-        self._begins[mine[np.flatnonzero(np.diff(contour[mine], prepend=-1))]] = True
+        sized_rows = _sized_rows(decoded, goal, match)
+        self._counts[sized_rows] = True
+        self._begins[sized_rows[np.flatnonzero(np.diff(contour[sized_rows], prepend=-1))]] = True
         self._least = np.full((count, 2), np.inf)
         self._most = np.full((count, 2), -np.inf)
         self._at = start[:2]
@@ -106,8 +106,8 @@ class SlideExtents:
         the slides (R, 2), (R, 2) mm, infinite where they did not move, and the last ones (R, 2)
         mm, NaN there."""
         rows = slice(low, low + len(end))
-        known = np.isfinite(end[:, 0])
-        latest = np.maximum.accumulate(np.where(known, np.arange(1, len(end) + 1), 0))
+        is_known = np.isfinite(end[:, 0])
+        latest = np.maximum.accumulate(np.where(is_known, np.arange(1, len(end) + 1), 0))
         places = np.concatenate([self._at[None, :], end])[np.concatenate([[0], latest])]
         self._at = places[-1]
         counts, begins = self._counts[rows], self._begins[rows]
@@ -118,10 +118,10 @@ class SlideExtents:
         ):
             extreme.at(extent, contour[counts], part[counts])
             extreme.at(extent, contour[begins], places[:-1][begins])
-        for ends, found in zip(self._ends, self._places, strict=True):
+        for ends, places_kept in zip(self._ends, self._places, strict=True):
             # A place behind the last row of a block is that before the first of the next.
             one, other = np.searchsorted(ends, [low, low + len(end) + 1])
-            found[one:other] = places[ends[one:other] - low]
+            places_kept[one:other] = places[ends[one:other] - low]
 
 
 def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[PredictedSize]:
@@ -137,27 +137,27 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Pre
     slide = slides.boxes
     edges = _edges(goal, centre, slide)
     sized = edges.counts & np.isfinite(centre[:, 0, 0])
-    seen = sized & np.isfinite(slide[:, 0, 0])
-    if not seen.any():
+    is_seen = sized & np.isfinite(slide[:, 0, 0])
+    if not is_seen.any():
         return
     # Contours that the program does not cut still count in the nominal size of the part.
     yield from _axis_sizes(
         "part",
         _joint_size(edges.nominal[sized], edges.followed[sized]),
         _joint_size(
-            edges.predicted[_finest_contours(edges, seen)],
-            edges.followed[_finest_contours(edges, seen)],
+            edges.predicted[_finest_contours(edges, is_seen)],
+            edges.followed[_finest_contours(edges, is_seen)],
         ),
     )
     closed = (goal.loops[:, 0] != NO_LOOP) | edges.cleared
     for index in np.flatnonzero(
-        closed & _is_final_pass(centre, lowest, gap_mm) & seen & edges.listed
+        closed & _is_final_pass(centre, lowest, gap_mm) & is_seen & edges.listed
     ):
-        only = edges.followed[index : index + 1]
+        followed = edges.followed[index : index + 1]
         yield from _axis_sizes(
             f"contour {index + 1}",
-            _joint_size(edges.own[index : index + 1], only),
-            _joint_size(edges.predicted[index : index + 1], only),
+            _joint_size(edges.own[index : index + 1], followed),
+            _joint_size(edges.predicted[index : index + 1], followed),
         )
 
 
@@ -186,26 +186,33 @@ def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
     count = len(centre)
     edge = _edge_of(wanted)
     nominal, predicted, rough = centre.copy(), slide.copy(), np.zeros(count)
-    own = centre.copy()
+    own_boxes = centre.copy()
     followed, cleared = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
     listed = np.ones(count, dtype=np.bool_)
     if drawn is not None and (edge >= 0).any():
-        has = np.flatnonzero(edge >= 0)
-        of = edge[has]
+        with_edge = np.flatnonzero(edge >= 0)
+        edges_used = edge[with_edge]
         low, high = np.full((2, int(drawn.line.max()) + 1, 2), np.inf)
         np.minimum.at(low, drawn.line, drawn.planned[:, :, 0])
         np.minimum.at(high, drawn.line, -drawn.planned[:, :, 1])
-        whole = np.stack([low, -high], axis=2)[drawn.line[of]]
-        nominal[has] = drawn.nominal[of]
-        predicted[has] = drawn.planned[of] + slide[has] - centre[has]
-        rough[has] = np.abs(whole - drawn.nominal[of]).max(axis=(1, 2))
-        followed[has], cleared[has] = drawn.followed[of], drawn.cleared[of]
-        makes = np.abs(drawn.planned[of] - whole) <= SAME_MM
-        own[has] = np.where(
-            makes.all(axis=(1, 2))[:, None, None], drawn.nominal[of], drawn.planned[of]
+        drawn_boxes = np.stack([low, -high], axis=2)[drawn.line[edges_used]]
+        nominal[with_edge] = drawn.nominal[edges_used]
+        predicted[with_edge] = drawn.planned[edges_used] + slide[with_edge] - centre[with_edge]
+        rough[with_edge] = np.abs(drawn_boxes - drawn.nominal[edges_used]).max(axis=(1, 2))
+        followed[with_edge], cleared[with_edge] = (
+            drawn.followed[edges_used],
+            drawn.cleared[edges_used],
         )
-        listed[has] = makes.any(axis=(1, 2)) | ~drawn.cleared[of]
-    return _Edges(edge >= UNKNOWN_EDGE, nominal, predicted, rough, followed, cleared, own, listed)
+        makes = np.abs(drawn.planned[edges_used] - drawn_boxes) <= SAME_MM
+        own_boxes[with_edge] = np.where(
+            makes.all(axis=(1, 2))[:, None, None],
+            drawn.nominal[edges_used],
+            drawn.planned[edges_used],
+        )
+        listed[with_edge] = makes.any(axis=(1, 2)) | ~drawn.cleared[edges_used]
+    return _Edges(
+        edge >= UNKNOWN_EDGE, nominal, predicted, rough, followed, cleared, own_boxes, listed
+    )
 
 
 def _edge_of(wanted: CutMoves) -> Ints:
@@ -218,15 +225,16 @@ def _edge_of(wanted: CutMoves) -> Ints:
     return edge
 
 
-def _finest_contours(edges: _Edges, seen: Bools) -> Ints:
-    """Return the contours that decide a size, of those (C,) that are `seen`: where several lines
-    cut one edge, as in roughing and finishing, those of the line that comes nearest to it."""
-    rows = np.flatnonzero(seen)
+def _finest_contours(edges: _Edges, is_seen: Bools) -> Ints:
+    """Return the contours that decide a size, of those (C,) that are `is_seen`: where several
+    lines cut one edge, as in roughing and finishing, those of the line that comes nearest to
+    it."""
+    rows = np.flatnonzero(is_seen)
     boxes = edges.nominal[rows].reshape(len(rows), 4)
-    _, same = np.unique(boxes, axis=0, return_inverse=True)
-    least = np.full(len(rows), np.inf)
-    np.minimum.at(least, same.reshape(-1), edges.rough[rows])
-    return rows[edges.rough[rows] <= least[same.reshape(-1)]]
+    _, groups = np.unique(boxes, axis=0, return_inverse=True)
+    min_rough = np.full(len(rows), np.inf)
+    np.minimum.at(min_rough, groups.reshape(-1), edges.rough[rows])
+    return rows[edges.rough[rows] <= min_rough[groups.reshape(-1)]]
 
 
 def _joint_size(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
@@ -236,22 +244,22 @@ def _joint_size(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
     walls = boxes[~followed]
     if not len(walls):
         return high - low, np.ones(2, dtype=np.bool_)
-    beyond = walls[:, :, 0].min(axis=0) > low, walls[:, :, 1].max(axis=0) < high
-    return high - low, beyond[0] | beyond[1]
+    is_outside = walls[:, :, 0].min(axis=0) > low, walls[:, :, 1].max(axis=0) < high
+    return high - low, is_outside[0] | is_outside[1]
 
 
 def _is_final_pass(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
     """Return (C,) true for contours below which no contour of the same box is cut: passes between
     which the tool leaves the stock are contours of their own. `boxes` (C, 2, 2) and `lowest` (C,)
     are as `_extents` gives them."""
-    whole = boxes.transpose(0, 2, 1).reshape(-1, 4)
-    known = np.isfinite(whole[:, 0])
-    keys = np.full(whole.shape, np.iinfo(np.int64).min)
-    keys[known] = np.rint(whole[known] / gap_mm).astype(np.int64)
-    _, same = np.unique(keys, axis=0, return_inverse=True)
-    deepest = np.full(same.max(initial=-1) + 1, np.inf)
-    np.minimum.at(deepest, same.reshape(-1), lowest)
-    return np.asarray(lowest == deepest[same.reshape(-1)])
+    rows = boxes.transpose(0, 2, 1).reshape(-1, 4)
+    is_known = np.isfinite(rows[:, 0])
+    keys = np.full(rows.shape, np.iinfo(np.int64).min)
+    keys[is_known] = np.rint(rows[is_known] / gap_mm).astype(np.int64)
+    _, groups = np.unique(keys, axis=0, return_inverse=True)
+    deepest = np.full(groups.max(initial=-1) + 1, np.inf)
+    np.minimum.at(deepest, groups.reshape(-1), lowest)
+    return np.asarray(lowest == deepest[groups.reshape(-1)])
 
 
 def _is_looped(goal: LoopedCuts) -> Bools:
@@ -277,31 +285,33 @@ def _sized_rows(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
     does."""
     if len(decoded.cuts.rows) == 0 or len(goal.cuts.rows) == 0:
         return np.empty(0, dtype=np.int64)
-    of, has_loop = match.contour, np.append(_is_looped(goal), False)
-    follow = _wanted_rows(goal)[match.row] & (of >= 0)
-    looped = is_in_loop(decoded.cuts, decoded.loops) & (of >= 0) & has_loop[of]
+    wanted_contour, has_loop = match.contour, np.append(_is_looped(goal), False)
+    follow = _wanted_rows(goal)[match.row] & (wanted_contour >= 0)
+    looped = (
+        is_in_loop(decoded.cuts, decoded.loops) & (wanted_contour >= 0) & has_loop[wanted_contour]
+    )
     with_loop = np.zeros(len(has_loop), dtype=np.bool_)
-    with_loop[of[looped]] = True
-    return np.flatnonzero(looped | (follow & ~with_loop[of]))
+    with_loop[wanted_contour[looped]] = True
+    return np.flatnonzero(looped | (follow & ~with_loop[wanted_contour]))
 
 
 def _extents(cuts: CutMoves, counts: Bools) -> tuple[Floats, Floats]:
     """Return (C, 2, 2) mm: box [[x low, x high], [y low, y high]] of the rows of each contour that
     count, `counts` (N,), and (C,) mm: the lowest height of their ends; infinite for a contour
     without any."""
-    least = np.full((cuts.contour_count, 2), np.inf)
-    most = np.full((cuts.contour_count, 2), -np.inf)
+    low_corner = np.full((cuts.contour_count, 2), np.inf)
+    high_corner = np.full((cuts.contour_count, 2), -np.inf)
     lowest = np.full(cuts.contour_count, np.inf)
     for low in range(0, len(cuts.segments), ROWS_AT_ONCE):
         row = cuts.row[low : low + ROWS_AT_ONCE]
-        counted = np.flatnonzero(counts[row])
-        row, contour = row[counted], cuts.contour[row[counted]]
-        boxes = segment_boxes(cuts.segments[low + counted])
-        np.minimum.at(least, contour, boxes[:, :2])
-        np.maximum.at(most, contour, boxes[:, 2:])
+        counted_rows = np.flatnonzero(counts[row])
+        row, contour = row[counted_rows], cuts.contour[row[counted_rows]]
+        boxes = segment_boxes(cuts.segments[low + counted_rows])
+        np.minimum.at(low_corner, contour, boxes[:, :2])
+        np.maximum.at(high_corner, contour, boxes[:, 2:])
         begin, end = cuts.toolpath.starts_of(row), cuts.toolpath.end[row]
         np.minimum.at(lowest, contour, np.minimum(begin[:, 2], end[:, 2]))
-    return np.stack([least, most], axis=2), lowest
+    return np.stack([low_corner, high_corner], axis=2), lowest
 
 
 def _axis_sizes(

@@ -88,10 +88,10 @@ class Figure:
         if not self.count:
             return math.nan
         rank = math.ceil(PERCENTILE * self.count)
-        chosen = int(np.searchsorted(np.cumsum(self._histogram), rank))
-        if chosen == 0:
+        bin_index = int(np.searchsorted(np.cumsum(self._histogram), rank))
+        if bin_index == 0:
             return 0.0
-        edges = np.array([chosen, chosen + 1], dtype=np.int64) + BEFORE_FIRST
+        edges = np.array([bin_index, bin_index + 1], dtype=np.int64) + BEFORE_FIRST
         middle = float(np.left_shift(edges, SHIFT).view(np.float64).mean())
         return min(middle, self._max)
 
@@ -116,9 +116,9 @@ class RowBlock(Struct, frozen=True, eq=False):
         """Return (R,) a column of whole numbers."""
         return self.columns[:, column].astype(np.int64)
 
-    def largest(self, column: int, seen: Bools) -> Floats:
-        """Return (R,) a column of largest errors, NaN but for the rows that are `seen` (R,)."""
-        return np.where(seen, self.columns[:, column], np.nan)
+    def largest(self, column: int, is_seen: Bools) -> Floats:
+        """Return (R,) a column of largest errors, NaN but for the rows that are `is_seen` (R,)."""
+        return np.where(is_seen, self.columns[:, column], np.nan)
 
 
 def empty_columns(count: int) -> Floats:
@@ -165,37 +165,37 @@ class RowFigures:
     def add(self, block: RowBlock) -> None:
         """Add the next rows, all of whose samples are judged."""
         columns = block.columns
-        samples, known = block.count(at.SAMPLES), block.count(at.KNOWN)
+        samples, known_samples = block.count(at.SAMPLES), block.count(at.KNOWN)
         if self.books.ledger is not None:
             self.books.samples[block.rows] = samples
-        judged = np.where(block.is_cut, samples, 0)
-        inner = block.largest(at.INNER_MAX, judged > 0)
-        lag = block.largest(at.LAG_MAX, judged > 0)
-        total = block.largest(at.TOTAL_MAX, known > 0)
-        self.inner.add_rows(block.low, inner, columns[:, at.INNER_SQUARES], judged)
-        self.lag.add_rows(block.low, lag, columns[:, at.LAG_SQUARES], judged)
-        self.whole.add_rows(block.low, total, columns[:, at.TOTAL_SQUARES], known)
+        judged_samples = np.where(block.is_cut, samples, 0)
+        inner = block.largest(at.INNER_MAX, judged_samples > 0)
+        lag = block.largest(at.LAG_MAX, judged_samples > 0)
+        total = block.largest(at.TOTAL_MAX, known_samples > 0)
+        self.inner.add_rows(block.low, inner, columns[:, at.INNER_SQUARES], judged_samples)
+        self.lag.add_rows(block.low, lag, columns[:, at.LAG_SQUARES], judged_samples)
+        self.whole.add_rows(block.low, total, columns[:, at.TOTAL_SQUARES], known_samples)
         is_arc = are_arcs(self._toolpath.kind[block.rows])
         self.lines_mm = _larger_error(self.lines_mm, inner[~is_arc])
         self.arcs_mm = _larger_error(self.arcs_mm, inner[is_arc])
         self._sum += float(columns[:, at.TOTAL_SUM].sum())
         self.total[block.rows] = total
-        self.contours.add(block, known, (inner, lag, total))
+        self.contours.add(block, known_samples, (inner, lag, total))
         self.worst.add(block, (inner, lag, total))
         self._add_ends(block.low, columns[:, [at.COMMANDED_X, at.COMMANDED_Y]])
 
     def _add_ends(self, low: int, commanded: Floats) -> None:
         """Compare the positions of the controller after the next rows with the ends of the
         moves."""
-        off = np.abs(commanded - self._toolpath.end[low : low + len(commanded), :2])
-        endless = ~self.books.ended[low : low + len(off)]
+        distances = np.abs(commanded - self._toolpath.end[low : low + len(commanded), :2])
+        endless = ~self.books.ended[low : low + len(distances)]
         for row in np.flatnonzero(endless).tolist():
             x, y = commanded[row].tolist()
             self.books.endless[low + row] = x, y
-        off[~np.isfinite(off[:, 0])] = 0.0
-        self.missed.add(low, off, self._steps_mm)
-        off[endless] = 0.0
-        self.missed_by_others.add(low, off, self._steps_mm)
+        distances[~np.isfinite(distances[:, 0])] = 0.0
+        self.missed.add(low, distances, self._steps_mm)
+        distances[endless] = 0.0
+        self.missed_by_others.add(low, distances, self._steps_mm)
 
     @property
     def seconds(self) -> Floats:
@@ -208,10 +208,10 @@ class RowFigures:
         return self._sum / self.whole.count if self.whole.count else math.nan
 
 
-def _larger_error(most: float, errors: Floats) -> float:
+def _larger_error(previous: float, errors: Floats) -> float:
     """Return the largest known error, mm; NaN without any."""
-    known = errors[np.isfinite(errors)]
-    return float(np.fmax(most, known.max())) if len(known) else most
+    known_errors = errors[np.isfinite(errors)]
+    return float(np.fmax(previous, known_errors.max())) if len(known_errors) else previous
 
 
 # Figures of the whole motion: steps, reversals, time, and endless arcs.
@@ -325,35 +325,38 @@ class ContourSums:
         """Add the next rows: `samples` (R,) with a total error; the largest `errors` (R,) of
         interpolation and mechanics, and in all."""
         contour = self._match.contour[block.rows]
-        known = np.flatnonzero((samples > 0) & (contour >= 0))
-        of, columns = contour[known], block.columns[known]
-        inner, lag, total = (one[known] for one in errors)
-        np.add.at(self._samples, of, samples[known])
-        np.add.at(self._squares, of, columns[:, at.TOTAL_SQUARES])
-        np.add.at(self._sums, of, columns[:, at.TOTAL_SUM])
-        off = self._match.off_mm[block.rows][known]
-        for largest, one in zip(self._largest, (inner, lag, off), strict=True):
-            np.maximum.at(largest, of, one)
-        order = np.lexsort((known, -total, of))
-        worst = order[np.flatnonzero(np.diff(of[order], prepend=-1))]
-        worst = worst[total[worst] > self._total[of[worst]]]
-        here = of[worst]
-        self._total[here], self._row[here] = total[worst], block.low + known[worst]
-        self._at[here] = columns[worst][:, [at.TOTAL_X, at.TOTAL_Y]]
+        known_rows = np.flatnonzero((samples > 0) & (contour >= 0))
+        contours, columns = contour[known_rows], block.columns[known_rows]
+        inner, lag, total = (one[known_rows] for one in errors)
+        np.add.at(self._samples, contours, samples[known_rows])
+        np.add.at(self._squares, contours, columns[:, at.TOTAL_SQUARES])
+        np.add.at(self._sums, contours, columns[:, at.TOTAL_SUM])
+        drawn_off = self._match.off_mm[block.rows][known_rows]
+        for largest, one in zip(self._largest, (inner, lag, drawn_off), strict=True):
+            np.maximum.at(largest, contours, one)
+        order = np.lexsort((known_rows, -total, contours))
+        worst = order[np.flatnonzero(np.diff(contours[order], prepend=-1))]
+        worst = worst[total[worst] > self._total[contours[worst]]]
+        worst_contours = contours[worst]
+        self._total[worst_contours], self._row[worst_contours] = (
+            total[worst],
+            block.low + known_rows[worst],
+        )
+        self._at[worst_contours] = columns[worst][:, [at.TOTAL_X, at.TOTAL_Y]]
 
     def figures(self) -> Iterator[ContourFigures]:
         """Yield the figures of each of these contours."""
         every = np.flatnonzero(self._row >= 0)
         for low in range(0, len(every), CONTOURS_AT_ONCE):
-            here = every[low : low + CONTOURS_AT_ONCE]
+            batch = every[low : low + CONTOURS_AT_ONCE]
             columns = (
-                here,
-                self._row[here],
-                *self._at[here].T,
-                self._total[here],
-                np.sqrt(self._squares[here] / self._samples[here]),
-                self._sums[here] / self._samples[here],
-                *(largest[here] for largest in self._largest),
+                batch,
+                self._row[batch],
+                *self._at[batch].T,
+                self._total[batch],
+                np.sqrt(self._squares[batch] / self._samples[batch]),
+                self._sums[batch] / self._samples[batch],
+                *(largest[batch] for largest in self._largest),
             )
             numbers = (one.tolist() for one in columns)
             for contour, row, x, y, *figures in zip(*numbers, strict=True):
@@ -372,12 +375,18 @@ class WorstRows:
         """Add the next rows and their largest `errors` (R,) of interpolation and mechanics, and in
         all."""
         inner, lag, total = errors
-        known = np.flatnonzero(~np.isnan(total))
-        known = known[np.lexsort((known, -total[known]))][: self._count]
-        place = block.columns[known][:, [at.TOTAL_X, at.TOTAL_Y]]
-        here = [block.low + known, total[known], inner[known], lag[known], place]
-        both = np.concatenate([self.found, np.column_stack(here)])
-        self.found = both[np.lexsort((both[:, 0], -both[:, 1]))][: self._count]
+        known_rows = np.flatnonzero(~np.isnan(total))
+        known_rows = known_rows[np.lexsort((known_rows, -total[known_rows]))][: self._count]
+        place = block.columns[known_rows][:, [at.TOTAL_X, at.TOTAL_Y]]
+        columns = [
+            block.low + known_rows,
+            total[known_rows],
+            inner[known_rows],
+            lag[known_rows],
+            place,
+        ]
+        candidates = np.concatenate([self.found, np.column_stack(columns)])
+        self.found = candidates[np.lexsort((candidates[:, 0], -candidates[:, 1]))][: self._count]
 
 
 class MissedEnds:
@@ -387,15 +396,18 @@ class MissedEnds:
     def __init__(self) -> None:
         self.count, self.row, self.most_mm = 0, -1, 0.0
 
-    def add(self, low: int, off: Floats, steps_mm: tuple[float, float]) -> None:
+    def add(self, low: int, differences: Floats, steps_mm: tuple[float, float]) -> None:
         """Add the distances (R, 2) mm of the controller from the ends of the rows from `low`
         on."""
-        missed = np.flatnonzero((off > END_STEPS * np.array(steps_mm)).any(axis=1))
-        if len(missed):
-            far = np.hypot(*off[missed].T)
-            self.count += len(missed)
-            if far.max() > self.most_mm:
-                self.row, self.most_mm = low + int(missed[far.argmax()]), float(far.max())
+        missed_rows = np.flatnonzero((differences > END_STEPS * np.array(steps_mm)).any(axis=1))
+        if len(missed_rows):
+            distances = np.hypot(*differences[missed_rows].T)
+            self.count += len(missed_rows)
+            if distances.max() > self.most_mm:
+                self.row, self.most_mm = (
+                    low + int(missed_rows[distances.argmax()]),
+                    float(distances.max()),
+                )
 
 
 def contour_names(cuts: CutMoves) -> list[str]:

@@ -78,22 +78,26 @@ def own_match(cuts: CutMoves, circles: list[FullCircle]) -> Match:
     return Match(row, cuts.contour, cuts.contour, circle, np.broadcast_to(0.0, count))
 
 
-def match_through_compensation(match: Match, of: Ints, goal: Goal) -> Match:
+def match_through_compensation(match: Match, wanted_rows: Ints, goal: Goal) -> Match:
     """Return the match with the wanted rows from a match with the rows of a compensated toolpath:
-    `of` (S,) is the wanted row of each compensated row. Compensation may divide contours and
-    circles."""
-    known = match.row >= 0
-    row = np.where(known, of[np.maximum(match.row, 0)], -1) if len(of) else match.row
-    contour = np.where(known, goal.moves.cuts.contour[np.maximum(row, 0)], -1)
+    `wanted_rows` (S,) is the wanted row of each compensated row. Compensation may divide contours
+    and circles."""
+    is_known = match.row >= 0
+    row = (
+        np.where(is_known, wanted_rows[np.maximum(match.row, 0)], -1)
+        if len(wanted_rows)
+        else match.row
+    )
+    contour = np.where(is_known, goal.moves.cuts.contour[np.maximum(row, 0)], -1)
     circle = goal.circle_of_row
-    off = np.where(known, goal.off_mm[np.maximum(row, 0)], 0.0)
+    drawn_off = np.where(is_known, goal.off_mm[np.maximum(row, 0)], 0.0)
     return replace(
         match,
         row=row,
-        off_mm=_with_neighbours(off, contour),
+        off_mm=_with_neighbours(drawn_off, contour),
         contour=contour,
         only=np.where(match.only == ANY_CONTOUR, np.int32(ANY_CONTOUR), contour),
-        circle=np.where(known, circle[np.maximum(row, 0)], -1),
+        circle=np.where(is_known, circle[np.maximum(row, 0)], -1),
     )
 
 
@@ -109,54 +113,59 @@ def nearest_at_height(
     limit_mm, depth_mm = limits_mm
     near_mm = max(limit_mm, MIN_LIMIT_MM)
     points, z = samples.points, samples.z
-    found = moves.nearest(points, z, choice, (near_mm, depth_mm))
+    nearest = moves.nearest(points, z, choice, (near_mm, depth_mm))
     wrong_depth = np.zeros(len(points), dtype=np.bool_)
-    rest = np.flatnonzero(np.isinf(found.distance))
+    unmatched = np.flatnonzero(np.isinf(nearest.distance))
     if choice is None:
-        other = moves.nearest_of_all(points[rest], z[rest], near_mm)
+        other = moves.nearest_of_all(points[unmatched], z[unmatched], near_mm)
     else:
         # Without a limit, all moves between a sample and a far contour would be searched.
-        other = moves.nearest(points[rest], z[rest], choice[rest], (near_mm, math.inf))
-    found.distance[rest], found.segment[rest] = other.distance, other.segment
-    wrong_depth[rest] = other.distance <= limit_mm
-    return found, wrong_depth
+        other = moves.nearest(
+            points[unmatched], z[unmatched], choice[unmatched], (near_mm, math.inf)
+        )
+    nearest.distance[unmatched], nearest.segment[unmatched] = other.distance, other.segment
+    wrong_depth[unmatched] = other.distance <= limit_mm
+    return nearest, wrong_depth
 
 
-def match_contours(cuts: CutMoves, samples: CutSamples, found: NearestMoves, goal: Goal) -> Ints:
+def match_contours(cuts: CutMoves, samples: CutSamples, nearest: NearestMoves, goal: Goal) -> Ints:
     """Return (S,) the wanted contour to which the decoded contour of each sample belongs,
-    ANY_CONTOUR for none. `found` is changed in place to the nearest move of that contour."""
-    wanted = goal.moves
-    mine = cuts.contour[cuts.row[samples.segment]]
-    belongs = np.full(len(mine), ANY_CONTOUR, dtype=np.int64)
-    if len(mine) == 0 or len(wanted.cuts.segments) == 0:
+    ANY_CONTOUR for none. `nearest` is changed in place to the nearest move of that contour."""
+    wanted_moves = goal.moves
+    contours = cuts.contour[cuts.row[samples.segment]]
+    belongs = np.full(len(contours), ANY_CONTOUR, dtype=np.int64)
+    if len(contours) == 0 or len(wanted_moves.cuts.segments) == 0:
         return belongs
-    begin = run_offsets(mine, len(mine))
-    for candidate in _candidates(mine, wanted.contour_of(found.segment)):
+    begin = run_offsets(contours, len(contours))
+    for candidate in _candidates(contours, wanted_moves.contour_of(nearest.segment)):
         open_ = np.flatnonzero((belongs[begin[:-1]] == ANY_CONTOUR) & (candidate >= 0))
         if len(open_) == 0:
             break
-        which = ranges(begin[open_], np.diff(begin)[open_])
+        indices = ranges(begin[open_], np.diff(begin)[open_])
         choice = np.repeat(candidate[open_], np.diff(begin)[open_])
-        near, _ = nearest_at_height(
-            samples.of(which), choice, wanted, (goal.limit_mm, goal.depth_mm)
+        own_nearest, _ = nearest_at_height(
+            samples.of(indices), choice, wanted_moves, (goal.limit_mm, goal.depth_mm)
         )
         starts = np.cumsum(np.diff(begin)[open_]) - np.diff(begin)[open_]
-        fits = np.maximum.reduceat(near.distance, starts) <= goal.limit_mm
+        fits = np.maximum.reduceat(own_nearest.distance, starts) <= goal.limit_mm
         fitting = np.repeat(fits, np.diff(begin)[open_])
-        taken = which[fitting]
-        belongs[taken] = choice[fitting]
-        found.distance[taken] = near.distance[fitting]
-        found.segment[taken] = near.segment[fitting]
+        fitting_samples = indices[fitting]
+        belongs[fitting_samples] = choice[fitting]
+        nearest.distance[fitting_samples] = own_nearest.distance[fitting]
+        nearest.segment[fitting_samples] = own_nearest.segment[fitting]
     return belongs
 
 
-def _candidates(mine: Indices, nearest: Indices) -> list[Ints]:
+def _candidates(contours: Indices, nearest_contours: Indices) -> list[Ints]:
     """Return for each try (C,): the wanted contour nearest to most samples, then the next, −1 for
     none.
 
-    `mine` (S,) is the decoded contour of each sample (ascending), `nearest` (S,) the wanted one.
+    `contours` (S,) is the decoded contour of each sample (ascending), `nearest_contours` (S,) the
+    wanted one.
     """
-    pairs, votes = np.unique(np.column_stack([mine, nearest]), axis=0, return_counts=True)
+    pairs, votes = np.unique(
+        np.column_stack([contours, nearest_contours]), axis=0, return_counts=True
+    )
     order = np.lexsort((pairs[:, 1], -votes, pairs[:, 0]))
     contour, choice = pairs[order].T
     offsets = run_offsets(contour, len(contour))
@@ -164,8 +173,8 @@ def _candidates(mine: Indices, nearest: Indices) -> list[Ints]:
     tries = []
     for number in range(min(MAX_CONTOUR_TRIES, int(rank.max()) + 1)):
         column = np.full(len(offsets) - 1, -1, dtype=np.int64)
-        here = rank == number
-        column[np.repeat(np.arange(len(column)), np.diff(offsets))[here]] = choice[here]
+        is_rank = rank == number
+        column[np.repeat(np.arange(len(column)), np.diff(offsets))[is_rank]] = choice[is_rank]
         tries.append(column)
     return tries
 
@@ -186,24 +195,24 @@ def match_rows(
     cuts: CutMoves,
     samples: CutSamples,
     belongs: Ints,
-    found: NearestMoves,
+    nearest_moves: NearestMoves,
     goal: Goal,
 ) -> None:
     """Fill in the match of each row of `cuts` that has samples, which are all of its own;
-    `belongs` (S,) and `found` are the result of `match_contours`."""
-    wanted = goal.moves
+    `belongs` (S,) and `nearest_moves` are the result of `match_contours`."""
+    wanted_moves = goal.moves
     rows = cuts.row[samples.segment]
-    if len(rows) == 0 or len(wanted.cuts.segments) == 0:
+    if len(rows) == 0 or len(wanted_moves.cuts.segments) == 0:
         return
     offsets = run_offsets(rows, len(rows))
     begin, row = offsets[:-1], rows[offsets[:-1]]
     middle = begin + np.diff(offsets) // 2
-    nearest = wanted.contour_of(found.segment)
-    followed = wanted.cuts.row[found.segment]
+    nearest_contours = wanted_moves.contour_of(nearest_moves.segment)
+    followed = wanted_moves.cuts.row[nearest_moves.segment]
     match.row[row] = followed[middle]
-    known = belongs[begin] != ANY_CONTOUR
-    match.contour[row] = np.where(known, belongs[begin], nearest[middle])
-    match.only[row] = np.where(known, belongs[begin], _common_values(nearest, offsets))
+    is_known = belongs[begin] != ANY_CONTOUR
+    match.contour[row] = np.where(is_known, belongs[begin], nearest_contours[middle])
+    match.only[row] = np.where(is_known, belongs[begin], _common_values(nearest_contours, offsets))
     match.circle[row] = _common_values(goal.circle_of_row[followed], offsets)
     match.off_mm[row] = np.maximum.reduceat(goal.off_mm[followed], begin)
 
@@ -218,14 +227,14 @@ def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:
     """Return the largest value of each row (N,) and of its neighbours in its contour, because
     slides lag behind."""
     rows = np.flatnonzero(contour >= 0)
-    most = off_mm.copy()
+    max_off = off_mm.copy()
     for low in range(0, len(rows) - 1, ROWS_AT_ONCE):
-        some = rows[low : low + ROWS_AT_ONCE + 1]
-        same = contour[some[1:]] == contour[some[:-1]]
-        before, after = some[:-1][same], some[1:][same]
-        most[before] = np.maximum(most[before], off_mm[after])
-        most[after] = np.maximum(most[after], off_mm[before])
-    return most
+        batch = rows[low : low + ROWS_AT_ONCE + 1]
+        same_contour = contour[batch[1:]] == contour[batch[:-1]]
+        before, after = batch[:-1][same_contour], batch[1:][same_contour]
+        max_off[before] = np.maximum(max_off[before], off_mm[after])
+        max_off[after] = np.maximum(max_off[after], off_mm[before])
+    return max_off
 
 
 def _common_values(values: Ints | Indices, offsets: Ints) -> Ints:

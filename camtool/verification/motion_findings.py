@@ -54,14 +54,14 @@ def motion_findings(
 
 def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator[Finding]:
     coded = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
-    for (row, place), more in first_items(list(tally.endless_arcs.items())):
-        missed = np.hypot(*((np.array(place) - decoded.end[row, :2]) / coded))
-        yield (ARC_MISSES_END if math.isfinite(missed) else ARC_MISSES_END_FAR)(
+    for (row, place), other_count in first_items(list(tally.endless_arcs.items())):
+        missed_steps = np.hypot(*((np.array(place) - decoded.end[row, :2]) / coded))
+        yield (ARC_MISSES_END if math.isfinite(missed_steps) else ARC_MISSES_END_FAR)(
             where=f"{block_name(decoded, row)}, end {at_point(decoded.end[row])}",
-            measured=missed if math.isfinite(missed) else None,
+            measured=missed_steps if math.isfinite(missed_steps) else None,
             limit=0.0,
             move="arc" if decoded.is_arc[row] else "move",
-            more=more,
+            more=other_count,
         )
 
 
@@ -69,17 +69,19 @@ def _missed_ends(quantised: Toolpath, case: Case, rows: RowFigures) -> Iterator[
     """Yield END_NOT_REACHED for moves that end beside their programmed ends, except endless arcs:
     a remark where all are within the tolerance of coverage and of the corners that the program
     allows (G64 P, Q)."""
-    missed = rows.missed_by_others
-    if missed.count == 0:
+    ends = rows.missed_by_others
+    if ends.count == 0:
         return
-    asked = (mode.tolerance_mm + mode.merging_mm for mode in quantised.modes if mode.tolerance_mm)
-    meant_mm = case.coverage_mm + max(asked, default=0.0)
+    tolerances = (
+        mode.tolerance_mm + mode.merging_mm for mode in quantised.modes if mode.tolerance_mm
+    )
+    meant_mm = case.coverage_mm + max(tolerances, default=0.0)
     yield END_NOT_REACHED(
-        severity=Severity.WARNING if missed.most_mm > meant_mm else Severity.INFO,
-        where=f"{block_name(quantised, missed.row)}, end {at_point(quantised.end[missed.row])}",
-        measured=missed.most_mm * UM_PER_MM,
+        severity=Severity.WARNING if ends.most_mm > meant_mm else Severity.INFO,
+        where=f"{block_name(quantised, ends.row)}, end {at_point(quantised.end[ends.row])}",
+        measured=ends.most_mm * UM_PER_MM,
         limit=0.0,
-        count=missed.count,
+        count=ends.count,
     )
 
 
@@ -122,8 +124,8 @@ def _size_mm(cuts: CutMoves) -> float:
 def _nothing_moves(cuts: CutMoves) -> Iterator[Finding]:
     decoded = cuts.toolpath
     homes = np.isin(decoded.kind, (Kind.HOME_XY, Kind.HOME_Z))
-    still = bool((decoded.end == decoded.start).all())
-    if still and not decoded.is_arc.any() and not homes.any():
+    is_still = bool((decoded.end == decoded.start).all())
+    if is_still and not decoded.is_arc.any() and not homes.any():
         yield NO_MOTION()
     elif len(cuts.rows) == 0 and len(holes_of(decoded)) == 0:
         yield NO_MOTION_BELOW()
@@ -137,8 +139,8 @@ def _homing(decoded: Toolpath, machine: Machine) -> Iterator[Finding]:
 
 
 def _unknown_backlash(machine: Machine, tally: Tally) -> Iterator[Finding]:
-    given = zip(AXES, machine.axes, machine.play_map.used, tally.steps, strict=True)
-    for name, axis, cells, steps in given:
-        known = cells is not None or axis.backlash_mm > 0.0 or axis.compensation_mm > 0.0
-        if steps and not known:
+    axis_items = zip(AXES, machine.axes, machine.play_map.used, tally.steps, strict=True)
+    for name, axis, cells, steps in axis_items:
+        has_data = cells is not None or axis.backlash_mm > 0.0 or axis.compensation_mm > 0.0
+        if steps and not has_data:
             yield PLAY_NOT_KNOWN(where=f"axis {name}", axis=name)

@@ -86,15 +86,18 @@ class MoveIndex:
     def nearest_of_all(self, points: Floats, height: Floats, from_mm: float) -> NearestMoves:
         """Return the nearest move at any distance and height, which is expected within
         `from_mm`."""
-        found = NearestMoves(
+        nearest_moves = NearestMoves(
             np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64)
         )
-        rest, limit = np.arange(len(points)), from_mm
-        while len(rest) and len(self.cuts.segments):
-            near = self.nearest(points[rest], height[rest], None, (limit, math.inf))
-            found.distance[rest], found.segment[rest] = near.distance, near.segment
-            rest, limit = rest[np.isinf(near.distance)], limit * LIMIT_GROWTH
-        return found
+        remaining, limit = np.arange(len(points)), from_mm
+        while len(remaining) and len(self.cuts.segments):
+            found_now = self.nearest(points[remaining], height[remaining], None, (limit, math.inf))
+            nearest_moves.distance[remaining], nearest_moves.segment[remaining] = (
+                found_now.distance,
+                found_now.segment,
+            )
+            remaining, limit = remaining[np.isinf(found_now.distance)], limit * LIMIT_GROWTH
+        return nearest_moves
 
     def pairs_within(
         self, points: Floats, height: Floats, limits_mm: tuple[float, float]
@@ -103,17 +106,17 @@ class MoveIndex:
         their distances in XY, mm."""
         return pairs(self._moves, np.column_stack([points, height]), limits_mm)
 
-    def shares(self, points: Floats, which: Ints) -> Floats:
+    def shares(self, points: Floats, indices: Ints) -> Floats:
         """Return (J,) the position along segment which[j], from 0 to 1, of its point nearest to
         point j."""
         moves = self._moves
-        start = moves.start[which]
+        start = moves.start[indices]
         x, y = (points - start).T
-        dx, dy = (moves.end[which] - start).T
+        dx, dy = (moves.end[indices] - start).T
         square = dx * dx + dy * dy
         along = (x * dx + y * dy) / np.where(square > 0.0, square, 1.0)
-        arc = np.flatnonzero(moves.arc[which] >= 0)
-        table = moves.arcs[moves.arc[which[arc]]]
+        arc = np.flatnonzero(moves.arc[indices] >= 0)
+        table = moves.arcs[moves.arc[indices[arc]]]
         centre = table[:, [at.CX, at.CY]]
         px, py = (points[arc] - centre).T
         ax, ay = (start[arc] - centre).T
@@ -151,8 +154,8 @@ def run_offsets(labels: Ints | Indices, longest: int) -> Ints:
     if len(labels) == 0:
         return np.zeros(1, dtype=np.int64)
     change = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1])
-    begun = np.repeat(change, np.diff(np.append(change, len(labels))))
-    begin = np.flatnonzero((np.arange(len(labels)) - begun) % longest == 0)
+    run_begin = np.repeat(change, np.diff(np.append(change, len(labels))))
+    begin = np.flatnonzero((np.arange(len(labels)) - run_begin) % longest == 0)
     return np.append(begin, len(labels))
 
 

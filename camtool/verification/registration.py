@@ -214,16 +214,16 @@ class _Lines(Struct, frozen=True, eq=False):
             foot = np.where(k == 0.0, x, np.arctan2(k * x, 1.0 - k * y) / k)
         tries = np.stack([np.clip(foot, 0.0, frames.length), 0.0 * foot, frames.length])
         places = [point_at(self.segments, segment, each / frames.length) for each in tries]
-        apart = points - np.stack(places)
-        best = np.hypot(apart[..., 0], apart[..., 1]).argmin(axis=0)
+        arms = points - np.stack(places)
+        best = np.hypot(arms[..., 0], arms[..., 1]).argmin(axis=0)
         every = np.arange(len(points))
-        off, share = apart[best, every], tries[best, every] / frames.length
-        left = turn_left(frames.tangent_at(share))
-        distance = np.hypot(off[:, 0], off[:, 1])
-        side = np.where(dot(off, left) < 0.0, -1.0, 1.0)
-        known = distance > POSITION_EPS_MM
-        unit = off * (side / np.where(known, distance, 1.0))[:, None]
-        return side * distance, np.where(known[:, None], unit, left), segment
+        offsets, share = arms[best, every], tries[best, every] / frames.length
+        normal = turn_left(frames.tangent_at(share))
+        distance = np.hypot(offsets[:, 0], offsets[:, 1])
+        side = np.where(dot(offsets, normal) < 0.0, -1.0, 1.0)
+        has_side = distance > POSITION_EPS_MM
+        unit = offsets * (side / np.where(has_side, distance, 1.0))[:, None]
+        return side * distance, np.where(has_side[:, None], unit, normal), segment
 
 
 class _Path(Struct, frozen=True, eq=False):
@@ -274,8 +274,8 @@ class _Path(Struct, frozen=True, eq=False):
     def near_mm(self, radius_mm: float) -> float:
         """Return the distance within which a move follows a track of a tool of this radius, mm."""
         size = 0.0 if not len(self.boxes) else float(np.hypot(*np.diff(self.boxes[0])[:, 0]))
-        least = min(NEAR_MM, NEAR_SIZE * size) if size else NEAR_MM
-        return min(least, NEAR_SHARE * radius_mm) if radius_mm > 0.0 else least
+        nearness = min(NEAR_MM, NEAR_SIZE * size) if size else NEAR_MM
+        return min(nearness, NEAR_SHARE * radius_mm) if radius_mm > 0.0 else nearness
 
     def thin(self) -> _Path:
         """Return at most `SEARCH_POINTS` of the points, evenly chosen."""
@@ -286,20 +286,25 @@ class _Path(Struct, frozen=True, eq=False):
 def _boxes_of(cuts: CutMoves, limit_mm: float) -> Floats:
     """Return (B, 2, 2) mm: the boxes of the loops of all contours, of the whole where one has
     none; and that of everything first."""
-    found = loops(cuts, limit_mm)
+    contour_loops = loops(cuts, limit_mm)
     first, last = cuts.contour_ends()
-    known = found[:, 0] >= 0
-    first, last = np.where(known, found[:, 0], first), np.where(known, found[:, 1], last)
+    has_loop = contour_loops[:, 0] >= 0
+    first, last = (
+        np.where(has_loop, contour_loops[:, 0], first),
+        np.where(has_loop, contour_loops[:, 1], last),
+    )
     each = segment_boxes(cuts.segments)
     boxes = []
     for low, high in zip(cuts.first[first].tolist(), cuts.first[last + 1].tolist(), strict=True):
-        mine = each[low:high]
-        boxes.append((mine[:, :2].min(axis=0), mine[:, 2:].max(axis=0)))
+        rows = each[low:high]
+        boxes.append((rows[:, :2].min(axis=0), rows[:, 2:].max(axis=0)))
     found_boxes = np.array(boxes).reshape(-1, 2, 2).transpose(0, 2, 1)
     if not len(found_boxes):
         return found_boxes
-    whole = np.column_stack([found_boxes[:, :, 0].min(axis=0), found_boxes[:, :, 1].max(axis=0)])
-    return np.concatenate([whole[None], found_boxes])
+    total_box = np.column_stack(
+        [found_boxes[:, :, 0].min(axis=0), found_boxes[:, :, 1].max(axis=0)]
+    )
+    return np.concatenate([total_box[None], found_boxes])
 
 
 def register(
@@ -331,14 +336,16 @@ def register(
             running, [DRAWING_PLACE_NOWHERE(measured=0.0, limit=100.0 * MIN_FOLLOWED_SHARE)]
         )
     shift: tuple[float, float] | None = (0.0, 0.0)
-    said: list[Finding] = []
+    findings: list[Finding] = []
     if align or tool_diameter_mm is None:
-        shift, said = _find_place(path, lines, align=align)
+        shift, findings = _find_place(path, lines, align=align)
     if shift is None:
-        return _empty_registration(running, said)
-    moved = Polylines.joined([_shift_lines(drawing.paths, shift)]) if any(shift) else drawing.paths
-    return _Follower(program, path, _Lines.of(moved), drawing, limit_mm).registration(
-        shift, said, tool_diameter_mm, align=align
+        return _empty_registration(running, findings)
+    shifted = (
+        Polylines.joined([_shift_lines(drawing.paths, shift)]) if any(shift) else drawing.paths
+    )
+    return _Follower(program, path, _Lines.of(shifted), drawing, limit_mm).registration(
+        shift, findings, tool_diameter_mm, align=align
     )
 
 
@@ -355,10 +362,10 @@ def _tools_of(toolpath: Toolpath) -> Ints:
     return np.asarray(np.rint(number[latest]).astype(np.int64))
 
 
-def _empty_registration(running: Toolpath, said: Sequence[Finding]) -> Registration:
+def _empty_registration(running: Toolpath, findings: Sequence[Finding]) -> Registration:
     """Return the registration of a program that follows nothing, with findings that say so."""
     report = FoundReport(shift_mm=(0.0, 0.0), aligned=False, followed=0.0)
-    return Registration((0.0, 0.0), running, tuple(said), report, None)
+    return Registration((0.0, 0.0), running, tuple(findings), report, None)
 
 
 # The place: candidates by what offsets keep, refined by all of the path.
@@ -380,19 +387,19 @@ def _find_place(
 ) -> tuple[tuple[float, float] | None, list[Finding]]:
     """Return the shift of the drawing (x, y) mm, None where none fits, and findings on it."""
     few = path.thin()
-    here = _Place((0.0, 0.0), _followed_share(few, lines, np.zeros(2)))
-    if not align and here.share >= MIN_FOLLOWED_SHARE:
-        return here.shift, []
-    found = _refined_places(few, lines)
-    best = max([here, *found], key=lambda each: each.share)
-    if here.share >= MIN_EQUAL_SHARE * best.share:
-        best = here
+    as_drawn = _Place((0.0, 0.0), _followed_share(few, lines, np.zeros(2)))
+    if not align and as_drawn.share >= MIN_FOLLOWED_SHARE:
+        return as_drawn.shift, []
+    refined = _refined_places(few, lines)
+    best = max([as_drawn, *refined], key=lambda each: each.share)
+    if as_drawn.share >= MIN_EQUAL_SHARE * best.share:
+        best = as_drawn
     if best.share >= MIN_FOLLOWED_SHARE:
         if not align:
             x, y = best.shift
             return None, [
                 DRAWING_PLACE_ELSEWHERE(
-                    measured=100.0 * here.share, limit=100.0 * best.share, x=x, y=y
+                    measured=100.0 * as_drawn.share, limit=100.0 * best.share, x=x, y=y
                 )
             ]
         other = None if best.share >= MIN_OTHER_SHARE else _best_other_frame(few, lines)
@@ -401,7 +408,7 @@ def _find_place(
                 DRAWING_PLACE_OTHERWISE(measured=100.0 * best.share, limit=100.0 * other[1].share,
                                flag=other[0])
             ]  # fmt: skip
-        rivals = [] if best is here else _rival_places(best, found)
+        rivals = [] if best is as_drawn else _rival_places(best, refined)
         return best.shift, [
             DRAWING_PLACE_AMBIGUOUS(
                 x=best.shift[0], y=best.shift[1], other_x=each.shift[0], other_y=each.shift[1],
@@ -424,18 +431,20 @@ def _find_place(
 def _best_other_frame(path: _Path, lines: _Lines) -> tuple[str, _Place] | None:
     """Return another scale, mirror or turn of the drawing with which the path follows it well, as
     the flag that makes it; None without any."""
-    found = []
+    frames = []
     scales = [
         (flag, size * np.eye(2)) for flag, size in SCALES if _is_about_size(path, lines, size)
     ]
     for flag, matrix in (*TURNS, *scales):
         other = path.transform(np.linalg.inv(matrix))
-        here = _Place((0.0, 0.0), _followed_share(other, lines, np.zeros(2)))
+        as_drawn = _Place((0.0, 0.0), _followed_share(other, lines, np.zeros(2)))
         places = (
-            [here] if here.share >= MIN_OTHER_SHARE else [here, *_refined_places(other, lines)]
+            [as_drawn]
+            if as_drawn.share >= MIN_OTHER_SHARE
+            else [as_drawn, *_refined_places(other, lines)]
         )
-        found.append((flag, max(places, key=lambda each: each.share)))
-    best = max(found, key=lambda each: each[1].share)
+        frames.append((flag, max(places, key=lambda each: each.share)))
+    best = max(frames, key=lambda each: each[1].share)
     return best if best[1].share >= MIN_OTHER_SHARE else None
 
 
@@ -443,17 +452,17 @@ def _is_about_size(path: _Path, lines: _Lines, size: float) -> bool:
     """True if the cuts are about `size` times as large as the drawing."""
     if not len(path.boxes) or not len(lines.boxes):
         return False
-    about = NEAR_SCALE_RATIO if 0.5 < size < 2.0 else FAR_SCALE_RATIO
+    ratio = NEAR_SCALE_RATIO if 0.5 < size < 2.0 else FAR_SCALE_RATIO
     drawn = np.hypot(*(lines.boxes[:, :, 1].max(axis=0) - lines.boxes[:, :, 0].min(axis=0)))
     cut = np.hypot(*(path.boxes[0, :, 1] - path.boxes[0, :, 0]))
-    return bool(size * drawn / about < cut < size * drawn * about)
+    return bool(size * drawn / ratio < cut < size * drawn * ratio)
 
 
-def _rival_places(best: _Place, found: Sequence[_Place]) -> list[_Place]:
+def _rival_places(best: _Place, places: Sequence[_Place]) -> list[_Place]:
     """Return the other places that explain as much of the path."""
     return [
         each
-        for each in found
+        for each in places
         if each.share >= MIN_EQUAL_SHARE * best.share
         and np.hypot(*np.subtract(each.shift, best.shift)) > 2.0 * VOTE_MM
     ]
@@ -461,59 +470,61 @@ def _rival_places(best: _Place, found: Sequence[_Place]) -> list[_Place]:
 
 def _refined_places(path: _Path, lines: _Lines) -> list[_Place]:
     """Return the best candidates, refined, each once, the best first."""
-    found: list[_Place] = []
+    places: list[_Place] = []
     for shift in _candidate_shifts(path, lines):
         refined = _refine_shift(path, lines, shift)
-        if all(np.hypot(*(refined - each.shift)) > VOTE_MM for each in found):
+        if all(np.hypot(*(refined - each.shift)) > VOTE_MM for each in places):
             share = _followed_share(path, lines, refined)
-            found.append(_Place((float(refined[0]), float(refined[1])), share))
-    return sorted(found, key=lambda each: -each.share)
+            places.append(_Place((float(refined[0]), float(refined[1])), share))
+    return sorted(places, key=lambda each: -each.share)
 
 
 def _candidate_shifts(path: _Path, lines: _Lines) -> Floats:
     """Return (C, 2) shifts with the most votes."""
     drawn = _largest_boxes(lines.boxes)
-    mine = np.concatenate([path.boxes[:1], _largest_boxes(path.boxes[1:])])
-    whole = np.stack([lines.boxes[:, :, 0].min(axis=0), lines.boxes[:, :, 1].max(axis=0)], axis=1)
-    drawn = np.concatenate([whole[None], drawn])
+    path_boxes = np.concatenate([path.boxes[:1], _largest_boxes(path.boxes[1:])])
+    total_box = np.stack(
+        [lines.boxes[:, :, 0].min(axis=0), lines.boxes[:, :, 1].max(axis=0)], axis=1
+    )
+    drawn = np.concatenate([total_box[None], drawn])
     votes, weights = [np.zeros((1, 2))], [np.zeros(1)]
-    if len(mine):
-        size, their = np.diff(mine)[..., 0], np.diff(drawn)[..., 0]
+    if len(path_boxes):
+        size, their = np.diff(path_boxes)[..., 0], np.diff(drawn)[..., 0]
         grown = size[:, None] - their[None]
         room = VOTE_MM + 0.02 * their.max(axis=1)
-        alike = np.abs(grown[..., 0] - grown[..., 1]) <= room
-        alike &= np.abs(grown).max(axis=-1) <= 2.0 * MAX_RADIUS_MM
-        alike[0, 0] = True
-        i, j = np.nonzero(alike)
-        votes.append(mine[i].mean(axis=2) - drawn[j].mean(axis=2))
+        is_alike = np.abs(grown[..., 0] - grown[..., 1]) <= room
+        is_alike &= np.abs(grown).max(axis=-1) <= 2.0 * MAX_RADIUS_MM
+        is_alike[0, 0] = True
+        i, j = np.nonzero(is_alike)
+        votes.append(path_boxes[i].mean(axis=2) - drawn[j].mean(axis=2))
         weights.append(size[i].sum(axis=1))
     points = np.concatenate([path.centres, path.holes])[:MAX_MARKS]
-    theirs = _centres_of(lines)[:MAX_MARKS]
-    if len(points) and len(theirs):
-        votes.append((points[:, None] - theirs[None]).reshape(-1, 2))
+    marks = _centres_of(lines)[:MAX_MARKS]
+    if len(points) and len(marks):
+        votes.append((points[:, None] - marks[None]).reshape(-1, 2))
         share = float(path.length.sum()) / len(points)
-        weights.append(np.full(len(points) * len(theirs), share))
+        weights.append(np.full(len(points) * len(marks), share))
     every, weight = np.concatenate(votes), np.concatenate(weights)
     # Votes that fall on two sides of a border are counted in the cells about it.
     cell = np.rint(every / VOTE_MM).astype(np.int64)
-    names, of = np.unique(cell, axis=0, return_inverse=True)
-    total = np.bincount(of.reshape(-1), weight)
+    names, cells = np.unique(cell, axis=0, return_inverse=True)
+    total = np.bincount(cells.reshape(-1), weight)
     one, other = near_points(names.astype(np.float64), names.astype(np.float64), 1.5)
-    around = np.bincount(one, total[other], minlength=len(names))
-    best = np.argsort(-around, kind="stable")[: 4 * MAX_PLACES]
-    chosen: list[Floats] = []
+    neighbourhood = np.bincount(one, total[other], minlength=len(names))
+    best = np.argsort(-neighbourhood, kind="stable")[: 4 * MAX_PLACES]
+    middles: list[Floats] = []
     for cell_of in best.tolist():
         mine_of = one == cell_of
-        near = np.isin(of.reshape(-1), other[mine_of])
-        heavy = weight[near]
-        middle = every[near].mean(axis=0)
+        is_near = np.isin(cells.reshape(-1), other[mine_of])
+        heavy = weight[is_near]
+        middle = every[is_near].mean(axis=0)
         if heavy.sum() > 0.0:
-            middle = (every[near] * heavy[:, None]).sum(axis=0) / heavy.sum()
-        if all(np.hypot(*(middle - each)) > VOTE_MM for each in chosen):
-            chosen.append(middle)
-        if len(chosen) == MAX_PLACES:
+            middle = (every[is_near] * heavy[:, None]).sum(axis=0) / heavy.sum()
+        if all(np.hypot(*(middle - each)) > VOTE_MM for each in middles):
+            middles.append(middle)
+        if len(middles) == MAX_PLACES:
             break
-    return np.array(chosen)
+    return np.array(middles)
 
 
 def _largest_boxes(boxes: Floats) -> Floats:
@@ -533,43 +544,47 @@ def _refine_shift(path: _Path, lines: _Lines, shift: Floats) -> Floats:
     shift = np.array(shift, dtype=np.float64)
     for width in WIDTHS_MM:
         distance, normal, _ = lines.signed_distances(path.points - shift)
-        far = np.abs(distance)
-        radius = _peak_distance(far, path.length, width)
+        distances = np.abs(distance)
+        radius = _peak_distance(distances, path.length, width)
         side = np.where(distance < 0.0, -1.0, 1.0)
-        beside = np.abs(far - radius) < width
-        along = (far < width) & ~beside
-        off = np.where(beside, far - radius, distance)
-        grows = np.where(beside[:, None], side[:, None] * normal, normal)
-        used = np.flatnonzero(beside | along)
-        if len(used) < 3:
+        is_beside = np.abs(distances - radius) < width
+        along = (distances < width) & ~is_beside
+        offsets = np.where(is_beside, distances - radius, distance)
+        grows = np.where(is_beside[:, None], side[:, None] * normal, normal)
+        used_rows = np.flatnonzero(is_beside | along)
+        if len(used_rows) < 3:
             break
-        weight = np.sqrt(path.length[used])
-        columns = np.column_stack([grows[used], beside[used] & (radius > width)])
-        solved = np.linalg.lstsq(columns * weight[:, None], off[used] * weight, rcond=1e-6)[0]
+        weight = np.sqrt(path.length[used_rows])
+        columns = np.column_stack([grows[used_rows], is_beside[used_rows] & (radius > width)])
+        solved = np.linalg.lstsq(
+            columns * weight[:, None], offsets[used_rows] * weight, rcond=1e-6
+        )[0]
         shift += solved[:2]
     return shift
 
 
-def _peak_distance(far: Floats, length: Floats, width: float) -> float:
+def _peak_distance(distances: Floats, length: Floats, width: float) -> float:
     """Return the distance that most of the path keeps, within `width`; 0 where that is the
     line."""
     bins = max(width, BIN_MM)
-    which, counts = _distance_histogram(far, length, bins)
+    bin_of, counts = _distance_histogram(distances, length, bins)
     pairs = counts + np.append(counts[1:], 0.0)
-    at = int(pairs.argmax())
-    near = (which == at) | (which == at + 1)
-    middle = float(np.average(far[near], weights=length[near])) if near.any() else 0.0
+    peak = int(pairs.argmax())
+    is_near = (bin_of == peak) | (bin_of == peak + 1)
+    middle = (
+        float(np.average(distances[is_near], weights=length[is_near])) if is_near.any() else 0.0
+    )
     return middle if middle > width else 0.0
 
 
-def _distance_histogram(far: Floats, length: Floats, bins: float) -> tuple[Ints, Floats]:
+def _distance_histogram(distances: Floats, length: Floats, bins: float) -> tuple[Ints, Floats]:
     """Return the bin of each distance, and the length of the path in each bin; none in the last,
     which is farther than any tool is wide."""
-    most = int(MAX_RADIUS_MM / bins) + 2
-    which = np.minimum(far / bins, most).astype(np.int64)
-    counts = np.bincount(which, length, minlength=most + 1).astype(np.float64)
+    max_bin = int(MAX_RADIUS_MM / bins) + 2
+    bin_of = np.minimum(distances / bins, max_bin).astype(np.int64)
+    counts = np.bincount(bin_of, length, minlength=max_bin + 1).astype(np.float64)
     counts[-1] = 0.0
-    return which, counts
+    return bin_of, counts
 
 
 def _followed_share(path: _Path, lines: _Lines, shift: Floats) -> float:
@@ -577,10 +592,10 @@ def _followed_share(path: _Path, lines: _Lines, shift: Floats) -> float:
     if len(path.points) == 0:
         drilled = near_points(path.holes - shift, _centres_of(lines), NEAR_MM)[0]
         return len(np.unique(drilled)) / max(len(path.holes), 1)
-    far = np.abs(lines.signed_distances(path.points - shift)[0])
-    radius = _peak_distance(far, path.length, 2.0 * path.near_mm(0.0))
-    near = path.near_mm(radius)
-    fine = (np.abs(far - radius) <= near) | (far <= near)
+    distances = np.abs(lines.signed_distances(path.points - shift)[0])
+    radius = _peak_distance(distances, path.length, 2.0 * path.near_mm(0.0))
+    nearness = path.near_mm(radius)
+    fine = (np.abs(distances - radius) <= nearness) | (distances <= nearness)
     return float(path.length[fine].sum() / path.length.sum())
 
 
@@ -596,9 +611,12 @@ class _Tracks(Struct, frozen=True, eq=False):
     side: Ints
     sharp: Bools
 
-    def select(self, which: Ints) -> _Tracks:
+    def select(self, indices: Ints) -> _Tracks:
         return _Tracks(
-            self.paths.select(which), self.contour[which], self.side[which], self.sharp[which]
+            self.paths.select(indices),
+            self.contour[indices],
+            self.side[indices],
+            self.sharp[indices],
         )
 
     @classmethod
@@ -612,32 +630,34 @@ class _Tracks(Struct, frozen=True, eq=False):
         )
 
 
-def _tracks_of(lines: Polylines, radius_mm: float, which: Ints) -> _Tracks:
-    """Return the tracks beside the contours `which` for a tool of a radius; on them for a radius
-    of 0.
+def _tracks_of(lines: Polylines, radius_mm: float, contours: Ints) -> _Tracks:
+    """Return the tracks beside the contours `contours` for a tool of a radius; on them for a
+    radius of 0.
 
     Closed contours have round and sharp corners outside; an open one has one track that goes
     round it.
     """
     if radius_mm == 0.0:
-        none = np.zeros(len(which), dtype=np.int64)
-        return _Tracks(lines.select(which), which, none, none.astype(np.bool_))
+        zeros = np.zeros(len(contours), dtype=np.int64)
+        return _Tracks(lines.select(contours), contours, zeros, zeros.astype(np.bool_))
     parts = []
-    closed, open_ = which[lines.closed[which]], which[~lines.closed[which]]
+    closed, open_ = contours[lines.closed[contours]], contours[~lines.closed[contours]]
     if len(closed):
         ccw = _orient_ccw(lines.select(closed))
         for side, joins in ((-1, "round"), (1, "round"), (1, "sharp")):
-            paths, of = offset_each(ccw, -side * radius_mm, joins=joins)
+            paths, sources = offset_each(ccw, -side * radius_mm, joins=joins)
             if len(paths):
-                sides = np.full(len(of), side)
-                sharp = np.full(len(of), joins == "sharp")
-                parts.append(_Tracks(paths, closed[of], sides, sharp))
+                sides = np.full(len(sources), side)
+                sharp = np.full(len(sources), joins == "sharp")
+                parts.append(_Tracks(paths, closed[sources], sides, sharp))
     if len(open_):
-        about = Polylines.of([_doubled_path(path) for path in lines.select(open_)])
-        paths, of = offset_each(about, -radius_mm)
+        doubled = Polylines.of([_doubled_path(path) for path in lines.select(open_)])
+        paths, sources = offset_each(doubled, -radius_mm)
         if len(paths):
-            one = np.ones(len(of), dtype=np.int64)
-            parts.append(_Tracks(paths, open_[of], one, np.zeros(len(of), dtype=np.bool_)))
+            one = np.ones(len(sources), dtype=np.int64)
+            parts.append(
+                _Tracks(paths, open_[sources], one, np.zeros(len(sources), dtype=np.bool_))
+            )
     if not parts:
         empty = np.empty(0, dtype=np.int64)
         return _Tracks(lines.select(empty), empty, empty, empty.astype(np.bool_))
@@ -651,8 +671,8 @@ def _orient_ccw(lines: Polylines) -> Polylines:
 
 def _doubled_path(path: Polyline) -> Polyline:
     """Return an open path as a closed one of no width."""
-    back = reverse(path).vertices
-    return Polyline(np.concatenate([path.vertices[:-1], back[:-1]]), closed=True)
+    vertices_back = reverse(path).vertices
+    return Polyline(np.concatenate([path.vertices[:-1], vertices_back[:-1]]), closed=True)
 
 
 def _is_on_track(points: Floats, tracks: _Tracks, near_mm: float) -> Bools:
@@ -662,22 +682,22 @@ def _is_on_track(points: Floats, tracks: _Tracks, near_mm: float) -> Bools:
     return np.asarray(nearest(points, Segments.of(tracks.paths)).distance <= near_mm)
 
 
-def _candidate_radii(far: Floats, length: Floats) -> list[float]:
+def _candidate_radii(distances: Floats, length: Floats) -> list[float]:
     """Return the distances from the nearest line that much of a path keeps, the most kept
     first."""
-    which, counts = _distance_histogram(far, length, BIN_MM)
-    least = MIN_PEAK_SHARE * float(length.sum())
-    found: list[float] = []
+    bin_of, counts = _distance_histogram(distances, length, BIN_MM)
+    min_length = MIN_PEAK_SHARE * float(length.sum())
+    radii: list[float] = []
     for _ in range(MAX_CANDIDATES):
-        around = np.convolve(counts, np.ones(5), mode="same")
-        at = int(around.argmax())
-        if around[at] < least:
+        neighbourhood = np.convolve(counts, np.ones(5), mode="same")
+        peak = int(neighbourhood.argmax())
+        if neighbourhood[peak] < min_length:
             break
-        near = np.abs(which - at) <= 2
-        middle = float(np.average(far[near], weights=length[near] + 1e-12))
-        found.append(middle if middle > 2.0 * BIN_MM else 0.0)
-        counts[max(at - 4, 0) : at + 5] = 0.0
-    return list(dict.fromkeys(found))
+        is_near = np.abs(bin_of - peak) <= 2
+        middle = float(np.average(distances[is_near], weights=length[is_near] + 1e-12))
+        radii.append(middle if middle > 2.0 * BIN_MM else 0.0)
+        counts[max(peak - 4, 0) : peak + 5] = 0.0
+    return list(dict.fromkeys(radii))
 
 
 class _RadiusTrial(Struct, frozen=True, eq=False):
@@ -705,10 +725,10 @@ class _Cells(Struct, frozen=True, eq=False):
 
     def share(self, count: int) -> Floats:
         """Return (T,) the part of each track that is cut."""
-        whole = np.bincount(self.track, self.length, minlength=count)
+        total_mm = np.bincount(self.track, self.length, minlength=count)
         return np.asarray(
             np.bincount(self.track, self.length * self.cut, minlength=count)
-            / np.where(whole > 0.0, whole, 1.0)
+            / np.where(total_mm > 0.0, total_mm, 1.0)
         )
 
 
@@ -739,83 +759,85 @@ class _Follower(Struct, frozen=True, eq=False):
     def registration(
         self,
         shift: tuple[float, float],
-        said: Sequence[Finding],
+        place_findings: Sequence[Finding],
         tool_diameter_mm: float | None,
         *,
         align: bool,
     ) -> Registration:
-        """Return the registration; `said` are the findings on the place of the drawing."""
-        findings = list(said)
+        """Return the registration; `place_findings` are the findings on the place of the
+        drawing."""
+        findings = list(place_findings)
         if align and not findings and np.hypot(*shift) > self.limit_mm:
             findings.append(DRAWING_PLACE_MOVED(x=shift[0], y=shift[1]))
         radius = None if tool_diameter_mm is None else 0.5 * tool_diameter_mm
         parts, tools = [], []
         for number in np.unique(self.path.tool).tolist():
-            mine = np.flatnonzero(self.path.tool == number)
-            tried, more = self._radius(mine, radius)
-            findings += more
-            if tried is None:
+            own_points = np.flatnonzero(self.path.tool == number)
+            trial, remarks = self._radius(own_points, radius)
+            findings += remarks
+            if trial is None:
                 continue
-            tools.append(FoundTool(number if number >= 0 else None, 2.0 * tried.radius_mm,
+            tools.append(FoundTool(number if number >= 0 else None, 2.0 * trial.radius_mm,
                                    tool_diameter_mm is not None))  # fmt: skip
-            parts.append((tried, number))
-        chosen = self._join_trials(parts)
-        drilled = self._drilled_circles(chosen)
-        wanted, off = self.cuts.toolpath, np.empty(0)
+            parts.append((trial, number))
+        followed = self._join_trials(parts)
+        drilled = self._drilled_circles(followed)
+        wanted, offsets = self.cuts.toolpath, np.empty(0)
         rows = np.zeros(len(wanted), dtype=np.bool_)
-        if chosen is not None:
-            follow = _RowTracks.of(self.cuts, chosen, self.path)
-            wanted, off, rows = _with_tracks(self, chosen, follow), follow.off, follow.rows
-        if chosen is not None or drilled.any():
-            findings += self._not_cut_findings(chosen, drilled)
-        if chosen is not None:
-            findings += self._into_part_findings(chosen, rows)
-        findings += self._beside_findings(rows, off)
-        beside = float(self._row_lengths()[self.cuts.is_cut & ~rows].sum())
-        whole = float(self._row_lengths()[self.cuts.is_cut].sum())
-        wrong = any(each.severity == Severity.ERROR for each in findings)
-        if whole and beside > (1.0 - MIN_FOLLOWED_SHARE) * whole and not wrong:
-            findings.append(DRAWING_PLACE_NOWHERE(measured=100.0 * (1.0 - beside / whole),
+        if followed is not None:
+            follow = _RowTracks.of(self.cuts, followed, self.path)
+            wanted, offsets, rows = _with_tracks(self, followed, follow), follow.off, follow.rows
+        if followed is not None or drilled.any():
+            findings += self._not_cut_findings(followed, drilled)
+        if followed is not None:
+            findings += self._into_part_findings(followed, rows)
+        findings += self._beside_findings(rows, offsets)
+        beside_mm = float(self._row_lengths()[self.cuts.is_cut & ~rows].sum())
+        total_mm = float(self._row_lengths()[self.cuts.is_cut].sum())
+        has_error = any(each.severity == Severity.ERROR for each in findings)
+        if total_mm and beside_mm > (1.0 - MIN_FOLLOWED_SHARE) * total_mm and not has_error:
+            findings.append(DRAWING_PLACE_NOWHERE(measured=100.0 * (1.0 - beside_mm / total_mm),
                                           limit=100.0 * MIN_FOLLOWED_SHARE))  # fmt: skip
         report = FoundReport(
             shift_mm=shift,
             aligned=align,
-            followed=1.0 - beside / whole if whole else 0.0,
-            beside_mm=beside,
+            followed=1.0 - beside_mm / total_mm if total_mm else 0.0,
+            beside_mm=beside_mm,
             tools=tuple(tools),
-            **_side_counts(chosen, drilled, len(self.lines.paths)),
-            off_max_um=1000.0 * float(off.max()) if len(off) else None,
-            off_rms_um=1000.0 * float(np.sqrt(np.mean(off**2))) if len(off) else None,
+            **_side_counts(followed, drilled, len(self.lines.paths)),
+            off_max_um=1000.0 * float(offsets.max()) if len(offsets) else None,
+            off_rms_um=1000.0 * float(np.sqrt(np.mean(offsets**2))) if len(offsets) else None,
         )
         widths = {each.diameter_mm for each in tools}
-        alone = widths.pop() if len(widths) == 1 else None
-        return Registration(shift, wanted, tuple(findings), report, alone or None)
+        width = widths.pop() if len(widths) == 1 else None
+        return Registration(shift, wanted, tuple(findings), report, width or None)
 
     def _row_lengths(self) -> Floats:
         """Return (N,) mm: the length of the segments of each row."""
         sizes = segment_lengths(self.cuts.segments)
-        found: Floats = np.bincount(self.cuts.row, sizes, minlength=len(self.cuts.contour)).astype(
-            np.float64
-        )
-        return found
+        lengths: Floats = np.bincount(
+            self.cuts.row, sizes, minlength=len(self.cuts.contour)
+        ).astype(np.float64)
+        return lengths
 
     def _radius(
-        self, mine: Ints, given: float | None
+        self, indices: Ints, given_mm: float | None
     ) -> tuple[_RadiusTrial | None, list[Finding]]:
-        """Return the radius with which most of the points `mine` follow tracks, and its tracks."""
-        points, length = self.path.points[mine], self.path.length[mine]
-        far = np.abs(self.lines.signed_distances(points)[0])
-        found = _candidate_radii(far, length)
-        if given is not None:
-            kept = min(found, key=lambda each: abs(each - given), default=given)
-            if abs(kept - given) > self.limit_mm and kept > 0.0:
-                said = [TOOL_FOUND_OTHER(measured=2.0 * kept, limit=2.0 * given)]
+        """Return the radius with which most of the points `indices` follow tracks, and its
+        tracks."""
+        points, length = self.path.points[indices], self.path.length[indices]
+        distances = np.abs(self.lines.signed_distances(points)[0])
+        radii = _candidate_radii(distances, length)
+        if given_mm is not None:
+            radius_used = min(radii, key=lambda each: abs(each - given_mm), default=given_mm)
+            if abs(radius_used - given_mm) > self.limit_mm and radius_used > 0.0:
+                remarks = [TOOL_FOUND_OTHER(measured=2.0 * radius_used, limit=2.0 * given_mm)]
             else:
-                said = []
+                remarks = []
             return self._try_radius(
-                points, length, given, abs(kept - given) if kept else 0.0
-            ), said
-        tries = [self._try_radius(points, length, each, 0.0) for each in found]
+                points, length, given_mm, abs(radius_used - given_mm) if radius_used else 0.0
+            ), remarks
+        tries = [self._try_radius(points, length, each, 0.0) for each in radii]
         tries = [each for each in tries if each.length_mm > 0.0]
         if not tries:
             return None, []
@@ -832,173 +854,177 @@ class _Follower(Struct, frozen=True, eq=False):
             ):
                 best = smaller
                 break
-        said = []
+        remarks = []
         for other in tries:
-            more = float(length[other.follows & ~best.follows].sum())
+            extra_mm = float(length[other.follows & ~best.follows].sum())
             if other is best or not other.radius_mm or not other.keys - best.keys:
                 continue
-            apart = {key for key in other.keys if key not in best.keys}
-            if more >= MIN_RIVAL_SHARE * best.length_mm and len(apart) >= len(
+            other_keys = {key for key in other.keys if key not in best.keys}
+            if extra_mm >= MIN_RIVAL_SHARE * best.length_mm and len(other_keys) >= len(
                 other.keys & best.keys
             ):
-                said.append(
+                remarks.append(
                     TOOL_FOUND_SEVERAL(
                         measured=2.0 * best.radius_mm, other=2.0 * other.radius_mm,
                         share=best.length_mm / float(length.sum()),
-                        other_share=more / float(length.sum()),
+                        other_share=extra_mm / float(length.sum()),
                     )
                 )  # fmt: skip
                 break
-        return best, said
+        return best, remarks
 
     def _try_radius(
         self, points: Floats, length: Floats, radius: float, slack: float
     ) -> _RadiusTrial:
         """Return the tracks of a radius that are followed, and the points that follow them."""
-        near = self.path.near_mm(radius) + slack
+        nearness = self.path.near_mm(radius) + slack
         count = len(self.lines.paths)
         every = np.arange(count)
         tracks = _tracks_of(self.lines.paths, 0.0, every)
         if radius > 0.0:
-            reached = self._contours_at(points, radius, near)
+            reached = self._contours_at(points, radius, nearness)
             tracks = _Tracks.joined(
                 [tracks, _tracks_of(self.lines.paths, radius, np.flatnonzero(reached))]
             )
-        cells = self._cells(tracks, near)
-        which = _sides_followed(tracks, cells.share(len(tracks.paths)))
-        tracks = tracks.select(which)
-        follows = _is_on_track(points, tracks, near)
+        cells = self._cells(tracks, nearness)
+        indices = _sides_followed(tracks, cells.share(len(tracks.paths)))
+        tracks = tracks.select(indices)
+        follows = _is_on_track(points, tracks, nearness)
         return _RadiusTrial(radius, tracks, follows, float(length[follows].sum()))
 
-    def _contours_at(self, points: Floats, radius: float, near: float) -> Bools:
+    def _contours_at(self, points: Floats, radius: float, nearness: float) -> Bools:
         """Return (M,) true for contours from which any point is as far as the radius."""
-        found = np.zeros(len(self.lines.paths), dtype=np.bool_)
-        far, _, segment = self.lines.signed_distances(points)
-        found[np.unique(self.lines.segments.path[segment[np.abs(far) <= radius + near]])] = True
-        return found
+        is_reached = np.zeros(len(self.lines.paths), dtype=np.bool_)
+        distances, _, segment = self.lines.signed_distances(points)
+        is_reached[
+            np.unique(self.lines.segments.path[segment[np.abs(distances) <= radius + nearness]])
+        ] = True
+        return is_reached
 
-    def _cells(self, tracks: _Tracks, near: float) -> _Cells:
+    def _cells(self, tracks: _Tracks, nearness: float) -> _Cells:
         """Return points along tracks, and which of them the program cuts."""
         segments = Segments.of(tracks.paths)
         sizes = segment_lengths(segments)
         spacing = max(TRACK_MM, float(sizes.sum()) / MAX_TRACK_POINTS)
         parts = np.maximum(np.ceil(sizes / spacing).astype(np.int64), 2)
         owner = np.repeat(np.arange(len(sizes)), parts)
-        within = np.arange(len(owner)) - np.repeat(np.cumsum(parts) - parts, parts)
-        places = point_at(segments, owner, (within + 0.5) / parts[owner])
-        found = self.program.moves.nearest(places, np.zeros(len(places)), None, (near, np.inf))
-        cut = np.isfinite(found.distance)
+        steps = np.arange(len(owner)) - np.repeat(np.cumsum(parts) - parts, parts)
+        places = point_at(segments, owner, (steps + 0.5) / parts[owner])
+        nearest = self.program.moves.nearest(
+            places, np.zeros(len(places)), None, (nearness, np.inf)
+        )
+        cut = np.isfinite(nearest.distance)
         return _Cells(segments.path[owner], places, (sizes / parts)[owner], cut)
 
     def _join_trials(self, parts: Sequence[tuple[_RadiusTrial, int]]) -> _FollowedTracks | None:
         """Return the tracks of all tools, each once."""
-        parts = [(tried, number) for tried, number in parts if len(tried.tracks.paths)]
+        parts = [(trial, number) for trial, number in parts if len(trial.tracks.paths)]
         if not parts:
             return None
-        tracks = _Tracks.joined([tried.tracks for tried, _ in parts])
-        counts = [len(tried.tracks.paths) for tried, _ in parts]
-        radius = np.repeat([tried.radius_mm for tried, _ in parts], counts)
+        tracks = _Tracks.joined([trial.tracks for trial, _ in parts])
+        counts = [len(trial.tracks.paths) for trial, _ in parts]
+        radius = np.repeat([trial.radius_mm for trial, _ in parts], counts)
         radius = np.where(tracks.side == 0, 0.0, radius)
         tool = np.repeat([number for _, number in parts], counts)
         keys = np.column_stack([tracks.contour, tracks.side, np.rint(radius / POSITION_EPS_MM)])
         order = np.arange(len(keys))
         first = [k for k in order if k == int(np.flatnonzero((keys == keys[k]).all(axis=1))[0])
                  or tracks.side[k] != 0]  # fmt: skip
-        which = np.array(first, dtype=np.int64)
-        tracks, radius, tool = tracks.select(which), radius[which], tool[which]
-        near = max(self.path.near_mm(float(each)) for each in radius)
-        return _FollowedTracks(tracks, radius, tool, self._cells(tracks, near))
+        unique = np.array(first, dtype=np.int64)
+        tracks, radius, tool = tracks.select(unique), radius[unique], tool[unique]
+        nearness = max(self.path.near_mm(float(each)) for each in radius)
+        return _FollowedTracks(tracks, radius, tool, self._cells(tracks, nearness))
 
-    def _drilled_circles(self, chosen: _FollowedTracks | None) -> Bools:
+    def _drilled_circles(self, followed: _FollowedTracks | None) -> Bools:
         """Return (M,) the circles in whose middle a hole is drilled, and that are not cut."""
-        found = np.zeros(len(self.lines.paths), dtype=np.bool_)
+        is_drilled = np.zeros(len(self.lines.paths), dtype=np.bool_)
         holes = self.path.holes
         if not len(holes):
-            return found
-        cut = set() if chosen is None else set(chosen.tracks.contour.tolist())
+            return is_drilled
+        cut = set() if followed is None else set(followed.tracks.contour.tolist())
         for index, path in enumerate(self.lines.paths):
             circle = None if index in cut else circle_of(path)
             if circle is not None:
-                near = np.hypot(*(holes - np.array(circle[0])).T).min()
-                found[index] = near <= max(NEAR_MM, self.limit_mm)
-        return found
+                distance = np.hypot(*(holes - np.array(circle[0])).T).min()
+                is_drilled[index] = distance <= max(NEAR_MM, self.limit_mm)
+        return is_drilled
 
     def _not_cut_findings(
-        self, chosen: _FollowedTracks | None, drilled: Bools
+        self, followed: _FollowedTracks | None, drilled: Bools
     ) -> Iterator[Finding]:
         """Yield a finding for each contour that nothing cuts, and for each that is cut in part."""
         count = len(self.lines.paths)
         cut = np.zeros(count, dtype=np.bool_)
-        if chosen is not None:
-            cut[np.unique(chosen.tracks.contour)] = True
-        for index, more in first_items(np.flatnonzero(~cut & ~drilled).tolist()):
+        if followed is not None:
+            cut[np.unique(followed.tracks.contour)] = True
+        for index, other_count in first_items(np.flatnonzero(~cut & ~drilled).tolist()):
             yield NOT_CUT(
                 where=at_point(self.lines.boxes[index].mean(axis=1)),
                 contour=self.name(index),
-                more=more,
+                more=other_count,
             )
-        if chosen is None:
+        if followed is None:
             return
-        cells, tracks = chosen.cells, chosen.tracks
+        cells, tracks = followed.cells, followed.tracks
         count = len(tracks.paths)
-        whole = np.bincount(cells.track, cells.length, minlength=count)
-        left = whole * (1.0 - cells.share(count))
+        total_mm = np.bincount(cells.track, cells.length, minlength=count)
+        uncut_mm = total_mm * (1.0 - cells.share(count))
         # Of the variants of a contour the one of which most is cut says what is left of it.
-        order = np.lexsort((left, tracks.contour))
+        order = np.lexsort((uncut_mm, tracks.contour))
         first = order[np.flatnonzero(np.diff(tracks.contour[order], prepend=-1))]
-        some = first[left[first] >= MIN_LEFT_MM]
-        for track, more in first_items(some.tolist()):
-            at = cells.places[(cells.track == track) & ~cells.cut]
+        uncut_tracks = first[uncut_mm[first] >= MIN_LEFT_MM]
+        for track, other_count in first_items(uncut_tracks.tolist()):
+            places = cells.places[(cells.track == track) & ~cells.cut]
             yield NOT_CUT_PART(
-                where=at_point(at[len(at) // 2]),
+                where=at_point(places[len(places) // 2]),
                 contour=self.name(int(tracks.contour[track])),
-                measured=float(left[track]),
-                share=float(left[track] / whole[track]),
-                more=more,
+                measured=float(uncut_mm[track]),
+                share=float(uncut_mm[track] / total_mm[track]),
+                more=other_count,
             )
 
-    def _into_part_findings(self, chosen: _FollowedTracks, rows: Bools) -> Iterator[Finding]:
+    def _into_part_findings(self, followed: _FollowedTracks, rows: Bools) -> Iterator[Finding]:
         """Yield a finding for each move that follows nothing and comes nearer to the nearest line
         than the tool may that cuts along one side of it, or lies on its other side."""
         lines, loose = self.lines, np.flatnonzero(~rows[self.path.row])
         if not len(loose):
             return
-        far, _, segment = lines.signed_distances(self.path.points[loose])
+        distances, _, segment = lines.signed_distances(self.path.points[loose])
         contour = lines.segments.path[segment]
         ccw = np.zeros(len(lines.paths), dtype=np.bool_)
         closed = np.flatnonzero(lines.paths.closed)
         ccw[closed] = signed_areas(lines.paths.select(closed)) > 0.0
-        outward = np.where(ccw[contour], -far, far)
+        outward = np.where(ccw[contour], -distances, distances)
         room = np.full((len(lines.paths), 2), np.nan)  # within it, and outside
-        sided = np.flatnonzero(chosen.tracks.side != 0)
-        which = chosen.tracks.contour[sided]
-        room[which, (chosen.tracks.side[sided] + 1) // 2] = chosen.radius_mm[sided]
+        sided = np.flatnonzero(followed.tracks.side != 0)
+        contours = followed.tracks.contour[sided]
+        room[contours, (followed.tracks.side[sided] + 1) // 2] = followed.radius_mm[sided]
         tool = np.zeros(len(lines.paths), dtype=np.int64)
-        tool[which] = chosen.tool[sided]
+        tool[contours] = followed.tool[sided]
         one = np.isfinite(room).sum(axis=1) == 1
         side = np.where(np.isfinite(room[:, 1]), 1.0, -1.0)
         radius = np.nanmax(np.where(np.isfinite(room), room, -1.0), axis=1)
-        into = radius[contour] - side[contour] * outward
-        judged = one[contour] & lines.paths.closed[contour]
-        judged &= self.path.tool[loose] == tool[contour]
-        deep = np.where(judged, into, -1.0)
+        gouge_mm = radius[contour] - side[contour] * outward
+        is_judged = one[contour] & lines.paths.closed[contour]
+        is_judged &= self.path.tool[loose] == tool[contour]
+        depths = np.where(is_judged, gouge_mm, -1.0)
         row = self.path.row[loose]
-        order = np.lexsort((-deep, row))
+        order = np.lexsort((-depths, row))
         worst = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
-        bad = worst[deep[worst] > max(self.limit_mm, self.path.near_mm(0.0))]
-        for k, more in first_items(bad.tolist()):
+        gouges = worst[depths[worst] > max(self.limit_mm, self.path.near_mm(0.0))]
+        for k, other_count in first_items(gouges.tolist()):
             place = at_point(self.path.points[loose[k]])
             yield CUT_INTO_PART(
                 where=f"{block_name(self.cuts.toolpath, int(row[k]))} at {place}",
                 contour=self.name(int(contour[k])),
-                measured=float(deep[k]),
+                measured=float(depths[k]),
                 limit=self.limit_mm,
-                more=more,
+                more=other_count,
             )
 
-    def _beside_findings(self, rows: Bools, off: Floats) -> Iterator[Finding]:
-        """Yield findings on cuts that follow nothing, and on those that follow from afar: `off`
-        (J,) mm, by points of the rows (N,) that follow."""
+    def _beside_findings(self, rows: Bools, offsets: Floats) -> Iterator[Finding]:
+        """Yield findings on cuts that follow nothing, and on those that follow from afar:
+        `offsets` (J,) mm, by points of the rows (N,) that follow."""
         length, toolpath = self._row_lengths(), self.cuts.toolpath
         loose = np.flatnonzero(self.cuts.is_cut & ~rows)
         if len(loose) and rows.any():
@@ -1008,8 +1034,8 @@ class _Follower(Struct, frozen=True, eq=False):
                 measured=float(length[loose].sum()),
                 moves=len(loose),
             )
-        if len(off) and off.max() > self.limit_mm:
-            yield OFF_DRAWING(measured=float(off.max()), limit=self.limit_mm)
+        if len(offsets) and offsets.max() > self.limit_mm:
+            yield OFF_DRAWING(measured=float(offsets.max()), limit=self.limit_mm)
 
     def name(self, index: int) -> str:
         """Return `layer/entity` of a contour."""
@@ -1028,32 +1054,34 @@ def _sides_followed(tracks: _Tracks, share: Floats) -> Ints:
         name = contour, side, k if side < 0 else -1
         if name not in best or share[k] > share[best[name]] + MIN_SHARP_GAIN:
             best[name] = k
-    found: list[int] = []
+    selection: list[int] = []
     partly: dict[int, int] = {}
     for (contour, _, _), k in best.items():
         if share[k] >= CUT_SHARE:
-            found.append(k)
+            selection.append(k)
         elif share[k] >= PARTLY_SHARE:
             other = partly.get(contour)
             if other is None or share[k] > share[other]:
                 partly[contour] = k
-    known = set(tracks.contour[found].tolist())
-    found += [k for contour, k in partly.items() if contour not in known]
-    return np.array(sorted(found), dtype=np.int64)
+    with_side = set(tracks.contour[selection].tolist())
+    selection += [k for contour, k in partly.items() if contour not in with_side]
+    return np.array(sorted(selection), dtype=np.int64)
 
 
-def _side_counts(chosen: _FollowedTracks | None, drilled: Bools, count: int) -> dict[str, int]:
+def _side_counts(followed: _FollowedTracks | None, drilled: Bools, count: int) -> dict[str, int]:
     """Return the number of contours that are cut on each side, drilled, and not cut."""
-    found = {"outside": 0, "inside": 0, "on_line": 0}
+    counts = {"outside": 0, "inside": 0, "on_line": 0}
     cut: set[int] = set()
-    if chosen is not None:
+    if followed is not None:
         names = {-1: "inside", 0: "on_line", 1: "outside"}
-        keys = set(zip(chosen.tracks.contour.tolist(), chosen.tracks.side.tolist(), strict=True))
+        keys = set(
+            zip(followed.tracks.contour.tolist(), followed.tracks.side.tolist(), strict=True)
+        )
         for contour, side in keys:
-            found[names[side]] += 1
+            counts[names[side]] += 1
             cut.add(contour)
     holes = int(drilled.sum())
-    return {**found, "drilled": holes, "not_cut": count - len(cut) - holes}
+    return {**counts, "drilled": holes, "not_cut": count - len(cut) - holes}
 
 
 # The wanted moves: those of the program, along the tracks where they follow one.
@@ -1071,28 +1099,33 @@ class _RowTracks(Struct, frozen=True, eq=False):
     off: Floats
 
     @classmethod
-    def of(cls, cuts: CutMoves, chosen: _FollowedTracks, path: _Path) -> _RowTracks:
-        tracks = chosen.tracks
+    def of(cls, cuts: CutMoves, followed: _FollowedTracks, path: _Path) -> _RowTracks:
+        tracks = followed.tracks
         index = MoveIndex(_as_cuts(tracks.paths))
         samples = sample_cuts(cuts, TRACK_MM)
         row = cuts.row[samples.segment]
-        most = max(path.near_mm(radius) for radius in chosen.radius_mm.tolist())
+        max_nearness = max(path.near_mm(radius) for radius in followed.radius_mm.tolist())
         level = np.zeros(len(row))
-        found = index.nearest(samples.points, level, None, (most, np.inf))
-        of = np.where(found.segment >= 0, index.contour_of(found.segment), -1)
+        nearest = index.nearest(samples.points, level, None, (max_nearness, np.inf))
+        contours = np.where(nearest.segment >= 0, index.contour_of(nearest.segment), -1)
         # A row belongs to the track in its middle, and follows it if all of its points do.
         first = np.flatnonzero(np.diff(row, prepend=-1))
         last = np.append(first[1:], len(row))
-        middle = of[(first + last) // 2]
+        middle = contours[(first + last) // 2]
         choice = np.repeat(middle, last - first)
-        known = np.flatnonzero(choice >= 0)
+        with_choice = np.flatnonzero(choice >= 0)
         distance = np.full(len(row), np.inf)
         length = np.zeros(len(row))
-        if len(known):
-            own = index.nearest(samples.points[known], level[known], choice[known], (most, np.inf))
-            distance[known] = own.distance
-            hit = known[own.segment >= 0]
-            segment = own.segment[own.segment >= 0]
+        if len(with_choice):
+            own_nearest = index.nearest(
+                samples.points[with_choice],
+                level[with_choice],
+                choice[with_choice],
+                (max_nearness, np.inf),
+            )
+            distance[with_choice] = own_nearest.distance
+            hit = with_choice[own_nearest.segment >= 0]
+            segment = own_nearest.segment[own_nearest.segment >= 0]
             share = index.shares(samples.points[hit], segment)
             measured = MeasuredPaths(tracks.paths)
             sizes = segment_lengths(measured.segments)
@@ -1101,7 +1134,7 @@ class _RowTracks(Struct, frozen=True, eq=False):
             total, closed = measured.total_mm, tracks.paths.closed
         else:
             total, closed = np.zeros(0), np.zeros(0, dtype=np.bool_)
-        fine = np.maximum.reduceat(distance, first) <= most if len(first) else np.empty(0)
+        fine = np.maximum.reduceat(distance, first) <= max_nearness if len(first) else np.empty(0)
         fine = np.asarray(fine, dtype=np.bool_) & (middle >= 0)
         # Steps from point to point, the short way round.
         step = np.diff(length, append=length[-1:])
@@ -1109,18 +1142,18 @@ class _RowTracks(Struct, frozen=True, eq=False):
         with np.errstate(invalid="ignore"):
             step = np.where(np.isfinite(lap), step - lap * np.rint(step / lap), step)
         step[last - 1] = 0.0
-        way = np.add.reduceat(step, first) if len(first) else np.empty(0)
+        travel = np.add.reduceat(step, first) if len(first) else np.empty(0)
         size = np.bincount(cuts.row, segment_lengths(cuts.segments))[row[first]]
-        fine &= np.abs(np.abs(way) - size) <= 0.1 * size + 4.0 * most
+        fine &= np.abs(np.abs(travel) - size) <= 0.1 * size + 4.0 * max_nearness
         count = len(cuts.contour)
         rows = np.zeros(count, dtype=np.bool_)
         track = np.full(count, -1, dtype=np.int64)
         begin, end = np.zeros(count), np.zeros(count)
-        mine = row[first]
-        rows[mine] = fine
-        track[mine] = np.where(fine, middle, -1)
-        begin[mine] = length[first]
-        end[mine] = length[first] + way
+        own_rows = row[first]
+        rows[own_rows] = fine
+        track[own_rows] = np.where(fine, middle, -1)
+        begin[own_rows] = length[first]
+        end[own_rows] = length[first] + travel
         return cls(rows, track, begin, end, distance[rows[row] & np.isfinite(distance)])
 
 
@@ -1128,13 +1161,13 @@ def _as_cuts(paths: Polylines) -> CutMoves:
     """Return paths as moves at height 0, each a contour of its own, a row for each segment."""
     segments = Segments.of(paths)
     count = len(segments)
-    none = np.full(count, np.nan)
+    unknown = np.full(count, np.nan)
     toolpath = Toolpath(
         kind=np.full(count, Kind.LINE, dtype=np.int8),
         end=np.column_stack([segments.end, np.zeros(count)]),
         centre=np.full((count, 2), np.nan),
         feed=np.ones(count),
-        value=none,
+        value=unknown,
         source=np.full(count, -1, dtype=np.int32),
         block=np.full(count, -1, dtype=np.int32),
         start=np.zeros(3),
@@ -1143,26 +1176,26 @@ def _as_cuts(paths: Polylines) -> CutMoves:
     return CutMoves(toolpath, segments, first[:-1], first, segments.path.astype(np.int32))
 
 
-def _with_tracks(of: _Follower, chosen: _FollowedTracks, follow: _RowTracks) -> Toolpath:
+def _with_tracks(follower: _Follower, followed: _FollowedTracks, follow: _RowTracks) -> Toolpath:
     """Return the program with the tracks in the place of the moves that follow them."""
-    toolpath = of.cuts.toolpath
+    toolpath = follower.cuts.toolpath
     rows = np.flatnonzero(follow.rows)
     if not len(rows):
         return toolpath
-    measured = MeasuredPaths(chosen.tracks.paths)
+    measured = MeasuredPaths(followed.tracks.paths)
     new = np.ones(len(rows), dtype=np.bool_)
-    lap = np.where(chosen.tracks.paths.closed, measured.total_mm, np.inf)[follow.track[rows]]
+    lap = np.where(followed.tracks.paths.closed, measured.total_mm, np.inf)[follow.track[rows]]
     gap = follow.begin[rows[1:]] - follow.end[rows[:-1]]
     with np.errstate(invalid="ignore"):
         gap = np.where(np.isfinite(lap[1:]), gap - lap[1:] * np.rint(gap / lap[1:]), gap)
-    same = (np.diff(rows) == 1) & (np.diff(follow.track[rows]) == 0)
-    new[1:] = ~same | (np.abs(gap) > POSITION_EPS_MM)
+    is_next = (np.diff(rows) == 1) & (np.diff(follow.track[rows]) == 0)
+    new[1:] = ~is_next | (np.abs(gap) > POSITION_EPS_MM)
     first = np.flatnonzero(new)
     last = np.append(first[1:], len(rows)) - 1
     # A profile for each chain of moves: the lengths, counted on, and heights of its points.
-    way = follow.end[rows] - follow.begin[rows]
+    travel = follow.end[rows] - follow.begin[rows]
     chain = np.cumsum(new) - 1
-    ends = np.cumsum(way)
+    ends = np.cumsum(travel)
     ends += (follow.begin[rows[first]] - np.append(0.0, ends)[first])[chain]
     length = np.insert(ends, first, follow.begin[rows[first]])
     height = np.insert(toolpath.end[rows, 2], first, toolpath.starts_of(rows[first])[:, 2])
@@ -1178,14 +1211,14 @@ def _with_tracks(of: _Follower, chosen: _FollowedTracks, follow: _RowTracks) -> 
     moves = joined_moves(vertices, feed, runs)
     track = follow.track[rows[first]]
     return _splice_tracks(
-        of, chosen, (rows[first], rows[last] + 1), (vertices, runs, moves), track
+        follower, followed, (rows[first], rows[last] + 1), (vertices, runs, moves), track
     )
 
 
 def _close_turns(kind: Ints, end: Floats) -> None:
     """Let whole turns end exactly where they begin, or rounding would make nothing of them."""
-    apart = np.hypot(*np.diff(end[:, :2], axis=0, prepend=end[:1, :2]).T)
-    for row in np.flatnonzero(are_arcs(kind) & (apart <= POSITION_EPS_MM)).tolist():
+    gaps = np.hypot(*np.diff(end[:, :2], axis=0, prepend=end[:1, :2]).T)
+    for row in np.flatnonzero(are_arcs(kind) & (gaps <= POSITION_EPS_MM)).tolist():
         end[row, :2] = end[row - 1, :2]
 
 
@@ -1196,10 +1229,10 @@ def _link(end: Sequence[float] | Floats, feed: float, chain: int) -> tuple[Any, 
 
 
 def _splice_tracks(
-    of: _Follower,
-    chosen: _FollowedTracks,
+    follower: _Follower,
+    followed: _FollowedTracks,
     chains: tuple[Ints, Ints],
-    made: tuple[Floats, Ints, Cuts],
+    built: tuple[Floats, Ints, Cuts],
     track: Ints,
 ) -> Toolpath:
     """Return the rows of the program that follow nothing, and between them the moves along the
@@ -1208,86 +1241,92 @@ def _splice_tracks(
     Chain k stands for the rows from chains[0][k] to chains[1][k], and is on the track track[k].
     What leads to a chain ends where it begins, and what follows it begins where it ends.
     """
-    toolpath, (vertices, runs, moves) = of.cuts.toolpath, made
+    toolpath, (vertices, runs, moves) = follower.cuts.toolpath, built
     begins, finishes = chains
     end = toolpath.end.copy()
     across = np.append(np.flatnonzero(moves_across(toolpath)), len(toolpath))
     parts: list[tuple[Any, ...]] = []
     low = np.searchsorted(moves.run, np.arange(len(begins) + 1))
-    names = [of.name(int(contour)) for contour in chosen.tracks.contour]
+    names = [follower.name(int(contour)) for contour in followed.tracks.contour]
     texts = len(toolpath.texts)
     bent = np.append(toolpath.is_arc, False)
-    here, before = 0, toolpath.start[:2]
+    row_index, before = 0, toolpath.start[:2]
     for k, (first, last) in enumerate(zip(begins.tolist(), finishes.tolist(), strict=True)):
         start, z = vertices[runs[k], :2], vertices[runs[k], 2]
-        moved = int(across[np.searchsorted(across, here)])
-        end[here : min(moved, first), :2] = before
+        next_motion = int(across[np.searchsorted(across, row_index)])
+        end[row_index : min(next_motion, first), :2] = before
         leads = int(across[max(np.searchsorted(across, first) - 1, 0)])
-        straight = moved < first and not bent[leads]
+        straight = next_motion < first and not bent[leads]
         if straight:
             end[leads:first, :2] = start
-        parts.append((slice(here, first), None))
+        parts.append((slice(row_index, first), None))
         if not straight and np.hypot(*(start - before)) > POSITION_EPS_MM:
             parts.append((None, _link([*start, z], moves.feed[low[k]], k)))
-        mine = slice(low[k], low[k + 1])
+        span = slice(low[k], low[k + 1])
         kind = np.where(
-            np.isnan(moves.centre[mine, 0]),
+            np.isnan(moves.centre[span, 0]),
             Kind.LINE,
-            np.where(moves.ccw[mine], Kind.ARC_CCW, Kind.ARC_CW),
+            np.where(moves.ccw[span], Kind.ARC_CCW, Kind.ARC_CW),
         )
-        parts.append((None, (kind, moves.end[mine], moves.centre[mine], moves.feed[mine], k)))
-        here, before = last, vertices[runs[k + 1] - 1, :2]
+        parts.append((None, (kind, moves.end[span], moves.centre[span], moves.feed[span], k)))
+        row_index, before = last, vertices[runs[k + 1] - 1, :2]
         if bent[across[np.searchsorted(across, last)]]:
             # An arc keeps its start: a full turn that begins elsewhere would be none.
             parts.append((None, _link(toolpath.end[last - 1], moves.feed[low[k]], k)))
             before = toolpath.end[last - 1, :2]
-    moved = int(across[np.searchsorted(across, here)])
-    end[here:moved, :2] = before
-    parts.append((slice(here, len(toolpath)), None))
+    next_motion = int(across[np.searchsorted(across, row_index)])
+    end[row_index:next_motion, :2] = before
+    parts.append((slice(row_index, len(toolpath)), None))
     columns: dict[str, list[Any]] = {
         name: [] for name in ("kind", "end", "centre", "feed", "value", "source", "edge")
     }
-    for rows, given in parts:
-        if given is None:
+    for rows, chain in parts:
+        if chain is None:
             row = np.arange(rows.start, rows.stop)
-            found = (toolpath.kind[row], end[row], toolpath.centre[row], toolpath.feed[row])
-            more = toolpath.value[row], toolpath.source[row], np.full(len(row), UNKNOWN_EDGE)
+            kept_columns = (toolpath.kind[row], end[row], toolpath.centre[row], toolpath.feed[row])
+            tail = toolpath.value[row], toolpath.source[row], np.full(len(row), UNKNOWN_EDGE)
         else:
-            *found, k = given
-            count, on = len(found[0]), int(track[k])
-            one = int(chosen.tracks.contour[on])
-            its = one if of.lines.paths.closed[one] else UNKNOWN_EDGE
-            more = np.full(count, np.nan), np.full(count, texts + on), np.full(count, its)
-        for name, column in zip(columns, (*found, *more), strict=True):
+            *kept_columns, k = chain
+            count, track_number = len(kept_columns[0]), int(track[k])
+            one = int(followed.tracks.contour[track_number])
+            edge_number = one if follower.lines.paths.closed[one] else UNKNOWN_EDGE
+            tail = (
+                np.full(count, np.nan),
+                np.full(count, texts + track_number),
+                np.full(count, edge_number),
+            )
+        for name, column in zip(columns, (*kept_columns, *tail), strict=True):
             columns[name].append(column)
-    whole = {name: np.concatenate(column) for name, column in columns.items()}
-    edge = whole.pop("edge").astype(np.int64)
-    _close_turns(whole["kind"], whole["end"])
+    table = {name: np.concatenate(column) for name, column in columns.items()}
+    edge = table.pop("edge").astype(np.int64)
+    _close_turns(table["kind"], table["end"])
     count = len(edge)
-    worst = np.zeros((len(of.lines.paths) + 1, 2))
-    path_of = np.repeat(np.arange(len(of.lines.paths)), np.diff(of.lines.paths.offsets))
-    np.maximum.at(worst, path_of, of.drawing.off_mm)
-    on_track = whole["source"] - texts
-    contour = np.where(on_track >= 0, np.append(chosen.tracks.contour, -1)[on_track], -1)
-    none = np.zeros(len(of.lines.paths), dtype=np.bool_)
+    worst = np.zeros((len(follower.lines.paths) + 1, 2))
+    path_of = np.repeat(
+        np.arange(len(follower.lines.paths)), np.diff(follower.lines.paths.offsets)
+    )
+    np.maximum.at(worst, path_of, follower.drawing.off_mm)
+    on_track = table["source"] - texts
+    contour = np.where(on_track >= 0, np.append(followed.tracks.contour, -1)[on_track], -1)
+    nothing_followed = np.zeros(len(follower.lines.paths), dtype=np.bool_)
     return Toolpath(
-        kind=whole["kind"].astype(np.int8),
-        end=whole["end"],
-        centre=whole["centre"],
-        feed=whole["feed"],
-        value=whole["value"],
-        source=whole["source"].astype(np.int32),
+        kind=table["kind"].astype(np.int8),
+        end=table["end"],
+        centre=table["centre"],
+        feed=table["feed"],
+        value=table["value"],
+        source=table["source"].astype(np.int32),
         block=np.full(count, -1, dtype=np.int32),
         start=toolpath.start,
         texts=(*toolpath.texts, *names),
-        made_from=of.drawing.file,
+        made_from=follower.drawing.file,
         drawn=DrawnEdges(
             off_mm=worst[contour],
             edge=edge,
-            nominal=of.lines.boxes,
-            planned=of.lines.boxes,
-            line=np.arange(len(of.lines.paths)),
-            followed=none,
-            cleared=none,
+            nominal=follower.lines.boxes,
+            planned=follower.lines.boxes,
+            line=np.arange(len(follower.lines.paths)),
+            followed=nothing_followed,
+            cleared=nothing_followed,
         ),
     )

@@ -583,10 +583,10 @@ def gate_findings(
     exceeds, or whose figure is not known."""
     if gates.error_mm is not None:
         yield from _error_gate(report.error_um.total.max, gates.error_mm * UM_PER_MM)
-        deep = gouged_mm(findings)
-        if deep > gates.error_mm:
+        depth = gouged_mm(findings)
+        if depth > gates.error_mm:
             yield ABOVE_GATE_GOUGED(
-                where="--max-error", measured=deep * UM_PER_MM, limit=gates.error_mm * UM_PER_MM
+                where="--max-error", measured=depth * UM_PER_MM, limit=gates.error_mm * UM_PER_MM
             )
     count = report.cutting_reversals
     if gates.reversals is not None and count > gates.reversals:
@@ -601,25 +601,27 @@ def gate_findings(
         )
 
 
-def stock_gate_findings(what: str, limit_mm: float, found: Bracket | None) -> Iterator[Finding]:
-    """Yield ABOVE_GATE where the `what` of the stock, "gouge" or "leftover", exceeds its limit, is
-    not proved to keep to it, or (None) is not known."""
-    where, limit_um = f"--max-{what}", limit_mm * UM_PER_MM
-    if found is None:
-        yield ABOVE_GATE_NO_STOCK(where=where, limit=limit_um, what=what)
-    elif found.low > limit_mm:
+def stock_gate_findings(
+    subject: str, limit_mm: float, bracket: Bracket | None
+) -> Iterator[Finding]:
+    """Yield ABOVE_GATE where the `subject` of the stock, "gouge" or "leftover", exceeds its limit,
+    is not proved to keep to it, or (None) is not known."""
+    flag, limit_um = f"--max-{subject}", limit_mm * UM_PER_MM
+    if bracket is None:
+        yield ABOVE_GATE_NO_STOCK(where=flag, limit=limit_um, what=subject)
+    elif bracket.low > limit_mm:
         yield ABOVE_GATE_STOCK(
-            where=where,
-            measured=found.low * UM_PER_MM,
+            where=flag,
+            measured=bracket.low * UM_PER_MM,
             limit=limit_um,
-            what=what,
-            x=found.at_mm[0],
-            y=found.at_mm[1],
-            most=found.high * UM_PER_MM,
+            what=subject,
+            x=bracket.at_mm[0],
+            y=bracket.at_mm[1],
+            most=bracket.high * UM_PER_MM,
         )
-    elif found.high > limit_mm:
+    elif bracket.high > limit_mm:
         yield ABOVE_GATE_NOT_PROVED(
-            where=where, measured=found.high * UM_PER_MM, limit=limit_um, what=what
+            where=flag, measured=bracket.high * UM_PER_MM, limit=limit_um, what=subject
         )
 
 
@@ -643,8 +645,8 @@ def clock(seconds: float) -> str:
     >>> clock(3725.4)
     '1:02:05'
     """
-    whole = round(seconds)
-    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+    total = round(seconds)
+    return f"{total // 3600}:{total // 60 % 60:02d}:{total % 60:02d}"
 
 
 def duration(seconds: float) -> str:
@@ -653,25 +655,25 @@ def duration(seconds: float) -> str:
     >>> duration(216.0), duration(3725.4), duration(7.2)
     ('3 min 36 s', '1 h 2 min 5 s', '7 s')
     """
-    whole = round(seconds)
-    parts = (whole // 3600, "h"), (whole // 60 % 60, "min"), (whole % 60, "s")
+    total = round(seconds)
+    parts = (total // 3600, "h"), (total // 60 % 60, "min"), (total % 60, "s")
     return " ".join(f"{count} {unit}" for count, unit in parts if count) or "0 s"
 
 
 def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
     """Yield (name, value) of each line of the summary."""
     steps, extents = report.steps, report.extents_mm
-    how = report.interpolator
-    if how in ("dsm", "dda", "stairs"):
-        how = f"arcs by {how}"
-    elif how == "path":
-        how = "followed exactly"
-    yield "target", f"{report.target} ({how})"
+    method = report.interpolator
+    if method in ("dsm", "dda", "stairs"):
+        method = f"arcs by {method}"
+    elif method == "path":
+        method = "followed exactly"
+    yield "target", f"{report.target} ({method})"
     if report.dimensions:
         x, y = report.dimensions[:2]
         shown = f"error X {percent(x.error_percent)}, Y {percent(y.error_percent)}"
-        what = "" if x.of == "edge" else " of the tool's centre"
-        yield "size", f"{x.nominal_mm:.3f} × {y.nominal_mm:.3f} mm{what}; predicted {shown}"
+        subject = "" if x.of == "edge" else " of the tool's centre"
+        yield "size", f"{x.nominal_mm:.3f} × {y.nominal_mm:.3f} mm{subject}; predicted {shown}"
     spans = zip("XYZ", (extents.x, extents.y, extents.z), strict=True)
     yield "travel", ", ".join(f"{axis} {mm(low)} to {mm(high)}" for axis, (low, high) in spans)
     program = f"{report.contours} contours, {report.moves} moves"
@@ -695,8 +697,8 @@ def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
         if report.planned.setup:
             yield "set-up", report.planned.setup
         yield from (("cut", line) for line in _operation_words(report.planned.operations))
-        far, drawn = report.planned.rapid_mm, report.planned.rapid_drawn_mm
-        yield "rapids", f"{mm(far)} mm in XY ({mm(drawn)} mm in the order of the drawing)"
+        distance, drawn = report.planned.rapid_mm, report.planned.rapid_drawn_mm
+        yield "rapids", f"{mm(distance)} mm in XY ({mm(drawn)} mm in the order of the drawing)"
     if report.before is not None:
         yield "before", _before_words(report)
     if report.asked is not None:
@@ -714,15 +716,17 @@ def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
     if report.closure_um is not None:
         yield "closure", f"{report.closure_um:.2f} µm"
     if report.unreached is not None and report.unreached.moves:
-        far = report.unreached.max_um
-        yield "ends", f"{report.unreached.moves} moves end elsewhere, up to {far:.2f} µm away"
+        distance = report.unreached.max_um
+        yield "ends", f"{report.unreached.moves} moves end elsewhere, up to {distance:.2f} µm away"
     if report.shape is not None:
         yield "shape", _shape_words(report.shape)
     yield from (("dimension", inspected_words(each)) for each in report.inspection)
     bounds = {
         (one.input, one.within): None for each in report.inspection for one in each.not_known
     }
-    yield from (("not known", f"{name}: if {within}") for name, within in bounds if within)
+    yield from (
+        ("not known", f"{name}: if {condition}") for name, condition in bounds if condition
+    )
 
 
 def inspected_words(item: InspectedReport) -> str:
@@ -759,52 +763,52 @@ def _chance(probability: float) -> str:
     return "under 0.1 %" if share < 0.1 else f"{share:.1f} %"
 
 
-def _asked_words(asked: AskedReport) -> str:
+def _asked_words(counts: AskedReport) -> str:
     """Return in words how many moves are exactly those that camtool would write."""
-    if asked.alike == asked.moves:
-        return f"all {asked.moves} cutting moves are those that camtool writes"
+    if counts.alike == counts.moves:
+        return f"all {counts.moves} cutting moves are those that camtool writes"
     return (
-        f"{asked.alike} of {asked.moves} cutting moves are those that camtool writes, the others"
-        f" up to {asked.off_um:.2f} µm off ({asked.limit_um:.2f} µm allowed)"
+        f"{counts.alike} of {counts.moves} cutting moves are those that camtool writes, the others"
+        f" up to {counts.off_um:.2f} µm off ({counts.limit_um:.2f} µm allowed)"
     )
 
 
-def _found_words(found: FoundReport) -> Iterator[str]:
+def _found_words(part: FoundReport) -> Iterator[str]:
     """Yield in words the part of the drawing that the program cuts, the tool, and its distance."""
-    if not found.tools and not found.drilled:
+    if not part.tools and not part.drilled:
         yield "nothing of the drawing"
         return
     sides = {
-        "outside": found.outside,
-        "inside": found.inside,
-        "on the line": found.on_line,
-        "drilled": found.drilled,
-        "not cut": found.not_cut,
+        "outside": part.outside,
+        "inside": part.inside,
+        "on the line": part.on_line,
+        "drilled": part.drilled,
+        "not cut": part.not_cut,
     }
     counts = ", ".join(f"{count} {side}" for side, count in sides.items() if count)
     tools = ", ".join(
         ("tool" if each.number is None else f"tool {each.number}")
         + (f" of {mm(each.diameter_mm)} mm" if each.diameter_mm else " on the lines")
         + (" as given" if each.given else "")
-        for each in found.tools
+        for each in part.tools
     )
     yield f"contours: {counts or 'none'}{'; ' if tools else ''}{tools}"
-    x, y = found.shift_mm
-    where = f"drawing at X{x:.3f} Y{y:.3f}" if x or y else "drawing at its own zero"
-    beside = f", {mm(found.beside_mm)} mm beside it" if found.beside_mm else ""
-    yield f"{where}; {found.followed:.1%} of the cuts follow it{beside}"
-    if found.off_max_um is not None:
-        yield f"program off it by {um(found.off_max_um)} µm at most, rms {um(found.off_rms_um)}"
+    x, y = part.shift_mm
+    place = f"drawing at X{x:.3f} Y{y:.3f}" if x or y else "drawing at its own zero"
+    beside_text = f", {mm(part.beside_mm)} mm beside it" if part.beside_mm else ""
+    yield f"{place}; {part.followed:.1%} of the cuts follow it{beside_text}"
+    if part.off_max_um is not None:
+        yield f"program off it by {um(part.off_max_um)} µm at most, rms {um(part.off_rms_um)}"
 
 
 def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
     """Yield tool, spindle, feeds, depth and passes, one line per operation."""
     for each in operations[:MAX_OPERATIONS]:
         name = one_line(each.name or each.kind)
-        called = one_line(f" {each.tool_name}") if each.tool_name else ""
-        tool = f"tool{called} {each.tool_diameter_mm:g} mm"
+        tool_name = one_line(f" {each.tool_name}") if each.tool_name else ""
+        tool = f"tool{tool_name} {each.tool_diameter_mm:g} mm"
         if not each.tool_diameter_mm:
-            tool = f"tool{called} of no width" if called else "no tool width"
+            tool = f"tool{tool_name} of no width" if tool_name else "no tool width"
         speed = "no spindle speed" if each.spindle_rpm is None else f"spindle {each.spindle_rpm:g}"
         chip = ""
         if each.chip_load_mm is not None and each.surface_speed_m_min is not None:
@@ -829,8 +833,8 @@ def remarks(report: Report) -> str:
     words = "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
     gouges = [each for each in report.findings if each.code == ProgramCode.GOUGE.name]
     if gouges:
-        deep = gouged_mm(gouges)
-        size = f" of {deep:.4g} mm or more" if deep else ""
+        depth = gouged_mm(gouges)
+        size = f" of {depth:.4g} mm or more" if depth else ""
         words += f"; gouges{size} come on top (see GOUGE)"
     return words
 
@@ -852,9 +856,9 @@ def gouged_mm(findings: Iterable[Finding | FindingReport]) -> float:
 
 def _shape_words(shape: ShapeReport) -> str:
     """Return overcut and undercut of a round tool in words."""
-    over = f"overcut {shape.overcut_um:.2f} µm deep, {shape.overcut_mm2:.4f} mm²"
+    overcut_text = f"overcut {shape.overcut_um:.2f} µm deep, {shape.overcut_mm2:.4f} mm²"
     under = f"undercut {shape.undercut_um:.2f} µm, {shape.undercut_mm2:.4f} mm²"
-    return f"{over}; {under} (tool {shape.tool_diameter_mm:g} mm)"
+    return f"{overcut_text}; {under} (tool {shape.tool_diameter_mm:g} mm)"
 
 
 def move_name(block: int | None, move: int) -> str:
@@ -876,7 +880,7 @@ def _before_words(report: Report) -> str:
 
 def _error_sources(report: Report) -> str:
     sources = _by_source(report.error_um)
-    return ", ".join(f"{name} {um(most)}" for name, (most, _, _) in sources.items()) + " µm"
+    return ", ".join(f"{name} {um(max_um)}" for name, (max_um, _, _) in sources.items()) + " µm"
 
 
 _MaxRmsP95 = tuple[float | None, float | None, float | None]
@@ -970,10 +974,10 @@ def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
     digests = [("machine", f"{setup.machine}, digest {setup.machine_sha256}")]
     if setup.program_sha256 is not None:
         digests.append(("program", f"digest {setup.program_sha256}"))
-    changed = [
+    changed_values = [
         (item.key, f"{item.value} (the target's own: {item.was})") for item in setup.changed
     ]
-    return (*digests, *changed, *setup.flags)
+    return (*digests, *changed_values, *setup.flags)
 
 
 def shorten(words: str) -> str:
@@ -1046,7 +1050,7 @@ def _inspection_sheet(report: Report) -> ReportSheet:
 def _error_sheet(report: Report) -> ReportSheet:
     total = report.error_um.total
     figures = {**_by_source(report.error_um), "total": (total.max, total.rms, total.p95)}
-    rows = tuple((name, *map(um, three)) for name, three in figures.items())
+    rows = tuple((name, *map(um, figures_um)) for name, figures_um in figures.items())
     return ReportSheet("sources", ("error by source", "max µm", "rms µm", "p95 µm"), rows)
 
 
@@ -1157,24 +1161,24 @@ SETUP_FINDINGS = 6
 def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
     """Yield (name, value) of the place of the stock, the extents of the program, and its time and
     tools."""
-    planned, extents = report.planned, report.extents_mm
-    if planned is not None and planned.setup:
-        yield "set-up", planned.setup
-    stock = None if planned is None else planned.stock
+    plan, extents = report.planned, report.extents_mm
+    if plan is not None and plan.setup:
+        yield "set-up", plan.setup
+    stock = None if plan is None else plan.stock
     if stock is not None:
         yield "stock", _stock_words(stock)
-    if planned is not None and planned.cut_mm:
-        left, low, right, top = planned.cut_mm
-        ends = f"X {mm(left)} to {mm(right)}, Y {mm(low)} to {mm(top)}"
-        size = f"{mm(right - left)} × {mm(top - low)} mm"
+    if plan is not None and plan.cut_mm:
+        left_x, low, right, top = plan.cut_mm
+        ends = f"X {mm(left_x)} to {mm(right)}, Y {mm(low)} to {mm(top)}"
+        size = f"{mm(right - left_x)} × {mm(top - low)} mm"
         yield "blank", f"at least {size}, for the tools cut {ends}"
-    yield "zero", _zero_words(stock, "drawing" if planned is None else planned.zero)
-    if planned is not None and len(planned.tools) > 1:
-        rows = [key for key, _ in groupby(each.tool for each in planned.operations)]
-        mounted = ", then ".join(_tool_called(planned, row) for row in rows)
-        yield "mounted", mounted + _touch_words(planned.touch_mm)
-    if planned is not None and planned.swept_mm is not None:
-        yield "clamps", _clamp_words(planned, planned.swept_mm)
+    yield "zero", _zero_words(stock, "drawing" if plan is None else plan.zero)
+    if plan is not None and len(plan.tools) > 1:
+        rows = [key for key, _ in groupby(each.tool for each in plan.operations)]
+        mounted = ", then ".join(_tool_called(plan, row) for row in rows)
+        yield "mounted", mounted + _touch_words(plan.touch_mm)
+    if plan is not None and plan.swept_mm is not None:
+        yield "clamps", _clamp_words(plan, plan.swept_mm)
     if by_hand := "; ".join(_by_hand(report)):
         yield "by hand", by_hand
     axes = zip("XYZ", (extents.x, extents.y, extents.z), strict=True)
@@ -1205,7 +1209,7 @@ def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "d
     if stock is None or stock.corner_mm is None:
         return f"X0 Y0 {drawn}; Z0 is the top of the stock"
     x, y = (-place + 0.0 for place in stock.corner_mm)
-    too = "" if zero in ("drawing", "set-up") else f", and {drawn}"
+    suffix = "" if zero in ("drawing", "set-up") else f", and {drawn}"
     corner = "lower left corner"
     if zero == "set-up" and stock.size_mm is not None:
         # The corner that is nearest to zero is where it is touched off.
@@ -1214,54 +1218,56 @@ def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "d
         corner = f"{'upper' if upper else 'lower'} {'right' if right else 'left'} corner"
         x, y = x - wide * right, y - high * upper
     if round(x, 6) == round(y, 6) == 0.0:
-        return f"X0 Y0 is the {corner} of the stock{too}; Z0 is its top"
+        return f"X0 Y0 is the {corner} of the stock{suffix}; Z0 is its top"
     across = f"{abs(x):g} mm {'right' if x >= 0.0 else 'left'} of"
     along = f"{abs(y):g} mm {'above' if y >= 0.0 else 'below'}"
-    return f"X0 Y0 is {across} and {along} the {corner} of the stock{too}; Z0 is its top"
+    return f"X0 Y0 is {across} and {along} the {corner} of the stock{suffix}; Z0 is its top"
 
 
-def setup_sheets(planned: Planned) -> Iterator[ReportSheet]:
+def setup_sheets(plan: Planned) -> Iterator[ReportSheet]:
     """Yield the tools in the order of use, and the operations."""
     rows = tuple(
         (
-            _tool_called(planned, row),
+            _tool_called(plan, row),
             tool.words,
             f"{tool.reach_mm:.4g}",
             "–" if tool.stickout_mm is None else f"{tool.stickout_mm:g}",
             "–" if tool.cutting_length_mm is None else f"{tool.cutting_length_mm:g}",
         )
-        for row, tool in enumerate(planned.tools)
+        for row, tool in enumerate(plan.tools)
     )
     heads = ("tool", "shape", "must stick out more than mm", "sticks out mm", "edges mm")
     yield ReportSheet("tools", heads, rows, words=2)
-    yield ReportSheet("operations", *_setup_operations(planned), words=3)
+    yield ReportSheet("operations", *_setup_operations(plan), words=3)
 
 
 MIN_CLAMP_MM = 3.0
 """A strip of the stock that is narrower is no place for a clamp."""
 
 
-def _clamp_words(planned: Planned, swept_mm: tuple[float, float, float, float]) -> str:
+def _clamp_words(plan: Planned, swept_mm: tuple[float, float, float, float]) -> str:
     """Return the strips of the stock over which no tool and no holder passes, or the box outside
     of which none does where the stock is not known."""
-    bare = [tool.holder_diameter_mm is None for tool in planned.tools]
-    what = (
-        "no tool or holder passes" if not any(bare) else "no tool passes (holders are not known)"
+    lacks_holder = [tool.holder_diameter_mm is None for tool in plan.tools]
+    subject = (
+        "no tool or holder passes"
+        if not any(lacks_holder)
+        else "no tool passes (holders are not known)"
     )
-    left, low, right, top = swept_mm
-    stock = planned.stock
+    left_x, low, right, top = swept_mm
+    stock = plan.stock
     if stock is None or stock.corner_mm is None or stock.size_mm is None:
-        return f"{what} outside X {mm(left)} to {mm(right)}, Y {mm(low)} to {mm(top)}"
+        return f"{subject} outside X {mm(left_x)} to {mm(right)}, Y {mm(low)} to {mm(top)}"
     (x, y), (wide, high) = stock.corner_mm, stock.size_mm
-    strips = ("X", x, left), ("X", right, x + wide), ("Y", y, low), ("Y", top, y + high)
-    free = [
+    strips = ("X", x, left_x), ("X", right, x + wide), ("Y", y, low), ("Y", top, y + high)
+    free_strips = [
         f"{axis} {mm(begin)} to {mm(end)}"
         for axis, begin, end in strips
         if end - begin >= MIN_CLAMP_MM
     ]
-    if not free:
-        return f"no edge of the stock has {MIN_CLAMP_MM:g} mm over which {what}"
-    return f"on the stock at {', '.join(free)}: {what} there"
+    if not free_strips:
+        return f"no edge of the stock has {MIN_CLAMP_MM:g} mm over which {subject}"
+    return f"on the stock at {', '.join(free_strips)}: {subject} there"
 
 
 def _touch_words(places: tuple[tuple[float, float] | None, ...]) -> str:
@@ -1274,11 +1280,11 @@ def _touch_words(places: tuple[tuple[float, float] | None, ...]) -> str:
 
 def _by_hand(report: Report) -> Iterator[str]:
     """Yield the tabs to cut, by operation and tool, and the pieces to take out."""
-    planned = report.planned
-    for each in () if planned is None else planned.operations:
-        if planned is not None and each.tabs:
+    plan = report.planned
+    for each in () if plan is None else plan.operations:
+        if plan is not None and each.tabs:
             tabs = f"{each.tabs} tab{'s' * (each.tabs > 1)}"
-            tool = _tool_called(planned, each.tool).strip("()")
+            tool = _tool_called(plan, each.tool).strip("()")
             yield f"cut {tabs} of {each.name or each.kind} ({tool})"
     loose = [one for one in report.findings if one.code == ProgramCode.LOOSE_PIECE.name]
     if loose:
@@ -1286,21 +1292,21 @@ def _by_hand(report: Report) -> Iterator[str]:
         yield f"take out what comes loose: {places}" if places else "take out what comes loose"
 
 
-def _tool_called(planned: Planned, row: int) -> str:
+def _tool_called(plan: Planned, row: int) -> str:
     """Return `1 mill`, or the tool's place in the order where it has neither number nor name."""
-    tool = planned.tools[row]
+    tool = plan.tools[row]
     number = "" if tool.number is None else f"T{tool.number}"
     return f"{number} {tool.name}".strip() or f"({row + 1})"
 
 
-def _setup_operations(planned: Planned) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
-    whole = ("operation", "kind", "tool", "coolant", "depth mm", "passes", "leaves mm")
+def _setup_operations(plan: Planned) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    general = ("operation", "kind", "tool", "coolant", "depth mm", "passes", "leaves mm")
     speeds = ("rev/min", "m/min", "feed mm/min", "mm per tooth", "plunge mm/min")
     rows = tuple(
         (
             each.name or each.kind,
             each.kind,
-            _tool_called(planned, each.tool),
+            _tool_called(plan, each.tool),
             each.coolant,
             f"{each.depth_mm:.4g}",
             "–" if each.passes is None else str(each.passes),
@@ -1312,16 +1318,16 @@ def _setup_operations(planned: Planned) -> tuple[tuple[str, ...], tuple[tuple[st
             f"{each.plunge_mm_min:g}",
             "–" if each.time_s is None else clock(each.time_s),
         )
-        for each in planned.operations
+        for each in plan.operations
     )
-    heads = (*whole, *speeds, "time")
+    heads = (*general, *speeds, "time")
     # A column of dashes says nothing, nor one of coolant that is off.
     says = [
         set(column) - ({"off"} if head == "coolant" else {"–"})
         for head, column in zip(heads, zip(*rows, strict=True), strict=True)
     ]
-    kept = [k for k, words in enumerate(says) if words]
-    return tuple(heads[k] for k in kept), tuple(tuple(row[k] for k in kept) for row in rows)
+    columns = [k for k, words in enumerate(says) if words]
+    return tuple(heads[k] for k in columns), tuple(tuple(row[k] for k in columns) for row in rows)
 
 
 def _within_words(
@@ -1333,14 +1339,14 @@ def _within_words(
     shown = f"{value:.{digits}g}"
     if limits is None:
         return shown
-    least, most = limits
-    return f"{shown} ({range_words((least, math.inf if most is None else most))})"
+    min_value, max_value = limits
+    return f"{shown} ({range_words((min_value, math.inf if max_value is None else max_value))})"
 
 
 def gravest_findings(page: ReportPage) -> tuple[FindingReport, ...]:
     """Return the findings that one must know at the machine, errors first."""
-    found = [each for each in page.findings if each.severity in _GRAVEST_FIRST]
-    return tuple(sorted(found, key=lambda item: _GRAVEST_FIRST[item.severity]))
+    grave = [each for each in page.findings if each.severity in _GRAVEST_FIRST]
+    return tuple(sorted(grave, key=lambda item: _GRAVEST_FIRST[item.severity]))
 
 
 # A page as Markdown, for the summary of a pipeline's job or a comment on a pull request.
@@ -1365,15 +1371,15 @@ _BROKEN = {"@": "@<!-- -->", "://": ":<!-- -->//", "www.": "www<!-- -->."}
 def page_markdown(page: ReportPage) -> str:
     """Return the page, at most PAGE_BYTES long; where something is left out, its last line says
     so."""
-    kept: list[str] = []
+    lines: list[str] = []
     room = PAGE_BYTES
     for line in _markdown_lines(page):
         room -= len(line.encode(errors="replace")) + 1
         if room < 0:
-            kept += ["", "*The rest is left out: the page would be too long.*"]
+            lines += ["", "*The rest is left out: the page would be too long.*"]
             break
-        kept.append(line)
-    return "\n".join(kept).rstrip() + "\n"
+        lines.append(line)
+    return "\n".join(lines).rstrip() + "\n"
 
 
 def markdown_words(words: str) -> str:

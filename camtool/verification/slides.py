@@ -107,8 +107,8 @@ class SlidePass:
         self._cuts, self._is_cut = paths.decoded, paths.decoded.is_cut
         self._first, self._last = _rows_of_circles(match.circle, len(paths.circles))
         self._slot = _slots(self._first, self._last)
-        seen = np.flatnonzero(self._last >= 0)
-        self._closing = seen[np.argsort(self._last[seen], kind="stable")].tolist()
+        seen_circles = np.flatnonzero(self._last >= 0)
+        self._closing = seen_circles[np.argsort(self._last[seen_circles], kind="stable")].tolist()
         self._tasks = Tasks(paths, match, self._slot)
         self._task = self._tasks.of(0, min(ROWS_AT_ONCE, len(self._is_cut)))
         slots = int(self._slot.max(initial=-1)) + 1
@@ -124,15 +124,15 @@ class SlidePass:
         cuts = np.searchsorted(chunk.row, bounds)
         for (low, high), row in zip(pairwise(cuts.tolist()), bounds[:-1], strict=True):
             self._close(row)
-            lost = judge_samples(
+            lost_row = judge_samples(
                 np.ascontiguousarray(chunk.row[low:high]),
                 np.ascontiguousarray(chunk.commanded[low:high]),
                 np.ascontiguousarray(chunk.slide[low:high]),
                 self._task,
                 self._sums,
             )
-            if lost >= 0:
-                raise self._lost(int(chunk.row[low + lost]))
+            if lost_row >= 0:
+                raise self._lost(int(chunk.row[low + lost_row]))
 
     def _lost(self, row: int) -> ProgramError:
         return ProgramError(
@@ -196,9 +196,11 @@ class SlidePass:
     def seen_circles(self) -> tuple[SeenCircle, ...]:
         """Return the circles that the slides followed, in order; at most `BINS_KEPT`."""
         return tuple(
-            SeenCircle(self.circles[circle], self.circle_figures[circle], found, self.bins[circle])
+            SeenCircle(
+                self.circles[circle], self.circle_figures[circle], figures, self.bins[circle]
+            )
             for circle in sorted(self.bins)
-            if (found := self.reversing[circle]) is not None
+            if (figures := self.reversing[circle]) is not None
         )
 
 
@@ -214,17 +216,17 @@ class Tasks:
         self._rows = row if begins.all() else row[begins]
         contour = paths.wanted.contour[self._rows]
         self._begins = np.searchsorted(contour, np.arange(paths.wanted.contour_count + 1))
-        known = bool((match.only[paths.decoded.is_cut] != ANY_CONTOUR).all())
+        is_known = bool((match.only[paths.decoded.is_cut] != ANY_CONTOUR).all())
         every = shapes(paths.wanted, 0, len(paths.wanted.contour))
         heights = move_heights(paths.wanted)
-        tree = move_tree(len(self._rows), self._boxes, contour if known else None)
+        tree = move_tree(len(self._rows), self._boxes, contour if is_known else None)
         self._moves = Moves(every, heights, *tree)
         self._centre = np.array([circle.centre_mm for circle in paths.circles]).reshape(-1, 2)
         self._directions = bin_directions()
 
-    def _boxes(self, which: Ints | Indices) -> Floats:
+    def _boxes(self, indices: Ints | Indices) -> Floats:
         """Return (J, 4) mm: the boxes of these moves that cut."""
-        ends = _ends(self._paths.wanted, self._rows[which])
+        ends = _ends(self._paths.wanted, self._rows[indices])
         segments, (first, last) = self._paths.wanted.segments, np.array(ends, dtype=np.int64)
         boxes, parted = segment_boxes(segments[first]), np.flatnonzero(first < last)
         other = segment_boxes(segments[last[parted]])
@@ -237,8 +239,8 @@ class Tasks:
         match, toolpath, rows = self._match, self._paths.decoded.toolpath, np.arange(low, high)
         cuts = self._paths.decoded.is_cut[low:high]
         of_row = np.where(cuts, np.cumsum(cuts) - 1, -1)
-        circle, beside = match.circle[low:high], match.row[low:high]
-        beside = np.where(beside >= 0, np.searchsorted(self._rows, beside), -1)
+        circle, beside_rows = match.circle[low:high], match.row[low:high]
+        beside_rows = np.where(beside_rows >= 0, np.searchsorted(self._rows, beside_rows), -1)
         ends = np.column_stack([toolpath.starts_of(rows)[:, 2], toolpath.end[low:high, 2]])
         depth_mm = self._paths.depth_mm
         return Task(
@@ -246,7 +248,13 @@ class Tasks:
             own=shapes(self._paths.decoded, low, high),
             moves=self._moves,
             rows=np.column_stack(
-                [of_row, self._ranges(match.only[low:high]), circle, self._slot[circle], beside]
+                [
+                    of_row,
+                    self._ranges(match.only[low:high]),
+                    circle,
+                    self._slot[circle],
+                    beside_rows,
+                ]
             ),
             window=np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]),
             off=match.off_mm[low:high].copy(),
@@ -254,12 +262,12 @@ class Tasks:
             directions=self._directions,
         )
 
-    def _ranges(self, only: Indices) -> Ints:
-        """Return (R, 2) begin and end (not included) of the contours `only` (R,), or of all
+    def _ranges(self, contours: Indices) -> Ints:
+        """Return (R, 2) begin and end (not included) of the contours `contours` (R,), or of all
         moves."""
-        every = only == ANY_CONTOUR
-        low = np.where(every, 0, self._begins[only])
-        high = np.where(every, len(self._rows), self._begins[np.where(every, 0, only + 1)])
+        every = contours == ANY_CONTOUR
+        low = np.where(every, 0, self._begins[contours])
+        high = np.where(every, len(self._rows), self._begins[np.where(every, 0, contours + 1)])
         return np.column_stack([low, high])
 
 
@@ -290,18 +298,18 @@ def _slots(first: Ints, last: Ints) -> Ints:
     different ones."""
     slot = np.full(len(first), -1, dtype=np.int64)
     busy: list[tuple[int, int]] = []
-    free: list[int] = []
+    free_slots: list[int] = []
     for circle in _in_order(first, last):
         while busy and busy[0][0] < first[circle]:
-            heapq.heappush(free, heapq.heappop(busy)[1])
-        slot[circle] = heapq.heappop(free) if free else len(busy)
+            heapq.heappush(free_slots, heapq.heappop(busy)[1])
+        slot[circle] = heapq.heappop(free_slots) if free_slots else len(busy)
         heapq.heappush(busy, (int(last[circle]), int(slot[circle])))
     return slot
 
 
 def _in_order(first: Ints, last: Ints) -> Iterator[int]:
-    seen = np.flatnonzero(last >= 0)
-    yield from seen[np.argsort(first[seen], kind="stable")].tolist()
+    seen_circles = np.flatnonzero(last >= 0)
+    yield from seen_circles[np.argsort(first[seen_circles], kind="stable")].tolist()
 
 
 # Cutting moves as columns for the compiled judge: one move for each row that cuts.
@@ -311,14 +319,14 @@ def move_heights(cuts: CutMoves) -> Floats:
     """Return (J, 2) mm: the lowest and highest points of the moves that cut; one row, seen as
     many, where all are at one height."""
     rows = cuts.rows
-    found = np.empty((len(rows), 2))
+    heights_mm = np.empty((len(rows), 2))
     for low in range(0, len(rows), ROWS_AT_ONCE):
         first, last = _ends(cuts, rows[low : low + ROWS_AT_ONCE])
         ends = np.column_stack([cuts.heights(first), cuts.heights(last)])
-        found[low : low + len(ends), 0] = ends.min(axis=1)
-        found[low : low + len(ends), 1] = ends.max(axis=1)
-    level = len(found) and (found == found[0, 0]).all()
-    return np.broadcast_to(found[:1].copy(), found.shape) if level else found
+        heights_mm[low : low + len(ends), 0] = ends.min(axis=1)
+        heights_mm[low : low + len(ends), 1] = ends.max(axis=1)
+    level = len(heights_mm) and (heights_mm == heights_mm[0, 0]).all()
+    return np.broadcast_to(heights_mm[:1].copy(), heights_mm.shape) if level else heights_mm
 
 
 def _ends(cuts: CutMoves, rows: Ints | Indices) -> tuple[Indices, Indices]:
@@ -338,9 +346,9 @@ def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
     if len(first) < len(segments):
         start, end = start[first], end[last]
     arcs = np.flatnonzero(segments.bulge[first])
-    which = np.full(len(first), -1, dtype=np.int32)
+    arc_indices = np.full(len(first), -1, dtype=np.int32)
     bent, row = segments[first[arcs].astype(np.int64)], cuts.row[begin + first[arcs]]
-    which[arcs] = np.arange(len(arcs))
+    arc_indices[arcs] = np.arange(len(arcs))
     sweep = np.abs(bent.sweep) * (last - first + 1)[arcs]
     turn = np.where(bent.bulge < 0.0, -1.0, 1.0)
     toolpath = cuts.toolpath
@@ -351,7 +359,7 @@ def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
     table[:, [at.UX, at.UY]] = turn[:, None] * (start[arcs] - bent.centre)
     table[:, [at.VX, at.VY]] = turn[:, None] * (end[arcs] - bent.centre)
     table[:, at.WIDE] = np.where(closed, at.FULL, (sweep > np.pi).astype(float))
-    return at.Shapes(start, end, which, table)
+    return at.Shapes(start, end, arc_indices, table)
 
 
 # The path of the slides, thinned for pictures to a bounded number of points.
@@ -379,33 +387,33 @@ class TraceSize(Struct, frozen=True, eq=False):
     most: int
 
 
-def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
-    """Return a stride for samples about `spacing_mm` apart that keeps about half of `most`
+def trace_size(decoded: Toolpath, spacing_mm: float, max_points: int) -> TraceSize:
+    """Return a stride for samples about `spacing_mm` apart that keeps about half of `max_points`
     points."""
-    if most == 0:
+    if max_points == 0:
         return TraceSize(decoded.start[None, :2], 0, 1)
     lengths = row_lengths(decoded)
     lengths += decoded.by_parts(lambda part: np.abs(part.end[:, 2] - part.starts[:, 2]))
     expected = float(lengths.sum()) / spacing_mm
-    stride = max(1, int(np.ceil(2.0 * expected / most)))
-    return TraceSize(decoded.start[None, :2], stride, most)
+    stride = max(1, int(np.ceil(2.0 * expected / max_points)))
+    return TraceSize(decoded.start[None, :2], stride, max_points)
 
 
-def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> SlideTrace:
+def trace_of(sums: Sums, start: Floats, cutting: Bools, max_points: int) -> SlideTrace:
     """Return the start (1, 2) mm and the samples that the judge kept, none for a stride of 0.
-    Where they are more than `most` (more rows than points), runs of them are reduced to the sample
-    with the largest error. `cutting` (N,): the rows that cut."""
-    written, held = int(sums.pen[WRITTEN]), unwritten(sums.pen)
-    sums.trace[written : written + len(held)] = held
-    count = written + len(held) + 1
-    chosen = np.arange(count)
-    if count > most:
-        longest = -(-count // most)
+    Where they are more than `max_points` (more rows than points), runs of them are reduced to the
+    sample with the largest error. `cutting` (N,): the rows that cut."""
+    written, pending = int(sums.pen[WRITTEN]), unwritten(sums.pen)
+    sums.trace[written : written + len(pending)] = pending
+    count = written + len(pending) + 1
+    chosen_rows = np.arange(count)
+    if count > max_points:
+        longest = -(-count // max_points)
         error = np.concatenate([[0.0], sums.trace[: count - 1, 2]])
-        chosen = run_peaks(error, np.append(np.arange(0, count, longest), count))
-    kept = sums.trace[np.maximum(chosen - 1, 0)]
-    first = chosen == 0
-    kept[first] = (*start[0], 0.0, 0.0)
-    row = kept[:, 3].astype(np.int64)
+        chosen_rows = run_peaks(error, np.append(np.arange(0, count, longest), count))
+    samples = sums.trace[np.maximum(chosen_rows - 1, 0)]
+    first = chosen_rows == 0
+    samples[first] = (*start[0], 0.0, 0.0)
+    row = samples[:, 3].astype(np.int64)
     shown = np.append(cutting, False)[np.where(first, -1, row)]
-    return SlideTrace(kept[:, :2].copy(), kept[:, 2].copy(), row, shown)
+    return SlideTrace(samples[:, :2].copy(), samples[:, 2].copy(), row, shown)

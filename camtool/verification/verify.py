@@ -92,9 +92,9 @@ class Verification:
         """Return the verification with these findings, in its report too."""
         return replace(self, report=self.report.with_findings(findings), findings=findings)
 
-    def with_planning(self, planned: Planned, before: BaselineReport | None) -> Verification:
+    def with_planning(self, plan: Planned, before: BaselineReport | None) -> Verification:
         """Return the verification with the figures of planning in its report."""
-        report = replace(self.report, planned=planned, before=before)
+        report = replace(self.report, planned=plan, before=before)
         return replace(self, report=report)
 
 
@@ -114,16 +114,16 @@ def judge(
 ) -> Verification:
     """Judge a case by the chunks of its motion, or by a run that is judged as it is simulated."""
     progress = progress or Progress()
-    paths, coverage, conformance, turned = _compare_cuts(case)
-    cuts, wanted = paths.decoded, paths.wanted
+    paths, coverage, conformance, direction_faults = _compare_cuts(case)
+    cuts, wanted_cuts = paths.decoded, paths.wanted
     cutter = cutter_of(case.options, cuts) if case.options.shape else None
     shape_points = points_wanted(cuts, cutter)
     # Slides may curve where their program does not: the shape needs no fewer points than pictures,
     # and is the same whether there are any.
-    least = max(shape_points, TRACE_POINTS) if shape_points else 0
-    points = max(case.options.trace_points, least)
-    own, looped = _with_loops(case, paths)
-    sizes_of = SlideExtents(case.decoded.start, own, looped, coverage.match)
+    min_points = max(shape_points, TRACE_POINTS) if shape_points else 0
+    points = max(case.options.trace_points, min_points)
+    own_cuts, looped = _with_loops(case, paths)
+    sizes_of = SlideExtents(case.decoded.start, own_cuts, looped, coverage.match)
     steps_mm = case.machine.axes.x.coded_step_mm, case.machine.axes.y.coded_step_mm
     worst, keep = case.options.worst, case.options.keep_ledger
     rows = RowFigures(cuts, coverage.match, steps_mm, worst, keep_ledger=keep)
@@ -141,14 +141,16 @@ def judge(
     motion_faults = motion_findings(cuts, case, tally, extents, rows)
     shape = None
     if shape_points and cutter is not None:
-        shape = wanted_shape(wanted, cutter, case.options.kept)
-    planned = () if case.wanted is None else case.wanted.findings
-    overcut = overcut_findings(shape, {finding.code for finding in planned})
-    findings = _all_findings(case, coverage, conformance, (*turned, *motion_faults, *overcut))
+        shape = wanted_shape(wanted_cuts, cutter, case.options.kept)
+    plan_findings = () if case.wanted is None else case.wanted.findings
+    overcut = overcut_findings(shape, {finding.code for finding in plan_findings})
+    findings = _all_findings(
+        case, coverage, conformance, (*direction_faults, *motion_faults, *overcut)
+    )
     result = ReportBuilder(case, cuts, looped, coverage, slides, tally, conformance)
     report = result.report(extents, findings, trace, shape)
     follows = coverage.match.row
-    return Verification(report, trace, findings, rows, wanted, follows, slides.seen_circles())
+    return Verification(report, trace, findings, rows, wanted_cuts, follows, slides.seen_circles())
 
 
 def _compare_cuts(
@@ -160,39 +162,41 @@ def _compare_cuts(
     flat_cuts = case.wanted is None or is_flat(case.wanted)
     quantised = case.target.model.quantised(case.decoded, case.machine)
     decoded = Side.of(quantised, flat_cuts=flat_cuts)
-    wanted = decoded if case.wanted is None else Side.of(case.wanted, flat_cuts=flat_cuts)
-    circles = full_circles(wanted.cuts, case.coverage_mm)
-    goal = Goal(wanted.moves, circles, case.coverage_mm, case.depth_mm)
+    wanted_side = decoded if case.wanted is None else Side.of(case.wanted, flat_cuts=flat_cuts)
+    circles = full_circles(wanted_side.cuts, case.coverage_mm)
+    goal = Goal(wanted_side.moves, circles, case.coverage_mm, case.depth_mm)
     conformance = _conformance(case, flat_cuts=flat_cuts)
     # What conformance or registration found with its own tolerance is not found again.
     is_judged = case.registration is None and not (conformance and conformance.place)
-    coverage = _coverage(case, (decoded, wanted), goal, flat_cuts=flat_cuts, is_judged=is_judged)
-    turned = _direction_findings(case, decoded, wanted, flat_cuts=flat_cuts)
-    paths = Paths(decoded.cuts, wanted.cuts, circles, case.depth_mm)
-    return paths, coverage, conformance, turned
+    coverage = _coverage(
+        case, (decoded, wanted_side), goal, flat_cuts=flat_cuts, is_judged=is_judged
+    )
+    direction_faults = _direction_findings(case, decoded, wanted_side, flat_cuts=flat_cuts)
+    paths = Paths(decoded.cuts, wanted_side.cuts, circles, case.depth_mm)
+    return paths, coverage, conformance, direction_faults
 
 
 def _with_loops(case: Case, paths: Paths) -> tuple[LoopedCuts, LoopedCuts]:
     """Return the decoded and the wanted cuts with their loops."""
-    own = LoopedCuts(paths.decoded, loops(paths.decoded, case.coverage_mm))
+    own_cuts = LoopedCuts(paths.decoded, loops(paths.decoded, case.coverage_mm))
     if paths.wanted is paths.decoded:
-        return own, own
-    return own, LoopedCuts(paths.wanted, loops(paths.wanted, case.coverage_mm))
+        return own_cuts, own_cuts
+    return own_cuts, LoopedCuts(paths.wanted, loops(paths.wanted, case.coverage_mm))
 
 
 def _coverage(
     case: Case, sides: tuple[Side, Side], goal: Goal, *, flat_cuts: bool, is_judged: bool
 ) -> Coverage:
     """Match and compare the decoded side with the wanted one, which may be compensated."""
-    decoded, wanted = sides
+    decoded, wanted_side = sides
     if case.wanted is None:
         return Coverage(own_match(decoded.cuts, goal.circles), Figure(), ())
     programmed = goal  # what the program should say
     if case.compensated is not None:
-        wanted = Side.of(case.compensated.toolpath, flat_cuts=flat_cuts)
-        programmed = Goal(wanted.moves, [], goal.limit_mm, goal.depth_mm)
-    own = case.row_from if wanted.toolpath is case.written_from else None
-    coverage = cover(decoded, wanted, programmed, SAMPLE_MM, own, is_judged=is_judged)
+        wanted_side = Side.of(case.compensated.toolpath, flat_cuts=flat_cuts)
+        programmed = Goal(wanted_side.moves, [], goal.limit_mm, goal.depth_mm)
+    row_from = case.row_from if wanted_side.toolpath is case.written_from else None
+    coverage = cover(decoded, wanted_side, programmed, SAMPLE_MM, row_from, is_judged=is_judged)
     if case.compensated is None:
         return coverage
     return replace(
@@ -201,13 +205,13 @@ def _coverage(
 
 
 def _direction_findings(
-    case: Case, decoded: Side, wanted: Side, *, flat_cuts: bool
+    case: Case, decoded: Side, wanted_side: Side, *, flat_cuts: bool
 ) -> tuple[Finding, ...]:
     """Return CUT_OTHER_WAY for contours that are cut against the moves they were written from."""
     if case.written_from is None:
         return ()
-    source = wanted
-    if wanted.toolpath is not case.written_from:
+    source = wanted_side
+    if wanted_side.toolpath is not case.written_from:
         source = Side.of(case.written_from, flat_cuts=flat_cuts)
     limits = case.coverage_mm, case.depth_mm
     return tuple(direction_findings(decoded.moves, source.moves, limits, SAMPLE_MM, case.row_from))
@@ -340,8 +344,8 @@ class ReportBuilder(Struct, frozen=True, eq=False):
 
     def _off_um(self, off_mm: float) -> float | None:
         """Return a distance from the drawing; None where none is known."""
-        known = self.case.wanted is not None and self.case.wanted.drawn is not None
-        return rounded(off_mm * UM_PER_MM) if known else None
+        is_known = self.case.wanted is not None and self.case.wanted.drawn is not None
+        return rounded(off_mm * UM_PER_MM) if is_known else None
 
     def _dimensions(self) -> tuple[record.DimensionReport, ...]:
         return tuple(
@@ -368,19 +372,19 @@ class ReportBuilder(Struct, frozen=True, eq=False):
                 D_um=rounded_or_none(figures.radial_mean_mm, UM_PER_MM),
                 direction="ccw" if circle.ccw else "cw",
                 z_mm=rounded(circle.z_mm),
-                step_um=tuple(rounded_or_none(value, UM_PER_MM) for value in turned.step),
-                spike_um=tuple(rounded_or_none(value, UM_PER_MM) for value in turned.spike),
-                B_um=tuple(rounded_or_none(value, UM_PER_MM) for value in turned.value),
+                step_um=tuple(rounded_or_none(value, UM_PER_MM) for value in reversal.step),
+                spike_um=tuple(rounded_or_none(value, UM_PER_MM) for value in reversal.spike),
+                B_um=tuple(rounded_or_none(value, UM_PER_MM) for value in reversal.value),
                 fit_um=self._off_um(float(off_mm[k])),
             )
-            for k, circle, figures, turned in zip(
+            for k, circle, figures, reversal in zip(
                 range(len(self.slides.circles)),
                 self.slides.circles,
                 self.slides.circle_figures,
                 self.slides.reversing,
                 strict=True,
             )
-            if figures is not NO_FIGURES and turned is not None
+            if figures is not NO_FIGURES and reversal is not None
         )
 
     def _both_ways(self) -> tuple[record.BothWaysReport, ...]:
@@ -428,22 +432,22 @@ class ReportBuilder(Struct, frozen=True, eq=False):
 
     def _source(self, row: int) -> str:
         """Return layer and entity of the wanted move to which a decoded row belongs."""
-        wanted = int(self.coverage.match.row[row])
-        return self.goal.cuts.toolpath.text(wanted) if wanted >= 0 else ""
+        wanted_row = int(self.coverage.match.row[row])
+        return self.goal.cuts.toolpath.text(wanted_row) if wanted_row >= 0 else ""
 
     def _unreached(self) -> record.UnreachedReport:
-        missed = self.slides.rows.missed
-        return record.UnreachedReport(missed.count, rounded(missed.most_mm * UM_PER_MM))
+        missed_ends = self.slides.rows.missed
+        return record.UnreachedReport(missed_ends.count, rounded(missed_ends.most_mm * UM_PER_MM))
 
     def _asked(self) -> record.AskedReport | None:
-        asked, conformance = self.case.asked, self.conformance
-        if asked is None or conformance is None:
+        request, conformance = self.case.asked, self.conformance
+        if request is None or conformance is None:
             return None
         return record.AskedReport(
             moves=conformance.moves,
             alike=conformance.alike,
             off_um=rounded(conformance.off_mm * UM_PER_MM),
-            limit_um=rounded(asked.limits_mm[0] * UM_PER_MM),
+            limit_um=rounded(request.limits_mm[0] * UM_PER_MM),
         )
 
     def _shape(self, trace: SlideTrace, wanted: WantedShape | None) -> record.ShapeReport | None:
@@ -475,11 +479,11 @@ def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
         return math.nan
     mechanics = Mechanics(case.machine, toolpath.start, case.options.effects)
 
-    def off(part: Toolpath) -> Floats:
+    def deviation(part: Toolpath) -> Floats:
         slide, _ = mechanics.follow(part.end, np.array([0, len(part)]))
         return np.abs(slide[:, 2] - part.end[:, 2])
 
-    return float(toolpath.by_parts(off)[cuts.is_cut].max())
+    return float(toolpath.by_parts(deviation)[cuts.is_cut].max())
 
 
 def assumptions(case: Case) -> tuple[str, ...]:
@@ -488,8 +492,8 @@ def assumptions(case: Case) -> tuple[str, ...]:
     assumed = case.target.model.assumptions(case.decoded, case.machine)
     if link.baud is None:
         return (*assumed, "the program is in the controller before it runs")
-    how = "block by block, before each is cut" if link.wait == "sequential" else "while it runs"
-    return (*assumed, f"the program comes at {link.baud:g} baud, {how}")
+    timing = "block by block, before each is cut" if link.wait == "sequential" else "while it runs"
+    return (*assumed, f"the program comes at {link.baud:g} baud, {timing}")
 
 
 def _block(case: Case, row: int) -> int | None:
