@@ -224,10 +224,10 @@ def _text(
             lines.append(f"X {x:g} Y {y:g}: Z {z:.4f} mm, between {low:.4f} and {high:.4f}")
     for axis, place, rows in profiles:
         other = "Y" if axis == "x" else "X"
-        deepest = rows[int(np.argmin(rows[:, 1]))]
+        low = rows[int(np.argmin(rows[:, 1]))]
         lines.append(
-            f"section {axis.upper()} {place:g}: {len(rows)} points, deepest Z {deepest[1]:.4f} mm at"
-            f" {other} {deepest[0]:.3f}"
+            f"section {axis.upper()} {place:g}: {len(rows)} points, deepest Z {low[1]:.4f} mm at"
+            f" {other} {low[0]:.3f}"
         )
     if with_volume:
         removed, lowest = stock.removed_mm3(), stock.lowest

@@ -319,11 +319,7 @@ def _lost_vertices(tags: Tags) -> list[str]:
             stated_count = (
                 str(tags.value(int(counts[count_row]))).strip() if count_row < len(counts) else ""
             )
-            if (
-                count_row < len(counts)
-                and counts[count_row] < end
-                and stated_count != str(holds)
-            ):
+            if count_row < len(counts) and counts[count_row] < end and stated_count != str(holds):
                 where = tags.where(begin)
                 losses.append(
                     f"{where}: LWPOLYLINE counts {stated_count[:9]} vertices and holds {holds}"
