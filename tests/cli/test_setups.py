@@ -228,7 +228,7 @@ ZERO = {
 def test_a_set_up_may_have_its_own_zero(camtool: Run, tmp_path: Path, zero: str) -> None:
     """The same program, shifted; pins, stock and clamps move with it."""
     write_part(tmp_path)
-    box = '[[keep_out]]\nname = "clamp"\nx = "70..80mm"\ny = "0..10mm"\n'
+    box = '[[keep_out]]\nname = "clamp"\nx = "59..80mm"\ny = "18..22mm"\n'
     pins = "pins = [[30, 2], [30, 37]]\n"
     text = (tmp_path / "part.toml").read_text(encoding="utf-8") + pins + box
     flags = ("-t", "grbl", "--job", "part.toml", "--setup", "bottom")
