@@ -66,10 +66,10 @@ class ClusterPool:
         with _connect(self._address) as client:
             order = _Order(self._work.digest(), pickle.dumps(self._work))
             workers = _Workers(client, order, self._note)
-            sent = _SentDrawings(client, order, tasks)
-            while sent.has_results_left:
+            drawings_sent = _SentDrawings(client, order, tasks)
+            while drawings_sent.has_results_left:
                 threads = workers.threads()
-                results = [*sent.send(AHEAD * threads), *sent.take_results()]
+                results = [*drawings_sent.send(AHEAD * threads), *drawings_sent.take_results()]
                 yield from results
                 if not results:
                     yield None
@@ -182,9 +182,9 @@ class _Workers:
                 self._note("the cluster has workers now")
             self._without_since_s, self._reported = None, False
             return
-        now = time.monotonic()
-        self._without_since_s = now if self._without_since_s is None else self._without_since_s
-        if not self._reported and now - self._without_since_s >= ALONE_S:
+        time_s = time.monotonic()
+        self._without_since_s = time_s if self._without_since_s is None else self._without_since_s
+        if not self._reported and time_s - self._without_since_s >= ALONE_S:
             self._reported = True
             self._note("the cluster has no workers; waiting for some (Ctrl-C ends this)")
 
@@ -203,13 +203,13 @@ def make_on_worker(digest: str, work: bytes, task: bytes, data: bytes) -> Output
 def _work_of(digest: str, work: bytes) -> BatchWork:
     """Unpickle the work, once for all drawings of a run."""
     try:
-        loaded: BatchWork = pickle.loads(work)
-        same = loaded.digest() == digest
+        batch_work: BatchWork = pickle.loads(work)
+        is_same = batch_work.digest() == digest
     except Exception:  # anything may go wrong when an object of other code is loaded
-        same = False
-    if not same:
+        is_same = False
+    if not is_same:
         raise OtherCodeError(f"it has camtool {__version__}")
-    return loaded
+    return batch_work
 
 
 @contextmanager
@@ -262,11 +262,11 @@ def _lost_error() -> CamtoolError:
 def _refusal(worker: str, error: Exception) -> CamtoolError:
     """Return the error for a worker whose camtool differs."""
     if isinstance(error, OtherCodeError):
-        why = f"{error}, or other code or packages under that number, and this is {__version__}"
+        reason = f"{error}, or other code or packages under that number, and this is {__version__}"
     else:
-        why = f"it cannot run this camtool {__version__} ({error})"
+        reason = f"it cannot run this camtool {__version__} ({error})"
     return CamtoolError(
-        f"{worker} is refused: {why}",
+        f"{worker} is refused: {reason}",
         where="--scheduler",
         mend=f"install the same everywhere; {_MEND}",
     )
@@ -278,7 +278,7 @@ def _result(future: Future, task: DrawingTask) -> Outputs:
     from distributed import KilledWorker
 
     try:
-        made: Outputs = future.result()
+        outputs: Outputs = future.result()
     except KilledWorker as error:
         times = error.allowed_failures + 1
         return Outputs(
@@ -288,7 +288,7 @@ def _result(future: Future, task: DrawingTask) -> Outputs:
         raise _lost_error() from error
     except Exception as error:
         raise _refusal("a worker", error) from error
-    return made
+    return outputs
 
 
 @contextmanager

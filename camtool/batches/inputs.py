@@ -25,7 +25,7 @@ from camtool.importers.options import SUFFIXES
 
 
 def find_tasks(
-    sources: Sequence[str], out: Path, outputs: Collection[Path] = frozenset()
+    sources: Sequence[str], folder: Path, outputs: Collection[Path] = frozenset()
 ) -> list[DrawingTask]:
     """Return one task for each drawing, sorted by output; a drawing given twice counts once.
 
@@ -36,13 +36,13 @@ def find_tasks(
     tasks: dict[Path, DrawingTask] = {}
     places = RealPaths()
     for source in sources:
-        found = False
-        for path, stem in _drawings_of(source, places.of(out)):
+        has_drawing = False
+        for path, stem in _drawings_of(source, places.of(folder)):
             place = places.of(path)
             if place not in outputs:
-                found = True
+                has_drawing = True
                 tasks.setdefault(place, DrawingTask(str(path), stem))
-        if not found:
+        if not has_drawing:
             raise InputError(
                 "holds no drawing" if Path(source).is_dir() else "no file matches",
                 file=source,
@@ -53,13 +53,13 @@ def find_tasks(
     return sorted(tasks.values(), key=lambda task: task.stem)
 
 
-def _drawings_of(source: str, out: Path) -> Iterator[tuple[Path, str]]:
-    """Yield the drawings of one argument, each with its stem; `out` is a real path."""
+def _drawings_of(source: str, folder: Path) -> Iterator[tuple[Path, str]]:
+    """Yield the drawings of one argument, each with its stem; `folder` is a real path."""
     path = Path(source)
     if path.is_dir():
-        for found in files_below(path, out):
-            if found.suffix.lower() in SUFFIXES:
-                yield found, _stem(found.relative_to(path))
+        for file in files_below(path, folder):
+            if file.suffix.lower() in SUFFIXES:
+                yield file, _stem(file.relative_to(path))
     elif path.exists() or not glob.has_magic(source):
         if not path.exists():
             raise InputError("there is no such file or folder", file=source, mend="check the path")
@@ -67,8 +67,8 @@ def _drawings_of(source: str, out: Path) -> Iterator[tuple[Path, str]]:
     else:
         base = _fixed_part(source)
         if base.is_dir():
-            for found in files_matching(base, path.relative_to(base).parts, out):
-                yield found, _stem(found.relative_to(base))
+            for file in files_matching(base, path.relative_to(base).parts, folder):
+                yield file, _stem(file.relative_to(base))
 
 
 def _fixed_part(pattern: str) -> Path:
@@ -136,9 +136,9 @@ def files_matching(
 ) -> Iterator[Path]:
     """Yield the files below `base` that match a pattern, given by its parts; `**` does not enter
     the folder `excluded`."""
-    head, rest = parts[0], parts[1:]
+    head, tail = parts[0], parts[1:]
     if head == ANY_FOLDERS:
-        yield from files_matching(base, rest or ("*",), excluded)
+        yield from files_matching(base, tail or ("*",), excluded)
         for entry in _entries(base):
             hidden = entry.name.startswith(".") or entry.is_symlink()
             if _is_dir(entry) and not (
@@ -147,9 +147,9 @@ def files_matching(
                 yield from files_matching(Path(entry.path), parts, excluded)
     elif not glob.has_magic(head):
         place = base / head
-        if rest and place.is_dir():
-            yield from files_matching(place, rest, excluded)
-        elif not rest and place.is_file():
+        if tail and place.is_dir():
+            yield from files_matching(place, tail, excluded)
+        elif not tail and place.is_file():
             yield place
     else:
         for entry in _entries(base):
@@ -157,9 +157,9 @@ def files_matching(
                 continue
             if entry.name.startswith(".") and not head.startswith("."):
                 continue
-            if rest and _is_dir(entry):
-                yield from files_matching(Path(entry.path), rest, excluded)
-            elif not rest and not _is_dir(entry) and _is_file(entry):
+            if tail and _is_dir(entry):
+                yield from files_matching(Path(entry.path), tail, excluded)
+            elif not tail and not _is_dir(entry) and _is_file(entry):
                 yield Path(entry.path)
 
 

@@ -13,33 +13,33 @@ NAME = ".camtool-batch.lock"
 
 
 @contextmanager
-def lock_folder(out: Path) -> Iterator[bool]:
-    """Lock the folder `out` against other batches within the block; yields False if its file
+def lock_folder(folder: Path) -> Iterator[bool]:
+    """Lock the folder `folder` against other batches within the block; yields False if its file
     system has no locks.
 
     Raises OutputError, which names the process that holds the lock or the reason why the folder
     cannot be written.
     """
 
-    def taken(who: str) -> OutputError:
+    def refuse_taken(who: str) -> OutputError:
         return OutputError(
             f"another batch writes there ({who})",
-            file=str(out),
+            file=str(folder),
             mend="let it end, or choose another --out",
         )
 
-    begun = False
+    has_begun = False
     try:
-        with held(out / NAME, taken) as locked:
-            begun = True
+        with held(folder / NAME, refuse_taken) as locked:
+            has_begun = True
             yield locked
     except OutputError:
         raise
     except OSError as error:
-        if begun:
+        if has_begun:
             raise
         raise OutputError(
             f"cannot be written ({error.strerror})",
-            file=str(out / NAME),
+            file=str(folder / NAME),
             mend="choose another --out",
         ) from error

@@ -44,9 +44,9 @@ class ManifestEntry(Struct, frozen=True):
 class Manifest:
     """The entries of an output folder by stem."""
 
-    def __init__(self, out: Path) -> None:
-        self._out = out
-        self._place = out / NAME
+    def __init__(self, folder: Path) -> None:
+        self._out = folder
+        self._place = folder / NAME
         self._entries, self._tidy = _read(self._place)
 
     def up_to_date(self, stem: str, key: str) -> ManifestEntry | None:
@@ -68,19 +68,19 @@ class Manifest:
         place, entry = self._out / name, self._entries.get(stem)
         if not os.path.lexists(place):
             return True
-        known = {} if entry is None else entry.all_outputs
+        own_outputs = {} if entry is None else entry.all_outputs
         return self._has_digest(name, content_digest(data)) or (
-            name in known and self._has_digest(name, known[name])
+            name in own_outputs and self._has_digest(name, own_outputs[name])
         )
 
     def add(self, stem: str, entry: ManifestEntry) -> None:
         """Append an entry; OSError when it cannot be written."""
         before = self._entries.get(stem)
         if before is not None:
-            left = {
+            earlier = {
                 name: each for name, each in before.all_outputs.items() if name not in entry.files
             }
-            entry = replace(entry, earlier=left)
+            entry = replace(entry, earlier=earlier)
         self._entries[stem] = entry
         self._tidy = False
         # The line break comes first too, in case a full disk has cut the line before short.
@@ -184,9 +184,9 @@ def packages_digest(name: str) -> str:
         needs = metadata.requires(name) or []
     except metadata.PackageNotFoundError:
         return digest_of()
-    wanted = sorted(need for need in needs if "extra ==" not in need)
-    found = (re.match(r"[\w.-]+", need) for need in wanted)
-    return digest_of(*(f"{one[0]} {_version(one[0])}" for one in found if one))
+    requirements = sorted(need for need in needs if "extra ==" not in need)
+    names = (re.match(r"[\w.-]+", need) for need in requirements)
+    return digest_of(*(f"{one[0]} {_version(one[0])}" for one in names if one))
 
 
 def _version(name: str) -> str:

@@ -80,8 +80,8 @@ class LocalPool:
         try:
             while queue or any(worker.task for worker in self._workers):
                 self._assign_tasks(queue)
-                ready = wait([worker.pipe for worker in self._workers], TICK_S)
-                senders = [worker for worker in self._workers if worker.pipe in ready]
+                ready_pipes = wait([worker.pipe for worker in self._workers], TICK_S)
+                senders = [worker for worker in self._workers if worker.pipe in ready_pipes]
                 results = [each for worker in senders if (each := self._receive(worker))]
                 results += self._kill_overdue()
                 yield from results
@@ -93,8 +93,8 @@ class LocalPool:
     def _assign_tasks(self, queue: deque[DrawingTask]) -> None:
         """Start workers while there are tasks for them; give each free worker a task."""
         busy = sum(worker.task is not None for worker in self._workers)
-        wanted = min(self._options.jobs, busy + len(queue))
-        while len(self._workers) < wanted:
+        worker_count = min(self._options.jobs, busy + len(queue))
+        while len(self._workers) < worker_count:
             self._workers.append(self._start_worker())
         for worker in self._workers:
             if queue and worker.ready and worker.task is None:
@@ -110,14 +110,14 @@ class LocalPool:
 
     def _start_worker(self) -> _Worker:
         context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(target=serve, args=(theirs,), daemon=True)
+        own_pipe, other_pipe = context.Pipe()
+        process = context.Process(target=serve, args=(other_pipe,), daemon=True)
         with _interrupts_blocked():
             process.start()
-        theirs.close()
-        worker = _Worker(process, ours)
+        other_pipe.close()
+        worker = _Worker(process, own_pipe)
         with suppress(OSError):  # it has ended: the pipe shows that later
-            ours.send(self._work)
+            own_pipe.send(self._work)
         return worker
 
     def _receive(self, worker: _Worker) -> tuple[DrawingTask, Outputs] | None:
@@ -130,12 +130,12 @@ class LocalPool:
         if message == READY:
             worker.ready = True
             return None
-        made, peak_mib = message
+        outputs, peak_mib = message
         task, worker.task = worker.task, None
         worker.done += 1
         if worker.done >= RECYCLE_AFTER or peak_mib > RECYCLE_MIB:
             self._drop(worker)
-        return None if task is None else (task, made)
+        return None if task is None else (task, outputs)
 
     def _remove_dead(self, worker: _Worker) -> tuple[DrawingTask, Outputs] | None:
         worker.process.join(END_S)
@@ -250,18 +250,18 @@ def make_outputs(work: BatchWork, task: DrawingTask, data: bytes | None) -> Outp
     """Make the outputs of one drawing; any exception becomes an error of this drawing alone."""
     begin = time.perf_counter()
     try:
-        made = work.make(task, data)
+        outputs = work.make(task, data)
     except CamtoolError as error:
-        made = Outputs(error=str(error))
+        outputs = Outputs(error=str(error))
     except MemoryError:
-        made = Outputs(error=f"{task.source}: needs more memory than there is")
+        outputs = Outputs(error=f"{task.source}: needs more memory than there is")
     except Exception as error:
-        where = traceback.format_exc(limit=-1).strip().splitlines()[1].strip()
-        made = Outputs(
+        place = traceback.format_exc(limit=-1).strip().splitlines()[1].strip()
+        outputs = Outputs(
             error=f"{task.source}: fault in camtool itself ({type(error).__name__}: {error}; "
-            f"{where}); please report it"
+            f"{place}); please report it"
         )
-    return replace(made, seconds=time.perf_counter() - begin)
+    return replace(outputs, seconds=time.perf_counter() - begin)
 
 
 def peak_mib() -> float:

@@ -173,21 +173,23 @@ def _up_to_date(
     return manifest.up_to_date(task.stem, order.key(task, content))
 
 
-def _record(task: DrawingTask, made: Outputs, order: BatchSettings, manifest: Manifest) -> Outcome:
+def _record(
+    task: DrawingTask, outputs: Outputs, order: BatchSettings, manifest: Manifest
+) -> Outcome:
     """Write the files of a result and return its outcome."""
-    error, remarks = made.error, made.remarks
+    error, remarks = outputs.error, outputs.remarks
     names: tuple[str, ...] = ()
     if error is None:
-        files = {f"{task.stem}{extension}": data for extension, data in made.files.items()}
+        files = {f"{task.stem}{extension}": data for extension, data in outputs.files.items()}
         error = _write_files(task, files, order, manifest)
         if error is None:
             names = tuple(files)
             entry = ManifestEntry(
-                order.key(task, made.content),
+                order.key(task, outputs.content),
                 {name: content_digest(data) for name, data in files.items()},
-                made.warnings,
-                dict(made.figures),
-                dict(made.verdicts),
+                outputs.warnings,
+                dict(outputs.figures),
+                dict(outputs.verdicts),
             )
             try:
                 manifest.add(task.stem, entry)
@@ -200,11 +202,11 @@ def _record(task: DrawingTask, made: Outputs, order: BatchSettings, manifest: Ma
         names,
         error=error,
         remarks=remarks,
-        warnings=made.warnings,
-        figures=made.figures,
-        verdicts=made.verdicts,
-        seconds=made.seconds,
-        code=made.code,
+        warnings=outputs.warnings,
+        figures=outputs.figures,
+        verdicts=outputs.verdicts,
+        seconds=outputs.seconds,
+        code=outputs.code,
     )
 
 

@@ -123,7 +123,7 @@ def send(
         target,
         source=display_name(program),
         first=begin,
-        left=state,
+        state=state,
         tool_at=tool_at,
         progress=progress(),
     )
@@ -306,7 +306,7 @@ class _Sending:
         keys = {"p": Request.PAUSE, " ": Request.PAUSE, "r": Request.RESUME, "\n": Request.RESUME}
         keys |= {"s": Request.STEP, "q": Request.STOP}
         with opened_line(self.port) as line, keys_of_terminal() as key:
-            journal = Journal(self.place, self._head(), more=self.more)
+            journal = Journal(self.place, self._head(), appends=self.more)
             wishes = UserRequests(key, keys)
             self._tell = tell = Messages(quiet=self.quiet)
             driver = Driver(
@@ -321,7 +321,7 @@ class _Sending:
                     journal.close(
                         conversation.state.value,
                         conversation.why,
-                        still=conversation.is_still,
+                        is_still=conversation.is_still,
                         place=one.place_of(conversation),
                         **counts,
                     )
@@ -426,7 +426,7 @@ class _Sending:
         share = 1.0 - left_s / total_s if total_s else float(state == "finished")
         try:
             reason = conversation.why
-            page = self._page.html(state, facts, block, place, share=share, why=reason)
+            page = self._page.html(state, facts, block, place, share=share, reason=reason)
             self._page.write(page)
         except OSError as error:
             self._tell(f"{self.live} cannot be written ({error.strerror})")

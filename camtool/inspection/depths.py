@@ -88,17 +88,17 @@ class Floor(Struct, frozen=True, eq=False):
 
     def has(self, points: Floats) -> Bools:
         """Mask (P,) of the points (P, 2) on the floor."""
-        found = self._holds(self.layer.inwards(points), 0.0)
-        found &= self.solid.bands(points)[:, 0] >= -self.depth_mm - SAME_DEPTH_MM
-        return np.asarray(found & self.is_beyond_tabs(points))
+        is_inside = self._holds(self.layer.inwards(points), 0.0)
+        is_inside &= self.solid.bands(points)[:, 0] >= -self.depth_mm - SAME_DEPTH_MM
+        return np.asarray(is_inside & self.is_beyond_tabs(points))
 
     def meets(self, squares: Floats) -> Bools:
         """Mask (K,) of the squares (K, 3), middle and half a side, that may have points of the
         floor."""
         reach = math.sqrt(2.0) * squares[:, 2]
-        found = self._holds(self.layer.inwards(squares[:, :2]), reach)
-        found &= self.solid.bounds(squares)[:, 1] >= -self.depth_mm - SAME_DEPTH_MM
-        return np.asarray(found & (self._beyond_tabs(squares[:, :2]) > -reach))
+        is_near = self._holds(self.layer.inwards(squares[:, :2]), reach)
+        is_near &= self.solid.bounds(squares)[:, 1] >= -self.depth_mm - SAME_DEPTH_MM
+        return np.asarray(is_near & (self._beyond_tabs(squares[:, :2]) > -reach))
 
     def _holds(self, s: Floats, reach: Floats | float) -> Bools:
         band = self.solid.wall_mm
@@ -111,8 +111,8 @@ class Floor(Struct, frozen=True, eq=False):
 
     def _beyond_tabs(self, points: Floats) -> Floats:
         """Return how far (P,) points lie beyond the discs of the tabs, mm; inf without any."""
-        away = [np.hypot(*(points - tab[:2]).T) - tab[2] for tab in self.tabs]
-        return np.asarray(np.min(away, axis=0) if away else np.full(len(points), np.inf))
+        distances = [np.hypot(*(points - tab[:2]).T) - tab[2] for tab in self.tabs]
+        return np.asarray(np.min(distances, axis=0) if distances else np.full(len(points), np.inf))
 
 
 class FloorDepths(Struct, frozen=True):
@@ -143,10 +143,10 @@ class Floors:
     def at(self, place_mm: tuple[float, float]) -> Floor | None:
         """Return the floor at a place in the work frame; None where none is asked for, and on a
         slope."""
-        at = np.array([place_mm])
-        low = float(self._exact.bands(at)[0, 0])
+        places = np.array([place_mm])
+        low = float(self._exact.bands(places)[0, 0])
         layers = [(float(each.depths(s, s, 0.0)[1][0]), float(s[0]), each)
-                  for each in self._exact.must for s in (each.inwards(at),)]  # fmt: skip
+                  for each in self._exact.must for s in (each.inwards(places),)]  # fmt: skip
         depth, s, layer = max(layers, key=lambda each: each[0], default=(-math.inf, 0.0, None))
         if layer is None or depth <= 0.0:
             return None
@@ -158,27 +158,27 @@ class Floors:
         step, part = self._steps[layer.name], _part_of(layer, place_mm)
         round_ = cutter_profile(step.operation.tool).corner_mm > 0.0
         is_line = layer.side == ABOUT and (layer.rise > 0.0 or round_)
-        wanted = -step.setting.levels_mm[-1] if is_line else STOCK_TOP_MM - low
-        return Floor(place_mm, part, self._solid, begins, self._tabs, wanted, is_line)
+        depth_wanted = -step.setting.levels_mm[-1] if is_line else STOCK_TOP_MM - low
+        return Floor(place_mm, part, self._solid, begins, self._tabs, depth_wanted, is_line)
 
     def places(self) -> Iterator[tuple[float, float]]:
         """Yield a place on each floor, several on some: in closed regions the one of a lattice
         that is farthest from the walls, on lines their middle."""
         for layer in self._exact.must:
             for line in layer.lines:
-                alone = replace(layer, lines=Polylines.of([line]))
+                single = replace(layer, lines=Polylines.of([line]))
                 if layer.side == ABOUT:
-                    points = _points_along(alone)
+                    points = _points_along(single)
                     px, py = points[len(points) // 2].tolist()
                     yield px, py
                 elif layer.side == INSIDE:
-                    low, high = np.reshape(alone.curves.boxes, (-1, 2, 2)).transpose(1, 0, 2)
+                    low, high = np.reshape(single.curves.boxes, (-1, 2, 2)).transpose(1, 0, 2)
                     shares = (np.arange(LATTICE) + 0.5) / LATTICE
                     x, y = (low.min(axis=0) + shares[:, None] * np.ptp(
                         np.concatenate([low, high]), axis=0)).T  # fmt: skip
                     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
                     # Islands are other lines of the layer, around which `at` finds no floor.
-                    inner = np.minimum(layer.inwards(points), alone.inwards(points))
+                    inner = np.minimum(layer.inwards(points), single.inwards(points))
                     px, py = points[int(inner.argmax())].tolist()
                     yield px, py
 
@@ -187,10 +187,10 @@ def _points_along(layer: WantedLayer) -> Floats:
     """Return points (P, 2) along the lines of a layer."""
     every = layer.segments
     count = np.ceil(segment_lengths(every) / POINTS_APART_MM).astype(np.int64) + 1
-    which = np.repeat(np.arange(len(count)), count)
-    place = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-    part = place / np.maximum(count[which] - 1, 1)
-    return point_at(every, which, part)
+    owners = np.repeat(np.arange(len(count)), count)
+    place = np.arange(len(owners)) - np.repeat(np.cumsum(count) - count, count)
+    part = place / np.maximum(count[owners] - 1, 1)
+    return point_at(every, owners, part)
 
 
 def _part_of(layer: WantedLayer, place_mm: tuple[float, float]) -> WantedLayer:
@@ -199,36 +199,37 @@ def _part_of(layer: WantedLayer, place_mm: tuple[float, float]) -> WantedLayer:
     lines = layer.lines
     if layer.side == INSIDE:
         levels = Nesting(lines).levels
-        around = [row for row in range(len(lines)) if _is_within(lines[row], place_mm)]
-        outer = max(around, key=lambda row: int(levels.depth[row]), default=-1)
+        rows_around = [row for row in range(len(lines)) if _is_within(lines[row], place_mm)]
+        outer = max(rows_around, key=lambda row: int(levels.depth[row]), default=-1)
         rows: Ints = np.flatnonzero(levels.parent == outer)
         if outer >= 0:
             rows = np.append(rows, outer)
     elif layer.side == ABOUT:
-        at = np.array([place_mm])
-        away = [-float(replace(layer, lines=lines.select([row])).inwards(at)[0])
+        points = np.array([place_mm])
+        distances = [-float(replace(layer, lines=lines.select([row])).inwards(points)[0])
                 for row in range(len(lines))]  # fmt: skip
-        rows = np.array([int(np.argmin(away))])
+        rows = np.array([int(np.argmin(distances))])
     else:
         return layer
     return replace(layer, lines=lines.select(np.sort(rows).tolist()))
 
 
 def _is_within(line: Polyline, place_mm: tuple[float, float]) -> bool:
-    alone = WantedLayer("", Polylines.of([line]), INSIDE, 0.0, 0.0, 0.0, 0.0)
-    return bool(alone.inwards(np.array([place_mm]))[0] >= 0.0)
+    single = WantedLayer("", Polylines.of([line]), INSIDE, 0.0, 0.0, 0.0, 0.0)
+    return bool(single.inwards(np.array([place_mm]))[0] >= 0.0)
 
 
 def depths_of(floors: Sequence[Floor], moves: StockMoves) -> list[FloorDepths | None]:
     """Measure floors in the stock after moves, whose Z is exact to 1 / Z_WEIGHT of what they are
     beside the slides; None where the band beside the walls leaves nothing of a floor."""
-    tree, deep = stock_tree(moves), moves.beside_mm / Z_WEIGHT
+    tree, slack = stock_tree(moves), moves.beside_mm / Z_WEIGHT
     measured = (
         (_along_line if floor.is_line else _over_region)(floor, tree, moves.beside_mm)
         for floor in floors
     )
     return [
-        each and FloorDepths(each.here_mm, max(each.least_mm - deep, 0.0), each.greatest_mm + deep)
+        each
+        and FloorDepths(each.here_mm, max(each.least_mm - slack, 0.0), each.greatest_mm + slack)
         for each in measured
     ]
 
@@ -239,26 +240,26 @@ def _along_line(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths 
     points = points[floor.is_beyond_tabs(points)]
     if not len(points):
         return None
-    here = int(np.hypot(*(points - floor.place_mm).T).argmin())
-    least, middle, greatest = (
-        STOCK_TOP_MM - tree.heights(points, None, band + more)[0]
-        for more in (-beside_mm, 0.0, beside_mm)
+    index = int(np.hypot(*(points - floor.place_mm).T).argmin())
+    smallest, middle, greatest = (
+        STOCK_TOP_MM - tree.heights(points, None, band + shift)[0]
+        for shift in (-beside_mm, 0.0, beside_mm)
     )
-    return FloorDepths(float(middle[here]), float(least.min()), float(greatest.max()))
+    return FloorDepths(float(middle[index]), float(smallest.min()), float(greatest.max()))
 
 
 def _over_region(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths | None:
     """Bracket the heights over a floor."""
 
     def greatest(value: Callable[[Floats], Floats], upper: Callable[[Floats], Floats]) -> float:
-        found = greatest_value(
+        maximum = greatest_value(
             lambda at: np.where(floor.has(at), value(at), -np.inf),
             lambda squares: np.where(floor.meets(squares), upper(squares), -np.inf),
             floor.box_mm,
             TOLERANCE_MM,
             max_squares=MAX_SQUARES,
         )
-        return found.high if found.low > -math.inf else -math.inf
+        return maximum.high if maximum.low > -math.inf else -math.inf
 
     highest = greatest(
         lambda at: tree.heights(at, None, -beside_mm)[0],
@@ -270,9 +271,9 @@ def _over_region(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths
     )
     if not math.isfinite(highest + deepest):
         return None
-    least, most = STOCK_TOP_MM - min(highest, STOCK_TOP_MM), STOCK_TOP_MM + deepest
-    here = STOCK_TOP_MM - float(tree.heights(np.array([floor.place_mm]))[0][0])
-    return FloorDepths(min(max(here, least), most), least, most)
+    smallest, largest = STOCK_TOP_MM - min(highest, STOCK_TOP_MM), STOCK_TOP_MM + deepest
+    depth = STOCK_TOP_MM - float(tree.heights(np.array([floor.place_mm]))[0][0])
+    return FloorDepths(min(max(depth, smallest), largest), smallest, largest)
 
 
 def proposed_floors(drawing: Drawing, job: Job, machine: Machine) -> Iterator[Dimension]:
@@ -282,24 +283,24 @@ def proposed_floors(drawing: Drawing, job: Job, machine: Machine) -> Iterator[Di
     placement = replace(job.placement, copies=(1, 1), pitch_mm=(0.0, 0.0))
     single = replace(job, placement=placement)
     floors = Floors(planned(drawing, single, machine, undivided=True).steps, 0.0)
-    where = placements(drawing, single)[0]
-    back = np.linalg.inv(where.matrix)
+    first_placement = placements(drawing, single)[0]
+    inverse = np.linalg.inv(first_placement.matrix)
     thick = math.inf if job.stock is None else job.stock.thickness_mm
-    known: set[bytes] = set()
+    seen_lines: set[bytes] = set()
     counts: Counter[str] = Counter()
     for place in floors.places():
         floor = floors.at(place)
         if floor is None or floor.depth_mm >= thick - POSITION_EPS_MM:
             continue
         lines = floor.layer.lines.vertices.tobytes()
-        if lines in known:
+        if lines in seen_lines:
             continue
-        known.add(lines)
+        seen_lines.add(lines)
         counts[floor.layer.name] += 1
         name = f"{floor.layer.name} {counts[floor.layer.name]}"
-        x, y = (back @ (np.array(place) - where.shift)).tolist()
-        deep = floor.depth_mm
-        yield Dimension(f"{name} depth", "depth", ((x, y),), "", nominal_mm=deep)
+        x, y = (inverse @ (np.array(place) - first_placement.shift)).tolist()
+        depth = floor.depth_mm
+        yield Dimension(f"{name} depth", "depth", ((x, y),), "", nominal_mm=depth)
         if floor.layer.side == INSIDE and math.isfinite(thick):
-            left = thick - deep
-            yield Dimension(f"{name} floor", "thickness", ((x, y),), "", nominal_mm=left)
+            thickness_left = thick - depth
+            yield Dimension(f"{name} floor", "thickness", ((x, y),), "", nominal_mm=thickness_left)

@@ -58,12 +58,12 @@ class CircleFeature(Struct, frozen=True, eq=False):
     def has(self, angle: Floats, slack: float = 0.0) -> Bools:
         """Mask (K,) of the angles, rad, that lie on one of its arcs, or within `slack` beside
         it."""
-        found = np.zeros(np.shape(angle), dtype=np.bool_)
+        is_on_arc = np.zeros(np.shape(angle), dtype=np.bool_)
         for start, sweep in self.arcs:
             first = start if sweep > 0.0 else start + sweep
-            beyond = np.mod(angle - first + slack, 2.0 * math.pi)
-            found |= beyond <= abs(sweep) + 2.0 * slack
-        return found
+            angle_beyond = np.mod(angle - first + slack, 2.0 * math.pi)
+            is_on_arc |= angle_beyond <= abs(sweep) + 2.0 * slack
+        return is_on_arc
 
     def distance_mm(self, place: Place) -> float:
         """Return the radial distance of a place from the arcs; infinite beside them."""
@@ -72,13 +72,13 @@ class CircleFeature(Struct, frozen=True, eq=False):
         on_arc = self.has(np.array([math.atan2(y, x)]), slack)[0]
         return abs(math.hypot(x, y) - self.radius_mm) if on_arc else math.inf
 
-    def in_work_frame(self, where: AffineMap) -> CircleFeature:
+    def in_work_frame(self, placement: AffineMap) -> CircleFeature:
         """Return the circle in the work frame."""
-        turn = math.atan2(where.matrix[1, 0], where.matrix[0, 0])
-        flip = -1.0 if np.linalg.det(where.matrix) < 0.0 else 1.0
+        turn = math.atan2(placement.matrix[1, 0], placement.matrix[0, 0])
+        flip = -1.0 if np.linalg.det(placement.matrix) < 0.0 else 1.0
         arcs = np.column_stack([turn + flip * self.arcs[:, 0], flip * self.arcs[:, 1]])
         return CircleFeature(
-            self.path, where.point(self.centre_mm), where.scale * self.radius_mm, arcs
+            self.path, placement.point(self.centre_mm), placement.scale * self.radius_mm, arcs
         )
 
 
@@ -106,13 +106,13 @@ class EdgeFeature(Struct, frozen=True, eq=False):
 
     def distance_mm(self, place: Place) -> float:
         """Return the distance of a place from the edge."""
-        beside = np.subtract(place, self.start_mm)
-        at = float(np.clip(beside @ self.along, 0.0, self.length_mm))
-        return float(np.hypot(*(beside - at * self.along)))
+        offset = np.subtract(place, self.start_mm)
+        position = float(np.clip(offset @ self.along, 0.0, self.length_mm))
+        return float(np.hypot(*(offset - position * self.along)))
 
-    def in_work_frame(self, where: AffineMap) -> EdgeFeature:
+    def in_work_frame(self, placement: AffineMap) -> EdgeFeature:
         """Return the edge in the work frame."""
-        return EdgeFeature(self.path, where.point(self.start_mm), where.point(self.end_mm))
+        return EdgeFeature(self.path, placement.point(self.start_mm), placement.point(self.end_mm))
 
 
 Feature = CircleFeature | EdgeFeature
@@ -124,10 +124,10 @@ class OutlineFeature(Struct, frozen=True, eq=False):
     path: int
     features: tuple[Feature, ...]
 
-    def in_work_frame(self, where: AffineMap) -> OutlineFeature:
+    def in_work_frame(self, placement: AffineMap) -> OutlineFeature:
         """Return the outline in the work frame."""
         return OutlineFeature(
-            self.path, tuple(each.in_work_frame(where) for each in self.features)
+            self.path, tuple(each.in_work_frame(placement) for each in self.features)
         )
 
 
@@ -139,9 +139,9 @@ class DistanceEnd(Struct, frozen=True, eq=False):
     how: Literal["edge", "centre", "outermost"]
     side: int = 1
 
-    def in_work_frame(self, where: AffineMap) -> DistanceEnd:
+    def in_work_frame(self, placement: AffineMap) -> DistanceEnd:
         """Return the end in the work frame."""
-        return DistanceEnd(self.feature.in_work_frame(where), self.how, self.side)
+        return DistanceEnd(self.feature.in_work_frame(placement), self.how, self.side)
 
 
 class BoundDimension(Struct, frozen=True, eq=False):
@@ -158,25 +158,28 @@ class BoundDimension(Struct, frozen=True, eq=False):
     @property
     def nominal_mm(self) -> float:
         """Nominal value: that of the dimension, or else the drawn size."""
-        given = self.dimension.nominal_mm
-        return self.drawn_mm if given is None else given
+        stated_mm = self.dimension.nominal_mm
+        return self.drawn_mm if stated_mm is None else stated_mm
 
     @property
     def features(self) -> tuple[Feature, ...]:
         """All circles and edges on which it depends."""
-        whole = [
+        feature_groups = [
             each.features if isinstance(each, OutlineFeature) else (each,) for each in self.of
         ]
-        return (*(one for several in whole for one in several), *(e.feature for e in self.ends))
+        return (
+            *(one for several in feature_groups for one in several),
+            *(e.feature for e in self.ends),
+        )
 
-    def in_work_frame(self, where: AffineMap) -> BoundDimension:
+    def in_work_frame(self, placement: AffineMap) -> BoundDimension:
         """Return it in the work frame, whose lengths are those of the drawing."""
-        direction = where.matrix @ self.direction / where.scale
-        places = tuple(where.point(place) for place in self.dimension.places_mm)
+        direction = placement.matrix @ self.direction / placement.scale
+        places = tuple(placement.point(place) for place in self.dimension.places_mm)
         return BoundDimension(
             replace(self.dimension, places_mm=places),
-            tuple(each.in_work_frame(where) for each in self.of),
-            tuple(end.in_work_frame(where) for end in self.ends),
+            tuple(each.in_work_frame(placement) for each in self.of),
+            tuple(end.in_work_frame(placement) for end in self.ends),
             direction,
             self.drawn_mm,
         )
@@ -196,8 +199,8 @@ class Features:
         """Return the features whose box, widened by BIND_MM, contains a place; the box of a circle
         contains its centre."""
         x, y = place
-        around = np.array([[x - BIND_MM, y - BIND_MM, x + BIND_MM, y + BIND_MM]])
-        return [self._each[row] for row in self._index.touching(around)[1].tolist()]
+        box = np.array([[x - BIND_MM, y - BIND_MM, x + BIND_MM, y + BIND_MM]])
+        return [self._each[row] for row in self._index.touching(box)[1].tolist()]
 
 
 def _box(feature: Feature) -> tuple[float, float, float, float]:
@@ -222,17 +225,17 @@ def _of_path(index: int, path: Polyline) -> Iterator[Feature]:
 
 
 def _circles(index: int, segments: Segments) -> Iterator[CircleFeature]:
-    which = np.flatnonzero(segments.is_arc)
-    left = segments[which]
-    todo = np.arange(len(which))
+    arc_rows = np.flatnonzero(segments.is_arc)
+    all_arcs = segments[arc_rows]
+    todo = np.arange(len(arc_rows))
     while len(todo):
-        gap = np.hypot(*(left.centre[todo] - left.centre[todo[0]]).T)
-        gap = np.maximum(gap, np.abs(left.radius[todo] - left.radius[todo[0]]))
-        mine = todo[gap <= SAME_CIRCLE_MM]
+        gap = np.hypot(*(all_arcs.centre[todo] - all_arcs.centre[todo[0]]).T)
+        gap = np.maximum(gap, np.abs(all_arcs.radius[todo] - all_arcs.radius[todo[0]]))
+        same_circle = todo[gap <= SAME_CIRCLE_MM]
         todo = todo[gap > SAME_CIRCLE_MM]
-        x, y = left.centre[mine].mean(axis=0).tolist()
-        arcs = np.column_stack([left.start_angle[mine], left.sweep[mine]])
-        yield CircleFeature(index, (x, y), float(left.radius[mine].mean()), arcs)
+        x, y = all_arcs.centre[same_circle].mean(axis=0).tolist()
+        arcs = np.column_stack([all_arcs.start_angle[same_circle], all_arcs.sweep[same_circle]])
+        yield CircleFeature(index, (x, y), float(all_arcs.radius[same_circle].mean()), arcs)
 
 
 def _edges(index: int, segments: Segments, *, closed: bool) -> Iterator[EdgeFeature]:
@@ -260,24 +263,32 @@ def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension 
         return _distance(dimension, features, file)
     if dimension.kind in DEPTHS:
         return BoundDimension(dimension, (), (), np.zeros(2), dimension.nominal_mm or 0.0)
-    here = features.at(dimension.places_mm[0])
+    candidates_here = features.at(dimension.places_mm[0])
     if dimension.kind == "straightness":
-        found: list[Feature] = [
-            each for each in here if isinstance(each, EdgeFeature) and _near(each, dimension)
+        candidates: list[Feature] = [
+            each
+            for each in candidates_here
+            if isinstance(each, EdgeFeature) and _near(each, dimension)
         ]
-        return _single(dimension, found, 0.0, file)
+        return _single(dimension, candidates, 0.0, file)
     if dimension.kind == "profile":
-        paths = sorted({each.path for each in here if _near(each, dimension)})
+        paths = sorted({each.path for each in candidates_here if _near(each, dimension)})
         if len(paths) != 1:
             return _unbound(dimension, len(paths), file)
-        whole = OutlineFeature(paths[0], tuple(each for each in features if each.path == paths[0]))
-        return BoundDimension(dimension, (whole,), (), np.zeros(2), 0.0)
+        outline = OutlineFeature(
+            paths[0], tuple(each for each in features if each.path == paths[0])
+        )
+        return BoundDimension(dimension, (outline,), (), np.zeros(2), 0.0)
     circles = [
-        each for each in here if isinstance(each, CircleFeature) and _is_of(each, dimension)
+        each
+        for each in candidates_here
+        if isinstance(each, CircleFeature) and _is_of(each, dimension)
     ]
     if len(circles) > 1 and dimension.nominal_mm is not None:
-        wanted = dimension.nominal_mm * (0.5 if dimension.kind == "diameter" else 1.0)
-        circles = [each for each in circles if abs(each.radius_mm - wanted) <= BIND_MM] or circles
+        radius_wanted = dimension.nominal_mm * (0.5 if dimension.kind == "diameter" else 1.0)
+        circles = [
+            each for each in circles if abs(each.radius_mm - radius_wanted) <= BIND_MM
+        ] or circles
     circles = _closed_circle_first(circles)
     drawn = 0.0
     if circles and dimension.kind in ("diameter", "radius"):
@@ -288,8 +299,8 @@ def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension 
 def _closed_circle_first(circles: list[CircleFeature]) -> list[CircleFeature]:
     """Of circles about one centre return the closed one if there is exactly one: a dimension there
     is of the hole, not of a fillet around it."""
-    whole = [each for each in circles if each.is_closed]
-    return whole if len(whole) == 1 else circles
+    closed = [each for each in circles if each.is_closed]
+    return closed if len(closed) == 1 else circles
 
 
 def _near(feature: Feature, dimension: Dimension) -> bool:
@@ -305,11 +316,11 @@ def _is_of(circle: CircleFeature, dimension: Dimension) -> bool:
 
 
 def _single(
-    dimension: Dimension, found: Sequence[Feature], drawn_mm: float, file: str
+    dimension: Dimension, candidates: Sequence[Feature], drawn_mm: float, file: str
 ) -> BoundDimension | Finding:
-    if len(found) != 1:
-        return _unbound(dimension, len(found), file)
-    return BoundDimension(dimension, (found[0],), (), np.zeros(2), drawn_mm)
+    if len(candidates) != 1:
+        return _unbound(dimension, len(candidates), file)
+    return BoundDimension(dimension, (candidates[0],), (), np.zeros(2), drawn_mm)
 
 
 def _distance(dimension: Dimension, features: Features, file: str) -> BoundDimension | Finding:
@@ -324,10 +335,10 @@ def _distance(dimension: Dimension, features: Features, file: str) -> BoundDimen
     direction = direction / np.hypot(*direction)
     ends = []
     for place in (first, second):
-        found = _ends_at(place, direction, features.at(place))
-        if len(found) != 1:
-            return _unbound(dimension, len(found), file, place)
-        ends.append(found[0])
+        candidates = _ends_at(place, direction, features.at(place))
+        if len(candidates) != 1:
+            return _unbound(dimension, len(candidates), file, place)
+        ends.append(candidates[0])
     places = [_place_of(end, direction) for end in ends]
     drawn = float((places[1] - places[0]) @ direction)
     return BoundDimension(dimension, (), tuple(ends), direction, drawn)
@@ -340,16 +351,16 @@ def _place_of(end: DistanceEnd, direction: Floats) -> Floats:
     """
     if isinstance(end.feature, EdgeFeature):
         return np.asarray(end.feature.start_mm)
-    beyond = end.side * end.feature.radius_mm if end.how == "outermost" else 0.0
-    return np.asarray(end.feature.centre_mm + beyond * direction)
+    offset = end.side * end.feature.radius_mm if end.how == "outermost" else 0.0
+    return np.asarray(end.feature.centre_mm + offset * direction)
 
 
 def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> list[DistanceEnd]:
     """Return the possible ends at a place near these features for a measurement along `direction`,
     edges before circles that are tangent to them."""
     circles = [each for each in features if isinstance(each, CircleFeature)]
-    about = [each for each in circles if math.dist(place, each.centre_mm) <= BIND_MM]
-    centres = [DistanceEnd(each, "centre") for each in _closed_circle_first(about)]
+    concentric = [each for each in circles if math.dist(place, each.centre_mm) <= BIND_MM]
+    centres = [DistanceEnd(each, "centre") for each in _closed_circle_first(concentric)]
     edges = [
         DistanceEnd(each, "edge")
         for each in features
@@ -364,10 +375,10 @@ def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> li
         spoke = np.subtract(place, each.centre_mm)
         if each.distance_mm(place) > BIND_MM:
             continue
-        away = float(spoke @ direction) / each.radius_mm
+        cosine = float(spoke @ direction) / each.radius_mm
         # A place that is BIND_MM off has turned by up to BIND_MM / radius.
-        if abs(away) >= math.cos(min(SQUARE_RAD + BIND_MM / each.radius_mm, 0.5)):
-            outermost.append(DistanceEnd(each, "outermost", 1 if away > 0.0 else -1))
+        if abs(cosine) >= math.cos(min(SQUARE_RAD + BIND_MM / each.radius_mm, 0.5)):
+            outermost.append(DistanceEnd(each, "outermost", 1 if cosine > 0.0 else -1))
     return outermost
 
 

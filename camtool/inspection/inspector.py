@@ -98,19 +98,21 @@ class Inspector:
         assert run.decoded is not None
         assert run.verification is not None
         self._decoded, self._target = run.decoded, run.target
-        wanted = run.verification.wanted
+        wanted_moves = run.verification.wanted
         self._follows = run.verification.follows.astype(np.int64)
-        self._tool = ToolAt(wanted.toolpath, run.job, tool_mm(run.job))
-        moves = swept_moves(wanted, self._tool)
-        self._points = _points(wanted)
+        self._tool = ToolAt(wanted_moves.toolpath, run.job, tool_mm(run.job))
+        moves = swept_moves(wanted_moves, self._tool)
+        self._points = _points(wanted_moves)
         self._last: tuple[Machine, SweptSegments] | None = None
         self._edges_of: tuple[Machine, float, dict[int, Floats]] | None = None
         self._job = run.job
         self._depths_by_z: dict[Axis, dict[int, FloorDepths | None]] = {}
-        found: list[tuple[Dimension, Finding]] = []
-        self.dimensions: tuple[Inspected, ...] = tuple(_inspected(run, dimensions, moves, found))
-        self._leave_out_narrow_floors(found)
-        self.left_out = tuple(found)
+        not_inspected: list[tuple[Dimension, Finding]] = []
+        self.dimensions: tuple[Inspected, ...] = tuple(
+            _inspected(run, dimensions, moves, not_inspected)
+        )
+        self._leave_out_narrow_floors(not_inspected)
+        self.left_out = tuple(not_inspected)
 
     def sizes(
         self, variant: MachineVariant | None = None, left_mm: Mapping[int, float] | None = None
@@ -124,18 +126,19 @@ class Inspector:
         `left_mm`: if so much more is left on the walls of these paths of the drawing. The tool's
         path lies so much farther from them then, and so does the edge that it cuts.
         """
-        lies = self._edges(variant or MachineVariant(self._target.machine))
-        more = left_mm or {}
+        edges = self._edges(variant or MachineVariant(self._target.machine))
+        allowances = left_mm or {}
         sizes = []
         for each in self.dimensions:
             if each.floor is not None:
                 sizes.append(self._depth(each, variant or MachineVariant(self._target.machine)))
                 continue
-            moved = [
-                lies[id(cut)] + (0.0 if cut.on_path else cut.side * more.get(feature.path, 0.0))
+            shifted = [
+                edges[id(cut)]
+                + (0.0 if cut.on_path else cut.side * allowances.get(feature.path, 0.0))
                 for feature, cut in zip(each.bound.features, each.cuts, strict=True)
             ]
-            size = size_of(each.bound, each.cuts, moved)
+            size = size_of(each.bound, each.cuts, shifted)
             sizes.append(size or MachinedSize(math.nan, math.nan, math.nan))
         return sizes
 
@@ -144,10 +147,10 @@ class Inspector:
         `id`."""
         if not any(each.cuts for each in self.dimensions):
             return {}
-        known = self._edges_of
-        if known is None or known[0] is not variant.machine or known[1] != variant.wider_mm:
+        cached = self._edges_of
+        if cached is None or cached[0] is not variant.machine or cached[1] != variant.wider_mm:
             slides = self._slides(variant.machine).wider(0.5 * variant.wider_mm)
-            lies = {
+            edges = {
                 id(cut): edge_at(feature, cut, rows_of(slides, cut, feature))
                 for feature, cut in {
                     id(cut): (feature, cut)
@@ -155,8 +158,8 @@ class Inspector:
                     for feature, cut in zip(each.bound.features, each.cuts, strict=True)
                 }.values()
             }
-            known = self._edges_of = variant.machine, variant.wider_mm, lies
-        return known[2]
+            cached = self._edges_of = variant.machine, variant.wider_mm, edges
+        return cached[2]
 
     def values(self, variant: MachineVariant) -> Floats:
         """Compute best fit, least and largest local size (3 D,) mm of each of D dimensions."""
@@ -166,78 +169,78 @@ class Inspector:
     def machined(self, variant: MachineVariant) -> Floats:
         """Compute the positions (T,) mm of the edges of all cuts on a variant of the machine, one
         cut after the other, NaN where one is not cut; then the three values of each depth."""
-        lies = self._edges(variant).values()
+        edges = self._edges(variant).values()
         depths = (self._depth(each, variant) for each in self.dimensions if each.floor is not None)
         sizes = ((each.fit_mm, each.low_mm, each.high_mm) for each in depths)
-        return np.concatenate([np.zeros(0), *(each.reshape(-1) for each in lies), *sizes])
+        return np.concatenate([np.zeros(0), *(each.reshape(-1) for each in edges), *sizes])
 
     def _depth(self, each: Inspected, variant: MachineVariant) -> MachinedSize:
         """Measure a depth or a thickness on a variant of the machine. What changes the motion in
         the plane alone changes no depth."""
         z = variant.machine.axes.z
         if z not in self._depths_by_z:
-            plain = without_scatter(MachineVariant(self._target.machine)).machine
-            machine = replace(plain, axes=replace(plain.axes, z=z))
+            mean_machine = without_scatter(MachineVariant(self._target.machine)).machine
+            machine = replace(mean_machine, axes=replace(mean_machine.axes, z=z))
             target = replace(self._target, machine=machine)
             tools = tools_of_rows(self._decoded, self._job)
             moves = slide_moves(self._decoded, target, tools, z_weight=Z_WEIGHT)
             floors = [one.floor for one in self.dimensions if one.floor is not None]
-            found = zip(floors, depths_of(floors, moves), strict=True)
-            self._depths_by_z[z] = {id(floor): depth for floor, depth in found}
+            measured_floors = zip(floors, depths_of(floors, moves), strict=True)
+            self._depths_by_z[z] = {id(floor): depth for floor, depth in measured_floors}
         depth = self._depths_by_z[z][id(each.floor)]
         if depth is None:
             return MachinedSize(math.nan, math.nan, math.nan)
-        down = (depth.here_mm, depth.least_mm, depth.greatest_mm)
-        here, least, greatest = (value + variant.deeper_mm for value in down)
+        measured = (depth.here_mm, depth.least_mm, depth.greatest_mm)
+        depth_here, smallest, greatest = (value + variant.deeper_mm for value in measured)
         if not each.stock_mm:
-            return MachinedSize(here, least, greatest)
+            return MachinedSize(depth_here, smallest, greatest)
         thick = each.stock_mm + variant.thicker_mm
-        return MachinedSize(thick - here, thick - greatest, thick - least)
+        return MachinedSize(thick - depth_here, thick - greatest, thick - smallest)
 
-    def _leave_out_narrow_floors(self, found: list[tuple[Dimension, Finding]]) -> None:
+    def _leave_out_narrow_floors(self, not_inspected: list[tuple[Dimension, Finding]]) -> None:
         """Leave out floors of which the band beside their walls leaves nothing."""
         if not any(each.floor is not None for each in self.dimensions):
             return
-        plain = MachineVariant(self._target.machine)
-        narrow = [
+        variant = MachineVariant(self._target.machine)
+        narrow_floors = [
             each
             for each in self.dimensions
-            if each.floor is not None and math.isnan(self._depth(each, plain).fit_mm)
+            if each.floor is not None and math.isnan(self._depth(each, variant).fit_mm)
         ]
-        for each in narrow:
+        for each in narrow_floors:
             assert each.floor is not None
             band_mm = each.floor.solid.wall_mm
-            where = each.bound.dimension.source
-            why = DIMENSION_NOT_CUT_NARROW(where=where, name=each.name, measured=band_mm)
-            found.append((each.bound.dimension, why))
-        if narrow:
-            self.dimensions = tuple(each for each in self.dimensions if each not in narrow)
+            place = each.bound.dimension.source
+            finding = DIMENSION_NOT_CUT_NARROW(where=place, name=each.name, measured=band_mm)
+            not_inspected.append((each.bound.dimension, finding))
+        if narrow_floors:
+            self.dimensions = tuple(each for each in self.dimensions if each not in narrow_floors)
 
     def measured(self, nodes: Floats, weights: Floats) -> Floats:
         """Compute the values (N, 3 D) mm of N parts whose edges are mixed with the weights (N, M)
         from the edges `nodes` (M, T) of M parts."""
         cuts = {id(cut): cut for each in self.dimensions for cut in each.cuts}
-        own: dict[int, tuple[Floats, Floats]] = {}  # levels, and the nodes' edges there
+        own_edges: dict[int, tuple[Floats, Floats]] = {}  # levels, and the nodes' edges there
         begin = 0
         for key, cut in cuts.items():
             edges = nodes[:, begin : begin + cut.seen.size].reshape(len(nodes), *cut.seen.shape)
             begin += cut.seen.size
-            kept = distinct_levels(edges)
-            own[key] = cut.levels_mm[kept], edges[:, kept]
-        found = np.empty((len(weights), len(self.dimensions), 3))
+            levels_kept = distinct_levels(edges)
+            own_edges[key] = cut.levels_mm[levels_kept], edges[:, levels_kept]
+        sizes = np.empty((len(weights), len(self.dimensions), 3))
         for index, each in enumerate(self.dimensions):
             if each.floor is not None:
-                found[:, index] = weights @ nodes[:, begin : begin + 3]
+                sizes[:, index] = weights @ nodes[:, begin : begin + 3]
                 begin += 3
                 continue
-            levels = [own[id(cut)][0] for cut in each.cuts]
-            simulated = [own[id(cut)][1] for cut in each.cuts]
-            most = max(1, MAX_EDGES_AT_ONCE // max(one[0].size for one in simulated))
-            for first in range(0, len(weights), most):
-                part = weights[first : first + most]
-                lies = [np.tensordot(part, one, axes=1) for one in simulated]
-                found[first : first + most, index] = sizes_of(each.bound, levels, lies)
-        return found.reshape(len(weights), -1)
+            levels = [own_edges[id(cut)][0] for cut in each.cuts]
+            simulated = [own_edges[id(cut)][1] for cut in each.cuts]
+            max_parts = max(1, MAX_EDGES_AT_ONCE // max(one[0].size for one in simulated))
+            for first in range(0, len(weights), max_parts):
+                part = weights[first : first + max_parts]
+                mixed_edges = [np.tensordot(part, one, axes=1) for one in simulated]
+                sizes[first : first + max_parts, index] = sizes_of(each.bound, levels, mixed_edges)
+        return sizes.reshape(len(weights), -1)
 
     @property
     def edges(self) -> Floats:
@@ -256,15 +259,18 @@ class Inspector:
 
     def _slides(self, machine: Machine) -> SweptSegments:
         """Simulate the path of the slides of this machine for the program."""
-        known = self._last
-        if known is None or known[0] is not machine:
+        cached = self._last
+        if cached is None or cached[0] is not machine:
             from camtool.verification.verify import Case, VerifyOptions, verify
 
             options = VerifyOptions(trace_points=self._points)
             target = replace(self._target, machine=machine)
-            done = verify(Case(self._decoded, target, options=options))
-            known = self._last = machine, swept_trace(done.trace, self._follows, self._tool)
-        return known[1]
+            verification = verify(Case(self._decoded, target, options=options))
+            cached = self._last = (
+                machine,
+                swept_trace(verification.trace, self._follows, self._tool),
+            )
+        return cached[1]
 
 
 def _edges_of(bound: BoundDimension) -> Floats:
@@ -282,17 +288,17 @@ def _edges_of(bound: BoundDimension) -> Floats:
             half = [0.5, 0.5] if end.how == "centre" else [1.0]
             rows += [sign * share * bound.direction for share in half]
         return np.array(rows)
-    alike = np.full(2, math.sqrt(0.5))
+    diagonal = np.full(2, math.sqrt(0.5))
     if kind == "position":
-        return np.array([alike, alike])
-    return np.array([2.0 * alike if kind == "profile" else alike])
+        return np.array([diagonal, diagonal])
+    return np.array([2.0 * diagonal if kind == "profile" else diagonal])
 
 
 def _inspected(
     run: Run,
     dimensions: Iterable[Dimension],
     moves: SweptSegments,
-    found: list[tuple[Dimension, Finding]],
+    not_inspected: list[tuple[Dimension, Finding]],
 ) -> Iterable[Inspected]:
     assert run.drawing is not None
     assert run.job is not None
@@ -305,42 +311,44 @@ def _inspected(
             where="tolerances",
             mend="limits hold for the part as drawn: leave out fit and scale",
         )
-    known: dict[tuple[int, int], Cut | None] = {}
+    cuts_by_feature: dict[tuple[int, int], Cut | None] = {}
     floors: Floors | None = None
     for dimension in dimensions:
         if dimension.kind in DEPTHS:
             floors = floors or _floors(run)
-            for copy, where in enumerate(maps):
-                place = where.point(dimension.places_mm[0])
+            for copy, placement in enumerate(maps):
+                place = placement.point(dimension.places_mm[0])
                 each = _inspected_depth(run, dimension, floors.at(place))
                 if isinstance(each, Finding):
-                    found.append((dimension, each))
+                    not_inspected.append((dimension, each))
                     continue
                 yield replace(each, copy=copy if len(maps) > 1 else None)
             continue
         bound = bind(dimension, features, run.drawing.file)
         if isinstance(bound, Finding):
-            found.append((dimension, bound))
+            not_inspected.append((dimension, bound))
             continue
-        for copy, where in enumerate(maps):
-            placed = bound.in_work_frame(where)
+        for copy, placement in enumerate(maps):
+            placed_bound = bound.in_work_frame(placement)
             cuts = []
-            for drawn, feature in zip(bound.features, placed.features, strict=True):
+            for drawn, feature in zip(bound.features, placed_bound.features, strict=True):
                 key = id(drawn), copy
-                if key not in known:
-                    known[key] = cut_of(feature, moves)
-                cuts.append(known[key])
-            here = Inspected(placed, tuple(filter(None, cuts)), copy if len(maps) > 1 else None)
-            if len(here.cuts) == len(cuts):
-                yield here
+                if key not in cuts_by_feature:
+                    cuts_by_feature[key] = cut_of(feature, moves)
+                cuts.append(cuts_by_feature[key])
+            candidate = Inspected(
+                placed_bound, tuple(filter(None, cuts)), copy if len(maps) > 1 else None
+            )
+            if len(candidate.cuts) == len(cuts):
+                yield candidate
                 continue
-            missing = placed.features[cuts.index(None)]
+            missing = placed_bound.features[cuts.index(None)]
             finding = DIMENSION_NOT_CUT(
                 where=f"{run.drawing.file}, {dimension.source}",
-                name=here.name,
+                name=candidate.name,
                 what="edge" if isinstance(missing, EdgeFeature) else "circle",
             )
-            found.append((dimension, finding))
+            not_inspected.append((dimension, finding))
 
 
 def _floors(run: Run) -> Floors:
@@ -366,35 +374,35 @@ def _inspected_depth(run: Run, dimension: Dimension, floor: Floor | None) -> Ins
         return DIMENSION_NOT_CUT_NO_STOCK(where=place, name=name)
     thick = 0.0 if stock is None else stock.thickness_mm
     if stock is not None and floor.depth_mm >= thick - POSITION_EPS_MM:
-        deep = floor.depth_mm
-        return DIMENSION_NOT_CUT_THROUGH(where=place, name=name, measured=deep, limit=thick)
+        depth = floor.depth_mm
+        return DIMENSION_NOT_CUT_THROUGH(where=place, name=name, measured=depth, limit=thick)
     stock_mm = thick if dimension.kind == "thickness" else 0.0
-    asked = stock_mm - floor.depth_mm if stock_mm else floor.depth_mm
-    known, _ = limited(dimension, asked)
-    known = replace(known, places_mm=(floor.place_mm,))
-    bound = BoundDimension(known, (), (), np.zeros(2), asked)
+    nominal = stock_mm - floor.depth_mm if stock_mm else floor.depth_mm
+    limited_dimension, _ = limited(dimension, nominal)
+    limited_dimension = replace(limited_dimension, places_mm=(floor.place_mm,))
+    bound = BoundDimension(limited_dimension, (), (), np.zeros(2), nominal)
     return Inspected(bound, (), None, floor, stock_mm)
 
 
 class ToolAt:
     """Cutting width of the tool of each wanted row at the surface."""
 
-    def __init__(self, wanted: Toolpath, job: Job, diameter_mm: float | None) -> None:
+    def __init__(self, wanted_moves: Toolpath, job: Job, diameter_mm: float | None) -> None:
         """Take the tools of the operations that the wanted moves name; without names, one tool of
         this diameter (None: no width)."""
-        rows = np.arange(len(wanted))
-        starts, ends = wanted.starts_of(rows)[:, 2], wanted.end[:, 2]
+        rows = np.arange(len(wanted_moves))
+        starts, ends = wanted_moves.starts_of(rows)[:, 2], wanted_moves.end[:, 2]
         self.z = np.maximum(starts, ends)
         """(N,) mm: the height to which each row cuts at least as wide as at the surface; infinite
         where the tool tapers all the way."""
         lowest = np.minimum(starts, ends)
-        self.radius = np.full(len(wanted), 0.5 * (diameter_mm or 0.0))
+        self.radius = np.full(len(wanted_moves), 0.5 * (diameter_mm or 0.0))
         """(N,) mm: the radius at the surface."""
-        operations = wanted.operations
+        operations = wanted_moves.operations
         if operations is None:
             return
         tools: dict[str, Tool] = {each.name: each.tool for each in job.operations}
-        last = [*operations.begin[1:].tolist(), len(wanted)]
+        last = [*operations.begin[1:].tolist(), len(wanted_moves)]
         for note, begin, end in zip(
             operations.notes, operations.begin.tolist(), last, strict=True
         ):
@@ -412,13 +420,13 @@ class ToolAt:
                 self.z[part] = np.where(tapers, np.inf, straight)
 
 
-def swept_moves(wanted: CutMoves, tool: ToolAt) -> SweptSegments:
+def swept_moves(wanted_cuts: CutMoves, tool: ToolAt) -> SweptSegments:
     """Return the cutting moves as segments within `CHORD_MM` of their arcs."""
-    arcs = wanted.segments.is_arc
-    least = float(wanted.segments.radius[arcs].min()) if arcs.any() else math.inf
-    samples = sample_cuts(wanted, min(math.sqrt(8.0 * least * CHORD_MM), 1.0))
+    arcs = wanted_cuts.segments.is_arc
+    min_radius = float(wanted_cuts.segments.radius[arcs].min()) if arcs.any() else math.inf
+    samples = sample_cuts(wanted_cuts, min(math.sqrt(8.0 * min_radius * CHORD_MM), 1.0))
     inside = np.flatnonzero(samples.segment[1:] == samples.segment[:-1])
-    row = wanted.row[samples.segment[inside]].astype(np.int64)
+    row = wanted_cuts.row[samples.segment[inside]].astype(np.int64)
     a, b = samples.points[inside], samples.points[inside + 1]
     return SweptSegments(a, b, tool.radius[row], tool.z[row], row)
 
@@ -434,12 +442,12 @@ def swept_trace(trace: SlideTrace, follows: Ints, tool: ToolAt) -> SweptSegments
     return SweptSegments(a, b, tool.radius[row], tool.z[row], row)
 
 
-def _points(wanted: CutMoves) -> int:
+def _points(wanted_cuts: CutMoves) -> int:
     """Return the number of points of the path of the slides for chords within `CHORD_MM` of the
     smallest arc."""
-    arcs = wanted.segments.is_arc
+    arcs = wanted_cuts.segments.is_arc
     if not arcs.any():
         return TRACE_POINTS
-    chord = math.sqrt(8.0 * float(wanted.segments.radius[arcs].min()) * CHORD_MM)
-    length = float(row_lengths(wanted.toolpath).sum())
+    chord = math.sqrt(8.0 * float(wanted_cuts.segments.radius[arcs].min()) * CHORD_MM)
+    length = float(row_lengths(wanted_cuts.toolpath).sum())
     return int(min(max(4.0 * length / chord, TRACE_POINTS), MAX_POINTS))

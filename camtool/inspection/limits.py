@@ -77,9 +77,9 @@ class LimitsText(Struct, frozen=True):
         """Return the limits for this nominal size, mm; OptionError if a class is not in the
         tables, or a limit of size is not above 0."""
         if self.iso:
-            found = iso_limits(self.iso, nominal_mm)
-            self._check_agreement(found)
-            return found
+            limits = iso_limits(self.iso, nominal_mm)
+            self._check_agreement(limits)
+            return limits
         lower, upper = self._deviations(nominal_mm)
         if nominal_mm > 0.0 and nominal_mm + lower <= 0.0:
             raise OptionError(
@@ -101,13 +101,13 @@ class LimitsText(Struct, frozen=True):
             )
         return lower, upper
 
-    def _check_agreement(self, found: Limits) -> None:
+    def _check_agreement(self, limits: Limits) -> None:
         if self.deviations_mm is None:
             return
         lower, upper = self.deviations_mm
-        if max(abs(lower - found.lower_mm), abs(upper - found.upper_mm)) > SAME_LIMIT_MM:
+        if max(abs(lower - limits.lower_mm), abs(upper - limits.upper_mm)) > SAME_LIMIT_MM:
             raise OptionError(
-                f"{self.iso} is {deviation_words(found.lower_mm, found.upper_mm)}, "
+                f"{self.iso} is {deviation_words(limits.lower_mm, limits.upper_mm)}, "
                 f"not {deviation_words(lower, upper)}",
                 mend="keep the class or the numbers",
             )
@@ -142,9 +142,9 @@ def read_words(words: str, mm_per_unit: float = 1.0) -> LimitsText:
             f"limits {text!r} are a fit of two parts",
             mend=f"write the class of this one: {fit[1]} or {fit[2]}",
         )
-    both = _WITH_NUMBERS.fullmatch(text)
-    if both:
-        return replace(_numbers(both[2].strip(), mm_per_unit), iso=both[1])
+    both_match = _WITH_NUMBERS.fullmatch(text)
+    if both_match:
+        return replace(_numbers(both_match[2].strip(), mm_per_unit), iso=both_match[1])
     return _numbers(text, mm_per_unit)
 
 
@@ -159,30 +159,32 @@ def normalised_words(words: str) -> str:
 
 def _numbers(text: str, mm_per_unit: float) -> LimitsText:
     """Parse deviations or limits of size."""
-    found = _BOTH.fullmatch(text)
-    if found:
-        unit = found["aunit"] or ""
-        value = float(found["a"]) * MM_PER_UNIT.get(unit, mm_per_unit)
+    match = _BOTH.fullmatch(text)
+    if match:
+        unit = match["aunit"] or ""
+        value = float(match["a"]) * MM_PER_UNIT.get(unit, mm_per_unit)
         return LimitsText(deviations_mm=_ordered(-value, value, text), unit=unit)
-    found = _PAIR.fullmatch(text)
-    if not found:
-        alone = re.fullmatch(_NUMBER % ("a", "a"), text)
-        if alone and float(alone["a"]):
-            sign = alone["a"] if alone["a"][0] in "+-" else f"±{alone['a']}"
+    match = _PAIR.fullmatch(text)
+    if not match:
+        single_match = re.fullmatch(_NUMBER % ("a", "a"), text)
+        if single_match and float(single_match["a"]):
+            sign = single_match["a"] if single_match["a"][0] in "+-" else f"±{single_match['a']}"
             hint = {"+": f"{sign}/0", "-": f"0/{sign}"}.get(sign[0], sign)
             raise OptionError(f"limits {text!r} are one number of two", mend=f"write {hint}")
         raise NotUnderstood(f"limits {text!r} are not understood", mend=_EXAMPLES)
-    units = {found[name] for name in ("aunit", "bunit") if found[name]}
+    units = {match[name] for name in ("aunit", "bunit") if match[name]}
     if len(units) > 1:
         raise OptionError(f"limits {text!r} have two units", mend="write both in one unit")
     unit = units.pop() if units else ""
     mm = MM_PER_UNIT.get(unit, mm_per_unit)
-    first, second = (round(float(found[name]) * mm, 9) for name in "ab")
-    signed = [name for name in "ab" if found[name][0] in "+-"]
-    zero = [name for name in "ab" if not float(found[name])]
+    first, second = (round(float(match[name]) * mm, 9) for name in "ab")
+    signed = [name for name in "ab" if match[name][0] in "+-"]
+    zero = [name for name in "ab" if not float(match[name])]
     if not signed and not zero:
-        up = found["between"] in _UPWARDS
-        return LimitsText(sizes_mm=_ordered(*_up(first, second, up), text, sizes=True), unit=unit)
+        is_upwards = match["between"] in _UPWARDS
+        return LimitsText(
+            sizes_mm=_ordered(*_up(first, second, is_upwards), text, sizes=True), unit=unit
+        )
     if not {*signed, *zero} >= {"a", "b"} or not signed:
         raise OptionError(
             f"limits {text!r} lack a sign", mend="write deviations like +0.1/-0.2 or +0.1/0"
@@ -242,8 +244,8 @@ def iso_limits(name: str, nominal_mm: float) -> Limits:
     size if the tables lack them."""
     from pressfit import fit
 
-    found = re.fullmatch(r"([A-Za-z]{1,2})(\d{1,2})", name)
-    letter, grade = (found[1], int(found[2])) if found else (name, 0)
+    match = re.fullmatch(r"([A-Za-z]{1,2})(\d{1,2})", name)
+    letter, grade = (match[1], int(match[2])) if match else (name, 0)
     size = round(nominal_mm, SIZE_DIGITS)
     hole, low = letter[0].isupper(), letter.lower()
     if not math.isfinite(size) or size <= 0.0:
@@ -300,33 +302,33 @@ _GENERAL = re.compile(r"(?:ISO\s*2768\s*(?:-\s*1\s*)?[-–− ]?\s*)?([fmcv])([H
 
 def general_class(words: str) -> str:
     """Return the class f, m, c or v of "ISO 2768-m"; OptionError for any other text."""
-    found = _GENERAL.fullmatch(words.strip()) if len(words) <= MAX_WORDS_CHARS else None
-    if found is None:
+    match = _GENERAL.fullmatch(words.strip()) if len(words) <= MAX_WORDS_CHARS else None
+    if match is None:
         raise OptionError(
             f"general tolerance {words[:MAX_WORDS_CHARS]!r} is not known",
             mend="use ISO 2768-f, ISO 2768-m, ISO 2768-c or ISO 2768-v",
         )
-    if found[2]:
+    if match[2]:
         raise OptionError(
-            f"general tolerance {words!r} has a class of form, {found[2].upper()} of ISO 2768-2, "
+            f"general tolerance {words!r} has a class of form, {match[2].upper()} of ISO 2768-2, "
             "which camtool does not know",
-            mend=f"write ISO 2768-{found[1].lower()}, and tolerances of form as dimensions",
+            mend=f"write ISO 2768-{match[1].lower()}, and tolerances of form as dimensions",
         )
-    return found[1].lower()
+    return match[1].lower()
 
 
 def general_limits(words: str, kind: Kind, nominal_mm: float) -> Limits | None:
     """Return the general tolerance ("ISO 2768-m") of a nominal size, mm; None if the standard has
     none: for form and position, for sizes below MIN_GENERAL_MM and beyond its tables."""
-    of = _CLASSES.index(general_class(words))
+    column = _CLASSES.index(general_class(words))
     size = round(nominal_mm, SIZE_DIGITS)
     if kind in ZONES or not size >= MIN_GENERAL_MM:
         return None
     table = _TABLE_2 if kind == "radius" else _TABLE_1
-    for most, values in table:
-        if size <= most:
-            value = values[of]
-            return None if value is None else Limits(-value, value, f"ISO 2768-{_CLASSES[of]}")
+    for upper_mm, values in table:
+        if size <= upper_mm:
+            value = values[column]
+            return None if value is None else Limits(-value, value, f"ISO 2768-{_CLASSES[column]}")
     return None
 
 
@@ -350,5 +352,7 @@ def limited(dimension: Dimension, drawn_mm: float) -> tuple[Dimension, tuple[Fin
                     kind=dimension.kind,
                 ),
             )
-    known = replace(dimension, nominal_mm=nominal_mm, limits=limits, words="", general="")
-    return known, findings
+    limited_dimension = replace(
+        dimension, nominal_mm=nominal_mm, limits=limits, words="", general=""
+    )
+    return limited_dimension, findings

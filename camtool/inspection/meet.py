@@ -205,8 +205,8 @@ def _limits_mm(each: InspectedReport) -> tuple[float, float]:
 
 
 def _standard_mm(each: InspectedReport) -> float:
-    known = (each.standard_um or 0.0) / UM_PER_MM
-    return known or NO_STANDARD_MM
+    standard_mm = (each.standard_um or 0.0) / UM_PER_MM
+    return standard_mm or NO_STANDARD_MM
 
 
 class Need(Struct, frozen=True):
@@ -258,24 +258,24 @@ class Meeting(Struct, frozen=True, eq=False):
 
 
 def meet(
-    case: MeetingCase, most: int = DEFAULT_TRIALS, progress: Progress | None = None
+    case: MeetingCase, max_trials: int = DEFAULT_TRIALS, progress: Progress | None = None
 ) -> Meeting:
     """Find the cheapest change of the job after which all dimensions hold; if there is none, the
     best one and a certificate. The result is never worse than the start. Raises the errors of
     `post` and `inspect` for the job as it is."""
     _check_readable(case)
-    asked = tuple(
+    asked_dimensions = tuple(
         each
         for each in case.tolerances.dimensions
         if each.limits is not None or (each.kind in DEPTHS and each.asks)
     )
-    case = replace(case, tolerances=replace(case.tolerances, dimensions=asked))
+    case = replace(case, tolerances=replace(case.tolerances, dimensions=asked_dimensions))
     bench = Bench(case, progress or Progress())
-    bench.progress.begin("trying programs", most)
+    bench.progress.begin("trying programs", max_trials)
     before = bench.first()
     after, every = before, True
     if not before.holds:
-        after, every = find_cheapest(before, levers(bench, before), bench.try_changes, most)
+        after, every = find_cheapest(before, levers(bench, before), bench.try_changes, max_trials)
     trials = bench.trials
     run, tables = bench.run_of(after.proposal), bench.tables_of(after.proposal)
     assert run.report is not None
@@ -288,19 +288,19 @@ def meet(
 
 def _check_readable(case: MeetingCase) -> None:
     """Raise OptionError for dimensions that cannot be inspected with any job."""
-    wanted = [each for each in case.tolerances.dimensions if each.asks]
+    wanted_dimensions = [each for each in case.tolerances.dimensions if each.asks]
     read = (
         each
         for each in case.tolerances.findings
         if each.severity is Severity.ERROR or each.code in NOT_INSPECTED
     )
-    lost = [*read, *unbound_findings(case.drawing, wanted)]
-    if lost:
-        more = f" (and {len(lost) - 1} more)" if len(lost) > 1 else ""
+    unreadable = [*read, *unbound_findings(case.drawing, wanted_dimensions)]
+    if unreadable:
+        suffix = f" (and {len(unreadable) - 1} more)" if len(unreadable) > 1 else ""
         raise OptionError(
-            f"no job can be said to meet it: {lost[0].message}{more}",
-            where=lost[0].where,
-            mend=f"{lost[0].code.mend}; or leave it out",
+            f"no job can be said to meet it: {unreadable[0].message}{suffix}",
+            where=unreadable[0].where,
+            mend=f"{unreadable[0].code.mend}; or leave it out",
         )
 
 
@@ -309,19 +309,22 @@ Tried = Callable[[JobChanges], "MeetingTrial | None"]
 
 
 def find_cheapest(
-    before: MeetingTrial, choices: Sequence[Sequence[JobChanges]], tried: Tried, most: int
+    before: MeetingTrial,
+    choices: Sequence[Sequence[JobChanges]],
+    try_changes: Tried,
+    max_trials: int,
 ) -> tuple[MeetingTrial, bool]:
     """Return the trial with the fewest changes that holds, the first of several, or else the one
     with the best score; and True if all proposals before it were tried, at most `max_trials`. At
     most one of each list in `choices` is applied, the cheapest first."""
-    best, known = before, {JobChanges(): before}
-    for count, proposal in enumerate(_proposals(choices, known), start=1):
-        if count > most:
+    best, trials = before, {JobChanges(): before}
+    for count, proposal in enumerate(_proposals(choices, trials), start=1):
+        if count > max_trials:
             return best, False
-        trial = tried(proposal)
+        trial = try_changes(proposal)
         if trial is None:
             continue
-        known[proposal] = trial
+        trials[proposal] = trial
         if trial.holds:
             return trial, True
         if trial.score < best.score:
@@ -330,16 +333,16 @@ def find_cheapest(
 
 
 def _proposals(
-    choices: Sequence[Sequence[JobChanges]], known: Mapping[JobChanges, MeetingTrial]
+    choices: Sequence[Sequence[JobChanges]], trials: Mapping[JobChanges, MeetingTrial]
 ) -> Iterator[JobChanges]:
     """Yield all proposals of up to MAX_CHANGES changes, by their number; for each number the
     allowances found by a trial with one change less come first."""
     for count in range(1, MAX_CHANGES + 1):
-        for base in list(known.values()):
+        for base in list(trials.values()):
             if base.proposal.count == count - 1 and base.left and not base.proposal.left:
                 yield replace(base.proposal, left=base.left)
-        for some in itertools.combinations(choices, count):
-            for each in itertools.product(*some):
+        for chosen_levers in itertools.combinations(choices, count):
+            for each in itertools.product(*chosen_levers):
                 yield sum(each, JobChanges())
 
 
@@ -348,25 +351,31 @@ def levers(bench: Bench, before: MeetingTrial) -> list[list[JobChanges]]:
     applied."""
     job, target = bench.job, bench.case.target
     machine = target.machine
-    short = {path for k in before.short for path in before.paths[k]}
-    cutting = bench.contours.cutting(short)
-    mine = [(row, operation) for row, _, operation in _rows(job) if row in cutting]
-    found = [
+    short_paths = {path for k in before.short for path in before.paths[k]}
+    cutting = bench.contours.cutting(short_paths)
+    own_rows = [(row, operation) for row, _, operation in _rows(job) if row in cutting]
+    lever_list = [
         _job_lever("compensate", True, job.compensate),
-        *(_other_words("direction", row, each) for row, each in mine),
-        *(_other_words("start", row, each) for row, each in mine),
+        *(_other_words("direction", row, each) for row, each in own_rows),
+        *(_other_words("start", row, each) for row, each in own_rows),
         _job_lever("approach", True, job.approach),
         _job_lever("minimise", "reversals", job.minimise),
-        *(_slower_feeds(row, each, machine) for row, each in mine),
+        *(_slower_feeds(row, each, machine) for row, each in own_rows),
     ]
     for key, values in target.target.ways.items():
-        now = _at(machine, key)
-        found.append([JobChanges(settings=(f'{key}="{each}"',)) for each in values if each != now])
-    return [each for each in found if each]
+        value_now = _at(machine, key)
+        lever_list.append(
+            [JobChanges(settings=(f'{key}="{each}"',)) for each in values if each != value_now]
+        )
+    return [each for each in lever_list if each]
 
 
-def _job_lever(key: str, value: Any, now: Any) -> list[JobChanges]:
-    return [] if now == value else [JobChanges((Change(key, value, None, str(now).lower()),))]
+def _job_lever(key: str, value: Any, value_now: Any) -> list[JobChanges]:
+    return (
+        []
+        if value_now == value
+        else [JobChanges((Change(key, value, None, str(value_now).lower()),))]
+    )
 
 
 OTHER_WORDS = {"direction": ("climb", "conventional"), "start": ("longest-line", "corner")}
@@ -377,10 +386,12 @@ def _other_words(key: str, row: int, operation: Operation) -> list[JobChanges]:
     """Return the alternative values of a key of an operation, if its kind has that key."""
     if not is_known(key, operation.kind):
         return []
-    now = getattr(operation, OPERATION[key].field)
-    said = now if isinstance(now, str) else f"{now[0]:g},{now[1]:g}"
+    value_now = getattr(operation, OPERATION[key].field)
+    text = value_now if isinstance(value_now, str) else f"{value_now[0]:g},{value_now[1]:g}"
     return [
-        JobChanges((Change(key, word, row, said),)) for word in OTHER_WORDS[key] if word != now
+        JobChanges((Change(key, word, row, text),))
+        for word in OTHER_WORDS[key]
+        if word != value_now
     ]
 
 
@@ -417,41 +428,41 @@ class JobContours(Struct, frozen=True, eq=False):
     @classmethod
     def of(cls, case: MeetingCase, job: Job) -> JobContours:
         """Collect the contours of a job."""
-        placed = place(case.drawing, job)
-        sides = Sides.of(placed, job, case.target.machine.defaults.cut_depth_mm)
+        placed_drawing = place(case.drawing, job)
+        sides = Sides.of(placed_drawing, job, case.target.machine.defaults.cut_depth_mm)
         depths: dict[str, set[int]] = {}
-        nesting = placed.nesting.among(np.arange(len(placed.paths)))
-        for name, depth in zip(placed.sources, nesting.levels.depth.tolist(), strict=True):
+        nesting = placed_drawing.nesting.among(np.arange(len(placed_drawing.paths)))
+        for name, depth in zip(placed_drawing.sources, nesting.levels.depth.tolist(), strict=True):
             depths.setdefault(name, set()).add(depth)
         rests = {each.rest for each in job.operations} - {""}
         head = {name: name for name in depths}
         cut: dict[int, tuple[str, ...]] = {}
         walls: dict[int, tuple[str, ...]] = {}
-        most: dict[str, float] = {}
+        max_allowance: dict[str, float] = {}
         for row, index, operation in _rows(job):
-            mine = np.flatnonzero(sides.cuts[index, : len(placed.paths)])
-            names = cut[row] = tuple(dict.fromkeys(placed.sources[k] for k in mine))
+            cut_rows = np.flatnonzero(sides.cuts[index, : len(placed_drawing.paths)])
+            names = cut[row] = tuple(dict.fromkeys(placed_drawing.sources[k] for k in cut_rows))
             if not is_known("allowance", operation.kind) or not operation.tool.radius_mm:
                 continue
             walls[row] = names
             for name in names:
-                most[name] = min(
-                    most.get(name, math.inf), MAX_LEFT_SHARE * operation.tool.radius_mm
+                max_allowance[name] = min(
+                    max_allowance.get(name, math.inf), MAX_LEFT_SHARE * operation.tool.radius_mm
                 )
-            alone = not (operation.rest or operation.name in rests)
+            is_alone = not (operation.rest or operation.name in rests)
             if not operation.contract.runs_beside:
                 # A contour within another one is an island of its pocket, or bored with it.
-                alone = alone and not nesting.among(mine).levels.depth.any()
-            if not (alone and all(name and len(depths[name]) == 1 for name in names)):
+                is_alone = is_alone and not nesting.among(cut_rows).levels.depth.any()
+            if not (is_alone and all(name and len(depths[name]) == 1 for name in names)):
                 heads = {head[name] for name in names}
                 head = {name: min(heads) if each in heads else each for name, each in head.items()}
         depth = {name: min(each) for name, each in depths.items()}
-        return cls(cut, walls, depth, head, most, case.drawing.sources)
+        return cls(cut, walls, depth, head, max_allowance, case.drawing.sources)
 
     def cutting(self, paths: Iterable[int]) -> set[int]:
         """Return the rows of the file that cut some paths of the drawing."""
         names = {self.of_path[path] for path in paths}
-        return {row for row, mine in self.cut.items() if names.intersection(mine)}
+        return {row for row, cut_names in self.cut.items() if names.intersection(cut_names)}
 
     def together(self, paths: Iterable[int]) -> tuple[str, ...]:
         """Return the names of some paths of the drawing that other contours have too."""
@@ -461,31 +472,32 @@ class JobContours(Struct, frozen=True, eq=False):
     def left(self, by_name: Mapping[str, float]) -> tuple[Left, ...]:
         """Return the allowances on walls, mm by the names of contours, as parts of operations:
         inner contours before those around them."""
-        found: list[Left] = []
+        parts_found: list[Left] = []
         for row, names in self.walls.items():
             if not any(by_name.get(name) for name in names):
                 continue
             parts: list[tuple[float, list[str]]] = []
             order = sorted(names, key=lambda name: -self.depth[name])
             for _, level in itertools.groupby(order, key=lambda name: self.depth[name]):
-                here: dict[float, list[str]] = {}
+                names_by_mm: dict[float, list[str]] = {}
                 for name in level:
-                    here.setdefault(by_name.get(name, 0.0), []).append(name)
-                for by_mm, some in here.items():
+                    names_by_mm.setdefault(by_name.get(name, 0.0), []).append(name)
+                for by_mm, contour_names in names_by_mm.items():
                     if parts and parts[-1][0] == by_mm:
-                        parts[-1][1].extend(some)
+                        parts[-1][1].extend(contour_names)
                     else:
-                        parts.append((by_mm, some))
-            found += [
-                Left(row, by_mm, tuple(some) if len(parts) > 1 else ()) for by_mm, some in parts
+                        parts.append((by_mm, contour_names))
+            parts_found += [
+                Left(row, by_mm, tuple(contour_names) if len(parts) > 1 else ())
+                for by_mm, contour_names in parts
             ]
-        return tuple(found)
+        return tuple(parts_found)
 
-    def by_name(self, left: Iterable[Left]) -> dict[str, float]:
-        """Return the allowances by name, from parts of operations (inverse of `left`)."""
+    def by_name(self, allowances: Iterable[Left]) -> dict[str, float]:
+        """Return the allowances by name, from parts of operations (inverse of `allowances`)."""
         return {
             name: each.by_mm
-            for each in left
+            for each in allowances
             for name in each.entities or self.walls[each.operation]
         }
 
@@ -497,71 +509,84 @@ def closed_form(
     best; {} if none helps. `verdicts` are those of the inspector's dimensions, None for those that
     could not be measured."""
     rows = [(k, each) for k, each in enumerate(verdicts) if each is not None]
-    short = {
+    short_names = {
         contours.of_path[path]
         for k, each in rows
         if each.verdict != "in"
         for path in paths_of(inspector.dimensions[k])
     }
-    heads = sorted({contours.head[name] for name in short if name in contours.most_mm})
-    moved = {name: heads.index(head) for name, head in contours.head.items() if head in heads}
-    most = np.full(len(heads), math.inf)
-    for name, index in moved.items():
-        most[index] = min(most[index], contours.most_mm.get(name, math.inf))
+    heads = sorted({contours.head[name] for name in short_names if name in contours.most_mm})
+    head_rows = {name: heads.index(head) for name, head in contours.head.items() if head in heads}
+    max_allowances = np.full(len(heads), math.inf)
+    for name, index in head_rows.items():
+        max_allowances[index] = min(max_allowances[index], contours.most_mm.get(name, math.inf))
     if not heads:
         return {}
 
-    def sizes(left: Floats) -> Floats:
+    def sizes(allowances: Floats) -> Floats:
         """(D, 2) the largest and the least local size of each dimension."""
         by_path = {
-            path: float(left[moved[name]])
+            path: float(allowances[head_rows[name]])
             for path, name in enumerate(contours.of_path)
-            if name in moved
+            if name in head_rows
         }
-        made = inspector.sizes(left_mm=by_path)
-        return np.array([(made[k].high_mm, made[k].low_mm) for k, _ in rows])
+        new_sizes = inspector.sizes(left_mm=by_path)
+        return np.array([(new_sizes[k].high_mm, new_sizes[k].low_mm) for k, _ in rows])
 
     limits = np.array([_limits_mm(each)[::-1] for _, each in rows])
     standards = np.array([_standard_mm(each) for _, each in rows])
-    left = np.round(_best_left(sizes, limits, standards, most), LEFT_DIGITS)
-    return {name: float(left[index]) for name, index in moved.items()} if left.any() else {}
+    allowances = np.round(_best_left(sizes, limits, standards, max_allowances), LEFT_DIGITS)
+    return (
+        {name: float(allowances[index]) for name, index in head_rows.items()}
+        if allowances.any()
+        else {}
+    )
 
 
 def _best_left(
-    sizes: Callable[[Floats], Floats], limits: Floats, standards: Floats, most: Floats
+    sizes: Callable[[Floats], Floats], limits: Floats, standards: Floats, max_allowances: Floats
 ) -> Floats:
     """Solve the linear programme above for the allowances (C,); `sizes` maps (C,) to sizes (D, 2),
     and `limits` (D, 2) are the upper and the lower ones, infinite for none."""
-    count, dims = len(most), len(limits)
+    count, dims = len(max_allowances), len(limits)
     # x = t_1 … t_D, then what is left and what is taken, both 0 or more, of each contour.
     goal = np.concatenate([-np.ones(dims), np.full(2 * count, PER_MM)])
     unit = np.eye(dims)
     conditions = [
         (np.hstack([-unit, np.zeros((dims, 2 * count))]), np.full(dims, -FAR_ENOUGH)),
         (np.hstack([np.zeros((2 * count, dims)), np.eye(2 * count)]), np.zeros(2 * count)),
-        (np.hstack([np.zeros((2 * count, dims)), -np.eye(2 * count)]), -np.tile(most, 2)),
+        (
+            np.hstack([np.zeros((2 * count, dims)), -np.eye(2 * count)]),
+            -np.tile(max_allowances, 2),
+        ),
     ]
-    left = np.zeros(count)
+    allowances = np.zeros(count)
     for _ in range(ROUNDS):
-        here = sizes(left)
+        base_sizes = sizes(allowances)
         slopes = np.stack(
-            [(sizes(left + STEP_MM * step) - here) / STEP_MM for step in np.eye(count)], axis=2
+            [
+                (sizes(allowances + STEP_MM * step) - base_sizes) / STEP_MM
+                for step in np.eye(count)
+            ],
+            axis=2,
         )  # (D, 2, C)
         for side, sign in ((0, 1.0), (1, -1.0)):
             # sign·size(a) + u t ≤ sign·limit, with size(a) = here + slopes·(a − left).
-            known = np.isfinite(limits[:, side]) & np.isfinite(here[:, side])
-            slope = sign * slopes[known, side]
-            row = np.hstack([-standards[known, None] * unit[known], -slope, slope])
-            bound = sign * (here[known, side] - limits[known, side]) - slope @ left
+            is_finite = np.isfinite(limits[:, side]) & np.isfinite(base_sizes[:, side])
+            slope = sign * slopes[is_finite, side]
+            row = np.hstack([-standards[is_finite, None] * unit[is_finite], -slope, slope])
+            bound = (
+                sign * (base_sizes[is_finite, side] - limits[is_finite, side]) - slope @ allowances
+            )
             conditions.append((row, bound))
         rows, bounds = zip(*conditions, strict=True)
         x = minimise(goal, np.vstack(rows), np.hstack(bounds))
-        found = x[dims : dims + count] - x[dims + count :]
-        expected = here + slopes @ (found - left)
-        left = found
-        if np.nanmax(np.abs(sizes(left) - expected), initial=0.0) <= SETTLED:
+        solution = x[dims : dims + count] - x[dims + count :]
+        expected = base_sizes + slopes @ (solution - allowances)
+        allowances = solution
+        if np.nanmax(np.abs(sizes(allowances) - expected), initial=0.0) <= SETTLED:
             break
-    return left
+    return allowances
 
 
 def paths_of(each: Inspected) -> tuple[int, ...]:
@@ -596,12 +621,12 @@ class Bench(Struct, eq=False, dict=True):
         with errors or if no dimension with limits can be inspected."""
         run = self._posted(JobChanges(), self.case.target)
         if run.report is None or run.failed:
-            wrong = (each for each in run.findings if each.severity is Severity.ERROR)
-            said = next((f": {each.message}" for each in wrong), "")
+            errors = (each for each in run.findings if each.severity is Severity.ERROR)
+            first_error = next((f": {each.message}" for each in errors), "")
             raise OptionError(
-                f"the job has errors, so that no dimension can be inspected{said}",
+                f"the job has errors, so that no dimension can be inspected{first_error}",
                 file=self.case.drawing.file,
-                mend="" if said else "see what camtool post says of it",
+                mend="" if first_error else "see what camtool post says of it",
             )
         trial = self._judge(run, JobChanges())
         if not trial.verdicts:
@@ -651,46 +676,51 @@ class Bench(Struct, eq=False, dict=True):
         most one half: then the simulations for its uncertainty are skipped, and the uncertainty of
         the job as it is is used."""
         inspector = Inspector(run, self.case.tolerances.dimensions)
-        found: list[InspectedReport | None] = list(self._predict_verdicts(inspector))
-        beyond = any(each is None or each.verdict == "out" for each in found)
+        verdicts: list[InspectedReport | None] = list(self._predict_verdicts(inspector))
+        is_beyond = any(each is None or each.verdict == "out" for each in verdicts)
         new = any(_key_of(each) not in self._first for each in inspector.dimensions)
-        if new or not beyond:
-            found = [
+        if new or not is_beyond:
+            verdicts = [
                 each if isinstance(each, InspectedReport) else None
                 for each in verdicts_of(inspector, run)
             ]
-        seen = [k for k, each in enumerate(found) if each is not None]
+        present = [k for k, each in enumerate(verdicts) if each is not None]
         assert run.report is not None
         trial = MeetingTrial(
             proposal,
-            verdicts=tuple(each for each in found if each is not None),
-            paths=tuple(paths_of(inspector.dimensions[k]) for k in seen),
-            missing=len(inspector.left_out) + len(found) - len(seen),
+            verdicts=tuple(each for each in verdicts if each is not None),
+            paths=tuple(paths_of(inspector.dimensions[k]) for k in present),
+            missing=len(inspector.left_out) + len(verdicts) - len(present),
             time_s=run.report.time_s,
         )
         if new:
-            for one, each in zip(inspector.dimensions, found, strict=True):
+            for one, each in zip(inspector.dimensions, verdicts, strict=True):
                 if each is not None:
                     self._first.setdefault(_key_of(one), each)
-        more = closed_form(inspector, found, self.contours) if trial.short else {}
-        if not more:
+        allowances = closed_form(inspector, verdicts, self.contours) if trial.short else {}
+        if not allowances:
             return trial
         so_far = self.contours.by_name(proposal.left)
-        whole = {name: round(so_far.get(name, 0.0) + by, LEFT_DIGITS) for name, by in more.items()}
-        return replace(trial, left=self.contours.left({**so_far, **whole}))
+        total = {
+            name: round(so_far.get(name, 0.0) + by_mm, LEFT_DIGITS)
+            for name, by_mm in allowances.items()
+        }
+        return replace(trial, left=self.contours.left({**so_far, **total}))
 
     def _predict_verdicts(self, inspector: Inspector) -> Iterator[InspectedReport | None]:
         """Return the dimensions with their sizes and the verdicts that follow with the
         uncertainties of the job as it is; None for those that are not cut or new."""
         for one, size in zip(inspector.dimensions, inspector.sizes(), strict=True):
-            known = self._first.get(_key_of(one))
-            if known is None or not math.isfinite(size.low_mm + size.high_mm):
+            stated = self._first.get(_key_of(one))
+            if stated is None or not math.isfinite(size.low_mm + size.high_mm):
                 yield None
                 continue
-            made = replace(known, fit_mm=size.fit_mm, low_mm=size.low_mm, high_mm=size.high_mm)
-            within = margin(made)
-            verdict = "in" if within >= GUARD else "out" if within < 0.0 else "undecided"
-            yield replace(made, verdict=verdict)
+            predicted = replace(
+                stated, fit_mm=size.fit_mm, low_mm=size.low_mm, high_mm=size.high_mm
+            )
+            distance = margin(predicted)
+            verdict = "in" if distance >= GUARD else "out" if distance < 0.0 else "undecided"
+            yield replace(predicted, verdict=verdict)
 
     def certificate(self, best: MeetingTrial) -> Certificate:
         """Explain why the best trial does not hold."""
@@ -726,12 +756,12 @@ class Bench(Struct, eq=False, dict=True):
 
         if not holds(number.best):
             return None
-        good, bad = 1.0, 0.0  # parts of the way from what it is to its best
+        holding, failing = 1.0, 0.0  # parts of the way from what it is to its best
         for _ in range(BISECTIONS):
-            middle = 0.5 * (good + bad)
-            good, bad = (middle, bad) if holds(number.at(middle)) else (good, middle)
-        rounded = _rounded(number.at(good), number.best)
-        return rounded if holds(rounded) else number.at(good)
+            middle = 0.5 * (holding + failing)
+            holding, failing = (middle, failing) if holds(number.at(middle)) else (holding, middle)
+        rounded = _rounded(number.at(holding), number.best)
+        return rounded if holds(rounded) else number.at(holding)
 
     def _holds(self, best: MeetingTrial, settings: Sequence[str]) -> bool:
         """True if the proposal holds on a machine with other numbers, with the allowances for
@@ -798,10 +828,10 @@ def _mechanics(machine: Machine) -> Iterator[_Number]:
         axis, cells = (machine.axes.x, machine.axes.y)[index], machine.play_map.used[index]
         ratio = axis.real_step_mm / axis.coded_step_mm
         plays = [play for row in cells.play_mm for play in row] if cells else [axis.backlash_mm]
-        now, best = sum(plays) / len(plays), axis.compensation_mm * ratio
-        if abs(now - best) > CERTAIN:
+        present, best = sum(plays) / len(plays), axis.compensation_mm * ratio
+        if abs(present - best) > CERTAIN:
             key = f"play_map.{name}.play_mm" if cells else f"axes.{name}.backlash_mm"
-            yield _Number(key, now, best, cells.play_mm if cells else ())
+            yield _Number(key, present, best, cells.play_mm if cells else ())
         if abs(ratio - 1.0) > CERTAIN:
             yield _Number(f"axes.{name}.real_step_mm", axis.real_step_mm, axis.coded_step_mm)
     lean = machine.mechanics.squareness_rad
@@ -815,9 +845,9 @@ def _standards(machine: Machine, binding: InspectedReport) -> Iterator[_Number]:
     for each in binding.contributions:
         scatter = each.input.endswith(REPEATABILITY)
         key = f"{'axes' if scatter else 'uncertainty'}.{each.input}"
-        now = _at(machine, key)
-        if isinstance(now, float) and now > 0.0:
-            yield _Number(key, now, 0.0)
+        present = _at(machine, key)
+        if isinstance(present, float) and present > 0.0:
+            yield _Number(key, present, 0.0)
 
 
 REPEATABILITY = "repeatability_mm"
@@ -833,11 +863,11 @@ def _at(record: object, key: str) -> object:
 
 def _rounded(value: float, best: float) -> float:
     """Round a value to few digits, towards the best one."""
-    off = abs(value - best)
-    if off == 0.0:
+    difference = abs(value - best)
+    if difference == 0.0:
         return value
-    unit = 10.0 ** (math.floor(math.log10(off)) + 1 - NEEDED_DIGITS)
-    return best + math.copysign(math.floor(off / unit) * unit, value - best)
+    unit = 10.0 ** (math.floor(math.log10(difference)) + 1 - NEEDED_DIGITS)
+    return best + math.copysign(math.floor(difference / unit) * unit, value - best)
 
 
 # In words.
@@ -851,21 +881,23 @@ def to_text(meeting: Meeting) -> str:
     before = {each.name: each for each in meeting.before.verdicts}
     rows = [("", "limits, mm", "as it is", "", "then", "")]
     for each in meeting.after.verdicts:
-        known = before.get(each.name)
-        was = ("not cut", "") if known is None else (_extreme(known), known.verdict)
-        rows.append((each.name, _limits(each), *was, _extreme(each), each.verdict))
+        earlier = before.get(each.name)
+        earlier_words = (
+            ("not cut", "") if earlier is None else (_extreme(earlier), earlier.verdict)
+        )
+        rows.append((each.name, _limits(each), *earlier_words, _extreme(each), each.verdict))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
     ]
-    said = list(change_lines(meeting.after.proposal))
-    lines += ["", *(f"change: {line}" for line in said or ["none"])]
+    lines_of_changes = list(change_lines(meeting.after.proposal))
+    lines += ["", *(f"change: {line}" for line in lines_of_changes or ["none"])]
     took, takes = meeting.before.time_s, meeting.after.time_s
     lines.append(f"time: {took:.1f} s, then {takes:.1f} s")
-    more = "" if meeting.all else "; --most allows no more"
+    suffix = "" if meeting.all else "; --most allows no more"
     plural = "" if meeting.trials == 1 else "s"
-    lines.append(f"tried: {meeting.trials} program{plural}{more}")
+    lines.append(f"tried: {meeting.trials} program{plural}{suffix}")
     if meeting.certificate is not None:
         lines += ["", *_certificate_lines(meeting)]
     return "\n".join(lines)
@@ -887,53 +919,52 @@ def change_lines(proposal: JobChanges) -> Iterator[str]:
     for each in proposal.left:
         if not each.by_mm:
             continue
-        more = "more left" if each.by_mm > 0.0 else "less left"
+        direction = "more left" if each.by_mm > 0.0 else "less left"
         names = ", ".join(each.entities[:MAX_NAMED])
         if len(each.entities) > MAX_NAMED:
             names += f" and {len(each.entities) - MAX_NAMED} more"
-        of = f"the walls of {names}" if names else "all its walls"
-        yield (
-            f"operation {each.operation + 1}: {abs(each.by_mm):.{LEFT_DIGITS}f} mm {more} on {of}"
-        )
+        walls = f"the walls of {names}" if names else "all its walls"
+        depth = f"{abs(each.by_mm):.{LEFT_DIGITS}f} mm {direction}"
+        yield f"operation {each.operation + 1}: {depth} on {walls}"
     for change in proposal.changes:
         whose = "job" if change.operation is None else f"operation {change.operation + 1}"
         value = str(change.value).lower() if isinstance(change.value, bool) else change.value
-        was = f", was {change.instead}" if change.instead else ""
-        yield f"{whose}: {change.key} = {value}{was}"
+        earlier_words = f", was {change.instead}" if change.instead else ""
+        yield f"{whose}: {change.key} = {value}{earlier_words}"
     for setting in proposal.settings:
         yield f"machine: --set {setting}"
 
 
 def _certificate_lines(meeting: Meeting) -> Iterator[str]:
     """Return the lines of the certificate."""
-    why = meeting.certificate
-    assert why is not None
-    if why.binding is None:
+    certificate = meeting.certificate
+    assert certificate is not None
+    if certificate.binding is None:
         yield "a dimension cannot be inspected: the findings say which, and why"
         return
-    each = why.binding
+    each = certificate.binding
     yield f"{each.name} decides: {_extreme(each)} mm, and must be {_limits(each)} mm"
-    if why.unknown:
+    if certificate.unknown:
         yield (
             "nothing can make it hold while [uncertainty] of the machine file does not say "
-            f"{', '.join(why.unknown)}"
+            f"{', '.join(certificate.unknown)}"
         )
         return
     if each.unknown and each.unknown_um:
         unsaid = ", ".join(each.unknown)
         yield f"{each.unknown_um:.3g} µm of that is what [uncertainty] does not say: {unsaid}"
-    for need in why.needs:
+    for need in certificate.needs:
         better = "at most" if abs(need.needed) < abs(need.now) else "at least"
         unit = need.key.rpartition("_")[2]
         yield f"it would take {need.key} {better} {need.needed:.9g} (it is {need.now:.6g}), {unit}"
-    for name in why.together:
+    for name in certificate.together:
         yield (
             f"several contours are named {name}, and have one allowance: with names of their own "
             "(an id, or an element each) each would have its own"
         )
-    if not why.needs and why.exact:
+    if not certificate.needs and certificate.exact:
         yield "no single number of the machine would do: all of them must be better"
-    if not why.needs and not why.exact:
+    if not certificate.needs and not certificate.exact:
         yield (
             "not even a machine without play, errors of scale and these uncertainties would do: "
             "the tool, its controller or the limits must be others"
@@ -943,7 +974,7 @@ def _certificate_lines(meeting: Meeting) -> Iterator[str]:
 def to_data(meeting: Meeting) -> dict[str, Any]:
     """Return the result as data for JSON: mm and s, standard uncertainties in µm."""
     before = {each.name: each for each in meeting.before.verdicts}
-    why, proposal = meeting.certificate, meeting.after.proposal
+    certificate, proposal = meeting.certificate, meeting.after.proposal
     return {
         "holds": meeting.holds,
         "changes": [
@@ -972,15 +1003,16 @@ def to_data(meeting: Meeting) -> dict[str, Any]:
         "trials": meeting.trials,
         "all_tried": meeting.all,
         "certificate": None
-        if why is None
+        if certificate is None
         else {
-            "binding": None if why.binding is None else why.binding.name,
-            "unknown": why.unknown,
+            "binding": None if certificate.binding is None else certificate.binding.name,
+            "unknown": certificate.unknown,
             "needs": [
-                {"key": each.key, "now": each.now, "needed": each.needed} for each in why.needs
+                {"key": each.key, "now": each.now, "needed": each.needed}
+                for each in certificate.needs
             ],
-            "exact_machine": why.exact,
-            "together": why.together,
+            "exact_machine": certificate.exact,
+            "together": certificate.together,
         },
     }
 
@@ -1010,10 +1042,10 @@ def _head(case: MeetingCase, best: MeetingTrial) -> Iterator[str]:
     """Return the comments at the top of a job file."""
     name = one_line(PurePath(case.drawing.file).name)
     target = case.target.machine.target.name
-    count, short = len(best.verdicts) + best.missing, len(best.short) + best.missing
+    count, short_count = len(best.verdicts) + best.missing, len(best.short) + best.missing
     if best.holds:
         yield f"{ALL_HOLD}{name} that has limits holds on {target} ({count})."
     else:
-        yield f"{NOT_ALL_HOLD}{name} hold on {target}: {short} of {count} do not."
+        yield f"{NOT_ALL_HOLD}{name} hold on {target}: {short_count} of {count} do not."
     for line in change_lines(best.proposal):
         yield one_line(line)

@@ -55,46 +55,47 @@ def propose_file(
     are written without limits. A dimension that fits no drawn feature is a comment. InputError for
     a drawing without anything to measure."""
     faults: list[DrawingError] = []
-    said, findings = dimensions_of(drawing, faults=faults)
+    said_dimensions, findings = dimensions_of(drawing, faults=faults)
     features = features_of(drawing.paths)
-    known = set()
+    seen_measures = set()
     rows: list[Dimension] = []
-    lost: list[tuple[Dimension, Finding]] = []
-    for each in said:
+    not_bound: list[tuple[Dimension, Finding]] = []
+    for each in said_dimensions:
         bound = bind(each, features, drawing.file)
         if isinstance(bound, BoundDimension):
-            known.add(measured_by(bound))
+            seen_measures.add(measured_by(bound))
             rows.append(each)
         else:
-            lost.append((each, bound))
-    left = 0
+            not_bound.append((each, bound))
+    left_out_count = 0
     for each in chain(_sizes(features, drawing.paths.closed.tolist()), floors):
         if len(rows) >= MAX_DIMENSIONS:
-            left += 1
+            left_out_count += 1
             continue
         bound = bind(each, features, drawing.file)
         if each.kind in DEPTHS:
             rows.append(each)
-        elif isinstance(bound, BoundDimension) and measured_by(bound) not in known:
-            known.add(measured_by(bound))
+        elif isinstance(bound, BoundDimension) and measured_by(bound) not in seen_measures:
+            seen_measures.add(measured_by(bound))
             rows.append(limited(each, bound.drawn_mm)[0])
-    if not rows and not lost:
+    if not rows and not not_bound:
         raise InputError(
             "has no circles and slots to measure, nor outlines that end in edges along X or Y",
             file=drawing.file,
             mend="write tolerances.toml by hand (docs/tolerances.md)",
         )
     text = _HEADER + "".join(map(_row, rows))
-    for each, why in lost:
-        text += (
-            f"\n# {one_line(f'{each.source}: {why.message}; give it places on edges or circles')}"
-        )
+    for each, finding in not_bound:
+        remark = f"{each.source}: {finding.message}; give it places on edges or circles"
+        text += f"\n# {one_line(remark)}"
         text += _row(each).replace("\n# limits", "\nlimits").rstrip().replace("\n", "\n# ") + "\n"
     for fault in faults:
         text += f"\n# {one_line(f'{fault.where}: {fault.message}')}\n"
-    if left:
-        text += f"\n# {left} more circles, slots and sizes of the drawing are not listed.\n"
-    return text, (*findings, *(why for _, why in lost)), tuple(faults)
+    if left_out_count:
+        text += (
+            f"\n# {left_out_count} more circles, slots and sizes of the drawing are not listed.\n"
+        )
+    return text, (*findings, *(finding for _, finding in not_bound)), tuple(faults)
 
 
 def _row(each: Dimension) -> str:
@@ -127,39 +128,60 @@ def _pair(place: Place) -> str:
 def _turned(direction: float) -> str:
     """Format a direction: x, y or degrees."""
     degrees = math.degrees(direction) % 180.0
-    for name, of in (("x", 0.0), ("y", 90.0), ("x", 180.0)):
-        if abs(degrees - of) <= 10.0**-DIGITS:
+    for name, angle in (("x", 0.0), ("y", 90.0), ("x", 180.0)):
+        if abs(degrees - angle) <= 10.0**-DIGITS:
             return f'"{name}"'
     return f"{degrees:.9g}"
 
 
 def _sizes(features: Iterable[Feature], closed: Sequence[bool]) -> Iterator[Dimension]:
     """Yield the sizes of all paths, path by path: circles, slots, outlines."""
-    paths = [list(of) for _, of in groupby(features, lambda each: each.path)]
-    circles = [of[0] for of in paths if len(of) == 1 and isinstance(of[0], CircleFeature)]
-    whole = [each for each in circles if each.is_closed]
-    shapes = [of for of in paths if closed[of[0].path] and of[0] not in whole]
-    for number, circle in enumerate(whole, 1):
+    paths = [
+        list(features_of_path) for _, features_of_path in groupby(features, lambda each: each.path)
+    ]
+    circles = [
+        features_of_path[0]
+        for features_of_path in paths
+        if len(features_of_path) == 1 and isinstance(features_of_path[0], CircleFeature)
+    ]
+    closed_circles = [each for each in circles if each.is_closed]
+    shapes = [
+        features_of_path
+        for features_of_path in paths
+        if closed[features_of_path[0].path] and features_of_path[0] not in closed_circles
+    ]
+    for number, circle in enumerate(closed_circles, 1):
         name, size = f"circle {number}", 2.0 * circle.radius_mm
         yield Dimension(name, "diameter", (circle.centre_mm,), "", nominal_mm=size)
-    slots = [(of, slot) for of in shapes if (slot := _slot(of)) is not None]
+    slots = [
+        (features_of_path, slot)
+        for features_of_path in shapes
+        if (slot := _slot(features_of_path)) is not None
+    ]
     for number, (_, slot) in enumerate(slots, 1):
-        for what, (first, second, direction) in zip(("width", "length"), slot, strict=True):
+        for measure, (first, second, direction) in zip(("width", "length"), slot, strict=True):
             yield Dimension(
-                f"slot {number} {what}", "distance", (first, second), "", direction_rad=direction
+                f"slot {number} {measure}",
+                "distance",
+                (first, second),
+                "",
+                direction_rad=direction,
             )
-    is_slot = {id(of) for of, _ in slots}
-    outlines = [of for of in shapes if id(of) not in is_slot]
+    is_slot = {id(features_of_path) for features_of_path, _ in slots}
+    outlines = [
+        features_of_path for features_of_path in shapes if id(features_of_path) not in is_slot
+    ]
     yield from chain.from_iterable(
-        _overall(f"outline {number}", of) for number, of in enumerate(outlines, 1)
+        _overall(f"outline {number}", features_of_path)
+        for number, features_of_path in enumerate(outlines, 1)
     )
 
 
-def _slot(of: Sequence[Feature]) -> tuple[tuple[Place, Place, float], ...] | None:
+def _slot(features: Sequence[Feature]) -> tuple[tuple[Place, Place, float], ...] | None:
     """Return start, end and direction of the width and of the length of a slot; None for other
     paths."""
-    ends = [each for each in of if isinstance(each, CircleFeature)]
-    edges = [each for each in of if isinstance(each, EdgeFeature)]
+    ends = [each for each in features if isinstance(each, CircleFeature)]
+    edges = [each for each in features if isinstance(each, EdgeFeature)]
     if len(ends) != 2 or len(edges) != 2:
         return None
     half = all(abs(abs(float(each.arcs[:, 1].sum())) - math.pi) <= 1e-3 for each in ends)
@@ -175,11 +197,11 @@ def _slot(of: Sequence[Feature]) -> tuple[tuple[Place, Place, float], ...] | Non
     return width, (first, last, axis % math.pi)
 
 
-def _overall(name: str, of: Sequence[Feature]) -> Iterator[Dimension]:
+def _overall(name: str, features: Sequence[Feature]) -> Iterator[Dimension]:
     """Return the overall sizes of a path along x and y."""
     for axis, letter in enumerate("xy"):
         direction = np.eye(2)[axis]
-        ends = [_outermost(of, direction, side) for side in (-1.0, 1.0)]
+        ends = [_outermost(features, direction, side) for side in (-1.0, 1.0)]
         if ends[0] is not None and ends[1] is not None:
             yield Dimension(
                 f"{name} {letter}",
@@ -190,25 +212,27 @@ def _overall(name: str, of: Sequence[Feature]) -> Iterator[Dimension]:
             )
 
 
-def _outermost(of: Sequence[Feature], direction: Floats, side: float) -> Place | None:
+def _outermost(features: Sequence[Feature], direction: Floats, side: float) -> Place | None:
     """Return the place of the outermost edge or arc in a direction; None if a corner is farther
     out."""
     farthest, place = -math.inf, None
-    for each in of:
+    for each in features:
         if isinstance(each, EdgeFeature):
-            at = max(side * float(direction @ end) for end in (each.start_mm, each.end_mm))
-            here = _middle(each) if each.is_square_to(direction) else None
+            position = max(side * float(direction @ end) for end in (each.start_mm, each.end_mm))
+            candidate = _middle(each) if each.is_square_to(direction) else None
         else:
             angle = math.atan2(*(side * direction)[::-1])
-            here = _point(each.centre_mm + side * each.radius_mm * direction)
-            at = side * float(direction @ np.array(here))
+            candidate = _point(each.centre_mm + side * each.radius_mm * direction)
+            position = side * float(direction @ np.array(candidate))
             if not each.has(np.array([angle]))[0]:
                 ends = np.cumsum(each.arcs, axis=1).ravel()
                 tips = np.column_stack([np.cos(ends), np.sin(ends)]) * each.radius_mm
-                at = float((side * (each.centre_mm + tips) @ direction).max())
-                here = None
-        if at > farthest + POSITION_EPS_MM or (at > farthest - POSITION_EPS_MM and place is None):
-            farthest, place = max(at, farthest), here
+                position = float((side * (each.centre_mm + tips) @ direction).max())
+                candidate = None
+        if position > farthest + POSITION_EPS_MM or (
+            position > farthest - POSITION_EPS_MM and place is None
+        ):
+            farthest, place = max(position, farthest), candidate
     return place
 
 

@@ -86,19 +86,23 @@ class SweptSegments(Struct, frozen=True, eq=False, dict=True):
     z: Floats
     row: Ints
 
-    def of(self, which: Ints | Bools) -> SweptSegments:
+    def of(self, selection: Ints | Bools) -> SweptSegments:
         """Select the segments of a mask or of indices."""
         return SweptSegments(
-            self.a[which], self.b[which], self.radius[which], self.z[which], self.row[which]
+            self.a[selection],
+            self.b[selection],
+            self.radius[selection],
+            self.z[selection],
+            self.row[selection],
         )
 
     def of_rows(self, rows: Ints) -> SweptSegments:
         """Select the segments of some rows (R,), which are sorted."""
         order, row = self._by_row
         first, last = np.searchsorted(row, rows), np.searchsorted(row, rows, side="right")
-        many = last - first
-        place = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many)
-        return self.of(order[np.repeat(first, many) + place])
+        counts = last - first
+        place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        return self.of(order[np.repeat(first, counts) + place])
 
     @cached_property
     def _by_row(self) -> tuple[Ints, Ints]:
@@ -179,13 +183,14 @@ def envelope(
     bound = math.inf
     finite = mask & np.isfinite(crossing)
     if finite.any() and above_mm:
-        middles = [np.median(row[here]) for row, here in zip(crossing, finite, strict=True)
-                   if here.any()]  # fmt: skip
+        middles = [
+            np.median(row[cut]) for row, cut in zip(crossing, finite, strict=True) if cut.any()
+        ]
         bound = float(max(middles)) + above_mm
     elif finite.sum() == mask.sum():
         bound = float(crossing[finite].max(initial=-math.inf))
-    rest = _envelope(feature, stations, swept, mask, levels_mm, bound)
-    return np.minimum(crossing, rest)
+    remaining = _envelope(feature, stations, swept, mask, levels_mm, bound)
+    return np.minimum(crossing, remaining)
 
 
 def _envelope(
@@ -198,15 +203,15 @@ def _envelope(
 ) -> Floats:
     """Compute `envelope` (L, S) mm of the segments that can reach below `bound_mm`; with −∞, of
     those that cross a normal themselves."""
-    found = np.full((len(levels_mm), len(stations.places)), np.inf)
+    positions = np.full((len(levels_mm), len(stations.places)), np.inf)
     segment, station = _pairs(feature, stations, swept, bound_mm)
     # The deepest level to which a segment reaches; the shallower ones follow at the end.
     level = np.searchsorted(-levels_mm, -swept.z + SAME_LEVEL_MM, side="right") - 1
-    wanted: Bools = np.asarray(mask.any(axis=0))
-    keep = wanted[station] & (level[segment] >= 0)
+    is_wanted: Bools = np.asarray(mask.any(axis=0))
+    keep = is_wanted[station] & (level[segment] >= 0)
     segment, station = segment[keep], station[keep]
     if not len(segment):
-        return found
+        return positions
     level = level[segment]
     place, normal = stations.places[station], stations.normals[station]
     along = np.column_stack([normal[:, 1], -normal[:, 0]])
@@ -218,7 +223,7 @@ def _envelope(
     for u, v in ((ua, va), (ub, vb)):
         under = wide & (np.abs(u) <= radius)
         low = v[under] - np.sqrt(radius[under] ** 2 - u[under] ** 2)
-        np.minimum.at(found, (level[under], station[under]), low)
+        np.minimum.at(positions, (level[under], station[under]), low)
     du, dv = ub - ua, vb - va
     length = np.hypot(du, dv)
     moves = np.flatnonzero(du != 0.0)
@@ -228,10 +233,10 @@ def _envelope(
     share = (radius[moves] * nu - ua[moves]) / du
     crosses = (share >= 0.0) & (share <= 1.0)
     low = va[moves] - radius[moves] * nv + share * dv
-    np.minimum.at(found, (level[moves][crosses], station[moves][crosses]), low[crosses])
-    found = np.minimum.accumulate(found[::-1], axis=0)[::-1]
-    found[~mask] = np.inf
-    return found
+    np.minimum.at(positions, (level[moves][crosses], station[moves][crosses]), low[crosses])
+    positions = np.minimum.accumulate(positions[::-1], axis=0)[::-1]
+    positions[~mask] = np.inf
+    return positions
 
 
 def _pairs(
@@ -245,12 +250,12 @@ def _pairs(
         from_a, from_b = swept.a - centre, swept.b - centre
         step = from_b - from_a
         share = -(from_a * step).sum(axis=1) / np.maximum((step * step).sum(axis=1), 1e-300)
-        nearest = np.hypot(*(from_a + np.clip(share, 0.0, 1.0)[:, None] * step).T)
+        nearest_mm = np.hypot(*(from_a + np.clip(share, 0.0, 1.0)[:, None] * step).T)
         farthest = np.maximum(np.hypot(*from_a.T), np.hypot(*from_b.T))
         outer = float(stations.normals[0] @ (stations.places[0] - centre)) > 0.0
-        least_v = nearest - feature.radius_mm if outer else feature.radius_mm - farthest
+        least_v = nearest_mm - feature.radius_mm if outer else feature.radius_mm - farthest
         reach = _reach(swept.radius, least_v, bound_mm)
-        sine = reach / np.maximum(nearest, 1e-300)
+        sine = reach / np.maximum(nearest_mm, 1e-300)
         half = np.where(sine >= 1.0, math.pi, np.arcsin(np.minimum(sine, 1.0)))
         first = np.arctan2(from_a[:, 1], from_a[:, 0])
         last = np.arctan2(from_b[:, 1], from_b[:, 0])
@@ -268,9 +273,9 @@ def _pairs(
     last_at = np.floor(high / stations.wide - 0.5).astype(np.int64)
     if isinstance(feature, EdgeFeature):
         first_at, last_at = np.maximum(first_at, 0), np.minimum(last_at, count - 1)
-    many = np.clip(last_at - first_at + 1, 0, count)
-    segment = np.repeat(np.arange(len(many)), many)
-    place = np.arange(len(segment)) - np.repeat(np.cumsum(many) - many, many)
+    counts = np.clip(last_at - first_at + 1, 0, count)
+    segment = np.repeat(np.arange(len(counts)), counts)
+    place = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
     station = np.mod(first_at[segment] + place, count)
     return segment, station
 
@@ -288,57 +293,57 @@ def _reach(radius: Floats, least_v: Floats, bound_mm: float) -> Floats:
 # Which moves cut a feature.
 
 
-def cut_of(feature: Feature, wanted: SweptSegments) -> Cut | None:
+def cut_of(feature: Feature, wanted_moves: SweptSegments) -> Cut | None:
     """Find the wanted moves that cut a feature and how; None if none do.
 
     A tool that tapers makes a feature only where it runs along it, or where its edge at the
     surface is the feature itself: a chamfer is none."""
-    straight = np.isfinite(wanted.z)
-    walls = _cut_of(feature, wanted.of(straight))
-    tapering = _cut_of(feature, wanted.of(~straight))
+    straight = np.isfinite(wanted_moves.z)
+    walls = _cut_of(feature, wanted_moves.of(straight))
+    tapering = _cut_of(feature, wanted_moves.of(~straight))
     if tapering is not None and tapering[1] <= REACHED_MM:
         return walls[0] if walls is not None and walls[1] <= REACHED_MM else tapering[0]
     return None if walls is None else walls[0]
 
 
-def _cut_of(feature: Feature, wanted: SweptSegments) -> tuple[Cut, float] | None:
+def _cut_of(feature: Feature, wanted_moves: SweptSegments) -> tuple[Cut, float] | None:
     """Return the cut of a feature by these moves and their distance from it, mm; None if they do
     not cut it."""
-    near = _near_feature(feature, wanted)
-    v, beside = _offsets(feature, wanted, near)
-    near, v = near[beside], v[beside]
-    if not len(near):
+    near_moves = _near_feature(feature, wanted_moves)
+    v, is_beside = _offsets(feature, wanted_moves, near_moves)
+    near_moves, v = near_moves[is_beside], v[is_beside]
+    if not len(near_moves):
         return None
-    radius = wanted.radius[near]
-    tapers = np.isinf(wanted.z[near])
+    radius = wanted_moves.radius[near_moves]
+    tapers = np.isinf(wanted_moves.z[near_moves])
     inner = np.abs(v) <= np.where(tapers, 0.0, ON_PATH_SHARE * radius) + REACHED_MM
     on_path = bool(inner.any())
     if on_path:
-        side, mine = 1, near[inner]
+        side, own_moves = 1, near_moves[inner]
     else:
         best = int(np.argmin(np.abs(np.abs(v) - radius)))
         side = 1 if v[best] > 0.0 else -1
-        mine = near[side * v > ON_PATH_SHARE * radius]
-    rows = np.unique(wanted.row[mine])
-    chosen = wanted.of(np.isin(wanted.row, rows))
+        own_moves = near_moves[side * v > ON_PATH_SHARE * radius]
+    rows = np.unique(wanted_moves.row[own_moves])
+    chosen_moves = wanted_moves.of(np.isin(wanted_moves.row, rows))
     if on_path:
-        chosen = replace(chosen, radius=np.zeros(len(chosen.a)))
+        chosen_moves = replace(chosen_moves, radius=np.zeros(len(chosen_moves.a)))
     stations = stations_of(feature, side)
-    levels = _levels(chosen)
+    levels = _levels(chosen_moves)
     every = np.broadcast_to(stations.measured, (len(levels), len(stations.measured)))
-    planned = envelope(
-        feature, stations, chosen, every, levels_mm=levels, above_mm=2.0 * REACHED_MM
+    planned_edges = envelope(
+        feature, stations, chosen_moves, every, levels_mm=levels, above_mm=2.0 * REACHED_MM
     )
-    seen = np.isfinite(planned)
+    is_cut = np.isfinite(planned_edges)
     middles = []
-    for row, here in zip(planned, seen, strict=True):
-        middles.append(float(np.median(row[here])) if here.any() else math.inf)
-        here[here] = np.abs(row[here] - middles[-1]) <= REACHED_MM
-    counts = seen.sum(axis=1)
+    for row, is_seen in zip(planned_edges, is_cut, strict=True):
+        middles.append(float(np.median(row[is_seen])) if is_seen.any() else math.inf)
+        is_seen[is_seen] = np.abs(row[is_seen] - middles[-1]) <= REACHED_MM
+    counts = is_cut.sum(axis=1)
     if counts[0] < MIN_CUT_SHARE * stations.measured.sum():
         return None
-    enough = counts >= LEVEL_SHARE * counts[0]
-    cut = Cut(side, on_path, rows, stations, levels[enough], seen[enough])
+    is_deep_enough = counts >= LEVEL_SHARE * counts[0]
+    cut = Cut(side, on_path, rows, stations, levels[is_deep_enough], is_cut[is_deep_enough])
     return cut, abs(middles[0])
 
 
@@ -361,25 +366,25 @@ def _near_feature(feature: Feature, swept: SweptSegments) -> Ints:
         low = np.minimum(feature.start_mm, feature.end_mm)
         high = np.maximum(feature.start_mm, feature.end_mm)
     reach = (swept.radius + BESIDE_MM)[:, None]
-    least, most = np.minimum(swept.a, swept.b), np.maximum(swept.a, swept.b)
-    return np.flatnonzero(((most >= low - reach) & (least <= high + reach)).all(axis=1))
+    low_ends, high_ends = np.minimum(swept.a, swept.b), np.maximum(swept.a, swept.b)
+    return np.flatnonzero(((high_ends >= low - reach) & (low_ends <= high + reach)).all(axis=1))
 
 
-def _offsets(feature: Feature, swept: SweptSegments, which: Ints) -> tuple[Floats, Bools]:
+def _offsets(feature: Feature, swept: SweptSegments, indices: Ints) -> tuple[Floats, Bools]:
     """Compute the distances (J,) mm of the midpoints of segments from the feature, above 0 outside
     of a circle and left of an edge; and the mask of those beside it and within reach."""
-    middle = 0.5 * (swept.a[which] + swept.b[which])
+    middle = 0.5 * (swept.a[indices] + swept.b[indices])
     if isinstance(feature, CircleFeature):
         spoke = middle - np.asarray(feature.centre_mm)
         v = np.hypot(spoke[:, 0], spoke[:, 1]) - feature.radius_mm
-        beside = feature.has(np.arctan2(spoke[:, 1], spoke[:, 0]))
+        is_beside = feature.has(np.arctan2(spoke[:, 1], spoke[:, 0]))
     else:
         along = feature.along
-        away = middle - np.asarray(feature.start_mm)
-        v = away @ np.array([-along[1], along[0]])
-        s = away @ along
-        beside = (s >= 0.0) & (s <= feature.length_mm)
-    return v, np.asarray(beside & (np.abs(v) <= swept.radius[which] + BESIDE_MM))
+        arms = middle - np.asarray(feature.start_mm)
+        v = arms @ np.array([-along[1], along[0]])
+        s = arms @ along
+        is_beside = (s >= 0.0) & (s <= feature.length_mm)
+    return v, np.asarray(is_beside & (np.abs(v) <= swept.radius[indices] + BESIDE_MM))
 
 
 # Sizes of envelopes.
@@ -398,50 +403,52 @@ def edge_at(feature: Feature, cut: Cut, swept: SweptSegments) -> Floats:
     """Compute the position (L, S) mm of the machined edge of a feature at each depth, outwards
     from a circle and to the left of an edge; NaN where it is not cut. `swept` is the path of the
     slides."""
-    lies = envelope(feature, cut.stations, swept, cut.seen, levels_mm=cut.levels_mm)
-    lies[~np.isfinite(lies)] = np.nan
-    return np.asarray(cut.side * lies)
+    edges = envelope(feature, cut.stations, swept, cut.seen, levels_mm=cut.levels_mm)
+    edges[~np.isfinite(edges)] = np.nan
+    return np.asarray(cut.side * edges)
 
 
 def rows_of(swept: SweptSegments, cut: Cut, feature: Feature) -> SweptSegments:
     """Select the segments of the slides near a feature that belong to the moves that cut it."""
-    mine = swept.of_rows(cut.rows)
-    mine = mine.of(_near_feature(feature, mine))
-    return replace(mine, radius=np.zeros(len(mine.a))) if cut.on_path else mine
+    own_moves = swept.of_rows(cut.rows)
+    own_moves = own_moves.of(_near_feature(feature, own_moves))
+    return replace(own_moves, radius=np.zeros(len(own_moves.a))) if cut.on_path else own_moves
 
 
 def size_of(
-    bound: BoundDimension, cuts: Sequence[Cut], lies: Sequence[Floats]
+    bound: BoundDimension, cuts: Sequence[Cut], edges: Sequence[Floats]
 ) -> MachinedSize | None:
     """Compute the size of a dimension from the cuts of its features and the positions (L, S) of
     their machined edges, as from `edge_at`, in the order of `bound.features`; None if one is not
     cut. Below the deepest cut of a feature its deepest edge counts."""
     levels = [cut.levels_mm for cut in cuts]
-    found = sizes_of(bound, levels, [each[None] for each in lies])[0]
-    return MachinedSize(*found.tolist()) if np.isfinite(found).all() else None
+    values = sizes_of(bound, levels, [each[None] for each in edges])[0]
+    return MachinedSize(*values.tolist()) if np.isfinite(values).all() else None
 
 
-def sizes_of(bound: BoundDimension, levels_mm: Sequence[Floats], lies: Sequence[Floats]) -> Floats:
-    """Compute best fit, least and largest local size (N, 3) mm of N parts at once. `lies` (N, L,
-    S) are the positions of the edges of each feature at its depths `levels_mm` (L,); NaN where one
-    is not cut. A station counts if it is cut on all N parts."""
+def sizes_of(
+    bound: BoundDimension, levels_mm: Sequence[Floats], edges_of_features: Sequence[Floats]
+) -> Floats:
+    """Compute best fit, least and largest local size (N, 3) mm of N parts at once.
+    `edges_of_features` (N, L, S) are the positions of the edges of each feature at its depths
+    `levels_mm` (L,); NaN where one is not cut. A station counts if it is cut on all N parts."""
     every = np.unique(np.concatenate(levels_mm))[::-1]
-    found: list[Floats] = []
+    sizes_by_level: list[Floats] = []
     last: list[Floats] = []
     for level in every.tolist():
-        here = [
-            edges[:, min(int(np.searchsorted(-own, -level)), edges.shape[1] - 1)]
-            for own, edges in zip(levels_mm, lies, strict=True)
+        edges_here = [
+            edges[:, min(int(np.searchsorted(-own_levels, -level)), edges.shape[1] - 1)]
+            for own_levels, edges in zip(levels_mm, edges_of_features, strict=True)
         ]
-        if last and all(map(_are_equal, here, last)):
+        if last and all(map(_are_equal, edges_here, last)):
             continue
-        last = here
-        if all(_cut_on_all(each).sum() >= MIN_STATIONS for each in here):
-            found.append(_sizes(bound, here))
-    if not found:
-        return np.full((len(lies[0]), 3), math.nan)
-    fit, low, high = found[0].T
-    for each in found[1:]:
+        last = edges_here
+        if all(_cut_on_all(each).sum() >= MIN_STATIONS for each in edges_here):
+            sizes_by_level.append(_sizes(bound, edges_here))
+    if not sizes_by_level:
+        return np.full((len(edges_of_features[0]), 3), math.nan)
+    fit, low, high = sizes_by_level[0].T
+    for each in sizes_by_level[1:]:
         low, high = np.minimum(low, each[:, 1]), np.maximum(high, each[:, 2])
     return np.column_stack([fit, low, high])
 
@@ -449,11 +456,11 @@ def sizes_of(bound: BoundDimension, levels_mm: Sequence[Floats], lies: Sequence[
 def distinct_levels(nodes: Floats) -> Ints:
     """Return the depths of a feature at which its edges differ from those at the next deeper kept
     depth on any of M parts: `nodes` (M, L, S) mm."""
-    kept = [nodes.shape[1] - 1]
+    kept_levels = [nodes.shape[1] - 1]
     for level in range(nodes.shape[1] - 2, -1, -1):
-        if not _are_equal(nodes[:, level], nodes[:, kept[-1]]):
-            kept.append(level)
-    return np.array(kept[::-1])
+        if not _are_equal(nodes[:, level], nodes[:, kept_levels[-1]]):
+            kept_levels.append(level)
+    return np.array(kept_levels[::-1])
 
 
 def _are_equal(one: Floats, other: Floats) -> bool:
@@ -464,29 +471,30 @@ def _are_equal(one: Floats, other: Floats) -> bool:
 MIN_STATIONS = 3
 
 
-def _cut_on_all(off: Floats) -> Bools:
+def _cut_on_all(offsets: Floats) -> Bools:
     """Mask (S,) of the stations that are cut on all parts (N, S)."""
-    return np.asarray(np.isfinite(off).all(axis=0))
+    return np.asarray(np.isfinite(offsets).all(axis=0))
 
 
-def _sizes(bound: BoundDimension, lies: Sequence[Floats]) -> Floats:
-    """Compute the sizes (N, 3) mm of N parts whose features have their edges at `lies` (N, S)
+def _sizes(bound: BoundDimension, edges: Sequence[Floats]) -> Floats:
+    """Compute the sizes (N, 3) mm of N parts whose features have their edges at `edges` (N, S)
     each."""
     kind = bound.dimension.kind
     if kind == "distance":
         first, second = (
-            _values(end, each, bound.direction) for end, each in zip(bound.ends, lies, strict=True)
+            _values(end, each, bound.direction)
+            for end, each in zip(bound.ends, edges, strict=True)
         )
         return _distances_between(first, second)
     if kind == "profile":
-        return _zones(2.0 * np.nanmax(np.abs(lies[0]), axis=1))
-    feature, off = bound.features[0], lies[0]
-    seen = _cut_on_all(off)
+        return _zones(2.0 * np.nanmax(np.abs(edges[0]), axis=1))
+    feature, offsets = bound.features[0], edges[0]
+    is_cut = _cut_on_all(offsets)
     if isinstance(feature, EdgeFeature):
-        place = np.linspace(-1.0, 1.0, len(seen))[seen]
+        place = np.linspace(-1.0, 1.0, len(is_cut))[is_cut]
         table = np.column_stack([np.ones(len(place)), place])
-        return _zones(_widths(table, off[:, seen]))
-    points = _circle_points(feature, off)
+        return _zones(_widths(table, offsets[:, is_cut]))
+    points = _circle_points(feature, offsets)
     centre, radius = fit_circles(points, np.asarray(feature.centre_mm))
     if kind == "position":
         return _zones(2.0 * np.hypot(*(centre - np.asarray(feature.centre_mm)[:, None])))
@@ -509,31 +517,33 @@ def _zones(wide_mm: Floats) -> Floats:
     return np.column_stack([wide_mm, wide_mm, wide_mm])
 
 
-def _interpolate(x: Floats, at: Floats, values: Floats, period: float | None = None) -> Floats:
-    """Interpolate values (N, Q) at x (Q,) linearly between those (N, J) at `at` (J,), which may
-    wrap around after a period."""
-    number = np.arange(len(at), dtype=np.float64)
+def _interpolate(
+    x: Floats, nodes_x: Floats, values: Floats, period: float | None = None
+) -> Floats:
+    """Interpolate values (N, Q) at x (Q,) linearly between those (N, J) at `nodes_x` (J,), which
+    may wrap around after a period."""
+    number = np.arange(len(nodes_x), dtype=np.float64)
     if period is not None:
-        at, x = np.mod(at, period), np.mod(x, period)
-    order = np.argsort(at, kind="stable")
-    at, values = at[order], values[:, order]
+        nodes_x, x = np.mod(nodes_x, period), np.mod(x, period)
+    order = np.argsort(nodes_x, kind="stable")
+    nodes_x, values = nodes_x[order], values[:, order]
     if period is not None:
-        at = np.concatenate([at[-1:] - period, at, at[:1] + period])
+        nodes_x = np.concatenate([nodes_x[-1:] - period, nodes_x, nodes_x[:1] + period])
         values = np.concatenate([values[:, -1:], values, values[:, :1]], axis=1)
-        number = np.arange(len(at), dtype=np.float64)
-    place = np.interp(x, at, number)
-    left = np.minimum(place.astype(np.int64), len(at) - 2)
-    share = place - left
-    return np.asarray(values[:, left] * (1.0 - share) + values[:, left + 1] * share)
+        number = np.arange(len(nodes_x), dtype=np.float64)
+    place = np.interp(x, nodes_x, number)
+    row = np.minimum(place.astype(np.int64), len(nodes_x) - 2)
+    share = place - row
+    return np.asarray(values[:, row] * (1.0 - share) + values[:, row + 1] * share)
 
 
-def _circle_points(circle: CircleFeature, off: Floats) -> Floats:
+def _circle_points(circle: CircleFeature, offsets: Floats) -> Floats:
     """Compute the points, X and Y (2, N, J) mm, of machined circles, by angle, where they are
     cut."""
     stations = stations_of(circle, 1)
-    seen = _cut_on_all(off)
-    places, normals = stations.places[seen].T[:, None], stations.normals[seen].T[:, None]
-    return np.asarray(places + off[:, seen] * normals)
+    is_cut = _cut_on_all(offsets)
+    places, normals = stations.places[is_cut].T[:, None], stations.normals[is_cut].T[:, None]
+    return np.asarray(places + offsets[:, is_cut] * normals)
 
 
 def _lengths(vectors: Floats) -> Floats:
@@ -550,18 +560,18 @@ CENTRE_MM = 1e-9
 """An iteration that moves the centre by less is the last."""
 
 
-def fit_circles(points: Floats, near: Floats) -> tuple[Floats, Floats]:
+def fit_circles(points: Floats, near_mm: Floats) -> tuple[Floats, Floats]:
     """Fit circles to points (2, N, J) by least squares of radial distances; return centres (2, N)
-    and radii (N,), mm. `near` (2,) is a place near the centres.
+    and radii (N,), mm. `near_mm` (2,) is a place near the centres.
 
-    Gauss-Newton with the derivatives of the first circle about `near`, from which the others
+    Gauss-Newton with the derivatives of the first circle about `near_mm`, from which the others
     differ by micrometres: with d = |p − c| and u = (p − c)/d, [u, 1] (δc, R) = d.
     """
-    spoke = points[:, 0].T - near
+    spoke = points[:, 0].T - near_mm
     distance = np.hypot(spoke[:, 0], spoke[:, 1])
     terms = np.column_stack([spoke / distance[:, None], np.ones(len(spoke))])
     inverse = np.linalg.pinv(terms)[:2]
-    centre = np.repeat(near[:, None], points.shape[1], axis=1)
+    centre = np.repeat(near_mm[:, None], points.shape[1], axis=1)
     for _ in range(CENTRE_ROUNDS):
         distances = _lengths(points - centre[..., None])
         # Sums, not products of matrices, whose last digits may differ from run to run.
@@ -582,15 +592,15 @@ class _Values(Struct, frozen=True, eq=False):
     fit_mm: Floats
 
 
-def _values(end: DistanceEnd, off: Floats, direction: Floats) -> _Values:
-    feature, seen = end.feature, _cut_on_all(off)
+def _values(end: DistanceEnd, offsets: Floats, direction: Floats) -> _Values:
+    feature, is_cut = end.feature, _cut_on_all(offsets)
     if isinstance(feature, EdgeFeature):
         stations = stations_of(feature, 1)
-        points = stations.places[seen] + off[:, seen, None] * stations.normals[seen]
+        points = stations.places[is_cut] + offsets[:, is_cut, None] * stations.normals[is_cut]
         across = points[0] @ np.array([-direction[1], direction[0]])
         values = points @ direction
         return _Values(values, across, values.mean(axis=1))
-    points = _circle_points(feature, off)
+    points = _circle_points(feature, offsets)
     if end.how == "centre":
         middle = direction @ fit_circles(points, np.asarray(feature.centre_mm))[0]
         return _Values(middle[:, None], None, middle)
@@ -604,14 +614,14 @@ def _distances_between(first: _Values, second: _Values) -> Floats:
     fit = second.fit_mm - first.fit_mm
     if first.across is not None and second.across is not None:
         low, high = second.across.min(), second.across.max()
-        beside = (first.across >= low) & (first.across <= high)
-        if beside.any():
-            across = first.across[beside]
-            local = _interpolate(across, second.across, second.values) - first.values[:, beside]
+        is_beside = (first.across >= low) & (first.across <= high)
+        if is_beside.any():
+            across = first.across[is_beside]
+            local = _interpolate(across, second.across, second.values) - first.values[:, is_beside]
             return np.column_stack([fit, local.min(axis=1), local.max(axis=1)])
-    least = second.values.min(axis=1) - first.values.max(axis=1)
-    most = second.values.max(axis=1) - first.values.min(axis=1)
-    return np.column_stack([fit, least, most])
+    smallest = second.values.min(axis=1) - first.values.max(axis=1)
+    greatest = second.values.max(axis=1) - first.values.min(axis=1)
+    return np.column_stack([fit, smallest, greatest])
 
 
 # Minimum zones. With deviations e_i and the functions of a line or a circle in a table T (a
@@ -622,13 +632,13 @@ def _distances_between(first: _Values, second: _Values) -> Floats:
 # is a linear programme of three or four unknowns, and 2 h is the width of the zone.
 
 
-def _widths(table: Floats, off: Floats) -> Floats:
+def _widths(table: Floats, offsets: Floats) -> Floats:
     """Compute the widths (N,) mm of the narrowest zones around deviations (N, J) by functions (J,
     K)."""
     ones = np.ones((len(table), 1))
     rows = np.vstack([np.hstack([table, ones]), np.hstack([-table, ones])])
-    middle = off.mean(axis=1, keepdims=True)
-    bounds = np.hstack([off - middle, middle - off])
+    middle = offsets.mean(axis=1, keepdims=True)
+    bounds = np.hstack([offsets - middle, middle - offsets])
     goal = np.append(np.zeros(table.shape[1]), 1.0)
     return np.maximum(2.0 * minimise_many(goal, rows, bounds)[:, -1], 0.0)
 
@@ -664,26 +674,26 @@ def minimise_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
 def _exchange(goal: Floats, every: Floats, limits: Floats, active: Ints) -> tuple[Floats, Ints]:
     """Exchange active conditions (N, K) of rows (J, K) and their limits (N, J) until none is
     violated; return x (N, K) and the conditions that are active then."""
-    active, found = active.copy(), np.zeros(active.shape)
+    active, solutions = active.copy(), np.zeros(active.shape)
     open_ = np.arange(len(active))
     for _ in range(MAX_EXCHANGES):
-        own = active[open_]
-        basis = every[own]
-        held = np.take_along_axis(limits[open_], own, axis=1)
-        x = np.linalg.solve(basis, held[..., None])[..., 0]
-        found[open_] = x
-        short = limits[open_] - x @ every.T
-        enters = short.argmax(axis=1)
-        turned = np.swapaxes(basis, 1, 2)
-        price = np.linalg.solve(turned, np.broadcast_to(goal, x.shape)[..., None])[..., 0]
-        change = np.linalg.solve(turned, every[enters][..., None])[..., 0]
+        own_active = active[open_]
+        basis = every[own_active]
+        active_limits = np.take_along_axis(limits[open_], own_active, axis=1)
+        x = np.linalg.solve(basis, active_limits[..., None])[..., 0]
+        solutions[open_] = x
+        violation = limits[open_] - x @ every.T
+        enters = violation.argmax(axis=1)
+        transposed = np.swapaxes(basis, 1, 2)
+        price = np.linalg.solve(transposed, np.broadcast_to(goal, x.shape)[..., None])[..., 0]
+        change = np.linalg.solve(transposed, every[enters][..., None])[..., 0]
         may = change > VIOLATION_EPS_MM
         ratio = np.divide(price, change, out=np.full_like(price, np.inf), where=may)
         leaves = ratio.argmin(axis=1)
         each = np.arange(len(open_))
-        goes_on = (short[each, enters] > VIOLATION_EPS_MM) & may.any(axis=1)
+        goes_on = (violation[each, enters] > VIOLATION_EPS_MM) & may.any(axis=1)
         open_, each = open_[goes_on], each[goes_on]
         if not len(open_):
             break
         active[open_, leaves[each]] = enters[each]
-    return found, active
+    return solutions, active

@@ -80,16 +80,16 @@ def dimensions_of(
     dimensions have no limits."""
     if isinstance(tolerances_file, Path):
         tolerances_file = read_tolerances(tolerances_file)
-    general, asked = tolerances_file or ("", ())
+    general, stated = tolerances_file or ("", ())
     features, file = features_of(drawing.paths), drawing.file
     findings: list[Finding] = []
     dimensions: list[Dimension] = []
-    known: dict[object, Dimension] = {}
+    by_measure: dict[object, Dimension] = {}
     with_limits: dict[str, list[Dimension]] = {}
-    for each in asked:
+    for each in stated:
         bound = bind(each, features, file)
         settled = _with_limits(each, bound, file, findings)
-        holds = known.setdefault(_measures(each, bound), each)
+        holds = by_measure.setdefault(_measures(each, bound), each)
         if holds is each:
             with_limits[each.source] = settled
             dimensions += settled
@@ -101,39 +101,45 @@ def dimensions_of(
     for place, callout in enumerate(drawing.callouts):
         measured = replace(_measured_dimension(callout), general=general)
         bound = bind(measured, features, file)
-        what = _measures(measured, bound)
-        if what in known:
-            findings.append(_duplicate_finding(measured, known[what], file))
+        measure = _measures(measured, bound)
+        if measure in by_measure:
+            findings.append(_duplicate_finding(measured, by_measure[measure], file))
             continue
         drawn_mm = bound.drawn_mm if isinstance(bound, BoundDimension) else math.inf
         # Programs round the places of a dimension: what is drawn counts.
         if abs(drawn_mm - callout.measured_mm) <= DIFFERS_MM:
             measured = replace(measured, nominal_mm=round(drawn_mm, 9))
-        said = _callout_dimensions(callout, measured, file, features, findings, faults)
-        drawn += ((place, each) for each in said)
-    kept: list[tuple[int, Dimension]] = []
+        callout_dimensions = _callout_dimensions(
+            callout, measured, file, features, findings, faults
+        )
+        drawn += ((place, each) for each in callout_dimensions)
+    kept_dimensions: list[tuple[int, Dimension]] = []
     for place, each in sorted(drawn, key=lambda item: item[1].limits is None):
         bound = bind(each, features, file)
         if isinstance(bound, BoundDimension):
-            same = known.setdefault(measured_by(bound), each)
-            if same is not each:
-                if same.source != each.source:
-                    findings.append(_duplicate_finding(each, same, file))
+            earlier = by_measure.setdefault(measured_by(bound), each)
+            if earlier is not each:
+                if earlier.source != each.source:
+                    findings.append(_duplicate_finding(each, earlier, file))
                 continue
-        kept += ((place, one) for one in _with_limits(each, bound, file, findings))
-    dimensions += (each for _, each in sorted(kept, key=lambda item: item[0]))
+        kept_dimensions += ((place, one) for one in _with_limits(each, bound, file, findings))
+    dimensions += (each for _, each in sorted(kept_dimensions, key=lambda item: item[0]))
     return tuple(_with_unique_names(dimensions)), tuple(findings)
 
 
 def _duplicate_finding(one: Dimension, holds: Dimension, file: str) -> Finding:
     """Return the finding that two dimensions measure the same: a warning if both are of the
     drawing and their limits differ."""
-    where = f"{file}, {one.source}"
-    ours, theirs = one.limits, holds.limits
-    if ours is None or theirs is None or _deviations(ours) == _deviations(theirs):
-        return DIMENSION_TWICE(where=where, holds=holds.source)
+    place = f"{file}, {one.source}"
+    own_limits, other_limits = one.limits, holds.limits
+    if (
+        own_limits is None
+        or other_limits is None
+        or _deviations(own_limits) == _deviations(other_limits)
+    ):
+        return DIMENSION_TWICE(where=place, holds=holds.source)
     return DIMENSION_TWICE_DIFFERS(
-        where=where, limits=ours.said, holds=holds.source, others=theirs.said
+        where=place, limits=own_limits.said, holds=holds.source, others=other_limits.said
     )
 
 
@@ -154,9 +160,9 @@ def _with_limits(
         return [dimension]
     nominal = dimension.nominal_mm
     if nominal is not None and abs(nominal - drawn) > DIFFERS_MM:
-        where = f"{file}, {_place_of(dimension)}"
+        place = f"{file}, {_place_of(dimension)}"
         findings.append(
-            DIMENSION_DIFFERS(where=where, measured=drawn, limit=nominal, name=dimension.name)
+            DIMENSION_DIFFERS(where=place, measured=drawn, limit=nominal, name=dimension.name)
         )
         return []
     with _with_place(file, _place_of(dimension)):
@@ -199,12 +205,12 @@ def measured_by(bound: BoundDimension) -> object:
 def _with_unique_names(dimensions: Sequence[Dimension]) -> Iterator[Dimension]:
     """Give every dimension a name of its own."""
     names = [each.name for each in dimensions]
-    taken: set[str] = set()
+    names_used: set[str] = set()
     for each in dimensions:
         name, number = each.name, 1
-        while name in taken or (number == 1 and names.count(name) > 1):
+        while name in names_used or (number == 1 and names.count(name) > 1):
             name, number = f"{each.name} #{number}", number + 1
-        taken.add(name)
+        names_used.add(name)
         yield replace(each, name=name)
 
 
@@ -247,15 +253,15 @@ def read_tolerances(path: Path) -> Asked:
     """Read the general tolerance of a file ("" for none) and its dimensions; CamtoolError with
     file, place and correction for invalid content."""
     file = str(path)
-    whole = read_table(path)
-    if isinstance(whole.get("dimension"), dict):
+    file_table = read_table(path)
+    if isinstance(file_table.get("dimension"), dict):
         raise InputError(
             "[dimension] is a single table",
             file=file,
             where="table [dimension]",
             mend="write [[dimension]] above each dimension",
         )
-    table = convert(whole, _File, file)
+    table = convert(file_table, _File, file)
     if not table.general and not table.dimension:
         raise InputError(
             "says nothing of any dimension",
@@ -274,12 +280,12 @@ def read_tolerances(path: Path) -> Asked:
 
 
 @contextmanager
-def _with_place(file: str, where: str) -> Iterator[None]:
+def _with_place(file: str, place: str) -> Iterator[None]:
     """Add file and place to an error of the block."""
     try:
         yield
     except OptionError as error:
-        raise InputError(error.message, file=file, where=where, mend=error.mend) from error
+        raise InputError(error.message, file=file, where=place, mend=error.mend) from error
 
 
 def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
@@ -287,9 +293,9 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
     place = f"dimension {number}"
     _check_keys(row, str(path), place)
 
-    def mm(value: Length, key: str, least: float = -MAX_SIZE_MM) -> float:
+    def mm(value: Length, key: str, min_mm: float = -MAX_SIZE_MM) -> float:
         with _with_place(str(path), f"{place}, key {key}"):
-            return _mm(value, key, least)
+            return _mm(value, key, min_mm)
 
     pairs = {"at": row.at, "from": row.start, "to": row.to}
     places = tuple(
@@ -310,11 +316,11 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
     nominal = None if row.nominal is None else mm(row.nominal, "nominal", 0.0)
     if row.limits is not None:
         with _with_place(str(path), f"{place}, key limits"):
-            said = read_words(row.limits)
-            _check_units(row.nominal, said)
+            limits_text = read_words(row.limits)
+            _check_units(row.nominal, limits_text)
             words = row.limits
             if nominal is not None:
-                limits, words = said.limits(nominal), ""
+                limits, words = limits_text.limits(nominal), ""
     direction = None
     if row.direction is not None:
         with _with_place(str(path), f"{place}, key direction"):
@@ -341,7 +347,7 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
 
 def _check_keys(row: _Row, file: str, place: str) -> None:
     """Raise InputError for a key that this kind lacks or does not know."""
-    given = {
+    given_keys = {
         "at": row.at,
         "from": row.start,
         "to": row.to,
@@ -353,30 +359,30 @@ def _check_keys(row: _Row, file: str, place: str) -> None:
     needed = ["from", "to"] if row.kind in ("distance", "width") else ["at"]
     sizes = ["direction", "nominal", "limits"] if len(needed) == 2 else ["nominal", "limits"]
     takes = [*needed, *(["zone"] if row.kind in ZONES else sizes)]
-    for key, value in given.items():
-        where = f"{place}, key {key}"
+    for key, value in given_keys.items():
+        key_place = f"{place}, key {key}"
         if value is not None and key not in takes:
             raise InputError(
                 f"a {row.kind} has no {key}",
                 file=file,
-                where=where,
+                where=key_place,
                 mend=f"it takes {', '.join(takes)}",
             )
         if value is None and key in needed:
             example = '["10mm", "5mm"]'
             raise InputError(
-                "key is missing", file=file, where=where, mend=f"write {key} = {example}"
+                "key is missing", file=file, where=key_place, mend=f"write {key} = {example}"
             )
 
 
-def _mm(value: Length, name: str, least: float) -> float:
-    found = parse_length(value, name=name) if isinstance(value, str) else float(value)
-    if not least <= found <= MAX_SIZE_MM:
+def _mm(value: Length, name: str, min_mm: float) -> float:
+    length = parse_length(value, name=name) if isinstance(value, str) else float(value)
+    if not min_mm <= length <= MAX_SIZE_MM:
         raise OptionError(
-            f"{name} {value!r} is not between {least:g} and {MAX_SIZE_MM:g} mm",
+            f"{name} {value!r} is not between {min_mm:g} and {MAX_SIZE_MM:g} mm",
             mend="correct it or its unit",
         )
-    return found
+    return length
 
 
 def _check_units(nominal: Length | None, words: LimitsText) -> None:
@@ -400,10 +406,10 @@ def _direction(value: Length) -> float:
     if isinstance(value, str) and value.strip().lower() in ("x", "y"):
         return 0.0 if value.strip().lower() == "x" else math.pi / 2.0
     try:
-        found = parse_angle(value) if isinstance(value, str) else math.radians(value)
+        angle = parse_angle(value) if isinstance(value, str) else math.radians(value)
     except OptionError as error:
         raise OptionError(error.message, mend='use "x", "y" or degrees') from error
-    return found
+    return angle
 
 
 # Callouts
@@ -442,22 +448,22 @@ def read_text(text: str, mm_per_unit: float = 1.0) -> CalloutText | None:
     >>> read_text("4x Ø5 H7")
     CalloutText(count=4, sign='Ø', nominal_mm=5.0, words='H7', bare=False)
     """
-    plain = normalised_words(_NOTES.sub("", text)) or "<>"
-    bare = _AROUND.get(plain[:1], "") == plain[-1:] != ""
-    found = _TEXT.fullmatch(plain[1:-1].strip() if bare else plain)
-    if found is None or found["count"] == "0":
+    plain_text = normalised_words(_NOTES.sub("", text)) or "<>"
+    is_bare = _AROUND.get(plain_text[:1], "") == plain_text[-1:] != ""
+    match = _TEXT.fullmatch(plain_text[1:-1].strip() if is_bare else plain_text)
+    if match is None or match["count"] == "0":
         return None
-    sign = "Ø" if found["sign"] not in ("R", None) else found["sign"] or ""
-    said = CalloutText(count=int(found["count"] or 1), sign=sign, bare=bare)
-    size = _SIZE.fullmatch(found["rest"])
+    sign = "Ø" if match["sign"] not in ("R", None) else match["sign"] or ""
+    parsed = CalloutText(count=int(match["count"] or 1), sign=sign, bare=is_bare)
+    size = _SIZE.fullmatch(match["rest"])
     if size is None:  # limits of size alone: 20.1/19.9
-        return replace(said, words=found["rest"]) if _SIZES.fullmatch(found["rest"]) else None
+        return replace(parsed, words=match["rest"]) if _SIZES.fullmatch(match["rest"]) else None
     nominal = None
     if size["size"] != "<>":
         nominal = float(size["size"]) * MM_PER_UNIT.get(size["unit"] or "", mm_per_unit)
         if not 0.0 < nominal <= MAX_SIZE_MM:
             return None
-    return replace(said, nominal_mm=nominal, words=size["limits"] or "")
+    return replace(parsed, nominal_mm=nominal, words=size["limits"] or "")
 
 
 def _callout_dimensions(
@@ -469,33 +475,35 @@ def _callout_dimensions(
     faults: list[DrawingError] | None,
 ) -> Iterator[Dimension]:
     """Return the dimensions of a callout: one, or as many as its text counts."""
-    where = f"{file}, {callout.source}"
+    place = f"{file}, {callout.source}"
     text = one_line(callout.text)
     if callout.scale != 1.0:
         shown = callout.measured_mm * callout.scale
         findings.append(
-            DIMENSION_DIFFERS_VIEW(where=where, measured=callout.measured_mm, limit=shown)
+            DIMENSION_DIFFERS_VIEW(where=place, measured=callout.measured_mm, limit=shown)
         )
         return
-    said = read_text(callout.text, callout.mm_per_unit)
-    if said is None:
-        findings.append(CALLOUT_TEXT(where=where, text=text))
+    parsed = read_text(callout.text, callout.mm_per_unit)
+    if parsed is None:
+        findings.append(CALLOUT_TEXT(where=place, text=text))
         return
-    one = _by_sign(measured, said.sign)
+    one = _by_sign(measured, parsed.sign)
     assert one.nominal_mm is not None
     drawn = one.nominal_mm
-    nominal = drawn if said.nominal_mm is None else round(said.nominal_mm, 9)
-    sign = {"diameter": "Ø", "radius": "R"}.get(one.kind, said.sign)
+    nominal = drawn if parsed.nominal_mm is None else round(parsed.nominal_mm, 9)
+    sign = {"diameter": "Ø", "radius": "R"}.get(one.kind, parsed.sign)
     one = replace(one, name=f"{sign}{round(nominal, 4):g}", nominal_mm=nominal)
     if abs(nominal - drawn) > DIFFERS_MM:
-        at = f"{file}, {_place_of(one)}"
-        findings.append(DIMENSION_DIFFERS(where=at, measured=drawn, limit=nominal, name=one.name))
+        place_text = f"{file}, {_place_of(one)}"
+        findings.append(
+            DIMENSION_DIFFERS(where=place_text, measured=drawn, limit=nominal, name=one.name)
+        )
         return
     limits = None
     try:
-        limits = _limits(callout, said, nominal)
+        limits = _limits(callout, parsed, nominal)
     except NotUnderstood:
-        findings.append(CALLOUT_TEXT(where=where, text=text))
+        findings.append(CALLOUT_TEXT(where=place, text=text))
         return
     except OptionError as error:
         fault = DrawingError(
@@ -507,9 +515,9 @@ def _callout_dimensions(
         if faults is None:
             raise fault from error
         faults.append(fault)
-    alone = said.bare or callout.exact or limits is not None
-    one = replace(one, limits=limits, general="" if alone else one.general)
-    yield from _repeat_by_count(one, said.count, features, where, findings)
+    has_own_limits = parsed.bare or callout.exact or limits is not None
+    one = replace(one, limits=limits, general="" if has_own_limits else one.general)
+    yield from _repeat_by_count(one, parsed.count, features, place, findings)
 
 
 def _measured_dimension(callout: Callout) -> Dimension:
@@ -537,20 +545,20 @@ def _by_sign(measured: Dimension, sign: str) -> Dimension:
     return replace(measured, kind=kind, nominal_mm=share * measured.nominal_mm)
 
 
-def _limits(callout: Callout, said: CalloutText, nominal_mm: float) -> Limits | None:
+def _limits(callout: Callout, parsed: CalloutText, nominal_mm: float) -> Limits | None:
     """Return the limits of the text, else those of its style if the text shows them; None without
     either."""
-    if said.words:
-        return read_words(said.words, callout.mm_per_unit).limits(nominal_mm)
+    if parsed.words:
+        return read_words(parsed.words, callout.mm_per_unit).limits(nominal_mm)
     shown = not callout.text or "<>" in callout.text
-    if not shown or said.bare or callout.upper_mm is None or callout.lower_mm is None:
+    if not shown or parsed.bare or callout.upper_mm is None or callout.lower_mm is None:
         return None
     lower, upper = callout.lower_mm, callout.upper_mm
     return read_words(deviation_words(lower, upper)).limits(nominal_mm)
 
 
 def _repeat_by_count(
-    one: Dimension, count: int, features: Features, where: str, findings: list[Finding]
+    one: Dimension, count: int, features: Features, place: str, findings: list[Finding]
 ) -> Iterator[Dimension]:
     """Return the dimension and the same of the other circles of its size, if there are as many as
     it counts; otherwise the dimension alone, with a finding."""
@@ -568,7 +576,7 @@ def _repeat_by_count(
     ]
     if len(equal) != count:
         findings.append(
-            COUNT_DIFFERS(where=where, measured=len(equal), limit=count, name=one.name)
+            COUNT_DIFFERS(where=place, measured=len(equal), limit=count, name=one.name)
         )
         yield one
         return

@@ -205,11 +205,11 @@ class Inputs(Struct, frozen=True, dict=True):
     @property
     def factors(self) -> Floats:
         """Shift (D, P) of the machine along each direction, per unit of each input."""
-        found, directions = np.zeros((len(self.directions), len(self.each))), self.directions
+        factors, directions = np.zeros((len(self.directions), len(self.each))), self.directions
         for column, each in enumerate(self.each):
             for direction, factor in each.along:
-                found[directions.index(direction), column] += factor
-        return found
+                factors[directions.index(direction), column] += factor
+        return factors
 
     @property
     def standards(self) -> Floats:
@@ -246,14 +246,14 @@ def inputs_of(machine: Machine, tool_diameter_mm: float, *, depths: bool = False
     What nothing depends on is left out: the uncertainty of a compensation of 0, that of a tool
     without width, and scatter that is not modelled. Sizes are predicted without scatter.
     """
-    said = machine.uncertainty
-    found: list[Input] = []
+    stated = machine.uncertainty
+    inputs: list[Input] = []
     axes = [
-        ("x", machine.axes.x, said.x, machine.play_map.used[0]),
-        ("y", machine.axes.y, said.y, machine.play_map.used[1]),
+        ("x", machine.axes.x, stated.x, machine.play_map.used[0]),
+        ("y", machine.axes.y, stated.y, machine.play_map.used[1]),
     ]
     if depths:
-        axes.append(("z", machine.axes.z, said.z, None))
+        axes.append(("z", machine.axes.z, stated.z, None))
     length, part, angle = (
         partial(_input, unit, probe)
         for unit, probe in (("mm", PROBE_MM), ("", PROBE_SCALE), ("rad", PROBE_RAD))
@@ -261,42 +261,44 @@ def inputs_of(machine: Machine, tool_diameter_mm: float, *, depths: bool = False
     # The tool comes first: the motion of the machine itself is still known then.
     if tool_diameter_mm > 0.0:
         wider = Direction("tool", _with_tool), 1.0
-        found.append(length("tool_diameter_mm", tool_diameter_mm, said.tool_diameter_mm, wider))
-        found.append(length("runout_mm", 0.0, said.runout_mm, wider))
+        inputs.append(length("tool_diameter_mm", tool_diameter_mm, stated.tool_diameter_mm, wider))
+        inputs.append(length("runout_mm", 0.0, stated.runout_mm, wider))
     if depths:
         lower, thicker = Direction("z.zero", _with_depth), Direction("stock", _with_stock)
-        found.append(length("z_zero_mm", 0.0, said.z_zero_mm, (lower, 1.0)))
-        thickness = length("stock_thickness_mm", 0.0, said.stock_thickness_mm, (thicker, 1.0))
-        found.append(thickness)
-    for name, axis, known, cells in axes:
+        inputs.append(length("z_zero_mm", 0.0, stated.z_zero_mm, (lower, 1.0)))
+        thickness = length("stock_thickness_mm", 0.0, stated.stock_thickness_mm, (thicker, 1.0))
+        inputs.append(thickness)
+    for name, axis, standards, cells in axes:
         plays = [play for row in cells.play_mm for play in row] if cells else [axis.backlash_mm]
         scale = Direction(f"{name}.scale", _with_scale(name), distorts=True)
         ratio = axis.real_step_mm / axis.coded_step_mm
         mean, added = sum(plays) / len(plays), axis.compensation_mm
-        lost = Direction(
+        backlash = Direction(
             f"{name}.backlash",
             _with_backlash(name),
             lowest=-max(plays),
             kink=ratio * added - mean if added > 0.0 else 0.0,
             bends=True,
         )
-        found.append(length(f"{name}.backlash_mm", mean, known.backlash_mm, (lost, 1.0)))
+        inputs.append(length(f"{name}.backlash_mm", mean, standards.backlash_mm, (backlash, 1.0)))
         if added > 0.0:
-            against = lost, -ratio
-            found.append(length(f"{name}.compensation_mm", added, known.compensation_mm, against))
-        found.append(part(f"{name}.scale", ratio, known.scale, (scale, 1.0)))
+            signed = backlash, -ratio
+            inputs.append(
+                length(f"{name}.compensation_mm", added, standards.compensation_mm, signed)
+            )
+        inputs.append(part(f"{name}.scale", ratio, standards.scale, (scale, 1.0)))
     lean = Direction("squareness", _with_squareness, distorts=True), 1.0
     value = machine.mechanics.squareness_rad
-    found.append(angle("squareness_rad", value, said.squareness_rad, lean))
-    found.append(_temperature(machine))
-    found.append(length("process_mm", 0.0, said.process_mm, edges=(1.0, 1.0, 1.0)))
+    inputs.append(angle("squareness_rad", value, stated.squareness_rad, lean))
+    inputs.append(_temperature(machine))
+    inputs.append(length("process_mm", 0.0, stated.process_mm, edges=(1.0, 1.0, 1.0)))
     for name, axis, *_ in axes:
         shares = (float(name == "x"), float(name == "y"), float(name == "z"))
         if axis.repeatability_mm > 0.0:
             scatter = axis.repeatability_mm
-            found.append(length(f"{name}.repeatability_mm", 0.0, scatter, edges=shares))
-    correlation = said.correlation([each.name for each in found])
-    return Inputs(MachineVariant(machine), tuple(found), correlation)
+            inputs.append(length(f"{name}.repeatability_mm", 0.0, scatter, edges=shares))
+    correlation = stated.correlation([each.name for each in inputs])
+    return Inputs(MachineVariant(machine), tuple(inputs), correlation)
 
 
 def _input(
@@ -315,32 +317,35 @@ def _input(
 def _temperature(machine: Machine) -> Input:
     """Return the input of the room temperature, K from 20 °C; unknown unless both expansions are
     known. Unknown expansions may differ as much as those of all materials do."""
-    said = machine.uncertainty
-    known = said.part_expansion_per_k, said.machine_expansion_per_k
+    stated = machine.uncertainty
+    expansions = stated.part_expansion_per_k, stated.machine_expansion_per_k
     usual = EXPANSIONS_OF_PARTS, EXPANSIONS_OF_MACHINES
     part, slides = (
-        every if own is None else (own, own) for own, every in zip(known, usual, strict=True)
+        every if own_expansion is None else (own_expansion, own_expansion)
+        for own_expansion, every in zip(expansions, usual, strict=True)
     )
     differ = max(slides[1] - part[0], part[1] - slides[0], key=abs)
-    if None not in known:
+    if None not in expansions:
         differ = slides[0] - part[0]
     every_key = (
-        ("part_expansion_per_k", known[0]),
-        ("machine_expansion_per_k", known[1]),
-        ("temperature_k", said.temperature_k),
+        ("part_expansion_per_k", expansions[0]),
+        ("machine_expansion_per_k", expansions[1]),
+        ("temperature_k", stated.temperature_k),
     )
     missing = tuple(key for key, value in every_key if value is None)
-    if not missing or said.temperature_k == 0.0:
-        standard, missing = said.temperature_k, ()
+    if not missing or stated.temperature_k == 0.0:
+        standard, missing = stated.temperature_k, ()
     else:
         standard = None
     warmer = ROOM_K
-    if said.temperature_k is not None:
-        warmer = min(ROOM_K, MAX_SIGMAS * said.temperature_k)
-    within = [f"the room is within 20 ± {warmer:g} °C"]
-    for what, own, (low, high) in zip(("part", "machine"), known, usual, strict=True):
-        if own is None:
-            within.append(f"the {what} grows by {low * 1e6:g} to {high * 1e6:g} µm/m per K")
+    if stated.temperature_k is not None:
+        warmer = min(ROOM_K, MAX_SIGMAS * stated.temperature_k)
+    conditions = [f"the room is within 20 ± {warmer:g} °C"]
+    for body, own_expansion, (low, high) in zip(
+        ("part", "machine"), expansions, usual, strict=True
+    ):
+        if own_expansion is None:
+            conditions.append(f"the {body} grows by {low * 1e6:g} to {high * 1e6:g} µm/m per K")
     return Input(
         name="temperature_k",
         unit="K",
@@ -350,23 +355,23 @@ def _temperature(machine: Machine) -> Input:
         along=((Direction("growth", _grown), differ),),
         missing=missing,
         most=warmer if missing else math.inf,
-        within=", ".join(within) if missing else "",
+        within=", ".join(conditions) if missing else "",
     )
 
 
 def _with_backlash(name: str) -> Moved:
-    def moved(variant: MachineVariant, by_mm: float) -> MachineVariant:
+    def shift_backlash(variant: MachineVariant, by_mm: float) -> MachineVariant:
         machine = variant.machine
         index = "xyz".index(name)
         cells = machine.play_map.used[index]
         if cells is not None:
-            own: dict[str, Any] = {name: _more_play(cells, by_mm)}
-            return _varied(variant, play_map=replace(machine.play_map, **own))
+            changes: dict[str, Any] = {name: _more_play(cells, by_mm)}
+            return _varied(variant, play_map=replace(machine.play_map, **changes))
         axis = tuple(machine.axes)[index]
         own_axis = replace(axis, backlash_mm=max(0.0, axis.backlash_mm + by_mm))
         return _varied(variant, axes=replace(machine.axes, **{name: own_axis}))
 
-    return moved
+    return shift_backlash
 
 
 def _more_play(cells: PlayCells, by_mm: float) -> PlayCells:
@@ -375,18 +380,18 @@ def _more_play(cells: PlayCells, by_mm: float) -> PlayCells:
 
 
 def _with_scale(name: str) -> Moved:
-    def moved(variant: MachineVariant, by: float) -> MachineVariant:
+    def shift_scale(variant: MachineVariant, factor: float) -> MachineVariant:
         axes = variant.machine.axes
         axis = tuple(axes)["xyz".index(name)]
-        axis = replace(axis, real_step_mm=axis.real_step_mm * (1.0 + by))
+        axis = replace(axis, real_step_mm=axis.real_step_mm * (1.0 + factor))
         return _varied(variant, axes=replace(axes, **{name: axis}))
 
-    return moved
+    return shift_scale
 
 
-def _grown(variant: MachineVariant, by: float) -> MachineVariant:
+def _grown(variant: MachineVariant, factor: float) -> MachineVariant:
     for name in "xyz":
-        variant = _with_scale(name)(variant, by)
+        variant = _with_scale(name)(variant, factor)
     return variant
 
 
@@ -417,10 +422,10 @@ def without_scatter(variant: MachineVariant) -> MachineVariant:
     axes = variant.machine.axes
     if not any(axis.repeatability_mm for axis in axes):
         return variant
-    plain = {
+    mean_axes = {
         name: replace(axis, repeatability_mm=0.0) for name, axis in zip("xyz", axes, strict=True)
     }
-    return _varied(variant, axes=replace(axes, **plain))
+    return _varied(variant, axes=replace(axes, **mean_axes))
 
 
 # The weights of edges.
@@ -437,13 +442,15 @@ def edges_of(features: Sequence[tuple[int, Floats]]) -> Floats:
     """Return weights (K, E, 2), or (K, E, 3) where one has Z, from the weights (E_f, 2) or
     (E_f, 3) of some features, each with a number of values, such as a least and a greatest
     diameter. Features share no edges."""
-    axes = max((own.shape[1] for _, own in features), default=2)
+    axes = max((own_weights.shape[1] for _, own_weights in features), default=2)
     rows = sum(count for count, _ in features)
-    weights = np.zeros((rows, sum(len(own) for _, own in features), axes))
+    weights = np.zeros((rows, sum(len(own_weights) for _, own_weights in features), axes))
     row = column = 0
-    for count, own in features:
-        weights[row : row + count, column : column + len(own), : own.shape[1]] = own
-        row, column = row + count, column + len(own)
+    for count, own_weights in features:
+        weights[row : row + count, column : column + len(own_weights), : own_weights.shape[1]] = (
+            own_weights
+        )
+        row, column = row + count, column + len(own_weights)
     return weights
 
 
@@ -502,18 +509,18 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
     def at_most(self) -> Floats:
         """Upper bounds (K, P) mm of the change of a value by an unknown input: infinite without a
         bound, 0 if the value does not depend on it."""
-        most = np.array([each.most / each.probe for each in self.inputs])
+        max_change = np.array([each.most / each.probe for each in self.inputs])
         matters = self.probed > NEGLIGIBLE_MM
-        return np.where(matters, np.where(matters, self.probed, 1.0) * most, 0.0)
+        return np.where(matters, np.where(matters, self.probed, 1.0) * max_change, 0.0)
 
     def probability(self, low: int, high: int, limits: tuple[float, float]) -> float:
         """Return the probability that value `low` is not below the lower limit and value `high`
         not above the upper one, mm. The two are of one feature, so that they share its edges. A
         limit may be infinite."""
-        both = [low, high]
-        if self.linear[both].all():
-            least, most = self.expected[both].tolist()
-            return probability(least, most, self.covariance[np.ix_(both, both)], limits)
+        rows = [low, high]
+        if self.linear[rows].all():
+            low_value, high_value = self.expected[rows].tolist()
+            return probability(low_value, high_value, self.covariance[np.ix_(rows, rows)], limits)
         above, below = self.drawn[:, low] - limits[0], limits[1] - self.drawn[:, high]
         scatter = float(self.scatter[low])
         if scatter < CERTAIN:
@@ -525,7 +532,7 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
     def contributions(self, value: int) -> tuple[InputContribution, ...]:
         """Return the contributions of the known inputs to a value, the largest first, without
         those of 0."""
-        found = [
+        contributions = [
             InputContribution(
                 each,
                 float(self.sensitivities[value, column]),
@@ -535,8 +542,10 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
             for column, each in enumerate(self.inputs)
             if each.standard
         ]
-        found = [each for each in found if each.standard_mm or each.variance_mm2]
-        return tuple(sorted(found, key=lambda each: (-abs(each.variance_mm2), -each.standard_mm)))
+        contributions = [each for each in contributions if each.standard_mm or each.variance_mm2]
+        return tuple(
+            sorted(contributions, key=lambda each: (-abs(each.variance_mm2), -each.standard_mm))
+        )
 
     def unknown(self, value: int) -> tuple[Input, ...]:
         """Return the inputs on which a value depends and whose uncertainty is unknown."""
@@ -583,43 +592,43 @@ def propagate(
     centre = at_nodes[0]
     slopes = np.zeros((len(centre), len(places)))
     reach = np.zeros_like(slopes)
-    for column, (at, which) in enumerate(zip(places, rows, strict=True)):
-        if len(at) > 1:
-            first, last = at_nodes[which[0]], at_nodes[which[-1]]
-            slopes[:, column] = (last - first) / (at[-1] - at[0])
-            for row, x in zip(which, at.tolist(), strict=True):
+    for column, (positions, node_rows) in enumerate(zip(places, rows, strict=True)):
+        if len(positions) > 1:
+            first, last = at_nodes[node_rows[0]], at_nodes[node_rows[-1]]
+            slopes[:, column] = (last - first) / (positions[-1] - positions[0])
+            for row, x in zip(node_rows, positions.tolist(), strict=True):
                 if x:
                     change = np.abs(at_nodes[row] - centre) / abs(x)
                     reach[:, column] = np.maximum(reach[:, column], change)
     sensitivities = slopes @ factors
 
     draws = _normals(len(inputs.each), DRAWS) @ inputs.root
-    off = draws @ factors.T
+    offsets = draws @ factors.T
     # Each input by itself, with the values that are equally likely.
     quantiles = _quantiles(QUANTILES)
-    for own, standard in zip(factors.T, inputs.standards, strict=True):
-        off = np.concatenate([off, np.outer(quantiles * standard, own)])
-    found = measure(nodes, _weights_of(off, inputs.directions, places, rows, len(nodes)))
-    drawn, single = found[:DRAWS], found[DRAWS:].reshape(len(inputs.each), QUANTILES, -1)
+    for own_factors, standard in zip(factors.T, inputs.standards, strict=True):
+        offsets = np.concatenate([offsets, np.outer(quantiles * standard, own_factors)])
+    measured = measure(nodes, _weights_of(offsets, inputs.directions, places, rows, len(nodes)))
+    drawn, single = measured[:DRAWS], measured[DRAWS:].reshape(len(inputs.each), QUANTILES, -1)
     shifts = drawn.mean(axis=0) - centre
     # A linear value has the very draws of its sensitivities.
     straight = draws @ sensitivities.T
     linear = np.abs(drawn - centre - straight).max(axis=0, initial=0.0) <= LINEAR_MM
     shifts[linear] = 0.0
-    around = np.where(linear, straight, drawn - centre - shifts)
-    joint = around.T @ around / DRAWS
-    alone = single.var(axis=1).T
-    alone[alone < CERTAIN**2] = 0.0
-    alone[linear] = (sensitivities[linear] * inputs.standards) ** 2
+    residual = np.where(linear, straight, drawn - centre - shifts)
+    joint = residual.T @ residual / DRAWS
+    single_variance = single.var(axis=1).T
+    single_variance[single_variance < CERTAIN**2] = 0.0
+    single_variance[linear] = (sensitivities[linear] * inputs.standards) ** 2
     # What a value owes to each input in proportion; the rest is what bends.
-    variances = sensitivities * (around.T @ draws / DRAWS)
-    rest = np.diag(joint) - variances.sum(axis=1)
-    bent = np.maximum(alone - (sensitivities * inputs.standards) ** 2, 0.0)
-    whole = bent.sum(axis=1, keepdims=True)
-    bent = np.where(whole > 0.0, bent, alone)
-    whole = bent.sum(axis=1, keepdims=True)
-    shares = np.divide(bent, whole, out=np.zeros_like(bent), where=whole > 0.0)
-    variances += rest[:, None] * shares
+    variances = sensitivities * (residual.T @ draws / DRAWS)
+    remainder = np.diag(joint) - variances.sum(axis=1)
+    bent = np.maximum(single_variance - (sensitivities * inputs.standards) ** 2, 0.0)
+    total = bent.sum(axis=1, keepdims=True)
+    bent = np.where(total > 0.0, bent, single_variance)
+    total = bent.sum(axis=1, keepdims=True)
+    shares = np.divide(bent, total, out=np.zeros_like(bent), where=total > 0.0)
+    variances += remainder[:, None] * shares
     largest = reach @ np.abs(factors)
     scatter = np.zeros(len(centre))
     for column, each in enumerate(inputs.each):
@@ -627,10 +636,10 @@ def propagate(
             weights = _weights(edges, each)
             sensitivities[:, column] = np.sqrt((weights**2).sum(axis=1))
             largest[:, column] = sensitivities[:, column]
-            own = (each.standard or 0.0) ** 2 * weights @ weights.T
-            joint += own
-            variances[:, column] = alone[:, column] = np.diag(own)
-            scatter += np.diag(own)
+            own_factors = (each.standard or 0.0) ** 2 * weights @ weights.T
+            joint += own_factors
+            variances[:, column] = single_variance[:, column] = np.diag(own_factors)
+            scatter += np.diag(own_factors)
     return Budget(
         inputs=inputs.each,
         values=centre,
@@ -638,7 +647,7 @@ def propagate(
         sensitivities=sensitivities,
         covariance=joint,
         variances=variances,
-        alone=alone,
+        alone=single_variance,
         probed=largest * inputs.probes,
         runs=len(nodes),
         drawn=drawn,
@@ -656,35 +665,36 @@ def _nodes(direction: Direction, standard: float, probe: float, extremes: bool) 
         return np.zeros(1)
     places = {0.0, step}
     if twice:
-        back = min(step, -direction.lowest)
-        if back > CERTAIN:
-            places.add(-back)
+        step_back = min(step, -direction.lowest)
+        if step_back > CERTAIN:
+            places.add(-step_back)
         if KINK_NEAR[0] * standard < abs(direction.kink) < KINK_NEAR[1] * standard:
             places.add(max(direction.kink, direction.lowest))
     return np.array(sorted(places))
 
 
 def _weights_of(
-    off: Floats,
+    offsets: Floats,
     directions: Sequence[Direction],
     places: Sequence[Floats],
     rows: Sequence[Sequence[int]],
     count: int,
 ) -> Floats:
-    """Compute the weights (N, M) of the M simulated machines in N machines at `off` (N, D) along
-    the directions: piecewise linear between the nodes, extrapolated beyond the outer ones."""
-    weights = np.zeros((len(off), count))
+    """Compute the weights (N, M) of the M simulated machines in N machines at `offsets` (N, D)
+    along the directions: piecewise linear between the nodes, extrapolated beyond the outer
+    ones."""
+    weights = np.zeros((len(offsets), count))
     weights[:, 0] = 1.0
-    each = np.arange(len(off))
-    for column, (at, which) in enumerate(zip(places, rows, strict=True)):
-        if len(at) < 2:
+    each = np.arange(len(offsets))
+    for column, (positions, node_rows) in enumerate(zip(places, rows, strict=True)):
+        if len(positions) < 2:
             continue
-        x = np.maximum(off[:, column], directions[column].lowest)
-        left = np.clip(np.searchsorted(at, x, side="right") - 1, 0, len(at) - 2)
-        share = (x - at[left]) / (at[left + 1] - at[left])
-        row = np.asarray(which)
-        np.add.at(weights, (each, row[left]), 1.0 - share)
-        np.add.at(weights, (each, row[left + 1]), share)
+        x = np.maximum(offsets[:, column], directions[column].lowest)
+        low_index = np.clip(np.searchsorted(positions, x, side="right") - 1, 0, len(positions) - 2)
+        share = (x - positions[low_index]) / (positions[low_index + 1] - positions[low_index])
+        row = np.asarray(node_rows)
+        np.add.at(weights, (each, row[low_index]), 1.0 - share)
+        np.add.at(weights, (each, row[low_index + 1]), share)
         weights[:, 0] -= 1.0
     return weights
 
@@ -706,8 +716,8 @@ def _quantiles(count: int) -> Floats:
     from statistics import NormalDist
 
     middles = [NormalDist().inv_cdf((k + 0.5) / count) for k in range(count)]
-    found = np.array(middles)
-    return np.asarray(found / found.std())
+    normalised = np.array(middles)
+    return np.asarray(normalised / normalised.std())
 
 
 def _weights(edges: Floats, each: Input) -> Floats:
@@ -742,13 +752,13 @@ def monte_carlo(values: Values, inputs: Inputs, edges: Floats, draws: int, seed:
     scatter of the axes. Unknown inputs keep their value; a backlash below 0 becomes 0."""
     random = np.random.default_rng(seed)
     process = next((each for each in inputs.each if all(each.edges)), None)
-    found = []
+    samples = []
     for _ in range(draws):
-        off = inputs.factors @ (random.standard_normal(len(inputs.each)) @ inputs.root)
+        offsets = inputs.factors @ (random.standard_normal(len(inputs.each)) @ inputs.root)
         variant = inputs.variant
-        for direction, by in zip(inputs.directions, off.tolist(), strict=True):
-            if by:
-                variant = direction.moved(variant, max(by, direction.lowest))
+        for direction, shift in zip(inputs.directions, offsets.tolist(), strict=True):
+            if shift:
+                variant = direction.moved(variant, max(shift, direction.lowest))
         mechanics = replace(variant.machine.mechanics, seed=int(random.integers(1 << 32)))
         if without_scatter(variant) is not variant:
             variant = _varied(variant, mechanics=mechanics)
@@ -757,8 +767,8 @@ def monte_carlo(values: Values, inputs: Inputs, edges: Floats, draws: int, seed:
             weights = _weights(edges, process)
             shifts = random.standard_normal(weights.shape[1])
             drawn = drawn + process.standard * weights @ shifts
-        found.append(drawn)
-    return Draws(np.array(found))
+        samples.append(drawn)
+    return Draws(np.array(samples))
 
 
 # Normal distributions.
@@ -797,8 +807,8 @@ def both_below(a: float, b: float, correlation: float) -> float:
     pieces are finer there.
     """
     r = min(1.0, max(-1.0, correlation))
-    rest = math.sqrt((1.0 - r) * (1.0 + r))
-    if rest < CERTAIN:
+    sine = math.sqrt((1.0 - r) * (1.0 + r))
+    if sine < CERTAIN:
         if r > 0.0:
             return normal_below(min(a, b))
         return max(0.0, normal_below(a) - normal_below(-b))
@@ -809,7 +819,7 @@ def both_below(a: float, b: float, correlation: float) -> float:
         return normal_below(a)
     ends = {-FAR, end, *(float(x) for x in range(-8, 9, 2))}
     if r:
-        ends |= {(b + rest * each) / r for each in STEEPNESS}
+        ends |= {(b + sine * each) / r for each in STEEPNESS}
     pieces = sorted(x for x in ends if -FAR <= x <= end)
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     total = 0.0
@@ -817,8 +827,8 @@ def both_below(a: float, b: float, correlation: float) -> float:
         half = 0.5 * (stop - start)
         x = start + half * (nodes + 1.0)
         density = np.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi)
-        given = [normal_below((b - r * each) / rest) for each in x.tolist()]
-        total += half * float(weights @ (density * given))
+        conditional = [normal_below((b - r * each) / sine) for each in x.tolist()]
+        total += half * float(weights @ (density * conditional))
     return min(1.0, max(0.0, total))
 
 

@@ -76,12 +76,12 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
     if run.verification is None or run.drawing is None or run.job is None:
         return run
     inspector = Inspector(run, tolerances.dimensions)
-    found = tuple(verdicts_of(inspector, run))
-    verdicts = tuple(each for each in found if isinstance(each, InspectedReport))
-    wrong = _findings(verdicts, tolerances.require)
+    results = tuple(verdicts_of(inspector, run))
+    verdicts = tuple(each for each in results if isinstance(each, InspectedReport))
+    verdict_findings = _findings(verdicts, tolerances.require)
     unmeasured = (
         (inspected.bound.dimension, each)
-        for inspected, each in zip(inspector.dimensions, found, strict=True)
+        for inspected, each in zip(inspector.dimensions, results, strict=True)
         if isinstance(each, Finding)
     )
     gate = tolerances.require is not None
@@ -94,7 +94,9 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
     )
     if gate and not any(each.upper_mm is not None for each in verdicts):
         left_out = (*left_out, NOTHING_REQUIRED(where="tolerances"))
-    findings = tuple(dict.fromkeys((*_without_read(run.findings, run), *left_out, *wrong)))
+    findings = tuple(
+        dict.fromkeys((*_without_read(run.findings, run), *left_out, *verdict_findings))
+    )
     verification = run.verification.with_findings(findings)
     report = replace(verification.report, inspection=verdicts)
     return replace(run, verification=replace(verification, report=report), findings=findings)
@@ -126,8 +128,8 @@ hold."""
 
 def _as_error(finding: Finding) -> Finding:
     """Return the finding, as an error if it says that a dimension is not inspected."""
-    wrong = finding.code in NOT_INSPECTED
-    return replace(finding, severity=Severity.ERROR) if wrong else finding
+    is_error = finding.code in NOT_INSPECTED
+    return replace(finding, severity=Severity.ERROR) if is_error else finding
 
 
 def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Finding]:
@@ -159,7 +161,7 @@ def _verdict(each: Inspected, size: MachinedSize, budget: Budget, first: int) ->
         upper = (0.0 if zone else bound.nominal_mm) + limits.upper_mm
     deciding = _deciding(size, budget, (lower, upper), first)
     standard = float(budget.standards[deciding])
-    most = float(budget.at_most[deciding].sum())
+    max_change = float(budget.at_most[deciding].sum())
     unknown = budget.unknown(deciding)
     contributions = _contributions(budget, deciding)
     chance, verdict = None, "predicted"
@@ -172,7 +174,7 @@ def _verdict(each: Inspected, size: MachinedSize, budget: Budget, first: int) ->
         largest = max(open_by or contributions, key=_likely_um).input
         keys = {one.name: one.missing[0] for one in unknown}
         measure = keys.get(largest, largest)
-    bounded = math.isfinite(most)
+    bounded = math.isfinite(max_change)
     return InspectedReport(
         name=each.name,
         kind=bound.dimension.kind,
@@ -187,8 +189,8 @@ def _verdict(each: Inspected, size: MachinedSize, budget: Budget, first: int) ->
         high_mm=rounded(size.high_mm),
         verdict=verdict,
         standard_um=rounded_or_none(standard, UM_PER_MM) if bounded else None,
-        unknown_um=rounded_or_none(most, UM_PER_MM) if bounded else None,
-        guard_um=rounded_or_none(GUARD * standard + most, UM_PER_MM) if bounded else None,
+        unknown_um=rounded_or_none(max_change, UM_PER_MM) if bounded else None,
+        guard_um=rounded_or_none(GUARD * standard + max_change, UM_PER_MM) if bounded else None,
         probability=chance,
         contributions=contributions,
         unknown=tuple(key for one in unknown for key in one.missing),
@@ -199,21 +201,23 @@ def _verdict(each: Inspected, size: MachinedSize, budget: Budget, first: int) ->
 def _contributions(budget: Budget, value: int) -> tuple[ContributionReport, ...]:
     """Return the contributions of the inputs to a value: the known ones, the largest first, then
     the unknown ones, unbounded ones first."""
-    known = (
+    known_rows = (
         ContributionReport(one.input.name, rounded_or_none(one.standard_mm, UM_PER_MM))
         for one in budget.contributions(value)
     )
-    most = dict(zip(budget.inputs, budget.at_most[value].tolist(), strict=True))
+    max_change = dict(zip(budget.inputs, budget.at_most[value].tolist(), strict=True))
     unknown = (
         ContributionReport(
             one.name,
             None,
-            rounded_or_none(most[one], UM_PER_MM) if math.isfinite(most[one]) else None,
+            rounded_or_none(max_change[one], UM_PER_MM)
+            if math.isfinite(max_change[one])
+            else None,
             one.within,
         )
-        for one in sorted(budget.unknown(value), key=lambda one: -most[one])
+        for one in sorted(budget.unknown(value), key=lambda one: -max_change[one])
     )
-    return (*known, *unknown)
+    return (*known_rows, *unknown)
 
 
 def _likely_um(one: ContributionReport) -> float:
@@ -239,17 +243,17 @@ def _decided(
         wide = lower - share * off_low, upper + share * off_high
         return budget.probability(low, high, wide)
 
-    known = chance(0.0)
+    probability_known = chance(0.0)
     if not off_low and not off_high:
-        return known, _word(known)
+        return probability_known, _word(probability_known)
     if math.isfinite(off_low + off_high):
-        least, most = chance(-1.0), chance(1.0)
-        if _word(least) == "in":
-            return least, "in"
-        if _word(most) == "out":
-            return most, "out"
-        if _word(known) == "undecided":
-            return known, "undecided"
+        min_chance, max_chance = chance(-1.0), chance(1.0)
+        if _word(min_chance) == "in":
+            return min_chance, "in"
+        if _word(max_chance) == "out":
+            return max_chance, "out"
+        if _word(probability_known) == "undecided":
+            return probability_known, "undecided"
     return None, "undecided"
 
 
@@ -271,10 +275,10 @@ def _deciding(
     inside = {high: upper - size.high_mm}
     if lower is not None:
         inside[low] = size.low_mm - lower
-    most = budget.at_most.sum(axis=1)
+    max_change = budget.at_most.sum(axis=1)
 
     def sigmas(value: int) -> float:
-        return float((inside[value] - most[value]) / max(budget.standards[value], 1e-12))
+        return float((inside[value] - max_change[value]) / max(budget.standards[value], 1e-12))
 
     return min(inside, key=sigmas)
 
@@ -291,9 +295,9 @@ def _shown_between(each: Inspected) -> tuple[tuple[float, float], tuple[float, f
     if isinstance(first, EdgeFeature):
         return first.start_mm, first.end_mm
     x, y = first.centre_mm
-    away = first.radius_mm * math.sqrt(0.5)
+    offset = first.radius_mm * math.sqrt(0.5)
     if bound.dimension.kind in ("diameter", "roundness"):
-        return (x - away, y - away), (x + away, y + away)
+        return (x - offset, y - offset), (x + offset, y + offset)
     if isinstance(first, CircleFeature) and bound.dimension.kind == "position":
         return (x, y), (x, y)
     start, sweep = first.arcs[0].tolist()
@@ -308,27 +312,27 @@ def _findings(verdicts: Iterable[InspectedReport], require: Required | None) -> 
     for each in verdicts:
         if each.verdict not in ("out", "undecided") or each.upper_mm is None:
             continue
-        over = each.high_mm - each.upper_mm
+        excess = each.high_mm - each.upper_mm
         under = -math.inf if each.lower_mm is None else each.lower_mm - each.low_mm
         worst, limit = (each.high_mm, each.upper_mm)
-        if under > over and each.lower_mm is not None:
+        if under > excess and each.lower_mm is not None:
             worst, limit = each.low_mm, each.lower_mm
-        out = each.verdict == "out"
-        wrong = require == "in" or (require == "not-out" and out)
-        severity = Severity.ERROR if wrong else Severity.WARNING
-        if out:
+        is_out = each.verdict == "out"
+        is_error = require == "in" or (require == "not-out" and is_out)
+        severity = Severity.ERROR if is_error else Severity.WARNING
+        if is_out:
             yield DIMENSION_NOT_IN_OUT(
                 where=each.source, measured=worst, limit=limit, severity=severity, name=each.name
             )
             continue
-        why = f"measure {each.measure}"
+        advice = f"measure {each.measure}"
         if each.measure in each.unknown:
-            why = f"[uncertainty] of the machine file does not say {', '.join(each.unknown)}"
+            advice = f"[uncertainty] of the machine file does not say {', '.join(each.unknown)}"
         yield DIMENSION_NOT_IN_UNDECIDED(
             where=each.source,
             measured=worst,
             limit=limit,
             severity=severity,
             name=each.name,
-            why=why,
+            why=advice,
         )

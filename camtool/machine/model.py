@@ -338,8 +338,8 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def standard(self, key: str) -> float | None:
         """The standard uncertainty at a key such as "x.scale"; None: not known."""
         record, _, name = key.rpartition(".")
-        found: float | None = getattr(getattr(self, record) if record else self, name)
-        return found
+        value: float | None = getattr(getattr(self, record) if record else self, name)
+        return value
 
     def correlation(self, keys: Sequence[str]) -> Floats:
         """(P, P) the coefficients between these keys."""
@@ -348,13 +348,13 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         matrix = np.eye(len(keys))
         for one, other, coefficient in self.correlations:
             if one in keys and other in keys:
-                at = keys.index(one), keys.index(other)
-                matrix[at] = matrix[at[::-1]] = coefficient
+                place = keys.index(one), keys.index(other)
+                matrix[place] = matrix[place[::-1]] = coefficient
         return matrix
 
     def check(self) -> None:
         """MachineError for correlations that no numbers can have, or of what is not known."""
-        seen = set[frozenset[str]]()
+        pairs = set[frozenset[str]]()
         for number, (one, other, _) in enumerate(self.correlations):
             for key in (one, other):
                 if key not in CORRELATED_KEYS:
@@ -370,14 +370,14 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                         number,
                     )
             pair = frozenset((one, other))
-            if len(pair) == 1 or pair in seen:
-                what = "twice" if pair in seen else "with itself"
+            if len(pair) == 1 or pair in pairs:
+                fault = "twice" if pair in pairs else "with itself"
                 raise _wrong_correlation(
-                    f"{one} is correlated {what}" + (f" with {other}" if pair in seen else ""),
+                    f"{one} is correlated {fault}" + (f" with {other}" if pair in pairs else ""),
                     "give each pair of different keys once",
                     number,
                 )
-            seen.add(pair)
+            pairs.add(pair)
         self._check_semidefinite()
 
     def _check_semidefinite(self) -> None:
@@ -388,23 +388,23 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
         keys = [key for key in CORRELATED_KEYS if any(key in row for row in self.correlations)]
         sizes, directions = np.linalg.eigh(self.correlation(keys))
-        least = float(sizes[0])
-        if least >= -SEMIDEFINITE:
+        min_size = float(sizes[0])
+        if min_size >= -SEMIDEFINITE:
             return
         # With all coefficients times t the eigenvalues are 1 + t (λ - 1).
-        factor = math.floor(100.0 / (1.0 - least)) / 100.0
+        factor = math.floor(100.0 / (1.0 - min_size)) / 100.0
         shares = np.abs(directions[:, 0])
         involved = [key for key, share in zip(keys, shares, strict=True) if share > SEMIDEFINITE]
         raise _wrong_correlation(
             f"those of {', '.join(involved)} contradict each other: the covariance is not "
-            f"positive semidefinite (an eigenvalue of the correlations is {least:.2g})",
+            f"positive semidefinite (an eigenvalue of the correlations is {min_size:.2g})",
             f"multiply them by {factor:g} or less, or measure them again",
         )
 
 
 def _wrong_correlation(message: str, mend: str, number: int | None = None) -> MachineError:
-    at = "" if number is None else f"[{number}]"
-    return MachineError(message, where=f"table [uncertainty], key correlations{at}", mend=mend)
+    place = "" if number is None else f"[{number}]"
+    return MachineError(message, where=f"table [uncertainty], key correlations{place}", mend=mend)
 
 
 # `Machine` alone, in an annotation, is a machine of any target. Python knows such defaults from
@@ -444,9 +444,9 @@ class Machine(
         """SHA-256, hex, of all that a file must say to get this machine: equal for equal machines,
         on every computer, wherever their records stand in the code. How well its numbers are known
         is no part of it: no program depends on that."""
-        known = {key: value for key, value in _given(self).items() if key != "uncertainty"}
-        given = msgspec.json.encode(known, order="deterministic")
-        return hashlib.sha256(given).hexdigest()
+        values = {key: value for key, value in _given(self).items() if key != "uncertainty"}
+        data = msgspec.json.encode(values, order="deterministic")
+        return hashlib.sha256(data).hexdigest()
 
     @property
     def short_digest(self) -> str:
@@ -501,29 +501,29 @@ class Machine(
 
 def _given(record: msgspec.Struct) -> dict[str, Any]:
     """The values of a record that are not its defaults, with its tag."""
-    config, given = record.__struct_config__, dict[str, Any]()
+    config, values = record.__struct_config__, dict[str, Any]()
     if config.tag_field is not None:
-        given[config.tag_field] = config.tag
+        values[config.tag_field] = config.tag
     for field in msgspec.structs.fields(record):
         value = getattr(record, field.name)
-        made = field.default_factory
-        if value == (field.default if made is msgspec.NODEFAULT else made()):
+        factory = field.default_factory
+        if value == (field.default if factory is msgspec.NODEFAULT else factory()):
             continue
         if not isinstance(value, msgspec.Struct):
-            given[field.encode_name] = value
+            values[field.encode_name] = value
         elif (inner := _given(value)) or not isinstance(field.default, msgspec.Struct):
-            given[field.encode_name] = inner
-    return given
+            values[field.encode_name] = inner
+    return values
 
 
 def controller_of(machine: Machine, kind: type[_Record]) -> _Record:
     """The machine's controller, which must be of this kind; MachineError when it is not."""
     if not isinstance(machine.controller, kind):
-        wanted = kind.__struct_config__.tag
+        kind_name = kind.__struct_config__.tag
         raise MachineError(
-            f"{machine.target.name} needs the controller {wanted}",
+            f"{machine.target.name} needs the controller {kind_name}",
             where="table [controller], key model",
-            mend=f'write model = "{wanted}"',
+            mend=f'write model = "{kind_name}"',
         )
     return machine.controller
 

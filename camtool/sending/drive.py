@@ -96,8 +96,8 @@ class Driver:
                     self._listen(conversation)
                     self._handle_request(conversation)
             except OSError as error:
-                why, _ = port_fault(error)
-                conversation.lose_port(f"the port is gone ({why})", self.now())
+                reason, _ = port_fault(error)
+                conversation.lose_port(f"the port is gone ({reason})", self.now())
             except BaseException as error:
                 if self._fault is not None:
                     conversation.lose_port("camtool was ended", self.now())
@@ -142,13 +142,13 @@ class Driver:
             else:
                 return
 
-    def _show(self, conversation: Conversation, show: Callable[[Any], None], what: Any) -> None:
+    def _show(self, conversation: Conversation, show: Callable[[Any], None], value: Any) -> None:
         """Show a value to the user. If that fails, nobody watches the machine, and it is
         stopped."""
         if not self._has_display:
             return
         try:
-            show(what)
+            show(value)
         except BaseException as error:
             self._has_display = False
             if isinstance(error, OSError):
@@ -162,34 +162,36 @@ class Driver:
             return
         wait_s = min((conversation.next_s - self.now()) / self.speed, TICK_S)
         data = self.line.read(max(wait_s, 0.0))
-        now = self.now()
+        time_s = self.now()
         if data:
-            conversation.receive(data, now)
-        if now >= conversation.next_s:
-            conversation.tick(now)
+            conversation.receive(data, time_s)
+        if time_s >= conversation.next_s:
+            conversation.tick(time_s)
 
     def _handle_request(self, conversation: Conversation) -> None:
-        wish, now = self.wish(), self.now()
+        wish, time_s = self.wish(), self.now()
         if wish is Request.PAUSE:
-            conversation.pause(now)
+            conversation.pause(time_s)
         elif wish is Request.RESUME:
             conversation.single = False
-            conversation.resume(now)
+            conversation.resume(time_s)
         elif wish is Request.STEP:
             conversation.single = True
-            conversation.resume(now)
+            conversation.resume(time_s)
         elif wish is Request.STOP:
-            conversation.stop(now)
+            conversation.stop(time_s)
             if conversation.state is WireState.STOPPING:
                 self._act(conversation)
                 self._show(conversation, self.tell, STOPPING_MESSAGE)
         elif wish is Request.CLOSE:
-            conversation.hurry(now)
+            conversation.hurry(time_s)
             for action in conversation.actions():
                 if isinstance(action, Write):
                     self.line.write(action.data)
             self.line.close()
-            conversation.lose_port("camtool was ended before the machine said that it stands", now)
+            conversation.lose_port(
+                "camtool was ended before the machine said that it stands", time_s
+            )
 
     def _note(self, conversation: Conversation) -> bool:
         """Write the counts of the conversation to the journal; if that fails, stop the machine."""
@@ -208,8 +210,8 @@ class Driver:
 def counts_of(conversation: Conversation, block_of: Callable[[int], int]) -> dict[str, int]:
     """Return the progress of a conversation: packets sent, acknowledged and done, and the last
     blocks of the program that are done and that were sent."""
-    block, sent = conversation.block, conversation.packets[: conversation.sent]
-    last = max((packet.block for packet in sent[-1:]), default=-1)
+    block, packets_sent = conversation.block, conversation.packets[: conversation.sent]
+    last = max((packet.block for packet in packets_sent[-1:]), default=-1)
     return {
         "sent": conversation.sent,
         "acknowledged": conversation.acknowledged,

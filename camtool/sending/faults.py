@@ -39,25 +39,25 @@ class Faults:
         >>> Faults.of("drop=0.2,late=2s,unplug=1min")
         Faults(drop=0.2, double=0.0, garble=0.0, late=0.01, late_s=2.0, unplug_s=60.0)
         """
-        found: dict[str, float] = {}
+        values: dict[str, float] = {}
         for part in filter(None, (part.strip() for part in text.split(","))):
             name, has_value, value = part.partition("=")
             if name in ("drop", "double", "garble"):
-                found[name] = _probability(part, value) if has_value else DEFAULT_PROBABILITY
+                values[name] = _probability(part, value) if has_value else DEFAULT_PROBABILITY
             elif name == "late" and has_value:
                 time, _, probability = value.partition(":")
-                found["late_s"] = parse_time(time)
-                found["late"] = (
+                values["late_s"] = parse_time(time)
+                values["late"] = (
                     _probability(part, probability) if probability else DEFAULT_PROBABILITY
                 )
             elif name == "unplug" and has_value:
-                found["unplug_s"] = parse_time(value)
+                values["unplug_s"] = parse_time(value)
             else:
-                known = "drop, double, garble, late=TIME, unplug=TIME"
-                raise OptionError(f"{part!r} is no fault", mend=f"faults are {known}")
-        if min(found.get("late_s", 0.0), found.get("unplug_s", 0.0)) < 0.0:
+                examples = "drop, double, garble, late=TIME, unplug=TIME"
+                raise OptionError(f"{part!r} is no fault", mend=f"faults are {examples}")
+        if min(values.get("late_s", 0.0), values.get("unplug_s", 0.0)) < 0.0:
             raise OptionError(f"{text!r} has a time below 0")
-        return cls(**found)
+        return cls(**values)
 
     @property
     def is_faultless(self) -> bool:
@@ -96,14 +96,14 @@ class FaultyLine:
         faults, random = self.faults, self._random
         if not data:
             return
-        late = faults.late_s if faults.late and random.random() < faults.late else 0.0
+        delay_s = faults.late_s if faults.late and random.random() < faults.late else 0.0
         for octet in data:
             drop, double, garble = random.random(), random.random(), random.random()
-            bit = random.randrange(8)
-            self._free_s = max(self._free_s, now + late) + self._byte_s
+            bit_number = random.randrange(8)
+            self._free_s = max(self._free_s, now + delay_s) + self._byte_s
             if self._unplugged(self._free_s) or drop < faults.drop:
                 continue
-            come = octet ^ (1 << bit) if garble < faults.garble else octet
+            come = octet ^ (1 << bit_number) if garble < faults.garble else octet
             copies = 2 if double < faults.double else 1
             self._under_way += [(self._free_s, come)] * copies
 
@@ -134,16 +134,16 @@ class WiredTwin:
     def __init__(
         self,
         twin: Twin,
-        there: Faults = Faults(),
-        back: Faults = Faults(),
+        faults_there: Faults = Faults(),
+        faults_back: Faults = Faults(),
         *,
         seed: int = 0,
         paced: bool = False,
     ) -> None:
         byte_s = twin.byte_s if paced else 0.0
         self.twin = twin
-        self.there = FaultyLine(there, Random(f"{seed} there"), byte_s)
-        self.back = FaultyLine(back, Random(f"{seed} back"), byte_s)
+        self.there = FaultyLine(faults_there, Random(f"{seed} there"), byte_s)
+        self.back = FaultyLine(faults_back, Random(f"{seed} back"), byte_s)
 
     def connect(self, now: float) -> None:
         """Open the line."""
@@ -164,21 +164,21 @@ class WiredTwin:
     def next_s(self) -> float | None:
         """Return the time of the next event that happens by itself; None if there is none."""
         times = self.there.next_s(), self.back.next_s(), self.twin.next_s()
-        return min((at for at in times if at is not None), default=None)
+        return min((time_s for time_s in times if time_s is not None), default=None)
 
     def wake_s(self) -> float | None:
         """Return the time of the next event except outputs within a travel: a clock without real
         time jumps to it."""
         times = self.there.next_s(), self.back.next_s(), self.twin.wake_s()
-        return min((at for at in times if at is not None), default=None)
+        return min((time_s for time_s in times if time_s is not None), default=None)
 
     def unplugged(self, now: float) -> bool:
         """True if the plug has been pulled."""
         times = self.there.faults.unplug_s, self.back.faults.unplug_s
-        return any(at is not None and now >= at for at in times)
+        return any(time_s is not None and now >= time_s for time_s in times)
 
     def _run(self, now: float) -> None:
-        while (at := self.there.next_s()) is not None and at <= now:
-            self.back.put(self.twin.advance(at), at)
-            self.back.put(self.twin.receive(self.there.take(at), at), at)
+        while (time_s := self.there.next_s()) is not None and time_s <= now:
+            self.back.put(self.twin.advance(time_s), time_s)
+            self.back.put(self.twin.receive(self.there.take(time_s), time_s), time_s)
         self.back.put(self.twin.advance(now), now)

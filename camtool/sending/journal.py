@@ -63,13 +63,13 @@ class Journal:
         file: Path,
         head: Mapping[str, Any],
         *,
-        more: bool = False,
+        appends: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Begin a journal, which replaces an earlier one as soon as something has been sent; with
-        `more`, append to the earlier one."""
+        `appends`, append to the earlier one."""
         self.file, self._clock = file, clock
-        self._replaces = not more
+        self._replaces = not appends
         self._begun = self._synced = clock()
         self._last: dict[str, Any] = {}
         try:
@@ -77,8 +77,8 @@ class Journal:
             self._end_line()
         except OSError as error:
             raise self._refused(error) from error
-        at = time.strftime("%Y-%m-%dT%H:%M:%S%z")
-        self._head = {"journal": VERSION, **head, "at": at}
+        started = time.strftime("%Y-%m-%dT%H:%M:%S%z")
+        self._head = {"journal": VERSION, **head, "at": started}
         self._add(self._head, sync=True)
 
     def note(self, place: Point | None = None, **counts: Any) -> None:
@@ -87,12 +87,12 @@ class Journal:
         if counts == self._last or not counts.get("sent"):
             return
         self._last = counts
-        now = self._clock()
-        line = {"s": round(now - self._begun, 3), **counts, "place": place}
+        time_s = self._clock()
+        line = {"s": round(time_s - self._begun, 3), **counts, "place": place}
         if self._replaces:
             self._replaces = False
             self._begin_anew()
-        self._add(line, sync=now - self._synced >= SYNC_S)
+        self._add(line, sync=time_s - self._synced >= SYNC_S)
 
     def _begin_anew(self) -> None:
         """Remove the lines of an earlier program."""
@@ -101,12 +101,12 @@ class Journal:
             os.ftruncate(self._handle, 0)
         self._add(self._head, sync=False)
 
-    def close(self, end: str, why: str, *, still: bool = False, **counts: Any) -> None:
-        """Write the end and its counts; `still`: the machine is known to stand at the place in
+    def close(self, end: str, reason: str, *, is_still: bool = False, **counts: Any) -> None:
+        """Write the end and its counts; `is_still`: the machine is known to stand at the place in
         them."""
         seconds = round(self._clock() - self._begun, 3)
         try:
-            line = {"s": seconds, "end": end, "why": why, **counts, "still": still}
+            line = {"s": seconds, "end": end, "why": reason, **counts, "still": is_still}
             self._add(line, sync=True)
         finally:
             os.close(self._handle)
@@ -169,9 +169,9 @@ def read_journal(file: Path) -> JournalState:
         raise InputError("is no journal of camtool send", file=str(file))
     place, new = JournalState(head.sha256, head.machine, head.target, head.first, False), head
     for row in rows:
-        again = _head(row)
-        if again is not None:
-            new = again
+        head_again = _head(row)
+        if head_again is not None:
+            new = head_again
             continue
         try:
             line = msgspec.json.decode(row, type=_Line)

@@ -104,18 +104,18 @@ def opened_line(port: Port) -> Iterator[OpenPort]:
     if port.frame not in _FRAMES:
         raise InputError(f"{port.frame!r} is no frame", mend=f"give one of {', '.join(_FRAMES)}")
 
-    def taken(who: str) -> InputError:
+    def refuse_taken(who: str) -> InputError:
         return InputError(
             f"another camtool sends there ({who})", file=port.name, mend="end it first"
         )
 
-    with held(_lock_of(port), taken):
+    with held(_lock_of(port), refuse_taken):
         try:
             line = OpenPort(port)
         except (OSError, ValueError) as error:
-            why, mend = port_fault(error)
+            reason, mend = port_fault(error)
             raise InputError(
-                f"the port cannot be opened ({why})", file=port.name, mend=mend
+                f"the port cannot be opened ({reason})", file=port.name, mend=mend
             ) from error
         try:
             yield line
@@ -155,11 +155,11 @@ def list_serial_ports() -> list[SerialPort]:
     """List the serial ports of this computer, by name."""
     from serial.tools import list_ports
 
-    found = [
+    serial_ports = [
         SerialPort(each.device, _known_text(each.description), _known_text(each.hwid))
         for each in list_ports.comports()
     ]
-    return sorted(found, key=lambda each: each.name)
+    return sorted(serial_ports, key=lambda each: each.name)
 
 
 def _known_text(text: str | None) -> str:

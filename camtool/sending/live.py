@@ -80,13 +80,13 @@ class LivePage:
         place: Place | None = None,
         *,
         share: float = 0.0,
-        why: str = "",
+        reason: str = "",
     ) -> str:
         """Return the page. `block`: the last acknowledged block of what is sent; `place` (x, y, z)
         of the tool; `share`: share of the time that is over, 0 to 1."""
         row = int(np.searchsorted(self._blocks, block, side="right")) - 1
         percent = math.floor(100.0 * share)  # 100 only at the end
-        sent = {
+        values = {
             "title": f"{percent} % {self._title}: {state}",
             "row": row,
             "place": place,
@@ -102,8 +102,8 @@ class LivePage:
             percent=percent,
             share=100.0 * share,
             facts="".join(rows),
-            why=html.escape(why),
-            sent=json.dumps(sent).replace("<", "\\u003c"),
+            why=html.escape(reason),
+            sent=json.dumps(values).replace("<", "\\u003c"),
         )
         return self._before + shown + self._after
 

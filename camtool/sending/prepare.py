@@ -124,10 +124,12 @@ class Consignment(Struct, frozen=True, eq=False):
         (x, x1), (y, y1), (z, z1) = toolpath_extents(path.part(first, len(path))).tolist()
         return (x, y, z), (x1, y1, z1)
 
-    def block_of(self, sent: int) -> int:
-        """Return the last block of the program that is done with block `sent` (from 0) of what is
-        sent; −1 within the entry."""
-        return sent if self.rest is None or sent < 0 else int(self.rest.done[sent])
+    def block_of(self, sent_block: int) -> int:
+        """Return the last block of the program that is done with block `sent_block` (from 0) of
+        what is sent; −1 within the entry."""
+        return (
+            sent_block if self.rest is None or sent_block < 0 else int(self.rest.done[sent_block])
+        )
 
 
 def digest(data: bytes) -> str:
@@ -145,16 +147,16 @@ def wire_of(target: LoadedTarget) -> Wire:
     return wire
 
 
-def manner_of(target: LoadedTarget, **how: Any) -> Manner:
+def manner_of(target: LoadedTarget, **choices: Any) -> Manner:
     """Return the settings of a conversation; MachineError for those that the controller has no
     command for."""
-    if how.get("unlock") and not wire_of(target).unlocks:
+    if choices.get("unlock") and not wire_of(target).unlocks:
         raise MachineError(
             f"{target.machine.target.name} has no command to unlock over its line",
             where="--unlock",
             mend="leave it out",
         )
-    return Manner(**how)
+    return Manner(**choices)
 
 
 def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Port:
@@ -171,11 +173,11 @@ def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Po
 def check_settings(data: bytes, target: LoadedTarget, file: str) -> None:
     """Raise ProgramError for a program that names other values of the machine than its file
     has."""
-    given = _SETTINGS.search(data[:HEAD_BYTES])
-    if given is None or given[1].decode() == target.machine.short_digest:
+    match = _SETTINGS.search(data[:HEAD_BYTES])
+    if match is None or match[1].decode() == target.machine.short_digest:
         return
     raise ProgramError(
-        f"was written for another machine file (settings {given[1].decode()}, the machine has "
+        f"was written for another machine file (settings {match[1].decode()}, the machine has "
         f"{target.machine.short_digest})",
         file=file,
         mend="post it again for this machine, or give the machine file it was made with",
@@ -188,12 +190,12 @@ def consignment(
     *,
     source: str,
     first: int = 0,
-    left: JournalState | None = None,
+    state: JournalState | None = None,
     tool_at: ToolAt = "",
     progress: Progress | None = None,
 ) -> Consignment:
     """Verify a program and cut it into packets; with `first` (a block, from 0) its rest from there
-    on. `left`: the state in its journal; `tool_at`: the place of the tool as the user gives it.
+    on. `state`: the state in its journal; `tool_at`: the place of the tool as the user gives it.
     Raises ProgramError for a program with errors, or for another machine's."""
     wire = wire_of(target)
     check_settings(data, target, source)
@@ -201,21 +203,21 @@ def consignment(
     run = verify_program(data, target, source=source, judging=judging, progress=progress)
     if run.failed:
         return Consignment(run, wire, _no_forecast(run), ())
-    decoded, rest = run.decoded, None
+    decoded, rest_program = run.decoded, None
     assert decoded is not None
-    standing = None if left is None else _standing(left, decoded, tool_at)
+    resume_point = None if state is None else _standing(state, decoded, tool_at)
     begin_mm = None
     if (
-        standing is not None
+        resume_point is not None
         and wire.place in ("kept", "steps")
         and tool_at in ("journal", "known")
     ):
-        begin_mm = standing.place_mm
-    resumes_midway = standing is not None and standing.place_mm is not None
+        begin_mm = resume_point.place_mm
+    resumes_midway = resume_point is not None and resume_point.place_mm is not None
     resumes_midway = resumes_midway and wire.place in ("told", "steps") and tool_at != "zero"
     if first or resumes_midway:
-        rest = rest_of(decoded, target, first, data, begin_mm=begin_mm)
-        data = rest.data
+        rest_program = rest_of(decoded, target, first, data, begin_mm=begin_mm)
+        data = rest_program.data
         decoded = read_program(data, target, source=source).decoded
         assert decoded is not None
         if begin_mm is not None:
@@ -226,14 +228,14 @@ def consignment(
     else:
         forecast = forecast_of_run(run)
     packets = tuple(wire.packets(data, target.machine, forecast))
-    return Consignment(run, wire, forecast, packets, rest, standing)
+    return Consignment(run, wire, forecast, packets, rest_program, resume_point)
 
 
-def _standing(left: JournalState, decoded: Toolpath, tool_at: ToolAt) -> ResumePoint:
+def _standing(state: JournalState, decoded: Toolpath, tool_at: ToolAt) -> ResumePoint:
     """Return the point at which the program was left; if it was not stopped, some of the sent
     blocks are done."""
-    under_way = (decoded.block >= left.block - 1) & (decoded.block <= left.last)
-    return ResumePoint(left.tool_mm, left.is_still, decoded.end[under_way], tool_at)
+    under_way = (decoded.block >= state.block - 1) & (decoded.block <= state.last)
+    return ResumePoint(state.tool_mm, state.is_still, decoded.end[under_way], tool_at)
 
 
 def _shift(path: Toolpath, by_mm: Floats) -> Toolpath:
@@ -246,58 +248,60 @@ def _shift(path: Toolpath, by_mm: Floats) -> Toolpath:
     )
 
 
-def tool_at_of(wire: Wire, left: JournalState, given: ToolAt, name: str) -> tuple[ToolAt, str]:
+def tool_at_of(wire: Wire, state: JournalState, answer: ToolAt, name: str) -> tuple[ToolAt, str]:
     """Decide where the tool is when a program resumes: as the user gave it, or as it follows from
     the journal; and the question to ask the user, "" for none. Raises MachineError and OptionError
     for answers that the controller or the journal does not allow."""
-    where = f"--tool-at {given}" if given else "--tool-at"
+    place = f"--tool-at {answer}" if answer else "--tool-at"
     if wire.place == "homed":
-        if given:
-            raise MachineError(f"{name} homes before each piece", where=where, mend="leave it out")
+        if answer:
+            raise MachineError(f"{name} homes before each piece", where=place, mend="leave it out")
         return "", ""
     unknown = OptionError(
         "the journal does not say where the tool stands: it was not stopped at a known place",
-        where=where,
+        where=place,
         mend="bring the tool to part zero, where the program begins, and give --tool-at zero",
     )
-    sure = left.is_still and left.tool_mm is not None
+    is_sure = state.is_still and state.tool_mm is not None
     if wire.place == "told":
-        if given == "journal" and not sure:
+        if answer == "journal" and not is_sure:
             raise unknown
-        return given, ""
-    if given == "zero" or (not given and left.last < 0):
+        return answer, ""
+    if answer == "zero" or (not answer and state.last < 0):
         return "zero", ""
-    left_words = f"the program was left at {place_words(left.tool_mm)} by the simulation"
+    left_words = f"the program was left at {place_words(state.tool_mm)} by the simulation"
     if wire.place == "kept":
-        if given:
+        if answer:
             raise MachineError(
                 f"{name} does not say where it stands, and has no command to set its place",
-                where=where,
+                where=place,
                 mend="bring the tool to part zero, where the program begins, and give --tool-at "
                 "zero",
             )
-        left_words = left_words if sure else "nobody knows where the program was left"
+        left_words = left_words if is_sure else "nobody knows where the program was left"
         return (
             "zero",
             f"{left_words}, and it goes on from part zero: does the tool stand there now",
         )
-    if given == "known":
+    if answer == "known":
         raise MachineError(
             f"{name} knows only steps",
-            where=where,
+            where=place,
             mend="give --tool-at journal where the tool has stayed, zero where you have brought "
             "it to part zero",
         )
-    if not sure:
+    if not is_sure:
         raise unknown
-    asked = f"{left_words}, and goes on from there: has the tool stayed there"
-    return "journal", "" if given else asked
+    question = f"{left_words}, and goes on from there: has the tool stayed there"
+    return "journal", "" if answer else question
 
 
 def _no_forecast(run: Run) -> Forecast:
-    none, whole = np.zeros(0), np.zeros((0, 3), dtype=np.int64)
+    no_times, no_steps = np.zeros(0), np.zeros((0, 3), dtype=np.int64)
     assert run.decoded is not None
-    return Forecast(run.decoded, none, none, whole[:, 0], whole, whole, np.zeros((0, 3)))
+    return Forecast(
+        run.decoded, no_times, no_times, no_steps[:, 0], no_steps, no_steps, np.zeros((0, 3))
+    )
 
 
 def forecast_of_run(run: Run) -> Forecast:
@@ -366,32 +370,32 @@ def rest_of(
     if low >= high or not _has_moves(decoded.part(low, high)):
         raise OptionError(f"nothing moves from block {first + 1} on", mend="it is finished")
     machine = target.machine
-    own = None if data is None else target.target.rest(data, machine, first)
-    if own is not None:
-        done = np.arange(first - own[1], blocks)
-        done[: own[1]] = -1
-        return Rest(own[0], first, own[1], done)
+    target_rest = None if data is None else target.target.rest(data, machine, first)
+    if target_rest is not None:
+        done_blocks = np.arange(first - target_rest[1], blocks)
+        done_blocks[: target_rest[1]] = -1
+        return Rest(target_rest[0], first, target_rest[1], done_blocks)
     if begin_mm is not None and (decoded.kind[low:high] == Kind.SET_ZERO).any():
         raise OptionError(
             f"the program sets part zero behind block {first + 1}",
             mend="bring the tool to part zero, and give --tool-at zero",
         )
     data, reread = _write_rest(decoded, low, high, target, begin_mm)
-    wanted = decoded.part(low, high)
-    pairs = _MovePairs(wanted, reread, target).match()
+    wanted_path = decoded.part(low, high)
+    pairs = _MovePairs(wanted_path, reread, target).match()
     if pairs is None:
         raise PostError(
             f"the rest of the program cannot be written again as it is from block {first + 1} on",
             mend="choose the block at the beginning of a contour",
         )
-    ends, into = pairs
+    ends, entry_end = pairs
     # A block of the program is done when all moves up to its last one are.
-    moves = np.flatnonzero(wanted.is_motion)
-    last = np.append(wanted.block[moves[1:]] > wanted.block[moves[:-1]], True)
-    done = np.full(int(reread.block.max()) + 1, -1)
-    np.maximum.at(done, reread.block[ends[last]], wanted.block[moves[last]])
-    done[: reread.block[into]] = -1
-    return Rest(data, first, int(reread.block[into]), np.maximum.accumulate(done))
+    moves = np.flatnonzero(wanted_path.is_motion)
+    last = np.append(wanted_path.block[moves[1:]] > wanted_path.block[moves[:-1]], True)
+    done_blocks = np.full(int(reread.block.max()) + 1, -1)
+    np.maximum.at(done_blocks, reread.block[ends[last]], wanted_path.block[moves[last]])
+    done_blocks[: reread.block[entry_end]] = -1
+    return Rest(data, first, int(reread.block[entry_end]), np.maximum.accumulate(done_blocks))
 
 
 def _write_rest(
@@ -408,10 +412,10 @@ def _write_rest(
     }
     columns["source"] = np.concatenate([np.full(count, -1), decoded.source[low:high]])
     columns["mode"] = np.concatenate([np.full(count, -1), decoded.mode[low:high]])
-    whole = replace(decoded, **columns, findings=(), drawn=None, operations=None)
+    rest_path = replace(decoded, **columns, findings=(), drawn=None, operations=None)
     if begin_mm is not None:
-        whole = replace(_shift(whole, -np.array(begin_mm)), start=decoded.start)
-    program = target.target.write(whole, target.machine)
+        rest_path = replace(_shift(rest_path, -np.array(begin_mm)), start=decoded.start)
+    program = target.target.write(rest_path, target.machine)
     reread = target.target.read(program.data, target.machine)
     return program.data, reread if begin_mm is None else _shift(reread, np.array(begin_mm))
 
@@ -458,8 +462,8 @@ def _entry(decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | 
             path.event(Kind.DWELL, spin_up_s)
     coolants = (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD, Kind.COOLANT_OFF)
     cooled = np.flatnonzero(np.isin(kinds, coolants))
-    off = cooled[kinds[cooled] == Kind.COOLANT_OFF]
-    for row in cooled[cooled > (off[-1] if len(off) else -1)].tolist():
+    off_rows = cooled[kinds[cooled] == Kind.COOLANT_OFF]
+    for row in cooled[cooled > (off_rows[-1] if len(off_rows) else -1)].tolist():
         path.event(Kind(int(kinds[row])))
     path.rapid(x, y)
     if z < safe:
@@ -485,49 +489,49 @@ class _MovePairs:
     an entry (`reread`). They are equal, or, where the writer splits a move, lines that lie on it;
     moves shorter than the resolution of the dialect may be missing."""
 
-    def __init__(self, wanted: Toolpath, reread: Toolpath, target: LoadedTarget) -> None:
+    def __init__(self, wanted_path: Toolpath, reread: Toolpath, target: LoadedTarget) -> None:
         machine = target.machine
-        self._wanted, self._again = wanted, reread
-        self._begins, self._others = wanted.starts, reread.starts
+        self._wanted, self._again = wanted_path, reread
+        self._begins, self._others = wanted_path.starts, reread.starts
         unit = [target.target.unit_mm(machine, axis) for axis in machine.axes]
         self._slack = np.array(unit) + POSITION_EPS_MM
         self._max_deviation = float(self._slack.max()) + machine.defaults.fit_tolerance_mm
-        self._arms = PolarArcs(wanted, wanted.is_arc)
+        self._arms = PolarArcs(wanted_path, wanted_path.is_arc)
 
     def match(self) -> tuple[Ints, int] | None:
         """Return the last row of `reread` for each wanted move (M,), and its first row after the
         entry; None if the moves differ."""
         rows = np.flatnonzero(self._wanted.is_motion)
-        others = np.flatnonzero(self._again.is_motion)
-        tail = others[max(len(others) - len(rows), 0) :]
+        moves = np.flatnonzero(self._again.is_motion)
+        tail = moves[max(len(moves) - len(rows), 0) :]
         if len(tail) == len(rows) and self._are_equal(rows, tail).all():
             return tail, int(tail[0])
-        ends, at = np.empty(len(rows), dtype=np.int64), len(self._again)
+        ends, end = np.empty(len(rows), dtype=np.int64), len(self._again)
         for k in range(len(rows) - 1, -1, -1):
             row = rows[k : k + 1]
-            ends[k], begin = self._last_move(at), None
+            ends[k], begin = self._last_move(end), None
             if self._is_negligible(self._wanted, self._begins, row):
                 continue
             if ends[k] >= 0:
                 begin = self._begin(row, int(ends[k]))
             if begin is None:
                 return None
-            at = begin
-        return np.maximum(ends, at), at
+            end = begin
+        return np.maximum(ends, end), end
 
-    def _last_move(self, at: int) -> int:
-        """Return the last row before `at` that moves, −1 if none does."""
-        at -= 1
-        while at >= 0 and self._is_negligible(self._again, self._others, np.array([at])):
-            at -= 1
-        return at
+    def _last_move(self, end: int) -> int:
+        """Return the last row before `end` that moves, −1 if none does."""
+        end -= 1
+        while end >= 0 and self._is_negligible(self._again, self._others, np.array([end])):
+            end -= 1
+        return end
 
-    def _begin(self, row: Ints, at: int) -> int | None:
-        """Return the first of the rows, up to and including `at`, that make up a wanted move; None
-        if they do not."""
-        part = np.array([at])
+    def _begin(self, row: Ints, end: int) -> int | None:
+        """Return the first of the rows, up to and including `end`, that make up a wanted move;
+        None if they do not."""
+        part = np.array([end])
         if self._are_equal(row, part).all():
-            return at
+            return end
         if not self._are_near(self._wanted.end[row], self._again.end[part]).all():
             return None
         while self._lies_on(row, part):
@@ -546,41 +550,45 @@ class _MovePairs:
             self._are_near(starts[row], path.end[row]).all()
         )
 
-    def _are_near(self, ones: Floats, others: Floats) -> Bools:
+    def _are_near(self, ones: Floats, other_points: Floats) -> Bools:
         """Mask (K,) of the points (K, 3) that are within the resolution of each other."""
-        return np.asarray((np.abs(ones - others) <= self._slack).all(axis=1))
+        return np.asarray((np.abs(ones - other_points) <= self._slack).all(axis=1))
 
-    def _are_equal(self, rows: Ints, others: Ints) -> Bools:
+    def _are_equal(self, rows: Ints, other_rows: Ints) -> Bools:
         """Mask (K,) of equal moves."""
-        wanted, reread = self._wanted, self._again
-        off = np.nan_to_num(np.abs(wanted.centre[rows] - reread.centre[others])).max(axis=1)
-        same: Bools = (wanted.kind[rows] == reread.kind[others]) & (off <= self._slack.max())
-        same &= self._are_near(self._begins[rows], self._others[others])
-        return same & self._are_near(wanted.end[rows], reread.end[others])
+        wanted_path, reread = self._wanted, self._again
+        deviations = np.nan_to_num(
+            np.abs(wanted_path.centre[rows] - reread.centre[other_rows])
+        ).max(axis=1)
+        is_same: Bools = (wanted_path.kind[rows] == reread.kind[other_rows]) & (
+            deviations <= self._slack.max()
+        )
+        is_same &= self._are_near(self._begins[rows], self._others[other_rows])
+        return is_same & self._are_near(wanted_path.end[rows], reread.end[other_rows])
 
     def _lies_on(self, row: Ints, part: Ints) -> bool:
         """True if a line, or an arc about the same centre, is a part of a wanted move."""
-        wanted, reread = self._wanted, self._again
-        rapid = wanted.kind[row] == Kind.RAPID, reread.kind[part] == Kind.RAPID
+        wanted_path, reread = self._wanted, self._again
+        rapid = wanted_path.kind[row] == Kind.RAPID, reread.kind[part] == Kind.RAPID
         if rapid[0] != rapid[1] or not reread.is_motion[part].all():
             return False
         points = np.concatenate([self._others[part], reread.end[part]])
         if reread.is_arc[part].any():
-            off = np.abs(wanted.centre[row] - reread.centre[part]).max()
-            if wanted.kind[row] != reread.kind[part] or off > self._slack.max():
+            deviation = np.abs(wanted_path.centre[row] - reread.centre[part]).max()
+            if wanted_path.kind[row] != reread.kind[part] or deviation > self._slack.max():
                 return False
         else:
             points = np.concatenate([points, points.mean(axis=0)[None, :]])
-        if wanted.is_arc[row].any():
+        if wanted_path.is_arc[row].any():
             arms, k = self._arms, int(np.searchsorted(self._arms.row, row[0]))
             radius = np.hypot(*(points[:, :2] - arms.centre[k]).T)
             low, high = sorted((float(arms.radius[k]), float(arms.end_radius[k])))
-            far = np.maximum(low - radius, radius - high)
+            distances = np.maximum(low - radius, radius - high)
         else:
-            begin, way = self._begins[row[0]], wanted.end[row[0]] - self._begins[row[0]]
-            share = np.clip((points - begin) @ way / (way @ way), 0.0, 1.0)
-            far = np.linalg.norm(begin + share[:, None] * way - points, axis=1)
-        return bool((far <= self._max_deviation).all())
+            begin, step = self._begins[row[0]], wanted_path.end[row[0]] - self._begins[row[0]]
+            share = np.clip((points - begin) @ step / (step @ step), 0.0, 1.0)
+            distances = np.linalg.norm(begin + share[:, None] * step - points, axis=1)
+        return bool((distances <= self._max_deviation).all())
 
 
 def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]]:
@@ -622,21 +630,21 @@ def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]
 
 def _begin_words(one: Consignment) -> str:
     """Describe where the tool must stand when the program begins or resumes."""
-    standing, told = one.standing, one.wire.place == "told"
-    tool_at = "zero" if standing is None else standing.tool_at
+    resume_point, is_told = one.standing, one.wire.place == "told"
+    tool_at = "zero" if resume_point is None else resume_point.tool_at
     if tool_at == "zero":
         x, y, z = one.forecast.decoded.start.tolist()
-        more = ", and the controller is told so" if standing is not None and told else ""
-        return f"the tool stands at part zero: {place_words((x, y, z))}{more}"
+        suffix = ", and the controller is told so" if resume_point is not None and is_told else ""
+        return f"the tool stands at part zero: {place_words((x, y, z))}{suffix}"
     if one.wire.place == "homed":
         return "it homes first"
-    if tool_at == "known" and told:
+    if tool_at == "known" and is_told:
         return "the controller knows where the tool stands"
-    assert standing is not None
-    left = place_words(standing.place_mm) or "a place that nobody knows"
+    assert resume_point is not None
+    place = place_words(resume_point.place_mm) or "a place that nobody knows"
     if not tool_at:
-        return f"the program was left at {left}; the controller must say the same"
-    return f"the tool stands where the program was left, at {left}"
+        return f"the program was left at {place}; the controller must say the same"
+    return f"the tool stands where the program was left, at {place}"
 
 
 def _spindle(decoded: Toolpath, target: LoadedTarget) -> list[str]:

@@ -72,8 +72,8 @@ class PseudoTerminal:
         looking = select.poll()
         looking.register(self._master, select.POLLIN)
         # What the client has written before it closed is still to be read.
-        both = select.POLLHUP | select.POLLIN
-        if any(event & both == select.POLLHUP for _, event in looking.poll(0)):
+        events = select.POLLHUP | select.POLLIN
+        if any(event & events == select.POLLHUP for _, event in looking.poll(0)):
             self._open = False
             return None
         if not self._open:
@@ -140,18 +140,18 @@ class Clock:
             self._now = (time.monotonic() - self._begun) * self.speed
         return self._now
 
-    def wait_s(self, at: float | None) -> float:
-        """Return the real time to wait for a client if the next event is at `at`."""
-        if at is None:
+    def wait_s(self, event_s: float | None) -> float:
+        """Return the real time to wait for a client if the next event is at `event_s`."""
+        if event_s is None:
             return POLL_S
         if self.speed is None:
             return ANSWER_S
-        return min(max((at - self.now()) / self.speed, 0.0), POLL_S)
+        return min(max((event_s - self.now()) / self.speed, 0.0), POLL_S)
 
-    def skip_to(self, at: float | None) -> None:
-        """Advance a clock without real time to `at`, since no client has sent anything."""
-        if self.speed is None and at is not None:
-            self._now = max(self._now, at)
+    def skip_to(self, event_s: float | None) -> None:
+        """Advance a clock without real time to `event_s`, since no client has sent anything."""
+        if self.speed is None and event_s is not None:
+            self._now = max(self._now, event_s)
 
 
 def serve(
@@ -173,16 +173,16 @@ def serve(
                 return
             connected, waiting = False, b""
             wired.read(clock.now())
-            at = wired.wake_s()
-            time.sleep(min(clock.wait_s(at), POLL_S))
-            clock.skip_to(at)
+            event_s = wired.wake_s()
+            time.sleep(min(clock.wait_s(event_s), POLL_S))
+            clock.skip_to(event_s)
             continue
         if not connected:
             connected = True
             wired.connect(clock.now())
         waiting += wired.read(clock.now())
-        at = wired.wake_s()
-        patience = 0.0 if waiting else clock.wait_s(at)
+        event_s = wired.wake_s()
+        patience = 0.0 if waiting else clock.wait_s(event_s)
         readable, writable, _ = select.select([file], [file] if waiting else [], [], patience)
         try:
             if writable:
@@ -198,4 +198,4 @@ def serve(
             port.hang_up()
             continue
         if not readable and not waiting:
-            clock.skip_to(at)
+            clock.skip_to(event_s)

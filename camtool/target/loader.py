@@ -44,8 +44,8 @@ def resolved_table(
     `needs` are missing."""
     table, name = base, base_name
     if user is not None:
-        said, name = user
-        extends = said.get("extends")
+        user_table, name = user
+        extends = user_table.get("extends")
         if extends != base["target"]["name"]:
             raise MachineError(
                 f"extends {extends!r}, but the target is {base['target']['name']!r}",
@@ -53,7 +53,7 @@ def resolved_table(
                 where="key extends",
                 mend=f'write extends = "{base["target"]["name"]}" or change --target',
             )
-        extra = {key: value for key, value in said.items() if key != "extends"}
+        extra = {key: value for key, value in user_table.items() if key != "extends"}
         table = _overlaid(target, table, extra)
     file = name
     for setting in settings:
@@ -68,8 +68,8 @@ def machine_of(target: Target, table: Table, name: str) -> Machine:
     records: Any = reduce(or_, _records(target))
     generic: Any = Machine
     kind: type[Machine] = generic[records, target.dialect, target.link]
-    whole: Table = {"dialect": {}, "link": {}} | table
-    machine: Machine = convert(whole, kind, name)
+    full_table: Table = {"dialect": {}, "link": {}} | table
+    machine: Machine = convert(full_table, kind, name)
     if machine.coolant.kinds and not target.switches_coolant:
         raise MachineError(
             f"programs of {machine.target.name} cannot switch coolant",
@@ -144,8 +144,10 @@ def _overlaid(target: Target, below: Table, above: Table) -> Table:
     are dropped, except those that all controllers have."""
     old, new = below.get("controller"), above.get("controller")
     if isinstance(old, dict) and isinstance(new, dict) and "model" in new:
-        own = _own_options(target, old.get("model")) if new["model"] != old.get("model") else set()
-        below = below | {"controller": {key: old[key] for key in old.keys() - own}}
+        own_options = (
+            _own_options(target, old.get("model")) if new["model"] != old.get("model") else set()
+        )
+        below = below | {"controller": {key: old[key] for key in old.keys() - own_options}}
     return _laid_over(below, above)
 
 
@@ -165,8 +167,8 @@ def _laid_over(below: Table, above: Table) -> Table:
     merged = dict(below)
     for key, value in above.items():
         old = merged.get(key)
-        both = isinstance(old, dict) and isinstance(value, dict)
-        merged[key] = _laid_over(old, value) if both else value  # type: ignore[arg-type]
+        are_tables = isinstance(old, dict) and isinstance(value, dict)
+        merged[key] = _laid_over(old, value) if are_tables else value  # type: ignore[arg-type]
     return merged
 
 

@@ -93,10 +93,10 @@ class LoadedTarget:
         """OptionError for options that the machine's controller does not have."""
         if options.chunk_steps < 1:
             raise OptionError(f"chunk_steps is {options.chunk_steps}", mend="give at least 1")
-        known = self.interpolators
-        if options.interpolator is None or options.interpolator in known:
+        names = self.interpolators
+        if options.interpolator is None or options.interpolator in names:
             return
-        if not known:
+        if not names:
             raise OptionError(
                 f"the controller of {self.machine.target.name} has no interpolators to choose "
                 "from",
@@ -105,7 +105,7 @@ class LoadedTarget:
             )
         raise OptionError(
             f"unknown interpolator {options.interpolator!r}",
-            mend=f"{', '.join(known[:-1])} or {known[-1]}",
+            mend=f"{', '.join(names[:-1])} or {names[-1]}",
         )
 
     def twin(self, choices: Sequence[str] = ()) -> Twin:
@@ -119,16 +119,18 @@ class LoadedTarget:
                 mend=f'leave model = "path" out: its own is {self.target.name}',
             )
         record = self.target.twin_settings()
-        given = dict(choice.partition("=")[::2] for choice in choices)
+        given_choices = dict(choice.partition("=")[::2] for choice in choices)
         try:
-            chosen = msgspec.convert(given, record, strict=False)
+            choices_made = msgspec.convert(given_choices, record, strict=False)
         except msgspec.ValidationError as error:
-            known = "; ".join(f"{name}={value}" for name, value in choices_of(record))
+            listed = "; ".join(f"{name}={value}" for name, value in choices_of(record))
             raise OptionError(
                 f"{', '.join(choices)}: {error}",
-                mend=f"there are (the first is ours): {known}" if known else "there is no choice",
+                mend=f"there are (the first is ours): {listed}"
+                if listed
+                else "there is no choice",
             ) from None
-        return self.target.twin(self.machine, chosen)
+        return self.target.twin(self.machine, choices_made)
 
     def with_settings(self, settings: Sequence[str]) -> LoadedTarget:
         """The target with further `key.key=value` settings; MachineError names a wrong one."""
@@ -147,17 +149,21 @@ class LoadedTarget:
 
         Keys of `needs` always differ: the target's own value is `not said`.
         """
-        now = dict(_flat("", self.values()))
+        values = dict(_flat("", self.values()))
         base = read_table(self.file)
         needs = missing_keys(base, str(self.file))
-        given = [f"{key}={json.dumps(now[key])}" for key in needs if key in now]
-        table, name = resolved_table(self.target, base, str(self.file), None, given)
-        plain = replace(self, machine=machine_of(self.target, table, name), table=table)
-        own = dict(_flat("", plain.values()))
+        settings = [f"{key}={json.dumps(values[key])}" for key in needs if key in values]
+        table, name = resolved_table(self.target, base, str(self.file), None, settings)
+        plain_target = replace(self, machine=machine_of(self.target, table, name), table=table)
+        own_values = dict(_flat("", plain_target.values()))
         return [
-            (key, _as_text(now.get(key)), _as_text(None if key in needs else own.get(key)))
-            for key in {**own, **now}
-            if key in needs or now.get(key) != own.get(key)
+            (
+                key,
+                _as_text(values.get(key)),
+                _as_text(None if key in needs else own_values.get(key)),
+            )
+            for key in {**own_values, **values}
+            if key in needs or values.get(key) != own_values.get(key)
         ]
 
 
@@ -194,8 +200,8 @@ def loaded_target(
     target, file = find_target(name)
     table, last = resolved_table(target, read_table(file), str(file), user, settings)
     machine = machine_of(target, table, last)
-    own = {} if user is None else user[0]
-    unsaid = tuple(_placeholders(own, settings)) if target.any_machine else ()
+    user_values = {} if user is None else user[0]
+    unsaid = tuple(_placeholders(user_values, settings)) if target.any_machine else ()
     return LoadedTarget(machine, target, file, table, unsaid)
 
 
@@ -208,14 +214,14 @@ NUMBERS = {
 """Keys of axes that differ from machine to machine, by the name of the quantity."""
 
 
-def _placeholders(own: Table, settings: Sequence[str]) -> Iterator[str]:
+def _placeholders(user_table: Table, settings: Sequence[str]) -> Iterator[str]:
     """Yield the names of the numbers that the user has not given for all axes, neither in the
     machine file nor by `--set`."""
-    axes = own.get("axes", {})
-    given = {f"axes.{axis}.{key}" for axis, keys in axes.items() for key in keys}
-    given |= {each.partition("=")[0].strip() for each in settings}
+    axes = user_table.get("axes", {})
+    given_keys = {f"axes.{axis}.{key}" for axis, keys in axes.items() for key in keys}
+    given_keys |= {each.partition("=")[0].strip() for each in settings}
     for name, key in NUMBERS.items():
-        if not all(f"axes.{axis}.{key}" in given for axis in "xyz"):
+        if not all(f"axes.{axis}.{key}" in given_keys for axis in "xyz"):
             yield name
 
 
@@ -242,18 +248,18 @@ def each_target(
     for name in target_names():
         if name.startswith(prefix):
             try:
-                taken = take(name)
+                taken_value = take(name)
             except CamtoolError as error:
                 if broken is not None:
                     broken.append(error)
                 continue
-            yield name, taken
+            yield name, taken_value
 
 
 def filter_target() -> str | None:
     """The target that `camtool filter` uses by default."""
-    found = each_target(find_target)
-    return next((name for name, (target, _) in found if target.filter_default), None)
+    targets = each_target(find_target)
+    return next((name for name, (target, _) in targets if target.filter_default), None)
 
 
 def find_target(name: str) -> tuple[Target, Path]:
@@ -264,13 +270,13 @@ def find_target(name: str) -> tuple[Target, Path]:
 def _entry_point(name: str) -> EntryPoint:
     """Return the entry point of a target; UnknownTargetError with the nearest names if there is
     none."""
-    found = {point.name: point for point in entry_points(GROUP)}
-    if name not in found:
-        near = difflib.get_close_matches(name, found, n=3, cutoff=0.4) or sorted(found)
+    points = {point.name: point for point in entry_points(GROUP)}
+    if name not in points:
+        near_names = difflib.get_close_matches(name, points, n=3, cutoff=0.4) or sorted(points)
         raise UnknownTargetError(
-            f"unknown target {name!r}", mend=f"did you mean {' or '.join(near)}?"
+            f"unknown target {name!r}", mend=f"did you mean {' or '.join(near_names)}?"
         )
-    return found[name]
+    return points[name]
 
 
 def _load(point: EntryPoint) -> tuple[Target, Path]:
@@ -306,26 +312,26 @@ class Guarded:
         return Guarded, (self._guarded, self._value)
 
     def __getattr__(self, name: str) -> Any:
-        found = getattr(self._guarded, name)
-        if not callable(found) or isinstance(found, type):
-            return found
+        attribute = getattr(self._guarded, name)
+        if not callable(attribute) or isinstance(attribute, type):
+            return attribute
 
-        def called(*arguments: Any, **named: Any) -> Any:
+        def call(*arguments: Any, **named: Any) -> Any:
             try:
-                made = found(*arguments, **named)
+                result = attribute(*arguments, **named)
             except CamtoolError:
                 raise
             except Exception as error:
                 raise self._fault(name, error) from error
-            if isinstance(made, Iterator):
-                return self._each(name, made)
-            return Guarded(made, self._value) if name == "model" else made
+            if isinstance(result, Iterator):
+                return self._each(name, result)
+            return Guarded(result, self._value) if name == "model" else result
 
-        return called
+        return call
 
-    def _each(self, name: str, made: Iterator[Any]) -> Iterator[Any]:
+    def _each(self, name: str, results: Iterator[Any]) -> Iterator[Any]:
         try:
-            yield from made
+            yield from results
         except CamtoolError:
             raise
         except Exception as error:

@@ -64,11 +64,11 @@ def machine_template(
     base: str,
     base_text: str,
     needs: Iterable[str] = (),
-    given: Sequence[ControllerSetting] = (),
+    settings: Sequence[ControllerSetting] = (),
 ) -> str:
     """TOML text of the machine `name`, which extends the target `base`.
 
-    The values that are `given` stand in it with what says them, as comments where they are in
+    The values that are `settings` stand in it with what says them, as comments where they are in
     doubt. Every other value of the target's
     own file (`base_text`) is a comment, with its source, for the user to uncomment and change;
     every axis has `backlash_mm`, since every machine has backlash. `needs` are keys that the user
@@ -78,11 +78,11 @@ def machine_template(
         raise OptionError(
             f"{name!r} is no name for a machine", mend="use small letters, digits and hyphens"
         )
-    said = {each.key: each for each in given}
-    needed = [key for key in needs if key not in said]
-    known = "What is known of it stands here; every other" if given else "Every"
+    settings_by_key = {each.key: each for each in settings}
+    needed = [key for key in needs if key not in settings_by_key]
+    text = "What is known of it stands here; every other" if settings else "Every"
     lines = [
-        f"# {name}: a machine on {base}. {known} value is that of {base}, as a comment:",
+        f"# {name}: a machine on {base}. {text} value is that of {base}, as a comment:",
         "# take its # away, and change what differs on your machine.",
         f"# camtool post drawing.dxf --machine {name}",
         "",
@@ -94,42 +94,47 @@ def machine_template(
     ]
     tables = list(_tables(base_text))
     for table, keys in _UNCERTAIN.items():
-        own = next((rows for name, rows in tables if name == table), None)
-        if own is None:
-            tables.append((table, own := []))
-        there = {key[2] for key in map(_KEY.match, own) if key}
-        own += [
-            f"## {key + ' =':<25} # {about}" for key, about in keys.items() if key not in there
+        own_rows = next((rows for name, rows in tables if name == table), None)
+        if own_rows is None:
+            tables.append((table, own_rows := []))
+        present = {key[2] for key in map(_KEY.match, own_rows) if key}
+        own_rows += [
+            f"## {key + ' =':<25} # {meaning}"
+            for key, meaning in keys.items()
+            if key not in present
         ]
     for table, rows in tables:
         lines += ["", f"[{table}]"]
         if table in _ABOUT:
             lines.append(f"## {_ABOUT[table]}")
         lines += [f"# {key} =     # you must say this" for key in _own_keys(table, needed)]
-        lines += _rows(table, rows, said, set(needs))
-    for table in dict.fromkeys(key.rpartition(".")[0] for key in said):
+        lines += _rows(table, rows, settings_by_key, set(needs))
+    for table in dict.fromkeys(key.rpartition(".")[0] for key in settings_by_key):
         lines += ["", f"[{table}]"]
-        lines += [_line(said.pop(f"{table}.{key}"), key) for key in _own_keys(table, said)]
+        lines += [
+            _line(settings_by_key.pop(f"{table}.{key}"), key)
+            for key in _own_keys(table, settings_by_key)
+        ]
     return "\n".join(lines) + "\n"
 
 
 def _rows(
-    table: str, rows: Iterable[str], said: dict[str, ControllerSetting], needs: set[str]
+    table: str, rows: Iterable[str], settings: dict[str, ControllerSetting], needs: set[str]
 ) -> Iterator[str]:
     """The lines of one table; what is said of it is taken out of `value_of`."""
-    backlash = table not in _AXES or f"{table}.backlash_mm" in said
+    backlash = table not in _AXES or f"{table}.backlash_mm" in settings
     for row in rows:
         key = _KEY.match(row)
         path = f"{table}.{key[2]}" if key else ""
         backlash |= "backlash_mm" in row
-        if key and path in said:
-            yield _line(said.pop(path), key[2])
+        if key and path in settings:
+            yield _line(settings.pop(path), key[2])
         elif row.startswith("#"):
             yield row
         elif key and path not in needs:
             yield f"# {row}"
-    for name in _own_keys(table, tuple(said)):
-        yield _line(said.pop(f"{table}.{name}"), name)
+    for name in _own_keys(table, tuple(settings)):
+        yield _line(settings.pop(f"{table}.{name}"), name)
     if not backlash:
         yield _BACKLASH
 

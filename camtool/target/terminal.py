@@ -77,8 +77,8 @@ class Terminal:
 
     def flush(self) -> list[str]:
         """Return the unfinished line, if there is one, and forget it."""
-        rest, self._rest = self._rest, b""
-        return [self._with_meaning(rest)] if rest else []
+        partial, self._rest = self._rest, b""
+        return [self._with_meaning(partial)] if partial else []
 
     def meaning(self, line: str) -> str:
         """Return the explanation of an answer; "" for one that needs none."""

@@ -78,14 +78,14 @@ def travel_of(chunks: Iterable[Chunk], *, by_passes: bool = False) -> Travel:
     for chunk in chunks:
         ledger = chunk.ledger
         ends = begin + np.cumsum(ledger.duration_s)
-        at = np.searchsorted(ledger.row, chunk.row)
+        rows = np.searchsorted(ledger.row, chunk.row)
         first = np.searchsorted(chunk.row, ledger.row)
-        count = np.bincount(at, minlength=len(ledger.row))
-        share = (np.arange(len(chunk.row)) - first[at] + 1) / count[at]
+        count = np.bincount(rows, minlength=len(ledger.row))
+        share = (np.arange(len(chunk.row)) - first[rows] + 1) / count[rows]
         passes = np.maximum(ledger.iterations if by_passes else count, 1)
         commanded.append(chunk.commanded)
-        seconds.append(ends[at] - ledger.duration_s[at] * (1.0 - share))
-        added.append((ledger.duration_s / passes)[at])
+        seconds.append(ends[rows] - ledger.duration_s[rows] * (1.0 - share))
+        added.append((ledger.duration_s / passes)[rows])
         begin = float(ends[-1]) if len(ends) else begin
     return Travel(np.concatenate(commanded), np.concatenate(seconds), np.concatenate(added), begin)
 
@@ -118,19 +118,19 @@ class Slides:
         count = len(travel)
         slide, reversals = self._mechanics.follow(travel.commanded, np.arange(count + 1))
         steps = reversals @ self._mechanics.compensation_steps
-        late = np.cumsum(steps * travel.added_s)
+        delays = np.cumsum(steps * travel.added_s)
         self._travel, self._slide = travel, slide
-        self._times = now + travel.seconds + late
+        self._times = now + travel.seconds + delays
         self._block, self.done = block, 0
         self._added = reversals * self._mechanics.compensation_steps
-        self.ends_s = now + travel.total_s + (float(late[-1]) if count else 0.0)
+        self.ends_s = now + travel.total_s + (float(delays[-1]) if count else 0.0)
 
     def next_s(self) -> float | None:
         """Time of the next output, or of the end; None if nothing is under way."""
         if self.ends_s is None:
             return None
-        left = self._times[self.done : self.done + 1]
-        return float(left[0]) if len(left) else self.ends_s
+        due = self._times[self.done : self.done + 1]
+        return float(due[0]) if len(due) else self.ends_s
 
     def advance(self, now: float) -> tuple[Ints, Ints]:
         """Make the outputs that are due. Return the steps (K, 3) of the axes in the outputs since
@@ -139,27 +139,27 @@ class Slides:
         high = int(np.searchsorted(self._times, now, side="right"))
         high = max(high, low) if self.ends_s is not None else low
         before = self.commanded_mm
-        made = self._travel.commanded[low:high]
+        outputs = self._travel.commanded[low:high]
         if high > low:
-            self.done, self.commanded_mm = high, made[-1]
+            self.done, self.commanded_mm = high, outputs[-1]
             owner = np.full(high - low, self._block, dtype=np.int64)
             self._pieces.append(
-                TwinTrace(self._times[low:high], owner, made, self._slide[low:high])
+                TwinTrace(self._times[low:high], owner, outputs, self._slide[low:high])
             )
         if self.ends_s is not None and now >= self.ends_s:
             self.ends_s = None
             if self._travel.left_at is not None:
                 self.set_position(self._travel.left_at)
-        way = np.diff(made, axis=0, prepend=before[None, :]) / self._step_mm
-        return np.rint(way).astype(np.int64), self._added[low:high]
+        travel = np.diff(outputs, axis=0, prepend=before[None, :]) / self._step_mm
+        return np.rint(travel).astype(np.int64), self._added[low:high]
 
     def stop(self, now: float) -> None:
         """Stop where the slides are now; the rest of the travel is never done."""
         self.advance(now)
         if self.ends_s is not None:
             self._mechanics.states[:] = self._before
-            made = self._travel.commanded[: self.done]
-            self._mechanics.follow(made, np.array([0, len(made)]))
+            outputs = self._travel.commanded[: self.done]
+            self._mechanics.follow(outputs, np.array([0, len(outputs)]))
         self.ends_s = None
 
     def set_position(self, position_mm: Floats) -> None:
@@ -237,7 +237,7 @@ class Twin(ABC):
     def next_s(self) -> float | None:
         """Time at which it may send something if nothing comes in; None: never. A controller that
         reports its outputs sends something at each; one that does not needs only `wake_s`."""
-        times = [at for at in (self.wake_s(), self.slides.next_s()) if at is not None]
+        times = [time_s for time_s in (self.wake_s(), self.slides.next_s()) if time_s is not None]
         return min(times, default=None)
 
     @property
@@ -261,14 +261,14 @@ class Twin(ABC):
         self.slides.advance(self.now)
 
     def _run(self, now: float) -> None:
-        while (at := self.wake_s()) is not None and at <= now:
-            self.now = max(at, self.now)
+        while (time_s := self.wake_s()) is not None and time_s <= now:
+            self.now = max(time_s, self.now)
             self._make_outputs()
             self._wake()
         self.now = max(now, self.now)
         self._make_outputs()
 
     def _take_output(self) -> bytes:
-        sent = bytes(self._out)
+        output = bytes(self._out)
         self._out.clear()
-        return sent
+        return output

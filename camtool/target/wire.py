@@ -169,22 +169,23 @@ class ResumePoint(Struct, frozen=True, eq=False):
                 math.dist(at_mm, x) < NEAR_MM for x in places
             ):
                 return ""
-        stands = f"takes its place for {place_words(at_mm)}"
+        claim = f"takes its place for {place_words(at_mm)}"
         if at_mm is None:
-            stands = "does not say where it stands"
-        left, ways = "nobody knows where the program was left", ""
+            claim = "does not say where it stands"
+        place_text, choices = "nobody knows where the program was left", ""
         if self.place_mm is not None:
-            left = f"the program was left at {place_words(self.place_mm)}"
+            place_text = f"the program was left at {place_words(self.place_mm)}"
             if self.is_still:
-                ways = "journal (where it was left), "
+                choices = "journal (where it was left), "
             else:
-                left = (
+                place_text = (
                     f"the program was not stopped, and last seen at {place_words(self.place_mm)}"
                 )
         anew = "has begun anew, and " if restarted else ""
         return (
-            f"the controller {anew}{stands}, but {left}: home it (--home), or say where the tool "
-            f"is by --tool-at: {ways}zero (brought to part zero) or known (it is right there)"
+            f"the controller {anew}{claim}, but {place_text}: home it (--home), or say where the "
+            f"tool is by --tool-at: {choices}zero (brought to part zero) or known (it is right "
+            "there)"
         )
 
 
@@ -247,8 +248,8 @@ class Conversation(ABC):
 
     def actions(self) -> list[Action]:
         """Return the actions to carry out now, in order, and forget them."""
-        out, self._out = self._out, []
-        return out
+        actions, self._out = self._out, []
+        return actions
 
     @property
     def at_mm(self) -> Place | None:
@@ -297,11 +298,11 @@ class Conversation(ABC):
         """Stop harder than `stop` has done, where the protocol can; nobody waits for the end."""
         self.stop(now)
 
-    def lose_port(self, why: str, now: float) -> None:
+    def lose_port(self, reason: str, now: float) -> None:
         """End the conversation: the port is gone, and nothing can be sent any more."""
         if not self.is_over:
             self._out.clear()
-            self._end(WireState.FAILED, "; ".join(filter(None, (why, self._unattended))))
+            self._end(WireState.FAILED, "; ".join(filter(None, (reason, self._unattended))))
 
     @property
     def _unattended(self) -> str:
@@ -313,15 +314,15 @@ class Conversation(ABC):
 
     def _unwrite(self) -> bool:
         """Take back what was to be written and was not handed out yet; True if there was any."""
-        told: list[Action] = [action for action in self._out if isinstance(action, Tell)]
-        taken, self._out = len(told) < len(self._out), told
-        return taken
+        told_actions: list[Action] = [action for action in self._out if isinstance(action, Tell)]
+        was_unwritten, self._out = len(told_actions) < len(self._out), told_actions
+        return was_unwritten
 
     def _tell(self, text: str) -> None:
         self._out.append(Tell(text))
 
-    def _end(self, state: WireState, why: str = "") -> None:
-        self.state, self.why, self.next_s = state, why, NEVER
+    def _end(self, state: WireState, reason: str = "") -> None:
+        self.state, self.why, self.next_s = state, reason, NEVER
 
 
 class PacketByPacket(Conversation):
@@ -341,8 +342,8 @@ class PacketByPacket(Conversation):
     @property
     def is_still(self) -> bool:
         """True behind a packet, and where a packet that was stopped has never begun."""
-        behind = self.is_over and self.done == self.sent and not self._busy
-        return behind or (self.state is WireState.STOPPED and not self.halts_within)
+        is_done = self.is_over and self.done == self.sent and not self._busy
+        return is_done or (self.state is WireState.STOPPED and not self.halts_within)
 
     def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
         super().__init__(packets, manner)
@@ -398,8 +399,11 @@ class PacketByPacket(Conversation):
         if not self._busy:
             self._stopped()
         elif not self._halt(now, unsent=unsent):
-            left = self.next_s - now
-            self._tell(self.goes_on + (f" (up to {left:.0f} s more)" if left < NEVER else ""))
+            remaining_s = self.next_s - now
+            self._tell(
+                self.goes_on
+                + (f" (up to {remaining_s:.0f} s more)" if remaining_s < NEVER else "")
+            )
 
     def _go_on(self, now: float) -> None:
         """Send the next packet, unless the user is to be waited for."""
@@ -427,23 +431,23 @@ class PacketByPacket(Conversation):
         else:
             self._go_on(now)
 
-    def _stopped(self, known: str = "") -> None:
-        """End the conversation with a machine that stands; `known`, or else `stands`, tells the
-        user how far that is sure."""
+    def _stopped(self, certainty: str = "") -> None:
+        """End the conversation with a machine that stands; `certainty`, or else `stands`, tells
+        the user how far that is sure."""
         self._busy = False
         if self._failing:
             self._end(WireState.FAILED, self._failing)
         else:
-            self._end(WireState.STOPPED, known or self.stands)
+            self._end(WireState.STOPPED, certainty or self.stands)
 
-    def _fail(self, why: str, now: float) -> None:
+    def _fail(self, reason: str, now: float) -> None:
         """Stop the machine where the protocol can, and fail."""
         if self.is_over or self._failing:
             return
-        self._failing, self.state = why, WireState.STOPPING
+        self._failing, self.state = reason, WireState.STOPPING
         unsent = self._unwrite()
         if not self._busy or not self._halt(now, unsent=unsent):
-            self._end(WireState.FAILED, why)
+            self._end(WireState.FAILED, reason)
 
 
 class Wire(ABC):
@@ -514,8 +518,8 @@ def port_fault(error: Exception) -> tuple[str, str]:
     """Return what is wrong with a serial port and its remedy, for an OSError or an exception of
     pyserial, whose own words are for programmers."""
     text = str(error)
-    said = re.search(r"\[Errno (\d+)\]", text)
-    number = getattr(error, "errno", None) or (int(said[1]) if said else None)
+    match = re.search(r"\[Errno (\d+)\]", text)
+    number = getattr(error, "errno", None) or (int(match[1]) if match else None)
     if number is not None:
         mend = _MENDS.get(number, "camtool ports lists the ports")
         return os.strerror(number), mend

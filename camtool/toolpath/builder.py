@@ -145,12 +145,13 @@ class ToolpathBuilder:
     def _move(
         self,
         kind: Kind,
-        to: tuple[Coordinate, Coordinate, Coordinate],
+        target: tuple[Coordinate, Coordinate, Coordinate],
         feed: float,
         centre: tuple[float, float] = (math.nan, math.nan),
     ) -> ToolpathBuilder:
         x, y, z = (
-            old if new is None else float(new) for new, old in zip(to, self.position, strict=True)
+            old if new is None else float(new)
+            for new, old in zip(target, self.position, strict=True)
         )
         self.position = (x, y, z)
         return self._add(kind, self.position, centre, feed, None)
@@ -208,10 +209,10 @@ class _Column:
 
     def add(self, rows: Ints | Floats | float, count: int) -> None:
         """Append `count` ≥ 1 rows; a single number is the value of all of them."""
-        given = np.broadcast_to(np.asarray(rows, dtype=self._dtype), self.shape_of(count))
+        values = np.broadcast_to(np.asarray(rows, dtype=self._dtype), self.shape_of(count))
         if self._same and not self._count:
-            self._rows = given[:1].copy()
-        if self._same and not _are_same(self._rows, given):
+            self._rows = values[:1].copy()
+        if self._same and not _are_same(self._rows, values):
             self._same = False
             self._rows = np.repeat(self._rows, self._count, axis=0)
         end = self._count + count
@@ -220,7 +221,7 @@ class _Column:
                 if not self._rows.flags.writeable:
                     self._rows = self._rows.copy()
                 self._rows.resize(self.shape_of(end + end // GROWTH), refcheck=False)
-            self._rows[self._count : end] = given
+            self._rows[self._count : end] = values
         self._count = end
 
     def to_array(self) -> Any:

@@ -63,15 +63,15 @@ def xy_then_z(toolpath: Toolpath) -> LoweredToolpath:
     """
     begin, end = toolpath.starts, toolpath.end
     in_xy = toolpath.is_arc | (toolpath.is_motion & (end[:, :2] != begin[:, :2]).any(axis=1))
-    both = in_xy & (end[:, 2] != begin[:, 2])
-    if not both.any():
+    changes_both = in_xy & (end[:, 2] != begin[:, 2])
+    if not changes_both.any():
         return _identity(toolpath)
-    row, part = _repeat_rows(np.where(both, 2, 1))
-    up = end[:, 2] > begin[:, 2]
+    row, part = _repeat_rows(np.where(changes_both, 2, 1))
+    goes_up = end[:, 2] > begin[:, 2]
     # First parts: Z of a climb, XY of a descent. Second parts end where the move ended.
-    is_z = both[row] & (up[row] == (part == 0))
+    is_z = changes_both[row] & (goes_up[row] == (part == 0))
     points = end[row]
-    first = both[row] & (part == 0)
+    first = changes_both[row] & (part == 0)
     points[first & is_z, :2] = begin[row[first & is_z], :2]
     points[first & ~is_z, 2] = begin[row[first & ~is_z], 2]
     kind = toolpath.kind[row]
@@ -117,8 +117,8 @@ def arcs_to_lines(toolpath: Toolpath, rows: Bools, tolerance_mm: float) -> Lower
     """
     if not (math.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise OptionError(f"tolerance {tolerance_mm:g} mm is not above 0")
-    chosen = toolpath.is_arc & rows
-    arms = PolarArcs(toolpath, chosen)
+    is_arc = toolpath.is_arc & rows
+    arms = PolarArcs(toolpath, is_arc)
     largest = np.maximum(arms.radius, arms.end_radius)
     with np.errstate(divide="ignore"):
         half_sine = np.sqrt(np.minimum(tolerance_mm / (2.0 * largest), 1.0))
@@ -225,11 +225,11 @@ def without_coolant(toolpath: Toolpath) -> Toolpath:
     cools = np.isin(toolpath.kind, (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD, Kind.COOLANT_OFF))
     if not cools.any():
         return toolpath
-    found = EVENT_LEFT_OUT_COOLANT(
+    finding = EVENT_LEFT_OUT_COOLANT(
         where=toolpath.place(int(cools.argmax())), count=int(cools.sum())
     )
-    rest = toolpath.picked(np.flatnonzero(~cools))
-    return replace(rest, findings=(*toolpath.findings, found))
+    remainder = toolpath.picked(np.flatnonzero(~cools))
+    return replace(remainder, findings=(*toolpath.findings, finding))
 
 
 def at_feed(toolpath: Toolpath, feed_mm_min: float) -> Toolpath:
@@ -246,11 +246,11 @@ def within_feeds(toolpath: Toolpath, machine: Machine) -> Toolpath:
     if not fast.any():
         return toolpath
     max_feed = float(toolpath.feed[fast].max())
-    found = FEED_ABOVE_LIMIT_LOWERED(
+    finding = FEED_ABOVE_LIMIT_LOWERED(
         measured=max_feed, limit=limit, cuts=int(fast.sum()), machine=machine.target.name
     )
     return replace(
         toolpath,
         feed=np.where(fast, limit, toolpath.feed),
-        findings=(*toolpath.findings, found),
+        findings=(*toolpath.findings, finding),
     )

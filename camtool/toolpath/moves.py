@@ -217,16 +217,16 @@ class Toolpath:
     def by_parts(self, column: Callable[[Toolpath], Column]) -> Column:
         """Compute a column (N, …) for ROWS_AT_ONCE rows at a time; each value must follow from its
         row and the start of that row alone."""
-        bare = replace(self, drawn=None, operations=None)
+        plain_path = replace(self, drawn=None, operations=None)
         if len(self) <= ROWS_AT_ONCE:
-            return column(bare)
-        found: Any = None
+            return column(plain_path)
+        result: Any = None
         for low in range(0, len(self), ROWS_AT_ONCE):
-            part = column(bare.part(low, low + ROWS_AT_ONCE))
-            if found is None:
-                found = np.empty((len(self), *part.shape[1:]), dtype=part.dtype)
-            found[low : low + len(part)] = part
-        return cast(Column, found)
+            part = column(plain_path.part(low, low + ROWS_AT_ONCE))
+            if result is None:
+                result = np.empty((len(self), *part.shape[1:]), dtype=part.dtype)
+            result[low : low + len(part)] = part
+        return cast(Column, result)
 
     def picked(self, row: Ints, **others: Codes | Ints | Floats) -> Toolpath:
         """Select rows (M,) in the given order, with repetitions; `others` replaces columns of the
@@ -290,13 +290,13 @@ def feeds_below_top(toolpath: Toolpath) -> Bools:
 
 def _sweeps(kind: Codes, begin: Floats, end: Floats, centre: Floats) -> Floats:
     """Compute the sweeps (K,) in rad of K arcs, signed as in `Toolpath.sweeps`."""
-    full = 2.0 * np.pi
+    full_turn = 2.0 * np.pi
     from_ = np.arctan2(begin[:, 1] - centre[:, 1], begin[:, 0] - centre[:, 0])
-    to = np.arctan2(end[:, 1] - centre[:, 1], end[:, 0] - centre[:, 0])
+    end_angle = np.arctan2(end[:, 1] - centre[:, 1], end[:, 0] - centre[:, 0])
     sign = np.where(kind == Kind.ARC_CW, -1.0, 1.0)
-    turn = np.mod(sign * (to - from_), full)
-    same = (end[:, :2] == begin[:, :2]).all(axis=1)
-    return np.asarray(sign * np.where(same | (turn == 0.0), full, turn))
+    turn = np.mod(sign * (end_angle - from_), full_turn)
+    same_ends = (end[:, :2] == begin[:, :2]).all(axis=1)
+    return np.asarray(sign * np.where(same_ends | (turn == 0.0), full_turn, turn))
 
 
 def read_only(column: Column) -> Column:
@@ -306,17 +306,19 @@ def read_only(column: Column) -> Column:
 
 
 def _as_column(
-    name: str, given: Any, dtype: type[np.generic], shape: tuple[int, ...]
+    name: str, values: Any, dtype: type[np.generic], shape: tuple[int, ...]
 ) -> np.ndarray[Any, Any]:
     """Return the column if it is read-only and of this type, else a read-only copy. ValueError for
     another shape."""
-    column: np.ndarray[Any, Any] = given
-    owner = getattr(given, "base", None)
-    owner = given if owner is None else owner  # a view is as final as the array that owns its data
+    column: np.ndarray[Any, Any] = values
+    owner = getattr(values, "base", None)
+    owner = (
+        values if owner is None else owner
+    )  # a view is as final as the array that owns its data
     is_final = isinstance(owner, np.ndarray) and owner.flags.owndata and not owner.flags.writeable
-    is_column = isinstance(given, np.ndarray) and given.dtype == dtype
-    if not (is_final and is_column and not given.flags.writeable):
-        column = read_only(np.array(given, dtype=dtype))
+    is_column = isinstance(values, np.ndarray) and values.dtype == dtype
+    if not (is_final and is_column and not values.flags.writeable):
+        column = read_only(np.array(values, dtype=dtype))
     if column.shape != shape:
         raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
     return column
@@ -355,30 +357,31 @@ class PolarArcs:
     met.
     """
 
-    def __init__(self, toolpath: Toolpath, chosen: Bools) -> None:
+    def __init__(self, toolpath: Toolpath, is_chosen: Bools) -> None:
         """Raise PostError for an arc without a centre."""
-        self.row = np.flatnonzero(chosen)
+        self.row = np.flatnonzero(is_chosen)
         self.centre = toolpath.centre[self.row]
-        bad = ~np.isfinite(self.centre).all(axis=1)
-        if bad.any():
-            raise PostError("an arc without a centre", where=f"move {self.row[bad.argmax()]}")
+        is_bad = ~np.isfinite(self.centre).all(axis=1)
+        if is_bad.any():
+            raise PostError("an arc without a centre", where=f"move {self.row[is_bad.argmax()]}")
         self.begin, self.end = toolpath.starts_of(self.row), toolpath.end[self.row]
-        out, back = self.begin[:, :2] - self.centre, self.end[:, :2] - self.centre
-        self.radius = np.hypot(out[:, 0], out[:, 1])
-        self.end_radius = np.hypot(back[:, 0], back[:, 1])
-        self.angle = np.arctan2(out[:, 1], out[:, 0])
+        start_arm, end_arm = self.begin[:, :2] - self.centre, self.end[:, :2] - self.centre
+        self.radius = np.hypot(start_arm[:, 0], start_arm[:, 1])
+        self.end_radius = np.hypot(end_arm[:, 0], end_arm[:, 1])
+        self.angle = np.arctan2(start_arm[:, 1], start_arm[:, 0])
         self.sweep = _sweeps(toolpath.kind[self.row], self.begin, self.end, self.centre)
 
-    def points(self, which: Ints, share: Floats) -> Floats:
-        """Compute the points (K, 3) mm of the arcs `which` (K,) at `share` (K,) of their sweep."""
-        angle = self.angle[which] + share * self.sweep[which]
-        radius = self.radius[which] + share * (self.end_radius - self.radius)[which]
-        rise = (self.end[:, 2] - self.begin[:, 2])[which]
+    def points(self, indices: Ints, share: Floats) -> Floats:
+        """Compute the points (K, 3) mm of the arcs `indices` (K,) at `share` (K,) of their
+        sweep."""
+        angle = self.angle[indices] + share * self.sweep[indices]
+        radius = self.radius[indices] + share * (self.end_radius - self.radius)[indices]
+        rise = (self.end[:, 2] - self.begin[:, 2])[indices]
         return np.column_stack(
             [
-                self.centre[which, 0] + radius * np.cos(angle),
-                self.centre[which, 1] + radius * np.sin(angle),
-                self.begin[which, 2] + share * rise,
+                self.centre[indices, 0] + radius * np.cos(angle),
+                self.centre[indices, 1] + radius * np.sin(angle),
+                self.begin[indices, 2] + share * rise,
             ]
         )
 
@@ -392,14 +395,17 @@ def toolpath_extents(toolpath: Toolpath, *, rows: Bools | None = None) -> Floats
     if rows is None:
         points, arcs = [toolpath.start[None, :], toolpath.end], toolpath.is_arc
     else:
-        chosen = np.flatnonzero(rows)
-        points, arcs = [toolpath.starts_of(chosen), toolpath.end[chosen]], toolpath.is_arc & rows
+        chosen_rows = np.flatnonzero(rows)
+        points, arcs = (
+            [toolpath.starts_of(chosen_rows), toolpath.end[chosen_rows]],
+            toolpath.is_arc & rows,
+        )
     low = high = points[0][0]
     for ends in points:
         for first in range(0, len(ends), ROWS_AT_ONCE):
-            some = ends[first : first + ROWS_AT_ONCE]
-            low = np.concatenate([low[None, :], some]).min(axis=0)
-            high = np.concatenate([high[None, :], some]).max(axis=0)
+            batch = ends[first : first + ROWS_AT_ONCE]
+            low = np.concatenate([low[None, :], batch]).min(axis=0)
+            high = np.concatenate([high[None, :], batch]).max(axis=0)
     tops = _arc_extremes(toolpath, np.flatnonzero(arcs))
     if len(tops):
         low[:2] = np.minimum(low[:2], tops.min(axis=0))
@@ -418,8 +424,8 @@ def _arc_extremes(toolpath: Toolpath, arcs: Ints) -> Floats:
     compass = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
     from_start = np.arctan2(compass[:, 1], compass[:, 0]) - np.arctan2(arm[:, 1:], arm[:, :1])
     turn = np.mod(sign[:, None] * from_start, 2.0 * np.pi)
-    arc, which = np.nonzero(turn <= sweep[:, None])
-    return np.asarray(centre[arc] + radius[arc, None] * compass[which])
+    arc, directions = np.nonzero(turn <= sweep[:, None])
+    return np.asarray(centre[arc] + radius[arc, None] * compass[directions])
 
 
 def mounted_before(toolpath: Toolpath) -> Bools:

@@ -13,19 +13,20 @@ from camtool.toolpath.moves import Toolpath
 
 def refuse(
     toolpath: Toolpath,
-    bad: Bools,
+    is_bad: Bools,
     message: str | Callable[[int], str],
     mend: str = "",
     *,
     rows: Ints | None = None,
 ) -> None:
-    """Raise PostError for the first row of the mask `bad` (N,); `message` may be a function of the
-    row.
+    """Raise PostError for the first row of the mask `is_bad` (N,); `message` may be a function of
+    the row.
 
-    `rows` maps rows of `bad` to rows of `toolpath`, where `bad` is of a toolpath made from it.
+    `rows` maps rows of `is_bad` to rows of `toolpath`, where `is_bad` is of a toolpath made from
+    it.
     """
-    if bad.any():
-        row = int(np.argmax(bad)) if rows is None else int(rows[np.argmax(bad)])
+    if is_bad.any():
+        row = int(np.argmax(is_bad)) if rows is None else int(rows[np.argmax(is_bad)])
         text = message if isinstance(message, str) else message(row)
         raise PostError(text, where=toolpath.place(row), mend=mend)
 
@@ -48,10 +49,10 @@ def refuse_two_radii(toolpath: Toolpath, max_mm: float) -> None:
         toolpath, toolpath.is_arc & ~centred, "an arc without a centre", "give the arc a centre"
     )
     with np.errstate(invalid="ignore"):
-        bad = toolpath.is_arc & ~(spread <= max_mm)
+        is_bad = toolpath.is_arc & ~(spread <= max_mm)
     refuse(
         toolpath,
-        bad,
+        is_bad,
         lambda row: f"the radii at start and end of an arc differ by {spread[row]:.4f} mm",
         f"they may differ by {max_mm:g} mm",
     )
@@ -61,5 +62,5 @@ def radius_spread(toolpath: Toolpath) -> Floats:
     """Compute the difference (N,) mm of an arc's radii at its start and its end; NaN for rows
     without a centre."""
     with np.errstate(invalid="ignore", over="ignore"):
-        out, back = (p[:, :2] - toolpath.centre for p in (toolpath.starts, toolpath.end))
-        return np.asarray(np.abs(np.hypot(*out.T) - np.hypot(*back.T)))
+        start_arm, end_arm = (p[:, :2] - toolpath.centre for p in (toolpath.starts, toolpath.end))
+        return np.asarray(np.abs(np.hypot(*start_arm.T) - np.hypot(*end_arm.T)))

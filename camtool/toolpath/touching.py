@@ -24,8 +24,8 @@ def untouched_place(toolpath: Toolpath, row: int, mm: float = 1.0) -> tuple[floa
     cuts = feeds_below_top(toolpath)
     if not cuts[row:].any():
         return None
-    (left, right), (low, high) = toolpath_extents(toolpath, rows=cuts)[:2].tolist()
-    grid = np.stack(np.meshgrid(np.linspace(left, right, GRID), np.linspace(low, high, GRID)), -1)
+    (low_x, right), (low, high) = toolpath_extents(toolpath, rows=cuts)[:2].tolist()
+    grid = np.stack(np.meshgrid(np.linspace(low_x, right, GRID), np.linspace(low, high, GRID)), -1)
     places = grid.reshape(-1, 2)
     places = np.vstack([[0.0, 0.0], places[np.argsort(np.hypot(*places.T), kind="stable")]])
     rows = np.flatnonzero(cuts[:row])
@@ -37,10 +37,10 @@ def untouched_place(toolpath: Toolpath, row: int, mm: float = 1.0) -> tuple[floa
         along = end - begin
         length = np.maximum((along * along).sum(axis=1), np.finfo(float).tiny)
         part = np.clip(((place - begin) * along).sum(axis=1) / length, 0.0, 1.0)
-        away = np.hypot(*(begin + part[:, None] * along - place).T)
+        distances = np.hypot(*(begin + part[:, None] * along - place).T)
         # Of an arc the whole circle counts.
         round_away = np.abs(np.hypot(*(place - centre).T) - radius)
-        if (np.where(is_arc, round_away, away) >= reach).all():
+        if (np.where(is_arc, round_away, distances) >= reach).all():
             return float(place[0]), float(place[1])
     return None
 

@@ -40,8 +40,8 @@ class WordColumn(Struct, frozen=True, eq=False):
     @property
     def style(self) -> tuple[int, int, int, int]:
         """Digits, decimals, kept decimals and sign, as `camtool.kernels.words` takes them."""
-        kept = self.decimals if self.kept is None else self.kept
-        return self.digits, self.decimals, kept, int(self.plus)
+        decimals_kept = self.decimals if self.kept is None else self.kept
+        return self.digits, self.decimals, decimals_kept, int(self.plus)
 
 
 class TextLines(Struct, frozen=True, eq=False):
@@ -56,16 +56,16 @@ class TextLines(Struct, frozen=True, eq=False):
         """Characters (M,) of each line, its end included."""
         return np.diff(self.ends, prepend=0)
 
-    def with_lines(self, between: Iterable[tuple[int, str]]) -> bytes:
+    def with_lines(self, extra_lines: Iterable[tuple[int, str]]) -> bytes:
         """Return the text with further lines inserted, each (k, line) before line k; k ascends."""
-        text, out, done = memoryview(self.data), BytesIO(), 0
-        for k, line in between:
+        text, output, offset = memoryview(self.data), BytesIO(), 0
+        for k, line in extra_lines:
             upto = int(self.ends[k - 1]) if k > 0 else 0
-            out.write(text[done:upto])
-            out.write(f"{line}\n".encode("ascii"))
-            done = upto
-        out.write(text[done:])
-        return out.getvalue()
+            output.write(text[offset:upto])
+            output.write(f"{line}\n".encode("ascii"))
+            offset = upto
+        output.write(text[offset:])
+        return output.getvalue()
 
 
 def line_lengths(data: bytes) -> Ints:
@@ -81,16 +81,16 @@ def texts_of(columns: Sequence[WordColumn], *, blanks: bool = False, end: str = 
     fixed_ends = np.cumsum([len(piece) for piece in pieces])
     styles = np.array([each.style for each in columns], dtype=np.int64)
     room = len(fixed) + len(columns) * (MAX_NUMBER_CHARS + 1)
-    out: Octets = np.empty(ROWS_AT_ONCE * room, dtype=np.uint8)
+    buffer: Octets = np.empty(ROWS_AT_ONCE * room, dtype=np.uint8)
     count, parts, ends = len(columns[0].units), [], np.zeros(len(columns[0].units), dtype=np.int64)
     begin = 0
     for low in range(0, count, ROWS_AT_ONCE):
         rows = slice(low, min(low + ROWS_AT_ONCE, count))
         values = np.column_stack([each.units[rows] for each in columns]).astype(np.int64)
         written = np.column_stack([each.written[rows] for each in columns]).view(np.uint8)
-        put_words(values, written, fixed, fixed_ends, styles, blanks, out, ends[rows])
+        put_words(values, written, fixed, fixed_ends, styles, blanks, buffer, ends[rows])
         size = int(ends[rows][-1])
-        parts.append(out[:size].tobytes())
+        parts.append(buffer[:size].tobytes())
         ends[rows] += begin
         begin += size
     return TextLines(b"".join(parts), ends)

@@ -373,7 +373,7 @@ def test_a_certificate_names_what_it_would_take(tmp_path: Path) -> None:
     """Nothing mends a window that is wider than the plate's bore is sure: how sure must the tool
     be? At the named value it holds, a tenth beyond it does not."""
     made = case(tmp_path, [limited(WINDOW, "±0.0045")])
-    found = meet(made, most=4)
+    found = meet(made, max_trials=4)
     assert not found.holds
     assert found.after.score <= found.before.score
     why = found.certificate
@@ -404,7 +404,7 @@ def test_contours_of_one_name_have_one_allowance(tmp_path: Path, apart: bool) ->
     one = {"name": "one", "kind": "distance", "from": [5, 10], "to": [15, 10]}
     two = {"name": "two", "kind": "distance", "from": [20, 10], "to": [30, 10]}
     asked = [limited(one, "+0.06/+0.02"), limited(two, "-0.02/-0.06")]
-    found = meet(case(tmp_path, asked, svg=svg, job='kind = "profile"\nside = "inside"'), most=3)
+    found = meet(case(tmp_path, asked, svg=svg, job='kind = "profile"\nside = "inside"'), max_trials=3)
     assert found.holds == apart
     if not apart:
         assert found.certificate is not None
@@ -432,7 +432,7 @@ def test_what_is_not_known_is_named_first(tmp_path: Path) -> None:
     machine = camtool.load_target(
         "linuxcnc", settings=[*EXACT, *(each for each in KNOWN if "process" not in each)]
     )
-    found = meet(replace(made, target=machine), most=3)
+    found = meet(replace(made, target=machine), max_trials=3)
     assert not found.holds
     assert found.certificate is not None
     assert found.certificate.unknown == ("process_mm",)
@@ -452,7 +452,7 @@ def test_what_is_not_known_but_bounded_makes_limits_narrower(tmp_path: Path) -> 
     assert bore.unknown_um is not None
     assert bore.unknown_um > 10.0
     assert bore.high_mm + bore.unknown_um / 1000.0 < 7.96
-    never = meet(replace(case(tmp_path, [limited(BORE, "±0.02")]), target=target), most=1)
+    never = meet(replace(case(tmp_path, [limited(BORE, "±0.02")]), target=target), max_trials=1)
     assert never.certificate is not None
     assert never.certificate.unknown == ()
     assert "what [uncertainty] does not say: part_expansion_per_k" in to_text(never)

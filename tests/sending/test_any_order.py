@@ -368,7 +368,7 @@ def stopped_and_gone_on(name: str, seed: int) -> str:
     tool_at, asked = tool_at_of(one.wire, left, said, name)
     try:
         second = consignment(
-            program, target, source=name, first=left.block, left=left, tool_at=tool_at
+            program, target, source=name, first=left.block, state=left, tool_at=tool_at
         )
     except OptionError as refused:
         if "nothing moves" not in str(refused):

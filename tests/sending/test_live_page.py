@@ -86,7 +86,7 @@ def test_it_is_a_page_by_itself_and_names_are_text(tmp_path: Path) -> None:
     assert '"again_ms": 0' in text  # nothing comes any more
     assert '"again_ms": 1000' in page.html("sending", {}, 3)
     assert not re.search(r"(src|href)=", text)
-    told = page.html("sending", {"place": "<b>"}, 9, share=0.4199, why="a <hold>")
+    told = page.html("sending", {"place": "<b>"}, 9, share=0.4199, reason="a <hold>")
     assert "<b>, 41 %" not in told
     assert "</b>, 41 %" in told
     assert "a &lt;hold&gt;" in told

@@ -205,7 +205,7 @@ def test_a_journal_holds_to_its_last_whole_line(tmp_path: Path) -> None:
     journal.note(sent=9, acknowledged=7, done=5, block=4)
     file.write_bytes(file.read_bytes() + b'{"s": 3, "blo')
     assert read_journal(file).block == 5
-    more = Journal(file, head | {"first": 5}, more=True)
+    more = Journal(file, head | {"first": 5}, appends=True)
     assert read_journal(file).block == 5
     more.note(sent=2, acknowledged=1, done=1, block=8)
     assert read_journal(file).block == 9
@@ -275,7 +275,7 @@ def left_at(program: Path, place: tuple[float, float, float], *, still: bool = T
     journal.note(place, sent=30, acknowledged=25, done=20, block=19, last=29)
     if still:
         counts = {"sent": 30, "acknowledged": 25, "done": 20, "block": 19, "last": 29}
-        journal.close("stopped", "", still=True, place=place, **counts)
+        journal.close("stopped", "", is_still=True, place=place, **counts)
     return journal.file
 
 
@@ -522,7 +522,7 @@ def test_a_machine_that_says_no_place_is_not_gone_on_with_unasked(
     counts = {"sent": 2, "acknowledged": 2, "done": 2, "block": 4, "last": 4}
     journal = Journal(Path(f"{file}.journal"), head)
     journal.note((1.0, 2.0, 3.0), **counts)
-    journal.close("stopped", "", still=True, place=(1.0, 2.0, 3.0), **counts)
+    journal.close("stopped", "", is_still=True, place=(1.0, 2.0, 3.0), **counts)
     words = [word for setting in settings for word in ("--set", setting)]
     line = command(str(file), "-t", target, *words, "--port", "/dev/null", "--yes", "--resume")
     done = subprocess.run(

@@ -57,7 +57,7 @@ def test_faults_never_skip_or_double_a_block(fault: str, seed: int) -> None:
     twin, _ = made("grbl")
     program = logo("grbl")
     talk = conversation(program)
-    talked(talk, WiredTwin(twin, back=Faults.of(fault), seed=seed), latest_s=1000.0)
+    talked(talk, WiredTwin(twin, faults_back=Faults.of(fault), seed=seed), latest_s=1000.0)
     wanted = sent_without_faults()
     assert twin.decoded == list(wanted[: len(twin.decoded)])
     assert talk.state in (WireState.FINISHED, WireState.FAILED)

@@ -99,7 +99,7 @@ def test_the_pauses_are_those_of_the_thesis() -> None:
 def test_with_an_echo_no_job_begins_that_came_back_otherwise(fault: str, seed: int) -> None:
     settings = (STREAM, "link.echo=echo")
     twin, talk = loaded(*settings).twin(["echo=characters"]), conversation(JOBS, *settings)
-    line = WiredTwin(twin, back=Faults.of(fault), seed=seed)
+    line = WiredTwin(twin, faults_back=Faults.of(fault), seed=seed)
     now = talked(talk, line, going_on, latest_s=1000.0, coarse=True)
     assert now < 1000.0
     assert JOBS.startswith(b"".join(twin.decoded))

@@ -70,7 +70,7 @@ def test_each_reading_of_what_is_open(choices: list[str], settings: list[str]) -
 def test_faults_never_skip_or_double_a_block(fault: str, seed: int) -> None:
     twin, loaded = made("pic-mmh")
     talk = conversation(SHORT, loaded)
-    line = WiredTwin(twin, back=Faults.of(fault), seed=seed)
+    line = WiredTwin(twin, faults_back=Faults.of(fault), seed=seed)
     now = talked(talk, line, latest_s=2000.0)
     assert twin.decoded == executed(SHORT)[: len(twin.decoded)]
     assert max(talk.block, -1) < len(twin.decoded)

@@ -87,7 +87,7 @@ def test_a_machine_that_hears_nothing_while_it_draws_hears_every_block(
 def test_answers_that_fail_end_it_where_it_stands(fault: str, seed: int) -> None:
     twin, _ = made("valcnc", ["answer=ok"])
     talk = conversation(answers=True)
-    line = WiredTwin(twin, back=Faults.of(fault), seed=seed, paced=True)
+    line = WiredTwin(twin, faults_back=Faults.of(fault), seed=seed, paced=True)
     talked_with(talk, line, latest_s=1000.0)
     whole = logo("valcnc").replace(b" ", b"").splitlines(keepends=True)
     assert twin.decoded == whole[: len(twin.decoded)]
