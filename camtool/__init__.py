@@ -106,8 +106,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import camtool.api
 
-    found = globals()[name] = getattr(camtool.api, name)
-    return found
+    value = globals()[name] = getattr(camtool.api, name)
+    return value
 
 
 def __dir__() -> list[str]:

@@ -100,9 +100,9 @@ BYTES = "<bytes>"
 """The name in messages of a program that was given as bytes."""
 
 
-def _patterns(given: str | Sequence[str]) -> tuple[str, ...]:
+def _patterns(patterns: str | Sequence[str]) -> tuple[str, ...]:
     """The patterns; a single one may be given as it is."""
-    return (given,) if isinstance(given, str) else tuple(given)
+    return (patterns,) if isinstance(patterns, str) else tuple(patterns)
 
 
 def read_drawing(
@@ -192,10 +192,10 @@ def targets() -> list[ListedTarget]:
     """The installed machines, sorted by name: title, extension, and the keys that the user's
     machine file must give. A plug-in that cannot be loaded is left out with a warning."""
     broken: list[CamtoolError] = []
-    found = [listed for _, listed in each_target(list_target, broken=broken)]
+    listed_targets = [listed for _, listed in each_target(list_target, broken=broken)]
     for error in broken:
         warnings.warn(str(error), stacklevel=2)
-    return found
+    return listed_targets
 
 
 def load_target(
@@ -252,10 +252,10 @@ def plan(
     """
     from camtool.planning.plan import plan as planned
 
-    loaded, wanted = as_target(target), job or Job()
-    read = as_drawing(drawing, loaded, wanted)
-    made = planned(read, wanted, loaded.machine)
-    return ShownToolpath.of(made, read, wanted, loaded)
+    loaded_target, job_used = as_target(target), job or Job()
+    read = as_drawing(drawing, loaded_target, job_used)
+    toolpath = planned(read, job_used, loaded_target.machine)
+    return ShownToolpath.of(toolpath, read, job_used, loaded_target)
 
 
 def post(
@@ -274,9 +274,9 @@ def post(
     backlash, scale and squareness; exceeding one of the `gates` is a finding. Raises OptionError,
     and PostError for what the machine or its dialect cannot do. Source: docs/verifying.md.
     """
-    loaded, wanted = as_target(target), _with_compensation(job, compensate)
-    read = as_drawing(drawing, loaded, wanted)
-    return post_drawing(read, wanted, loaded, check=check, gates=gates)
+    loaded_target, job_used = as_target(target), _with_compensation(job, compensate)
+    read = as_drawing(drawing, loaded_target, job_used)
+    return post_drawing(read, job_used, loaded_target, check=check, gates=gates)
 
 
 def post_by_tool(
@@ -294,9 +294,9 @@ def post_by_tool(
     All of them are planned together, in one work frame; each is complete, and judged alone against
     what its operations ask for. Raises as `post` does. Source: docs/verifying.md.
     """
-    loaded, wanted = as_target(target), _with_compensation(job, compensate)
-    read = as_drawing(drawing, loaded, wanted)
-    return by_tool(read, wanted, loaded, check=check, gates=gates)
+    loaded_target, job_used = as_target(target), _with_compensation(job, compensate)
+    read = as_drawing(drawing, loaded_target, job_used)
+    return by_tool(read, job_used, loaded_target, check=check, gates=gates)
 
 
 def post_by_setup(
@@ -313,15 +313,15 @@ def post_by_setup(
     `job.setup(NAME)` is the job of one of them. Raises as `post` does, and OptionError for a job
     without set-ups. Source: docs/jobs.md.
     """
-    loaded, wanted = as_target(target), _with_compensation(job, compensate)
-    read = as_drawing(drawing, loaded, wanted)
-    return by_setup(read, wanted, loaded, check=check, gates=gates)
+    loaded_target, job_used = as_target(target), _with_compensation(job, compensate)
+    read = as_drawing(drawing, loaded_target, job_used)
+    return by_setup(read, job_used, loaded_target, check=check, gates=gates)
 
 
 def _with_compensation(job: Job | None, compensate: bool) -> Job:
     """The job, which compensates if it says so itself or is told to."""
-    wanted = job or Job()
-    return replace(wanted, compensate=True) if compensate else wanted
+    job_used = job or Job()
+    return replace(job_used, compensate=True) if compensate else job_used
 
 
 def inspect(
@@ -370,13 +370,15 @@ def meet(
     from camtool.jobs.changes import job_of_tables, together
     from camtool.jobs.tools import Shop
 
-    loaded, place = as_target(target), Path("job.toml" if job is None else job)
+    loaded_target, place = as_target(target), Path("job.toml" if job is None else job)
     file = JobTables() if job is None else read_job_file(place)
     tables = together(file, JobTables(), place.parent)
     job_of = partial(job_of_tables, place=place, shop=Shop())
-    read = as_drawing(drawing, loaded, job_of(tables))
-    asked = None if tolerances is None else Path(tolerances)
-    case = MeetingCase(read, loaded, tables, job_of, Tolerances(*dimensions_of(read, asked)))
+    read = as_drawing(drawing, loaded_target, job_of(tables))
+    tolerances_file = None if tolerances is None else Path(tolerances)
+    case = MeetingCase(
+        read, loaded_target, tables, job_of, Tolerances(*dimensions_of(read, tolerances_file))
+    )
     return met(case, most or DEFAULT_TRIALS)
 
 
@@ -434,10 +436,12 @@ def verify(
     in µm, sizes in mm, times in s. Raises ProgramError with block and column, and OptionError.
     Source: docs/verifying.md.
     """
-    loaded, wanted = as_target(target), job or Job()
+    loaded_target, job_used = as_target(target), job or Job()
     data, source = as_bytes(program)
-    read = None if against is None else as_drawing(against, loaded, wanted)
-    return verify_program(data, loaded, source=source, drawing=read, job=wanted, judging=judging)
+    read = None if against is None else as_drawing(against, loaded_target, job_used)
+    return verify_program(
+        data, loaded_target, source=source, drawing=read, job=job_used, judging=judging
+    )
 
 
 def compare(
@@ -457,16 +461,20 @@ def compare(
     OptionError for unknown variants, and MachineError for values that the machine cannot have.
     Source: docs/verifying.md.
     """
-    loaded, wanted, how = as_target(target), job or Job(), judging or Judging()
+    loaded_target, job_used, judging_used = as_target(target), job or Job(), judging or Judging()
     data, source = as_bytes(program)
-    read = None if against is None else as_drawing(against, loaded, wanted)
+    read = None if against is None else as_drawing(against, loaded_target, job_used)
     if isinstance(ways, str):
-        chosen = variants_of(ways, lambda settings: loaded.with_settings(settings), how)
+        variants = variants_of(
+            ways, lambda settings: loaded_target.with_settings(settings), judging_used
+        )
     else:
-        chosen = [ProgramVariant(name, as_target(each), how) for name, each in ways.items()]
-    if not chosen:
+        variants = [
+            ProgramVariant(name, as_target(each), judging_used) for name, each in ways.items()
+        ]
+    if not variants:
         raise OptionError("there is nothing to compare", mend="give a target for each way")
-    return compare_program(data, chosen, source=source, drawing=read, job=wanted)
+    return compare_program(data, variants, source=source, drawing=read, job=job_used)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -491,8 +499,8 @@ class Calibrated(Calibration):
         return to_text(self, self.machine)
 
     def __repr__(self) -> str:
-        found = ", ".join(each.name for each in self.estimates if not each.region)
-        return f"<Calibration of {self.target} from {self.file}: {found or 'nothing'}>"
+        names = ", ".join(each.name for each in self.estimates if not each.region)
+        return f"<Calibration of {self.target} from {self.file}: {names or 'nothing'}>"
 
 
 def calibrate(
@@ -509,21 +517,21 @@ def calibrate(
     `machine_file` of the result is the text of a new one. Raises InputError, which names file,
     table and key, OptionError and MachineError. Source: docs/calibration.md.
     """
-    own = None if machine is None else Path(machine)
+    machine_path = None if machine is None else Path(machine)
     if not isinstance(measurements, Measurements):
         measurements = read_measurements(Path(measurements))
-    name = target or (measurements.target if own is None else extended_by(own))
+    name = target or (measurements.target if machine_path is None else extended_by(machine_path))
     if not name:
         raise OptionError(
             "no machine is named",
             file=measurements.file,
             mend="give target, or name it in the file",
         )
-    known = load_target(name, machine=own).machine
-    found = calibrated(measurements, known)
-    values = {each.name: getattr(found, each.name) for each in fields(found)}
-    extends = {"extends": name} if own is None else read_table(own)
-    return Calibrated(**values, measurements=measurements, machine=known, extends=extends)
+    known_machine = load_target(name, machine=machine_path).machine
+    calibration = calibrated(measurements, known_machine)
+    values = {each.name: getattr(calibration, each.name) for each in fields(calibration)}
+    extends = {"extends": name} if machine_path is None else read_table(machine_path)
+    return Calibrated(**values, measurements=measurements, machine=known_machine, extends=extends)
 
 
 # Pictures of the results of the other calls.
@@ -575,12 +583,12 @@ def preview(
     return Picture(tuple(scene for scene in scenes if isinstance(scene, Scene)), options)
 
 
-def _as_shown(what: Any) -> Shown:
+def _as_shown(value: Any) -> Shown:
     """The value as one with a picture."""
-    if isinstance(what, Shown):
-        return what
-    if isinstance(what, Drawing):
-        return ShownDrawing.of(what)
-    if isinstance(what, Toolpath):
-        return ShownToolpath.of(what)
-    raise TypeError(f"{type(what).__name__} has no picture")
+    if isinstance(value, Shown):
+        return value
+    if isinstance(value, Drawing):
+        return ShownDrawing.of(value)
+    if isinstance(value, Toolpath):
+        return ShownToolpath.of(value)
+    raise TypeError(f"{type(value).__name__} has no picture")

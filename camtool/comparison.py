@@ -76,8 +76,8 @@ class Comparison(Shown):
     @property
     def verdicts(self) -> Mapping[str, Verification]:
         """The verification of each variant, by its name."""
-        judged = zip(self.ways, self.runs, strict=True)
-        return {each.name: run.verification for each, run in judged if run.verification}
+        judged_runs = zip(self.ways, self.runs, strict=True)
+        return {each.name: run.verification for each, run in judged_runs if run.verification}
 
     @property
     def rows(self) -> tuple[ContrastRow, ...]:
@@ -94,25 +94,27 @@ class Comparison(Shown):
         commanded = all(each.judging.interpolator is not None for each in self.ways)
         first, decoded = self.ways[0].target, self.runs[0].decoded
         assert decoded is not None
-        wanted = first.model.quantised(decoded, first.machine)
+        wanted_path = first.model.quantised(decoded, first.machine)
         place = worst_place(self.verdicts.values())
-        window = self._window(wanted, place)
+        window = self._window(wanted_path, place)
         room = MARGIN_SHARE * (window[:, 1] - window[:, 0]).max()
-        around = window + np.array([-room, room])
+        surroundings = window + np.array([-room, room])
         lines = []
         for variant, run in zip(self.ways, self.runs, strict=True):
-            moves, how = run.decoded, variant.judging
+            moves, options = run.decoded, variant.judging
             assert moves is not None
             cutting = cut_moves(moves, flat_cuts=True).is_cut
-            chunks = variant.target.simulate(moves, Options(how.interpolator, how.effects or ALL))
-            paths = paths_within(chunks, cutting, around, commanded=commanded)
+            chunks = variant.target.simulate(
+                moves, Options(options.interpolator, options.effects or ALL)
+            )
+            paths = paths_within(chunks, cutting, surroundings, commanded=commanded)
             lines.append((variant.name, paths))
-        what = "commanded positions" if commanded else "paths of the slides"
+        subject = "commanded positions" if commanded else "paths of the slides"
         x, y = place
-        note = f"{what}; the largest error of all is near ({x:.3f}, {y:.3f}) mm"
-        return Overlay(PurePath(self.source).name, window, wanted, lines, (note,))
+        note = f"{subject}; the largest error of all is near ({x:.3f}, {y:.3f}) mm"
+        return Overlay(PurePath(self.source).name, window, wanted_path, lines, (note,))
 
-    def _window(self, wanted: Toolpath, place: tuple[float, float]) -> Floats:
+    def _window(self, wanted_path: Toolpath, place: tuple[float, float]) -> Floats:
         """Return [[xmin, xmax], [ymin, ymax]] mm that the picture shows."""
         import numpy as np
 
@@ -120,11 +122,11 @@ class Comparison(Shown):
         step = max(max(each.axes.x.coded_step_mm, each.axes.y.coded_step_mm) for each in machines)
         error_um = max(row.total_max_um or 0.0 for row in self.rows)
         half = max(WINDOW_STEPS * step, WINDOW_ERRORS * error_um / UM_PER_MM)
-        whole = toolpath_extents(wanted)[:2]
-        size = float((whole[:, 1] - whole[:, 0]).max())
+        extents = toolpath_extents(wanted_path)[:2]
+        size = float((extents[:, 1] - extents[:, 0]).max())
         if size <= 2.0 * half * MAX_WHOLE_RATIO:
             pad = max(0.05 * size, error_um / UM_PER_MM, step)
-            return np.asarray(whole + np.array([-pad, pad]))
+            return np.asarray(extents + np.array([-pad, pad]))
         x, y = place
         return np.array([[x - half, x + half], [y - half, y + half]])
 
@@ -160,19 +162,20 @@ def compare_program(
     return Comparison(source, tuple(variants), tuple(runs))
 
 
-def variants_of(what: str, load: Load, judging: Judging) -> list[ProgramVariant]:
-    """Return the variants that `what` names: `interpolators`, `mechanics`, or KEY=VALUE,VALUE,...
+def variants_of(variants_text: str, load: Load, judging: Judging) -> list[ProgramVariant]:
+    """Return the variants that `variants_text` names: `interpolators`, `mechanics`, or
+    KEY=VALUE,VALUE,...
 
     OptionError for anything else, and MachineError for values that the machine cannot have.
     """
-    if what == "interpolators":
+    if variants_text == "interpolators":
         return _interpolators(load(()), judging)
-    if what == "mechanics":
+    if variants_text == "mechanics":
         return _mechanics(load(()), judging)
-    key, equals, values = what.partition("=")
+    key, equals, values = variants_text.partition("=")
     if not equals or not values.strip():
         raise OptionError(
-            f"{what!r} is nothing to compare",
+            f"{variants_text!r} is nothing to compare",
             where="--compare",
             mend="write interpolators, mechanics, backlash=0,0.1,0.2 or KEY=VALUE,VALUE,...",
         )

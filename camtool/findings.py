@@ -117,10 +117,10 @@ class Sentence:
         **values: float | str,
     ) -> Finding:
         """Return the finding with its message."""
-        given = self.severity if severity is None else severity
+        used_severity = self.severity if severity is None else severity
         return Finding(
             self.code,
-            self.code.severities[0] if given is None else given,
+            self.code.severities[0] if used_severity is None else used_severity,
             _TEXTS.vformat(self.text, (), {**values, "measured": measured, "limit": limit}),
             where=where,
             measured=None if measured is None else float(measured),
@@ -140,8 +140,8 @@ class _Texts(Formatter):
         """Return a value as text, or the words that are chosen by it."""
         if "|" not in format_spec:
             return format(value, format_spec)
-        *none, one, many = format_spec.split("|")
-        words = none[0] if none and value == 0 else one if value == 1 else many
+        *none_words, one, many_words = format_spec.split("|")
+        words = none_words[0] if none_words and value == 0 else one if value == 1 else many_words
         return words.replace("#", f"{value:.0f}")
 
 
@@ -170,12 +170,12 @@ _F = TypeVar("_F", bound=AnyFinding)
 def summarise_findings(findings: Iterable[_F]) -> list[tuple[_F, int]]:
     """Return the first MAX_ALIKE findings of each code and severity, in their order; the last of
     each group with the number of those that are left out, the others with 0."""
-    alike: dict[tuple[object, object], list[_F]] = {}
+    groups: dict[tuple[object, object], list[_F]] = {}
     order = list(findings)
     for each in order:
-        alike.setdefault((each.code, each.severity), []).append(each)
+        groups.setdefault((each.code, each.severity), []).append(each)
     shown = []
-    for group in alike.values():
+    for group in groups.values():
         shown += [(each, 0) for each in group[:MAX_ALIKE]]
         shown[-1] = (shown[-1][0], max(len(group) - MAX_ALIKE, 0))
     places = {id(each): place for place, each in enumerate(order)}

@@ -94,29 +94,32 @@ class Table:
 
     def only(self, names: Iterable[str]) -> Table:
         """The keys of these names."""
-        known = set(names)
-        given = {name: each for name, each in self.given.items() if name in known}
-        return Table(given, self.where, self.file)
+        name_set = set(names)
+        chosen = {name: each for name, each in self.given.items() if name in name_set}
+        return Table(chosen, self.where, self.file)
 
     def over(self, below: Table) -> Table:
         """The keys of both, those of this table where both have one."""
-        where = self if self.given else below
-        return Table({**below.given, **self.given}, where.where, where.file)
+        first_table = self if self.given else below
+        return Table({**below.given, **self.given}, first_table.where, first_table.file)
 
 
-def table_of(values: object, known: Iterable[str], where: str, file: str) -> Table:
-    """A TOML table, its keys checked; `where` is "" for the top of the file."""
+def table_of(values: object, known_keys: Iterable[str], table_place: str, file: str) -> Table:
+    """A TOML table, its keys checked; `table_place` is "" for the top of the file."""
     if not isinstance(values, dict):
         raise OptionError(
-            f"{values!r} is no table", file=file, where=where, mend=f"known keys: {_listed(known)}"
+            f"{values!r} is no table",
+            file=file,
+            where=table_place,
+            mend=f"known keys: {_listed(known_keys)}",
         )
     given = {}
     for name, value in values.items():
-        place = f"{where}, key {name}" if where else f"key {name}"
+        place = f"{table_place}, key {name}" if table_place else f"key {name}"
         given[name] = Given(value, place, file)
-        if name not in known:
-            raise given[name].refused("unknown key", meant(name, known))
-    return Table(given, where, file)
+        if name not in known_keys:
+            raise given[name].refused("unknown key", meant(name, known_keys))
+    return Table(given, table_place, file)
 
 
 def record_of(
@@ -149,13 +152,13 @@ def record_of(
 
 def why_idle(keys: Mapping[str, Key], name: str, record: object) -> OptionError | None:
     """Why a key has no effect in this record, as an error without a place; None when it has."""
-    only = keys[name].only
-    if only is None:
+    condition = keys[name].only
+    if condition is None:
         return None
-    other, values = only
+    other, values = condition
     field_name = keys[other].field
-    own = dict(getattr(record, "own", ()))
-    if own.get(field_name, getattr(record, field_name, None)) in values:
+    own_values = dict(getattr(record, "own", ()))
+    if own_values.get(field_name, getattr(record, field_name, None)) in values:
         return None
     needed = " or ".join(f'"{value}"' for value in values)
     return OptionError(
@@ -166,18 +169,18 @@ def why_idle(keys: Mapping[str, Key], name: str, record: object) -> OptionError 
 def refuse_idle(keys: Mapping[str, Key], table: Table, record: object) -> None:
     """Refuse a key that has no effect in the record made of its table."""
     for name, given in table.given.items():
-        why = why_idle(keys, name, record)
-        if why is not None:
-            raise given.refused(why.message, why.mend)
+        error = why_idle(keys, name, record)
+        if error is not None:
+            raise given.refused(error.message, error.mend)
 
 
-def meant(name: str, known: Iterable[str]) -> str:
+def meant(name: str, known_names: Iterable[str]) -> str:
     """The known name that was probably meant, and all known names: the mend of an unknown key."""
-    return f"{guess(name, known)}known keys: {_listed(known)}"
+    return f"{guess(name, known_names)}known keys: {_listed(known_names)}"
 
 
-def _listed(known: Iterable[str]) -> str:
-    return ", ".join(known)
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names)
 
 
 # How values are read: what TOML or the command line gives becomes numbers and records. Lengths,
@@ -251,16 +254,16 @@ def text(value: object) -> str:
     return value
 
 
-def word(known: Sequence[str]) -> Callable[[Given], Any]:
+def word(words: Sequence[str]) -> Callable[[Given], Any]:
     """Return a reader of one of the known words; the error for another one guesses which was
     meant."""
 
     def convert(value: object) -> str:
         name = text(value)
-        if name not in known:
+        if name not in words:
             raise OptionError(
                 f"unknown word {name!r}",
-                mend=f"{guess(name, known)}use one of {', '.join(known)}",
+                mend=f"{guess(name, words)}use one of {', '.join(words)}",
             )
         return name
 
@@ -296,6 +299,6 @@ PATTERNS_OF_NAMES = Value(plain(patterns))
 SWITCH = Value(plain(switch))
 
 
-def one_of(known: tuple[str, ...]) -> Value:
+def one_of(words: tuple[str, ...]) -> Value:
     """Return the Value of one of these words."""
-    return Value(word(known), choices=known)
+    return Value(word(words), choices=words)

@@ -25,14 +25,14 @@ _READ_BYTES = 1000
 
 
 @contextmanager
-def held(place: Path, taken: Callable[[str], Exception]) -> Iterator[bool]:
+def held(place: Path, refusal: Callable[[str], Exception]) -> Iterator[bool]:
     """Hold the lock file at `place` within the block; yields False if its file system has no
     locks.
 
     Raises `taken(owner)` if another process holds it, where `owner` is a text about that process,
     and OSError if the file cannot be made.
     """
-    handle, locked = _open_locked(place, taken)
+    handle, locked = _open_locked(place, refusal)
     try:
         with suppress(OSError):  # a full disk: the lock holds without a name in it
             os.ftruncate(handle, 0)
@@ -43,7 +43,7 @@ def held(place: Path, taken: Callable[[str], Exception]) -> Iterator[bool]:
         _release(place, handle)
 
 
-def _open_locked(place: Path, taken: Callable[[str], Exception]) -> tuple[int, bool]:
+def _open_locked(place: Path, refusal: Callable[[str], Exception]) -> tuple[int, bool]:
     """Open and lock the file; return its descriptor, and False if the file system has no locks."""
     while True:
         handle = os.open(place, os.O_RDWR | os.O_CREAT, 0o666)
@@ -59,7 +59,7 @@ def _open_locked(place: Path, taken: Callable[[str], Exception]) -> tuple[int, b
             os.close(handle)
             if error.errno not in _LOCKED:
                 raise
-            raise taken(who or "it has just begun") from error
+            raise refusal(who or "it has just begun") from error
 
 
 def _is_at(handle: int, place: Path) -> bool:

@@ -25,10 +25,10 @@ def _compiled(patterns: tuple[str, ...]) -> tuple[frozenset[str], tuple[re.Patte
     return frozenset(folded).difference(wild), tuple(re.compile(translate(each)) for each in wild)
 
 
-def guess(word: str, known: Iterable[str]) -> str:
+def guess(word: str, known_names: Iterable[str]) -> str:
     """Return "did you mean NAME? " with the most similar known name, "" if none is similar."""
     from difflib import get_close_matches
 
-    folded = {name.casefold(): name for name in known}
-    near = get_close_matches(word.casefold(), folded, n=1)
-    return f"did you mean {folded[near[0]]}? " if near else ""
+    folded = {name.casefold(): name for name in known_names}
+    near_names = get_close_matches(word.casefold(), folded, n=1)
+    return f"did you mean {folded[near_names[0]]}? " if near_names else ""

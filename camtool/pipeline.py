@@ -146,28 +146,30 @@ def post_drawing(
     `trace_points` of the slides' path are kept (None: the default). `progress` is told of each
     stage. Raises OptionError, MachineError, and PostError for what the target cannot write.
     """
-    how = _Posting(check, gates, trace_points, brief, progress=progress or Progress())
-    how.progress.begin(PLANNING)
-    how = replace(how, before=_stock_before(drawing, job, target.machine))
-    return _post_drawing(drawing, job, target, how)
+    posting = _Posting(check, gates, trace_points, brief, progress=progress or Progress())
+    posting.progress.begin(PLANNING)
+    posting = replace(posting, before=_stock_before(drawing, job, target.machine))
+    return _post_drawing(drawing, job, target, posting)
 
 
-def _post_drawing(drawing: Drawing, job: Job, target: LoadedTarget, how: _Posting) -> Run:
+def _post_drawing(drawing: Drawing, job: Job, target: LoadedTarget, posting: _Posting) -> Run:
     """The program of a job, judged in the stock that is there before it."""
     from camtool.planning.plan import planned
 
     def plain() -> Run | None:
         other = _without_measures(job)
-        if how.brief or other == job:
+        if posting.brief or other == job:
             return None
-        plainly = _Posting(progress=how.progress, before=how.before)
+        plainly = _Posting(progress=posting.progress, before=posting.before)
         return _post_drawing(drawing, other, target, plainly)
 
     def whole() -> Plan:
         return planned(drawing, job, target.machine, undivided=True)
 
-    how.progress.begin(PLANNING)
-    return _post_plan(drawing, planned(drawing, job, target.machine), target, how, plain, whole)
+    posting.progress.begin(PLANNING)
+    return _post_plan(
+        drawing, planned(drawing, job, target.machine), target, posting, plain, whole
+    )
 
 
 def post_by_tool(
@@ -188,13 +190,13 @@ def post_by_tool(
     """
     from camtool.planning.plan import parted, planned, turns_of_tools
 
-    how = _Posting(check, gates, trace_points, progress=progress or Progress())
+    posting = _Posting(check, gates, trace_points, progress=progress or Progress())
     machine = target.machine
-    how.progress.begin(PLANNING)
-    how = replace(how, before=_stock_before(drawing, job, machine))
+    posting.progress.begin(PLANNING)
+    posting = replace(posting, before=_stock_before(drawing, job, machine))
     every = planned(drawing, job, machine)
     turns = turns_of_tools(every)
-    how = replace(how, is_whole=len(turns) == 1)
+    posting = replace(posting, is_whole=len(turns) == 1)
     plans = parted(every, turns, drawing, machine)
 
     @cache
@@ -212,9 +214,11 @@ def post_by_tool(
 
     runs = []
     for k, plan in enumerate(plans):
-        plain, whole = partial(_kth_of, plains, k), partial(_kth_of, wholes, k)
+        plain_run, whole_plan = partial(_kth_of, plains, k), partial(_kth_of, wholes, k)
         part = f"program {k + 1} of {len(plans)}" if len(plans) > 1 else ""
-        runs.append(replace(_post_plan(drawing, plan, target, how, plain, whole), part=part))
+        runs.append(
+            replace(_post_plan(drawing, plan, target, posting, plain_run, whole_plan), part=part)
+        )
     return tuple(runs)
 
 
@@ -236,16 +240,16 @@ def post_by_setup(
 
     if not job.setups:
         raise OptionError("the job has no set-ups", where="[[setups]]", mend="post it as it is")
-    how = _Posting(check, gates, trace_points, progress=progress or Progress())
+    posting = _Posting(check, gates, trace_points, progress=progress or Progress())
     runs: list[Run] = []
     cut: list[tuple[Job, Toolpath]] = []
     for setup in job.setups:
-        own = job.setup(setup.name)
-        how = replace(how, before=stock_before(own, cut))
-        run = _post_drawing(drawing, own, target, how)
+        setup_job = job.setup(setup.name)
+        posting = replace(posting, before=stock_before(setup_job, cut))
+        run = _post_drawing(drawing, setup_job, target, posting)
         runs.append(replace(run, part=f"set-up {setup.name}"))
         if run.wanted is not None:
-            cut.append((own, run.wanted))
+            cut.append((setup_job, run.wanted))
     return tuple(runs)
 
 
@@ -256,8 +260,10 @@ def _stock_before(drawing: Drawing, job: Job, machine: Machine) -> StockBefore:
 
     if job.setup_of is None:
         return WHOLE
-    whole, own = job.setup_of
-    earlier = [whole.setup(each.name) for each in whole.setups[: whole.setups.index(own)]]
+    full_job, whole_job = job.setup_of
+    earlier = [
+        full_job.setup(each.name) for each in full_job.setups[: full_job.setups.index(whole_job)]
+    ]
     return stock_before(
         job, [(each, planned(drawing, each, machine).toolpath) for each in earlier]
     )
@@ -271,7 +277,7 @@ def _post_plan(
     drawing: Drawing,
     plan: Plan,
     target: LoadedTarget,
-    how: _Posting,
+    posting: _Posting,
     plain_run: Callable[[], Run | None],
     whole_plan: Callable[[], Plan],
 ) -> Run:
@@ -279,91 +285,91 @@ def _post_plan(
     reversals and backlash, None where it takes none, `whole_plan` the plan undivided."""
     from camtool.planning.checks import doubtful_settings
 
-    job, progress = plan.job, how.progress
-    wanted = plan.toolpath
-    run = Run(source=drawing.file, target=target, drawing=drawing, job=job, wanted=wanted)
+    job, progress = plan.job, posting.progress
+    wanted_path = plan.toolpath
+    run = Run(source=drawing.file, target=target, drawing=drawing, job=job, wanted=wanted_path)
     doubtful = doubtful_settings(
         plan.steps, target.machine, job.stock, starts_spindle=target.target.starts_spindle
     )
-    findings = _merge_findings(drawing.findings, wanted.findings, tuple(doubtful))
+    findings = _merge_findings(drawing.findings, wanted_path.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)
-    judged = plan if how.check else None
+    judged_plan = plan if posting.check else None
     del plan  # what is not judged needs no stages of it
-    compensation = _compensate(wanted, target.machine) if job.compensate else None
-    written = wanted if compensation is None else compensation.toolpath
+    compensation = _compensate(wanted_path, target.machine) if job.compensate else None
+    written = wanted_path if compensation is None else compensation.toolpath
     program, decoded = _write_and_read_back(written, target, drawing.file, progress)
     decoded = _with_operations(decoded, written, program)
     repeated = _repeated_findings(program, decoded)
-    findings = _merge_findings(findings, program.findings, decoded.findings, without=repeated)
-    if judged is None:
-        found = _stock_findings(Case(decoded, target), None, job, before=how.before)
-        findings = _merge_findings(findings, found)
+    findings = _merge_findings(findings, program.findings, decoded.findings, left_out=repeated)
+    if judged_plan is None:
+        stock_findings = _stock_findings(Case(decoded, target), None, job, before=posting.before)
+        findings = _merge_findings(findings, stock_findings)
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
     from camtool.planning.naming import setup_words
     from camtool.stock.checks import stock_request
     from camtool.verification.cuts import rapid_length_mm
 
-    plain = plain_run()
+    plain_result = plain_run()
     # Contours that are divided at reversals are judged as the whole contours of the drawing.
-    whole = judged
+    full_plan = judged_plan
     if _without_measures(job) != job and compensation is None:
-        whole = whole_plan()
+        full_plan = whole_plan()
     tool, nose = tool_mm(job), nose_of(job)
     options = VerifyOptions(
         source=drawing.file,
         tool_diameter_mm=tool,
         nose=nose,
-        kept=kept_of(whole.steps) if (tool or nose) and not how.brief else (),
-        shape=not how.brief,
-        trace_points=TRACE_POINTS if how.trace_points is None else how.trace_points,
+        kept=kept_of(full_plan.steps) if (tool or nose) and not posting.brief else (),
+        shape=not posting.brief,
+        trace_points=TRACE_POINTS if posting.trace_points is None else posting.trace_points,
     )
     case = Case(
         decoded,
         target,
-        whole.toolpath,
-        judged.placed,
+        full_plan.toolpath,
+        judged_plan.placed,
         options,
         compensation,
         written_from=written,
         row_from=_row_from(program, decoded),
     )
-    saved = sum(step.rapid_drawn_mm - step.rapid_mm for step in judged.steps)
+    saved = sum(step.rapid_drawn_mm - step.rapid_mm for step in judged_plan.steps)
     rapid = rapid_length_mm(written)
     figures = Planned(
         rapid_drawn_mm=rounded(rapid + saved),
         rapid_mm=rounded(rapid),
-        operations=_operations(judged.steps),
-        tools=_tools(judged.steps),
+        operations=_operations(judged_plan.steps),
+        tools=_tools(judged_plan.steps),
         stock=_stock(job),
         zero=job.placement.origin if job.placement.turn == UNTURNED else "set-up",
-        cut_mm=_cut_mm(wanted),
-        swept_mm=_swept_mm(wanted, judged.steps),
-        touch_mm=_touch_mm(wanted),
+        cut_mm=_cut_mm(wanted_path),
+        swept_mm=_swept_mm(wanted_path, judged_plan.steps),
+        touch_mm=_touch_mm(wanted_path),
         setup=setup_words(job),
     )
-    asked = stock_request(
-        judged.steps, job, _beside_mm(case), before=how.before, is_whole=how.is_whole
+    request = stock_request(
+        judged_plan.steps, job, _beside_mm(case), before=posting.before, is_whole=posting.is_whole
     )
-    del judged, whole  # the paths of the stages are not needed any more
+    del judged_plan, full_plan  # the paths of the stages are not needed any more
     verification = _judge_program(case, program.data, progress)
     findings = _merge_findings(
         findings,
-        _stock_findings(case, asked, job, findings, before=how.before),
-        _stock_gates(case, asked, job, how.gates),
+        _stock_findings(case, request, job, findings, before=posting.before),
+        _stock_gates(case, request, job, posting.gates),
     )
     figures = _with_times(figures, written, case, verification)
-    beyond = _gate_findings(verification, how.gates, findings)
-    findings = _merge_findings(findings, verification.findings, beyond, without=repeated)
-    verification = verification.with_planning(figures, _before_figures(plain))
+    gate_findings = _gate_findings(verification, posting.gates, findings)
+    findings = _merge_findings(findings, verification.findings, gate_findings, left_out=repeated)
+    verification = verification.with_planning(figures, _before_figures(plain_result))
     return replace(
         run,
         program=program,
         decoded=decoded,
         verification=verification.with_findings(findings),
         findings=findings,
-        before=plain,
+        before=plain_result,
     )
 
 
@@ -385,7 +391,7 @@ def verify_program(
     decoded = run.decoded
     assert decoded is not None
     case = Case(decoded, target)
-    kept: tuple[ProtectedRegion, ...] = ()
+    protected: tuple[ProtectedRegion, ...] = ()
     asked_of_stock: StockRequest | None = None
     before: StockBefore | None = None
     if drawing is not None and judging.found:
@@ -395,49 +401,49 @@ def verify_program(
         from camtool.planning.plan import planned
         from camtool.stock.checks import stock_request
 
-        wanted, machine = job or Job(), target.machine
+        job_used, machine = job or Job(), target.machine
         progress.begin(PLANNING)
-        plan = planned(drawing, wanted, machine)
-        compensation = _compensate(plan.toolpath, machine) if wanted.compensate else None
-        asked = _program_request(wanted, target, plan.toolpath, compensation)
-        if compensation is None and _without_measures(wanted) != wanted:
-            plan = planned(drawing, wanted, machine, undivided=True)
+        plan = planned(drawing, job_used, machine)
+        compensation = _compensate(plan.toolpath, machine) if job_used.compensate else None
+        request = _program_request(job_used, target, plan.toolpath, compensation)
+        if compensation is None and _without_measures(job_used) != job_used:
+            plan = planned(drawing, job_used, machine, undivided=True)
         case = replace(
             case,
             wanted=plan.toolpath,
             drawing=plan.placed,
             compensated=compensation,
-            asked=asked,
+            asked=request,
         )
-        kept = kept_of(plan.steps)
-        before = _stock_before(drawing, wanted, machine)
-        asked_of_stock = stock_request(plan.steps, wanted, _beside_mm(case), before=before)
+        protected = kept_of(plan.steps)
+        before = _stock_before(drawing, job_used, machine)
+        asked_of_stock = stock_request(plan.steps, job_used, _beside_mm(case), before=before)
     options = VerifyOptions(
         interpolator=judging.interpolator,
         effects=judging.effects or ALL,
         source=source,
         tool_diameter_mm=tool_mm(job or Job()),
         nose=nose_of(job or Job()),
-        kept=kept,
+        kept=protected,
         worst=WORST_LISTED if judging.worst is None else judging.worst,
         trace_points=TRACE_POINTS if judging.trace_points is None else judging.trace_points,
         keep_ledger=judging.keep_ledger,
     )
-    found = _judge_program(replace(case, options=options), data, progress)
-    beyond = _gate_findings(found, judging.gates)
-    beyond = (*_stock_gates(case, asked_of_stock, job, judging.gates), *beyond)
+    verification = _judge_program(replace(case, options=options), data, progress)
+    gate_findings = _gate_findings(verification, judging.gates)
+    gate_findings = (*_stock_gates(case, asked_of_stock, job, judging.gates), *gate_findings)
     planning = case.wanted.findings if case.wanted is not None else ()
     in_stock = _stock_findings(case, asked_of_stock, job or Job(), planning, before=before)
-    beyond = (*in_stock, *beyond)
-    if beyond:
-        found = found.with_findings((*found.findings, *beyond))
+    gate_findings = (*in_stock, *gate_findings)
+    if gate_findings:
+        verification = verification.with_findings((*verification.findings, *gate_findings))
     return replace(
         run,
         drawing=drawing,
         job=job,
         wanted=case.wanted,
-        verification=found,
-        findings=found.findings,
+        verification=verification,
+        findings=verification.findings,
     )
 
 
@@ -448,30 +454,32 @@ def _register_drawing(case: Case, drawing: Drawing, job: Job, *, align: bool) ->
     from camtool.verification.cuts import is_flat
     from camtool.verification.registration import register
 
-    placed = place(drawing, job)
-    found = register(
+    placed_drawing = place(drawing, job)
+    registration = register(
         case.decoded,
-        placed,
+        placed_drawing,
         tool_diameter_mm=tool_mm(job),
         align=align,
         limit_mm=coverage_of(case.machine),
         flat_cuts=is_flat(case.decoded),
     )
-    job = _found_job(job, found)
-    wanted = found.wanted if found.report.followed else None
-    placed = place(drawing, job)
-    return replace(case, wanted=wanted, drawing=placed, registration=found), job
+    job = _found_job(job, registration)
+    wanted_path = registration.wanted if registration.report.followed else None
+    placed_drawing = place(drawing, job)
+    return replace(
+        case, wanted=wanted_path, drawing=placed_drawing, registration=registration
+    ), job
 
 
-def _found_job(job: Job, found: Registration) -> Job:
+def _found_job(job: Job, registration: Registration) -> Job:
     """The job with the tool of a program, and the drawing where it lies under it."""
-    if found.diameter_mm is not None:
+    if registration.diameter_mm is not None:
         operations = tuple(
-            replace(each, tool=replace(each.tool, diameter_mm=found.diameter_mm))
+            replace(each, tool=replace(each.tool, diameter_mm=registration.diameter_mm))
             for each in job.operations
         )
         job = replace(job, operations=operations)
-    x, y = found.shift_mm
+    x, y = registration.shift_mm
     if x or y:
         # Aligning is refused where the job says an origin, so that the drawing's zero is it.
         job = replace(job, placement=replace(job.placement, origin=(-x, -y)))
@@ -500,37 +508,39 @@ def convert_program(
     progress = progress or Progress()
     progress.begin(f"reading {PurePath(file).name}")
     decoded = _decode(data, source, file)
-    same = source.machine.target.dialect == target.machine.target.dialect
-    wanted = decoded if same else carried_over(decoded)
+    is_same_dialect = source.machine.target.dialect == target.machine.target.dialect
+    wanted_path = decoded if is_same_dialect else carried_over(decoded)
     if not target.machine.coolant.kinds:
-        wanted = without_coolant(wanted)
+        wanted_path = without_coolant(wanted_path)
     if feed_mm_min is not None:
-        wanted = at_feed(wanted, feed_mm_min)
+        wanted_path = at_feed(wanted_path, feed_mm_min)
     else:
-        wanted = within_feeds(wanted, target.machine)
-    run = Run(source=file, target=target, wanted=wanted)
-    if worst(wanted.findings) >= Severity.ERROR:
-        return replace(run, findings=wanted.findings)
-    program, again = _write_and_read_back(wanted, target, file, progress)
-    repeated = _repeated_findings(program, again)
-    findings = _merge_findings(wanted.findings, program.findings, again.findings, without=repeated)
-    if not check:
-        return replace(run, program=program, decoded=again, findings=findings)
-    case = Case(
-        again,
-        target,
-        wanted,
-        options=VerifyOptions(source=file),
-        written_from=wanted,
-        row_from=_row_from(program, again),
+        wanted_path = within_feeds(wanted_path, target.machine)
+    run = Run(source=file, target=target, wanted=wanted_path)
+    if worst(wanted_path.findings) >= Severity.ERROR:
+        return replace(run, findings=wanted_path.findings)
+    program, reread = _write_and_read_back(wanted_path, target, file, progress)
+    repeated = _repeated_findings(program, reread)
+    findings = _merge_findings(
+        wanted_path.findings, program.findings, reread.findings, left_out=repeated
     )
-    judged = _judge_program(case, program.data, progress)
-    findings = _merge_findings(findings, judged.findings, without=repeated)
+    if not check:
+        return replace(run, program=program, decoded=reread, findings=findings)
+    case = Case(
+        reread,
+        target,
+        wanted_path,
+        options=VerifyOptions(source=file),
+        written_from=wanted_path,
+        row_from=_row_from(program, reread),
+    )
+    verification = _judge_program(case, program.data, progress)
+    findings = _merge_findings(findings, verification.findings, left_out=repeated)
     return replace(
         run,
         program=program,
-        decoded=again,
-        verification=judged.with_findings(findings),
+        decoded=reread,
+        verification=verification.with_findings(findings),
         findings=findings,
     )
 
@@ -540,8 +550,8 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
     import numpy as np
 
     decoded = _decode(data, target, source)
-    mine = target.machine.target
-    program = Program(data, mine.extension, mine.name, np.empty(0, dtype=np.int32))
+    names = target.machine.target
+    program = Program(data, names.extension, names.name, np.empty(0, dtype=np.int32))
     return Run(
         source=source, target=target, program=program, decoded=decoded, findings=decoded.findings
     )
@@ -592,11 +602,11 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
 
     cutting = [step for step in steps if step.runs]
     tools = list(dict.fromkeys(step.operation.tool for step in cutting))
-    found = []
+    rows = []
     for step in cutting:
         operation, setting = step.operation, step.setting
         in_passes = operation.contract.descent == "passes"
-        found.append(
+        rows.append(
             PlannedOperation(
                 name=operation.name,
                 kind=operation.kind,
@@ -621,7 +631,7 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
                 tabs=len({tuple(bridge.centre.tolist()) for bridge in step.bridges}),
             )
         )
-    return tuple(found)
+    return tuple(rows)
 
 
 def _open_ended(limits: tuple[float, float] | None) -> tuple[float, float | None] | None:
@@ -678,48 +688,50 @@ def _with_times(
     return replace(planned, operations=tuple(operations))
 
 
-def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
+def _cut_mm(wanted_path: Toolpath) -> tuple[float, float, float, float] | None:
     """Left, lower, right and upper end of what the tools cut; V bits as wide as at their depth.
     None where nothing is cut, or nobody knows by which operation."""
     import numpy as np
 
     from camtool.verification.cuts import is_flat
 
-    operations = wanted.operations
+    operations = wanted_path.operations
     if operations is None:
         return None
     begins = operations.begin.tolist()
-    boxes, ends = [], [*begins[1:], len(wanted)]
+    boxes, ends = [], [*begins[1:], len(wanted_path)]
     for note, low, high in zip(operations.notes, begins, ends, strict=True):
-        part = wanted.part(low, high)
+        part = wanted_path.part(low, high)
         cuts = part.is_feed if is_flat(part) else feeds_below_top(part)
         if not cuts.any():
             continue
         reach = 0.5 * note.tool.diameter_mm
         if note.tool.kind == "v" and note.tool.tip_angle_rad is not None:
-            deep = note.depth_mm * math.tan(0.5 * note.tool.tip_angle_rad)
-            reach = min(deep, reach or math.inf)
+            taper_reach = note.depth_mm * math.tan(0.5 * note.tool.tip_angle_rad)
+            reach = min(taper_reach, reach or math.inf)
         boxes.append(toolpath_extents(part, rows=cuts)[:2] + np.array([-reach, reach]))
     if not boxes:
         return None
     every = np.array(boxes)
-    (left, lowest), (right, top) = every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)
-    return float(left), float(lowest), float(right), float(top)
+    (left_x, lowest), (right, top) = every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)
+    return float(left_x), float(lowest), float(right), float(top)
 
 
-def _swept_mm(wanted: Toolpath, steps: Sequence[Step]) -> tuple[float, float, float, float] | None:
+def _swept_mm(
+    wanted_path: Toolpath, steps: Sequence[Step]
+) -> tuple[float, float, float, float] | None:
     """Left, lower, right and upper end of what tools, shanks and holders pass over, at any height
     and in rapids too, as far as they are known. None where nobody knows which tool moves."""
     import numpy as np
 
     tools = [step.operation.tool for step in steps if step.runs]
-    operations = wanted.operations
+    operations = wanted_path.operations
     if operations is None or len(operations.begin) != len(tools):
         return None
     begins = [0, *operations.begin[1:].tolist()]
     boxes = []
-    for tool, low, high in zip(tools, begins, [*begins[1:], len(wanted)], strict=True):
-        part = wanted.part(low, high)
+    for tool, low, high in zip(tools, begins, [*begins[1:], len(wanted_path)], strict=True):
+        part = wanted_path.part(low, high)
         if part.is_motion.any():
             reach = max([tool.radius_mm, *(radius for _, radius, *_ in tool.bodies)])
             box = toolpath_extents(part, rows=part.is_motion)[:2]
@@ -727,16 +739,16 @@ def _swept_mm(wanted: Toolpath, steps: Sequence[Step]) -> tuple[float, float, fl
     if not boxes:
         return None
     every = np.array(boxes)
-    (left, lowest), (right, top) = every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)
-    return float(left), float(lowest), float(right), float(top)
+    (left_x, lowest), (right, top) = every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)
+    return float(left_x), float(lowest), float(right), float(top)
 
 
-def _touch_mm(wanted: Toolpath) -> tuple[tuple[float, float] | None, ...]:
+def _touch_mm(wanted_path: Toolpath) -> tuple[tuple[float, float] | None, ...]:
     """Return where each tool that is mounted in the program can be touched off."""
     import numpy as np
 
-    rows = np.flatnonzero((wanted.kind == Kind.TOOL_CHANGE) & ~mounted_before(wanted))
-    return tuple(untouched_place(wanted, row) for row in rows.tolist())
+    rows = np.flatnonzero((wanted_path.kind == Kind.TOOL_CHANGE) & ~mounted_before(wanted_path))
+    return tuple(untouched_place(wanted_path, row) for row in rows.tolist())
 
 
 def _stock(job: Job) -> PlannedStock | None:
@@ -755,11 +767,11 @@ def _gate_findings(
     return tuple(gate_findings(verification.report, gates, findings))
 
 
-def _compensate(wanted: Toolpath, machine: Machine) -> CompensatedToolpath:
-    """The moves with which the slides follow `wanted`."""
+def _compensate(wanted_path: Toolpath, machine: Machine) -> CompensatedToolpath:
+    """The moves with which the slides follow `wanted_path`."""
     from camtool.planning.compensating import compensate
 
-    return compensate(wanted, machine)
+    return compensate(wanted_path, machine)
 
 
 def _without_measures(job: Job) -> Job:
@@ -767,13 +779,13 @@ def _without_measures(job: Job) -> Job:
     return replace(job, minimise="rapids", approach=False, compensate=False)
 
 
-def _before_figures(plain: Run | None) -> BaselineReport | None:
+def _before_figures(plain_run: Run | None) -> BaselineReport | None:
     """The figures of the plain run, for the report."""
-    if plain is None:
+    if plain_run is None:
         return None
-    if plain.verification is None or plain.failed:
+    if plain_run.verification is None or plain_run.failed:
         return BaselineReport()
-    report = plain.verification.report
+    report = plain_run.verification.report
     cutting, air = report.reversals.cutting, report.reversals.air
     return BaselineReport(
         cutting.x + cutting.y, air.x + air.y, report.error_um.total.max, report.time_s
@@ -820,25 +832,25 @@ def _stock_findings(
     from camtool.stock.slides import slide_moves, tools_of_rows
 
     decoded, moves, tools = case.decoded, None, None
-    found: list[Finding] = []
+    findings_found: list[Finding] = []
     try:
         tools = tools_of_rows(decoded, job)
         moves = stock_moves_of_toolpath(decoded, tools.index, tools.cutters)
     except OptionError as error:
         shapes = {operation.tool for operation in job.operations if operation.tool.diameter_mm}
         if request is not None and shapes:
-            found.append(STOCK_NOT_JUDGED_TOOLS(measured=len(shapes), mend=error.mend))
+            findings_found.append(STOCK_NOT_JUDGED_TOOLS(measured=len(shapes), mend=error.mend))
     beside_mm = WALL_COVERAGES * case.coverage_mm
-    found += rapid_findings(decoded, moves, job.stock, beside_mm, before)
+    findings_found += rapid_findings(decoded, moves, job.stock, beside_mm, before)
     if moves is None or tools is None or request is None:
-        return tuple(found)
+        return tuple(findings_found)
     if not any(cutter.radius_mm for cutter in tools.cutters):
-        return tuple(found)
+        return tuple(findings_found)
     from camtool.stock.checks import stock_findings
 
     if case.compensated is not None:
         moves = slide_moves(decoded, case.target, tools, case.simulation)
-    return (*found, *stock_findings(decoded, moves, request, case.depth_mm, planning))
+    return (*findings_found, *stock_findings(decoded, moves, request, case.depth_mm, planning))
 
 
 def _stock_gates(
@@ -853,18 +865,18 @@ def _stock_gates(
     stock = None
     with suppress(OptionError):
         stock = cut_stock(case.decoded, case.target, job, case.simulation)
-    found: list[Finding] = []
+    gate_findings: list[Finding] = []
     if gates.gouge_mm is not None:
         limit_mm, gouge = gates.gouge_mm, None
         if stock is not None and request is not None:
             gouge = proved_gouge(stock, request, limit_mm)
-        found += stock_gate_findings("gouge", limit_mm, gouge)
+        gate_findings += stock_gate_findings("gouge", limit_mm, gouge)
     if gates.leftover_mm is not None:
-        limit_mm, left = gates.leftover_mm, None
+        limit_mm, leftover = gates.leftover_mm, None
         if stock is not None and request is not None and request.is_whole:
-            left = proved_leftover(stock, request, limit_mm)
-        found += stock_gate_findings("leftover", limit_mm, left)
-    return tuple(found)
+            leftover = proved_leftover(stock, request, limit_mm)
+        gate_findings += stock_gate_findings("leftover", limit_mm, leftover)
+    return tuple(gate_findings)
 
 
 def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> Toolpath:
@@ -889,36 +901,39 @@ def _row_from(program: Program, decoded: Toolpath) -> Indices:
 
 
 def _program_request(
-    job: Job, target: LoadedTarget, planned: Toolpath, compensation: CompensatedToolpath | None
+    job: Job,
+    target: LoadedTarget,
+    planned_path: Toolpath,
+    compensation: CompensatedToolpath | None,
 ) -> ProgramRequest | None:
     """Write and read back the planned moves, to compare a program with what the job asks for; None
-    if planning found an error, which is a finding already. `compensation` is `planned` compensated
-    against the mechanics."""
+    if planning found an error, which is a finding already. `compensation` is `planned_path`
+    compensated against the mechanics."""
     from camtool.planning.settings import safe_z_of
     from camtool.verification.conformance import ProgramRequest
 
-    if worst(planned.findings) >= Severity.ERROR:
+    if worst(planned_path.findings) >= Severity.ERROR:
         return None
     machine = target.machine
-    wanted = planned if compensation is None else compensation.toolpath
-    program = target.target.write(wanted, machine)
+    wanted_path = planned_path if compensation is None else compensation.toolpath
+    program = target.target.write(wanted_path, machine)
     units = [target.target.unit_mm(machine, axis) for axis in machine.axes]
     written = target.target.read(program.data, machine)
     return ProgramRequest(
         written=written,
-        wanted=wanted,
+        wanted=wanted_path,
         unit_mm=max(units[:2]),
         unit_z_mm=units[2],
-        feed_named=_is_feed_named(job, machine, wanted, _row_from(program, written)),
+        feed_named=_is_feed_named(job, machine, wanted_path, _row_from(program, written)),
         feed_unit_mm_min=machine.feed.unit_mm_min,
         safe_z_mm=safe_z_of(job, machine),
         safe_z_named=job.safe_z_mm is not None,
     )
 
 
-def _is_feed_named(job: Job, machine: Machine, wanted: Toolpath, row_from: Indices) -> Bools:
+def _is_feed_named(job: Job, machine: Machine, wanted_path: Toolpath, row_from: Indices) -> Bools:
     """(N,) true for the written rows whose feed the job names, or which follows from one that it
-    names; they were written from the rows `row_from` (N,) of `wanted`."""
+    names; they were written from the rows `row_from` (N,) of `wanted_path`."""
     import numpy as np
 
     from camtool.planning.settings import feeds_of
@@ -930,12 +945,12 @@ def _is_feed_named(job: Job, machine: Machine, wanted: Toolpath, row_from: Indic
             named += [feeds.cut_mm_min, feeds.plunge_mm_min]
         elif operation.plunge_feed_mm_min is not None:
             named.append(feeds.plunge_mm_min)
-    return np.asarray(np.isin(wanted.feed[row_from], named) & (row_from >= 0))
+    return np.asarray(np.isin(wanted_path.feed[row_from], named) & (row_from >= 0))
 
 
 def _merge_findings(
-    *groups: tuple[Finding, ...], without: Collection[Finding] = ()
+    *groups: tuple[Finding, ...], left_out: Collection[Finding] = ()
 ) -> tuple[Finding, ...]:
-    """All findings in order, each once, except those `without`."""
+    """All findings in order, each once, except those `left_out`."""
     every = dict.fromkeys(finding for group in groups for finding in group)
-    return tuple(finding for finding in every if finding not in without)
+    return tuple(finding for finding in every if finding not in left_out)

@@ -33,10 +33,10 @@ class EntryPoint(NamedTuple):
 
     def load(self) -> Any:
         """Import the module and return the object."""
-        found: Any = import_module(self.module)
+        value: Any = import_module(self.module)
         for part in filter(None, self.attr.split(".")):
-            found = getattr(found, part)
-        return found
+            value = getattr(value, part)
+        return value
 
 
 def entry_points(group: str) -> tuple[EntryPoint, ...]:
@@ -83,13 +83,13 @@ def _search(group: str, folders: PathState) -> tuple[EntryPoint, ...]:
 def _packages(folders: PathState) -> dict[str, Path]:
     """Find the folder of each installed package's metadata; of one that is installed twice the
     first counts."""
-    found: dict[str, Path] = {}
-    for folder, changed in folders:
-        for entry in Path(folder).iterdir() if changed and Path(folder).is_dir() else ():
+    folders_by_name: dict[str, Path] = {}
+    for folder, has_changed in folders:
+        for entry in Path(folder).iterdir() if has_changed and Path(folder).is_dir() else ():
             if entry.suffix in (".dist-info", ".egg-info"):
                 name = entry.stem.partition("-")[0].lower().replace(".", "_")
-                found.setdefault(name, entry)
-    return found
+                folders_by_name.setdefault(name, entry)
+    return folders_by_name
 
 
 def _points(file: Path, group: str) -> Iterator[EntryPoint]:

@@ -65,33 +65,33 @@ class Project(Struct, frozen=True):
     @property
     def machine(self) -> Path | None:
         """Default machine file; None if `target` is set instead, or nothing."""
-        for file, said in self.files:
-            if said.machine is not None:
-                beside = file.parent / said.machine
-                return beside if beside.is_file() else self.machine_named(said.machine)
-            if said.target is not None:
+        for file, keys in self.files:
+            if keys.machine is not None:
+                beside_file = file.parent / keys.machine
+                return beside_file if beside_file.is_file() else self.machine_named(keys.machine)
+            if keys.target is not None:
                 return None
         return None
 
     @property
     def target(self) -> str | None:
         """Default target; None if `machine` is set instead, or nothing."""
-        for _, said in self.files:
-            if said.machine is not None or said.target is not None:
-                return said.target
+        for _, keys in self.files:
+            if keys.machine is not None or keys.target is not None:
+                return keys.target
         return None
 
     @property
     def job(self) -> Path | None:
         """Default job file."""
-        found = self.value_of("job")
-        return None if found is None else found[1].parent / found[0]
+        entry = self.value_of("job")
+        return None if entry is None else entry[1].parent / entry[0]
 
     def value_of(self, key: str) -> tuple[Any, Path] | None:
         """Return the value of a key in the nearest file that has it, and the file."""
-        for file, said in self.files:
-            if getattr(said, key) is not None:
-                return getattr(said, key), file
+        for file, keys in self.files:
+            if getattr(keys, key) is not None:
+                return getattr(keys, key), file
         return None
 
     @property
@@ -100,20 +100,20 @@ class Project(Struct, frozen=True):
         folders = dict.fromkeys([*(file.parent for file, _ in self.files), user_folder()])
         return tuple(folder / TOOLS for folder in folders if (folder / TOOLS).is_file())
 
-    def machine_named(self, said: str) -> Path:
+    def machine_named(self, name: str) -> Path:
         """Return the machine file of a name; a path is returned unchanged. MachineError with the
         known names for an unknown one."""
-        if _is_file_name(said):
-            return Path(said)
-        file = self.find(said)
+        if _is_file_name(name):
+            return Path(name)
+        file = self.find(name)
         if file is not None:
             return file
-        found = dict(self.machines())
-        known = f"known are {', '.join(found)}; " if found else ""
+        machines = dict(self.machines())
+        names = f"known are {', '.join(machines)}; " if machines else ""
         raise MachineError(
-            f"there is no machine {said!r}",
+            f"there is no machine {name!r}",
             where="--machine",
-            mend=f"{guess(said, found)}{known}make it with camtool init {said}, "
+            mend=f"{guess(name, machines)}{names}make it with camtool init {name}, "
             "or give the name of a file",
         )
 
@@ -128,8 +128,8 @@ class Project(Struct, frozen=True):
     def machines(self) -> Iterator[tuple[str, Path]]:
         """Yield the names and files of the user's machines: those of the project, and those of the
         configuration folder whose names the project does not have."""
-        found = (file for folder in self._folders() for file in sorted(folder.glob("*.toml")))
-        for file in found:
+        files = (file for folder in self._folders() for file in sorted(folder.glob("*.toml")))
+        for file in files:
             if file == self.find(file.stem):
                 yield file.stem, file
 
@@ -142,10 +142,12 @@ def project_of(folder: Path) -> Project:
     """Return the settings that apply to this folder. MachineError for a `camtool.toml` that cannot
     be read."""
     folder = folder.absolute()
-    own = next(filter(Path.is_file, (each / FILE for each in (folder, *folder.parents))), None)
+    own_file = next(
+        filter(Path.is_file, (each / FILE for each in (folder, *folder.parents))), None
+    )
     users = user_folder() / FILE
-    files = [] if own is None else [own]
-    if users != own and users.is_file():
+    files = [] if own_file is None else [own_file]
+    if users != own_file and users.is_file():
         files.append(users)
     return Project(tuple((file, _read_keys(file)) for file in files))
 
@@ -156,20 +158,20 @@ def _read_keys(file: Path) -> ProjectKeys:
 
 def names_machine(file: Path) -> bool:
     """True if a `camtool.toml`, which need not exist, names a machine or a target."""
-    said = _read_keys(file) if file.is_file() else ProjectKeys()
-    return said.machine is not None or said.target is not None
+    keys = _read_keys(file) if file.is_file() else ProjectKeys()
+    return keys.machine is not None or keys.target is not None
 
 
 def text_naming_machine(file: Path, name: str) -> str:
     """Return the text of a `camtool.toml`, which need not exist, that names this machine; its
     other lines are kept."""
-    said = f'machine = "{name}"'
+    machine_line = f'machine = "{name}"'
     if not file.is_file():
-        return f"# What camtool takes where no flag says otherwise.\n{said}\n"
+        return f"# What camtool takes where no flag says otherwise.\n{machine_line}\n"
     _read_keys(file)
     lines = file.read_text(encoding="utf-8").splitlines()
-    rest = [line for line in lines if not _MACHINE.match(line)]
-    return "\n".join([said, *rest]) + "\n"
+    other_lines = [line for line in lines if not _MACHINE.match(line)]
+    return "\n".join([machine_line, *other_lines]) + "\n"
 
 
 def user_folder() -> Path:
@@ -180,9 +182,9 @@ def user_folder() -> Path:
     return Path(click.get_app_dir("camtool"))
 
 
-def _is_file_name(said: str) -> bool:
+def _is_file_name(name: str) -> bool:
     """True if a machine is given by the name of a file, and not by its own."""
-    return NAME.fullmatch(said) is None or Path(said).is_file()
+    return NAME.fullmatch(name) is None or Path(name).is_file()
 
 
 def _is_machine(file: Path) -> bool:

@@ -102,9 +102,13 @@ class Run(Shown):
             return None
 
         def listing() -> Listing | None:
-            made = target.target.listing(program.data, target.machine)
+            target_listing = target.target.listing(program.data, target.machine)
             last = int(decoded.block.max(initial=-1))
-            return made if made is not None and last < len(made.blocks) else None
+            return (
+                target_listing
+                if target_listing is not None and last < len(target_listing.blocks)
+                else None
+            )
 
         return listing
 
@@ -131,10 +135,10 @@ class Run(Shown):
 
     def __repr__(self) -> str:
         name, target = PurePath(self.source).name, self.target.machine.target.name
-        made = "no program" if self.program is None else f"{len(self.program.data)} bytes"
+        written = "no program" if self.program is None else f"{len(self.program.data)} bytes"
         error = None if self.report is None else self.report.error_um.total.max
-        judged = "" if error is None else f", error {error:.2f} µm at most"
-        return f"<Run of {name} on {target}: {made}{judged}, {_count_findings(self.findings)}>"
+        errors = "" if error is None else f", error {error:.2f} µm at most"
+        return f"<Run of {name} on {target}: {written}{errors}, {_count_findings(self.findings)}>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -200,10 +204,10 @@ class ShownToolpath(Shown, Toolpath):
 _Kind = TypeVar("_Kind", ShownDrawing, ShownToolpath)
 
 
-def _as_shown(kind: type[_Kind], record: Drawing | Toolpath, **more: object) -> _Kind:
-    """The record as one of this `kind`, with `more` fields."""
+def _as_shown(kind: type[_Kind], record: Drawing | Toolpath, **extra_fields: object) -> _Kind:
+    """The record as one of this `kind`, with `extra_fields` fields."""
     values = {each.name: getattr(record, each.name) for each in fields(record)}
-    return kind(**(values | more))
+    return kind(**(values | extra_fields))
 
 
 def _count_findings(findings: tuple[Finding, ...]) -> str:
@@ -214,5 +218,5 @@ def _count_findings(findings: tuple[Finding, ...]) -> str:
 def _size(drawing: Drawing) -> str:
     if not len(drawing.paths):
         return "no lines"
-    (left, right), (low, high) = extents(drawing.paths).tolist()
-    return f"{right - left:.3f} × {high - low:.3f} mm"
+    (left_x, right), (low, high) = extents(drawing.paths).tolist()
+    return f"{right - left_x:.3f} × {high - low:.3f} mm"

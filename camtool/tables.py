@@ -75,15 +75,15 @@ def _within(value: Any) -> Iterable[Any]:
     return value if isinstance(value, list) else ()
 
 
-def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -> _T:
+def convert(table: Mapping[str, Any], kind: type[_T], file: str, prefix: str = "") -> _T:
     """Convert `table` to the record `kind`; MachineError with file, table and key when it does not
     fit."""
-    _refuse_infinite(table, file, at)
+    _refuse_infinite(table, file, prefix)
     try:
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:
         message, _, path = str(error).partition(" - at `$")
-        keys = [key for key in (at + path.rstrip("`")).split(".") if key]
+        keys = [key for key in (prefix + path.rstrip("`")).split(".") if key]
         unknown = re.search(r"unknown field `(.+?)`", message)
         missing = re.search(r"missing required field `(.+?)`", message)
         if unknown:
@@ -93,18 +93,18 @@ def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -
             keys.append(missing[1])
             message = "key is missing"
         elif message.startswith(_OUT_OF_RANGE):
-            message = _out_of_range(kind, table, keys[1:] if at else keys) or message
-        within = keys[1:] if at else keys
+            message = _out_of_range(kind, table, keys[1:] if prefix else keys) or message
+        keys_within = keys[1:] if prefix else keys
         if unknown:
-            mend = _mend(kind, table, within[:-1], within[-1])
+            mend = _mend(kind, table, keys_within[:-1], keys_within[-1])
         else:
-            mend = "" if missing else _choice(kind, table, within)
+            mend = "" if missing else _choice(kind, table, keys_within)
         *tables, key = keys or ["?"]
-        where = (f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}"
+        place = (f"table [{'.'.join(tables)}], " if tables else "") + f"key {key}"
         raise MachineError(
             message.replace("Invalid enum value", "Invalid value"),
             file=file,
-            where=where,
+            where=place,
             mend=mend,
         ) from None
 
@@ -119,23 +119,25 @@ _OUT_OF_RANGE = (
 def _out_of_range(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
     """Return the message for a number out of range at `keys` ("axes", "x", "travel_mm";
     "play_mm[0][1]"); "" if the range has only one end."""
-    *_, (about, value) = _along(kind, table, keys)
-    about = _fitting(about, value)
-    if about.ge is None or about.le is None:
+    *_, (type_info, value) = _along(kind, table, keys)
+    type_info = _fitting(type_info, value)
+    if type_info.ge is None or type_info.le is None:
         return ""
-    said = repr(value)
-    if len(said) > MAX_SHOWN_CHARS:
-        said = f"a number of {len(said)} characters"
-    ends = (str(end) if isinstance(end, int) else f"{end:g}" for end in (about.ge, about.le))
-    return f"{said} is not between {' and '.join(ends)}"
+    shown = repr(value)
+    if len(shown) > MAX_SHOWN_CHARS:
+        shown = f"a number of {len(shown)} characters"
+    ends = (
+        str(end) if isinstance(end, int) else f"{end:g}" for end in (type_info.ge, type_info.le)
+    )
+    return f"{shown} is not between {' and '.join(ends)}"
 
 
 def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
     """Return the allowed words at `keys`, and a suggestion; "" if any word is allowed."""
-    *above, (about, value) = _along(kind, table, keys)
+    *above, (type_info, value) = _along(kind, table, keys)
     words = [
         word
-        for one in getattr(about, "types", (about,))
+        for one in getattr(type_info, "types", (type_info,))
         if isinstance(one, msgspec.inspect.LiteralType)
         for word in one.values
     ]
@@ -146,42 +148,42 @@ def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
             for one in getattr(above[-1][0], "types", (above[-1][0],))
             if isinstance(one, msgspec.inspect.StructType) and one.tag_field == key
         ]
-    near = guess(value, map(str, words)) if isinstance(value, str) else ""
-    return f"{near}use one of {', '.join(map(str, words))}" if words else ""
+    suggestion = guess(value, map(str, words)) if isinstance(value, str) else ""
+    return f"{suggestion}use one of {', '.join(map(str, words))}" if words else ""
 
 
 def _along(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> Iterator[tuple[Any, Any]]:
     """Yield type information and value of a table, and of each part of it along `keys`."""
-    about: Any = msgspec.inspect.type_info(kind)
+    type_info: Any = msgspec.inspect.type_info(kind)
     value: Any = table
-    yield about, value
+    yield type_info, value
     for name in re.findall(r"[^.\[\]]+", ".".join(keys)):
         key = int(name) if isinstance(value, list) else name
-        about, value = _part(about, value, key), value[key]
-        yield about, value
+        type_info, value = _part(type_info, value, key), value[key]
+        yield type_info, value
 
 
-def _part(about: Any, value: Any, key: int | str) -> Any:
-    """Return type information of the part `key` of a table or a list with the type `about`."""
-    about = _fitting(about, value)
-    if isinstance(about, msgspec.inspect.StructType):
-        found = (field.type for field in about.fields if field.encode_name == key)
-        return next(found, None)  # None for the key that names the model
-    if isinstance(about, msgspec.inspect.TupleType):
-        return about.item_types[int(key)]
-    return getattr(about, "item_type", None)  # None for a table of an unknown model
+def _part(type_info: Any, value: Any, key: int | str) -> Any:
+    """Return type information of the part `key` of a table or a list with the type `type_info`."""
+    type_info = _fitting(type_info, value)
+    if isinstance(type_info, msgspec.inspect.StructType):
+        field_types = (field.type for field in type_info.fields if field.encode_name == key)
+        return next(field_types, None)  # None for the key that names the model
+    if isinstance(type_info, msgspec.inspect.TupleType):
+        return type_info.item_types[int(key)]
+    return getattr(type_info, "item_type", None)  # None for a table of an unknown model
 
 
-def _fitting(about: Any, value: Any) -> Any:
+def _fitting(type_info: Any, value: Any) -> Any:
     """Return the one of several allowed types that fits this value: the table of its model, or the
     type beside None."""
-    for one in getattr(about, "types", (about,)):
+    for one in getattr(type_info, "types", (type_info,)):
         if isinstance(one, msgspec.inspect.StructType):
             if one.tag is None or value.get(one.tag_field) == one.tag:
                 return one
         elif not isinstance(one, msgspec.inspect.NoneType):
             return one
-    return about
+    return type_info
 
 
 def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
@@ -196,23 +198,27 @@ def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
             if config is not None and values.get(config.tag_field) == config.tag:
                 record = model
     try:
-        known = [f.encode_name for f in msgspec.structs.fields(record)]
+        known_keys = [f.encode_name for f in msgspec.structs.fields(record)]
     except TypeError:
         return ""
-    return f"{guess(key, known)}known keys: {', '.join(known)}"
+    return f"{guess(key, known_keys)}known keys: {', '.join(known_keys)}"
 
 
-def _refuse_infinite(value: object, file: str, at: str) -> None:
+def _refuse_infinite(value: object, file: str, prefix: str) -> None:
     """Raise MachineError for inf and nan, which TOML allows and no machine has."""
     if isinstance(value, float) and not math.isfinite(value):
-        raise MachineError("is not finite", file=file, where=f"key {at}", mend="write a number")
+        raise MachineError(
+            "is not finite", file=file, where=f"key {prefix}", mend="write a number"
+        )
     items: Callable[[], Any] | None = getattr(value, "items", None)
     if items is not None:
         for key, item in items():
-            _refuse_infinite(item, file, f"{at}.{key}" if at else str(key))
+            _refuse_infinite(item, file, f"{prefix}.{key}" if prefix else str(key))
     elif isinstance(value, list):
         for number, item in enumerate(value, 1):
-            _refuse_infinite(item, file, f"{at} {number}" if isinstance(item, dict) else at)
+            _refuse_infinite(
+                item, file, f"{prefix} {number}" if isinstance(item, dict) else prefix
+            )
 
 
 # Tables as text again.

@@ -51,14 +51,15 @@ def parse_length(text: str, *, name: str = "length") -> float:
     value, unit = _split(text, name)
     if not unit and "/" in text:
         # A fraction suggests inches, a bare number is mm: either may be meant.
-        bare = text.strip()
+        number_text = text.strip()
         raise OptionError(
-            f"{name} {text!r} has no unit", mend=f"write {bare}in, or {bare}mm if that is meant"
+            f"{name} {text!r} has no unit",
+            mend=f"write {number_text}in, or {number_text}mm if that is meant",
         )
     factor = MM_PER_UNIT.get(unit.lower() or "mm")
     if factor is None:
-        known = ", ".join(u for u in MM_PER_UNIT if u.isascii() and u != '"')
-        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend=f"use one of {known}")
+        units = ", ".join(u for u in MM_PER_UNIT if u.isascii() and u != '"')
+        raise OptionError(f"unknown unit {unit!r} in {name} {text!r}", mend=f"use one of {units}")
     return value * factor
 
 

@@ -158,19 +158,19 @@ def _operation_tables(values: dict[str, Any], file: str) -> tuple[Table, ...] | 
 
 
 def _list_of_tables(
-    values: dict[str, Any], key: str, of: str, known: Iterable[str], file: str
+    values: dict[str, Any], key: str, subject: str, known_keys: Iterable[str], file: str
 ) -> tuple[Table, ...]:
     """Return the tables `[[key]]`, each with keys of the known ones; () without any."""
     rows = values.get(key, ())
     if key in values and not (isinstance(rows, list) and rows):
         raise OptionError(
-            f"is no list of {of}",
+            f"is no list of {subject}",
             file=file,
             where=f"key {key}",
             mend=f"begin each with [[{key}]]",
         )
     return tuple(
-        table_of(row, known, f"table [[{key}]] {_called(n, row)}", file)
+        table_of(row, known_keys, f"table [[{key}]] {_called(n, row)}", file)
         for n, row in enumerate(rows, start=1)
     )
 
@@ -190,35 +190,35 @@ def _place_table(top: Table, values: dict[str, Any], file: str) -> Table:
 def build_job(
     file: JobTables,
     flags: JobTables,
-    chosen: tuple[str, ...] = (),
+    selection: tuple[str, ...] = (),
     shop: Shop = Shop(),  # noqa: B008
 ) -> Job:
-    """The job of a file with the flags over it, of the operations that are `chosen` by name or
+    """The job of a file with the flags over it, of the operations that are `selection` by name or
     number (none: all). `shop`: the tools that jobs may name, and what holds where they say
     nothing. OptionError names file, table and key, or the flag, and says how to fix it."""
-    whole = flags.whole.over(file.whole)
-    tools = tools_for(file.tools, whole, file.folder, shop)
+    job_table = flags.whole.over(file.whole)
+    tools = tools_for(file.tools, job_table, file.folder, shop)
     tables = file.operations or (Table(),)
     record_of(operation_of, OPERATION, file.defaults.only(_RECORDED))
     stock = _stock(file.stock)
     operations = [
-        _operation(n, (file.defaults, own, flags.defaults), tools, len(tables))
-        for n, own in enumerate(tables, start=1)
+        _operation(n, (file.defaults, own_table, flags.defaults), tools, len(tables))
+        for n, own_table in enumerate(tables, start=1)
     ]
     operations = [
-        _deep(operation, (file.defaults, own, flags.defaults), stock)
-        for operation, own in zip(operations, tables, strict=True)
+        _deep(operation, (file.defaults, own_table, flags.defaults), stock)
+        for operation, own_table in zip(operations, tables, strict=True)
     ]
     _refuse_equal_names(operations, tables)
     operations = _rested(operations, tables)
     tools.refuse_idle_material(operations)
-    rows = _rows(operations, chosen)
+    rows = _rows(operations, selection)
     for layer in (file.defaults, flags.defaults):
         _refuse_unused(
             layer, operations if layer is file.defaults else [operations[n] for n in rows]
         )
     keys = {name for name in WHOLE if name not in _OF_TOOLS}
-    job = record_of(Job, WHOLE, whole.only(keys))
+    job = record_of(Job, WHOLE, job_table.only(keys))
     job = replace(
         job,
         operations=tuple(operations[n] for n in rows),
@@ -232,21 +232,21 @@ def build_job(
 def _with_setups(job: Job, tables: Sequence[Table], names: Sequence[str]) -> Job:
     """Return the job with its set-ups: where it has some of the operations of these `names` alone,
     with as many of each set-up."""
-    gone = set(names) - {each.name for each in job.operations}
+    absent = set(names) - {each.name for each in job.operations}
     setups = []
     for table in tables:
         for key in ("name", "operations"):
             if key not in table.given:
                 raise table.refused(f"key {key} is missing", "give name and operations")
         setup = record_of(_ANY_SETUP, SETUP, table.only(["name", "operations", "flip"]))
-        others = {SETUP[key].field: SETUP[key].read(table.given[key]) for key in table.given}
+        fields = {SETUP[key].field: SETUP[key].read(table.given[key]) for key in table.given}
         try:
-            setup = replace(setup, **others)
+            setup = replace(setup, **fields)
         except OptionError as error:
             raise table.refused(error.message, error.mend) from error
-        left = tuple(name for name in setup.operations if name not in gone)
-        if left:
-            setups.append(replace(setup, operations=left))
+        remaining = tuple(name for name in setup.operations if name not in absent)
+        if remaining:
+            setups.append(replace(setup, operations=remaining))
     try:
         return replace(job, setups=tuple(setups))
     except OptionError as error:
@@ -255,48 +255,50 @@ def _with_setups(job: Job, tables: Sequence[Table], names: Sequence[str]) -> Job
         raise
 
 
-def job_of_file(path: Path, chosen: tuple[str, ...] = (), libraries: tuple[Path, ...] = ()) -> Job:
+def job_of_file(
+    path: Path, selection: tuple[str, ...] = (), libraries: tuple[Path, ...] = ()
+) -> Job:
     """The job of a file alone, and of the tools of these libraries, the nearest first; raises as
     `build_job` does."""
-    return build_job(read_job_file(path), JobTables(), chosen, Shop(libraries))
+    return build_job(read_job_file(path), JobTables(), selection, Shop(libraries))
 
 
 def _operation(
     number: int, layers: tuple[Table, Table, Table], tools: Tools, count: int
 ) -> Operation:
     """Operation `number` of `count`: its own keys over the defaults, flags over both."""
-    defaults, own, flags = layers
-    merged = _nearest((defaults, own, flags)).only(OPERATION)
+    defaults, own_table, flags = layers
+    merged = _nearest((defaults, own_table, flags)).only(OPERATION)
     record_of(
-        operation_of, OPERATION, own.only(_RECORDED)
+        operation_of, OPERATION, own_table.only(_RECORDED)
     )  # keys that flags override must be right too
     kind = Operation.kind
     if "kind" in merged.given:
         kind = OPERATION["kind"].read(merged.given["kind"])
-    for name, given in own.only(OPERATION).given.items():
+    for name, key_value in own_table.only(OPERATION).given.items():
         if not is_known(name, kind):
-            raise given.refused(*_unknown(name, kind))
-    used = tools.of(layers, kind)
-    preset = tuple(key for key in used.preset.given if key not in merged.given)
-    merged = merged.over(used.preset)
-    known = merged.only(name for name in OPERATION if is_known(name, kind))
-    operation = record_of(operation_of, OPERATION, known.only(_RECORDED))
-    for name, given in own.only(OPERATION).given.items():
-        why = why_idle(OPERATION, name, operation)
-        if why is not None and merged.given[name] is given:
-            raise given.refused(why.message, why.mend)
+            raise key_value.refused(*_unknown(name, kind))
+    tool_used = tools.of(layers, kind)
+    preset = tuple(key for key in tool_used.preset.given if key not in merged.given)
+    merged = merged.over(tool_used.preset)
+    known_keys = merged.only(name for name in OPERATION if is_known(name, kind))
+    operation = record_of(operation_of, OPERATION, known_keys.only(_RECORDED))
+    for name, key_value in own_table.only(OPERATION).given.items():
+        reason = why_idle(OPERATION, name, operation)
+        if reason is not None and merged.given[name] is key_value:
+            raise key_value.refused(reason.message, reason.mend)
     if not operation.name and count > 1:
         operation = replace(operation, name=f"{kind} {number}")
-    operation = replace(_tooled(operation, known, used, tools), preset=preset)
-    _refuse_tool(operation, own)
+    operation = replace(_tooled(operation, known_keys, tool_used, tools), preset=preset)
+    _refuse_tool(operation, own_table)
     return operation
 
 
-def _tooled(operation: Operation, known: Table, used: Used, tools: Tools) -> Operation:
+def _tooled(operation: Operation, known_keys: Table, tool_used: Used, tools: Tools) -> Operation:
     """The operation with its tool, and that of its finishing pass with the feed and the speed that
     a preset of that gives it."""
-    fields: dict[str, Any] = {"tool": used.tool, "material": used.material}
-    keys = {key: known.given[key] for key in _OF_WALLS if key in known.given}
+    fields: dict[str, Any] = {"tool": tool_used.tool, "material": tool_used.material}
+    keys = {key: known_keys.given[key] for key in _OF_WALLS if key in known_keys.given}
     if FINISH_TOOL in keys:
         last = tools.of([Table({TOOL_NAME: keys[FINISH_TOOL]})], operation.kind)
         fields["finish_tool"] = last.tool
@@ -336,11 +338,11 @@ def _deep(operation: Operation, layers: Sequence[Table], stock: Stock | None) ->
         return operation.settled(stock)
     except OptionError as error:
         # The last pass may be what is wrong with the depth.
-        given = _nearest(layers).given
+        key_values = _nearest(layers).given
         named = re.search(r"key (\w+)$", error.where or "")
         keys = (named[1] if named else "", "breakthrough", "kind")
-        known = (key for key in keys if key in given and is_known(key, operation.kind))
-        place = given.get(next(known, ""))
+        stated = (key for key in keys if key in key_values and is_known(key, operation.kind))
+        place = key_values.get(next(stated, ""))
         if place is None:
             raise
         raise place.refused(error.message, error.mend) from error
@@ -349,33 +351,33 @@ def _deep(operation: Operation, layers: Sequence[Table], stock: Stock | None) ->
 def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operation]:
     """The operations with what they clear the rest of."""
     carvings = {each.name for each in operations if each.contract.rest == "floor" and each.name}
-    for operation, own in zip(operations, tables, strict=True):
+    for operation, own_table in zip(operations, tables, strict=True):
         for key in ("depth", "breakthrough"):
-            if operation.rest in carvings and key in own.given:
-                raise own.given[key].refused(
+            if operation.rest in carvings and key in own_table.given:
+                raise own_table.given[key].refused(
                     f"the floor of {operation.rest!r} has a depth already",
                     f"leave {key} out, it is that of the carving",
                 )
     try:
         return rested(operations)
     except OptionError as error:
-        for operation, own in zip(operations, tables, strict=True):
+        for operation, own_table in zip(operations, tables, strict=True):
             if operation.rest and repr(operation.name or operation.kind) in (error.where or ""):
-                raise own.given["rest"].refused(error.message, error.mend) from error
+                raise own_table.given["rest"].refused(error.message, error.mend) from error
         raise
 
 
 def _unknown(name: str, kind: str) -> tuple[str, str]:
     """Return message and mend for a key that a kind of operation does not know."""
-    known = [key for key in OPERATION if is_known(key, kind)]
-    return f"means nothing to the kind {kind}", f"it has: {', '.join(known)}, tool"
+    known_keys = [key for key in OPERATION if is_known(key, kind)]
+    return f"means nothing to the kind {kind}", f"it has: {', '.join(known_keys)}, tool"
 
 
-def _refuse_tool(operation: Operation, own: Table) -> None:
+def _refuse_tool(operation: Operation, own_table: Table) -> None:
     """Refuse a tool that is no V bit, or has no angle, where the operation needs one."""
     tool, kind = operation.tool, operation.kind
     if operation.contract.needs_v_bit and (tool.kind != "v" or tool.tip_angle_rad is None):
-        place = own.given.get("tool", own)
+        place = own_table.given.get("tool", own_table)
         raise place.refused(
             f"{kind} needs a V bit, not a tool of kind {tool.kind!r}"
             if tool.kind != "v"
@@ -394,21 +396,21 @@ def _refuse_equal_names(operations: list[Operation], tables: tuple[Table, ...]) 
             )
 
 
-def _rows(operations: list[Operation], chosen: tuple[str, ...]) -> list[int]:
+def _rows(operations: list[Operation], selection: tuple[str, ...]) -> list[int]:
     """The rows of the operations of these names or numbers, in the order of the job."""
     names = [operation.name for operation in operations]
     rows = set()
-    for text in chosen:
+    for text in selection:
         if text in names:
             rows.add(names.index(text))
         elif _OPERATION_NUMBER.fullmatch(text) and 1 <= int(text) <= len(names):
             rows.add(int(text) - 1)
         else:
-            near = difflib.get_close_matches(text, names, n=1)
+            near_names = difflib.get_close_matches(text, names, n=1)
             raise OptionError(
                 f"there is no operation {text!r}",
                 where="--operation",
-                mend=(f"did you mean {near[0]!r}? " if near else "")
+                mend=(f"did you mean {near_names[0]!r}? " if near_names else "")
                 + f"known: {', '.join(name or '1' for name in names)}",
             )
     return sorted(rows) or list(range(len(names)))
@@ -416,10 +418,10 @@ def _rows(operations: list[Operation], chosen: tuple[str, ...]) -> list[int]:
 
 def _refuse_unused(layer: Table, operations: list[Operation]) -> None:
     """Refuse a default or a flag that no operation uses."""
-    for name, given in layer.only(OPERATION).given.items():
+    for name, key_value in layer.only(OPERATION).given.items():
         reasons = [_why_unused(name, operation) for operation in operations]
         if None not in reasons and reasons[0] is not None:
-            raise given.refused(reasons[0].message, reasons[0].mend)
+            raise key_value.refused(reasons[0].message, reasons[0].mend)
 
 
 def _why_unused(name: str, operation: Operation) -> OptionError | None:

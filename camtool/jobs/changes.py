@@ -57,12 +57,12 @@ def together(file: JobTables, flags: JobTables, folder: Path) -> Values:
 
     OptionError for flags of a tool beside operations that name one: a file says either.
     """
-    whole = _raw(_over(flags.whole, file.whole))
+    job_values = _raw(_over(flags.whole, file.whole))
     for key in FILES:
-        given = flags.whole.given.get(key) or file.whole.given.get(key)
-        if given is not None:
-            whole[key] = _relative(given, file.folder, folder)
-    tables: Values = {**whole, **_raw(file.defaults)}
+        key_value = flags.whole.given.get(key) or file.whole.given.get(key)
+        if key_value is not None:
+            job_values[key] = _relative(key_value, file.folder, folder)
+    tables: Values = {**job_values, **_raw(file.defaults)}
     place = _raw(_over(flags.place, file.place))
     if place:
         tables["place"] = place
@@ -81,26 +81,30 @@ def together(file: JobTables, flags: JobTables, folder: Path) -> Values:
             for name, each in file.tools.items()
         }
     rows = file.operations or (Table(),)
-    carved = {str(_raw(own).get("name")) for own in rows if _leaves_floor(_raw(own))}
-    tables["operations"] = [_operation(own, file.defaults, flags.defaults, carved) for own in rows]
+    carved = {
+        str(_raw(own_table).get("name")) for own_table in rows if _leaves_floor(_raw(own_table))
+    }
+    tables["operations"] = [
+        _operation(own_table, file.defaults, flags.defaults, carved) for own_table in rows
+    ]
     return tables
 
 
-def _operation(own: Table, defaults: Table, flags: Table, carved: set[str]) -> Values:
+def _operation(own_table: Table, defaults: Table, flags: Table, carved: set[str]) -> Values:
     """The table of an operation with the flags that it knows over it. The floor of one that is
     `carved` has its depth."""
-    if _raw(own).get("rest") in carved:
+    if _raw(own_table).get("rest") in carved:
         flags = flags.only(set(flags.given) - {"depth", "breakthrough"})
-    kind = {**defaults.given, **own.given, **flags.given}.get("kind")
+    kind = {**defaults.given, **own_table.given, **flags.given}.get("kind")
     named = kind.value if kind is not None else "profile"
     tool = flags.only(TOOL_KEYS).given
-    if tool and TOOL_NAME in own.given and TOOL_NAME not in flags.given:
+    if tool and TOOL_NAME in own_table.given and TOOL_NAME not in flags.given:
         raise next(iter(tool.values())).refused(
             "cannot be written into a job file whose operation names its tool",
             "change the tool in the job file",
         )
-    known = [name for name in flags.given if name not in OPERATION or is_known(name, named)]
-    return _raw(_over(flags.only(known), own))
+    known_keys = [name for name in flags.given if name not in OPERATION or is_known(name, named)]
+    return _raw(_over(flags.only(known_keys), own_table))
 
 
 def _leaves_floor(table: Values) -> bool:
@@ -111,10 +115,10 @@ def _leaves_floor(table: Values) -> bool:
 
 def _over(above: Table, below: Table) -> Table:
     """The keys of both; the upper ones say instead of the lower what contradicts them."""
-    gone = {EITHER[name] for name in above.given if name in EITHER}
+    overridden = {EITHER[name] for name in above.given if name in EITHER}
     if TOOL_NAME in above.given:
-        gone |= set(TOOL_KEYS)
-    return above.over(below.only(set(below.given) - gone))
+        overridden |= set(TOOL_KEYS)
+    return above.over(below.only(set(below.given) - overridden))
 
 
 def _raw(table: Table) -> Values:
@@ -125,40 +129,43 @@ def _presets(presets: Mapping[str, Table]) -> Values:
     return {material: _raw(each) for material, each in presets.items()}
 
 
-def _relative(given: Given, was: Path, folder: Path) -> str:
+def _relative(given: Given, old_folder: Path, folder: Path) -> str:
     """The name of a file from the new folder: a file names it from its own, a flag from here."""
-    named = was / str(given.value) if given.file is not None else Path(str(given.value))
+    named = old_folder / str(given.value) if given.file is not None else Path(str(given.value))
     return Path(os.path.relpath(named.absolute(), folder.absolute())).as_posix()
 
 
-def changed(tables: Values, changes: Sequence[Change], left: Sequence[Left] = ()) -> Values:
-    """The tables with these changes. An operation with several `left` becomes as many, in their
-    order: together they name all entities that it takes."""
-    made = {**tables, **{each.key: each.value for each in changes if each.operation is None}}
+def changed(tables: Values, changes: Sequence[Change], own_parts: Sequence[Left] = ()) -> Values:
+    """The tables with these changes. An operation with several `own_parts` becomes as many, in
+    their order: together they name all entities that it takes."""
+    changed_tables = {
+        **tables,
+        **{each.key: each.value for each in changes if each.operation is None},
+    }
     names = {str(table.get("name")) for table in tables["operations"]}
     operations: list[Values] = []
     for row, table in enumerate(tables["operations"]):
-        own = {each.key: each.value for each in changes if each.operation == row}
-        mine = [each for each in left if each.operation == row]
-        operations += _divided({**table, **own}, mine, names)
-    made["operations"] = operations
-    return made
+        own_changes = {each.key: each.value for each in changes if each.operation == row}
+        left_parts = [each for each in own_parts if each.operation == row]
+        operations += _divided({**table, **own_changes}, left_parts, names)
+    changed_tables["operations"] = operations
+    return changed_tables
 
 
-def _divided(table: Values, left: Sequence[Left], names: set[str]) -> list[Values]:
+def _divided(table: Values, parts_left: Sequence[Left], names: set[str]) -> list[Values]:
     """The operations that one becomes; the first has its name, the others numbers behind it."""
-    if not left:
+    if not parts_left:
         return [table]
     name = str(table.get("name") or table.get("kind") or "profile")
     parts: list[Values] = []
-    for each in left:
+    for each in parts_left:
         part = dict(table)
         if each.by_mm:
-            by = length(table.get("allowance", 0.0)) + each.by_mm
-            part["allowance"] = f"{round(by, LEFT_DIGITS) + 0.0:.10g}mm"
+            allowance = length(table.get("allowance", 0.0)) + each.by_mm
+            part["allowance"] = f"{round(allowance, LEFT_DIGITS) + 0.0:.10g}mm"
         if each.entities:
             part["select_entities"] = [pattern_of(entity) for entity in each.entities]
-        if len(left) > 1:
+        if len(parts_left) > 1:
             part["name"] = name
         if parts:
             numbers = (f"{name} ({number})" for number in count(2))
@@ -172,8 +179,8 @@ def text_of(tables: Values, head: Sequence[str] = ()) -> str:
     """The text of a job file; `head` are comments at its top. A single operation stands at the
     top of the file."""
     if len(tables["operations"]) == 1:
-        whole = {key: value for key, value in tables.items() if key != "operations"}
-        tables = {**whole, **tables["operations"][0]}
+        job_values = {key: value for key, value in tables.items() if key != "operations"}
+        tables = {**job_values, **tables["operations"][0]}
     body = "\n".join(toml_lines(tables)).lstrip("\n")
     return "".join(f"# {line}\n" for line in head) + ("\n" if head else "") + body + "\n"
 

@@ -43,22 +43,22 @@ def described(
     findings: list[Finding] = []
     if drawing is None:
         return facts, findings
-    placed = place(drawing, job)
-    x, y = drawing_extents(placed).tolist()
+    placed_drawing = place(drawing, job)
+    x, y = drawing_extents(placed_drawing).tolist()
     facts = {"drawing": drawing.file, "extents_mm": {"x": x, "y": y}, **facts}
     unsaid = NOT_KNOWN_MM if machine is None else machine.defaults.cut_depth_mm
-    sides = Sides.of(placed, job, unsaid)
+    sides = Sides.of(placed_drawing, job, unsaid)
     for operation, row in zip(job.operations, facts["operations"], strict=True):
-        chosen = choose(placed, operation, sides)
-        closed = chosen.lines.closed
+        selection = choose(placed_drawing, operation, sides)
+        closed = selection.lines.closed
         row["takes"] = {
             "closed": int(closed.sum()),
             "open": int((~closed).sum()),
-            "points": len(chosen.points),
+            "points": len(selection.points),
         }
-        row["contours"] = _groups(operation, chosen, sides, placed)
+        row["contours"] = _groups(operation, selection, sides, placed_drawing)
         if operation.side == "auto" and runs_beside(operation):
-            findings += by_uncut(sides, operation, chosen.source[closed])
+            findings += by_uncut(sides, operation, selection.source[closed])
     return facts, findings
 
 
@@ -93,23 +93,23 @@ def _below(job: Job, operation: Operation) -> float | None:
 
 
 def _groups(
-    operation: Operation, chosen: Chosen, sides: Sides, placed: Drawing
+    operation: Operation, selection: Chosen, sides: Sides, placed_drawing: Drawing
 ) -> list[dict[str, Any]]:
     """Count the contours of each layer by the side on which the tool runs, and by the reason."""
     contract = operation.contract
     if contract.cuts in ("at", "over"):
         return []
     groups: Counter[tuple[str, str, str]] = Counter()
-    beside = runs_beside(operation)
-    for place_in, row in enumerate(chosen.source.tolist()):
+    is_beside = runs_beside(operation)
+    for place_in, row in enumerate(selection.source.tolist()):
         if contract.cuts in ("within", "along"):
-            side, why = ("within" if contract.cuts == "within" else "on"), contract.reason
+            side, reason = ("within" if contract.cuts == "within" else "on"), contract.reason
         else:
-            outer = "outside" if chosen.rim[place_in] else "inside"
-            side = outer if beside and chosen.lines.closed[place_in] else "on"
-            why = sides.why(operation, row)
-        groups[placed.layers[row], side, why] += 1
+            outer = "outside" if selection.rim[place_in] else "inside"
+            side = outer if is_beside and selection.lines.closed[place_in] else "on"
+            reason = sides.why(operation, row)
+        groups[placed_drawing.layers[row], side, reason] += 1
     return [
-        {"layer": layer, "contours": count, "side": side, "why": why}
-        for (layer, side, why), count in groups.items()
+        {"layer": layer, "contours": count, "side": side, "why": reason}
+        for (layer, side, reason), count in groups.items()
     ]

@@ -32,15 +32,15 @@ def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Draw
     set-ups of the part, or of those that `options` select. OptionError for a layer or colour of
     the job that the drawing has not, unless `options` select some."""
     job = job.whole
-    chosen, wanted = options.select, layers_of(job)
-    options = replace(options, select=replace(chosen, layers=chosen.layers or wanted))
+    selection, wanted_layers = options.select, layers_of(job)
+    options = replace(options, select=replace(selection, layers=selection.layers or wanted_layers))
     try:
         drawing = read_to_scale(partial(read_bytes, data, file), options, job)
     except NoMatchError as error:
-        if chosen.layers or error.pattern not in wanted:
+        if selection.layers or error.pattern not in wanted_layers:
             raise
         raise _unmatched(error, job) from error
-    if not (chosen.layers or chosen.exclude_layers or chosen.colours):
+    if not (selection.layers or selection.exclude_layers or selection.colours):
         refuse_unmatched(drawing, job)
     return drawing
 
@@ -78,26 +78,26 @@ def refuse_unmatched(drawing: Drawing, job: Job) -> None:
     layers = {*drawing.layers, *(mark.layer for mark in drawing.marks)}
     colours = {*drawing.colours, *(mark.colour for mark in drawing.marks)}
     for number, operation in enumerate(job.operations, start=1):
-        for what, patterns, known in (
+        for subject, patterns, names in (
             ("layer", operation.layers, layers),
             ("colour", operation.colours, colours),
         ):
             for pattern in patterns:
-                if not any(matches((pattern,), name) for name in known):
+                if not any(matches((pattern,), name) for name in names):
                     raise OptionError(
-                        f"no {what} matches {pattern!r}",
+                        f"no {subject} matches {pattern!r}",
                         file=drawing.file,
-                        where=f"{_called(operation, number)}key {what}s",
-                        mend=f"{guess(pattern, known)}it has {_listed(known)}",
+                        where=f"{_called(operation, number)}key {subject}s",
+                        mend=f"{guess(pattern, names)}it has {_listed(names)}",
                     )
 
 
 def _unmatched(error: NoMatchError, job: Job) -> OptionError:
     """The reader's error about a layer of the job, with the operation that names it."""
     rows = enumerate(job.operations, start=1)
-    called = next(_called(each, n) for n, each in rows if error.pattern in each.layers)
+    operation_place = next(_called(each, n) for n, each in rows if error.pattern in each.layers)
     return OptionError(
-        error.message, file=error.file, where=f"{called}key layers", mend=error.mend
+        error.message, file=error.file, where=f"{operation_place}key layers", mend=error.mend
     )
 
 
@@ -105,6 +105,6 @@ def _called(operation: Operation, number: int) -> str:
     return f"operation {number} {operation.name!r}, " if operation.name else ""
 
 
-def _listed(known: Iterable[str]) -> str:
-    names = sorted(name or '""' for name in known)
+def _listed(names_known: Iterable[str]) -> str:
+    names = sorted(name or '""' for name in names_known)
     return (", ".join(names[:NAMED]) + (" …" if len(names) > NAMED else "")) or "none"

@@ -117,17 +117,17 @@ def span(value: object) -> tuple[float, float]:
 
 
 def _range(
-    value: object, convert: Callable[[object], float], least: float = 0.0
+    value: object, convert: Callable[[object], float], min_value: float = 0.0
 ) -> tuple[float, float]:
     if not isinstance(value, str):
         return _two(value, convert, '["3mm", "8mm"]')
-    one, dots, two = (part.strip() for part in value.partition(".."))
-    if not dots or not (one or two):
+    one, dots, high = (part.strip() for part in value.partition(".."))
+    if not dots or not (one or high):
         raise OptionError(f"{value!r} is no range", mend='write it like "3..8mm"')
-    unit = _UNIT.search(two)
+    unit = _UNIT.search(high)
     if one and unit and not _UNIT.search(one):
         one += unit[0]
-    return convert(one) if one else least, convert(two) if two else math.inf
+    return convert(one) if one else min_value, convert(high) if high else math.inf
 
 
 def colours(value: object) -> tuple[str, ...]:
@@ -147,9 +147,9 @@ def lengths(value: object) -> tuple[float, float]:
         match = _PAIR.fullmatch(value.strip())
         if match is None:
             raise OptionError(f"{value!r} is no pair of lengths", mend='write it like "12x9mm"')
-        one, two = match.groups()
-        unit = _UNIT.search(two)
-        return length(one if unit is None or _UNIT.search(one) else one + unit[0]), length(two)
+        one, second = match.groups()
+        unit = _UNIT.search(second)
+        return length(one if unit is None or _UNIT.search(one) else one + unit[0]), length(second)
     return _two(value, length, '["12mm", "9mm"]')
 
 
@@ -207,8 +207,8 @@ def lead(given: Given) -> Lead:
 def tabs(given: Given) -> Tabs:
     """A table, or how many ("4") or how far apart ("20mm"), then ":width:height"."""
     value = given.value
-    counted = type(value) is int or (isinstance(value, str) and _COUNT.match(value))
-    first = "count" if counted else "spacing"
+    is_count = type(value) is int or (isinstance(value, str) and _COUNT.match(value))
+    first = "count" if is_count else "spacing"
     table = _parts(given, TABS, (first, "width", "height"))
     base: dict[str, Any] = {"count": 1}
     if "spacing" in table.given:
@@ -224,13 +224,13 @@ def _record(make: Callable[..., _T], keys: Mapping[str, Key], table: Table) -> _
     return record
 
 
-def _part_of(given: Given, known: Iterable[str]) -> Table:
+def _part_of(given: Given, known_keys: Iterable[str]) -> Table:
     """A table that is the value of a key, such as `entry = {kind = "ramp"}`."""
     parts = {}
     for name, value in given.value.items():
         parts[name] = Given(value, f"{given.where}.{name}", given.file)
-        if name not in known:
-            raise parts[name].refused("unknown key", meant(name, known))
+        if name not in known_keys:
+            raise parts[name].refused("unknown key", meant(name, known_keys))
     return Table(parts, given.where, given.file)
 
 
@@ -251,26 +251,26 @@ def _parts(given: Given, keys: Mapping[str, Key], names: Sequence[str]) -> Table
     return Table(parts, given.where, given.file)
 
 
-def _word_or_place(value: object, known: Sequence[str]) -> str | tuple[float, float]:
+def _word_or_place(value: object, words: Sequence[str]) -> str | tuple[float, float]:
     """Return one of the words, or a place given as a list of two lengths or a text with a
     comma."""
     if isinstance(value, list | tuple):
         return _two(value, length, '["10mm", "5mm"]')
     name = text(value)
-    if name in known:
+    if name in words:
         return name
     places = name.split(",")
     if len(places) != 2:
         raise OptionError(
             f"{name!r} is no place",
-            mend=f"{guess(name, known)}use one of {', '.join(known)}, or x,y",
+            mend=f"{guess(name, words)}use one of {', '.join(words)}, or x,y",
         )
     return length(places[0]), length(places[1])
 
 
-def _two(value: object, convert: Callable[[object], _T], like: str) -> tuple[_T, _T]:
+def _two(value: object, convert: Callable[[object], _T], example: str) -> tuple[_T, _T]:
     if not isinstance(value, list | tuple) or len(value) != 2:
-        raise OptionError(f"{value!r} is no list of two", mend=f"write it like {like}")
+        raise OptionError(f"{value!r} is no list of two", mend=f"write it like {example}")
     return convert(value[0]), convert(value[1])
 
 

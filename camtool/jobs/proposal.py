@@ -28,13 +28,13 @@ class Proposal(Struct, frozen=True):
         """Return the tools of this kind in the library, the widest first. Where the materials are
         known, only those with presets for the material that is cut, or for one of all: a tool
         without would cut with its spindle off."""
-        wanted = {self.material} if self.material else set(self.materials)
-        found = [
+        materials = {self.material} if self.material else set(self.materials)
+        tools = [
             tool
             for tool in self.library
-            if tool.kind == kind and (not wanted or wanted & set(tool.materials))
+            if tool.kind == kind and (not materials or materials & set(tool.materials))
         ]
-        return sorted(found, key=lambda tool: -tool.diameter_mm)
+        return sorted(tools, key=lambda tool: -tool.diameter_mm)
 
     def has_drill(self, width_mm: float) -> bool:
         """True if a drill of the library is as wide as a hole of this diameter."""

@@ -79,19 +79,19 @@ def stepped_holes(drawing: Drawing, proposal: Proposal, habits: Mapping[int, str
     if not tool:
         return SteppedHoles()
     depth = drawing.nesting.levels.depth
-    for wide, narrow, (outer, inner) in _circles_about_one_centre(drawing):
-        is_named = "countersink" in (habits[wide], habits[narrow])
+    for wide, inner_row, (outer, inner) in _circles_about_one_centre(drawing):
+        is_named = "countersink" in (habits[wide], habits[inner_row])
         is_within_part = habits[wide] in PLAIN and depth[wide] % 2 == 1
         if not proposal.fits_hole(inner) or not (is_named or is_within_part):
             continue
         share = outer / inner
         if is_named or (thickness and SINK_SHARES[0] <= share <= SINK_SHARES[1]):
-            bit = sinking_bit(proposal, 0.5 * (outer - inner), is_named=is_named)
-            if bit is not None:
-                sunk[wide] = Sink(narrow, 0.5 * (outer - inner), bit, is_named)
+            bit_tool = sinking_bit(proposal, 0.5 * (outer - inner), is_named=is_named)
+            if bit_tool is not None:
+                sunk[wide] = Sink(inner_row, 0.5 * (outer - inner), bit_tool, is_named)
                 continue
         if thickness and tool + HOLE_SIZE_MM < outer <= MAX_STEP_SHARE * inner:
-            bored[wide] = narrow
+            bored[wide] = inner_row
     return SteppedHoles(bored, sunk)
 
 
@@ -99,18 +99,20 @@ def sinking_bit(proposal: Proposal, width_mm: float, *, is_named: bool) -> Tool 
     """Return the V bit that cuts a slope so wide, and not through the stock; one of another angle
     than screws have only where the layer says that it is a countersink."""
     fits = []
-    for bit in proposal.tools("v"):
-        angle = bit.tip_angle_rad
+    for bit_tool in proposal.tools("v"):
+        angle = bit_tool.tip_angle_rad
         if angle is None:
             continue
-        off = min(abs(math.degrees(angle) - each) for each in SINK_ANGLES_DEG)
-        offset = Operation(tool=bit).tip_offset_mm
-        room = not bit.diameter_mm or bit.radius_at(offset) + width_mm <= bit.radius_mm
-        deep = width_mm / math.tan(0.5 * angle) + offset
-        is_screw = off <= SINK_ANGLE_SLACK_DEG
+        difference = min(abs(math.degrees(angle) - each) for each in SINK_ANGLES_DEG)
+        offset = Operation(tool=bit_tool).tip_offset_mm
+        room = (
+            not bit_tool.diameter_mm or bit_tool.radius_at(offset) + width_mm <= bit_tool.radius_mm
+        )
+        depth = width_mm / math.tan(0.5 * angle) + offset
+        is_screw = difference <= SINK_ANGLE_SLACK_DEG
         thickness = proposal.thickness_mm or math.inf
-        if room and deep < thickness and (is_screw or is_named):
-            fits.append((off, bit))
+        if room and depth < thickness and (is_screw or is_named):
+            fits.append((difference, bit_tool))
     return min(fits, key=lambda each: each[0])[1] if fits else None
 
 
@@ -120,13 +122,17 @@ def _circles_about_one_centre(
     """Return the rows of circles that hold one circle about the same centre and nothing else, the
     row of that, and the diameters of both, mm."""
     parent = drawing.nesting.levels.parent
-    held = np.bincount(parent[parent >= 0], minlength=len(parent))
-    found = []
-    for narrow in np.flatnonzero(parent >= 0).tolist():
-        wide = int(parent[narrow])
-        if held[wide] != 1 or held[narrow] or max(wide, narrow) >= len(drawing.paths):
+    child_counts = np.bincount(parent[parent >= 0], minlength=len(parent))
+    pairs = []
+    for inner_row in np.flatnonzero(parent >= 0).tolist():
+        wide = int(parent[inner_row])
+        if (
+            child_counts[wide] != 1
+            or child_counts[inner_row]
+            or max(wide, inner_row) >= len(drawing.paths)
+        ):
             continue
-        one, other = (circle_of(drawing.paths[row]) for row in (wide, narrow))
+        one, other = (circle_of(drawing.paths[row]) for row in (wide, inner_row))
         if one and other and math.dist(one[0], other[0]) <= SAME_HOLE_MM:
-            found.append((wide, narrow, (one[1], other[1])))
-    return found
+            pairs.append((wide, inner_row, (one[1], other[1])))
+    return pairs

@@ -86,31 +86,31 @@ class _Group(Struct, frozen=True):
 def _materials(proposal: Proposal) -> Iterator[str]:
     """Yield the row of the material that is cut, and those of the others as comments."""
     for name in proposal.materials:
-        said = name == proposal.material
-        yield _row(f"{'' if said else '# '}material = {toml_string(name)}", "as --material")
+        is_chosen = name == proposal.material
+        yield _row(f"{'' if is_chosen else '# '}material = {toml_string(name)}", "as --material")
 
 
 def proposed(drawing: Drawing, proposal: Proposal) -> list[Proposed]:
     """Return the operations that a drawing is cut by, in the order of cutting, each with its own
     name and the group of paths that it takes from."""
-    (left, right), (low, high) = drawing_extents(drawing).tolist()
+    (left_x, right), (low, high) = drawing_extents(drawing).tolist()
     groups = sorted(_groups(drawing), key=lambda group: _extent(drawing, group))
     habits = {row: _habit(group.name) for group in groups for row in group.paths}
     steps = stepped_holes(drawing, proposal, habits)
-    size = max(right - left, high - low)
-    made = [
+    size = max(right - left_x, high - low)
+    operations = [
         Proposed(group, part)
         for group in groups
         for part in _parts(drawing, group, size, proposal, steps)
     ]
-    made.sort(key=_turn)
+    operations.sort(key=_turn)
     names = set[str]()
-    for row, each in enumerate(made):
+    for row, each in enumerate(operations):
         name = each.part.name
         number = next(n for n in itertools.count(1) if _numbered(name, n) not in names)
-        made[row] = Proposed(each.group, replace(each.part, name=_numbered(name, number)))
-        names.add(made[row].part.name)
-    return made
+        operations[row] = Proposed(each.group, replace(each.part, name=_numbered(name, number)))
+        names.add(operations[row].part.name)
+    return operations
 
 
 def _turn(each: Proposed) -> tuple[int, bool]:
@@ -130,8 +130,8 @@ def job_template(
     a proposal of tool and stock, contours are told apart by what they are. `parts`: its
     operations, if not those that are `proposed`; `text`: how the drawing's text was read."""
     proposal = proposal or Proposal()
-    (left, right), (low, high) = drawing_extents(drawing).tolist()
-    size = (right - left, high - low)
+    (left_x, right), (low, high) = drawing_extents(drawing).tolist()
+    size = (right - left_x, high - low)
     parts = proposed(drawing, proposal) if parts is None else parts
     lines = [
         *_head(drawing, size, machine),
@@ -161,18 +161,18 @@ def _stock(
     size: tuple[float, float], proposal: Proposal, parts: Sequence[Proposed]
 ) -> Iterator[str]:
     """Yield the rows of the stock; where a drill goes through, its board takes the point."""
-    known = bool(proposal.thickness_mm)
-    thickness = f"{proposal.thickness_mm:.6g}" if known else "1"
+    is_known_thickness = bool(proposal.thickness_mm)
+    thickness = f"{proposal.thickness_mm:.6g}" if is_known_thickness else "1"
     remark = "its top is Z0; the corner is its lower left one"
-    yield _row("[stock]" if known else "# [stock]", remark)
+    yield _row("[stock]" if is_known_thickness else "# [stock]", remark)
     yield '# corner = ["0mm", "0mm"]'
     yield f'# size = ["{size[0]:.6g}mm", "{size[1]:.6g}mm"]'
-    yield f'{"" if known else "# "}thickness = "{thickness}mm"'
+    yield f'{"" if is_known_thickness else "# "}thickness = "{thickness}mm"'
     points = {tool.name: tool.point_mm for tool in proposal.library}
     drilled = [points.get(each.part.tool, 0.0) for each in parts if each.part.kind == "drill"]
-    deep = proposal.breakthrough_mm + max(drilled, default=0.0)
-    if known and deep > Stock(proposal.thickness_mm).through_mm:
-        board = math.ceil(10.0 * deep) / 10.0
+    depth = proposal.breakthrough_mm + max(drilled, default=0.0)
+    if is_known_thickness and depth > Stock(proposal.thickness_mm).through_mm:
+        board = math.ceil(10.0 * depth) / 10.0
         yield _row(f'spoilboard = "{board:g}mm"', "so deep goes the point of the drill below it")
     else:
         yield '# spoilboard = "0.5mm"'
@@ -292,22 +292,22 @@ class Remaining(Struct, frozen=True):
     def depth_mm(self) -> float | None:
         """The depth that the name of the layer says (`POCKET 2mm`, `d=3`), mm; None if it says
         none, and for holes, whose names say diameters."""
-        found = _DEPTH.search(self.name.casefold())
-        if found is None or self.habit in ("drill", "countersink"):
+        match = _DEPTH.search(self.name.casefold())
+        if match is None or self.habit in ("drill", "countersink"):
             return None
-        depth = float(next(filter(None, found.groups())).replace(",", "."))
+        depth = float(next(filter(None, match.groups())).replace(",", "."))
         return depth if 0.0 < depth <= (self.proposal.thickness_mm or MAX_DEPTH_MM) else None
 
     def crowded(self, width_mm: float) -> tuple[int, ...]:
         """Rows of the closed paths that a tool of this width cannot run beside or within."""
-        found = crowded(self.drawing, width_mm) - self.steps.rows
-        return tuple(row for row in self.contours if row in found)
+        crowded_rows = crowded(self.drawing, width_mm) - self.steps.rows
+        return tuple(row for row in self.contours if row in crowded_rows)
 
     @property
     def branched(self) -> tuple[int, ...]:
         """Rows of the paths of which it is not clear what they enclose."""
-        found = {path for branch in self.drawing.healing.branches for path in branch.paths}
-        return tuple(row for row in self.rows if row in found)
+        branched_rows = {path for branch in self.drawing.healing.branches for path in branch.paths}
+        return tuple(row for row in self.rows if row in branched_rows)
 
     @property
     def holes(self) -> dict[int, float]:
@@ -316,8 +316,8 @@ class Remaining(Struct, frozen=True):
         inner = self.contours if self.habit == "drill" else self.contours_that_are("inner")
         parents = set(self.drawing.nesting.levels.parent.tolist())
         empty = [row for row in inner if row not in parents]
-        found = {row: circle_of(self.drawing.paths[row]) for row in empty}
-        return {row: circle[1] for row, circle in found.items() if circle}
+        circles = {row: circle_of(self.drawing.paths[row]) for row in empty}
+        return {row: circle[1] for row, circle in circles.items() if circle}
 
     @property
     def contours(self) -> tuple[int, ...]:
@@ -338,10 +338,10 @@ class Remaining(Struct, frozen=True):
     def without(self, parts: Sequence[Part]) -> Remaining:
         """Return the paths and points that are left when these operations have taken theirs."""
         parts = [part for part in parts if not part.is_shared]
-        taken = {row for part in parts for row in part.rows}
+        taken_rows = {row for part in parts for row in part.rows}
         return replace(
             self,
-            rows=tuple(row for row in self.rows if row not in taken),
+            rows=tuple(row for row in self.rows if row not in taken_rows),
             marks=self.marks - sum(part.marks for part in parts),
             is_divided=self.is_divided or any(part.rows and not part.excludes for part in parts),
         )
@@ -363,25 +363,27 @@ def _parts(
     sunk = tuple(row for row in group.paths if row in steps.sunk)
     rows, marks = tuple(row for row in group.paths if row not in sunk), len(group.marks)
     title = group.called
-    left = Remaining(drawing, group.name, title, rows, marks, size_mm, proposal, steps, sunk)
+    remaining = Remaining(drawing, group.name, title, rows, marks, size_mm, proposal, steps, sunk)
     proposing = [kind for kind in installed_kinds().values() if kind.propose]
-    found: list[Part] = []
+    parts_found: list[Part] = []
     for kind in sorted(proposing, key=lambda kind: (kind.proposal_rank, kind.name)):
-        if left.rows or left.marks:
-            made: list[Part] = function_of(kind.propose)(left)
-            found += made
-            left = left.without(made)
-    excluded = [part.excludes for part in found if part.excludes]
-    found = [part if part.excludes else _excluding(part, excluded) for part in found]
-    depth = left.depth_mm
+        if remaining.rows or remaining.marks:
+            proposed_parts: list[Part] = function_of(kind.propose)(remaining)
+            parts_found += proposed_parts
+            remaining = remaining.without(proposed_parts)
+    excluded = [part.excludes for part in parts_found if part.excludes]
+    parts_found = [part if part.excludes else _excluding(part, excluded) for part in parts_found]
+    depth = remaining.depth_mm
     if depth is not None:
-        said = ("depth", f'"{depth:g}mm"', "as the layer is called")
-        kept = ([key for key in part.keys if key[0] not in ("depth", "tabs")] for part in found)
-        found = [
-            replace(part, keys=(*keys, said)) if is_known("depth", part.kind) else part
-            for part, keys in zip(found, kept, strict=True)
+        depth_key = ("depth", f'"{depth:g}mm"', "as the layer is called")
+        kept_keys = (
+            [key for key in part.keys if key[0] not in ("depth", "tabs")] for part in parts_found
+        )
+        parts_found = [
+            replace(part, keys=(*keys, depth_key)) if is_known("depth", part.kind) else part
+            for part, keys in zip(parts_found, kept_keys, strict=True)
         ]
-    return [_exact(drawing, group, part) for part in found]
+    return [_exact(drawing, group, part) for part in parts_found]
 
 
 def _exact(drawing: Drawing, group: _Group, part: Part) -> Part:
@@ -389,7 +391,7 @@ def _exact(drawing: Drawing, group: _Group, part: Part) -> Part:
     entities of one name may still be taken together."""
     if part.instead is not None:
         part = replace(part, instead=_exact(drawing, group, part.instead))
-    own = {key: value for key, value, _ in part.keys if key in SELECTING_KEYS}
+    own_words = {key: value for key, value, _ in part.keys if key in SELECTING_KEYS}
     rows = np.zeros(len(drawing.paths), dtype=np.bool_)
     rows[list(group.paths)] = True
     edges = np.array(
@@ -397,17 +399,17 @@ def _exact(drawing: Drawing, group: _Group, part: Part) -> Part:
     )
     every = drawing.nesting.among(np.arange(len(rows)))
     traits = Traits(every, drawing.sources, edges)
-    for more in _narrower(drawing, part):
-        words = {**own, **more}
+    for extra_words in _narrower(drawing, part):
+        words = {**own_words, **extra_words}
         fields = {
             OPERATION[key].field: OPERATION[key].read(Given(tomllib.loads(f"v={value}")["v"], key))
             for key, value in words.items()
         }
-        taken = np.flatnonzero(traits.selected(Operation(**fields), rows)).tolist()
-        if taken == sorted(part.rows):
+        taken_rows = np.flatnonzero(traits.selected(Operation(**fields), rows)).tolist()
+        if taken_rows == sorted(part.rows):
             break
-    added = [(key, value, "") for key, value in more.items()]
-    return replace(part, keys=(*(key for key in part.keys if key[0] not in more), *added))
+    added = [(key, value, "") for key, value in extra_words.items()]
+    return replace(part, keys=(*(key for key in part.keys if key[0] not in extra_words), *added))
 
 
 def _narrower(drawing: Drawing, part: Part) -> Iterator[dict[str, str]]:
@@ -426,12 +428,15 @@ def _narrower(drawing: Drawing, part: Part) -> Iterator[dict[str, str]]:
 
 def _excluding(part: Part, words: Sequence[str]) -> Part:
     """The part, which selects what these words too are true of."""
-    said = {key: value for key, value, _ in part.keys}.get("select")
-    if not words or said == '["point"]':
+    selection = {key: value for key, value, _ in part.keys}.get("select")
+    if not words or selection == '["point"]':
         return part
-    before = "" if said is None else f"{said[1:-1]}, "
-    more = ", ".join(toml_string(word) for word in words)
-    keys = (("select", f"[{before}{more}]", ""), *(k for k in part.keys if k[0] != "select"))
+    before = "" if selection is None else f"{selection[1:-1]}, "
+    extra_words = ", ".join(toml_string(word) for word in words)
+    keys = (
+        ("select", f"[{before}{extra_words}]", ""),
+        *(k for k in part.keys if k[0] != "select"),
+    )
     return replace(part, keys=keys)
 
 
@@ -461,22 +466,22 @@ def _text(drawing: Drawing, group: _Group, part: Part, proposal: Proposal) -> li
     keys = {key for key, _, _ in part.keys}
     is_through = is_known("breakthrough", part.kind) and "depth" not in keys
     if proposal.breakthrough_mm and is_through:
-        through = f'breakthrough = "{proposal.breakthrough_mm:.6g}mm"'
-        text.append(_row(through, "through the stock, and so far into the board below"))
+        through_row = f'breakthrough = "{proposal.breakthrough_mm:.6g}mm"'
+        text.append(_row(through_row, "through the stock, and so far into the board below"))
         is_stepped = contract.leaves_walls and contract.descent == "passes"
         if is_stepped and proposal.tool_mm and not proposal.materials and not part.tool:
             text.append(f'step_down = "{0.5 * proposal.tool_mm:.3g}mm"')
     if marks and contract.takes != "holes":
         text.append("# The points are not cut by this: they need an operation of the kind drill.")
-    given = {key for key, _, _ in part.keys} | {line.split(" = ")[0] for line in text}
-    if "breakthrough" in given:
-        given.add("depth")
-    known = {
+    given_keys = {key for key, _, _ in part.keys} | {line.split(" = ")[0] for line in text}
+    if "breakthrough" in given_keys:
+        given_keys.add("depth")
+    known_values = {
         name: key
         for name, key in OPERATION.items()
-        if is_known(name, part.kind) and name not in given
+        if is_known(name, part.kind) and name not in given_keys
     }
-    return [*text, *_comments(known)]
+    return [*text, *_comments(known_values)]
 
 
 def _counted(lines: Polylines) -> str:

@@ -62,7 +62,7 @@ def read_tool_table(text: str, file: str) -> dict[int, TableTool]:
 
 def _words(text: str) -> Iterator[tuple[str, str]]:
     """Letter and number of each word; OptionError for anything else, and for a letter twice."""
-    seen: set[str] = set()
+    letters_seen: set[str] = set()
     for word in text.split():
         match = _WORD.fullmatch(word)
         letter = match[1].upper() if match else ""
@@ -70,9 +70,9 @@ def _words(text: str) -> Iterator[tuple[str, str]]:
             raise OptionError(
                 f"{word!r} is no word of a tool table", mend="write it like T1 P1 Z0.511 D0.125"
             )
-        if letter in seen:
+        if letter in letters_seen:
             raise OptionError(f"the word {letter} comes twice", mend="give each word once")
-        seen.add(letter)
+        letters_seen.add(letter)
         yield letter, match[2]
 
 

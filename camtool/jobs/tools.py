@@ -83,23 +83,24 @@ def tool_tables(values: Mapping[str, Any], file: str) -> dict[str, Described]:
             "is no table of tools", "begin each tool with [tools.NAME]"
         )
     described = {name: _described(name, tool, file) for name, tool in tools.items()}
-    seen: dict[int, str] = {}
+    names_by_number: dict[int, str] = {}
     for name, each in described.items():
         tool_of(name, each)
         number = _number_of(each.keys)
         if number is None:
             continue
-        if number in seen:
+        if number in names_by_number:
             raise each.keys.given["number"].refused(
-                f"tool {number} is {seen[number]!r} already", "give each tool a number of its own"
+                f"tool {number} is {names_by_number[number]!r} already",
+                "give each tool a number of its own",
             )
-        seen[number] = name
+        names_by_number[number] = name
     return described
 
 
 def _described(name: str, values: object, file: str) -> Described:
-    where = f"table [tools.{name}]"
-    table = table_of(values, (*TOOL, PRESETS), where, file)
+    place = f"table [tools.{name}]"
+    table = table_of(values, (*TOOL, PRESETS), place, file)
     presets = table.given.get(PRESETS)
     if presets is None:
         return Described(table)
@@ -132,18 +133,21 @@ def tool_of(name: str, described: Described) -> Tool:
     return replace(_tool(name, described.keys, ""), materials=tuple(described.presets))
 
 
-def tools_for(named: Mapping[str, Described], whole: Table, folder: Path, shop: Shop) -> Tools:
+def tools_for(named: Mapping[str, Described], job_table: Table, folder: Path, shop: Shop) -> Tools:
     """The tools of a job: those `named` in its file, which is in this folder, those of libraries,
-    and those of a tool table, which its keys for the `whole` job name."""
-    library = _path_of("tool_library", whole, folder)
+    and those of a tool table, which its keys for the `job_table` job name."""
+    library = _path_of("tool_library", job_table, folder)
     tools = Tools(
         named,
         libraries=shop.libraries if library is None else (library, *shop.libraries),
-        material=whole.given.get("material", shop.material),
-        material_is_asked="material" in whole.given,
+        material=job_table.given.get("material", shop.material),
+        material_is_asked="material" in job_table.given,
         default=shop.tool,
     )
-    units, table = whole.given.get("tool_table_units"), _path_of("tool_table", whole, folder)
+    units, table = (
+        job_table.given.get("tool_table_units"),
+        _path_of("tool_table", job_table, folder),
+    )
     if table is None:
         if units is not None:
             raise units.refused("has no effect without tool_table", "give tool_table too")
@@ -152,14 +156,14 @@ def tools_for(named: Mapping[str, Described], whole: Table, folder: Path, shop: 
     return _with_table(replace(tools, units=unit), table)
 
 
-def _path_of(key: str, whole: Table, folder: Path) -> Path | None:
+def _path_of(key: str, job_table: Table, folder: Path) -> Path | None:
     """The file that a key names: in a job file relative to it, on the command line to where it is
     run."""
-    given = whole.given.get(key)
-    if given is None:
+    key_value = job_table.given.get(key)
+    if key_value is None:
         return None
-    name = WHOLE[key].read(given)
-    return folder / name if given.file is not None else Path(name)
+    name = WHOLE[key].read(key_value)
+    return folder / name if key_value.file is not None else Path(name)
 
 
 class Tools(Struct, frozen=True, dict=True):
@@ -184,20 +188,22 @@ class Tools(Struct, frozen=True, dict=True):
         The nearest name or number counts, and single keys (`tool_diameter`) of that layer and
         of nearer ones change it. The default tool is for operations that say nothing of a tool.
         """
-        at = max((n for n, layer in enumerate(layers) if TOOL_NAME in layer.given), default=-1)
-        said = None if at < 0 else layers[at].given[TOOL_NAME]
-        if said is None and not any(layer.only(TOOL_KEYS).given for layer in layers):
-            said = self.default
-        name, described = ("", Described(Table())) if said is None else self._chosen(said)
+        row = max((n for n, layer in enumerate(layers) if TOOL_NAME in layer.given), default=-1)
+        tool_name = None if row < 0 else layers[row].given[TOOL_NAME]
+        if tool_name is None and not any(layer.only(TOOL_KEYS).given for layer in layers):
+            tool_name = self.default
+        name, described = (
+            ("", Described(Table())) if tool_name is None else self._chosen(tool_name)
+        )
         keys = described.keys
-        for n, layer in enumerate(layers[max(at, 0) :], start=max(at, 0)):
-            own = layer.only(TOOL_KEYS)
-            if n == at and own.given:
-                raise next(iter(own.given.values())).refused(
+        for n, layer in enumerate(layers[max(row, 0) :], start=max(row, 0)):
+            own_keys = layer.only(TOOL_KEYS)
+            if n == row and own_keys.given:
+                raise next(iter(own_keys.given.values())).refused(
                     "contradicts the tool that is named beside it", "give one of the two"
                 )
-            given = {key.removeprefix("tool_"): value for key, value in own.given.items()}
-            keys = Table(given, own.where, own.file).over(keys)
+            tool_keys = {key.removeprefix("tool_"): value for key, value in own_keys.given.items()}
+            keys = Table(tool_keys, own_keys.where, own_keys.file).over(keys)
         return self._used(name, replace(described, keys=keys), kind)
 
     def _used(self, name: str, described: Described, kind: str) -> Used:
@@ -209,14 +215,14 @@ class Tools(Struct, frozen=True, dict=True):
         material = WHOLE["material"].read(self.material)
         preset = described.presets.get(material)
         if preset is None:
-            known = described.presets
+            presets = described.presets
             raise self.material.refused(
                 f"tool {name!r} has no preset for {material!r}",
-                f"{guess(material, known)}it has: {', '.join(known)}",
+                f"{guess(material, presets)}it has: {', '.join(presets)}",
             )
         limits = {
-            LIMITS[key].field: LIMITS[key].read(given)
-            for key, given in preset.only(LIMITS).given.items()
+            LIMITS[key].field: LIMITS[key].read(key_value)
+            for key, key_value in preset.only(LIMITS).given.items()
         }
         tool = replace(tool, materials=tuple(described.presets), **limits)
         return Used(tool, preset.only(OPERATION), material)
@@ -242,13 +248,13 @@ class Tools(Struct, frozen=True, dict=True):
             return self._numbered(value, given)
         if not isinstance(value, str):
             raise given.refused(f"{value!r} is no tool", "give its name in quotes, or its number")
-        known = self._every
-        if value in known:
-            return value, self._completed(known[value])
+        every_tool = self._every
+        if value in every_tool:
+            return value, self._completed(every_tool[value])
         raise given.refused(
             f"there is no tool {value!r}",
-            guess(value, known)
-            + (f"known: {', '.join(known)}" if known else f"write [tools.{value}]"),
+            guess(value, every_tool)
+            + (f"known: {', '.join(every_tool)}" if every_tool else f"write [tools.{value}]"),
         )
 
     def _numbered(self, number: int, given: Given) -> tuple[str, Described]:
@@ -258,10 +264,10 @@ class Tools(Struct, frozen=True, dict=True):
                     return name, self._completed(described)
             if number in self.table:
                 return self.table[number].remark, Described(self._of_table(number))
-        known = [str(each) for each in self.table]
+        numbers = [str(each) for each in self.table]
         raise given.refused(
             f"there is no tool {number}",
-            f"{self.table_file} has: {', '.join(known) or 'none'}"
+            f"{self.table_file} has: {', '.join(numbers) or 'none'}"
             if self.table_file
             else 'give the tool table: tool_table = "tool.tbl"',
         )
@@ -279,8 +285,8 @@ class Tools(Struct, frozen=True, dict=True):
         keys, number = described.keys, _number_of(described.keys)
         if number is None or number not in self.table:
             return described
-        known = self._of_table(number, needed="diameter" not in keys.given)
-        return replace(described, keys=keys.over(known))
+        table_keys = self._of_table(number, needed="diameter" not in keys.given)
+        return replace(described, keys=keys.over(table_keys))
 
     def _of_table(self, number: int, *, needed: bool = True) -> Table:
         """The keys of a tool of the table; refused when it lacks a diameter that is needed."""
@@ -291,8 +297,10 @@ class Tools(Struct, frozen=True, dict=True):
         values = {"number": number, "diameter": f"{tool.diameter!r}{self.units}"}
         if tool.diameter is None:
             del values["diameter"]
-        given = {name: Given(value, table.where, table.file) for name, value in values.items()}
-        return replace(table, given=given)
+        key_values = {
+            name: Given(value, table.where, table.file) for name, value in values.items()
+        }
+        return replace(table, given=key_values)
 
 
 def _with_table(tools: Tools, path: Path) -> Tools:
@@ -308,8 +316,8 @@ def _with_table(tools: Tools, path: Path) -> Tools:
 
 def _number_of(keys: Table) -> int | None:
     """The number of a tool of the file, if it has one."""
-    given = keys.given.get("number")
-    number: int | None = None if given is None else TOOL["number"].read(given)
+    number_value = keys.given.get("number")
+    number: int | None = None if number_value is None else TOOL["number"].read(number_value)
     return number
 
 

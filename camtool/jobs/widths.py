@@ -32,19 +32,19 @@ def has_room(lines: Polylines, radius_mm: float) -> Bools:
     """Mask (N,) of the closed paths within which the centre of a tool of this radius has room; of
     paths that enclose no clear region, those whose box is large enough."""
     ccw = reverse_lines(lines, signed_areas(lines) < 0.0)
-    found: Bools = (
+    has_space: Bools = (
         np.ptp(path_extents(lines), axis=2).min(axis=1, initial=np.inf) > 2.0 * radius_mm
     )
-    if not found.any():
-        return found
-    rows = np.flatnonzero(found)
+    if not has_space.any():
+        return has_space
+    rows = np.flatnonzero(has_space)
     try:
         owners = offset_each(ccw.select(rows), radius_mm)[1]
     except GeometryError:
-        return found
-    found[:] = False
-    found[rows[np.unique(owners)]] = True
-    return found
+        return has_space
+    has_space[:] = False
+    has_space[rows[np.unique(owners)]] = True
+    return has_space
 
 
 def is_slot(lines: Polylines, width_mm: float) -> Bools:
@@ -67,19 +67,21 @@ def crowded(drawing: Drawing, width_mm: float) -> frozenset[int]:
     levels = drawing.nesting.among(rows).levels
     is_outer = levels.depth % 2 == 0
     waste = np.where(is_outer, levels.parent, np.arange(len(rows)))
-    found = np.zeros(len(lines), dtype=np.bool_)
-    found[~is_outer] = ~has_room(lines.select(np.flatnonzero(~is_outer)), 0.5 * width_mm - SLOT_MM)
-    least = width_mm * (1.0 - NEAR_SHARE)
+    is_crowded = np.zeros(len(lines), dtype=np.bool_)
+    is_crowded[~is_outer] = ~has_room(
+        lines.select(np.flatnonzero(~is_outer)), 0.5 * width_mm - SLOT_MM
+    )
+    min_distance = width_mm * (1.0 - NEAR_SHARE)
     for one, other in near_paths(lines, lines, width_mm):
-        if one >= other or (found[one] and found[other]):
+        if one >= other or (is_crowded[one] and is_crowded[other]):
             continue
-        apart = approach(lines[one], lines[other]).distance
+        distance = approach(lines[one], lines[other]).distance
         # Contours of which one crosses the other bound no waste that anybody could name.
-        if apart < (least if waste[one] == waste[other] else POSITION_EPS_MM):
-            found[one] = found[other] = True
+        if distance < (min_distance if waste[one] == waste[other] else POSITION_EPS_MM):
+            is_crowded[one] = is_crowded[other] = True
     sizes = np.ptp(path_extents(lines), axis=2).max(axis=1)
-    small = sizes <= LETTER_SHARE * width_mm
+    is_small = sizes <= LETTER_SHARE * width_mm
     for row in np.argsort(levels.depth, kind="stable").tolist():  # holders before what they hold
         parent = int(levels.parent[row])
-        found[row] |= bool(parent >= 0 and found[parent] and small[parent])
-    return frozenset(rows[found].tolist())
+        is_crowded[row] |= bool(parent >= 0 and is_crowded[parent] and is_small[parent])
+    return frozenset(rows[is_crowded].tolist())
