@@ -26,7 +26,7 @@ from camtool.pictures.colours import (
     channels,
     on_dark,
 )
-from camtool.pictures.layers import LegendEntry, faults_of, line_swatch
+from camtool.pictures.layers import DotGroup, LegendEntry, faults_of, line_swatch
 from camtool.pictures.options import SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.page import (
     BAR_GAP,
@@ -302,7 +302,8 @@ def _from_outside(
     shown = np.column_stack([low - np.array([0.0, room]), high + np.array([0.0, 0.5 * room])])
     view = fit(shown, MARGIN, top + 20.0, box_right - thick, (0.2, 0.8))
     all_across = PageBox(0.0, top, width, view.box.bottom + 20.0)
-    entries = _entries(scene, options)
+    faults = _on_the_stock(faults_of(scene), solid, camera)
+    entries = [*_entries(scene, options), *faults.entries(view)]
     along = replace(view, scale=view.scale * ISO_SCALE) if options.view == "iso" else view
     table, bar_y = table_of(entries, along, view.box)
     legend_y = view.box.bottom + LEGEND_DROP - 30.0
@@ -313,12 +314,22 @@ def _from_outside(
         options,
         _raster(_stage(solid, bar, options), camera, view, all_across, options),
         _deepest(solid, camera, view) if level else _ghost(scene, camera, view),
+        faults.draw(Plot(view)) if faults else "",
         head,
         _sizes(solid, camera, view),
         "" if level else bar.draw(replace(view.box, right=box_right)),
         legend_rows(table, view.box.left, legend_y),
         scale_bar(along, view.box.right, bar_y - 30.0),
     )
+
+
+def _on_the_stock(marks: DotGroup, solid: Solid, camera: Camera) -> DotGroup:
+    """Return marks at (x, y) mm moved to where the camera sees their places on the stock; those
+    beside the stock are left out. Marks behind a higher part of the stock are seen through it."""
+    at = np.array(marks.places, dtype=np.float64).reshape(-1, 2)
+    heights = solid.found.at(at).clip(-solid.pair.thickness_mm)
+    rows = np.column_stack([at, heights])[~np.isnan(heights)].tolist()
+    return replace(marks, places=tuple(camera.place(*row) for row in rows))
 
 
 def _stage(solid: Solid, bar: MmBar, options: PictureOptions) -> Stage:

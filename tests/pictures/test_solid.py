@@ -391,3 +391,21 @@ def test_views_of_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     judged = ("verify", "a.ngc", "-t", "linuxcnc", "--against", "a.csv", "--preview", "d.svg")
     assert run(*judged, "--view", "leftover", *cut) == 0
     assert "than wanted" in spoken(Path("d.svg").read_text())[-1]
+
+
+def test_findings_lie_on_the_stock_in_the_view_aslant() -> None:
+    places = ((15.0, 9.5), (20.0, 35.0), (2.0, 2.0), (60.0, 2.0))
+    svg = draw(replace(scene(), faults=places), PictureOptions(view="iso"))
+    group = re.search(r'<g id="faults"[^>]*>(.*?)</g>', svg, re.DOTALL)
+    assert group is not None
+    rings = [
+        (float(x), float(y)) for x, y in re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', group[1])
+    ]
+    assert len(rings) == 3  # one lies beside the stock
+    # The uncut corner is at a known depth; the first ring's distance to the right gives the scale.
+    corner = rings[2]
+    unit = (rings[0][0] - corner[0]) / ((15.0 - 2.0 - (9.5 - 2.0)) * math.sqrt(0.5))
+    for (x, y), depth, ring in zip(places, (2.0, 5.0, 0.0), rings, strict=False):
+        across = unit * (x - 2.0 - (y - 2.0)) * math.sqrt(0.5)
+        up = unit * ((x - 2.0 + y - 2.0) / math.sqrt(6.0) - depth * math.sqrt(2.0 / 3.0))
+        assert ring == pytest.approx((corner[0] + across, corner[1] - up), abs=0.05)
