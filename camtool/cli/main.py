@@ -62,6 +62,7 @@ COMMANDS = (
     "jog",
     "measure",
     "meet",
+    "panel",
     "ports",
     "post",
     "preview",
@@ -110,6 +111,7 @@ def cli() -> None:
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
     camtool send    logo.pic -t pic-mmh --port /dev/ttyUSB0
+    camtool panel   logo.pic -t pic-mmh --port /dev/ttyUSB0   the same, from a page
     camtool ports                               where machines may be
     camtool home, jog, zero, unlock             a machine moved by hand
     camtool console grbl /dev/ttyUSB0           type to a controller

@@ -20,7 +20,6 @@ from camtool.cli.messages import say, say_findings, show_facts, show_text
 from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
-from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.sending.journal import JournalState
@@ -264,12 +263,10 @@ class _Sending:
     def run(self, *, single: bool, home: bool, unlock: bool, speed: float, yes: bool) -> int:
         """Send the program; return the exit code."""
         from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
-        from camtool.sending.drive import Driver, Request, counts_of
-        from camtool.sending.journal import Journal
+        from camtool.sending.carry import SendOptions, carry_program, program_conversation
+        from camtool.sending.drive import Request
         from camtool.sending.line import opened_line
         from camtool.sending.live import LivePage
-        from camtool.sending.prepare import manner_of
-        from camtool.target.wire import LATE_S, WireState
 
         one = self.one
         remaining_s = 0.0
@@ -288,58 +285,38 @@ class _Sending:
                     f"cannot be written ({error.strerror})", file=self.live
                 ) from error
         progress().begin("sending", len(one.packets))
-        real = not self.port.is_virtual
-        manner = manner_of(
-            self.target,
+        options = SendOptions(
+            self.place,
             single=single,
             home=home,
             unlock=unlock,
-            late_s=LATE_S * speed,
-            paced=real,
+            speed=speed,
+            more=self.more,
             file=self._program_file(),
-            standing=one.standing if one.wire.place == "told" else None,
-            reach_mm=one.reach_mm,
         )
-        # The dry run has asked for the first packet.
-        packets = [replace(packet, ask="") for packet in one.packets[:1]] + [*one.packets[1:]]
-        conversation = one.wire.conversation(packets, self.target.machine, manner)
+        conversation = program_conversation(one, self.target, self.port, options)
         keys = {"p": Request.PAUSE, " ": Request.PAUSE, "r": Request.RESUME, "\n": Request.RESUME}
         keys |= {"s": Request.STEP, "q": Request.STOP}
         with opened_line(self.port) as line, keys_of_terminal() as key:
-            journal = Journal(self.place, self._head(), appends=self.more)
             wishes = UserRequests(key, keys)
             self._tell = tell = Messages(quiet=self.quiet)
-            driver = Driver(
-                line, journal, one.block_of, wishes, self._watch, tell, speed, one.place_of
-            )
-            try:
-                with wishes.catch_signals():
-                    driver.carry(conversation)
-            finally:
-                counts = counts_of(conversation, one.block_of)
-                with suppress(OSError):
-                    journal.close(
-                        conversation.state.value,
-                        conversation.why,
-                        is_still=conversation.is_still,
-                        place=one.place_of(conversation),
-                        **counts,
-                    )
+            with wishes.catch_signals():
+                sent = carry_program(
+                    one,
+                    self.target,
+                    self.port,
+                    line,
+                    options,
+                    conversation=conversation,
+                    wish=wishes,
+                    watch=self._watch,
+                    tell=tell,
+                )
         tell.rest()
-        if conversation.state is WireState.FINISHED and driver.trouble is None:
+        if sent.is_finished:
             say(f"camtool: finished: {len(one.packets)} packets", quiet=self.quiet)
             return 0
-        block = one.block_of(conversation.block) if conversation.block >= 0 else -1
-        block = max(block, one.first - 1)
-        done_text = (
-            f"block {block + 1} is the last that is done" if block >= 0 else "no block is done"
-        )
-        ends = conversation.why or conversation.state.value
-        reason = f"{driver.trouble}; {ends}" if driver.trouble else ends
-        say(
-            f"camtool: error: {one.run.source}: {reason}; {done_text}; --resume goes on",
-            quiet=False,
-        )
+        say(f"camtool: error: {one.run.source}: {sent.words}; --resume goes on", quiet=False)
         return 1
 
     def _program_file(self) -> str:
@@ -354,18 +331,6 @@ class _Sending:
         write_all({str(copy): one.data})
         say(f"camtool: it opens {display_name(str(copy))}", quiet=self.quiet)
         return str(copy)
-
-    def _head(self) -> dict[str, Any]:
-        one = self.one
-        return {
-            "program": one.run.source,
-            "sha256": one.sha256,
-            "target": self.target.machine.target.name,
-            "machine": self.target.machine.digest,
-            "port": self.port.name,
-            "first": one.first,
-            "packets": len(one.packets),
-        }
 
     def _watch(self, conversation: Conversation) -> None:
         """Show the state of the conversation when it has changed."""

@@ -17,7 +17,7 @@ from camtool.errors import OutputError
 from camtool.target.wire import Conversation, Place, Tell, WireState, Write, port_fault
 
 TICK_S = 0.05
-"""Interval at which requests of the user and signals are read."""
+"""Interval at which requests of the user and signals are read, unless it is given."""
 
 STOPPING_MESSAGE = "stopping: waiting until it stands (a second Ctrl-C does not wait)"
 
@@ -33,6 +33,13 @@ class Request(Enum):
     STEP = "step"
     STOP = "stop"
     CLOSE = "close"  # stop at once by any means, and wait for nothing
+
+
+Order = Callable[[Conversation, float], None]
+"""A request with values of its own: what it does to the conversation at a time."""
+
+Wish = Callable[[], Request | Order | None]
+"""The next request of the user, None without one."""
 
 
 class LineToController(Protocol):
@@ -57,7 +64,7 @@ def _watch_nothing(_: Conversation) -> None:
     return
 
 
-def _no_wish() -> Request | None:
+def _no_wish() -> Request | Order | None:
     return None
 
 
@@ -69,11 +76,12 @@ class Driver:
     line: LineToController
     journal: Record | None = None
     block_of: Callable[[int], int] = lambda block: block
-    wish: Callable[[], Request | None] = _no_wish
+    wish: Wish = _no_wish
     watch: Callable[[Conversation], None] = _watch_nothing
     tell: Callable[[str], None] = lambda text: None
     speed: float = 1.0
     place_of: Callable[[Conversation], Place | None] = lambda conversation: conversation.at_mm
+    tick_s: float = TICK_S
     trouble: OutputError | None = field(default=None, init=False)
     """The error that kept the journal or the display from being written, if any."""
     _has_journal: bool = field(default=True, init=False)
@@ -160,7 +168,7 @@ class Driver:
     def _listen(self, conversation: Conversation) -> None:
         if conversation.is_over or conversation.has_actions:
             return
-        wait_s = min((conversation.next_s - self.now()) / self.speed, TICK_S)
+        wait_s = min((conversation.next_s - self.now()) / self.speed, self.tick_s)
         data = self.line.read(max(wait_s, 0.0))
         time_s = self.now()
         if data:
@@ -170,7 +178,11 @@ class Driver:
 
     def _handle_request(self, conversation: Conversation) -> None:
         wish, time_s = self.wish(), self.now()
-        if wish is Request.PAUSE:
+        if wish is None:
+            return
+        if not isinstance(wish, Request):
+            wish(conversation, time_s)
+        elif wish is Request.PAUSE:
             conversation.pause(time_s)
         elif wish is Request.RESUME:
             conversation.single = False

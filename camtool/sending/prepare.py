@@ -192,16 +192,18 @@ def consignment(
     first: int = 0,
     state: JournalState | None = None,
     tool_at: ToolAt = "",
+    despite_errors: bool = False,
     progress: Progress | None = None,
 ) -> Consignment:
     """Verify a program and cut it into packets; with `first` (a block, from 0) its rest from there
     on. `state`: the state in its journal; `tool_at`: the place of the tool as the user gives it.
-    Raises ProgramError for a program with errors, or for another machine's."""
+    A program with errors has no packets, unless `despite_errors`. Raises ProgramError for one that
+    cannot be read, or that is another machine's."""
     wire = wire_of(target)
     check_settings(data, target, source)
     judging = Judging(keep_ledger=True)
     run = verify_program(data, target, source=source, judging=judging, progress=progress)
-    if run.failed:
+    if run.failed and not (despite_errors and run.decoded is not None):
         return Consignment(run, wire, _no_forecast(run), ())
     decoded, rest_program = run.decoded, None
     assert decoded is not None

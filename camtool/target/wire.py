@@ -43,6 +43,11 @@ Place = tuple[float, float, float]
 
 ToolAt = Literal["", "journal", "zero", "known"]
 
+Override = Literal["feed", "rapid", "spindle"]
+
+HandAction = Literal["home", "zero", "jog", "hold", "unlock", "line"]
+"""Orders by hand. `jog` moves by so much, `hold` as long as a key is held, `line` is typed."""
+
 
 class Forecast(Struct, frozen=True, eq=False):
     """Simulated course of the B blocks of a program: `decoded`, the moves; `seconds` (B,) of each
@@ -91,6 +96,7 @@ class WireState(Enum):
     """State of a conversation."""
 
     OPENING = "opening"
+    READY = "ready"  # it stands, and takes orders by hand
     SENDING = "sending"
     WAITING = "waiting"  # for the user: `why` says what for
     PAUSING = "pausing"
@@ -304,6 +310,11 @@ class Conversation(ABC):
             self._out.clear()
             self._end(WireState.FAILED, "; ".join(filter(None, (reason, self._unattended))))
 
+    def override(self, name: Override, percent: int, now: float) -> None:
+        """Change the feed, the rapids or the spindle to a share of what is programmed, as far as
+        the controller can."""
+        self._tell(f"it has no override of its {name} over its line")
+
     @property
     def _unattended(self) -> str:
         """Return what the machine does if the connection is lost now; "" if it stands still."""
@@ -450,6 +461,215 @@ class PacketByPacket(Conversation):
             self._end(WireState.FAILED, reason)
 
 
+class Hand(Conversation):
+    """A machine moved by hand: a conversation that stays open between orders.
+
+    It is READY between orders, SENDING while one is carried out, and READY again when the machine
+    stands; an order that the controller refuses is told, and changes nothing. `stop` stops the
+    machine and ends the conversation, as everywhere; `close` ends it while the machine stands.
+    `says`: the state that the controller reports, in its own word; "" where it reports none.
+    """
+
+    says = ""
+
+    @abstractmethod
+    def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
+        """Carry out "home", "zero", "jog" or "unlock"; `values` as of `Wire.command`. MachineError
+        where the controller cannot, or is not READY."""
+
+    @abstractmethod
+    def hold(self, values: Mapping[str, float], now: float) -> None:
+        """Move in a direction until `release`: `values` are the senses of the axes (−1, 1) and the
+        "feed" (mm/min). MachineError as of `order`."""
+
+    @abstractmethod
+    def release(self, now: float) -> None:
+        """End `hold`: what ends the motion is the next thing to be written."""
+
+    @abstractmethod
+    def say(self, line: str, now: float) -> None:
+        """Send a typed line; its answers are told. MachineError as of `order`."""
+
+    def close(self, now: float) -> None:
+        """End the conversation with a machine that stands; otherwise stop it."""
+        if self.state is WireState.READY:
+            self._end(WireState.FINISHED)
+        else:
+            self.stop(now)
+
+    def check_ready(self, action: str) -> None:
+        """Raise MachineError where the machine does not wait for an order."""
+        if self.state is not WireState.READY:
+            raise MachineError(
+                f"the machine is busy ({self.state.value}): it takes no order to {action}",
+                mend="wait until it stands, or stop it",
+            )
+
+
+class CommandHand(Hand):
+    """A machine moved by the commands of its wire: each order is a conversation of its own."""
+
+    def __init__(self, wire: Wire, machine: Machine[Any, Any], manner: Manner) -> None:
+        super().__init__((), manner)
+        self._wire, self._machine = wire, machine
+        self._order: Conversation | None = None
+
+    def begin(self, now: float) -> None:
+        """Be ready: nothing is known of the machine before the first order."""
+        self.state = WireState.READY
+
+    def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
+        """Hold the conversation of the command."""
+        self._begin(action, self._wire.command(action, self._machine, values, self.manner), now)
+
+    def hold(self, values: Mapping[str, float], now: float) -> None:
+        """Hold the conversation of the command that moves until it is stopped."""
+        self.order("hold", values, now)
+
+    def release(self, now: float) -> None:
+        """Stop what `hold` began."""
+        if self._order is not None:
+            self._order.stop(now)
+            self._follow()
+
+    def say(self, line: str, now: float) -> None:
+        """Type the line to the terminal of the controller."""
+        self._begin("line", TypedLine(self._wire.terminal(self._machine), line, self.manner), now)
+
+    def _begin(self, action: str, conversation: Conversation, now: float) -> None:
+        self.check_ready(action)
+        self._order, self.state, self.why = conversation, WireState.SENDING, ""
+        conversation.begin(now)
+        self._follow()
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Hand bytes to the order that is carried out; show others."""
+        if self._order is not None:
+            self._order.receive(data, now)
+            self._follow()
+        elif data.strip():
+            self._tell(f"it says: {data.strip()[:60].decode('latin-1')}")
+
+    def tick(self, now: float) -> None:
+        """Pass the time to the order that is carried out."""
+        if self._order is not None and now >= self._order.next_s:
+            self._order.tick(now)
+            self._follow()
+
+    def pause(self, now: float) -> None:
+        """Do nothing: an order by hand has no pause."""
+
+    def resume(self, now: float) -> None:
+        """Give the order that waits for it what it waits for."""
+        if self._order is not None:
+            self._order.resume(now)
+            self._follow()
+
+    def stop(self, now: float) -> None:
+        """Stop the order that is carried out, and end."""
+        if self.is_over or self.state is WireState.STOPPING:
+            return
+        if self._order is None:
+            self._end(WireState.STOPPED, "stopped: nothing had been ordered, and nothing moved")
+            return
+        self._out.clear()
+        self.state = WireState.STOPPING
+        self._order.stop(now)
+        self._follow()
+
+    def hurry(self, now: float) -> None:
+        """Stop harder."""
+        if self._order is not None:
+            self._order.hurry(now)
+            self._follow()
+
+    @property
+    def _unattended(self) -> str:
+        return "" if self._order is None else self._order._unattended
+
+    def _follow(self) -> None:
+        """Take over the actions, the place and the state of the order that is carried out."""
+        order = self._order
+        if order is None:
+            return
+        self._out += order.actions()
+        self.next_s, self.why = order.next_s, order.why
+        self.place_mm = order.place_mm or self.place_mm
+        if not order.is_over:
+            if self.state is not WireState.STOPPING:
+                halted = order.state in HALTS
+                self.state = order.state if halted else WireState.SENDING
+            return
+        self._order, self.next_s = None, NEVER
+        if self.state is WireState.STOPPING:
+            self._end(order.state, order.why)
+            return
+        self.state, self.why = WireState.READY, ""
+        if order.state is not WireState.FINISHED:
+            self._tell(order.why)
+
+
+QUIET_S = 0.3
+"""An answer to a typed line is over when nothing has come for so long, s."""
+
+SILENT_S = 1.5
+"""A typed line to which nothing is answered for so long has no answer, s."""
+
+
+class TypedLine(Conversation):
+    """A line typed to a controller, and its answers."""
+
+    def __init__(self, terminal: Terminal, line: str, manner: Manner) -> None:
+        super().__init__((), manner)
+        self._terminal, self._line = terminal, line
+        self._answered = False
+
+    def begin(self, now: float) -> None:
+        """Send the line."""
+        self.state = WireState.SENDING
+        data = self._terminal.hello + self._terminal.encode(self._line)
+        if data:
+            self._write(data)
+        self.next_s = now + SILENT_S
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Show answers."""
+        for line in self._terminal.decode(data):
+            self._tell(line)
+        self._answered = True
+        self.next_s = now + QUIET_S
+
+    def tick(self, now: float) -> None:
+        """End when nothing has come for a while, and nothing is due."""
+        for line in self._terminal.flush():
+            self._tell(line)
+        if self._terminal.failed:
+            self._end(WireState.FAILED, self._terminal.failed)
+        elif self._terminal.due and not self.is_over:
+            self.next_s = now + SILENT_S
+        elif self.state is WireState.STOPPING:
+            self._end(WireState.STOPPED, "stopped: it was told to stop, and says nothing more")
+        elif self._terminal.runs_on:
+            self.next_s = now + SILENT_S
+        else:
+            self._end(WireState.FINISHED)
+
+    def pause(self, now: float) -> None:
+        """Do nothing: a line has no pause."""
+
+    def resume(self, now: float) -> None:
+        """Do nothing."""
+
+    def stop(self, now: float) -> None:
+        """Send what stops the machine."""
+        stop = self._terminal.halt()
+        self.state, self.next_s = WireState.STOPPING, now + SILENT_S
+        if stop:
+            self._write(stop)
+        else:
+            self._end(WireState.STOPPED, "nothing stops it over its line: its switch does")
+
+
 class Wire(ABC):
     """The protocol of one controller. `baud` and `frame` (data bits, parity, stop bits) are those
     of a serial port; `baud` None: not known. `ready` says what the user must see to beforehand."""
@@ -467,6 +687,10 @@ class Wire(ABC):
     """True if the controller locks itself and has a command to end that (`Manner.unlock`)."""
     stopping: ClassVar[str] = ""
     """Effect of a stop, such as "the machine stops at once"."""
+    by_hand: ClassVar[frozenset[HandAction]] = frozenset()
+    """Orders by hand that `command`, or the controller's own `hand`, takes."""
+    overrides: ClassVar[tuple[Override, ...]] = ()
+    """Overrides that its conversations carry out."""
 
     @abstractmethod
     def packets(
@@ -496,6 +720,10 @@ class Wire(ABC):
             f"{machine.target.name} has no command to {action} over its line",
             mend="do it at the machine",
         )
+
+    def hand(self, machine: Machine[Any, Any], manner: Manner) -> Hand:
+        """Return the conversation that moves the machine by hand."""
+        return CommandHand(self, machine, manner)
 
     def terminal(self, machine: Machine[Any, Any]) -> Terminal:
         """Return the terminal that translates typed lines into bytes and explains answers."""

@@ -27,7 +27,10 @@ from camtool.target.wire import (
     HALTS,
     Conversation,
     Forecast,
+    Hand,
+    HandAction,
     Manner,
+    Override,
     Packet,
     Place,
     Wire,
@@ -99,6 +102,7 @@ _STATUS = re.compile(
     r"<(Idle|Run|Hold:[01]|Jog|Alarm|Door:[0-3]|Check|Home|Sleep)((?:\|[A-Za-z]+:[^|<>]*)*)>"
 )
 _PLACE = re.compile(r"-?\d+\.\d+(?:,-?\d+\.\d+){2,}")
+_OVERRIDES = re.compile(r"\d{1,3},\d{1,3},\d{1,3}")
 _FEED = re.compile(r"\d{1,9}(?:\.\d*)?")
 _SETTING = re.compile(r"\$\d{1,3}=[^\s=]+")
 _PUSHED = re.compile(r"\[[A-Za-z0-9]{1,6}:.*\]")
@@ -183,6 +187,8 @@ class GrblWire(Wire):
     baud = BAUD
     place = "told"
     unlocks = True
+    by_hand = frozenset({"home", "zero", "jog", "hold", "unlock", "line"})
+    overrides = ("feed", "rapid", "spindle")
     ready = (
         "opening the port may reset the controller: where it is then, is zero to it until it is "
         "homed or zeroed",
@@ -223,13 +229,11 @@ class GrblWire(Wire):
         """`$H`; `$X`; the place as zero of G54; `$J=`."""
         if action == "unlock":
             return GrblConversation((), machine, replace(manner, unlock=True))
-        if action == "home":
-            return GrblConversation((), machine, manner, (b"$H",))
-        axes = "".join(f"{axis.upper()}{values[axis]:.3f}" for axis in "xyz" if axis in values)
-        if action == "zero":
-            return GrblConversation((), machine, manner, (f"G21G10L20P1{axes}".encode(),))
-        line = f"$J=G91G21{axes}F{values['feed']:.1f}"
-        return GrblConversation((), machine, manner, (line.encode(),))
+        return GrblConversation((), machine, manner, (hand_line(action, values).rstrip(b"\n"),))
+
+    def hand(self, machine: GrblMachine, manner: Manner) -> GrblHand:
+        """One conversation for all orders: each `command` would reset the controller first."""
+        return GrblHand(machine, manner)
 
 
 def _packets(data: bytes, forecast: Forecast) -> Iterator[Packet]:
@@ -323,6 +327,8 @@ class GrblConversation(Conversation):
         self._feed = 0.0
         self._moves = 0  # reports in a row that it moves, while it should stop
         self._jogs = any(each.startswith(b"$J=") for each in commands)
+        self.overrides: dict[Override, int] = {}
+        """Overrides in %, as it has reported them."""
 
     @property
     def at_mm(self) -> Place | None:
@@ -386,6 +392,12 @@ class GrblConversation(Conversation):
         self.stop(now)
         if not self.is_over and not self._reset_sent:
             self._reset(now)
+
+    def override(self, name: Override, percent: int, now: float) -> None:
+        """Real-time bytes, from the override that it reported last; they wait for nothing."""
+        before = self.overrides.get(name, 100)
+        self._write(override_bytes(name, percent, before))
+        self.overrides[name] = percent
 
     def _fail(self, reason: str, now: float) -> None:
         """Stop, and say why."""
@@ -633,6 +645,9 @@ class GrblConversation(Conversation):
         feed, before = values.get("FS", values.get("F", "")).partition(",")[0], self._feed
         self._feed = float(feed) if _FEED.fullmatch(feed) else 0.0
         self._slows = self._feed < before
+        if _OVERRIDES.fullmatch(values.get("Ov", "")):
+            names: tuple[Override, ...] = ("feed", "rapid", "spindle")
+            self.overrides = dict(zip(names, map(int, values["Ov"].split(",")), strict=True))
         closed = values.get("Pn", "")
         if closed and closed != self._closed and self._phase != "greeting":
             self._tell(f"it reports closed switches: {_switches(closed)}")
@@ -911,6 +926,191 @@ class GrblConversation(Conversation):
 
 
 SINGLE: Final = "single block"
+
+
+MIN_HELD_S: Final = 0.03
+"""Shortest time of a piece of a jog that lasts as long as a key is held: a line and its answer
+take up to 20 ms on a USB line."""
+
+HELD_PIECES: Final = 3
+"""Pieces that wait behind the distance in which the machine can stop."""
+
+OVERRIDE_BYTES: Final[dict[Override, tuple[int, Mapping[int, int]]]] = {
+    "feed": (0x90, {10: 0x91, -10: 0x92, 1: 0x93, -1: 0x94}),
+    "rapid": (0x95, {}),
+    "spindle": (0x99, {10: 0x9A, -10: 0x9B, 1: 0x9C, -1: 0x9D}),
+}
+"""The byte that sets an override to 100 %, and those that change it by so much (config.h)."""
+RAPIDS: Final = {100: 0x95, 50: 0x96, 25: 0x97}
+OVERRIDE_RANGE: Final = (10, 200)
+
+
+def override_bytes(name: Override, percent: int, before: int) -> bytes:
+    """Return the bytes that bring an override from one share of 100 % to another; rapids know 25,
+    50 and 100 %, and take the nearest of them."""
+    reset, changes = OVERRIDE_BYTES[name]
+    if name == "rapid":
+        return bytes([RAPIDS[min(RAPIDS, key=lambda known: abs(known - percent))]])
+    low, high = OVERRIDE_RANGE
+    percent = min(max(percent, low), high)
+    if percent == 100:
+        return bytes([reset])
+    tens, ones = divmod(abs(percent - before), 10)
+    sense = 1 if percent > before else -1
+    return bytes([changes[10 * sense]] * tens + [changes[sense]] * ones)
+
+
+class GrblHand(GrblConversation, Hand):
+    """A grbl moved by hand, asked for its state four times a second.
+
+    A jog that lasts as long as a key is held is a chain of short jogs, no longer than the distance
+    in which the machine can stop, as grbl's page on jogging advises: whatever becomes of the
+    sender, the machine stands soon. 0x85 ends it at once (jogging.md).
+    """
+
+    def __init__(self, machine: GrblMachine, manner: Manner) -> None:
+        super().__init__((), machine, manner)
+        self._held: Mapping[str, float] = {}
+        self._released = False
+        self._queued_s = 0.0  # the time up to which the pieces of a held jog last
+        self._typed = False  # whether answers are those to a typed line
+        self._refusal = ""
+
+    def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
+        """`$H`, `$X`, the place as zero of G54, `$J=`."""
+        self._begin(action, hand_line(action, values), now)
+
+    def say(self, line: str, now: float) -> None:
+        """A real-time byte goes out at once, a line when it is ready."""
+        word = line.strip()
+        if word in ("?", "!", "~"):
+            self._write(word.encode())
+            return
+        data = Terminal.unescape(word) + b"\n"
+        if len(data) > BUFFER_BYTES:
+            raise MachineError(f"the line has {len(data)} characters, more than its buffer holds")
+        self._begin("line", data, now)
+        self._typed = True
+
+    def _begin(self, action: str, line: bytes, now: float) -> None:
+        self.check_ready(action)
+        if self.says == "Alarm" and (line[:1] != b"$" or line[:3] == b"$J="):
+            raise MachineError(
+                f"it is locked{self._reasons}", mend="home it, or unlock it if its place is known"
+            )
+        self.state, self.why, self._idle = WireState.SENDING, "", 0
+        self._jogs, self._typed, self._acted = line.startswith(b"$J="), False, True
+        self._put(_Line(line))
+        self._poll(now)
+
+    def hold(self, values: Mapping[str, float], now: float) -> None:
+        """Begin the chain of jogs."""
+        self.check_ready("jog")
+        if self.says == "Alarm":
+            raise MachineError("it is locked", mend="home it, or unlock it if its place is known")
+        self._held, self._released = dict(values), False
+        self.state, self.why, self._idle = WireState.SENDING, "", 0
+        self._jogs, self._acted, self._queued_s = True, True, now
+        self._lengthen(now)
+
+    def release(self, now: float) -> None:
+        """Cancel the jog; a piece that grbl has not read yet is cancelled when it has."""
+        if self._held:
+            self._held, self._released = {}, True
+            self._write(JOG_CANCEL)
+            self._poll(now)
+
+    def _lengthen(self, now: float) -> None:
+        """Add a piece to a held jog, where it would end before the machine can stop."""
+        if not self._held:
+            return
+        self._schedule_poll(now)
+        speed = self._held["feed"] / 60.0
+        senses = {axis: self._held[axis] for axis in "xyz" if self._held.get(axis)}
+        norm = sum(sense * sense for sense in senses.values()) ** 0.5
+        rates = [axis.acceleration_mm_s2 for axis in self._machine.axes]
+        known = [rate for rate in rates if rate is not None]
+        stops_s = speed / (2.0 * min(known)) if known else 0.5
+        # A line that finds the planner full waits with its end already computed, and grbl goes
+        # there although the jog was cancelled meanwhile (motion_control.c, mc_line): it must
+        # never be full. Speeding up holds back as much as braking takes.
+        room = self._depth - SEGMENTS - 2 * HELD_PIECES
+        piece_s = max(MIN_HELD_S, 2.0 * stops_s / room)
+        self.next_s = min(max(self.next_s, now), now + piece_s)
+        if self._out_lines or self._queued_s - now > stops_s + HELD_PIECES * piece_s:
+            return
+        axes = {axis: sense / norm * speed * piece_s for axis, sense in senses.items()}
+        self._put(_Line(hand_line("jog", {**axes, "feed": self._held["feed"]})))
+        self._queued_s = max(self._queued_s, now) + piece_s
+
+    def tick(self, now: float) -> None:
+        """Lengthen a held jog; ask for reports."""
+        if self._held:
+            self._lengthen(now)
+            if now < self._polled + POLL_FACTOR * self.manner.late_s:
+                return
+        super().tick(now)
+        self._lengthen(now)
+
+    def _line(self, line: str, now: float) -> None:
+        known = _STATUS.fullmatch(line) or line == "ok" or line.startswith(("Grbl ", "ALARM:"))
+        if self._typed and self._phase != "greeting" and not known:
+            self._answered = now
+            meaning = GrblTerminal().meaning(line)
+            self._tell(f"{line}    {meaning}" if meaning else line)
+            if not line.startswith("error:"):
+                return
+        super()._line(line, now)
+
+    def _answer(self, line: str, now: float) -> None:
+        """A refusal of an order is told, and changes nothing."""
+        if not self._out_lines or self._phase == "greeting" or self.state is not WireState.SENDING:
+            super()._answer(line, now)
+            return
+        self._out_lines.popleft()
+        self._idle = 0
+        if line != "ok":
+            self._held = {}
+            if not self._typed:
+                meaning = ERRORS.get(int(line[6:]), "it says no more")
+                self._tell(f"it refuses ({line}): {meaning}")
+        if self._released:
+            self._write(JOG_CANCEL)
+        self._lengthen(now)
+
+    def _status(self, state: str, fields: str, now: float) -> None:
+        self.says = state
+        if state != "Alarm" or self.state is WireState.STOPPING:
+            if self._released and state == "Jog":
+                self._write(JOG_CANCEL)
+            if self.state is WireState.READY and self._idle > 2:
+                self.why = ""
+            super()._status(state, fields, now)
+            return
+        self._where(fields, now)
+        if self._phase == "greeting":
+            self._phase = "commands"
+        if not self._out_lines:
+            self.state, self.why = WireState.READY, f"it is locked{self._reasons}"
+
+    def _end(self, state: WireState, why: str = "") -> None:
+        """Behind an order it is ready for the next one."""
+        if state is WireState.FINISHED and self.state is WireState.SENDING:
+            self.state, self.why, self._released = WireState.READY, "", False
+            self._typed = False
+            return
+        super()._end(state, why)
+
+
+def hand_line(action: str, values: Mapping[str, float]) -> bytes:
+    """Return the line that homes ("home"), unlocks ("unlock"), makes the place zero of G54
+    ("zero") or jogs by so much ("jog"); `values` as of `Wire.command`."""
+    if action in ("home", "unlock"):
+        return HOMING if action == "home" else UNLOCKING
+    axes = "".join(f"{axis.upper()}{values[axis]:.3f}" for axis in "xyz" if axis in values)
+    if action == "zero":
+        return f"G21G10L20P1{axes}\n".encode()
+    return f"$J=G91G21{axes}F{values['feed']:.1f}\n".encode()
 
 
 SETTINGS: Final = {

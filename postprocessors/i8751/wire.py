@@ -61,6 +61,7 @@ class I8751Wire(Wire):
         "the controller has just been reset: it waits for its key",
         "a wrong bit on the way to the machine is not seen: replies do not repeat what came",
     )
+    by_hand = frozenset({"jog", "line"})
     stopping = (
         "a packet that is being executed is executed to its end; one that is not complete yet is "
         "never begun, and the controller must then be reset"

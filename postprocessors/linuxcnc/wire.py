@@ -85,6 +85,7 @@ class LinuxcncWire(Wire):
         "machine",
     )
     stopping = "the program is aborted: the slides slow down and stand"
+    by_hand = frozenset({"home", "zero", "jog", "line"})
 
     def packets(
         self, data: bytes, machine: LinuxcncMachine, forecast: Forecast

@@ -41,6 +41,9 @@ that there can be."""
 BY_HAND_HZ: Final = 166.0
 """Steps a second of PX and H by the line (L3196)."""
 
+ENDLESS_S: Final = 600.0
+"""Longest time for which a joystick command runs: about 100,000 steps, more than the travel."""
+
 RETREAT_STEPS: Final = 400
 """Steps of each axis back from its switch (L1700-1705)."""
 
@@ -65,6 +68,7 @@ class PicMmhWire(Wire):
         "no key may be pressed at the machine's own interface: any character stops it",
     )
     stopping = "A; stops it at once; its motors keep their place"
+    by_hand = frozenset({"home", "zero", "jog", "hold", "line"})
 
     def packets(self, data: bytes, machine: PicMmhMachine, forecast: Forecast) -> Sequence[Packet]:
         """The compensations, then the blocks."""
@@ -106,7 +110,7 @@ class PicMmhWire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> PicMmhConversation:
-        """`H;`; `Q;`, which is for all axes; `PX+1000;`."""
+        """`H;`; `Q;`, which is for all axes; `PX+1000;`; `JX+;`, until it is stopped."""
         if action == "home":
             packets = [Packet(b"H;", counts=(UNTIL_SILENT, 3 * RETREAT_STEPS))]
         elif action == "zero" and set("xyz") <= values.keys() and not any(values.values()):
@@ -119,6 +123,17 @@ class PicMmhWire(Wire):
                 if letter in values
                 for text, count in _steps(letter, values[letter], axis.coded_step_mm)
             ]
+        elif action == "hold":
+            senses = {letter: values[letter] for letter in "xyz" if values.get(letter)}
+            if len(senses) != 1:
+                raise MachineError(
+                    "the joystick of this controller moves one axis at a time",
+                    mend="hold one key at a time",
+                )
+            [(letter, sense)] = senses.items()
+            text = f"J{letter.upper()}{'-' if sense < 0.0 else '+'};"
+            steps = round(ENDLESS_S * _by_hand_hz(machine))
+            packets = [Packet(text.encode(), seconds=ENDLESS_S, counts=(UNTIL_SILENT, steps))]
         else:
             return super().command(action, machine, values, manner)  # type: ignore[return-value]
         return PicMmhConversation(packets, machine, manner)

@@ -39,6 +39,7 @@ class ValcncWire(Wire):
         "controller answers nothing (link.answer)",
         "keep a hand at the switch: a stop takes effect behind the block that is being cut",
     )
+    by_hand = frozenset({"line"})
     stopping = "nothing more is sent; the block that is being cut is cut to its end"
 
     def packets(self, data: bytes, machine: ValcncMachine, forecast: Forecast) -> Sequence[Packet]:

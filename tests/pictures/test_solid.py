@@ -398,9 +398,7 @@ def test_findings_lie_on_the_stock_in_the_view_aslant() -> None:
     svg = draw(replace(scene(), faults=places), PictureOptions(view="iso"))
     group = re.search(r'<g id="faults"[^>]*>(.*?)</g>', svg, re.DOTALL)
     assert group is not None
-    rings = [
-        (float(x), float(y)) for x, y in re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', group[1])
-    ]
+    rings = [(float(x), float(y)) for x, y in re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', group[1])]
     assert len(rings) == 3  # one lies beside the stock
     # The uncut corner is at a known depth; the first ring's distance to the right gives the scale.
     corner = rings[2]

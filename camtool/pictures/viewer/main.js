@@ -271,7 +271,32 @@ function begin() {
   new Pointer(stage, hovered, clicked);
   listen({ stage, player, panel });
   if (find("sent")) follow(JSON.parse(find("sent").textContent), stage, player);
+  if (window.parent !== window) listenToFrame(columns, stage, player);
   document.body.dataset.ready = "yes";
+}
+
+/** Within the panel: its page says how far the program has come, by block, and where the tool is. */
+function listenToFrame(columns, stage, player) {
+  let shown = null;
+  window.addEventListener("message", (event) => {
+    const said = event.origin === location.origin && event.data ? event.data.camtool : null;
+    if (!said || !player || JSON.stringify(said) === shown) return;
+    shown = JSON.stringify(said);
+    stage.run.place = said.place;
+    if (said.block !== null) {
+      const rows = columns.move_block;
+      let low = 0, high = rows.length;
+      while (low < high) {
+        const middle = (low + high) >> 1;
+        if (rows[middle] <= said.block) low = middle + 1;
+        else high = middle;
+      }
+      if (low) stage.run.toRow(low - 1);
+      else stage.run.toNothing();
+      player.show();
+    }
+    stage.changed();
+  });
 }
 
 const UNTOUCHED_MS = 1500;

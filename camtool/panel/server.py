@@ -1,0 +1,417 @@
+"""The panel's server: one page, one WebSocket, on this computer alone.
+
+The address of the page holds a key that is made anew at each start; without it nothing is
+answered. Requests whose host is not this server's own address are refused, and so is a WebSocket
+of a page from elsewhere: neither a page of another origin nor a scan of ports reaches the machine.
+One page commands, the others watch; what a page sends is decoded strictly.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import secrets
+from collections.abc import Awaitable, Callable
+from importlib import resources
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import msgspec
+from aiohttp import WSMsgType, web
+from msgspec import Struct
+
+from camtool.errors import CamtoolError
+from camtool.machine.model import Machine
+from camtool.panel.program import LoadedProgram
+from camtool.panel.session import Session
+from camtool.sending.drive import Request
+from camtool.target.wire import HandAction, Override, WireState
+
+if TYPE_CHECKING:
+    from camtool.target.registry import LoadedTarget
+
+HOST: Final = "127.0.0.1"
+
+PUSH_S: Final = 0.05
+"""Shortest interval between two states that are sent to a page, s."""
+
+ASKS_S: Final = 5.0
+"""Interval of pings; a page that does not answer is gone, s."""
+
+MAX_MESSAGE_BYTES: Final = 4096
+
+PAGE_FILES: Final = ("panel.html", "panel.css", "panel.js")
+
+_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; frame-src "
+    "'self'; img-src 'self' data:; frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
+)
+_TYPES: Final = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
+
+
+class Jog(Struct, frozen=True, tag="jog", tag_field="do", forbid_unknown_fields=True):
+    """Move by so much, mm, at a feed in mm/min; with `held`, in a direction until released."""
+
+    feed: float
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    held: bool = False
+
+
+class Keep(Struct, frozen=True, tag="keep", tag_field="do", forbid_unknown_fields=True):
+    """The key of a held jog is still down."""
+
+
+class Release(Struct, frozen=True, tag="release", tag_field="do", forbid_unknown_fields=True):
+    """The key of a held jog has been let go."""
+
+
+class Zero(Struct, frozen=True, tag="zero", tag_field="do", forbid_unknown_fields=True):
+    """The place of the tool becomes part zero of these axes."""
+
+    axes: str
+
+
+class Order(Struct, frozen=True, tag="order", tag_field="do", forbid_unknown_fields=True):
+    """Home or unlock."""
+
+    action: Literal["home", "unlock"]
+
+
+class Line(Struct, frozen=True, tag="line", tag_field="do", forbid_unknown_fields=True):
+    """A typed line."""
+
+    text: str
+
+
+class Change(Struct, frozen=True, tag="override", tag_field="do", forbid_unknown_fields=True):
+    """An override, %."""
+
+    name: Override
+    percent: int
+
+
+class Start(Struct, frozen=True, tag="start", tag_field="do", forbid_unknown_fields=True):
+    """Send the program: `single`: block by block; `first`: from this block on (from 1); `resumes`:
+    where the journal says that it was left; `despite_errors`: although it has findings that spoil
+    the part."""
+
+    single: bool = False
+    first: int = 1
+    resumes: bool = False
+    despite_errors: bool = False
+
+
+class Hold(Struct, frozen=True, tag="pause", tag_field="do", forbid_unknown_fields=True):
+    """Pause the program."""
+
+
+class GoOn(Struct, frozen=True, tag="resume", tag_field="do", forbid_unknown_fields=True):
+    """Go on; `single`: with one block."""
+
+    single: bool = False
+
+
+class Stop(Struct, frozen=True, tag="stop", tag_field="do", forbid_unknown_fields=True):
+    """Stop the machine. Every page may do this."""
+
+
+class Connect(Struct, frozen=True, tag="connect", tag_field="do", forbid_unknown_fields=True):
+    """Open the port again."""
+
+
+class Take(Struct, frozen=True, tag="take", tag_field="do", forbid_unknown_fields=True):
+    """Command from this page from now on."""
+
+
+Wanted = (
+    Jog
+    | Keep
+    | Release
+    | Zero
+    | Order
+    | Line
+    | Change
+    | Start
+    | Hold
+    | GoOn
+    | Stop
+    | Connect
+    | Take
+)
+_DECODER: Final = msgspec.json.Decoder(Wanted)
+
+
+class Client:
+    """A page that is open; `shown` is the number of the last message that it has."""
+
+    def __init__(self, socket: web.WebSocketResponse) -> None:
+        self.socket, self.shown = socket, 0
+        self.changed = asyncio.Event()
+
+
+class PanelServer:
+    """The pages of one session; `program` is what `Start` sends, None without one."""
+
+    def __init__(self, session: Session, program: LoadedProgram | None = None) -> None:
+        self.session, self.program = session, program
+        self.key = secrets.token_urlsafe(24)
+        self.port = 0
+        self._clients: list[Client] = []
+        self._commander: Client | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._starting: asyncio.Task[None] | None = None
+        self._end: Callable[[], object] = lambda: None
+
+    @property
+    def address(self) -> str:
+        """The address to open in a browser."""
+        return f"http://{HOST}:{self.port}/?key={self.key}"
+
+    # The server.
+
+    async def serve(self, port: int, ready: Callable[[], None]) -> None:
+        """Serve until `end` is called; `ready` is called when pages can be opened."""
+        self._loop = asyncio.get_running_loop()
+        ended = asyncio.Event()
+        loop = self._loop
+        self._end = lambda: loop.call_soon_threadsafe(ended.set)
+        app = web.Application(middlewares=[self._guard])
+        app.router.add_get("/", self._page)
+        app.router.add_get("/view", self._view)
+        app.router.add_get("/socket", self._socket)
+        app.router.add_get("/{name}", self._page)
+        runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=1.0)
+        await runner.setup()
+        site = web.TCPSite(runner, HOST, port)
+        await site.start()
+        self.port = runner.addresses[0][1]
+        ready()
+        try:
+            await ended.wait()
+        finally:
+            for client in list(self._clients):
+                await client.socket.close()
+            await runner.cleanup()
+
+    def end(self) -> None:
+        """End `serve`, from any thread."""
+        self._end()
+
+    def changed(self) -> None:
+        """Note, from any thread, that the session's state or messages have changed."""
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(self._wake)
+
+    def _wake(self) -> None:
+        for client in self._clients:
+            client.changed.set()
+
+    @web.middleware
+    async def _guard(
+        self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+    ) -> web.StreamResponse:
+        """Refuse what does not come from the page of this server, opened with its key."""
+        own = {f"{name}:{self.port}" for name in (HOST, "localhost")}
+        origin = request.headers.get("Origin")
+        allowed = request.host in own and origin in (None, *(f"http://{each}" for each in own))
+        key = request.query.get("key", "")
+        if not allowed or not hmac.compare_digest(key.encode(), self.key.encode()):
+            raise web.HTTPForbidden(text="open the address that camtool panel has printed\n")
+        response = await handler(request)
+        if not isinstance(response, web.WebSocketResponse):
+            response.headers["Cache-Control"] = "no-store"
+            response.headers["Referrer-Policy"] = "no-referrer"
+            response.headers["X-Content-Type-Options"] = "nosniff"
+        return response
+
+    async def _page(self, request: web.Request) -> web.Response:
+        name = request.match_info.get("name", PAGE_FILES[0])
+        if name not in PAGE_FILES:
+            raise web.HTTPNotFound
+        text = resources.files("camtool.panel.page").joinpath(name).read_text("utf-8")
+        response = web.Response(
+            text=text.replace("{key}", self.key), content_type=_TYPES[name.rpartition(".")[2]]
+        )
+        response.headers["Content-Security-Policy"] = _POLICY
+        return response
+
+    async def _view(self, request: web.Request) -> web.Response:
+        """The program in the viewer, which the page shows in a frame."""
+        if self.program is None:
+            raise web.HTTPNotFound
+        page = await asyncio.to_thread(self.program.page)
+        return web.Response(body=page, content_type="text/html", charset="utf-8")
+
+    async def _socket(self, request: web.Request) -> web.WebSocketResponse:
+        socket = web.WebSocketResponse(heartbeat=ASKS_S, max_msg_size=MAX_MESSAGE_BYTES)
+        if "Origin" not in request.headers:
+            raise web.HTTPForbidden(text="a page is to open this\n")
+        await socket.prepare(request)
+        client = Client(socket)
+        self._clients.append(client)
+        if self._commander is None:
+            self._commander = client
+        client.changed.set()
+        pushing = asyncio.create_task(self._push(client))
+        try:
+            async for message in socket:
+                if message.type is WSMsgType.TEXT:
+                    self._take(client, message.data)
+        finally:
+            pushing.cancel()
+            self._clients.remove(client)
+            if self._commander is client:
+                self._commander = None
+                self.session.release()
+            self._wake()
+        return socket
+
+    # What a page is told.
+
+    async def _push(self, client: Client) -> None:
+        """Send the state to a page whenever it has changed."""
+        await client.socket.send_str(self._first())
+        while not client.socket.closed:
+            await client.changed.wait()
+            client.changed.clear()
+            await client.socket.send_str(self._state(client))
+            await asyncio.sleep(PUSH_S)
+
+    def _first(self) -> str:
+        """What does not change: the machine and the program."""
+        session = self.session
+        return _json(
+            {
+                "machine": _machine(session.target),
+                "port": session.port.name,
+                "can": sorted(session.wire.by_hand),
+                "overrides": list(session.wire.overrides),
+                "ready": list(session.wire.ready),
+                "stopping": session.wire.stopping,
+                "program": None if self.program is None else self.program.facts(),
+            }
+        )
+
+    def _state(self, client: Client) -> str:
+        """What has changed."""
+        messages = [each for each in self.session.messages if each.number > client.shown]
+        if messages:
+            client.shown = messages[-1].number
+        return _json(
+            {
+                "state": self.session.state,
+                "role": "command" if client is self._commander else "watch",
+                "taken": self._commander is not None,
+                "pages": len(self._clients),
+                "messages": messages,
+            }
+        )
+
+    # What a page wants.
+
+    def _take(self, client: Client, text: str) -> None:
+        """Do what a page wants, if it may."""
+        session = self.session
+        try:
+            wanted = _DECODER.decode(text)
+            if isinstance(wanted, Stop):
+                session.stop()
+            elif isinstance(wanted, Take):
+                if self._commander is not client:
+                    session.release()
+                self._commander = client
+                self._wake()
+            elif client is not self._commander:
+                session.tell("this page only watches: take the command first", bad=True)
+            else:
+                self._do(wanted)
+        except msgspec.DecodeError as error:
+            session.tell(f"a request that is none ({error})", bad=True)
+        except CamtoolError as error:
+            session.tell(str(error), bad=True)
+
+    def _do(self, wanted: Any) -> None:
+        session = self.session
+        match wanted:
+            case Keep():
+                session.keep()
+            case Release():
+                session.release()
+            case Jog():
+                self._jog(wanted)
+            case Zero():
+                session.order("zero", {axis: 0.0 for axis in "xyz" if axis in wanted.axes})
+            case Order():
+                action: HandAction = wanted.action
+                session.order(action, {})
+            case Line():
+                session.say(wanted.text)
+            case Change():
+                session.override(wanted.name, wanted.percent)
+            case Hold():
+                session.request(Request.PAUSE)
+            case GoOn():
+                session.request(Request.STEP if wanted.single else Request.RESUME)
+            case Connect():
+                session.reopen()
+            case Start():
+                # It may have to be judged again, and the page goes on meanwhile.
+                self._starting = asyncio.create_task(asyncio.to_thread(self._start, wanted))
+
+    def _jog(self, wanted: Jog) -> None:
+        """Jog, at no more than the axes can do."""
+        machine = self.session.target.machine
+        values = {axis: getattr(wanted, axis) for axis in "xyz" if getattr(wanted, axis)}
+        rates = [getattr(machine.axes, axis).max_rate_mm_min for axis in values]
+        feed = min([wanted.feed, *(rate for rate in rates if rate is not None)])
+        if not feed > 0.0:
+            self.session.tell("a jog needs a feed above 0", bad=True)
+        elif wanted.held:
+            self.session.hold({**values, "feed": feed})
+        else:
+            self.session.order("jog", {**values, "feed": feed})
+
+    def _start(self, wanted: Start) -> None:
+        """Send the program."""
+        if self.program is None:
+            self.session.tell("no program was given: camtool panel PROGRAM", bad=True)
+            return
+        if self.session.state.state != WireState.READY.value:
+            self.session.tell("the machine is not ready", bad=True)
+            return
+        try:
+            one, options = self.program.prepared(
+                single=wanted.single,
+                first=wanted.first - 1,
+                resumes=wanted.resumes,
+                despite_errors=wanted.despite_errors,
+                speed=self.session.speed,
+            )
+            self.session.run_program(one, options)
+        except CamtoolError as error:
+            self.session.tell(str(error), bad=True)
+
+
+def _machine(target: LoadedTarget) -> dict[str, Any]:
+    """What the page must know of a machine."""
+    machine: Machine[Any, Any] = target.machine
+    axes = {
+        name: {
+            "step_mm": axis.coded_step_mm,
+            "travel_mm": axis.travel_mm,
+            "max_rate_mm_min": axis.max_rate_mm_min,
+        }
+        for name, axis in zip("xyz", machine.axes, strict=True)
+    }
+    return {
+        "name": machine.target.name,
+        "title": machine.target.title,
+        "feed_mm_min": machine.feed.default_mm_min,
+        "axes": axes,
+    }
+
+
+def _json(value: object) -> str:
+    return msgspec.json.encode(value).decode("utf-8")
