@@ -36,7 +36,7 @@ class LoadedProgram(Struct, frozen=True, eq=False):
 
     @property
     def journal(self) -> Path:
-        """Its journal, where `camtool send` has it."""
+        """Return the file of its journal, which is that of `camtool send`."""
         return Path(f"{self.file}.journal")
 
     def page(self) -> bytes:
@@ -44,7 +44,7 @@ class LoadedProgram(Struct, frozen=True, eq=False):
         return viewer_page(self.one.run.scene())
 
     def facts(self) -> dict[str, Any]:
-        """What the page shows of it, and its findings."""
+        """Return the values of the program that the page shows, and its findings."""
         one = self.one
         return {
             "name": Path(self.file).name,

@@ -280,7 +280,7 @@ class PanelServer:
             await asyncio.sleep(PUSH_S)
 
     def _first(self) -> str:
-        """What does not change: the machine and the program."""
+        """Return the first message to a page: the machine and the program, which do not change."""
         session = self.session
         return _json(
             {
@@ -295,7 +295,7 @@ class PanelServer:
         )
 
     def _state(self, client: Client) -> str:
-        """What has changed."""
+        """Return the state, and the messages that the page does not have yet."""
         messages = [each for each in self.session.messages if each.number > client.shown]
         if messages:
             client.shown = messages[-1].number
@@ -395,7 +395,7 @@ class PanelServer:
 
 
 def _machine(target: LoadedTarget) -> dict[str, Any]:
-    """What the page must know of a machine."""
+    """Return the facts of a machine that the page needs."""
     machine: Machine[Any, Any] = target.machine
     axes = {
         name: {
