@@ -48,7 +48,7 @@ _POLICY: Final = (
 _TYPES: Final = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
 
 
-class Jog(Struct, frozen=True, tag="jog", tag_field="do", forbid_unknown_fields=True):
+class JogRequest(Struct, frozen=True, tag="jog", tag_field="do", forbid_unknown_fields=True):
     """Move by so much, mm, at a feed in mm/min; with `held`, in a direction until released."""
 
     feed: float
@@ -58,40 +58,44 @@ class Jog(Struct, frozen=True, tag="jog", tag_field="do", forbid_unknown_fields=
     held: bool = False
 
 
-class Keep(Struct, frozen=True, tag="keep", tag_field="do", forbid_unknown_fields=True):
+class KeepRequest(Struct, frozen=True, tag="keep", tag_field="do", forbid_unknown_fields=True):
     """The key of a held jog is still down."""
 
 
-class Release(Struct, frozen=True, tag="release", tag_field="do", forbid_unknown_fields=True):
+class ReleaseRequest(
+    Struct, frozen=True, tag="release", tag_field="do", forbid_unknown_fields=True
+):
     """The key of a held jog has been let go."""
 
 
-class Zero(Struct, frozen=True, tag="zero", tag_field="do", forbid_unknown_fields=True):
+class ZeroRequest(Struct, frozen=True, tag="zero", tag_field="do", forbid_unknown_fields=True):
     """The place of the tool becomes part zero of these axes."""
 
     axes: str
 
 
-class Order(Struct, frozen=True, tag="order", tag_field="do", forbid_unknown_fields=True):
+class OrderRequest(Struct, frozen=True, tag="order", tag_field="do", forbid_unknown_fields=True):
     """Home or unlock."""
 
     action: Literal["home", "unlock"]
 
 
-class Line(Struct, frozen=True, tag="line", tag_field="do", forbid_unknown_fields=True):
+class LineRequest(Struct, frozen=True, tag="line", tag_field="do", forbid_unknown_fields=True):
     """A typed line."""
 
     text: str
 
 
-class Change(Struct, frozen=True, tag="override", tag_field="do", forbid_unknown_fields=True):
+class ChangeRequest(
+    Struct, frozen=True, tag="override", tag_field="do", forbid_unknown_fields=True
+):
     """An override, %."""
 
     name: Override
     percent: int
 
 
-class Start(Struct, frozen=True, tag="start", tag_field="do", forbid_unknown_fields=True):
+class StartRequest(Struct, frozen=True, tag="start", tag_field="do", forbid_unknown_fields=True):
     """Send the program: `single`: block by block; `first`: from this block on (from 1); `resumes`:
     where the journal says that it was left; `despite_errors`: although it has findings that spoil
     the part."""
@@ -102,42 +106,44 @@ class Start(Struct, frozen=True, tag="start", tag_field="do", forbid_unknown_fie
     despite_errors: bool = False
 
 
-class Hold(Struct, frozen=True, tag="pause", tag_field="do", forbid_unknown_fields=True):
+class HoldRequest(Struct, frozen=True, tag="pause", tag_field="do", forbid_unknown_fields=True):
     """Pause the program."""
 
 
-class GoOn(Struct, frozen=True, tag="resume", tag_field="do", forbid_unknown_fields=True):
+class GoOnRequest(Struct, frozen=True, tag="resume", tag_field="do", forbid_unknown_fields=True):
     """Go on; `single`: with one block."""
 
     single: bool = False
 
 
-class Stop(Struct, frozen=True, tag="stop", tag_field="do", forbid_unknown_fields=True):
+class StopRequest(Struct, frozen=True, tag="stop", tag_field="do", forbid_unknown_fields=True):
     """Stop the machine. Every page may do this."""
 
 
-class Connect(Struct, frozen=True, tag="connect", tag_field="do", forbid_unknown_fields=True):
+class ConnectRequest(
+    Struct, frozen=True, tag="connect", tag_field="do", forbid_unknown_fields=True
+):
     """Open the port again."""
 
 
-class Take(Struct, frozen=True, tag="take", tag_field="do", forbid_unknown_fields=True):
+class TakeRequest(Struct, frozen=True, tag="take", tag_field="do", forbid_unknown_fields=True):
     """Command from this page from now on."""
 
 
 Wanted = (
-    Jog
-    | Keep
-    | Release
-    | Zero
-    | Order
-    | Line
-    | Change
-    | Start
-    | Hold
-    | GoOn
-    | Stop
-    | Connect
-    | Take
+    JogRequest
+    | KeepRequest
+    | ReleaseRequest
+    | ZeroRequest
+    | OrderRequest
+    | LineRequest
+    | ChangeRequest
+    | StartRequest
+    | HoldRequest
+    | GoOnRequest
+    | StopRequest
+    | ConnectRequest
+    | TakeRequest
 )
 _DECODER: Final = msgspec.json.Decoder(Wanted)
 
@@ -151,7 +157,7 @@ class Client:
 
 
 class PanelServer:
-    """The pages of one session; `program` is what `Start` sends, None without one."""
+    """The pages of one session; `program` is what `StartRequest` sends, None without one."""
 
     def __init__(self, session: Session, program: LoadedProgram | None = None) -> None:
         self.session, self.program = session, program
@@ -316,9 +322,9 @@ class PanelServer:
         session = self.session
         try:
             wanted = _DECODER.decode(text)
-            if isinstance(wanted, Stop):
+            if isinstance(wanted, StopRequest):
                 session.stop()
-            elif isinstance(wanted, Take):
+            elif isinstance(wanted, TakeRequest):
                 if self._commander is not client:
                     session.release()
                 self._commander = client
@@ -335,32 +341,32 @@ class PanelServer:
     def _do(self, wanted: Any) -> None:
         session = self.session
         match wanted:
-            case Keep():
+            case KeepRequest():
                 session.keep()
-            case Release():
+            case ReleaseRequest():
                 session.release()
-            case Jog():
+            case JogRequest():
                 self._jog(wanted)
-            case Zero():
+            case ZeroRequest():
                 session.order("zero", {axis: 0.0 for axis in "xyz" if axis in wanted.axes})
-            case Order():
+            case OrderRequest():
                 action: HandAction = wanted.action
                 session.order(action, {})
-            case Line():
+            case LineRequest():
                 session.say(wanted.text)
-            case Change():
+            case ChangeRequest():
                 session.override(wanted.name, wanted.percent)
-            case Hold():
+            case HoldRequest():
                 session.request(Request.PAUSE)
-            case GoOn():
+            case GoOnRequest():
                 session.request(Request.STEP if wanted.single else Request.RESUME)
-            case Connect():
+            case ConnectRequest():
                 session.reopen()
-            case Start():
+            case StartRequest():
                 # It may have to be judged again, and the page goes on meanwhile.
                 self._starting = asyncio.create_task(asyncio.to_thread(self._start, wanted))
 
-    def _jog(self, wanted: Jog) -> None:
+    def _jog(self, wanted: JogRequest) -> None:
         """Jog, at no more than the axes can do."""
         machine = self.session.target.machine
         values = {axis: getattr(wanted, axis) for axis in "xyz" if getattr(wanted, axis)}
@@ -373,7 +379,7 @@ class PanelServer:
         else:
             self.session.order("jog", {**values, "feed": feed})
 
-    def _start(self, wanted: Start) -> None:
+    def _start(self, wanted: StartRequest) -> None:
         """Send the program."""
         if self.program is None:
             self.session.tell("no program was given: camtool panel PROGRAM", bad=True)

@@ -232,7 +232,7 @@ class GrblWire(Wire):
         return GrblConversation((), machine, manner, (hand_line(action, values).rstrip(b"\n"),))
 
     def hand(self, machine: GrblMachine, manner: Manner) -> GrblHand:
-        """Return one conversation for all orders: each `command` would reset the controller first."""
+        """Return one conversation for all orders: `command` would reset grbl before each."""
         return GrblHand(machine, manner)
 
 
