@@ -159,7 +159,12 @@ def test_a_fault_of_the_plan_is_seen_too() -> None:
         faulty = replace(good, end=end)
         for moves, said in ((good, "nowhere more than"), (faulty, f"up to {abs(by)} mm")):
             seen = scene_of(
-                title="", drawing=drawing, job=job, toolpath=moves, machine=machine, wanted_path=moves
+                title="",
+                drawing=drawing,
+                job=job,
+                toolpath=moves,
+                machine=machine,
+                wanted_path=moves,
             )
             text = spoken(draw(seen, PictureOptions(size_px=200, view=view)))
             assert said in text[-1]
