@@ -95,7 +95,7 @@ class LoadedProgram(Struct, frozen=True, eq=False):
                 self.target,
                 source=self.file,
                 first=begin,
-                left=state,
+                state=state,
                 despite_errors=despite_errors,
             )
         options = SendOptions(

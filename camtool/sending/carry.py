@@ -105,7 +105,7 @@ def carry_program(
         "first": one.first,
         "packets": len(one.packets),
     }
-    journal = Journal(options.journal, head, more=options.more)
+    journal = Journal(options.journal, head, appends=options.more)
     driver = Driver(line, journal, one.block_of, wish, watch, tell, options.speed, one.place_of)
     try:
         driver.carry(conversation)
@@ -115,7 +115,7 @@ def carry_program(
             journal.close(
                 conversation.state.value,
                 conversation.why,
-                still=conversation.is_still,
+                is_still=conversation.is_still,
                 place=one.place_of(conversation),
                 **counts,
             )
