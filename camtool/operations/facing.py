@@ -61,8 +61,8 @@ MAX_OVERHANG_MM = 1000.0
 def overhang_mm(operation: Operation) -> float:
     """Distance of the outermost round of the tool's centre from the stock: as given, or its
     radius."""
-    given: float | None = operation.own_value("overhang")
-    return operation.tool.radius_mm if given is None else given
+    given_mm: float | None = operation.own_value("overhang")
+    return operation.tool.radius_mm if given_mm is None else given_mm
 
 
 def checked(operation: Operation, stock: Stock | None) -> Operation:
@@ -78,9 +78,9 @@ def checked(operation: Operation, stock: Stock | None) -> Operation:
         )
     tool = operation.tool
     if tool.kind not in MILLS or not tool.diameter_mm:
-        given = f"one of kind {tool.kind!r}" if tool.diameter_mm else "one of no width"
+        tool_words = f"one of kind {tool.kind!r}" if tool.diameter_mm else "one of no width"
         raise OptionError(
-            f"facing needs an end mill, not {given}",
+            f"facing needs an end mill, not {tool_words}",
             where=key_of(operation, "tool"),
             mend="give a flat tool and its diameter",
         )
@@ -118,10 +118,10 @@ def faced(_: Chosen, setting: Setting) -> Work:
     operation, stock = setting.operation, setting.stock
     assert stock is not None, "checked"
     assert stock.box_mm is not None, "checked"
-    beyond = overhang_mm(operation) * np.array([-1.0, -1.0, 1.0, 1.0])
-    left, low, right, high = (np.array(stock.box_mm) + beyond).tolist()
+    overhang = overhang_mm(operation) * np.array([-1.0, -1.0, 1.0, 1.0])
+    left_x, low, right, high = (np.array(stock.box_mm) + overhang).tolist()
     step = operation.step_over * operation.tool.diameter_mm
-    lines = max(right - left, high - low) / step
+    lines = max(right - left_x, high - low) / step
     refuse_endless(
         2.0 * lines * len(setting.levels_mm),
         key_of(operation, "step_over"),
@@ -129,12 +129,12 @@ def faced(_: Chosen, setting: Setting) -> Work:
         "give a larger step-over, or a larger tool",
         is_long=operation.may_be_long,
     )
-    corners = np.array([[left, low], [right, low], [right, high], [left, high]])
+    corners = np.array([[left_x, low], [right, low], [right, high], [left_x, high]])
     region = Polylines.of([Polyline(np.insert(corners, 2, 0.0, axis=1), closed=True)])
     floor = over_floor(ConnectedRegion(region))
     runs: list[CutRun] = []
     for path, _region in clearing_paths(region, operation):
         inwards = reverse_vertices(path)
-        down = down_for(inwards, None, None, setting)
-        runs += lowered(inwards, down, floor, setting, "stock")
+        way_down = down_for(inwards, None, None, setting)
+        runs += lowered(inwards, way_down, floor, setting, "stock")
     return Work((Fixed(tuple(runs), setting, "stock"),))

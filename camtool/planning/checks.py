@@ -107,18 +107,20 @@ def checked(
     what is drawn beside the stock, leads and clamps beside it. A warning: something is cut wholly
     beside the stock.
     """
-    off = [
+    edge_findings = [
         *_clamps_off_stock(job),
         *(each for step in steps for each in _off_stock(step, job.stock)),
         *(each for step in steps for each in _leads_off_stock(step, job.stock)),
     ]
     if "off-stock" in job.allow:
-        off = [replace(each, severity=min(each.severity, Severity.WARNING)) for each in off]
+        edge_findings = [
+            replace(each, severity=min(each.severity, Severity.WARNING)) for each in edge_findings
+        ]
     return (
         *out_of_travel(toolpath, machine),
         *lowered_feeds(job, machine),
         *_too_deep(toolpath, job),
-        *(off or _beside_stock(toolpath, job)),
+        *(edge_findings or _beside_stock(toolpath, job)),
         *_tools_not_said(job),
         *_change_not_stated(toolpath, machine),
         *_feeds_above_limits(toolpath, machine),
@@ -181,17 +183,17 @@ def _too_deep(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     low = np.minimum(toolpath.starts[rows, 2], toolpath.end[rows, 2])
     deepest = int(rows[low.argmin()])
     depth = STOCK_TOP_MM - float(low.min())
-    through = depth - stock.thickness_mm
-    if POSITION_EPS_MM < through <= stock.through_mm + POSITION_EPS_MM:
+    below_mm = depth - stock.thickness_mm
+    if POSITION_EPS_MM < below_mm <= stock.through_mm + POSITION_EPS_MM:
         yield OUT_OF_STOCK_AS_ALLOWED(
             where=_place(toolpath, deepest),
             measured=depth,
             limit=stock.thickness_mm + stock.through_mm,
-            through=through,
+            through=below_mm,
             thickness=stock.thickness_mm,
             allowed=stock.through_mm,
         )
-    elif through > POSITION_EPS_MM:
+    elif below_mm > POSITION_EPS_MM:
         yield OUT_OF_STOCK(
             where=_place(toolpath, deepest),
             measured=depth,
@@ -206,10 +208,10 @@ def _beside_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     stock, cuts = job.stock, feeds_below_top(toolpath)
     if stock is None or stock.box_mm is None or not cuts.any():
         return
-    beside = _beside(toolpath, stock.box_mm, _radii(toolpath, job))
+    is_beside = _beside(toolpath, stock.box_mm, _radii(toolpath, job))
     stay = np.cumsum((toolpath.kind == Kind.RAPID) & (toolpath.end[:, 2] >= STOCK_TOP_MM))
-    within = np.unique(stay[cuts & ~beside])
-    outside = cuts & ~np.isin(stay, within)
+    touching_stays = np.unique(stay[cuts & ~is_beside])
+    outside = cuts & ~np.isin(stay, touching_stays)
     if outside.any():
         row = int(outside.argmax())
         x, y = toolpath.end[row, :2].tolist()
@@ -226,49 +228,51 @@ def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
     pocket that is open at the edge, a notch, and a line that runs out of the stock may be meant:
     a warning. The tool itself may run beside the stock.
     """
-    again = step.operation.stage == "finish" or step.operation.rest_of is not None
-    if stock is None or stock.box_mm is None or again or not step.runs:
+    is_repeat = step.operation.stage == "finish" or step.operation.rest_of is not None
+    if stock is None or stock.box_mm is None or is_repeat or not step.runs:
         return []
     chosen, contract = step.chosen, step.operation.contract
     boxes, names = path_extents(chosen.lines), list(chosen.names)
-    whole = chosen.lines.closed & (chosen.rim if contract.runs_beside else True)
-    whole = np.asarray(whole & (not contract.clears))
-    what = [contract.cut_name or ("part" if rim else "hole") for rim in chosen.rim.tolist()]
+    is_whole = chosen.lines.closed & (chosen.rim if contract.runs_beside else True)
+    is_whole = np.asarray(is_whole & (not contract.clears))
+    subjects = [contract.cut_name or ("part" if rim else "hole") for rim in chosen.rim.tolist()]
     if contract.takes in ("circles", "holes"):
         items = [item for item in step.items if isinstance(item, Fixed)]
-        mine = np.isin(chosen.source, [item.source for item in items])
-        boxes, names = boxes[mine], [names[row] for row in np.flatnonzero(mine).tolist()]
+        is_own = np.isin(chosen.source, [item.source for item in items])
+        boxes, names = boxes[is_own], [names[row] for row in np.flatnonzero(is_own).tolist()]
         points = chosen.points if contract.takes == "holes" else chosen.points[:0]
         boxes = np.concatenate([boxes, np.repeat(points[:, :, None], 2, axis=2)])
         names += chosen.point_names[: len(points)]
-        whole, what = np.zeros(len(boxes), dtype=np.bool_), ["hole"] * len(boxes)
-    left, low, right, high = stock.box_mm
-    beyond = np.column_stack(
+        is_whole, subjects = np.zeros(len(boxes), dtype=np.bool_), ["hole"] * len(boxes)
+    left_x, low, right, high = stock.box_mm
+    overhangs = np.column_stack(
         [
-            left - boxes[:, 0, 0],
+            left_x - boxes[:, 0, 0],
             boxes[:, 0, 1] - right,
             low - boxes[:, 1, 0],
             boxes[:, 1, 1] - high,
         ]
     )
     size = np.ptp(boxes, axis=2)[:, [0, 0, 1, 1]]
-    found = defaultdict[Sentence, list[Finding]](list)
-    for row in np.flatnonzero((beyond > OFF_STOCK_MM).any(axis=1)).tolist():
+    findings = defaultdict[Sentence, list[Finding]](list)
+    for row in np.flatnonzero((overhangs > OFF_STOCK_MM).any(axis=1)).tolist():
         # What lies off wholly, to the side on which it lies the farthest; else how much of it.
-        apart = beyond[row] - size[row]
-        off = bool((apart >= np.where(size[row] > 0.0, -POSITION_EPS_MM, OFF_STOCK_MM)).any())
-        edge = int((apart if off else beyond[row]).argmax())
-        sentence = OUT_OF_STOCK_PART if whole[row] else OUT_OF_STOCK_PARTLY
-        sentence = OUT_OF_STOCK_WHOLLY if off else sentence
+        gaps = overhangs[row] - size[row]
+        is_off = bool((gaps >= np.where(size[row] > 0.0, -POSITION_EPS_MM, OFF_STOCK_MM)).any())
+        edge = int((gaps if is_off else overhangs[row]).argmax())
+        sentence = OUT_OF_STOCK_PART if is_whole[row] else OUT_OF_STOCK_PARTLY
+        sentence = OUT_OF_STOCK_WHOLLY if is_off else sentence
         one = sentence(
             where=at_place(names[row], boxes[row].mean(axis=1)),
-            measured=max(float(apart[edge]), 0.0) if off else float(beyond[row, edge]),
+            measured=max(float(gaps[edge]), 0.0) if is_off else float(overhangs[row, edge]),
             limit=OFF_STOCK_MM,
-            what=what[row],
+            what=subjects[row],
             edge=EDGES[edge],
         )
-        found[sentence].append(one)
-    return [each for some in found.values() for each in shortened_list(some, OUT_OF_STOCK_MORE)]
+        findings[sentence].append(one)
+    return [
+        each for group in findings.values() for each in shortened_list(group, OUT_OF_STOCK_MORE)
+    ]
 
 
 def _clamps_off_stock(job: Job) -> Iterator[Finding]:
@@ -277,16 +281,16 @@ def _clamps_off_stock(job: Job) -> Iterator[Finding]:
     stock = job.stock
     if stock is None or stock.box_mm is None:
         return
-    left, low, right, high = stock.box_mm
+    left_x, low, right, high = stock.box_mm
     for box in job.keep_out:
-        (x, wide), (y, deep) = box.x_mm, box.y_mm
-        beyond = (left - wide, x - right, low - deep, y - high)
-        if max(beyond) > OFF_STOCK_MM and math.isfinite(sum((x, wide, y, deep))):
+        (x, wide), (y, height) = box.x_mm, box.y_mm
+        gaps = (left_x - wide, x - right, low - height, y - high)
+        if max(gaps) > OFF_STOCK_MM and math.isfinite(sum((x, wide, y, height))):
             yield OUT_OF_STOCK_CLAMP(
                 where=f"[[keep_out]] {box.name!r}",
-                measured=max(beyond),
+                measured=max(gaps),
                 limit=OFF_STOCK_MM,
-                edge=EDGES[beyond.index(max(beyond))],
+                edge=EDGES[gaps.index(max(gaps))],
             )
 
 
@@ -296,9 +300,9 @@ def _leads_off_stock(step: Step, stock: Stock | None) -> list[Finding]:
     operation, runs = step.operation, step.runs
     if stock is None or stock.box_mm is None or not runs:
         return []
-    left, low, right, high = stock.box_mm
+    left_x, low, right, high = stock.box_mm
     radius, first = operation.tool.radius_mm, runs.first
-    found = []
+    findings = []
     for lead, name, rows in (
         (operation.lead_in, "lead-in", first[:-1]),
         (operation.lead_out, "lead-out", first[1:] - 1),
@@ -306,19 +310,19 @@ def _leads_off_stock(step: Step, stock: Stock | None) -> list[Finding]:
         if lead.kind == "none":
             continue
         x, y = runs.vertices[rows, :2].T
-        beyond = np.column_stack([left - x, x - right, low - y, y - high]) - radius
-        for row in np.flatnonzero((beyond > OFF_STOCK_MM).any(axis=1)).tolist():
-            edge = int(beyond[row].argmax())
-            found.append(
+        overhangs = np.column_stack([left_x - x, x - right, low - y, y - high]) - radius
+        for row in np.flatnonzero((overhangs > OFF_STOCK_MM).any(axis=1)).tolist():
+            edge = int(overhangs[row].argmax())
+            findings.append(
                 OUT_OF_STOCK_LEAD(
                     where=f"{operation_name(operation)} at X {x[row]:.3f} Y {y[row]:.3f}",
-                    measured=float(beyond[row, edge]),
+                    measured=float(overhangs[row, edge]),
                     limit=OFF_STOCK_MM,
                     lead=name,
                     edge=EDGES[edge],
                 )
             )
-    return shortened_list(found, OUT_OF_STOCK_MORE_LEADS)
+    return shortened_list(findings, OUT_OF_STOCK_MORE_LEADS)
 
 
 def _beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:
@@ -330,8 +334,8 @@ def _beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:
     arc = toolpath.is_arc[:, None]
     low = np.where(arc, toolpath.centre - arm, low) - radius[:, None]
     high = np.where(arc, toolpath.centre + arm, high) + radius[:, None]
-    far = (high <= np.array(box[:2])) | (low >= np.array(box[2:]))
-    return np.asarray(far.any(axis=1))
+    is_outside = (high <= np.array(box[:2])) | (low >= np.array(box[2:]))
+    return np.asarray(is_outside.any(axis=1))
 
 
 def _tools_not_said(job: Job) -> Iterator[Finding]:
@@ -340,11 +344,11 @@ def _tools_not_said(job: Job) -> Iterator[Finding]:
         one, other = before.tool, operation.tool
         if _shape(one) == _shape(other) or other.number not in (None, one.number):
             continue
-        where = operation_name(operation)
+        place = operation_name(operation)
         if other.number is None:
-            yield TOOL_NOT_SAID(where=where)
+            yield TOOL_NOT_SAID(where=place)
         else:
-            yield TOOL_NOT_SAID_APART(where=where, number=other.number)
+            yield TOOL_NOT_SAID_APART(where=place, number=other.number)
 
 
 def _change_not_stated(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
@@ -392,7 +396,7 @@ def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Findin
     length = np.hypot(across, along)
     moves = toolpath.is_feed & (length > 0.0)
     feed = np.where(moves, toolpath.feed, 0.0) / np.where(moves, length, 1.0)
-    for what, part, limit in (
+    for direction, part, limit in (
         ("in X and Y", across, machine.max_feed_mm_min),
         ("along Z", along, machine.max_plunge_mm_min),
     ):
@@ -404,7 +408,7 @@ def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Findin
             where=_place(toolpath, row),
             measured=speed[row],
             limit=limit,
-            direction=what,
+            direction=direction,
             machine=machine.target.name,
         )
 
@@ -438,23 +442,23 @@ def doubtful_settings(
     starts_spindle = starts_spindle and machine.spindle.switched != "none"
     asks_speed = starts_spindle and machine.spindle.switched == "program"
     cutting = [step for step in steps if step.runs]
-    found: dict[str, list[Step]] = defaultdict(list)
+    doubts: dict[str, list[Step]] = defaultdict(list)
     for step in cutting:
         if asks_speed and step.setting.spindle_rpm is None and step.operation.spindle_rpm is None:
-            found[CUT_DOUBTFUL_SPEED.words()].append(step)
+            doubts[CUT_DOUBTFUL_SPEED.words()].append(step)
         reasons = (
             *_doubtful(step, starts_spindle),
             *_beyond_tool(step, stock),
             *_loose(step, stock, steps),
         )
         for reason in reasons:
-            found[reason].append(step)
-    if not found:
+            doubts[reason].append(step)
+    if not doubts:
         return []
     parts = []
-    for reason, of in found.items():
-        names = ", ".join(operation_name(step.operation) for step in of)
-        parts.append(reason if len(of) == len(cutting) else f"{names}: {reason}")
+    for reason, doubtful in doubts.items():
+        names = ", ".join(operation_name(step.operation) for step in doubtful)
+        parts.append(reason if len(doubtful) == len(cutting) else f"{names}: {reason}")
     return [CUT_DOUBTFUL(reasons="; ".join(parts))]
 
 
@@ -496,10 +500,10 @@ def _comes_down_beside(step: Step) -> bool:
     stock = step.setting.stock
     if stock is None or stock.box_mm is None:
         return False
-    left, low, right, high = stock.box_mm
+    left_x, low, right, high = stock.box_mm
     x, y = step.runs.vertices[step.runs.first[:-1], :2].T
-    beside = np.max([left - x, x - right, low - y, y - high], axis=0)
-    return bool((beside >= step.operation.tool.radius_mm - POSITION_EPS_MM).all())
+    distances = np.max([left_x - x, x - right, low - y, y - high], axis=0)
+    return bool((distances >= step.operation.tool.radius_mm - POSITION_EPS_MM).all())
 
 
 def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[str]:
@@ -508,8 +512,8 @@ def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[s
     operation, closed = step.operation, step.chosen.lines.closed
     if stock is None or operation.stage == "finish" or operation.tabs is not None:
         return
-    through = -step.setting.levels_mm[-1] >= stock.thickness_mm - POSITION_EPS_MM
-    if through and runs_beside(operation) and (step.chosen.rim & closed).any():
+    is_through = -step.setting.levels_mm[-1] >= stock.thickness_mm - POSITION_EPS_MM
+    if is_through and runs_beside(operation) and (step.chosen.rim & closed).any():
         later = steps[steps.index(step) + 1 :]
         finished = operation.stage == "rough" and later and later[0].operation.stage == "finish"
         yield (CUT_DOUBTFUL_LOOSE_FINISH if finished else CUT_DOUBTFUL_LOOSE).words()
@@ -531,9 +535,9 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
         yield CUT_DOUBTFUL_CHIP.words(chip=chip, limits=range_words(tool.chip_load_mm))
     if speed is not None and _is_beyond(speed, tool.surface_speed_m_min):
         yield CUT_DOUBTFUL_EDGE.words(speed=speed, limits=range_words(tool.surface_speed_m_min))
-    beside = contract.leaves_walls and (contract.clears or operation.side != "on")
+    cuts_beside = contract.leaves_walls and (contract.clears or operation.side != "on")
     below = depth - stock.thickness_mm if stock is not None else 0.0
-    if beside and max(below, 0.0) < tool.nose_mm - POSITION_EPS_MM:
+    if cuts_beside and max(below, 0.0) < tool.nose_mm - POSITION_EPS_MM:
         yield CUT_DOUBTFUL_NOSE.words(nose=tool.nose_mm)
     makes_floor = contract.clears or contract.cuts == "over"
     ridge = ridge_mm(tool, operation.step_over) if makes_floor else 0.0
@@ -550,16 +554,16 @@ def ridge_mm(tool: Tool, step_over: float) -> float:
     nose is r − √(r² − x²) above its tip there.
     """
     flat = tool.diameter_mm - 2.0 * tool.nose_mm
-    beside = max(0.5 * (step_over * tool.diameter_mm - flat), 0.0)
-    return tool.nose_mm - math.sqrt(max(tool.nose_mm**2 - beside**2, 0.0))
+    half_gap = max(0.5 * (step_over * tool.diameter_mm - flat), 0.0)
+    return tool.nose_mm - math.sqrt(max(tool.nose_mm**2 - half_gap**2, 0.0))
 
 
 def _is_beyond(value: float, limits: tuple[float, float] | None) -> bool:
     """True if a number is out of its limits, by more than rounding."""
     if limits is None:
         return False
-    least, most = limits
-    return value < least * (1.0 - LIMIT_SLACK) or value > most * (1.0 + LIMIT_SLACK)
+    min_value, max_value = limits
+    return value < min_value * (1.0 - LIMIT_SLACK) or value > max_value * (1.0 + LIMIT_SLACK)
 
 
 def deepest_pass(setting: Setting) -> float:

@@ -150,12 +150,12 @@ def ring_paths(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
     """
     linked = LinkedPath()
     first = None
-    for cell, around in _inside_out(root, linked):
+    for cell, outer_cell in _inside_out(root, linked):
         if first is None:
             first = cell
             linked.begin = pole(cell.region.boundary) if steps.from_pole else None
         paths = (*cell.tips, *cell.region.boundary)
-        linked.cut_all(paths, cell.region, around.region, steps.forward)
+        linked.cut_all(paths, cell.region, outer_cell.region, steps.forward)
     return linked.paths(), first or root
 
 
@@ -165,25 +165,27 @@ def _inside_out(root: Cell, linked: LinkedPath) -> Iterator[tuple[Cell, Cell]]:
     The highest first; later the one nearest to the end of the path so far, which grows meanwhile.
     """
     stack = [(root, list(root.inner))]
-    around: Cell | None = None
+    outer_cell: Cell | None = None
     while stack:
-        cell, left = stack[-1]
-        if not left:
+        cell, remaining = stack[-1]
+        if not remaining:
             stack.pop()
-            yield cell, around or cell
-            around = None
+            yield cell, outer_cell or cell
+            outer_cell = None
             continue
-        around = around or cell
-        chosen = left.pop(_pick(left, linked.here))
-        stack.append((chosen, list(chosen.inner)))
+        outer_cell = outer_cell or cell
+        next_cell = remaining.pop(_pick(remaining, linked.here))
+        stack.append((next_cell, list(next_cell.inner)))
 
 
-def _pick(cells: list[Cell], here: Floats | None) -> int:
+def _pick(cells: list[Cell], tool_place: Floats | None) -> int:
     """The cell nearest to a place; the highest when the tool is nowhere yet."""
-    if here is None:
+    if tool_place is None:
         return max(range(len(cells)), key=lambda row: (cells[row].height, -row))
-    apart = [min(closest(along, here)[0] for along in cell.region.paths) for cell in cells]
-    return int(np.argmin(apart))
+    distances = [
+        min(closest(along, tool_place)[0] for along in cell.region.paths) for cell in cells
+    ]
+    return int(np.argmin(distances))
 
 
 class Scan(Struct, frozen=True):
@@ -220,37 +222,37 @@ def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
 
     Several paths only where rounding hides the link from one stroke to the next (`LinkedPath`).
     """
-    whole, linked = ConnectedRegion(region), LinkedPath()
+    connected, linked = ConnectedRegion(region), LinkedPath()
     margin = min(scan.radius_mm - 0.5 * scan.step_mm, MAX_MARGIN_SHARE * scan.radius_mm)
     for part in parts_of(offset_shape(region, margin)):
         strokes = strokes_of(part, scan)
         order = _order(strokes)
         if not order:
             continue
-        ends = np.array([strokes.ends[k, :: -1 if turned else 1] for k, turned in order])
+        ends = np.array([strokes.ends[k, :: -1 if is_backward else 1] for k, is_backward in order])
         cut = [np.column_stack([each, np.zeros(2)]) for each in ends]
-        linked.cut(cut[0], whole)
+        linked.cut(cut[0], connected)
         links = routes(ends[:-1, 1], ends[1:, 0], ConnectedRegion(part))
         for link, stroke in zip(links, cut[1:], strict=True):
             linked.join(link, stroke)
-    linked.cut_all(region, whole, whole, scan.forward)
+    linked.cut_all(region, connected, connected, scan.forward)
     return linked.paths()
 
 
 def strokes_of(region: Polylines, scan: Scan) -> Strokes:
     """The pieces of equally spaced lines, no farther apart than the step, in a region."""
-    turned = Polylines.of([rotate(path, -scan.angle_rad) for path in region])
-    (left, right), (low, high) = extents(turned).tolist()
+    level_region = Polylines.of([rotate(path, -scan.angle_rad) for path in region])
+    (left_x, right), (low, high) = extents(level_region).tolist()
     count = max(1, math.ceil((high - low) / scan.step_mm))
     y = low + (np.arange(count) + 0.5) * ((high - low) / count)
-    ahead = np.array([math.cos(scan.angle_rad), math.sin(scan.angle_rad)])
-    across = np.array([-ahead[1], ahead[0]])
-    start = (left - scan.step_mm) * ahead + y[:, None] * across
-    end = (right + scan.step_mm) * ahead + y[:, None] * across
+    along_lines = np.array([math.cos(scan.angle_rad), math.sin(scan.angle_rad)])
+    across = np.array([-along_lines[1], along_lines[0]])
+    start = (left_x - scan.step_mm) * along_lines + y[:, None] * across
+    end = (right + scan.step_mm) * along_lines + y[:, None] * across
     lines = Segments.between(start, end, np.zeros(count))
     row, begin, stop = scanned(lines, Segments.of(region))
     ends = np.stack([point_at(lines, row, begin), point_at(lines, row, stop)], axis=1)
-    return Strokes(row, ends, ends @ ahead)
+    return Strokes(row, ends, ends @ along_lines)
 
 
 def _order(strokes: Strokes) -> list[tuple[int, bool]]:
@@ -259,51 +261,53 @@ def _order(strokes: Strokes) -> list[tuple[int, bool]]:
     From a stroke on to one beside it, as long as there is one; else to the nearest end of any
     that has at most one neighbour left, so that no row of strokes is interrupted.
     """
-    beside = _neighbours(strokes)
-    left = set(range(len(strokes)))
-    found: list[tuple[int, bool]] = []
+    neighbours = _neighbours(strokes)
+    remaining = set(range(len(strokes)))
+    ordered: list[tuple[int, bool]] = []
     onward = 1
-    while left:
-        if not found:
-            among, here, last = [0], strokes.ends[0, 0], 0
+    while remaining:
+        if not ordered:
+            among, tool_place, last = [0], strokes.ends[0, 0], 0
         else:
-            last, was_turned = found[-1]
-            here = strokes.ends[last, 0 if was_turned else 1]
-            among = _next(last, onward, strokes, beside, left)
-        apart = np.hypot(*np.moveaxis(strokes.ends[among] - here, 2, 0))
-        pick, side = np.unravel_index(int(apart.argmin()), apart.shape)
-        chosen = among[int(pick)]
-        if chosen in beside[last]:
-            onward = int(strokes.row[chosen] - strokes.row[last])
-        left.remove(chosen)
-        found.append((chosen, bool(side)))
-    return found
+            last, was_turned = ordered[-1]
+            tool_place = strokes.ends[last, 0 if was_turned else 1]
+            among = _next(last, onward, strokes, neighbours, remaining)
+        distances = np.hypot(*np.moveaxis(strokes.ends[among] - tool_place, 2, 0))
+        pick, side = np.unravel_index(int(distances.argmin()), distances.shape)
+        next_stroke = among[int(pick)]
+        if next_stroke in neighbours[last]:
+            onward = int(strokes.row[next_stroke] - strokes.row[last])
+        remaining.remove(next_stroke)
+        ordered.append((next_stroke, bool(side)))
+    return ordered
 
 
 def _next(
-    last: int, onward: int, strokes: Strokes, beside: list[list[int]], left: set[int]
+    last: int, onward: int, strokes: Strokes, neighbours: list[list[int]], remaining: set[int]
 ) -> list[int]:
     """The strokes that may follow the last one, which went on to the next line or the one before
     (`onward` 1 or −1)."""
-    near = [index for index in beside[last] if index in left]
-    ahead = [index for index in near if strokes.row[index] - strokes.row[last] == onward]
-    if near:
-        return ahead or near
-    ends = [index for index in left if sum(other in left for other in beside[index]) <= 1]
-    return sorted(ends or left)
+    nearby = [index for index in neighbours[last] if index in remaining]
+    onward_ones = [index for index in nearby if strokes.row[index] - strokes.row[last] == onward]
+    if nearby:
+        return onward_ones or nearby
+    ends = [
+        index for index in remaining if sum(other in remaining for other in neighbours[index]) <= 1
+    ]
+    return sorted(ends or remaining)
 
 
 def _neighbours(strokes: Strokes) -> list[list[int]]:
     """For each stroke those of the lines before and behind it that run beside a part of it."""
-    beside: list[list[int]] = [[] for _ in range(len(strokes))]
+    neighbours: list[list[int]] = [[] for _ in range(len(strokes))]
     first = np.searchsorted(strokes.row, np.arange(strokes.row.max(initial=-1) + 3))
     for index, row in enumerate(strokes.row.tolist()):
         low, high = strokes.span[index]
         for other in range(int(first[row + 1]), int(first[row + 2])):
             if strokes.span[other, 0] < high and strokes.span[other, 1] > low:
-                beside[index].append(other)
-                beside[other].append(index)
-    return beside
+                neighbours[index].append(other)
+                neighbours[other].append(index)
+    return neighbours
 
 
 def slot_paths(region: Polylines, tool_radius_mm: float) -> list[Floats]:
@@ -318,10 +322,10 @@ def slot_paths(region: Polylines, tool_radius_mm: float) -> list[Floats]:
     widest = _bands(region, tool_radius_mm, SLOT_TOLERANCE * diameter)
     if not widest:
         return []
-    whole = sum(length(path) for path in widest)
+    total_mm = sum(length(path) for path in widest)
     for hair in HAIRS:
         bands = _bands(region, tool_radius_mm, hair * diameter)
-        if sum(length(path) for path in bands) >= ALL_OF_IT * whole:
+        if sum(length(path) for path in bands) >= ALL_OF_IT * total_mm:
             break
     paths: list[Polyline] = []
     for band in bands:
@@ -341,12 +345,14 @@ def _bands(region: Polylines, radius: float, hair_mm: float) -> list[Polyline]:
     return [path for path in edges if length(path) >= 2.0 * MIN_SLOT_SHARE * radius]
 
 
-def _covered(path: Polyline, others: list[Polyline], near_mm: float) -> bool:
+def _covered(path: Polyline, other_paths: list[Polyline], near_mm: float) -> bool:
     """True if all of a path runs beside others: it is the other edge of a band."""
-    if not others:
+    if not other_paths:
         return False
     points = sample(path, length(path) / BAND_PLACES)
-    return bool((nearest(points, Segments.of(Polylines.of(others))).distance <= near_mm).all())
+    return bool(
+        (nearest(points, Segments.of(Polylines.of(other_paths))).distance <= near_mm).all()
+    )
 
 
 def _once(band: Polyline, near_mm: float) -> Polyline:
@@ -355,8 +361,8 @@ def _once(band: Polyline, near_mm: float) -> Polyline:
         return band
     along = MeasuredPath.of(band)
     half = 0.5 * along.total_mm
-    at = np.arange(BAND_PLACES) / BAND_PLACES * half
-    begin = float(at[np.hypot(*(along.at(at) - along.at(at + half)).T).argmax()])
+    lengths = np.arange(BAND_PLACES) / BAND_PLACES * half
+    begin = float(lengths[np.hypot(*(along.at(lengths) - along.at(lengths + half)).T).argmax()])
     one = Polyline(along.piece(begin, begin + half))
     other = Polyline(along.piece(begin + half, begin + 2.0 * half))
     if _covered(other, [one], near_mm):
@@ -389,8 +395,8 @@ class LinkedPath:
 
         Where rounding hides the link (`route`) the tool comes up: another path begins.
         """
-        here = self.here
-        self.join(None if here is None else route(here, stroke[0, :2], region), stroke)
+        tool_place = self.here
+        self.join(None if tool_place is None else route(tool_place, stroke[0, :2], region), stroke)
 
     def join(self, link: Floats | None, stroke: Floats) -> None:
         """A stroke after its link; None where there is none."""
@@ -405,27 +411,28 @@ class LinkedPath:
         self,
         paths: Iterable[Polyline],
         region: ConnectedRegion,
-        around: ConnectedRegion,
-        ahead: bool,
+        outer_region: ConnectedRegion,
+        is_forward: bool,
     ) -> None:
         """All these paths of a region, each time the nearest: closed ones once round from their
-        nearest place, as they are oriented or (not `ahead`) reversed; open ones from either end.
+        nearest place, as they are oriented or (not `is_forward`) reversed; open ones from either
+        end.
 
-        The first is reached through `around`, which contains the region.
+        The first is reached through `outer_region`, which contains the region.
         """
-        left = [MeasuredPath.of(path) for path in paths]
-        while left:
-            here = self._near(left[0].path)
-            begins = [_from_nearest(along, here) for along in left]
-            pick = min(range(len(left)), key=lambda row: begins[row][0])
-            along, begin = left.pop(pick), begins[pick][1]
+        remaining = [MeasuredPath.of(path) for path in paths]
+        while remaining:
+            tool_place = self._near(remaining[0].path)
+            begins = [_from_nearest(along, tool_place) for along in remaining]
+            pick = min(range(len(remaining)), key=lambda row: begins[row][0])
+            along, begin = remaining.pop(pick), begins[pick][1]
             if along.path.closed:
-                end = begin + (along.total_mm if ahead else -along.total_mm)
-                self.cut(along.piece(begin, end), around)
+                end = begin + (along.total_mm if is_forward else -along.total_mm)
+                self.cut(along.piece(begin, end), outer_region)
             else:
                 path = along.path if begin == 0.0 else reverse(along.path)
-                self.cut(path.vertices, around)
-            around = region
+                self.cut(path.vertices, outer_region)
+            outer_region = region
 
     def _near(self, path: Polyline) -> Floats:
         """Place of the tool, or where it would go down, or else the start of a path."""
@@ -438,11 +445,11 @@ class LinkedPath:
         return [*self._done, _chained(self._parts)] if self._parts else self._done
 
 
-def _from_nearest(along: MeasuredPath, here: Floats) -> tuple[float, float]:
+def _from_nearest(along: MeasuredPath, place: Floats) -> tuple[float, float]:
     """Distance of a place from where a path may begin, and the length along it to there."""
     if along.path.closed:
-        return closest(along, here)
-    to_start, to_end = np.hypot(*(along.path.vertices[[0, -1], :2] - here).T).tolist()
+        return closest(along, place)
+    to_start, to_end = np.hypot(*(along.path.vertices[[0, -1], :2] - place).T).tolist()
     return (to_start, 0.0) if to_start <= to_end else (to_end, along.total_mm)
 
 
@@ -468,11 +475,13 @@ class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
 
     def holds(self, points: Floats) -> Bools:
         """(P,) true for points (P, 2) in the region or on its boundary."""
-        within = inside(points, self.segments)
-        beside = np.flatnonzero(~within)
-        if len(beside):
-            within[beside] = nearest(points[beside], self.segments).distance <= ON_LINE_MM
-        return within
+        is_inside = inside(points, self.segments)
+        not_inside = np.flatnonzero(~is_inside)
+        if len(not_inside):
+            is_inside[not_inside] = (
+                nearest(points[not_inside], self.segments).distance <= ON_LINE_MM
+            )
+        return is_inside
 
     def place(self, point: Floats) -> tuple[int, float]:
         """The path nearest to a point (2,), and the length along it to its nearest place."""
@@ -484,9 +493,9 @@ class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
 
 def closest(along: MeasuredPath, point: Floats) -> tuple[float, float]:
     """Distance of a point (2,) from a path, and the length along it to the nearest place."""
-    apart = points_to_segments(point[None, :], along.segments)[0]
-    row = int(apart.argmin())
-    return float(apart[row]), float(along.reach[row]) + _length_to(point, along.segments, row)
+    distances = points_to_segments(point[None, :], along.segments)[0]
+    row = int(distances.argmin())
+    return float(distances[row]), float(along.reach[row]) + _length_to(point, along.segments, row)
 
 
 def _length_to(point: Floats, segments: Segments, row: int) -> float:
@@ -525,13 +534,13 @@ def routes(starts: Floats, ends: Floats, region: ConnectedRegion) -> list[Floats
     None where rounding hides where the straight line goes out or in, or the two places are not in
     one connected region.
     """
-    found: list[Floats | None] = []
+    links: list[Floats | None] = []
     for low in range(0, len(starts), LINKS_AT_ONCE):
-        some = slice(low, low + LINKS_AT_ONCE)
-        outside = _outside(starts[some], ends[some], region)
-        for start, end, parts in zip(starts[some], ends[some], outside, strict=True):
-            found.append(_linked(start, end, parts, region))
-    return found
+        batch = slice(low, low + LINKS_AT_ONCE)
+        outside = _outside(starts[batch], ends[batch], region)
+        for start, end, parts in zip(starts[batch], ends[batch], outside, strict=True):
+            links.append(_linked(start, end, parts, region))
+    return links
 
 
 def _linked(
@@ -541,9 +550,9 @@ def _linked(
     if np.hypot(*(end - start)) <= POSITION_EPS_MM:
         return np.array([[*start, 0.0]])
     rows = [np.array([[*start, 0.0]])]
-    for out, back in outside:
-        path, begin = region.place(start + out * (end - start))
-        other, stop = region.place(start + back * (end - start))
+    for leave_share, return_share in outside:
+        path, begin = region.place(start + leave_share * (end - start))
+        other, stop = region.place(start + return_share * (end - start))
         if path != other:
             return None
         rows.append(_along(region.paths[path], begin, stop))
@@ -558,24 +567,24 @@ def _outside(
     of the region, in order."""
     outside: list[list[tuple[float, float]]] = [[] for _ in range(len(starts))]
     room = nearest(starts, region.segments).distance
-    far = np.flatnonzero(np.hypot(*(ends - starts).T) > room + ON_LINE_MM)
-    if not len(far):
+    long_rows = np.flatnonzero(np.hypot(*(ends - starts).T) > room + ON_LINE_MM)
+    if not len(long_rows):
         return outside
-    lines = Segments.between(starts[far], ends[far], np.zeros(len(far)))
-    found = crossings(lines, region.segments, position_eps_mm=ON_LINE_MM)
-    every = np.arange(len(far))
-    rows = np.concatenate([every, every, found.row_a])
-    marks = np.concatenate([np.zeros(len(far)), np.ones(len(far)), found.ta])
+    lines = Segments.between(starts[long_rows], ends[long_rows], np.zeros(len(long_rows)))
+    crossings_found = crossings(lines, region.segments, position_eps_mm=ON_LINE_MM)
+    every = np.arange(len(long_rows))
+    rows = np.concatenate([every, every, crossings_found.row_a])
+    marks = np.concatenate([np.zeros(len(long_rows)), np.ones(len(long_rows)), crossings_found.ta])
     rows, marks = np.unique(np.column_stack([rows, marks]), axis=0).T
-    of = np.flatnonzero(rows[1:] == rows[:-1])  # a part is between two marks of one line
-    line, begin, stop = rows[of].astype(np.int64), marks[of], marks[of + 1]
-    out = ~region.holds(point_at(lines, line, 0.5 * (stop + begin)))
+    parts = np.flatnonzero(rows[1:] == rows[:-1])  # a part is between two marks of one line
+    line, begin, stop = rows[parts].astype(np.int64), marks[parts], marks[parts + 1]
+    is_outside = ~region.holds(point_at(lines, line, 0.5 * (stop + begin)))
     # Parts in a row are one.
-    goes_on = np.concatenate([[False], out[1:] & out[:-1] & (line[1:] == line[:-1])])
-    first = np.flatnonzero(out & ~goes_on)
-    last = np.flatnonzero(out & ~np.append(goes_on[1:], False))
+    goes_on = np.concatenate([[False], is_outside[1:] & is_outside[:-1] & (line[1:] == line[:-1])])
+    first = np.flatnonzero(is_outside & ~goes_on)
+    last = np.flatnonzero(is_outside & ~np.append(goes_on[1:], False))
     for row, low, high in zip(
-        far[line[first]].tolist(), begin[first].tolist(), stop[last].tolist(), strict=True
+        long_rows[line[first]].tolist(), begin[first].tolist(), stop[last].tolist(), strict=True
     ):
         outside[row].append((low, high))
     return outside
@@ -584,17 +593,21 @@ def _outside(
 def _along(along: MeasuredPath, begin: float, end: float) -> Floats:
     """The piece of a closed path between two lengths, in the shorter direction."""
     forth = (end - begin) % along.total_mm
-    back = along.total_mm - forth
-    return along.piece(begin, begin + forth) if forth <= back else along.piece(begin, begin - back)
+    length_back = along.total_mm - forth
+    return (
+        along.piece(begin, begin + forth)
+        if forth <= length_back
+        else along.piece(begin, begin - length_back)
+    )
 
 
 def tidy(vertices: Floats) -> Floats:
     """Vertices (k, 3) of an open path without steps up to POSITION_EPS_MM; both ends stay."""
     step = np.hypot(*np.diff(vertices[:, :2], axis=0).T)
     keep: Ints = np.flatnonzero(np.concatenate([step > POSITION_EPS_MM, [True]]))
-    kept = vertices[keep].copy()
-    kept[0, :2] = vertices[0, :2]
-    return kept
+    vertices_kept = vertices[keep].copy()
+    vertices_kept[0, :2] = vertices[0, :2]
+    return vertices_kept
 
 
 def parts_of(lines: Polylines) -> list[Polylines]:
@@ -639,40 +652,40 @@ def outside_parts(lines: Polylines, region: Polylines) -> list[Polyline]:
     """Return what of the paths lies outside of a region (even-odd): open pieces, or whole
     paths."""
     border = Segments.of(region)
-    found: list[Polyline] = []
+    outside_pieces: list[Polyline] = []
     for path in lines:
         along = MeasuredPath.of(path)
         marks = _marks(along, border)
         outside = ~inside(along.at(0.5 * (marks[1:] + marks[:-1])), border)
-        found += _runs(along, marks, outside)
-    return found
+        outside_pieces += _runs(along, marks, outside)
+    return outside_pieces
 
 
 def _marks(along: MeasuredPath, border: Segments) -> Floats:
     """The lengths along a path, ascending, where it meets the border, and both its ends."""
-    met = crossings(along.segments, border)
+    common = crossings(along.segments, border)
     lengths = segment_lengths(along.segments)
-    at = along.reach[met.row_a] + met.ta * lengths[met.row_a]
-    every = np.unique(np.concatenate([[0.0, along.total_mm], at]))
-    apart = np.concatenate([[True], np.diff(every) > POSITION_EPS_MM])
-    marks: Floats = every[apart]
+    meeting_lengths = along.reach[common.row_a] + common.ta * lengths[common.row_a]
+    every = np.unique(np.concatenate([[0.0, along.total_mm], meeting_lengths]))
+    is_distinct = np.concatenate([[True], np.diff(every) > POSITION_EPS_MM])
+    marks: Floats = every[is_distinct]
     marks[-1] = along.total_mm
     return marks
 
 
-def _runs(along: MeasuredPath, marks: Floats, wanted: Bools) -> list[Polyline]:
+def _runs(along: MeasuredPath, marks: Floats, is_wanted: Bools) -> list[Polyline]:
     """The pieces between marks that are wanted, neighbours as one."""
-    if wanted.all():
+    if is_wanted.all():
         return [along.path]
     begin, end = marks[:-1], marks[1:]
     if along.path.closed:
-        turn = int(np.argmin(wanted))
-        wanted = np.roll(wanted, -turn)
+        turn = int(np.argmin(is_wanted))
+        is_wanted = np.roll(is_wanted, -turn)
         begin = np.roll(
             np.where(np.arange(len(begin)) < turn, begin + along.total_mm, begin), -turn
         )
         end = np.roll(np.where(np.arange(len(end)) < turn, end + along.total_mm, end), -turn)
-    first, last = true_ranges(wanted)
+    first, last = true_ranges(is_wanted)
     return [
         Polyline(along.piece(low, high))
         for low, high in zip(begin[first].tolist(), end[last - 1].tolist(), strict=True)
@@ -684,14 +697,14 @@ def scanned(line: Segments, region: Segments) -> tuple[Ints, Floats, Floats]:
 
     Ascending by row and by part; pieces up to POSITION_EPS_MM are left out.
     """
-    met = crossings(line, region)
-    rows = np.concatenate([np.arange(len(line)), np.arange(len(line)), met.row_a])
-    part = np.concatenate([np.zeros(len(line)), np.ones(len(line)), met.ta])
+    common = crossings(line, region)
+    rows = np.concatenate([np.arange(len(line)), np.arange(len(line)), common.row_a])
+    part = np.concatenate([np.zeros(len(line)), np.ones(len(line)), common.ta])
     order = np.lexsort([part, rows])
     rows, part = rows[order], part[order]
-    same = rows[1:] == rows[:-1]
-    row, low, high = rows[:-1][same], part[:-1][same], part[1:][same]
+    same_line = rows[1:] == rows[:-1]
+    row, low, high = rows[:-1][same_line], part[:-1][same_line], part[1:][same_line]
     keep = (high - low) * segment_lengths(line)[row] > POSITION_EPS_MM
     row, low, high = row[keep], low[keep], high[keep]
-    within = inside(point_at(line, row, 0.5 * (low + high)), region)
-    return row[within], low[within], high[within]
+    is_inside = inside(point_at(line, row, 0.5 * (low + high)), region)
+    return row[is_inside], low[is_inside], high[is_inside]

@@ -195,9 +195,9 @@ class _Drive(Struct):
         """Move in the air to `end`, in the direction that takes the axis to the position for
         it."""
         for sense in (self.sense_of(begin, end), -self.sense_of(begin, end)):
-            to = self.position_for(end, sense)
-            if (to - self.at) * sense > 0.0 or (sense == self.sense and to == self.at):
-                self.at, self.sense = to, sense
+            target = self.position_for(end, sense)
+            if (target - self.at) * sense > 0.0 or (sense == self.sense and target == self.at):
+                self.at, self.sense = target, sense
                 return
 
 
@@ -273,8 +273,8 @@ class _BacklashCompensator:
 
     def _enter(self, point: Point) -> None:
         """Use the backlash of the region around a point from here on."""
-        for drive, found in zip(self._drives, self._regions.residuals(point), strict=True):
-            drive.residual = found
+        for drive, axis_residual in zip(self._drives, self._regions.residuals(point), strict=True):
+            drive.residual = axis_residual
 
     def _place(self) -> Point:
         x, y, z = (drive.at for drive in self._drives)
@@ -303,7 +303,7 @@ class _BacklashCompensator:
     def _overshoot(self, segment: MonotoneSegment, move: Move) -> None:
         """Go out and make one step back, before a reversal that the controller compensates too
         much."""
-        back = []
+        reversing = []
         for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             sense = drive.sense_of(begin, end)
             excess = (drive.at - drive.position_for(begin, sense)) * sense
@@ -312,10 +312,10 @@ class _BacklashCompensator:
                     drive.position_for(begin, drive.sense) - drive.position_for(begin, sense)
                 ) * sense
                 drive.at -= max(excess - (1.0 - OVERSHOOT) * thrown, 0.0) * sense
-                back.append((drive, sense))
-        if back:
+                reversing.append((drive, sense))
+        if reversing:
             self._line(move)
-            for drive, sense in back:
+            for drive, sense in reversing:
                 drive.at += drive.step_mm * sense
                 drive.sense = sense
             self._line(move)
@@ -325,10 +325,10 @@ class _BacklashCompensator:
         ahead."""
         drive = self._drives[index]
         begin, end = segment.begin[index], segment.end[index]
-        ahead = (drive.at - drive.position_for(begin, drive.sense)) * drive.sense
-        if ahead <= AHEAD_MM:
+        distance = (drive.at - drive.position_for(begin, drive.sense)) * drive.sense
+        if distance <= AHEAD_MM:
             return 0.0
-        if ahead >= abs(end - begin):
+        if distance >= abs(end - begin):
             return 1.0
         return segment.share_at(index, drive.at + drive.residual.error_mm(drive.sense))
 
@@ -393,15 +393,15 @@ class _Regions:
 
     def residuals(self, point: Sequence[float]) -> tuple[Residual, ...]:
         """Return the residuals (X, Y, Z) where the tool is at `point` mm."""
-        found = []
+        residuals = []
         for axis, cells in enumerate(self._cells):
             if cells is None:
-                found.append(self._plain[axis])
+                residuals.append(self._plain[axis])
                 continue
             column = bisect_right(cells.x_mm[1:-1], point[0] - self._zero[0])
             row = bisect_right(cells.y_mm[1:-1], point[1] - self._zero[1])
-            found.append(self._by_cell[axis][row][column])
-        return tuple(found)
+            residuals.append(self._by_cell[axis][row][column])
+        return tuple(residuals)
 
     def parts(self, segment: MonotoneSegment) -> Iterator[MonotoneSegment]:
         """Yield the segment cut at the edges of all regions."""
@@ -428,11 +428,11 @@ def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
     """Compute the residual of an axis with this backlash (None: its own); compensation is in whole
     steps."""
     play = axis.backlash_mm if play_mm is None else play_mm
-    whole = float(to_steps(axis.compensation_mm, axis.coded_step_mm)) * axis.coded_step_mm
+    whole_steps_mm = float(to_steps(axis.compensation_mm, axis.coded_step_mm)) * axis.coded_step_mm
     at_motor = replace(
         axis,
         backlash_mm=play * axis.coded_step_mm / axis.real_step_mm,
-        compensation_mm=whole,
+        compensation_mm=whole_steps_mm,
     )
     return residual(at_motor, machine.controller)
 
@@ -457,8 +457,11 @@ class MonotoneSegment(Struct, frozen=True):
         if self.centre is None:
             return line[0], line[1], line[2]
         (cx, cy), (x, y, _) = self.centre, self.begin
-        radius, back = math.hypot(x - cx, y - cy), math.hypot(self.end[0] - cx, self.end[1] - cy)
-        radius += share * (back - radius)
+        radius, end_radius = (
+            math.hypot(x - cx, y - cy),
+            math.hypot(self.end[0] - cx, self.end[1] - cy),
+        )
+        radius += share * (end_radius - radius)
         angle = math.atan2(y - cy, x - cx) + share * self.sweep_rad
         return cx + radius * math.cos(angle), cy + radius * math.sin(angle), line[2]
 
@@ -497,13 +500,13 @@ def monotone_segments(move: Move, sweep_rad: float) -> Iterator[MonotoneSegment]
     if move.kind not in (Kind.ARC_CW, Kind.ARC_CCW) or move.centre is None:
         yield MonotoneSegment(move.start, move.end)
         return
-    whole = MonotoneSegment(move.start, move.end, move.centre, sweep_rad)
+    full_segment = MonotoneSegment(move.start, move.end, move.centre, sweep_rad)
     cx, cy = move.centre
     sign = math.copysign(1.0, sweep_rad)
     # Seen along the arc the turning points are the next multiples of a quarter turn.
     quarter = 0.5 * math.pi
-    ahead = sign * math.atan2(move.start[1] - cy, move.start[0] - cx)
-    turn = (math.floor(ahead / quarter) + 1.0) * quarter - ahead
+    travel_angle = sign * math.atan2(move.start[1] - cy, move.start[0] - cx)
+    turn = (math.floor(travel_angle / quarter) + 1.0) * quarter - travel_angle
     shares = [0.0]
     while turn < abs(sweep_rad) - TURN_EPS_RAD:
         if turn > TURN_EPS_RAD:
@@ -511,4 +514,4 @@ def monotone_segments(move: Move, sweep_rad: float) -> Iterator[MonotoneSegment]
         turn += quarter
     shares.append(1.0)
     for low, high in pairwise(shares):
-        yield whole.part(low, high)
+        yield full_segment.part(low, high)

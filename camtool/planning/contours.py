@@ -85,12 +85,12 @@ def runs_of(
     bridges: list[Bridge] = []
     for begin in range(0, len(order), CONTOURS_AT_ONCE):
         rows = range(begin, min(begin + CONTOURS_AT_ONCE, len(order)))
-        some = [contours[int(order[row])] for row in rows]
-        made = _cut_lot(some, paths.select(rows), keep_out)
-        parts.append(made.runs)
-        counts += made.counts
-        findings += made.findings
-        bridges += made.bridges
+        lot_contours = [contours[int(order[row])] for row in rows]
+        lot_runs = _cut_lot(lot_contours, paths.select(rows), keep_out)
+        parts.append(lot_runs.runs)
+        counts += lot_runs.counts
+        findings += lot_runs.findings
+        bridges += lot_runs.bridges
     return CutContours(Runs.joined(parts), tuple(counts), tuple(findings), tuple(bridges))
 
 
@@ -101,14 +101,14 @@ def _cut_lot(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) -
     findings: list[Finding] = []
     bridges: list[Bridge] = []
     for contour, along in zip(contours, MeasuredPaths(paths), strict=True):
-        angle, changed = _ramp_angle(contour, along)
+        angle, angle_findings = _ramp_angle(contour, along)
         tabs, left_out = tabs_of(contour, along)
-        made, leads = (_closed_passes if along.closed else _open_passes)(
+        pass_runs, leads = (_closed_passes if along.closed else _open_passes)(
             contour, along, (angle, tabs), keep_out
         )
-        passes += made
-        counts.append(len(made))
-        findings += [*changed, *left_out, *leads.findings]
+        passes += pass_runs
+        counts.append(len(pass_runs))
+        findings += [*angle_findings, *left_out, *leads.findings]
         bridges += bridges_of(along, tabs, contour.setting.operation.tool, contour.name)
     names = [
         contour.name for contour, count in zip(contours, counts, strict=True) for _ in range(count)
@@ -187,10 +187,10 @@ def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
         return parts[0]
     rows = [np.insert(leads.to[:-1], 2, parts[0][0, 2], axis=1)]
     for part in parts[:-1]:
-        out = np.insert(leads.away[1:], 2, part[-1, 2], axis=1)
+        way_out = np.insert(leads.away[1:], 2, part[-1, 2], axis=1)
         part[-1, 3] = leads.away[0, 2]
-        out[-1, 3] = 0.0 - leads.away[0, 2]
-        rows += [part, out]
+        way_out[-1, 3] = 0.0 - leads.away[0, 2]
+        rows += [part, way_out]
     last = parts[-1]
     last[-1, 3] = leads.away[0, 2] if len(leads.away) else 0.0
     return np.concatenate([*rows, last, np.insert(leads.away[1:], 2, last[-1, 2], axis=1)])
@@ -260,11 +260,11 @@ def with_starts(
         # Where it turns back at once is the tip of a relief.
         bend = np.abs(along.turns)
         turns = (bend > START_CORNER_RAD) & (bend < math.pi - START_CORNER_RAD)
-        around = np.abs(along.segments.radius - away_mm) <= POSITION_EPS_MM
-        return path, np.flatnonzero(turns | around)
+        is_round = np.abs(along.segments.radius - away_mm) <= POSITION_EPS_MM
+        return path, np.flatnonzero(turns | is_round)
     length = _midpoint(along) if isinstance(rule, str) else along.nearest_to(rule)
-    begun, start = _with_vertex(path, along, length)
-    return begun, np.array([start], dtype=np.int64)
+    begun_path, start = _with_vertex(path, along, length)
+    return begun_path, np.array([start], dtype=np.int64)
 
 
 def _midpoint(along: MeasuredPath) -> float:
@@ -277,9 +277,9 @@ def _midpoint(along: MeasuredPath) -> float:
 
 def _with_vertex(path: Polyline, along: MeasuredPath, length: float) -> tuple[Polyline, int]:
     """Return a measured path with a vertex at this length, and the index of the vertex."""
-    off = np.abs(along.reach - length)
-    vertex = int(off.argmin())
-    if off[vertex] <= START_SNAP_MM:
+    distances = np.abs(along.reach - length)
+    vertex = int(distances.argmin())
+    if distances[vertex] <= START_SNAP_MM:
         return path, vertex % len(path)
     row = int(np.searchsorted(along.reach, length)) - 1
     begin, end = along.reach[row : row + 2]

@@ -63,7 +63,7 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
     """Return what is drawn for each row of a toolpath, whose rows are of the runs (N,) of these
     steps, counted through all of them; the drawing in the work frame."""
     # One number, seen as many, until there is another.
-    off = np.broadcast_to(0.0, (len(toolpath), 2))
+    off_mm = np.broadcast_to(0.0, (len(toolpath), 2))
     edge = np.broadcast_to(np.int64(NO_EDGE), len(toolpath))
     columns = [(*np.empty((2, 0, 2, 2)), *np.empty((2, 0), dtype=np.bool_))]
     lines = [np.empty(0, dtype=np.int64)]
@@ -71,25 +71,32 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
     before_of: dict[str | int, int] = {}
     for number, (step, later) in enumerate(zip_longest(steps, steps[1:])):
         rows = np.flatnonzero((runs >= first) & (runs < first + len(step.runs)))
-        mine = rows[toolpath.is_feed[rows]]
-        for some, values in _off(toolpath, mine, step, placed):
-            off = off if off.flags.writeable else off.copy()
-            off[some] = values
-        made = _edges(step, later, placed)
+        feed_rows = rows[toolpath.is_feed[rows]]
+        for batch, values in _off(toolpath, feed_rows, step, placed):
+            off_mm = off_mm if off_mm.flags.writeable else off_mm.copy()
+            off_mm[batch] = values
+        edges = _edges(step, later, placed)
         if len(rows):
             edge = edge if edge.flags.writeable else edge.copy()
-            own = made.of_run[runs[rows] - first]
-            edge[rows] = np.where(own >= 0, own + sum(map(len, lines)), own)
+            own_edges = edges.of_run[runs[rows] - first]
+            edge[rows] = np.where(own_edges >= 0, own_edges + sum(map(len, lines)), own_edges)
         # What clears the rest of another one makes its lines with it.
         before = max((int(line.max(initial=-1)) + 1 for line in lines), default=0)
         before = before_of.setdefault(step.operation.rest or step.operation.name or number, before)
-        lines.append(made.line + before)
-        columns.append((made.nominal, made.planned, made.followed, made.cleared))
+        lines.append(edges.line + before)
+        columns.append((edges.nominal, edges.planned, edges.followed, edges.cleared))
         first += len(step.runs)
-    nominal, planned, followed, cleared = map(np.concatenate, zip(*columns, strict=True))
+    nominal, planned_boxes, followed, cleared = map(np.concatenate, zip(*columns, strict=True))
     line = np.concatenate(lines)
     return DrawnEdges(
-        off, edge, nominal, planned, line, followed, cleared, datum_off_mm=placed.datum_off_mm
+        off_mm,
+        edge,
+        nominal,
+        planned_boxes,
+        line,
+        followed,
+        cleared,
+        datum_off_mm=placed.datum_off_mm,
     )
 
 
@@ -98,35 +105,35 @@ def _off(
 ) -> Iterator[tuple[Ints, Floats]]:
     """Yield some of the rows (R,) at a time, and (R, 2) how far what was drawn lies from the lines
     that they were planned along, mm; rows that are left out lie on them."""
-    made = step.operation.contract.path_error_mm
-    lines, of = step.chosen.lines, placed.off_mm
+    path_error = step.operation.contract.path_error_mm
+    lines, drawn_off = step.chosen.lines, placed.off_mm
     if placed.datum_off_mm:
-        of = of + placed.datum_off_mm
-    if of.any() and lines.vertices is not placed.paths.vertices:
-        of = of[_vertex_rows(placed.paths, step.chosen.source)]
-    if not len(rows) or not of.any():
-        if made:
-            yield rows, np.full((len(rows), 2), made)
+        drawn_off = drawn_off + placed.datum_off_mm
+    if drawn_off.any() and lines.vertices is not placed.paths.vertices:
+        drawn_off = drawn_off[_vertex_rows(placed.paths, step.chosen.source)]
+    if not len(rows) or not drawn_off.any():
+        if path_error:
+            yield rows, np.full((len(rows), 2), path_error)
         return
 
     begin = segment_rows(lines).astype(np.int32)
     end = next_vertices(lines.offsets)[begin].astype(np.int32)
     tree = segment_tree(lines.vertices, begin, end)
     for first in range(0, len(rows), ROWS_AT_ONCE):
-        some = slice(first, first + ROWS_AT_ONCE)
-        points = np.ascontiguousarray(_points(toolpath, rows[some]))
+        batch = slice(first, first + ROWS_AT_ONCE)
+        points = np.ascontiguousarray(_points(toolpath, rows[batch]))
         pairs = segments_within(points, distances_from(points, tree) + AS_NEAR_MM, tree)
-        most = np.zeros((len(points) // len(PLACES), 2))
-        np.maximum.at(most, pairs[:, 0] // len(PLACES), of[begin[pairs[:, 1]]])
-        yield rows[some], most + made
+        max_off = np.zeros((len(points) // len(PLACES), 2))
+        np.maximum.at(max_off, pairs[:, 0] // len(PLACES), drawn_off[begin[pairs[:, 1]]])
+        yield rows[batch], max_off + path_error
 
 
-def _vertex_rows(lines: Polylines, chosen: Ints) -> Ints:
+def _vertex_rows(lines: Polylines, selection: Ints) -> Ints:
     """The vertices of the chosen paths, in their order."""
-    counts = np.diff(lines.offsets)[chosen]
-    begin = lines.offsets[:-1][chosen]
-    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.asarray(np.repeat(begin, counts) + within)
+    counts = np.diff(lines.offsets)[selection]
+    begin = lines.offsets[:-1][selection]
+    steps = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.asarray(np.repeat(begin, counts) + steps)
 
 
 def _points(toolpath: Toolpath, rows: Ints) -> Floats:
@@ -158,41 +165,41 @@ class _Edges(Struct, frozen=True, eq=False):
 def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
     """The edges that a step cuts; `later` is the step after this one. What is finished behind it
     is made by that."""
-    none = np.empty(0, dtype=np.bool_)
+    no_rows = np.empty(0, dtype=np.bool_)
     operation = step.operation
     is_finished = operation.stage == "rough" and later and later.operation.stage == "finish"
     if not operation.contract.has_edge or is_finished or not len(step.runs):
         unsized, boxes = np.full(len(step.runs), NO_EDGE), np.empty((0, 2, 2))
-        return _Edges(unsized, boxes, boxes, unsized[:0], none, none)
+        return _Edges(unsized, boxes, boxes, unsized[:0], no_rows, no_rows)
     drawn = path_extents(placed.paths)
     if contours := contours_of(step.items):
         return _beside_or_on(step, contours, drawn)
     source = np.array([item.source for item in step.items])[step.owner]
-    line, planned = drawn[source], _cleared_boxes(step.runs, operation.tool)
+    line, planned_boxes = drawn[source], _cleared_boxes(step.runs, operation.tool)
     if operation.contract.leaves_walls:
         # Reliefs reach farther into corners than the walls are apart.
         low, high = np.moveaxis(line - operation.allowance_mm * OUTWARDS, 2, 0)
-        planned = np.clip(planned, low[:, :, None], high[:, :, None])
+        planned_boxes = np.clip(planned_boxes, low[:, :, None], high[:, :, None])
     every = np.arange(len(step.runs))
     is_cleared = np.ones(len(every), dtype=np.bool_)
-    return _Edges(every, line, planned, source, ~is_cleared, is_cleared)
+    return _Edges(every, line, planned_boxes, source, ~is_cleared, is_cleared)
 
 
 def _beside_or_on(step: Step, contours: Sequence[Contour], drawn: Floats) -> _Edges:
     """The edges of contours beside their lines, or on them; `drawn` (M, 2, 2): the boxes of what
     is drawn."""
-    used = np.unique(step.owner).tolist()
-    centres = path_extents(Polylines.of(contours[k].path for k in used))
-    source = np.array([contours[k].source for k in used])
-    nominal, planned = drawn[source], centres.copy()
-    followed = np.zeros(len(used), dtype=np.bool_)
-    for row, k in enumerate(used):
+    used_contours = np.unique(step.owner).tolist()
+    centres = path_extents(Polylines.of(contours[k].path for k in used_contours))
+    source = np.array([contours[k].source for k in used_contours])
+    nominal, planned_boxes = drawn[source], centres.copy()
+    followed = np.zeros(len(used_contours), dtype=np.bool_)
+    for row, k in enumerate(used_contours):
         if contours[k].material_left is None:
             followed[row] = _cut_radius(contours[k].setting) > 0.0
         else:
-            nominal[row], planned[row] = _boxes(contours[k], nominal[row], centres[row])
-    of_run = np.searchsorted(used, step.owner)
-    return _Edges(of_run, nominal, planned, source, followed, np.zeros_like(followed))
+            nominal[row], planned_boxes[row] = _boxes(contours[k], nominal[row], centres[row])
+    of_run = np.searchsorted(used_contours, step.owner)
+    return _Edges(of_run, nominal, planned_boxes, source, followed, np.zeros_like(followed))
 
 
 def _cut_radius(setting: Setting) -> float:
@@ -206,8 +213,8 @@ def _boxes(contour: Contour, drawn: Floats, centre: Floats) -> tuple[Floats, Flo
     operation = contour.setting.operation
     radius, allowance = operation.tool.radius_mm, operation.allowance_mm
     reach = _cut_radius(contour.setting)
-    more = np.diff(centre - drawn)[:, 0] - 2.0 * (radius + allowance)
-    if more.max() < -SAME_SIZE_MM:
+    excess = np.diff(centre - drawn)[:, 0] - 2.0 * (radius + allowance)
+    if excess.max() < -SAME_SIZE_MM:
         # Reliefs reach farther into corners than the walls are apart.
         low, high = (drawn - (allowance + radius - reach) * OUTWARDS).T
         return drawn, np.clip(centre + reach * OUTWARDS, low[:, None], high[:, None])
@@ -217,10 +224,10 @@ def _boxes(contour: Contour, drawn: Floats, centre: Floats) -> tuple[Floats, Flo
     spare = 0.0
     if operation.joins != "round":
         spare = 2.0 * (radius + allowance) * (operation.mitre_limit - 1.0)
-    if more.max() <= SAME_SIZE_MM + spare:
+    if excess.max() <= SAME_SIZE_MM + spare:
         return drawn, wall
-    planned = centre - reach * OUTWARDS if allowance >= 0.0 else wall
-    return centre - (radius + allowance) * OUTWARDS, planned
+    planned_box = centre - reach * OUTWARDS if allowance >= 0.0 else wall
+    return centre - (radius + allowance) * OUTWARDS, planned_box
 
 
 def _wall_box(contour: Contour, drawn: Floats) -> Floats:
@@ -243,8 +250,8 @@ def _cleared_boxes(runs: Runs, tool: Tool) -> Floats:
     is farthest where the centre stands at the angle  a + arcsin(d / (R s))  of the arc.
     """
     vertices, first = runs.vertices, runs.first[:-1]
-    heights, of = np.unique(np.minimum(vertices[:, 2], 0.0), return_inverse=True)
-    reach = np.array([tool.radius_at(-z) for z in heights.tolist()])[of.reshape(-1)]
+    heights, height_index = np.unique(np.minimum(vertices[:, 2], 0.0), return_inverse=True)
+    reach = np.array([tool.radius_at(-z) for z in heights.tolist()])[height_index.reshape(-1)]
     low = np.minimum.reduceat(vertices[:, :2] - reach[:, None], first)
     high = np.maximum.reduceat(vertices[:, :2] + reach[:, None], first)
     bent = vertices[:, 3] != 0.0
@@ -259,12 +266,16 @@ def _cleared_boxes(runs: Runs, tool: Tool) -> Floats:
         axis, is_high = quarter % 2, quarter < 2
         turn = np.sign(arcs.sweep) * (0.5 * np.pi * quarter + lean - arcs.start_angle)
         part = np.mod(turn, 2.0 * np.pi) / np.abs(arcs.sweep)
-        at = np.flatnonzero(part < 1.0)
-        edge = arcs.radius[at] * np.cos(lean[at]) + reach[rows[at]] + part[at] * wider[at]
+        sloping = np.flatnonzero(part < 1.0)
+        edge = (
+            arcs.radius[sloping] * np.cos(lean[sloping])
+            + reach[rows[sloping]]
+            + part[sloping] * wider[sloping]
+        )
         if is_high:
-            np.maximum.at(high[:, axis], run[at], arcs.centre[at, axis] + edge)
+            np.maximum.at(high[:, axis], run[sloping], arcs.centre[sloping, axis] + edge)
         else:
-            np.minimum.at(low[:, axis], run[at], arcs.centre[at, axis] - edge)
+            np.minimum.at(low[:, axis], run[sloping], arcs.centre[sloping, axis] - edge)
     return np.stack([low, high], axis=2)
 
 
@@ -292,20 +303,20 @@ def _kept(step: Step) -> Iterator[ProtectedRegion]:
         runs = tuple(run.vertices for run in step.runs)
         yield ProtectedRegion(runs, lines, depth % 2 == 1, True, operation.beyond_mm)
         return
-    beside = operation.contract.leaves_walls and runs_beside(operation)
-    beside = beside and operation.corners == "none"
-    for level in _levels(operation, depth) if beside else ():
-        mine = rows[level]
-        lines, stays = chosen.lines.select(mine.tolist()), chosen.rim[mine]
+    leaves_walls = operation.contract.leaves_walls and runs_beside(operation)
+    leaves_walls = leaves_walls and operation.corners == "none"
+    for level in _levels(operation, depth) if leaves_walls else ():
+        level_rows = rows[level]
+        lines, stays = chosen.lines.select(level_rows.tolist()), chosen.rim[level_rows]
         # Beside a rim the rest of the stock is waste; beside a hole it is part.
         for rim in (True, False):
-            names = {chosen.names[row] for row in mine[stays == rim].tolist()}
+            names = {chosen.names[row] for row in level_rows[stays == rim].tolist()}
             runs = _contour_runs(step, names)
             yield ProtectedRegion(runs, lines, stays, not rim, operation.beyond_mm)
-    judged = {chosen.names[row] for row in rows.tolist()} if beside else set()
+    judged_names = {chosen.names[row] for row in rows.tolist()} if leaves_walls else set()
     # Open contours are cut on their lines, wherever these are; other runs leave nothing either.
-    free = tuple(run.vertices for run in step.runs if run.name not in judged)
-    yield ProtectedRegion(free, Polylines.of([]), np.empty(0, dtype=np.bool_), False)
+    free_runs = tuple(run.vertices for run in step.runs if run.name not in judged_names)
+    yield ProtectedRegion(free_runs, Polylines.of([]), np.empty(0, dtype=np.bool_), False)
 
 
 def _levels(operation: Operation, depth: Ints) -> Iterator[Bools]:

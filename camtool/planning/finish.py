@@ -61,8 +61,8 @@ def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]
     if not operation.stage:
         return list(findings)
     if operation.stage == "rough":
-        own = {ProgramCode.GOUGE} if operation.contract.runs_beside else set()
-        return [each for each in findings if each.code in own or each.code not in OF_WALLS]
+        own_codes = {ProgramCode.GOUGE} if operation.contract.runs_beside else set()
+        return [each for each in findings if each.code in own_codes or each.code not in OF_WALLS]
     return [each for each in findings if each.code in (*OF_WALLS, PlanningCode.LEAD_LEFT_OUT)]
 
 
@@ -86,8 +86,8 @@ def in_passes(
     operation = setting.operation
     if not contours:
         return contours, []
-    most, where = _engaged(contours, operation, rough)
-    if most <= MAX_ENGAGED_SHARE * operation.tool.diameter_mm + POSITION_EPS_MM:
+    max_engaged, place = _engaged(contours, operation, rough)
+    if max_engaged <= MAX_ENGAGED_SHARE * operation.tool.diameter_mm + POSITION_EPS_MM:
         return contours, []
     depth = -setting.levels_mm[-1]
     try:
@@ -98,9 +98,9 @@ def in_passes(
         ) from error
     stepped = replace(setting, levels_mm=passes)
     contours = [replace(contour, setting=stepped) for contour in contours]
-    if math.isinf(most):
-        return contours, [FINISH_IN_PASSES_WHOLE(where=where, passes=len(passes))]
-    return contours, [FINISH_IN_PASSES(where=where, measured=most, passes=len(passes))]
+    if math.isinf(max_engaged):
+        return contours, [FINISH_IN_PASSES_WHOLE(where=place, passes=len(passes))]
+    return contours, [FINISH_IN_PASSES(where=place, measured=max_engaged, passes=len(passes))]
 
 
 def _engaged(contours: list[Contour], operation: Operation, rough: Step) -> tuple[float, str]:
@@ -109,16 +109,19 @@ def _engaged(contours: list[Contour], operation: Operation, rough: Step) -> tupl
     if not len(rough.runs):
         return math.inf, at_place(contours[0].name, contours[0].path.start.tolist())
     cleared = _paths(rough)
-    most, where = -math.inf, ""
+    max_engaged, place = -math.inf, ""
     wide = operation.tool.diameter_mm
     for contour in contours:
         path = contour.path
         points = sample(path, wide / SAMPLES_PER_TOOL) if wide else path.vertices[:, :2]
-        apart = nearest(points, cleared).distance
-        worst = int(apart.argmax())
-        if apart[worst] > most:
-            most, where = float(apart[worst]), at_place(contour.name, points[worst].tolist())
-    return most + operation.tool.radius_mm - rough.operation.tool.radius_mm, where
+        distances = nearest(points, cleared).distance
+        worst = int(distances.argmax())
+        if distances[worst] > max_engaged:
+            max_engaged, place = (
+                float(distances[worst]),
+                at_place(contour.name, points[worst].tolist()),
+            )
+    return max_engaged + operation.tool.radius_mm - rough.operation.tool.radius_mm, place
 
 
 def _paths(step: Step) -> Segments:

@@ -56,18 +56,18 @@ def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation
     """Findings on the sides of an operation: gouges, and sides that follow from uncut contours."""
     if operation.contract.clears:
         cleared = list(_cleared_away(chosen, sides, operation))
-        beyond = list(_beside_pocket(sides, operation)) if operation.beyond_mm else []
+        pocket_findings = list(_beside_pocket(sides, operation)) if operation.beyond_mm else []
         return [
             *shortened_list(cleared, GOUGE_BY_POCKET_MORE),
-            *shortened_list(beyond, GOUGE_MORE),
+            *shortened_list(pocket_findings, GOUGE_MORE),
         ]
     if not runs_beside(operation):
         return []
     gouges = list(_gouges(work, chosen, sides, operation))
-    found = shortened_list(gouges, GOUGE_MORE)
+    findings = shortened_list(gouges, GOUGE_MORE)
     if operation.side == "auto":
-        found += by_uncut(sides, operation, chosen.source[chosen.lines.closed])
-    return found
+        findings += by_uncut(sides, operation, chosen.source[chosen.lines.closed])
+    return findings
 
 
 def branch_findings(
@@ -75,14 +75,14 @@ def branch_findings(
 ) -> list[Finding]:
     """Errors where an operation needs to know what contours enclose that pass `branches` of the
     placed drawing at which that is a choice: its own, and those that decide its sides."""
-    beside = runs_beside(operation)
-    if not (beside or operation.contract.cuts == "within"):
+    is_beside = runs_beside(operation)
+    if not (is_beside or operation.contract.cuts == "within"):
         return []
-    asked = np.zeros(len(sides.lines), dtype=np.bool_)
-    asked[chosen.source] = True
-    if beside and operation.side == "auto":
-        asked |= sides.seen_by(operation).bounds
-    found = [
+    is_asked = np.zeros(len(sides.lines), dtype=np.bool_)
+    is_asked[chosen.source] = True
+    if is_beside and operation.side == "auto":
+        is_asked |= sides.seen_by(operation).bounds
+    findings = [
         BRANCHED_REGION(
             where=at_place(sides.names[rows[0]], branch.at_mm),
             measured=branch.ends,
@@ -90,9 +90,9 @@ def branch_findings(
             contour=sides.names[rows[0]],
         )
         for branch in branches
-        if (rows := [row for row in branch.paths if asked[row]])
+        if (rows := [row for row in branch.paths if is_asked[row]])
     ]
-    return shortened_list(found, BRANCHED_REGION_MORE)
+    return shortened_list(findings, BRANCHED_REGION_MORE)
 
 
 def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> Iterator[Finding]:
@@ -102,51 +102,54 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     if operation.stage == "rough":
         allowance = 0.0  # what roughing takes of it is not missed
     bevel = operation.chamfer_mm or 0.0  # edges of others are not to be broken
-    beside = [item for item in contours_of(work.items) if item.material_left is not None]
-    seen, sided = sides.seen_by(operation), sides.sided()
-    wanted = sided | seen.bounds
+    beside_items = [item for item in contours_of(work.items) if item.material_left is not None]
+    seen_sides, sided = sides.seen_by(operation), sides.sided()
+    is_wall = sided | seen_sides.bounds
     # Those of one operation with the side auto are offset together.
-    own = set(chosen.source.tolist())
+    own_rows = set(chosen.source.tolist())
     if operation.side == "auto":
-        wanted = wanted.copy()
-        wanted[chosen.source] = False
-    others = np.flatnonzero(wanted)
-    walls = sides.lines.select(others.tolist())
-    paths = Polylines.of(item.path for item in beside)
-    for one, which in near_paths(paths, walls, radius + bevel + max(allowance, 0.0)):
-        item, other = beside[one], int(others[which])
-        wall = walls[which]
+        is_wall = is_wall.copy()
+        is_wall[chosen.source] = False
+    wall_rows = np.flatnonzero(is_wall)
+    walls = sides.lines.select(wall_rows.tolist())
+    paths = Polylines.of(item.path for item in beside_items)
+    for one, wall_row in near_paths(paths, walls, radius + bevel + max(allowance, 0.0)):
+        item, other = beside_items[one], int(wall_rows[wall_row])
+        wall = walls[wall_row]
         if item.source == other:
             continue
-        near = approach(item.path, wall)
-        reach = radius if other in own else radius + bevel
+        nearest_approach = approach(item.path, wall)
+        reach = radius if other in own_rows else radius + bevel
         reach -= _taken_back(sides, other, item.path)
-        if near.distance >= reach - GOUGE_TOLERANCE_MM:
-            if other in own and near.distance < radius + allowance - GOUGE_TOLERANCE_MM:
+        if nearest_approach.distance >= reach - GOUGE_TOLERANCE_MM:
+            if (
+                other in own_rows
+                and nearest_approach.distance < radius + allowance - GOUGE_TOLERANCE_MM
+            ):
                 yield GOUGE_OF_ALLOWANCE(
-                    where=at_place(item.name, near.point),
-                    measured=near.distance,
+                    where=at_place(item.name, nearest_approach.point),
+                    measured=nearest_approach.distance,
                     limit=radius + allowance,
                     severity=Severity.WARNING,
                     tool=tool_name(operation.tool),
                     contour=item.name,
-                    amount=radius + allowance - near.distance,
+                    amount=radius + allowance - nearest_approach.distance,
                     other=sides.names[other],
                 )
             continue
         drawn = sides.lines[item.source]
-        kept = bool(sided[other])
-        if not kept and _lies_in(drawn, wall):
+        is_kept = bool(sided[other])
+        if not is_kept and _lies_in(drawn, wall):
             continue  # the edge of the stock, or of a sheet: nothing says that it stays
-        is_asked = operation.side != "auto" and (other in own or _cross(drawn, wall))
-        amount = reach - near.distance
-        if near.distance <= POSITION_EPS_MM:
+        is_asked = operation.side != "auto" and (other in own_rows or _cross(drawn, wall))
+        amount = reach - nearest_approach.distance
+        if nearest_approach.distance <= POSITION_EPS_MM:
             amount = reach + _beyond(item.path, wall, drawn)
-        yield (GOUGE if kept else GOUGE_OF_UNCUT)(
-            where=at_place(item.name, near.point),
-            measured=near.distance,
+        yield (GOUGE if is_kept else GOUGE_OF_UNCUT)(
+            where=at_place(item.name, nearest_approach.point),
+            measured=nearest_approach.distance,
             limit=reach,
-            severity=Severity.ERROR if kept and not is_asked else Severity.WARNING,
+            severity=Severity.ERROR if is_kept and not is_asked else Severity.WARNING,
             tool=tool_name(operation.tool),
             contour=item.name,
             amount=amount,
@@ -157,12 +160,12 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
 def _taken_back(sides: Sides, other: int, path: Polyline) -> float:
     """Distance by which the wall of a contour is taken back, mm, seen from where another path
     begins."""
-    without, within = sides.beyond_mm[other].tolist()
-    if not (without or within):
+    taken_outside, taken_inside = sides.beyond_mm[other].tolist()
+    if not (taken_outside or taken_inside):
         return 0.0
     # What stays is on the other side of the wall.
-    here = inside(np.array(path.vertices[:1, :2]), Segments.of(sides.lines[other]))[0]
-    return float(without if here else within)
+    starts_inside = inside(np.array(path.vertices[:1, :2]), Segments.of(sides.lines[other]))[0]
+    return float(taken_outside if starts_inside else taken_inside)
 
 
 def _beside_pocket(sides: Sides, pocket: Operation) -> Iterator[Finding]:
@@ -170,29 +173,29 @@ def _beside_pocket(sides: Sides, pocket: Operation) -> Iterator[Finding]:
     contour beside it that a profile follows. Where it only opens towards the contour around it,
     nothing is lost."""
     cut = sides.cut_by(pocket) & sides.lines.closed
-    rows, others = np.flatnonzero(cut), np.flatnonzero(sides.sided() & ~cut)
-    lines, walls = (sides.lines.select(each.tolist()) for each in (rows, others))
+    rows, wall_rows = np.flatnonzero(cut), np.flatnonzero(sides.sided() & ~cut)
+    lines, walls = (sides.lines.select(each.tolist()) for each in (rows, wall_rows))
     cleared = Segments.of(lines)
-    for one, which in near_paths(lines, walls, pocket.beyond_mm):
-        line, wall = lines[one], walls[which]
-        near = approach(line, wall)
-        if near.distance >= pocket.beyond_mm - GOUGE_TOLERANCE_MM:
+    for one, wall_row in near_paths(lines, walls, pocket.beyond_mm):
+        line, wall = lines[one], walls[wall_row]
+        nearest_approach = approach(line, wall)
+        if nearest_approach.distance >= pocket.beyond_mm - GOUGE_TOLERANCE_MM:
             continue
         places = _witnesses(wall)
-        aside = nearest(places, cleared).distance > GOUGE_TOLERANCE_MM
-        if not (aside & ~inside(places, cleared)).any():
+        is_outside = nearest(places, cleared).distance > GOUGE_TOLERANCE_MM
+        if not (is_outside & ~inside(places, cleared)).any():
             continue  # it goes through the floor
-        if near.distance <= GOUGE_TOLERANCE_MM and _lies_in(line, wall):
+        if nearest_approach.distance <= GOUGE_TOLERANCE_MM and _lies_in(line, wall):
             continue
         yield GOUGE(
-            where=at_place(sides.names[int(rows[one])], near.point),
-            measured=near.distance,
+            where=at_place(sides.names[int(rows[one])], nearest_approach.point),
+            measured=nearest_approach.distance,
             limit=pocket.beyond_mm,
             severity=Severity.WARNING,
             tool=tool_name(pocket.tool),
             contour=sides.names[int(rows[one])],
-            amount=pocket.beyond_mm - near.distance,
-            other=sides.names[int(others[which])],
+            amount=pocket.beyond_mm - nearest_approach.distance,
+            other=sides.names[int(wall_rows[wall_row])],
         )
 
 
@@ -214,16 +217,16 @@ def _within(points: Floats, wall: Polyline) -> tuple[Bools, Floats]:
 
 def _lies_in(path: Polyline, wall: Polyline) -> bool:
     """True if a path lies within a closed one."""
-    within, away = _parts(path, wall)
-    return bool((within | (away <= GOUGE_TOLERANCE_MM)).all())
+    is_inside, distances = _parts(path, wall)
+    return bool((is_inside | (distances <= GOUGE_TOLERANCE_MM)).all())
 
 
 def _cross(one: Polyline, other: Polyline) -> bool:
     """True if two closed paths cross, and not only touch."""
     for path, wall in ((one, other), (other, one)):
-        within, away = _parts(path, wall)
-        clear = away > GOUGE_TOLERANCE_MM
-        if (within & clear).any() and (~within & clear).any():
+        is_inside, distances = _parts(path, wall)
+        clear = distances > GOUGE_TOLERANCE_MM
+        if (is_inside & clear).any() and (~is_inside & clear).any():
             return True
     return False
 
@@ -232,18 +235,18 @@ def _beyond(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
     """Greatest distance of the tool's centre across a closed line, mm; the side on which most of
     the drawn contour lies is this side of it."""
     length = float(path_lengths(Polylines.of([path]))[0])
-    within, away = _within(sample(path, length / SAMPLES_ROUND), wall)
+    is_inside, distances = _within(sample(path, length / SAMPLES_ROUND), wall)
     home, clear = _parts(drawn, wall)
     mostly_in = bool((np.where(home, 1.0, -1.0) * (clear > GOUGE_TOLERANCE_MM)).sum() > 0.0)
-    return float(away[within != mostly_in].max(initial=0.0))
+    return float(distances[is_inside != mostly_in].max(initial=0.0))
 
 
 def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[Finding]:
     """Parts that another operation keeps, in what a pocket (or a bore) clears as deep as that, or
     deeper."""
-    kept = sides.kept_from(pocket)
-    kept[chosen.source] = False
-    rows = np.flatnonzero(kept)
+    is_kept = sides.kept_from(pocket)
+    is_kept[chosen.source] = False
+    rows = np.flatnonzero(is_kept)
     if len(rows) == 0:
         return
     holds = sides.cut_by(pocket)
@@ -264,22 +267,22 @@ def by_uncut(sides: Sides, operation: Operation, rows: Ints) -> Iterator[Finding
     """Yield findings of what follows from uncut closed contours, for those of the operation
     (`rows`): some have their side because of them, others in spite of those on the layers of
     frames."""
-    seen = sides.seen_by(operation)
-    for sentence, turned, around in (
-        (SIDE_BY_UNCUT, seen.by_uncut, sides.uncut),
-        (SIDE_BY_UNCUT_FRAME, seen.by_frames, sides.frames),
+    seen_sides = sides.seen_by(operation)
+    for sentence, is_turned, surrounding in (
+        (SIDE_BY_UNCUT, seen_sides.by_uncut, sides.uncut),
+        (SIDE_BY_UNCUT_FRAME, seen_sides.by_frames, sides.frames),
     ):
-        found = rows[turned[rows]]
-        if len(found) == 0:
+        affected = rows[is_turned[rows]]
+        if len(affected) == 0:
             continue
-        parent = sides.nesting.levels_by(around).parent
-        first = int(found[0])
+        parent = sides.nesting.levels_by(surrounding).parent
+        first = int(affected[0])
         name = sides.names[int(parent[first])]
         yield sentence(
             where=operation_name(operation),
-            measured=len(found),
+            measured=len(affected),
             uncut=name,
             layer=name.partition("/")[0],
             first=sides.names[first],
-            side="outside" if seen.rim[first] else "inside",
+            side="outside" if seen_sides.rim[first] else "inside",
         )

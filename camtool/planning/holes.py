@@ -83,8 +83,8 @@ def circle_of(path: Polyline) -> tuple[tuple[float, float], float] | None:
     radius = 0.25 * (xmax - xmin + ymax - ymin)
     segments = Segments.of(path)
     points = sample(path, 2.0 * math.pi * radius / SAMPLES_ROUND)
-    off = np.abs(np.hypot(*(points - centre).T) - radius).max()
-    round_enough = off <= max(ROUND_MM, ROUND_SHARE * radius) and off < 0.5 * radius
+    deviation = np.abs(np.hypot(*(points - centre).T) - radius).max()
+    round_enough = deviation <= max(ROUND_MM, ROUND_SHARE * radius) and deviation < 0.5 * radius
     once_round = bool(segments.is_arc.all()) and _turns_once(segments.sweep)
     return (centre, 2.0 * radius) if round_enough and once_round else None
 
@@ -109,14 +109,14 @@ def each_once(holes: list[Hole], drill_mm: float) -> list[Hole]:
         return (math.inf if diameter is None else abs(diameter - drill_mm), index)
 
     places = np.array([hole.at_mm for hole in holes]).reshape(-1, 2)
-    taken: Bools = np.zeros(len(holes), dtype=np.bool_)
-    kept: list[int] = []
+    is_taken: Bools = np.zeros(len(holes), dtype=np.bool_)
+    kept_rows: list[int] = []
     for index in sorted(range(len(holes)), key=misfit):
-        if taken[index]:
+        if is_taken[index]:
             continue
-        kept.append(index)
-        taken |= np.hypot(*(places - places[index]).T) <= SAME_HOLE_MM
-    return [holes[index] for index in sorted(kept)]
+        kept_rows.append(index)
+        is_taken |= np.hypot(*(places - places[index]).T) <= SAME_HOLE_MM
+    return [holes[index] for index in sorted(kept_rows)]
 
 
 def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
@@ -124,8 +124,8 @@ def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
     depth; ValueError for a depth that is not above 0."""
     if not depth_mm > 0.0:
         raise ValueError(f"a hole {depth_mm} mm deep")
-    whole = depth_mm if peck_mm is None else peck_mm
-    count = max(1, math.ceil(depth_mm / whole - PECK_SHARE))
+    peck_size = depth_mm if peck_mm is None else peck_mm
+    count = max(1, math.ceil(depth_mm / peck_size - PECK_SHARE))
     return [depth_mm * ((step + 1) / count) for step in range(count)]
 
 
@@ -145,14 +145,14 @@ def pecks(
 
 def circles_of(chosen: Chosen) -> tuple[list[Hole], list[str]]:
     """The full circles of the paths, and the names of the other paths."""
-    holes, others = [], []
+    holes, other_names = [], []
     for path, source, name in zip(chosen.lines, chosen.source, chosen.names, strict=True):
         circle = circle_of(path)
         if circle is None:
-            others.append(name)
+            other_names.append(name)
         else:
             holes.append(Hole(*circle, name, int(source), path))
-    return holes, others
+    return holes, other_names
 
 
 def largest_hole_mm(operation: Operation) -> float:
@@ -167,18 +167,18 @@ def drilled_holes(
 ) -> tuple[list[Hole], list[Hole], list[str]]:
     """Return the holes that an operation drills, each place once; the circles that are too large
     for it; and the names of the paths that are no circles."""
-    circles, others = circles_of(chosen)
+    circles, other_names = circles_of(chosen)
     limit = largest_hole_mm(operation) + HOLE_SIZE_MM
-    small = [hole for hole in circles if (hole.diameter_mm or 0.0) <= limit]
+    small_circles = [hole for hole in circles if (hole.diameter_mm or 0.0) <= limit]
     large = [hole for hole in circles if (hole.diameter_mm or 0.0) > limit]
     marks = [
         Hole((float(x), float(y)), None, name)
         for (x, y), name in zip(chosen.points, chosen.point_names, strict=True)
     ]
-    return each_once([*marks, *small], operation.tool.diameter_mm), large, others
+    return each_once([*marks, *small_circles], operation.tool.diameter_mm), large, other_names
 
 
 def named(names: list[str]) -> str:
     """The first few names, and how many more there are."""
-    more = len(names) - NAMES_SHOWN
-    return ", ".join(names[:NAMES_SHOWN]) + (f" and {more} more" if more > 0 else "")
+    extra = len(names) - NAMES_SHOWN
+    return ", ".join(names[:NAMES_SHOWN]) + (f" and {extra} more" if extra > 0 else "")

@@ -108,13 +108,13 @@ class Runs(Struct, frozen=True, eq=False):
             return parts[0]
         before = np.cumsum([0, *(len(part.vertices) for part in parts)], dtype=np.int64)
         firsts = [part.first[:-1] + n for part, n in zip(parts, before.tolist(), strict=False)]
-        none = cls.of([])
+        empty = cls.of([])
         return cls(
-            np.concatenate([none.vertices, *(part.vertices for part in parts)]),
-            np.concatenate([none.feed_mm_min, *(part.feed_mm_min for part in parts)]),
+            np.concatenate([empty.vertices, *(part.vertices for part in parts)]),
+            np.concatenate([empty.feed_mm_min, *(part.feed_mm_min for part in parts)]),
             np.concatenate([*firsts, before[-1:]]),
-            np.concatenate([none.plunge_mm_min, *(part.plunge_mm_min for part in parts)]),
-            np.concatenate([none.dwell_s, *(part.dwell_s for part in parts)]),
+            np.concatenate([empty.plunge_mm_min, *(part.plunge_mm_min for part in parts)]),
+            np.concatenate([empty.dwell_s, *(part.dwell_s for part in parts)]),
             tuple(name for part in parts for name in part.names),
         )
 

@@ -169,21 +169,21 @@ def all_above_zero(name: str, values: Sequence[float], unit: str = "") -> None:
         above_zero(name, value, unit)
 
 
-def at_least_zero(name: str, value: float, unit: str, most: float | None = None) -> None:
+def at_least_zero(name: str, value: float, unit: str, max_value: float | None = None) -> None:
     """Refuse a number below 0, or not plausible."""
     if not (math.isfinite(value) and value >= 0.0):
         raise OptionError(
             f"{_said(name, value, unit)} is not 0 or more",
             mend=f"give a {name} of 0 or more",
         )
-    _at_most(name, value, unit, most)
+    _at_most(name, value, unit, max_value)
 
 
-def finite(name: str, value: float, unit: str, most: float | None = None) -> None:
+def finite(name: str, value: float, unit: str, max_value: float | None = None) -> None:
     """Refuse what is no number, or not plausible."""
     if not math.isfinite(value):
         raise OptionError(f"{_said(name, value, unit)} is no number", mend=f"give a {name}")
-    _at_most(name, abs(value), unit, most)
+    _at_most(name, abs(value), unit, max_value)
 
 
 MAX_LONG_MOVES = 3_000_000
@@ -200,18 +200,18 @@ def refuse_endless(
 ) -> None:
     """OptionError when more than MAX_MOVES moves (MAX_LONG_MOVES if `is_long`) are estimated to
     result from what was `asked`, such as "10000 passes"."""
-    most = MAX_LONG_MOVES if is_long else MAX_MOVES
-    if moves > most:
+    max_moves = MAX_LONG_MOVES if is_long else MAX_MOVES
+    if moves > max_moves:
         meant = f", or --allow long if it is meant (up to {MAX_LONG_MOVES:,})"
         raise OptionError(
-            f"{asked} would make {moves:.3g} moves, more than {most:,}",
+            f"{asked} would make {moves:.3g} moves, more than {max_moves:,}",
             where=where,
             mend=mend if moves > MAX_LONG_MOVES else mend + meant,
         )
 
 
-def _at_most(name: str, value: float, unit: str, most: float | None) -> None:
-    limit = MAX_BY_UNIT[unit] if most is None else most
+def _at_most(name: str, value: float, unit: str, max_value: float | None) -> None:
+    limit = MAX_BY_UNIT[unit] if max_value is None else max_value
     if value > limit:
         raise OptionError(
             f"{_said(name, value, unit)} is more than {limit:g}", mend=f"give a smaller {name}"
@@ -248,14 +248,14 @@ def _refuse_fit(fit_mm: tuple[float, float]) -> None:
         )
 
 
-def _refuse_beyond(key: str, lengths: tuple[float, float], least: float, most: float) -> None:
+def _refuse_beyond(key: str, lengths: tuple[float, float], min_mm: float, max_mm: float) -> None:
     """Refuse lengths outside of these limits."""
     for length in lengths:
-        if not least <= length <= most:
+        if not min_mm <= length <= max_mm:
             raise OptionError(
-                f"{length:g} mm is not between {least:g} and {most:g}",
+                f"{length:g} mm is not between {min_mm:g} and {max_mm:g}",
                 where=f"key {key}",
-                mend=f"give a length from {least:g} to {most:g} mm",
+                mend=f"give a length from {min_mm:g} to {max_mm:g} mm",
             )
 
 
@@ -327,15 +327,15 @@ class Tool:
     def bodies(self) -> tuple[tuple[str, float, float, float], ...]:
         """The cylinders above the flutes that are known: "shank" or "holder", radius, and the
         heights above the tip where it begins and ends, mm."""
-        found = []
+        bodies = []
         ends = math.inf if self.stickout_mm is None else self.stickout_mm
         begins, shank = self.cutting_length_mm, self.shank_diameter_mm
         if begins is not None and shank is not None and begins < ends:
-            found.append(("shank", 0.5 * shank, begins, ends))
+            bodies.append(("shank", 0.5 * shank, begins, ends))
         if self.stickout_mm is not None and self.holder_diameter_mm is not None:
             top = ends + (self.holder_length_mm or math.inf)
-            found.append(("holder", 0.5 * self.holder_diameter_mm, ends, top))
-        return tuple(found)
+            bodies.append(("holder", 0.5 * self.holder_diameter_mm, ends, top))
+        return tuple(bodies)
 
     @property
     def radius_mm(self) -> float:
@@ -434,8 +434,10 @@ class Tabs:
                 finite("place of a tab", coordinate, "mm", MAX_POSITION_MM)
         if self.at_mm == ():
             raise OptionError("an empty list gives no tab", mend="leave tabs out")
-        given = [each for each in (self.count, self.spacing_mm, self.at_mm) if each is not None]
-        if len(given) != 1:
+        given_counts = [
+            each for each in (self.count, self.spacing_mm, self.at_mm) if each is not None
+        ]
+        if len(given_counts) != 1:
             raise OptionError(
                 "tabs need a count or a spacing, or places", mend="give one of the three"
             )
@@ -564,11 +566,13 @@ class Operation:
     def _refuse_contradictions(self) -> None:
         """Settings that are fine one by one and cannot be together."""
         named = f"operation {self.name!r}, " if self.name else ""
-        for word, others in _APART:
-            both = [other for other in others if word in self.select and other in self.select]
-            if both:
+        for word, other_words in _APART:
+            clashing = [
+                other for other in other_words if word in self.select and other in self.select
+            ]
+            if clashing:
                 raise OptionError(
-                    f"nothing is {word} and {both[0]}",
+                    f"nothing is {word} and {clashing[0]}",
                     where=f"{named}key select",
                     mend="leave one of them out, or make two operations",
                 )
@@ -638,29 +642,29 @@ class Operation:
             return self
         if self.rest_of is not None:
             return self
-        where = f"operation {self.name or self.kind!r}, key rest"
-        found = [each for each in others if each.name == self.rest]
-        if not found:
+        place = f"operation {self.name or self.kind!r}, key rest"
+        candidates = [each for each in others if each.name == self.rest]
+        if not candidates:
             names = ", ".join(each.name for each in others if each.name and each.name != self.name)
             raise OptionError(
                 f"there is no operation {self.rest!r}",
-                where=where,
+                where=place,
                 mend=f"name one of: {names}" if names else "name another operation",
             )
-        other = found[0]
-        mine, its = _selection_of(self), _selection_of(other)
-        if any(mine.values()) and mine != its:
+        other = candidates[0]
+        own_selection, other_selection = _selection_of(self), _selection_of(other)
+        if any(own_selection.values()) and own_selection != other_selection:
             raise OptionError(
                 f"it takes the paths of {self.rest!r}, and gives layers, colours or a selection"
                 " of its own too",
-                where=where,
+                where=place,
                 mend="leave these out",
             )
-        self._refuse_rest(other, where)
+        self._refuse_rest(other, place)
         depth = other.depth_mm
         if other.contract.rest == "corners" and self.depth_mm:
             depth = self.depth_mm
-        return replace(self, rest_of=other, depth_mm=depth, **its)
+        return replace(self, rest_of=other, depth_mm=depth, **other_selection)
 
     def _refuse_rest(self, other: Operation, where: str) -> None:
         """An operation that leaves this one nothing, or what it cannot clear."""
@@ -719,7 +723,7 @@ class Operation:
                         mend=f'give what is left for it, finish = "0.2mm", or leave {key} out',
                     )
             return (self,)
-        plain = replace(
+        without_finish = replace(
             self,
             finish_mm=None,
             finish_feed_mm_min=None,
@@ -729,9 +733,11 @@ class Operation:
         lead = Lead("arc", self.finish_mm)
         feed, speed = self.finish_feed_mm_min, self.finish_spindle_rpm
         return (
-            replace(plain, stage="rough", allowance_mm=self.allowance_mm + self.finish_mm),
             replace(
-                plain,
+                without_finish, stage="rough", allowance_mm=self.allowance_mm + self.finish_mm
+            ),
+            replace(
+                without_finish,
                 stage="finish",
                 name=f"{self.name or self.kind}{FINISH}",
                 tool=self.finish_tool or self.tool,
@@ -749,11 +755,11 @@ class Operation:
         """A cut beyond the line for which the tool's centre would have to cross it."""
         if self.allowance_mm >= 0.0:
             return
-        where = f"operation {self.name or self.kind!r}, key allowance"
+        place = f"operation {self.name or self.kind!r}, key allowance"
         if self.contract.runs_beside and self.side == "on":
             raise OptionError(
                 "a tool on the line cuts beyond it on both sides",
-                where=where,
+                where=place,
                 mend='leave allowance out, or give side = "auto"',
             )
         last = self.finish_tool or self.tool
@@ -763,7 +769,7 @@ class Operation:
             raise OptionError(
                 f"{wide} cannot cut {-self.allowance_mm:g} mm beyond the line: its centre would"
                 " not stay beside it",
-                where=where,
+                where=place,
                 mend=f"give {mend}, or a wider tool",
             )
 
@@ -771,27 +777,27 @@ class Operation:
         """The operation with the depth that its breakthrough makes in this stock; itself without
         one. A pointed drill, or a round nose, goes through with its whole diameter. OptionError
         for a stock that is not known, or that lies on too thin a board."""
-        beyond = self.breakthrough_mm
-        if beyond is None:
+        extra = self.breakthrough_mm
+        if extra is None:
             return self
-        where = f"operation {self.name!r}, key breakthrough" if self.name else "key breakthrough"
+        place = f"operation {self.name!r}, key breakthrough" if self.name else "key breakthrough"
         if stock is None:
             raise OptionError(
                 "the thickness of the stock is not known",
-                where=where,
+                where=place,
                 mend='write [stock] with its thickness, such as thickness = "3mm", or give depth',
             )
         point = self.tool.point_mm
-        if beyond + point > stock.through_mm * (1.0 + THROUGH_SLACK):
+        if extra + point > stock.through_mm * (1.0 + THROUGH_SLACK):
             tip = f" and the tool's point of {point:.4g} mm are" if point else " is"
             raise OptionError(
-                f"{beyond:g} mm{tip} deeper than the {stock.through_mm:g} mm that may be cut below"
+                f"{extra:g} mm{tip} deeper than the {stock.through_mm:g} mm that may be cut below"
                 " the stock",
-                where=where,
+                where=place,
                 mend="give less, or say how much the board below takes: spoilboard ="
-                f' "{beyond + point:.4g}mm" in [stock]',
+                f' "{extra + point:.4g}mm" in [stock]',
             )
-        return replace(self, depth_mm=stock.thickness_mm + beyond + point, breakthrough_mm=None)
+        return replace(self, depth_mm=stock.thickness_mm + extra + point, breakthrough_mm=None)
 
     def settled(self, stock: Stock | None) -> Operation:
         """Return the operation as its kind completes it, with the depth of its breakthrough.
@@ -853,11 +859,11 @@ def _selection_of(operation: Operation) -> dict[str, Any]:
 def rested(operations: Sequence[Operation]) -> list[Operation]:
     """The operations with what they clear the rest of. That of a pocket comes after it; a carved
     floor may be cleared before or after its walls."""
-    made = []
+    settled = []
     for row, each in enumerate(operations):
         later = [other for other in operations[row + 1 :] if other.contract.rest == "floor"]
-        made.append(each.after([*operations[:row], *later]))
-    return made
+        settled.append(each.after([*operations[:row], *later]))
+    return settled
 
 
 @dataclass(frozen=True)
@@ -901,12 +907,12 @@ class Placement:
         _refuse_beyond("pitch", self.pitch_mm, -farthest, farthest)
         if not isinstance(self.origin, str):
             _refuse_beyond("origin", self.origin, -MAX_POSITION_MM, MAX_POSITION_MM)
-        for what, count, pitch in zip(
+        for subject, count, pitch in zip(
             ("columns", "rows"), self.copies, self.pitch_mm, strict=True
         ):
             if count > 1 and pitch == 0.0:
                 raise OptionError(
-                    f"{count} {what} of copies lie on one another",
+                    f"{count} {subject} of copies lie on one another",
                     where="key copies",
                     mend="give the pitch from one copy to the next",
                 )
@@ -984,8 +990,8 @@ class KeepOutBox:
 
     def moved(self, by_mm: tuple[float, float]) -> KeepOutBox:
         """Return the box moved in the plane."""
-        (x, y), (left, right), (low, high) = by_mm, self.x_mm, self.y_mm
-        return replace(self, x_mm=(left + x, right + x), y_mm=(low + y, high + y))
+        (x, y), (left_x, right), (low, high) = by_mm, self.x_mm, self.y_mm
+        return replace(self, x_mm=(left_x + x, right + x), y_mm=(low + y, high + y))
 
 
 @dataclass(frozen=True)
@@ -1076,38 +1082,39 @@ class Job:
             one_of("word to allow", each, ALLOWED)
         if not self.operations:
             raise OptionError("the job has no operations", mend="give it at least one")
-        deep = [each.settled(self.stock) for each in self.operations]
-        made = [stage for each in rested(deep) for stage in each.stages()]
+        settled = [each.settled(self.stock) for each in self.operations]
+        stages = [stage for each in rested(settled) for stage in each.stages()]
         if "long" in self.allow:
-            made = [replace(each, may_be_long=True) for each in made]
-        object.__setattr__(self, "operations", tuple(made))
+            stages = [replace(each, may_be_long=True) for each in stages]
+        object.__setattr__(self, "operations", tuple(stages))
         self._refuse_setups()
 
     def _refuse_setups(self) -> None:
         """Refuse set-ups of one name or of unknown operations, and operations of no set-up."""
         names = [each.name for each in self.setups]
-        known = [each.name for each in self.operations if each.stage != "finish"]
+        operation_names = [each.name for each in self.operations if each.stage != "finish"]
         for row, setup in enumerate(self.setups):
-            where = f"table [[setups]] {row + 1} {setup.name!r}"
+            place = f"table [[setups]] {row + 1} {setup.name!r}"
             if not setup.name or setup.name in names[:row]:
                 raise OptionError(
-                    "set-ups have names of their own", where=where, mend="give each a name"
+                    "set-ups have names of their own", where=place, mend="give each a name"
                 )
             for name in setup.operations:
-                if name not in known:
+                if name not in operation_names:
                     raise OptionError(
                         f"there is no operation {name!r}",
-                        where=f"{where}, key operations",
-                        mend=guess(name, known) or f"known: {', '.join(known)}",
+                        where=f"{place}, key operations",
+                        mend=guess(name, operation_names)
+                        or f"known: {', '.join(operation_names)}",
                     )
             if not setup.operations:
                 raise OptionError(
-                    "has no operations", where=where, mend=f"known: {', '.join(known)}"
+                    "has no operations", where=place, mend=f"known: {', '.join(operation_names)}"
                 )
-            self._turn(setup, where)
-        taken = {name for setup in self.setups for name in setup.operations}
-        for name in known:
-            if self.setups and name not in taken:
+            self._turn(setup, place)
+        taken_names = {name for setup in self.setups for name in setup.operations}
+        for name in operation_names:
+            if self.setups and name not in taken_names:
                 raise OptionError(
                     f"operation {name!r} is in no set-up",
                     where="table [[setups]]",
@@ -1117,8 +1124,8 @@ class Job:
     def setup(self, name: str) -> Job:
         """Return the job of one set-up: its operations, the drawing turned over as it says, and
         the stock as it lies then. OptionError for a name that no set-up has."""
-        chosen = next((each for each in self.setups if each.name == name), None)
-        if chosen is None:
+        chosen_setup = next((each for each in self.setups if each.name == name), None)
+        if chosen_setup is None:
             names = [each.name for each in self.setups]
             raise OptionError(
                 f"there is no set-up {name!r}",
@@ -1130,9 +1137,9 @@ class Job:
             each
             for each in self.operations
             if each.name.removesuffix(FINISH if each.stage == "finish" else "")
-            in chosen.operations
+            in chosen_setup.operations
         )
-        turn, zero = self._turn(chosen, f"set-up {name!r}")
+        turn, zero = self._turn(chosen_setup, f"set-up {name!r}")
         return replace(
             self,
             operations=operations,
@@ -1140,7 +1147,7 @@ class Job:
             stock=None if self.stock is None else self.stock.turned(turn),
             keep_out=tuple(box.moved((-zero[0], -zero[1])) for box in self.keep_out),
             setups=(),
-            setup_of=(self, chosen),
+            setup_of=(self, chosen_setup),
         )
 
     def flip_line_mm(self, setup: JobSetup) -> float | None:
@@ -1175,8 +1182,8 @@ class Job:
                     where=f"{where}, key zero",
                     mend="write [stock] with its corner and size, or give zero = [x, y]",
                 )
-            (left, low, right, high), (x, y) = turn.box(box), ZEROS[zero]
-            zero = left + x * (right - left), low + y * (high - low)
+            (left_x, low, right, high), (x, y) = turn.box(box), ZEROS[zero]
+            zero = left_x + x * (right - left_x), low + y * (high - low)
         return turn.then(Turn(shift_mm=(-zero[0], -zero[1]))), zero
 
     @property
@@ -1209,20 +1216,20 @@ def job_of(**settings: Any) -> Job:
     }
     if tool:
         settings["tool"] = Tool(**tool)
-    whole = {key: settings.pop(key) for key in _names(Job) & settings.keys()}
+    job_fields = {key: settings.pop(key) for key in _names(Job) & settings.keys()}
     place = {key: settings.pop(key) for key in _names(Placement) & settings.keys()}
     if place:
-        whole["placement"] = Placement(**place)
-    return Job(operations=(operation_of(**{"kind": Operation.kind, **settings}),), **whole)
+        job_fields["placement"] = Placement(**place)
+    return Job(operations=(operation_of(**{"kind": Operation.kind, **settings}),), **job_fields)
 
 
 def operation_of(**settings: Any) -> Operation:
     """The operation of these fields; those that its kind alone has (without a kind: any kind) go
-    into `own`. TypeError for a name that it does not have."""
+    into `own_fields`. TypeError for a name that it does not have."""
     named = [kind_named(settings["kind"])] if "kind" in settings else installed_kinds().values()
     own_names = {key.field for kind in named for key in kind.own.values()} - _names(Operation)
-    own = tuple(sorted((name, settings.pop(name)) for name in own_names & settings.keys()))
-    return Operation(**settings, own=own) if own else Operation(**settings)
+    own_fields = tuple(sorted((name, settings.pop(name)) for name in own_names & settings.keys()))
+    return Operation(**settings, own=own_fields) if own_fields else Operation(**settings)
 
 
 def _names(record: type) -> set[str]:

@@ -104,14 +104,14 @@ class OperationKind:
     reason: str = ""
 
     def __post_init__(self) -> None:
-        for value, known in (
+        for value, words in (
             (self.takes, TAKES),
             (self.cuts, CUTS),
             (self.descent, DESCENTS),
             (self.rest, RESTS),
         ):
-            if value not in known:
-                raise ValueError(f"{value!r} is none of {', '.join(known)}")
+            if value not in words:
+                raise ValueError(f"{value!r} is none of {', '.join(words)}")
 
     @property
     def runs_beside(self) -> bool:
@@ -160,11 +160,11 @@ def _entry_points() -> list[EntryPoint]:
     """The entry points of all kinds; also of our own that the installation does not know yet, in a
     checkout that was updated and not installed again."""
     points = entry_points(GROUP)
-    known = {point.name for point in points}
-    ours = iter_modules(import_module(GROUP).__path__)
-    missing = (module.name for module in ours if module.name not in known)
-    made = (EntryPoint(name, f"{GROUP}.{name}:{name.upper()}") for name in missing)
-    return [*points, *made]
+    known_names = {point.name for point in points}
+    our_modules = iter_modules(import_module(GROUP).__path__)
+    missing = (module.name for module in our_modules if module.name not in known_names)
+    our_points = (EntryPoint(name, f"{GROUP}.{name}:{name.upper()}") for name in missing)
+    return [*points, *our_points]
 
 
 def _load(point: EntryPoint) -> OperationKind:

@@ -61,14 +61,16 @@ class Border(Struct, frozen=True, eq=False):
     @classmethod
     def of(cls, contour: Contour, keep_out: KeepOut) -> Border:
         """Return the border of a contour."""
-        line, left = contour.path, contour.material_left
+        line, material_left = contour.path, contour.material_left
         if contour.outline is not None:
             line = contour.outline
-            left = None if left is None else left != runs_back(line, contour.path)
+            material_left = (
+                None if material_left is None else material_left != runs_back(line, contour.path)
+            )
         operation = contour.setting.operation
         return cls(
             line,
-            None if left is None else not left,
+            None if material_left is None else not material_left,
             keep_out,
             operation.wall_radius_mm,
             operation.allowance_mm,
@@ -81,26 +83,32 @@ class Border(Struct, frozen=True, eq=False):
         What an engraved contour itself cuts there is not kept from its leads.
         """
         reach = 2.0 * size_mm + self.reach_mm + max(self.allowance_mm, 0.0)
-        found = segments_near(self.keep_out.lines, place, reach)
-        if self.free_left is None and len(found):
-            cut = points_to_segments(place[None], found)[0] < self.reach_mm
-            found = found[~np.isin(found.path, found.path[cut])]
-        return found
+        near_lines = segments_near(self.keep_out.lines, place, reach)
+        if self.free_left is None and len(near_lines):
+            cut = points_to_segments(place[None], near_lines)[0] < self.reach_mm
+            near_lines = near_lines[~np.isin(near_lines.path, near_lines.path[cut])]
+        return near_lines
 
-    def allows(self, lead: Segments, near: Segments) -> bool:
+    def allows(self, lead: Segments, near_segments: Segments) -> bool:
         """True if the tool cuts no wanted material along this one line or arc."""
-        distance, _ = paired_distances(lead[np.zeros(len(near), dtype=np.int64)], near)
-        wanted = self.reach_mm + np.where(self.keep_out.own[near.path], self.allowance_mm, 0.0)
-        far = bool((distance >= wanted - LEAD_SLACK_MM).all())
-        return far and (self.free_left is None or self._is_beside(lead))
+        distance, _ = paired_distances(
+            lead[np.zeros(len(near_segments), dtype=np.int64)], near_segments
+        )
+        distances_wanted = self.reach_mm + np.where(
+            self.keep_out.own[near_segments.path], self.allowance_mm, 0.0
+        )
+        is_far = bool((distance >= distances_wanted - LEAD_SLACK_MM).all())
+        return is_far and (self.free_left is None or self._is_beside(lead))
 
     def _is_beside(self, lead: Segments) -> bool:
         """True if no piece of the lead lies on the side of the contour that is not free."""
-        meets = crossings(lead, Segments.of(self.line))
-        parts = np.unique(np.concatenate([[0.0, 1.0], meets.ta]))
+        common = crossings(lead, Segments.of(self.line))
+        parts = np.unique(np.concatenate([[0.0, 1.0], common.ta]))
         rows = np.zeros(len(parts) - 1, dtype=np.int64)
-        left = signed_distances(self.line, point_at(lead, rows, 0.5 * (parts[:-1] + parts[1:])))
-        return bool(((left if self.free_left else -left) >= -LEAD_SLACK_MM).all())
+        distances = signed_distances(
+            self.line, point_at(lead, rows, 0.5 * (parts[:-1] + parts[1:]))
+        )
+        return bool(((distances if self.free_left else -distances) >= -LEAD_SLACK_MM).all())
 
 
 class Leads(Struct, frozen=True, eq=False):
@@ -129,20 +137,22 @@ def leads_of(
     if side is not None and runs_back(contour.path, along.path):
         side = not side
     findings: list[Finding] = []
-    made = []
+    leads_made = []
     for name, lead, length, sign in (
         ("lead-in", operation.lead_in, ends[0], -1.0),
         ("lead-out", operation.lead_out, ends[1], 1.0),
     ):
         place = along.at(np.array([length]))[0]
-        ahead = sign * (along.directions if sign < 0.0 else along.arrivals)(np.array([length]))[0]
-        vertices, size = _longest_lead(lead, (place, ahead), _lead_bulge(sign, side), border)
+        heading = (
+            sign * (along.directions if sign < 0.0 else along.arrivals)(np.array([length]))[0]
+        )
+        vertices, size = _longest_lead(lead, (place, heading), _lead_bulge(sign, side), border)
         if size < lead.length_mm and lead.kind != "none":
             findings.append(
                 _shortened_finding(name, lead, size, at_place(contour.name, place.tolist()))
             )
-        made.append(reverse_vertices(vertices) if sign < 0.0 else vertices)
-    return Leads(made[0], made[1], tuple(findings))
+        leads_made.append(reverse_vertices(vertices) if sign < 0.0 else vertices)
+    return Leads(leads_made[0], leads_made[1], tuple(findings))
 
 
 def _lead_bulge(sign: float, material_left: bool | None) -> float:
@@ -157,20 +167,20 @@ def _lead_bulge(sign: float, material_left: bool | None) -> float:
 
 
 def _longest_lead(
-    lead: Lead, at: tuple[Floats, Floats], bulge: float, border: Border
+    lead: Lead, place_and_heading: tuple[Floats, Floats], bulge: float, border: Border
 ) -> tuple[Floats, float]:
     """Return the longest permitted lead as it leaves its place at the contour; and its size,
     mm."""
-    place, ahead = at
-    near = border.near(place, lead.length_mm)
+    place, heading = place_and_heading
+    near_segments = border.near(place, lead.length_mm)
     size = lead.length_mm
     for _ in range(LEAD_HALVINGS + 1 if lead.kind != "none" else 0):
-        end, bend = place + size * ahead, 0.0
+        end, bend = place + size * heading, 0.0
         if lead.kind == "arc" and bulge != 0.0:
-            left = np.array([-ahead[1], ahead[0]])
-            end, bend = end + math.copysign(size, bulge) * left, bulge
-        way = Segments.between(place[None], end[None], np.array([bend]))
-        if size > POSITION_EPS_MM and border.allows(way, near):
+            normal = np.array([-heading[1], heading[0]])
+            end, bend = end + math.copysign(size, bulge) * normal, bulge
+        lead_segments = Segments.between(place[None], end[None], np.array([bend]))
+        if size > POSITION_EPS_MM and border.allows(lead_segments, near_segments):
             return np.array([[*place, bend], [*end, 0.0]]), size
         size *= 0.5
     return np.empty((0, 3)), 0.0
@@ -178,14 +188,14 @@ def _longest_lead(
 
 def runs_back(path: Polyline, other: Polyline) -> bool:
     """True if `other`, a part of the path or all of it, is travelled in the other direction."""
-    there = MeasuredPath.of(other)
-    middle = 0.5 * there.reach[1:2]
-    point, ahead = there.at(middle), there.directions(middle)
+    other_along = MeasuredPath.of(other)
+    middle = 0.5 * other_along.reach[1:2]
+    point, heading = other_along.at(middle), other_along.directions(middle)
     segments = Segments.of(path)
     row = points_to_segments(point, segments).argmin(axis=1)
     frame = Frames.of(segments[row])
-    here = frame.tangent_at(frame.along(point) / frame.length)
-    return bool(dot(here, ahead)[0] < 0.0)
+    own_heading = frame.tangent_at(frame.along(point) / frame.length)
+    return bool(dot(own_heading, heading)[0] < 0.0)
 
 
 def segments_near(lines: Polylines, place: Floats, reach_mm: float) -> Segments:
@@ -198,8 +208,8 @@ def segments_near(lines: Polylines, place: Floats, reach_mm: float) -> Segments:
     following[offsets[1:] - 1] = offsets[:-1]
     x, y = vertices[:, 0], vertices[:, 1]
     step = np.abs(x[following] - x) + np.abs(y[following] - y)
-    away = np.maximum(np.abs(x - place[0]), np.abs(y - place[1]))
-    keep = away <= reach_mm + 0.5 * math.pi * step
+    distances = np.maximum(np.abs(x - place[0]), np.abs(y - place[1]))
+    keep = distances <= reach_mm + 0.5 * math.pi * step
     keep[offsets[1:][~lines.closed] - 1] = False
     path = np.searchsorted(offsets, np.flatnonzero(keep), side="right") - 1
     ends = vertices[following[keep], :2]
@@ -216,30 +226,30 @@ def signed_distances(path: Polyline, points: Floats) -> Floats:
     """
     segments = Segments.of(path)
     if path.closed:
-        within = inside(points, segments)
+        is_inside = inside(points, segments)
         distance = nearest(points, segments).distance
-        return np.where(within == (signed_area(path) > 0.0), distance, -distance)
-    found = nearest(points, segments)
+        return np.where(is_inside == (signed_area(path) > 0.0), distance, -distance)
+    nearest_points = nearest(points, segments)
     frames = Frames.of(segments)
-    near = frames[found.segment]
-    q = points - near.start
-    power = near.curvature * dot(q, q) - 2.0 * dot(near.normal, q)
-    left = np.where(power > 0.0, -found.distance, found.distance)
-    ahead = frames.tangent_at(np.zeros(len(segments)))
-    behind = frames.tangent_at(np.ones(len(segments)))
+    near_frames = frames[nearest_points.segment]
+    q = points - near_frames.start
+    power = near_frames.curvature * dot(q, q) - 2.0 * dot(near_frames.normal, q)
+    signed = np.where(power > 0.0, -nearest_points.distance, nearest_points.distance)
+    start_tangents = frames.tangent_at(np.zeros(len(segments)))
+    end_tangents = frames.tangent_at(np.ones(len(segments)))
     for j in range(len(points)):
-        row = int(found.segment[j])
+        row = int(nearest_points.segment[j])
         for vertex in (row, row + 1):
             arm = points[j] - path.vertices[vertex, :2]
-            if math.hypot(*arm) > found.distance[j] + POSITION_EPS_MM:
+            if math.hypot(*arm) > nearest_points.distance[j] + POSITION_EPS_MM:
                 continue
-            into = behind[vertex - 1] if vertex > 0 else np.zeros(2)
-            out = ahead[vertex] if vertex < len(segments) else np.zeros(2)
-            way = into + out
-            across = float(way[0] * arm[1] - way[1] * arm[0])
+            arriving = end_tangents[vertex - 1] if vertex > 0 else np.zeros(2)
+            leaving = start_tangents[vertex] if vertex < len(segments) else np.zeros(2)
+            mean_direction = arriving + leaving
+            across = float(mean_direction[0] * arm[1] - mean_direction[1] * arm[0])
             at_end = vertex in (0, len(segments))
-            left[j] = across if at_end else math.copysign(found.distance[j], across)
-    return left
+            signed[j] = across if at_end else math.copysign(nearest_points.distance[j], across)
+    return signed
 
 
 def _shortened_finding(name: str, lead: Lead, size: float, where: str) -> Finding:

@@ -62,7 +62,7 @@ def link(
     approach = approaches() if approaches is not None else None
     tool: Tool | None = None
     speed: float | None = None
-    cooled, done = "off", 0
+    cooled, done_count = "off", 0
     lowest = min((float(runs.vertices[:, 2].min()) for _, runs in worked if runs), default=0.0)
     for setting, runs in worked:
         operation = setting.operation
@@ -84,9 +84,9 @@ def link(
         cooled = _set_coolant(builder, cooled, operation.coolant)
         if builder.position[2] > heights[0]:  # from where tools are changed, not down aslant
             builder.rapid(*_rounded(runs.vertices[0, :2]).tolist())
-        for lot in _lots(runs):
-            _add_cuts(builder, lot, done, heights, approach)
-        done += len(runs)
+        for run_lot in _lots(runs):
+            _add_cuts(builder, run_lot, done_count, heights, approach)
+        done_count += len(runs)
     builder.source = ""
     _set_coolant(builder, cooled, "off")
     _set_spindle(builder, speed, None, spindle)
@@ -146,32 +146,35 @@ def _operation_note(setting: Setting) -> OperationNote:
 
 
 def _set_spindle(
-    builder: ToolpathBuilder, speed: float | None, wanted: float | None, spindle: Spindle
+    builder: ToolpathBuilder, speed: float | None, wanted_rpm: float | None, spindle: Spindle
 ) -> float | None:
     """Bring the spindle from one speed to another, None being off; return the new speed. Nothing
     is done where the program does not switch it."""
-    if wanted == speed or spindle.switched != "program":
+    if wanted_rpm == speed or spindle.switched != "program":
         return speed
-    if wanted is None:
+    if wanted_rpm is None:
         builder.event(Kind.SPINDLE_OFF, None)
         return None
-    builder.event(Kind.SPINDLE_CCW if spindle.direction == "ccw" else Kind.SPINDLE_CW, wanted)
+    builder.event(Kind.SPINDLE_CCW if spindle.direction == "ccw" else Kind.SPINDLE_CW, wanted_rpm)
     if spindle.spin_up_s > 0.0:
         builder.event(Kind.DWELL, spindle.spin_up_s)
-    return wanted
+    return wanted_rpm
 
 
-def _set_coolant(builder: ToolpathBuilder, now: str, wanted: str) -> str:
+def _set_coolant(builder: ToolpathBuilder, coolant_now: str, wanted_coolant: str) -> str:
     """Change from one way of cooling to another; return the new one."""
-    if now != wanted and (wanted == "off" or (now not in ("off", wanted) and wanted != "both")):
+    if coolant_now != wanted_coolant and (
+        wanted_coolant == "off"
+        or (coolant_now not in ("off", wanted_coolant) and wanted_coolant != "both")
+    ):
         builder.event(Kind.COOLANT_OFF, None)
-        now = "off"
-    if now != wanted and wanted != "off":
-        if wanted in ("mist", "both") and now != "mist":
+        coolant_now = "off"
+    if coolant_now != wanted_coolant and wanted_coolant != "off":
+        if wanted_coolant in ("mist", "both") and coolant_now != "mist":
             builder.event(Kind.COOLANT_MIST, None)
-        if wanted in ("flood", "both") and now != "flood":
+        if wanted_coolant in ("flood", "both") and coolant_now != "flood":
             builder.event(Kind.COOLANT_FLOOD, None)
-    return wanted
+    return wanted_coolant
 
 
 class _Lot(Struct, frozen=True, eq=False):
@@ -193,19 +196,19 @@ def _lots(runs: Runs) -> Iterator[_Lot]:
     may_part[first[:-1]] = True
     begin = 0
     while begin < count:
-        ahead = may_part[begin + VERTICES_AT_ONCE :]
-        end = begin + VERTICES_AT_ONCE + int(ahead.argmax()) if ahead.any() else count
+        may_end = may_part[begin + VERTICES_AT_ONCE :]
+        end = begin + VERTICES_AT_ONCE + int(may_end.argmax()) if may_end.any() else count
         low = int(np.searchsorted(first, begin, side="right")) - 1
         high = int(np.searchsorted(first, end))
         goes_on = bool(first[high] > end)
-        rows, of = slice(begin, end + goes_on), slice(low, high)
+        rows, run_rows = slice(begin, end + goes_on), slice(low, high)
         part = Runs(
             runs.vertices[rows],
             runs.feed_mm_min[rows],
             first[low : high + 1].clip(begin, rows.stop) - begin,
-            runs.plunge_mm_min[of],
-            runs.dwell_s[of],
-            runs.names[of],
+            runs.plunge_mm_min[run_rows],
+            runs.dwell_s[run_rows],
+            runs.names[run_rows],
         )
         yield _Lot(part, low, bool(first[low] < begin), goes_on)
         begin = end
@@ -213,7 +216,7 @@ def _lots(runs: Runs) -> Iterator[_Lot]:
 
 def _add_cuts(
     builder: ToolpathBuilder,
-    lot: _Lot,
+    run_lot: _Lot,
     before: int,
     heights: tuple[float, float | None],
     approach: Approach | None,
@@ -225,11 +228,11 @@ def _add_cuts(
     """
     safe_z_mm, feed_z_mm = heights
     come_down = 2 + (feed_z_mm is not None)
-    runs, count = lot.runs, len(lot.runs)
+    runs, count = run_lot.runs, len(run_lot.runs)
     vertices, first = runs.vertices, runs.first
     cut = cuts(vertices, runs.feed_mm_min, first)
     begins, ends = np.ones(count, dtype=np.bool_), np.ones(count, dtype=np.bool_)
-    begins[0], ends[-1] = not lot.begun, not lot.goes_on
+    begins[0], ends[-1] = not run_lot.begun, not run_lot.goes_on
     heads = np.flatnonzero(begins)
     come = [] if approach is None else [approach(runs[k]) for k in heads.tolist()]
     places = [place for place in come if place is not None]
@@ -250,23 +253,23 @@ def _add_cuts(
     end[start[approached], :2] = np.array(places).reshape(-1, 2)
     across = (start + approached)[heads]
     end[across, :2] = vertices[first[heads], :2]
-    down = across + come_down - 1
+    down_rows = across + come_down - 1
     if feed_z_mm is not None:
         end[across + 1, :2], end[across + 1, 2] = vertices[first[heads], :2], feed_z_mm
-    kind[down], end[down] = Kind.LINE, vertices[first[heads], :3]
-    speed[down] = runs.plunge_mm_min[heads]
+    kind[down_rows], end[down_rows] = Kind.LINE, vertices[first[heads], :3]
+    speed[down_rows] = runs.plunge_mm_min[heads]
     is_arc = np.isfinite(cut.centre[:, 0]) & np.isfinite(cut.feed)
     turning = np.where(cut.ccw, Kind.ARC_CCW, Kind.ARC_CW)
     straight = np.where(np.isnan(cut.feed), Kind.RAPID, Kind.LINE)
     kind[cutting] = np.where(is_arc, turning, straight)
     end[cutting], speed[cutting] = cut.end, cut.feed
     centre[cutting[is_arc]] = cut.centre[is_arc]
-    up = stop[ends] - 1
+    up_rows = stop[ends] - 1
     rests = stop[dwells] - 2
     kind[rests], value[rests], end[rests] = Kind.DWELL, runs.dwell_s[dwells], end[rests - 1]
-    end[up, :2] = end[up - 1, :2]
+    end[up_rows, :2] = end[up_rows - 1, :2]
     number = np.repeat(np.arange(count), rows_each)
     source = builder.provenance(runs.names)[number]
-    run = before + lot.first + number
+    run = before + run_lot.first + number
     columns = _rounded(end), _rounded(centre), speed
     builder.moves(kind, *columns, value=value, source=source, run=run)

@@ -21,8 +21,8 @@ def at_place(name: str, point: Sequence[float]) -> str:
 
 def tool_name(tool: Tool) -> str:
     """Return the tool's diameter, and its name if it has one."""
-    called = f" ({tool.name})" if tool.name else ""
-    return f"a tool of {tool.diameter_mm:g} mm{called}"
+    name = f" ({tool.name})" if tool.name else ""
+    return f"a tool of {tool.diameter_mm:g} mm{name}"
 
 
 def width_name(operation: Operation) -> str:
@@ -54,8 +54,10 @@ def tool_words(tool: Tool) -> str:
 
 def key_of(operation: Operation, key: str) -> str:
     """Name the place of a setting of an operation: in its job, or in the preset of its tool."""
-    of = f" of the tool's preset for {operation.material!r}" if key in operation.preset else ""
-    return f"{operation_name(operation)}, key {key}{of}"
+    preset_words = (
+        f" of the tool's preset for {operation.material!r}" if key in operation.preset else ""
+    )
+    return f"{operation_name(operation)}, key {key}{preset_words}"
 
 
 def operation_name(operation: Operation) -> str:
@@ -65,10 +67,10 @@ def operation_name(operation: Operation) -> str:
 
 def range_words(limits: tuple[float, float] | None) -> str:
     """Describe a range: `0.02 to 0.06`, `at most 0.06` or `at least 0.02`."""
-    least, most = limits or (0.0, math.inf)
-    if math.isinf(most):
-        return f"at least {least:g}"
-    return f"{least:g} to {most:g}" if least else f"at most {most:g}"
+    min_value, max_value = limits or (0.0, math.inf)
+    if math.isinf(max_value):
+        return f"at least {min_value:g}"
+    return f"{min_value:g} to {max_value:g}" if min_value else f"at most {max_value:g}"
 
 
 def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
@@ -81,12 +83,16 @@ def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
     )
 
 
-def shortened_list(findings: Sequence[Finding], more: Sentence) -> list[Finding]:
+def shortened_list(findings: Sequence[Finding], sentence: Sentence) -> list[Finding]:
     """Return the first `MAX_LISTED` of findings of one kind, and one more that counts the
     others."""
-    listed, rest = list(findings[:MAX_LISTED]), findings[MAX_LISTED:]
-    if rest:
-        listed.append(more(where=rest[0].where, measured=len(rest), severity=rest[0].severity))
+    listed, unlisted = list(findings[:MAX_LISTED]), findings[MAX_LISTED:]
+    if unlisted:
+        listed.append(
+            sentence(
+                where=unlisted[0].where, measured=len(unlisted), severity=unlisted[0].severity
+            )
+        )
     return listed
 
 
@@ -100,8 +106,8 @@ def setup_heading(job: Job) -> tuple[str, ...]:
     to it from the face that is drawn; () for a job that is no set-up."""
     if job.setup_of is None:
         return ()
-    whole, setup = job.setup_of
-    line_mm, turn = whole.flip_line_mm(setup), job.placement.turn
+    part_job, setup = job.setup_of
+    line_mm, turn = part_job.flip_line_mm(setup), job.placement.turn
     if line_mm is None or setup.flip is None:
         return f"set-up {setup.name}", "the face that is drawn is up"
     across, sides = (0, "left and right") if setup.flip == "y" else (1, "front and back")
@@ -123,10 +129,10 @@ def setup_words(job: Job) -> str:
     if pins := pins_of(job):
         words.append("pins at " + ", ".join(f"X{x:g} Y{y:g}" for x, y in pins))
     if setup.flip is not None:
-        beside = setup.flip_error_mm
-        known = "an unknown length" if beside is None else f"up to {beside:g} mm"
+        error_mm = setup.flip_error_mm
+        length = "an unknown length" if error_mm is None else f"up to {error_mm:g} mm"
         words.append(
-            f"its cuts lie {known} beside those of the other face (flip_error), which is in no "
+            f"its cuts lie {length} beside those of the other face (flip_error), which is in no "
             "error"
         )
     return "; ".join(words)

@@ -162,24 +162,24 @@ def best_order(
 def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Floats) -> Tour:
     """Return the tour of these rows, with the tables that the search uses."""
     count, variants = len(choices), len(choices.owner)
-    turned = _reversed_rows(choices)
+    reversed_rows = _reversed_rows(choices)
     stays = bool(np.isnan(goal).any())
     goal = start if stays else goal
     outside = [np.tile(start, 2), np.tile(goal, 2)]
     ends = np.concatenate([np.column_stack([choices.entry, choices.exit]), outside])
     places, owner = _places(choices)
-    near, near_first = neighbours(tree_of(places), owner, count)
+    neighbour_rows, near_first = neighbours(tree_of(places), owner, count)
     after_first, after = _followers(before, count)
     earlier_first, earlier = _followers(np.asarray(before).reshape(-1, 2)[:, ::-1], count)
     item = np.concatenate([[count], choices.owner[rows], [count + 1]])
     row = np.empty(count + 2, dtype=np.int64)
     row[item] = np.concatenate([[variants], rows, [variants + 1]])
-    one_way = (turned == np.arange(variants)) & (choices.entry != choices.exit).any(axis=1)
+    one_way = (reversed_rows == np.arange(variants)) & (choices.entry != choices.exit).any(axis=1)
     return Tour(
         ends,
-        np.concatenate([turned, [variants, variants + 1]]),
+        np.concatenate([reversed_rows, [variants, variants + 1]]),
         choices.first,
-        near,
+        neighbour_rows,
         near_first,
         after,
         after_first,
@@ -196,13 +196,13 @@ def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Flo
 def _reversed_rows(choices: Choices) -> Ints:
     """Return, for each row (S,), the row of its item with entry and exit exchanged; itself when
     there is none."""
-    turned = np.arange(len(choices.owner))
+    reversed_rows = np.arange(len(choices.owner))
     rows = np.flatnonzero((choices.entry != choices.exit).any(axis=1))
-    of = choices.owner[rows]
+    owners = choices.owner[rows]
     for item in range(0, len(choices), ITEMS_AT_ONCE):
-        some = rows[slice(*np.searchsorted(of, [item, item + ITEMS_AT_ONCE]).tolist())]
-        turned[some] = _reversed_rows_among(choices, some)
-    return turned
+        batch = rows[slice(*np.searchsorted(owners, [item, item + ITEMS_AT_ONCE]).tolist())]
+        reversed_rows[batch] = _reversed_rows_among(choices, batch)
+    return reversed_rows
 
 
 def _reversed_rows_among(choices: Choices, rows: Ints) -> Ints:
@@ -211,9 +211,9 @@ def _reversed_rows_among(choices: Choices, rows: Ints) -> Ints:
     if len(rows) == 0:
         return rows
     owner, entry, leave = choices.owner[rows, None], choices.entry[rows], choices.exit[rows]
-    both = np.concatenate([np.hstack([owner, entry, leave]), np.hstack([owner, leave, entry])])
-    _, found, group = np.unique(both, axis=0, return_index=True, return_inverse=True)
-    other = found[group.reshape(-1)[len(rows) :]]
+    table = np.concatenate([np.hstack([owner, entry, leave]), np.hstack([owner, leave, entry])])
+    _, first_rows, group = np.unique(table, axis=0, return_index=True, return_inverse=True)
+    other = first_rows[group.reshape(-1)[len(rows) :]]
     return np.where(other < len(rows), rows[np.minimum(other, len(rows) - 1)], rows)
 
 
@@ -224,9 +224,9 @@ def _places(choices: Choices) -> tuple[Floats, Ints]:
     step = -(-variants // MAX_PLACES_EACH)
     rank = np.arange(len(choices.owner)) - first[choices.owner]
     rows = np.flatnonzero(rank % step[choices.owner] == 0)
-    alone = rows[(choices.entry[rows] != choices.exit[rows]).any(axis=1)]
-    owner = np.concatenate([choices.owner[rows], choices.owner[alone]])
-    places = np.concatenate([choices.entry[rows], choices.exit[alone]])
+    two_ended = rows[(choices.entry[rows] != choices.exit[rows]).any(axis=1)]
+    owner = np.concatenate([choices.owner[rows], choices.owner[two_ended]])
+    places = np.concatenate([choices.entry[rows], choices.exit[two_ended]])
     by_owner = np.argsort(owner, kind="stable")
     return places[by_owner], owner[by_owner]
 
@@ -252,10 +252,10 @@ def _followers(before: Ints, count: int) -> tuple[Ints, Ints]:
     return np.searchsorted(pairs[:, 0], np.arange(count + 1)), pairs[:, 1].copy()
 
 
-def _cycle_error(left: set[int]) -> OptionError:
-    names = ", ".join(str(item) for item in sorted(left)[:MAX_NAMED_ITEMS])
+def _cycle_error(waiting: set[int]) -> OptionError:
+    names = ", ".join(str(item) for item in sorted(waiting)[:MAX_NAMED_ITEMS])
     return OptionError(
-        f"{len(left)} items each have to be cut before another of them, among them {names}",
+        f"{len(waiting)} items each have to be cut before another of them, among them {names}",
         mend="let one of them be cut before the others",
     )
 
@@ -294,8 +294,8 @@ def _contour_ends(items: Items) -> Iterator[Ends]:
     contours, owner = contours_of(items), _contour_rows(items)
     lines = _lines_of(contours)
     begins = _start_mask(contours, lines) & np.repeat(lines.closed, np.diff(lines.offsets))
-    of = np.repeat(owner, np.diff(lines.offsets))
-    yield of[begins], np.tile(lines.vertices[begins, :2], 2)
+    owners = np.repeat(owner, np.diff(lines.offsets))
+    yield owners[begins], np.tile(lines.vertices[begins, :2], 2)
     opens = np.flatnonzero(~lines.closed)
     start, end = (
         lines.vertices[lines.offsets[opens], :2],
@@ -305,21 +305,21 @@ def _contour_ends(items: Items) -> Iterator[Ends]:
     turns = np.array(is_reversible, dtype=np.bool_)
     # Passes to and fro leave the tool where it went down when their number is even.
     even = [len(contours[k].setting.levels_mm) % 2 == 0 for k in opens.tolist()]
-    back = (turns & np.array(even, dtype=np.bool_))[:, None]
-    yield owner[opens], np.hstack([start, np.where(back, start, end)])
-    yield owner[opens[turns]], np.hstack([end, np.where(back, end, start)])[turns]
+    is_reversed = (turns & np.array(even, dtype=np.bool_))[:, None]
+    yield owner[opens], np.hstack([start, np.where(is_reversed, start, end)])
+    yield owner[opens[turns]], np.hstack([end, np.where(is_reversed, end, start)])[turns]
 
 
 def _start_mask(contours: Sequence[Contour], lines: Polylines) -> Bools:
     """Return the mask (N,) of the vertices of `lines`, the paths of the contours, at which these
     may begin."""
-    found, offsets = joints(lines), lines.offsets
+    is_joint, offsets = joints(lines), lines.offsets
     for k, contour in enumerate(contours):
         if len(contour.starts):
             begin, end = offsets[k : k + 2].tolist()
-            found[begin:end] = False
-            found[begin + contour.starts] = True
-    return found
+            is_joint[begin:end] = False
+            is_joint[begin + contour.starts] = True
+    return is_joint
 
 
 def must_precede(items: Items) -> Ints:
@@ -333,11 +333,14 @@ def must_precede(items: Items) -> Ints:
     order = np.argsort(shape, kind="stable")
     shape, item = shape[order], item[order]
     first = np.searchsorted(shape, np.arange(len(shapes) + 1))
-    held = np.flatnonzero(parent[shape] >= 0)
-    holder = parent[shape[held]]
+    inner_rows = np.flatnonzero(parent[shape] >= 0)
+    holder = parent[shape[inner_rows]]
     counts = first[holder + 1] - first[holder]
-    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    one, other = np.repeat(item[held], counts), item[np.repeat(first[holder], counts) + within]
+    steps = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    one, other = (
+        np.repeat(item[inner_rows], counts),
+        item[np.repeat(first[holder], counts) + steps],
+    )
     return np.unique(np.column_stack([one, other])[one != other], axis=0)
 
 
@@ -352,16 +355,16 @@ def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
     outlines = [contour.outline for contour in contours]
     if any(outline is not None for outline in outlines):
         # The runs that a contour was divided into share its outline: they hold and lie as it does.
-        known: dict[int, int] = {}
+        numbers: dict[int, int] = {}
         keys = [-k if path is None else id(path) for k, path in enumerate(outlines, 1)]
-        shape = np.array([known.setdefault(key, len(known)) for key in keys])
+        shape = np.array([numbers.setdefault(key, len(numbers)) for key in keys])
         first = np.unique(shape, return_index=True)[1].tolist()
         lines = Polylines.of(outlines[k] or contours[k].path for k in first)
-    others = [(k, path) for k, item in _fixed_items(items) for path in _places_of(item)]
+    fixed_places = [(k, path) for k, item in _fixed_items(items) for path in _places_of(item)]
     return (
-        Polylines.joined([lines, Polylines.of(path for _, path in others)]),
-        np.concatenate([shape, len(lines) + np.arange(len(others))]),
-        np.concatenate([owner, np.array([k for k, _ in others], dtype=np.int64)]),
+        Polylines.joined([lines, Polylines.of(path for _, path in fixed_places)]),
+        np.concatenate([shape, len(lines) + np.arange(len(fixed_places))]),
+        np.concatenate([owner, np.array([k for k, _ in fixed_places], dtype=np.int64)]),
     )
 
 

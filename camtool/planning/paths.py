@@ -132,18 +132,18 @@ class MeasuredPath:
         Measured from the start of an arc of the curvature k, with the point at x along the tangent
         and y along the left normal, the foot of the point is  atan2(k x, 1 − k y) / k  along.
         """
-        where = np.array([point])
-        found = nearest(where, self.segments)
-        row = int(found.segment[0])
-        frame = Frames.of(self.segments[found.segment])
-        q = where - frame.start
+        place = np.array([point])
+        nearest_place = nearest(place, self.segments)
+        row = int(nearest_place.segment[0])
+        frame = Frames.of(self.segments[nearest_place.segment])
+        q = place - frame.start
         x, y = float(dot(q, frame.tangent)[0]), float(dot(q, frame.normal)[0])
         k, size = float(frame.curvature[0]), float(frame.length[0])
         foot = x if k == 0.0 else math.atan2(k * x, 1.0 - k * y) / k
         begin = float(self.reach[row])
         tries = begin + np.array([min(max(foot, 0.0), size), 0.0, size])
-        apart = self.at(tries) - where
-        return float(tries[np.hypot(apart[:, 0], apart[:, 1]).argmin()])
+        gaps = self.at(tries) - place
+        return float(tries[np.hypot(gaps[:, 0], gaps[:, 1]).argmin()])
 
     def piece(self, begin: float, end: float) -> Floats:
         """Return vertices (k, 3) x, y, bulge from one length to another, backwards when `end` is
@@ -151,8 +151,8 @@ class MeasuredPath:
 
         Vertices nearer than POSITION_EPS_MM to an end are that end. The last bulge is 0.
         """
-        found = piece(self.paths.tracks, self.index, begin, end)
-        return np.ascontiguousarray(found[:, [0, 1, 3]])
+        vertices = piece(self.paths.tracks, self.index, begin, end)
+        return np.ascontiguousarray(vertices[:, [0, 1, 3]])
 
     def _locate(self, lengths: Floats, ahead_mm: float) -> tuple[Ints, Floats]:
         """Return the segment that is so far ahead of each length, and the part of it at the
@@ -172,10 +172,10 @@ class MeasuredPath:
 def reverse_vertices(vertices: Floats) -> Floats:
     """Return vertices (k, n) of an open path, the bulge in the last column, travelled in the other
     direction."""
-    back = vertices[::-1].copy()
-    back[:-1, -1] = 0.0 - vertices[-2::-1, -1]
-    back[-1:, -1] = 0.0
-    return back
+    vertices_back = vertices[::-1].copy()
+    vertices_back[:-1, -1] = 0.0 - vertices[-2::-1, -1]
+    vertices_back[-1:, -1] = 0.0
+    return vertices_back
 
 
 def join_paths(paths: Sequence[Floats]) -> Floats:
@@ -198,12 +198,12 @@ def true_ranges(values: Bools) -> tuple[Ints, Ints]:
 def flat_path(vertices: Floats) -> Polyline | None:
     """Return a run (n, 4) of x, y, z, bulge seen from above, without the moves that lead nowhere
     there; None when it stays at one place."""
-    kept: list[Floats] = []
+    vertices_kept: list[Floats] = []
     for vertex in vertices[:, [0, 1, 3]]:
-        if kept and np.hypot(*(vertex[:2] - kept[-1][:2])) <= POSITION_EPS_MM:
-            kept.pop()  # the later one knows the bulge of the move that leads away
-        kept.append(vertex)
-    return Polyline(np.array(kept)) if len(kept) > 1 else None
+        if vertices_kept and np.hypot(*(vertex[:2] - vertices_kept[-1][:2])) <= POSITION_EPS_MM:
+            vertices_kept.pop()  # the later one knows the bulge of the move that leads away
+        vertices_kept.append(vertex)
+    return Polyline(np.array(vertices_kept)) if len(vertices_kept) > 1 else None
 
 
 class Cuts(Struct, frozen=True, eq=False):
@@ -223,17 +223,17 @@ def joints(lines: Polylines) -> Bools:
 
     For a circle every vertex is as good, and all are true; so are those of open paths.
     """
-    found = np.ones(len(lines.vertices), dtype=np.bool_)
+    is_joint = np.ones(len(lines.vertices), dtype=np.bool_)
     rows = np.flatnonzero(np.repeat(lines.closed, np.diff(lines.offsets)))
     segments = Segments.of(lines)
     segments = segments[lines.closed[segments.path]]
     first = np.searchsorted(segments.path, segments.path)
     last = np.searchsorted(segments.path, segments.path, side="right") - 1
-    here = np.arange(len(segments))
-    split = ~_same_arc(segments[np.where(here == first, last, here - 1)], segments)
+    row_numbers = np.arange(len(segments))
+    split = ~_same_arc(segments[np.where(row_numbers == first, last, row_numbers - 1)], segments)
     parts = np.bincount(segments.path[split], minlength=len(lines))
-    found[rows] = split | (parts[segments.path] == 0)
-    return found
+    is_joint[rows] = split | (parts[segments.path] == 0)
+    return is_joint
 
 
 def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
@@ -262,8 +262,8 @@ def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
     arcs, centre = np.flatnonzero(bulge), np.full((len(heads), 2), np.nan)
     centre[arcs] = segments[best[arcs]].centre
     begin = segments.start[heads[arcs]]
-    apart = np.hypot(*(end[arcs, :2] - begin).T)
-    round_ = apart <= POSITION_EPS_MM
+    gaps = np.hypot(*(end[arcs, :2] - begin).T)
+    round_ = gaps <= POSITION_EPS_MM
     end[arcs[round_], :2] = begin[round_]
     return Cuts(run=run[heads], end=end, centre=centre, ccw=bulge > 0.0, feed=feed[heads])
 
@@ -289,19 +289,19 @@ def _is_single_arc(segments: Segments, begin: int, last: int, swept: float) -> b
     """True if the rows from `begin` to `last` sweep no more than an arc may, or a whole circle."""
     if abs(swept) <= MAX_PART_SWEEP_RAD:
         return True
-    apart = segments.end[last] - segments.start[begin]
-    return bool(np.hypot(*apart) <= POSITION_EPS_MM and abs(swept) <= 2.0 * np.pi + SLOPE_EPS)
+    gap = segments.end[last] - segments.start[begin]
+    return bool(np.hypot(*gap) <= POSITION_EPS_MM and abs(swept) <= 2.0 * np.pi + SLOPE_EPS)
 
 
 def _continues(segments: Segments, rise: Floats, feed: Floats) -> Bools:
     """Mask (n−1,) of the segments that go on in the next: one run, circle, slope and feed."""
-    found = _same_arc(segments[:-1], segments[1:]) & (feed[:-1] == feed[1:])
-    found &= np.diff(segments.path) == 0
-    pairs = np.flatnonzero(found)
-    found[pairs] = np.abs(_slopes(segments, rise, pairs + 1) - _slopes(segments, rise, pairs)) <= (
-        SLOPE_EPS
-    )
-    return np.asarray(found)
+    continues = _same_arc(segments[:-1], segments[1:]) & (feed[:-1] == feed[1:])
+    continues &= np.diff(segments.path) == 0
+    pairs = np.flatnonzero(continues)
+    continues[pairs] = np.abs(
+        _slopes(segments, rise, pairs + 1) - _slopes(segments, rise, pairs)
+    ) <= (SLOPE_EPS)
+    return np.asarray(continues)
 
 
 def _slopes(segments: Segments, rise: Floats, rows: Ints) -> Floats:
@@ -312,10 +312,10 @@ def _slopes(segments: Segments, rise: Floats, rows: Ints) -> Floats:
 
 def _same_arc(one: Segments, other: Segments) -> Bools:
     """Mask (K,) of the rows of which both are arcs of one circle in the same direction."""
-    found = one.is_arc & (np.sign(one.bulge) == np.sign(other.bulge))
-    rows = np.flatnonzero(found)
+    is_same = one.is_arc & (np.sign(one.bulge) == np.sign(other.bulge))
+    rows = np.flatnonzero(is_same)
     one, other = one[rows], other[rows]
-    apart = one.centre - other.centre
-    near = np.hypot(apart[:, 0], apart[:, 1]) <= POSITION_EPS_MM
-    found[rows] = near & (np.abs(one.radius - other.radius) <= POSITION_EPS_MM)
-    return np.asarray(found)
+    gaps = one.centre - other.centre
+    is_near = np.hypot(gaps[:, 0], gaps[:, 1]) <= POSITION_EPS_MM
+    is_same[rows] = is_near & (np.abs(one.radius - other.radius) <= POSITION_EPS_MM)
+    return np.asarray(is_same)

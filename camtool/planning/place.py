@@ -91,9 +91,9 @@ def place(drawing: Drawing, job: Job) -> Drawing:
     OptionError for an impossible fit, for a scale that leaves no shape at all, and for what is
     larger than any machine.
     """
-    placed = drawing if job.placement == Placement() else _place(drawing, job)
-    _refuse_too_large(placed, job)
-    return placed
+    placed_drawing = drawing if job.placement == Placement() else _place(drawing, job)
+    _refuse_too_large(placed_drawing, job)
+    return placed_drawing
 
 
 def _place(drawing: Drawing, job: Job) -> Drawing:
@@ -101,10 +101,10 @@ def _place(drawing: Drawing, job: Job) -> Drawing:
     placement = job.placement
     _refuse_too_many(drawing, placement)
     maps = placements(drawing, job)
-    off = datum_off(drawing, job, maps[0])
-    if len(maps) == 1 and _is_identity(maps[0]) and not off:
+    off_mm = datum_off(drawing, job, maps[0])
+    if len(maps) == 1 and _is_identity(maps[0]) and not off_mm:
         return drawing
-    return replace(_map_drawing(drawing, maps), datum_off_mm=off)
+    return replace(_map_drawing(drawing, maps), datum_off_mm=off_mm)
 
 
 def placements(drawing: Drawing, job: Job) -> list[AffineMap]:
@@ -125,12 +125,12 @@ def part_scale(drawing: Drawing, job: Job) -> float:
     return _first_map(drawing, job).scale
 
 
-def collapse_findings(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
+def collapse_findings(drawing: Drawing, placed_drawing: Drawing, job: Job) -> list[Finding]:
     """Return a finding for paths that the scale made too small for a shape: points that became
     one, and paths that became a point and are left out (a warning: something drawn is not cut)."""
     columns, rows = job.placement.copies
-    paths = columns * rows * len(drawing.paths) - len(placed.paths)
-    points = columns * rows * len(drawing.paths.vertices) - len(placed.paths.vertices)
+    paths = columns * rows * len(drawing.paths) - len(placed_drawing.paths)
+    points = columns * rows * len(drawing.paths.vertices) - len(placed_drawing.paths.vertices)
     if not points:
         return []
     return [
@@ -147,11 +147,11 @@ def collapse_findings(drawing: Drawing, placed: Drawing, job: Job) -> list[Findi
 
 def _first_map(drawing: Drawing, job: Job) -> AffineMap:
     """Return the mirror, rotation and scale about the drawing's zero."""
-    placement, turned = job.placement, _mirror_and_rotation(job.placement)
+    placement, turn_map = job.placement, _mirror_and_rotation(job.placement)
     scale = placement.scale
     if placement.fit_mm is not None:
-        scale = _fitting_scale(placement.fit_mm, _box(drawing, job, turned), drawing.file)
-    return AffineMap(scale * turned.matrix, turned.shift, scale)
+        scale = _fitting_scale(placement.fit_mm, _box(drawing, job, turn_map), drawing.file)
+    return AffineMap(scale * turn_map.matrix, turn_map.shift, scale)
 
 
 def _mirror_and_rotation(placement: Placement) -> AffineMap:
@@ -165,55 +165,56 @@ def _mirror_and_rotation(placement: Placement) -> AffineMap:
 # side of it lies off that of what was drawn by no more than the segments that reach so far do.
 
 
-def datum_off(drawing: Drawing, job: Job, placed: AffineMap) -> float:
-    """Return an upper bound of the distance, mm in the work frame, of the drawing that is `placed`
-    from where the box of what was drawn would have put it; 0 where no box is asked for."""
+def datum_off(drawing: Drawing, job: Job, placed_map: AffineMap) -> float:
+    """Return an upper bound of the distance, mm in the work frame, of the drawing that is
+    `placed_map` from where the box of what was drawn would have put it; 0 where no box is asked
+    for."""
     placement = job.placement
     by_box = placement.origin in ("lower-left", "centre")
     if not (by_box or placement.fit_mm) or not drawing.off_mm.any():
         return 0.0
-    turned = _mirror_and_rotation(placement)
-    box, slack = _box(drawing, job, turned), _box_slack(drawing, job, turned)
+    turn_map = _mirror_and_rotation(placement)
+    box, slack = _box(drawing, job, turn_map), _box_slack(drawing, job, turn_map)
     if box is None:
         return 0.0
-    off = far = 0.0
+    off_mm = distance = 0.0
     size = box[:, 1] - box[:, 0]
     if placement.origin == "lower-left":
-        off, far = math.hypot(*slack[:, 0]), math.hypot(*size)
+        off_mm, distance = math.hypot(*slack[:, 0]), math.hypot(*size)
     elif placement.origin == "centre":
-        off, far = 0.5 * math.hypot(*slack.sum(axis=1)), 0.5 * math.hypot(*size)
+        off_mm, distance = 0.5 * math.hypot(*slack.sum(axis=1)), 0.5 * math.hypot(*size)
     else:
-        far = math.hypot(*np.abs(box).max(axis=1))
+        distance = math.hypot(*np.abs(box).max(axis=1))
     if placement.fit_mm is not None:
         room = np.array(placement.fit_mm)
         is_bounded = (room > 0.0) & (size > 0.0)
         share = slack.sum(axis=1)[is_bounded] / size[is_bounded]
         scales = room[is_bounded] / size[is_bounded]
-        least = scales.min() * (1.0 + share[scales.argmin()])
-        off += far * float(share[scales * (1.0 - share) <= least].max())
-    return float(placed.scale * off)
+        min_scale = scales.min() * (1.0 + share[scales.argmin()])
+        off_mm += distance * float(share[scales * (1.0 - share) <= min_scale].max())
+    return float(placed_map.scale * off_mm)
 
 
-def _box_slack(drawing: Drawing, job: Job, where: AffineMap) -> Floats:
+def _box_slack(drawing: Drawing, job: Job, frame_map: AffineMap) -> Floats:
     """Return an upper bound (2, 2), mm, of the distance of each side of `_box` from that of what
     was drawn."""
     paths, marks = rows_taken(drawing, job)
-    lines, off = drawing.paths.select(paths), drawing.off_mm[:, 0]
+    lines, off_mm = drawing.paths.select(paths), drawing.off_mm[:, 0]
     if len(paths) < len(drawing.paths):
-        chosen = np.zeros(len(drawing.paths), dtype=np.bool_)
-        chosen[paths] = True
-        off = off[np.repeat(chosen, np.diff(drawing.paths.offsets))]
-    lines = Polylines(where.vertices(lines.vertices), lines.offsets, lines.closed)
+        is_chosen = np.zeros(len(drawing.paths), dtype=np.bool_)
+        is_chosen[paths] = True
+        off_mm = off_mm[np.repeat(is_chosen, np.diff(drawing.paths.offsets))]
+    lines = Polylines(frame_map.vertices(lines.vertices), lines.offsets, lines.closed)
     low = np.full((3, 2), np.inf)  # of what is there, and of what may have been drawn
     high = -low
     every = segment_rows(lines)
     for first in range(0, len(every), SEGMENTS_AT_ONCE):
         rows = every[first : first + SEGMENTS_AT_ONCE]
-        boxes, about = segment_boxes(Segments.leaving(lines, rows)), off[rows][:, None]
-        low = np.minimum(low, [(boxes[:, :2] + k * about).min(axis=0) for k in (0, -1, 1)])
-        high = np.maximum(high, [(boxes[:, 2:] + k * about).max(axis=0) for k in (0, -1, 1)])
+        boxes, slack = segment_boxes(Segments.leaving(lines, rows)), off_mm[rows][:, None]
+        low = np.minimum(low, [(boxes[:, :2] + k * slack).min(axis=0) for k in (0, -1, 1)])
+        high = np.maximum(high, [(boxes[:, 2:] + k * slack).max(axis=0) for k in (0, -1, 1)])
     if marks:
-        points = where.points(np.array([drawing.marks[index].at_mm for index in marks]))
+        points = frame_map.points(np.array([drawing.marks[index].at_mm for index in marks]))
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     return np.asarray(np.abs(np.array([low[1:] - low[0], high[1:] - high[0]])).max(axis=1).T)
 
@@ -267,20 +268,20 @@ def _origin(drawing: Drawing, job: Job, first: AffineMap, shifts: Floats) -> Flo
     return np.asarray(low if origin == "lower-left" else 0.5 * (low + high))
 
 
-def _box(drawing: Drawing, job: Job, where: AffineMap) -> Floats | None:
-    """Return the box (2, 2) of all that the operations take, mapped by `where`; None when they
+def _box(drawing: Drawing, job: Job, frame_map: AffineMap) -> Floats | None:
+    """Return the box (2, 2) of all that the operations take, mapped by `frame_map`; None when they
     take nothing."""
     paths, marks = rows_taken(drawing, job)
     boxes = []
     if paths:
-        boxes.append(extents(_map_lines(drawing.paths.select(paths), [where])[0]))
+        boxes.append(extents(_map_lines(drawing.paths.select(paths), [frame_map])[0]))
     if marks:
-        points = where.points(np.array([drawing.marks[index].at_mm for index in marks]))
+        points = frame_map.points(np.array([drawing.marks[index].at_mm for index in marks]))
         boxes.append(np.column_stack([points.min(axis=0), points.max(axis=0)]))
     if not boxes:
         return None
-    both = np.array(boxes)
-    return np.column_stack([both[:, :, 0].min(axis=0), both[:, :, 1].max(axis=0)])
+    stacked = np.array(boxes)
+    return np.column_stack([stacked[:, :, 0].min(axis=0), stacked[:, :, 1].max(axis=0)])
 
 
 def rows_taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
@@ -329,31 +330,31 @@ def _refuse_too_many(drawing: Drawing, placement: Placement) -> None:
         )
 
 
-def _refuse_too_large(placed: Drawing, job: Job) -> None:
+def _refuse_too_large(placed_drawing: Drawing, job: Job) -> None:
     """Refuse a drawing that is larger in the work frame than any machine, or far from part
     zero."""
-    places = placed.paths.vertices[:, :2]
+    places = placed_drawing.paths.vertices[:, :2]
     if len(places) == 0:
         return
     times = ALLOWED_TIMES if "long" in job.allow else 1.0
-    size, most = float(np.ptp(places, axis=0).max()), MAX_SIZE_MM * times
-    if not size <= most:
+    size, max_size = float(np.ptp(places, axis=0).max()), MAX_SIZE_MM * times
+    if not size <= max_size:
         key = _enlarging_key(job.placement)
         mend = f"give a smaller {key}" if key else "give --units, a scale, or the --layer to cut"
         raise OptionError(
-            f"what is cut is {size:.4g} mm long, more than {most:g} mm",
-            file=placed.file,
+            f"what is cut is {size:.4g} mm long, more than {max_size:g} mm",
+            file=placed_drawing.file,
             where=f"key {key}" if key else None,
             mend=mend + _or_allow(size, MAX_SIZE_MM),
         )
-    away, farthest = float(np.abs(places).max()), MAX_DISTANCE_MM * times
-    if away > farthest:
+    distance, farthest = float(np.abs(places).max()), MAX_DISTANCE_MM * times
+    if distance > farthest:
         raise OptionError(
-            f"what is cut lies {away:.4g} mm from part zero, more than {farthest:g} mm",
-            file=placed.file,
+            f"what is cut lies {distance:.4g} mm from part zero, more than {farthest:g} mm",
+            file=placed_drawing.file,
             where="key origin",
             mend="use an origin on what is cut: lower-left or centre"
-            + _or_allow(away, MAX_DISTANCE_MM),
+            + _or_allow(distance, MAX_DISTANCE_MM),
         )
 
 
@@ -372,29 +373,31 @@ def _enlarging_key(placement: Placement) -> str:
     return "pitch" if placement.copies != (1, 1) else ""
 
 
-def _is_identity(where: AffineMap) -> bool:
-    return np.array_equal(where.matrix, np.eye(2)) and not where.shift.any()
+def _is_identity(frame_map: AffineMap) -> bool:
+    return np.array_equal(frame_map.matrix, np.eye(2)) and not frame_map.shift.any()
 
 
 def _map_drawing(drawing: Drawing, maps: list[AffineMap]) -> Drawing:
     """Return the drawing with all that has a place repeated for each map; paths that the scale
     makes a point are left out."""
-    paths, rows, kept = _map_lines(drawing.paths, maps)
-    off = np.tile(maps[0].scale * drawing.off_mm, (len(maps), 1))
+    paths, rows, kept_vertices = _map_lines(drawing.paths, maps)
+    off_mm = np.tile(maps[0].scale * drawing.off_mm, (len(maps), 1))
     copy, path = np.divmod(rows, max(1, len(drawing.paths)))
-    which = list(zip(copy.tolist(), path.tolist(), strict=True))
+    copies = list(zip(copy.tolist(), path.tolist(), strict=True))
     return replace(
         drawing,
         paths=paths,
         # What left points that went now leaves the one before them.
-        off_mm=np.maximum.reduceat(off, kept, axis=0) if len(kept) else off,
-        layers=tuple(drawing.layers[each] for _, each in which),
-        colours=tuple(drawing.colours[each] for _, each in which),
-        sources=tuple(_copy_name(drawing.sources[each], n) for n, each in which),
-        line_types=tuple(drawing.line_types[each] for _, each in which),
+        off_mm=np.maximum.reduceat(off_mm, kept_vertices, axis=0)
+        if len(kept_vertices)
+        else off_mm,
+        layers=tuple(drawing.layers[each] for _, each in copies),
+        colours=tuple(drawing.colours[each] for _, each in copies),
+        sources=tuple(_copy_name(drawing.sources[each], n) for n, each in copies),
+        line_types=tuple(drawing.line_types[each] for _, each in copies),
         marks=tuple(
-            replace(mark, at_mm=where.point(mark.at_mm), source=_copy_name(mark.source, n))
-            for n, where in enumerate(maps)
+            replace(mark, at_mm=copy_map.point(mark.at_mm), source=_copy_name(mark.source, n))
+            for n, copy_map in enumerate(maps)
             for mark in drawing.marks
         ),
         gaps=_map_gaps(drawing.gaps, maps),
@@ -415,22 +418,22 @@ def _map_lines(lines: Polylines, maps: list[AffineMap]) -> tuple[Polylines, Ints
     counts = np.tile(np.diff(lines.offsets), len(maps))
     closed = np.tile(lines.closed, len(maps))
     with np.errstate(over="ignore", invalid="ignore"):
-        vertices = np.concatenate([where.vertices(lines.vertices) for where in maps])
+        vertices = np.concatenate([copy_map.vertices(lines.vertices) for copy_map in maps])
         keep, _ = without_repeats(vertices, counts, closed)
     try:
         if keep.all():
             offsets = np.concatenate([[0], np.cumsum(counts)])
             return Polylines(vertices, offsets, closed), np.arange(count), np.arange(len(keep))
         owner = np.repeat(np.arange(count), counts)[keep]
-        left = np.bincount(owner, minlength=count)
-        rows = np.flatnonzero(left >= 2)
+        vertex_counts = np.bincount(owner, minlength=count)
+        rows = np.flatnonzero(vertex_counts >= 2)
         if not len(rows):
             offsets = np.concatenate([[0], np.cumsum(counts)])
             Polylines(vertices, offsets, closed)  # raises: it names the first point
-        closed &= encloses(vertices[keep], owner, left)
-        offsets = np.concatenate([[0], np.cumsum(left[rows])])
-        kept = np.flatnonzero(keep)[left[owner] >= 2]
-        return Polylines(vertices[kept], offsets, closed[rows]), rows, kept
+        closed &= encloses(vertices[keep], owner, vertex_counts)
+        offsets = np.concatenate([[0], np.cumsum(vertex_counts[rows])])
+        kept_vertices = np.flatnonzero(keep)[vertex_counts[owner] >= 2]
+        return Polylines(vertices[kept_vertices], offsets, closed[rows]), rows, kept_vertices
     except GeometryError as error:
         raise OptionError(
             f"scaled {maps[0].scale:g} times, {error.where or 'a path'} has no shape:"
@@ -448,12 +451,12 @@ def _map_unchosen(unchosen: Unchosen, maps: list[AffineMap]) -> Unchosen:
     except OptionError:  # nothing is left of them; what is chosen has been placed already
         return Unchosen()
     copy, path = np.divmod(rows, max(1, len(unchosen.paths)))
-    which = list(zip(copy.tolist(), path.tolist(), strict=True))
+    copies = list(zip(copy.tolist(), path.tolist(), strict=True))
     return Unchosen(
         paths=paths,
-        layers=tuple(unchosen.layers[each] for _, each in which),
-        sources=tuple(_copy_name(unchosen.sources[each], n) for n, each in which),
-        line_types=tuple(unchosen.line_types[each] for _, each in which),
+        layers=tuple(unchosen.layers[each] for _, each in copies),
+        sources=tuple(_copy_name(unchosen.sources[each], n) for n, each in copies),
+        line_types=tuple(unchosen.line_types[each] for _, each in copies),
     )
 
 
@@ -463,8 +466,8 @@ def _copy_name(source: str, copy: int) -> str:
 
 def _map_gaps(gaps: tuple[Gap, ...], maps: list[AffineMap]) -> tuple[Gap, ...]:
     return tuple(
-        replace(gap, at_mm=where.point(gap.at_mm), size_mm=gap.size_mm * where.scale)
-        for where in maps
+        replace(gap, at_mm=copy_map.point(gap.at_mm), size_mm=gap.size_mm * copy_map.scale)
+        for copy_map in maps
         for gap in gaps
     )
 
@@ -473,22 +476,24 @@ def _map_healing(drawing: Drawing, maps: list[AffineMap], rows: Ints) -> Healing
     """Return the places of branches and crossings of the paths `rows` that are left; the counts of
     what was corrected on reading stay as they were."""
     healing, paths = drawing.healing, len(drawing.paths)
-    now = {row: index for index, row in enumerate(rows.tolist())}
+    new_index = {row: index for index, row in enumerate(rows.tolist())}
     return replace(
         healing,
         branches=tuple(
             replace(
                 branch,
-                at_mm=where.point(branch.at_mm),
-                paths=tuple(now[k + n * paths] for k in branch.paths if k + n * paths in now),
+                at_mm=copy_map.point(branch.at_mm),
+                paths=tuple(
+                    new_index[k + n * paths] for k in branch.paths if k + n * paths in new_index
+                ),
             )
-            for n, where in enumerate(maps)
+            for n, copy_map in enumerate(maps)
             for branch in healing.branches
         ),
         crossings=tuple(
-            replace(each, at_mm=where.point(each.at_mm), path=now[each.path + n * paths])
-            for n, where in enumerate(maps)
+            replace(each, at_mm=copy_map.point(each.at_mm), path=new_index[each.path + n * paths])
+            for n, copy_map in enumerate(maps)
             for each in healing.crossings
-            if each.path + n * paths in now
+            if each.path + n * paths in new_index
         ),
     )

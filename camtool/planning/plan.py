@@ -109,38 +109,42 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
             where="table [[setups]]",
             mend=f"name one with --setup: {names}",
         )
-    placed = place(drawing, job)
-    sides = Sides.of(placed, _with_all_setups(job), machine.defaults.cut_depth_mm)
-    here: Point = HOME
+    placed_drawing = place(drawing, job)
+    sides = Sides.of(placed_drawing, _with_all_setups(job), machine.defaults.cut_depth_mm)
+    tool_place: Point = HOME
     steps: list[Step] = []
     settings = [setting_of(operation, job, machine) for operation in job.operations]
     for rank, setting in enumerate(settings, 1):
-        there = machine.defaults.park_mm if rank == len(settings) else None
+        end_place = machine.defaults.park_mm if rank == len(settings) else None
         before = steps[-1] if setting.operation.stage == "finish" else None
-        step = _step(placed, job, setting, machine, (here, there), sides, before)
-        end = _end(step.runs, here)
+        step = _step(placed_drawing, job, setting, machine, (tool_place, end_place), sides, before)
+        end = _end(step.runs, tool_place)
         if undivided and _is_divided(job, setting.operation):
-            plain = replace(job, minimise="rapids")
-            step = _step(placed, plain, setting, machine, (here, there), sides, before)
-        here = end
+            plain_job = replace(job, minimise="rapids")
+            step = _step(
+                placed_drawing, plain_job, setting, machine, (tool_place, end_place), sides, before
+            )
+        tool_place = end
         steps.append(step)
     steps = _rested(_sparing(steps))
-    found = Plan(job, placed, tuple(steps), ToolpathBuilder().finish())
-    return _linked(found, drawing, job, machine, undivided=undivided)
+    unlinked = Plan(job, placed_drawing, tuple(steps), ToolpathBuilder().finish())
+    return _linked(unlinked, drawing, job, machine, undivided=undivided)
 
 
 def _with_all_setups(job: Job) -> Job:
     """Return the job with the operations of the part's other set-ups behind its own: edges that
     are cut in these are edges too."""
-    others = [each for each in job.whole.operations if each not in job.operations]
-    return replace(job, operations=(*job.operations, *others)) if others else job
+    other_operations = [each for each in job.whole.operations if each not in job.operations]
+    return (
+        replace(job, operations=(*job.operations, *other_operations)) if other_operations else job
+    )
 
 
 def _linked(
-    plan: Plan, drawing: Drawing, whole: Job, machine: Machine, *, undivided: bool
+    plan: Plan, drawing: Drawing, full_job: Job, machine: Machine, *, undivided: bool
 ) -> Plan:
-    """The plan with the toolpath of its steps; its job may be a part of the `whole` one."""
-    job, placed, steps = plan.job, plan.placed, plan.steps
+    """The plan with the toolpath of its steps; its job may be a part of the `full_job` one."""
+    job, placed_drawing, steps = plan.job, plan.placed, plan.steps
     worked = [(step.setting, step.runs) for step in steps]
     approaches = None
     if not undivided and (job.approach or job.minimise == "reversals"):
@@ -149,10 +153,10 @@ def _linked(
         approaches = partial(Approaches, machine)
     builder = link(worked, machine, approaches)
     toolpath = builder.finish()
-    findings = collapse_findings(drawing, placed, job)
+    findings = collapse_findings(drawing, placed_drawing, job)
     findings += [finding for step in steps for finding in step.findings]
-    findings += _left_over(placed, whole, any(step.runs for step in steps))
-    findings += _coarse(drawing, placed)
+    findings += _left_over(placed_drawing, full_job, any(step.runs for step in steps))
+    findings += _coarse(drawing, placed_drawing)
     findings += checked(toolpath, job, machine, steps)
     made_from = PurePath(drawing.file).name
     toolpath = replace(
@@ -161,7 +165,7 @@ def _linked(
         made_from=made_from,
         setup=setup_heading(job),
         tabs_mm=_tabs(steps),
-        drawn=drawn_of(toolpath, builder.runs, steps, placed),
+        drawn=drawn_of(toolpath, builder.runs, steps, placed_drawing),
     )
     return replace(plan, toolpath=toolpath)
 
@@ -179,11 +183,13 @@ def turns_of_tools(plan: Plan) -> list[list[int]]:
     tool: Tool | None = None
     for index, step in enumerate(plan.steps):
         if step.runs:
-            mine = step.operation.tool
-            same = tool is None or tool == mine
-            if not (same or (tool and tool.number is not None and tool.number == mine.number)):
+            own_tool = step.operation.tool
+            same_tool = tool is None or tool == own_tool
+            if not (
+                same_tool or (tool and tool.number is not None and tool.number == own_tool.number)
+            ):
                 turns.append([])
-            tool = mine
+            tool = own_tool
         turns[-1].append(index)
     return turns
 
@@ -207,23 +213,23 @@ def parted(
     return tuple(parts)
 
 
-def _coarse(drawing: Drawing, placed: Drawing) -> Iterator[Finding]:
+def _coarse(drawing: Drawing, placed_drawing: Drawing) -> Iterator[Finding]:
     """FIT_COARSE for curves that were fitted for a smaller part than the job makes of them."""
-    if not drawing.fit.max_mm or not placed.fit.max_mm:
+    if not drawing.fit.max_mm or not placed_drawing.fit.max_mm:
         return
-    scale = placed.fit.max_mm / drawing.fit.max_mm
+    scale = placed_drawing.fit.max_mm / drawing.fit.max_mm
     if scale > drawing.made_for * (1.0 + SCALE_SHARE):
         yield FIT_COARSE(
-            where=placed.file,
-            measured=placed.fit.max_mm,
+            where=placed_drawing.file,
+            measured=placed_drawing.fit.max_mm,
             read=drawing.made_for,
             scale=scale,
-            off_um=placed.fit.max_mm * 1000.0,
+            off_um=placed_drawing.fit.max_mm * 1000.0,
         )
 
 
 def _step(
-    placed: Drawing,
+    placed_drawing: Drawing,
     job: Job,
     setting: Setting,
     machine: Machine,
@@ -234,27 +240,27 @@ def _step(
     """Plan one operation from what it takes to its runs, for a tool that comes from the first
     point of its `ends` and goes to the second (None: stays). `rough`: what has cleared the way,
     where it is a finishing pass."""
-    chosen = choose(placed, setting.operation, sides)
+    chosen = choose(placed_drawing, setting.operation, sides)
     work: Work = function_of(setting.operation.contract.work)(chosen, setting)
-    items, bare = work.items, list[Finding]()
+    items, tab_findings = work.items, list[Finding]()
     if contours := contours_of(items):
-        contours, bare = with_tabs(_with_starts(contours))
+        contours, tab_findings = with_tabs(_with_starts(contours))
         contours = _begun_between_tabs(contours)
         if rough is not None:
-            contours, more = in_passes(contours, setting, rough)
-            bare += more
+            contours, pass_findings = in_passes(contours, setting, rough)
+            tab_findings += pass_findings
         items = contours
     sided = side_findings(work, chosen, sides, setting.operation)
-    unclear = branch_findings(placed.healing.branches, chosen, sides, setting.operation)
-    findings = of_stage(setting.operation, [*unclear, *work.findings, *sided, *bare])
-    findings = [*_text_as_edge(placed, chosen, setting.operation, findings), *findings]
+    unclear = branch_findings(placed_drawing.healing.branches, chosen, sides, setting.operation)
+    findings = of_stage(setting.operation, [*unclear, *work.findings, *sided, *tab_findings])
+    findings = [*_text_as_edge(placed_drawing, chosen, setting.operation, findings), *findings]
     choices = choices_of(items)
     before = travel_mm(choices, drawn_order(choices), *ends)
     if job.minimise == "reversals":
         from camtool.planning.reversing import fewer_reversals
 
-        items, found = fewer_reversals(items, machine)
-        findings += found
+        items, reversal_findings = fewer_reversals(items, machine)
+        findings += reversal_findings
         choices = choices_of(items)
     _refuse_endless(items, setting)
     rows = best_order(choices, must_precede(items), *ends)
@@ -262,7 +268,7 @@ def _step(
     bridges: tuple[Bridge, ...] = ()
     if contours := contours_of(items):
         paths = chosen_paths(contours, choices, rows)
-        cut = runs_of(contours, order, paths, _walls(placed, sides, setting.operation))
+        cut = runs_of(contours, order, paths, _walls(placed_drawing, sides, setting.operation))
         runs, counts, bridges = cut.runs, cut.counts, cut.bridges
         findings += of_stage(setting.operation, cut.findings)
     else:
@@ -284,7 +290,7 @@ def _step(
 
 
 def _text_as_edge(
-    placed: Drawing, chosen: Chosen, operation: Operation, findings: Sequence[Finding]
+    placed_drawing: Drawing, chosen: Chosen, operation: Operation, findings: Sequence[Finding]
 ) -> Iterator[Finding]:
     """Outlines of text that are cut as edges, where the tool has no room beside some of them."""
     if not runs_beside(operation):
@@ -294,7 +300,7 @@ def _text_as_edge(
         for name, source, closed in zip(
             chosen.names, chosen.source.tolist(), chosen.lines.closed.tolist(), strict=True
         )
-        if closed and is_text(placed.sources[source])
+        if closed and is_text(placed_drawing.sources[source])
     ]
     spoilt = (ProgramCode.GOUGE, PlanningCode.CONTOUR_TOO_SMALL)
     places = [each.where or "" for each in findings if each.code in spoilt]
@@ -316,21 +322,21 @@ def _sparing(steps: list[Step]) -> list[Step]:
     bridges = [bridge for step in steps for bridge in step.bridges]
     if not bridges:
         return steps
-    made = []
+    spared = []
     for step in steps:
-        kept = raised_over_bridges(step.runs, step.operation, step.setting.feeds, bridges)
-        findings = (*step.findings, *of_stage(step.operation, kept.findings))
-        made.append(replace(step, runs=kept.runs, findings=findings))
-    return made
+        raised = raised_over_bridges(step.runs, step.operation, step.setting.feeds, bridges)
+        findings = (*step.findings, *of_stage(step.operation, raised.findings))
+        spared.append(replace(step, runs=raised.runs, findings=findings))
+    return spared
 
 
 def _rested(steps: list[Step]) -> list[Step]:
     """The steps; what one of them leaves for another to clear is said by that one alone."""
-    left = [step.operation.rest for step in steps if step.operation.rest_of is not None]
+    rest_names = [step.operation.rest for step in steps if step.operation.rest_of is not None]
     codes = (PlanningCode.UNREACHED, PlanningCode.DEPTH_LIMITED)
     return [
         replace(step, findings=tuple(each for each in step.findings if each.code not in codes))
-        if step.operation.name and step.operation.name in left
+        if step.operation.name and step.operation.name in rest_names
         else step
         for step in steps
     ]
@@ -361,32 +367,32 @@ def _refuse_endless(items: Items, setting: Setting) -> None:
             )
 
 
-def _walls(placed: Drawing, sides: Sides, operation: Operation) -> KeepOut:
+def _walls(placed_drawing: Drawing, sides: Sides, operation: Operation) -> KeepOut:
     """The closed lines that leads of a contour must keep away from: those of the operation itself,
     and those that any operation makes walls of."""
-    count = len(placed.paths)
+    count = len(placed_drawing.paths)
     makers = [each.contract.leaves_walls for each in sides.operations]
-    own, walls = sides.taken_by(operation)[:count], sides.cuts[makers, :count].any(axis=0)
-    rows = np.flatnonzero((own | walls) & placed.paths.closed)
-    return KeepOut(placed.paths.select(rows.tolist()), own[rows])
+    is_own, walls = sides.taken_by(operation)[:count], sides.cuts[makers, :count].any(axis=0)
+    rows = np.flatnonzero((is_own | walls) & placed_drawing.paths.closed)
+    return KeepOut(placed_drawing.paths.select(rows.tolist()), is_own[rows])
 
 
 def _with_starts(contours: list[Contour]) -> list[Contour]:
     """Contours, the closed ones with the places where their operation lets them begin."""
     if contours[0].setting.operation.start == "nearest":
         return contours
-    made = []
+    contours_made = []
     for contour in contours:
         operation = contour.setting.operation
         path, starts = with_starts(contour.path, operation.start, operation.away_mm)
-        made.append(replace(contour, path=path, starts=starts))
-    return made
+        contours_made.append(replace(contour, path=path, starts=starts))
+    return contours_made
 
 
 def _begun_between_tabs(contours: list[Contour]) -> list[Contour]:
     """The contours, those with tabs by hand beginning farthest from these, if nothing says where:
     no tab can stand where a contour begins."""
-    made = []
+    contours_made = []
     for contour in contours:
         tabs = contour.setting.operation.tabs
         if tabs and tabs.at_mm and contour.path.closed and not len(contour.starts):
@@ -394,32 +400,34 @@ def _begun_between_tabs(contours: list[Contour]) -> list[Contour]:
                 contour.path, middle_of_longest_gap(contour.path, tabs.at_mm), 0.0
             )
             contour = replace(contour, path=path, starts=starts)
-        made.append(contour)
-    return made
+        contours_made.append(contour)
+    return contours_made
 
 
-def _end(runs: Runs, here: Point) -> Point:
+def _end(runs: Runs, tool_place: Point) -> Point:
     """Return the place (x, y) mm at which the tool comes up after the runs."""
     if not len(runs):
-        return here
+        return tool_place
     x, y = runs.vertices[-1, :2].tolist()
     return x, y
 
 
-def _left_over(placed: Drawing, job: Job, cuts: bool) -> list[Finding]:
+def _left_over(placed_drawing: Drawing, job: Job, cuts: bool) -> list[Finding]:
     """Return findings of what is drawn and not cut: points that are not drilled, or all of it."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     drills = [operation for operation in job.operations if operation.contract.takes == "holes"]
-    left = [
+    uncut_marks = [
         mark
-        for mark in placed.marks
+        for mark in placed_drawing.marks
         if job.takes(mark.layer, mark.colour)
         and not any(takes_mark(operation, mark) for operation in drills)
     ]
-    if left:
-        found.append(MARKS_NOT_CUT(measured=len(left)))
-    if not cuts and (len(placed.paths) or placed.marks):
-        found.append(
-            (NOTHING_DRAWN_BUT_PATHS if len(placed.paths) else NOTHING_DRAWN)(where=placed.file)
+    if uncut_marks:
+        findings.append(MARKS_NOT_CUT(measured=len(uncut_marks)))
+    if not cuts and (len(placed_drawing.paths) or placed_drawing.marks):
+        findings.append(
+            (NOTHING_DRAWN_BUT_PATHS if len(placed_drawing.paths) else NOTHING_DRAWN)(
+                where=placed_drawing.file
+            )
         )
-    return found
+    return findings

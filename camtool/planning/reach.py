@@ -86,15 +86,17 @@ def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
     if tool_radius_mm <= POSITION_EPS_MM or len(region) == 0:
         return []
     reached = opened(region, tool_radius_mm)
-    least = MIN_FOOT_SHARE * np.pi * tool_radius_mm**2
+    min_area = MIN_FOOT_SHARE * np.pi * tool_radius_mm**2
     parting = PARTING * math.sqrt(2.0 * tool_radius_mm * TOGETHER_MM)
-    left = Nesting(_without(region, reached, least, parting))
-    pieces = [piece for _, piece in regions(left)]
+    nesting = Nesting(_without(region, reached, min_area, parting))
+    pieces = [piece for _, piece in regions(nesting)]
     areas = [float(signed_areas(piece).sum()) for piece in pieces]
-    large = [(area, piece) for area, piece in zip(areas, pieces, strict=True) if area >= least]
+    large = [(area, piece) for area, piece in zip(areas, pieces, strict=True) if area >= min_area]
     places = _far_places([piece for _, piece in large], reached)
-    found = [Unreached(area, at, piece) for (area, piece), at in zip(large, places, strict=True)]
-    return sorted(found, key=lambda piece: (-piece.area_mm2, piece.at_mm))
+    unreached_pieces = [
+        Unreached(area, place, piece) for (area, piece), place in zip(large, places, strict=True)
+    ]
+    return sorted(unreached_pieces, key=lambda piece: (-piece.area_mm2, piece.at_mm))
 
 
 def _far_places(pieces: Sequence[Polylines], reached: Polylines) -> list[tuple[float, float]]:
@@ -103,15 +105,15 @@ def _far_places(pieces: Sequence[Polylines], reached: Polylines) -> list[tuple[f
         centres = [extents(piece).mean(axis=1).tolist() for piece in pieces]
         return [(x, y) for x, y in centres]
     points = np.concatenate([piece.vertices[:, :2] for piece in pieces])
-    away = nearest(points, Segments.of(reached)).distance
-    found = []
+    distances = nearest(points, Segments.of(reached)).distance
+    places = []
     begin = 0
     for piece in pieces:
         end = begin + len(piece.vertices)
-        x, y = points[begin + int(away[begin:end].argmax())].tolist()
-        found.append((x, y))
+        x, y = points[begin + int(distances[begin:end].argmax())].tolist()
+        places.append((x, y))
         begin = end
-    return found
+    return places
 
 
 def _without(
@@ -125,9 +127,9 @@ def _without(
         return region
     inner = _apart(reached, region, least_mm2)
     sections = [*_apart(region, reached, least_mm2), *map(reverse, inner)]
-    whole = [path for path in sections if path.closed]
+    closed_paths = [path for path in sections if path.closed]
     opens = [path for path in sections if not path.closed]
-    return Polylines.of([*whole, *_closed(opens, parting_mm)])
+    return Polylines.of([*closed_paths, *_closed(opens, parting_mm)])
 
 
 def _apart(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polyline]:
@@ -143,16 +145,18 @@ def _apart(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polylin
     parts = np.array(PROBES)
     probes = (low[:, None] + (high - low)[:, None] * parts).ravel()
     points = point_at(segments, np.repeat(row, len(parts)), probes)
-    away = _distances(points, Segments.of(other)).reshape(-1, len(parts))
-    wanted = np.asarray((away[:, 1:-1] > TOGETHER_MM).any(axis=1))
+    distances = _distances(points, Segments.of(other)).reshape(-1, len(parts))
+    is_wanted = np.asarray((distances[:, 1:-1] > TOGETHER_MM).any(axis=1))
     lengths = segment_lengths(segments)[row] * (high - low)
     first = np.searchsorted(segments.path[row], np.arange(len(lines) + 1))
-    found: list[Polyline] = []
-    for index in np.unique(segments.path[row[wanted]]).tolist():
-        mine = slice(int(first[index]), int(first[index + 1]))
-        made = _Parts(lengths[mine], away[mine].max(axis=1), wanted[mine])
-        found += made.sections(lines[index], least_mm2)
-    return found
+    sections: list[Polyline] = []
+    for index in np.unique(segments.path[row[is_wanted]]).tolist():
+        path_rows = slice(int(first[index]), int(first[index + 1]))
+        path_parts = _Parts(
+            lengths[path_rows], distances[path_rows].max(axis=1), is_wanted[path_rows]
+        )
+        sections += path_parts.sections(lines[index], least_mm2)
+    return sections
 
 
 class _Parts(Struct, frozen=True, eq=False):
@@ -168,34 +172,34 @@ class _Parts(Struct, frozen=True, eq=False):
         if self.wanted.all():
             return [path]
         turn = int(np.argmin(self.wanted))
-        length, away = np.roll(self.length, -turn), np.roll(self.away, -turn)
+        length, distances = np.roll(self.length, -turn), np.roll(self.away, -turn)
         begin = np.concatenate([[0.0], np.cumsum(length)]) + self.length[:turn].sum()
         first, last = true_ranges(np.roll(self.wanted, -turn))
         # The path begins with a part that is not wanted, so that every other one is wanted.
         edges = np.column_stack([first, last]).ravel()
-        farthest = np.maximum.reduceat(np.append(away, 0.0), edges)[::2]
+        farthest = np.maximum.reduceat(np.append(distances, 0.0), edges)[::2]
         large = 2.0 * (begin[last] - begin[first]) * farthest >= least_mm2
         along = MeasuredPath.of(path)
-        found = []
+        sections = []
         for low, high in zip(begin[first[large]], begin[last[large]], strict=True):
             vertices = along.piece(float(low), float(high))
             if np.hypot(*np.diff(vertices[:, :2], axis=0).T).min() > POSITION_EPS_MM:
-                found.append(Polyline(vertices))
-        return found
+                sections.append(Polyline(vertices))
+        return sections
 
 
 def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
     """Rows and the parts from .. to (in fractions) into which the points on them divide them."""
     curves, points = IndexedCurves.of(segments), np.ascontiguousarray(points)
-    away = nearest_distances(points, curves.rows, curves.tree)
-    on = (away <= TOGETHER_MM) & ~_at_any(points, segments.start)
-    points, away = points[on], away[on]
-    pairs = curves_within(points, away + POSITION_EPS_MM, curves.rows, curves.tree)
+    distances = nearest_distances(points, curves.rows, curves.tree)
+    is_on = (distances <= TOGETHER_MM) & ~_at_any(points, segments.start)
+    points, distances = points[is_on], distances[is_on]
+    pairs = curves_within(points, distances + POSITION_EPS_MM, curves.rows, curves.tree)
     row = pairs[np.unique(pairs[:, 0], return_index=True)[1], 1]
     frames = Frames.of(segments)[row]
     along = frames.along(points)
-    within = (along > TOGETHER_MM) & (along < frames.length - TOGETHER_MM)
-    row, part = row[within], (along / frames.length)[within]
+    is_inner = (along > TOGETHER_MM) & (along < frames.length - TOGETHER_MM)
+    row, part = row[is_inner], (along / frames.length)[is_inner]
     rows = np.concatenate([np.arange(len(segments)), row])
     low = np.concatenate([np.zeros(len(segments)), part])
     order = np.lexsort([low, rows])
@@ -211,9 +215,9 @@ def _distances(points: Floats, segments: Segments) -> Floats:
     return nearest_distances(np.ascontiguousarray(points), curves.rows, curves.tree)
 
 
-def _at_any(points: Floats, others: Floats) -> Bools:
+def _at_any(points: Floats, other_points: Floats) -> Bools:
     """(P,) which of the points (P, 2) are at one of the others (N, 2)."""
-    node, _ = merge_points(np.concatenate([points, others]), TOGETHER_MM)
+    node, _ = merge_points(np.concatenate([points, other_points]), TOGETHER_MM)
     return np.isin(node[: len(points)], node[len(points) :])
 
 
@@ -223,37 +227,37 @@ def _closed(sections: list[Polyline], parting_mm: float) -> list[Polyline]:
         return []
     ends = np.array([[path.start, path.end] for path in sections]).reshape(-1, 2)
     node = merge_points(ends, SAME_PLACE_MM)[0].reshape(-1, 2)
-    lost = np.flatnonzero(~np.isin(node[:, 0], node[:, 1]))
+    unmatched = np.flatnonzero(~np.isin(node[:, 0], node[:, 1]))
     for row in np.flatnonzero(~np.isin(node[:, 1], node[:, 0])).tolist():
-        apart = np.hypot(*(ends[2 * lost] - ends[2 * row + 1]).T)
-        if apart.min(initial=math.inf) <= parting_mm:
-            node[row, 1] = node[lost[apart.argmin()], 0]
-    leaving: dict[int, list[int]] = defaultdict(list)
+        gaps = np.hypot(*(ends[2 * unmatched] - ends[2 * row + 1]).T)
+        if gaps.min(initial=math.inf) <= parting_mm:
+            node[row, 1] = node[unmatched[gaps.argmin()], 0]
+    rows_from: dict[int, list[int]] = defaultdict(list)
     for row, place in enumerate(node[:, 0].tolist()):
-        leaving[place].append(row)
+        rows_from[place].append(row)
     frames = [Frames.of(Segments.of(path)) for path in sections]
-    free = np.ones(len(sections), dtype=np.bool_)
-    found = []
+    is_free = np.ones(len(sections), dtype=np.bool_)
+    closed_paths = []
     for first in range(len(sections)):
-        path = [first] if free[first] else []
+        path = [first] if is_free[first] else []
         while path and node[path[-1], 1] != node[first, 0]:
-            free[path[-1]] = False
-            onward = [row for row in leaving[int(node[path[-1], 1])] if free[row]]
+            is_free[path[-1]] = False
+            onward = [row for row in rows_from[int(node[path[-1], 1])] if is_free[row]]
             if not onward:
                 path = []
                 break
             turns = [_turn(frames[path[-1]], frames[row]) for row in onward]
             path.append(onward[int(np.argmax(turns))])
         if path:
-            free[path] = False
-            found += _joined([sections[row] for row in path])
-    return found
+            is_free[path] = False
+            closed_paths += _joined([sections[row] for row in path])
+    return closed_paths
 
 
-def _turn(arriving: Frames, leaving: Frames) -> float:
+def _turn(arriving: Frames, leaving_frames: Frames) -> float:
     """The angle from the end of one section to the start of another, left positive."""
     x, y = arriving.tangent_at(np.ones(len(arriving.length)))[-1]
-    u, v = leaving.tangent[0]
+    u, v = leaving_frames.tangent[0]
     return float(np.arctan2(x * v - y * u, x * u + y * v))
 
 
@@ -284,46 +288,48 @@ def unreached_findings(
     feet = [piece for piece in pieces if piece.area_mm2 <= largest_foot]
     if setting.operation.corners != "none" or setting.operation.contract.breaks_edges:
         feet = []
-    called = width_name(setting.operation)
-    return [*_places(wide, called), *_corners(feet, called)]
+    tool_words = width_name(setting.operation)
+    return [*_places(wide, tool_words), *_corners(feet, tool_words)]
 
 
-def cut_away_findings(kept: Polylines, operation: Operation) -> list[Finding]:
+def cut_away_findings(kept_region: Polylines, operation: Operation) -> list[Finding]:
     """Return findings where an operation that cuts beyond its lines cuts away what is to stay (on
     the left of its closed paths) from both sides: what a disc of that radius does not cover, but
     for corners."""
-    beyond = operation.beyond_mm
-    if not beyond:
+    beyond_mm = operation.beyond_mm
+    if not beyond_mm:
         return []
-    corner = CORNER_SHARE * np.pi * beyond**2
-    thin = [piece for piece in unreached(kept, beyond) if piece.area_mm2 > corner]
-    found = [
+    corner = CORNER_SHARE * np.pi * beyond_mm**2
+    thin = [piece for piece in unreached(kept_region, beyond_mm) if piece.area_mm2 > corner]
+    findings = [
         GOUGE_BEYOND(
             where=_where(piece),
-            measured=2.0 * beyond,
+            measured=2.0 * beyond_mm,
             tool=tool_name(operation.tool),
-            amount=beyond,
+            amount=beyond_mm,
         )
         for piece in thin
     ]
-    return shortened_list(found, GOUGE_MORE)
+    return shortened_list(findings, GOUGE_MORE)
 
 
-def _places(pieces: Sequence[Unreached], called: str) -> Iterator[Finding]:
+def _places(pieces: Sequence[Unreached], tool_words: str) -> Iterator[Finding]:
     for piece in pieces[:MAX_LISTED]:
-        yield UNREACHED(where=_where(piece), measured=piece.area_mm2, tool=called)
-    rest = pieces[MAX_LISTED:]
-    if rest:
-        area = sum(piece.area_mm2 for piece in rest)
-        yield UNREACHED_MORE(where=_where(rest[0]), measured=area, tool=called, places=len(rest))
+        yield UNREACHED(where=_where(piece), measured=piece.area_mm2, tool=tool_words)
+    unlisted = pieces[MAX_LISTED:]
+    if unlisted:
+        area = sum(piece.area_mm2 for piece in unlisted)
+        yield UNREACHED_MORE(
+            where=_where(unlisted[0]), measured=area, tool=tool_words, places=len(unlisted)
+        )
 
 
-def _corners(pieces: Sequence[Unreached], called: str) -> Iterator[Finding]:
+def _corners(pieces: Sequence[Unreached], tool_words: str) -> Iterator[Finding]:
     if not pieces:
         return
     area = sum(piece.area_mm2 for piece in pieces)
     yield UNREACHED_CORNERS(
-        where=_where(pieces[0]), measured=area, tool=called, corners=len(pieces)
+        where=_where(pieces[0]), measured=area, tool=tool_words, corners=len(pieces)
     )
 
 

@@ -59,41 +59,41 @@ def add_reliefs(
     if near_mm == 0.0:
         return RelievedPath(path, np.empty((0, 2)))
     along, walls = MeasuredPath.of(path), MeasuredPath.of(original)
-    others = Segments.of(Polylines.of([original, *keep_out]))
+    other_walls = Segments.of(Polylines.of([original, *keep_out]))
     reliefs: dict[int, list[Floats]] = {}
-    left: list[Floats] = []
+    uncleared: list[Floats] = []
     for corner, vertex in _missed_corners(along, walls, near_mm).items():
         move = _relief_move(along, vertex, walls, corner, kind)
-        if _is_clear(move, walls.segments.start[corner], others, near_mm):
+        if _is_clear(move, walls.segments.start[corner], other_walls, near_mm):
             reliefs.setdefault(vertex, []).append(move[1])
         else:
-            left.append(walls.segments.start[corner])
+            uncleared.append(walls.segments.start[corner])
     rows: list[Floats] = []
     for vertex, row in enumerate(path.vertices):
         for tip in reliefs.get(vertex, []):
             rows += [np.array([*row[:2], 0.0]), np.array([*tip, 0.0])]
         rows.append(row)
-    return RelievedPath(Polyline(np.array(rows), path.closed), np.array(left).reshape(-1, 2))
+    return RelievedPath(Polyline(np.array(rows), path.closed), np.array(uncleared).reshape(-1, 2))
 
 
 def _missed_corners(along: MeasuredPath, walls: MeasuredPath, near_mm: float) -> dict[int, int]:
     """Return the corners (vertices of the walls) that the tool misses, with the vertex of its path
     at which it stands then: the nearest of those that are equally far from both walls of the
     corner."""
-    found: dict[int, tuple[float, int]] = {}
+    nearest_vertex: dict[int, tuple[float, int]] = {}
     for vertex in np.flatnonzero(np.abs(along.turns) > RELIEF_TURN_RAD).tolist():
         v = along.path.vertices[vertex, :2]
         distance = points_to_segments(v[None], walls.segments)[0]
-        away = float(distance.min())
-        if away < near_mm - RELIEF_MATCH_MM:
+        distance_min = float(distance.min())
+        if distance_min < near_mm - RELIEF_MATCH_MM:
             continue
-        near = distance <= away + RELIEF_MATCH_MM
+        is_near = distance <= distance_min + RELIEF_MATCH_MM
         reach = np.hypot(*(walls.segments.start - v).T)
-        missed = near & np.roll(near, 1) & (reach > away + MIN_RELIEF_MM)
-        for corner in np.flatnonzero(missed).tolist():
-            here = (float(reach[corner]), vertex)
-            found[corner] = min(found.get(corner, here), here)
-    return {corner: vertex for corner, (_, vertex) in found.items()}
+        is_missed = is_near & np.roll(is_near, 1) & (reach > distance_min + MIN_RELIEF_MM)
+        for corner in np.flatnonzero(is_missed).tolist():
+            candidate = (float(reach[corner]), vertex)
+            nearest_vertex[corner] = min(nearest_vertex.get(corner, candidate), candidate)
+    return {corner: vertex for corner, (_, vertex) in nearest_vertex.items()}
 
 
 def _relief_move(
@@ -101,19 +101,19 @@ def _relief_move(
 ) -> Floats:
     """Return the move (2, 2) from V to where the tool's edge touches the corner."""
     v, c = along.path.vertices[vertex, :2], walls.segments.start[corner]
-    away = float(points_to_segments(v[None], walls.segments).min())
+    distance_min = float(points_to_segments(v[None], walls.segments).min())
     arm = c - v
     if kind == "overcut":
-        ahead = _along_longer(along, vertex, walls, corner)
-        foot = float(arm @ ahead)
-        beside = math.sqrt(max(float(arm @ arm) - foot * foot, 0.0))
-        if beside <= away + RELIEF_MATCH_MM:
+        heading = _along_longer(along, vertex, walls, corner)
+        foot = float(arm @ heading)
+        offset = math.sqrt(max(float(arm @ arm) - foot * foot, 0.0))
+        if offset <= distance_min + RELIEF_MATCH_MM:
             # A straight wall stays at this distance; one that bends may come nearer.
-            bent = beside < away - RELIEF_MATCH_MM
-            back = math.sqrt(away * away - beside * beside) if bent else 0.0
-            return np.array([v, v + (foot - back) * ahead])
+            bent = offset < distance_min - RELIEF_MATCH_MM
+            setback = math.sqrt(distance_min * distance_min - offset * offset) if bent else 0.0
+            return np.array([v, v + (foot - setback) * heading])
     # Beside a bent wall the path along it may not come near enough to the corner.
-    return np.array([v, c - arm * (away / math.hypot(*arm))])
+    return np.array([v, c - arm * (distance_min / math.hypot(*arm))])
 
 
 def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int) -> Floats:
@@ -121,24 +121,26 @@ def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner:
 
     Of two as long it is the one nearer to the X axis, so that symmetric parts stay symmetric.
     """
-    here = along.reach[vertex : vertex + 1]
-    before = along.at(here - 0.5 * np.diff(along.reach)[vertex - 1])
+    length_here = along.reach[vertex : vertex + 1]
+    before = along.at(length_here - 0.5 * np.diff(along.reach)[vertex - 1])
     pair = np.array([corner - 1, corner]) % len(walls.segments)
-    beside = points_to_segments(before, walls.segments[pair])[0]
-    coming, going = np.diff(walls.reach)[pair[:: 1 if beside[0] <= beside[1] else -1]]
-    ahead, back = along.arrivals(here)[0], -along.directions(here)[0]
+    wall_distances = points_to_segments(before, walls.segments[pair])[0]
+    coming, going = np.diff(walls.reach)[
+        pair[:: 1 if wall_distances[0] <= wall_distances[1] else -1]
+    ]
+    heading, heading_back = along.arrivals(length_here)[0], -along.directions(length_here)[0]
     if abs(coming - going) <= POSITION_EPS_MM:
-        return np.asarray(ahead if abs(ahead[0]) >= abs(back[0]) else back)
-    return np.asarray(ahead if coming > going else back)
+        return np.asarray(heading if abs(heading[0]) >= abs(heading_back[0]) else heading_back)
+    return np.asarray(heading if coming > going else heading_back)
 
 
-def _is_clear(move: Floats, corner: Floats, others: Segments, near_mm: float) -> bool:
+def _is_clear(move: Floats, corner: Floats, other_walls: Segments, near_mm: float) -> bool:
     """True if a tool that makes this move cuts into no wanted line but those at the corner."""
     low, high = move.min(axis=0) - near_mm, move.max(axis=0) + near_mm
-    boxes = segment_boxes(others)
+    boxes = segment_boxes(other_walls)
     rows = np.flatnonzero(((boxes[:, :2] < high) & (boxes[:, 2:] > low)).all(axis=1))
-    at_corner = points_to_segments(corner[None], others[rows])[0] <= RELIEF_MATCH_MM
+    at_corner = points_to_segments(corner[None], other_walls[rows])[0] <= RELIEF_MATCH_MM
     rows = rows[~at_corner]
     line = Segments.between(move[:1], move[1:], np.zeros(1))
-    distance, _ = paired_distances(line[np.zeros_like(rows)], others[rows])
+    distance, _ = paired_distances(line[np.zeros_like(rows)], other_walls[rows])
     return bool((distance >= near_mm - RELIEF_SLACK_MM).all())

@@ -94,13 +94,13 @@ def fewer_reversals(items: Items, machine: Machine) -> tuple[Items, tuple[Findin
     if not any(each.matters for each in residual):
         return items, (_no_backlash(machine),)
     counts = _Counts()
-    found: list[Item] = []
+    items_made: list[Item] = []
     for item in items:
         if isinstance(item, Fixed):
-            found.append(item)
+            items_made.append(item)
         else:
-            found.extend(_runs_of(item, machine, residual, counts))
-    return tuple(found), tuple(_findings(counts))
+            items_made.extend(_runs_of(item, machine, residual, counts))
+    return tuple(items_made), tuple(_findings(counts))
 
 
 def _runs_of(
@@ -174,13 +174,13 @@ def _stays_whole(operation: Operation) -> str:
 def _run_of_contour(contour: Contour, path: Polyline, backward: bool) -> Contour:
     """Return a run of a contour; one that is the whole of an open contour keeps no other
     outline."""
-    left = contour.material_left
+    material_left = contour.material_left
     return replace(
         contour,
         path=reverse(path) if backward else path,
         reversible=False,
         starts=np.empty(0, dtype=np.int64),
-        material_left=left if left is None else left != backward,
+        material_left=material_left if material_left is None else material_left != backward,
         outline=contour.path if contour.path.closed else contour.outline,
     )
 
@@ -192,21 +192,21 @@ def _begun_at_reversals(
     air, and the number of these: two at most, one of X and one of Y."""
     count = len(parts)
     if len(contour.starts):
-        at = np.flatnonzero(parts.begin == 0.0)[contour.starts]
+        places = np.flatnonzero(parts.begin == 0.0)[contour.starts]
     else:
         ends = [np.append(each.first, each.last) for each in reversals]
-        at = np.unique(np.concatenate(ends) % count)
-    if len(at) == 0:
+        places = np.unique(np.concatenate(ends) % count)
+    if len(places) == 0:
         return contour, 0
-    held = [
-        ((at[:, None] - each.first) % count <= each.last - each.first).any(axis=1)
+    held_axes = [
+        ((places[:, None] - each.first) % count <= each.last - each.first).any(axis=1)
         for each in reversals
     ]
-    saved = held[0].astype(np.int64) + held[1]
+    saved = held_axes[0].astype(np.int64) + held_axes[1]
     best = saved == saved.max()
     if len(contour.starts):
         return replace(contour, starts=contour.starts[best]), int(saved.max())
-    path, starts = parts.with_vertices(at[best])
+    path, starts = parts.with_vertices(places[best])
     return replace(contour, path=path, starts=starts), int(saved.max())
 
 
@@ -322,15 +322,17 @@ def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
     count, segments = len(parts), parts.segments
     rows = np.repeat(np.arange(count), SAMPLES)
     points = point_at(segments, rows, np.tile(np.linspace(0.0, 1.0, SAMPLES), count))
-    near = [rows, rows - 1, rows + 1]
-    near = [row % count if parts.path.closed else row.clip(0, count - 1) for row in near]
+    near_rows = [rows, rows - 1, rows + 1]
+    near_rows = [row % count if parts.path.closed else row.clip(0, count - 1) for row in near_rows]
     errors = np.zeros((count, 2, 2))
     for i, x in enumerate((residual[0].minus_mm, residual[0].plus_mm)):
         for j, y in enumerate((residual[1].minus_mm, residual[1].plus_mm)):
             if x or y:
-                moved = points + np.array([x, y])
-                apart = np.min([point_to_segment(moved, segments[row]) for row in near], axis=0)
-                errors[:, i, j] = apart.reshape(count, SAMPLES).max(axis=1)
+                shifted = points + np.array([x, y])
+                distances = np.min(
+                    [point_to_segment(shifted, segments[row]) for row in near_rows], axis=0
+                )
+                errors[:, i, j] = distances.reshape(count, SAMPLES).max(axis=1)
     return errors
 
 
@@ -341,8 +343,8 @@ def drawn_error_mm(division: Division) -> float:
         sense, better = reversals.sense, division.residual[axis].better
         # An axis that stands still stays where it was driven to last.
         last = np.maximum.accumulate(np.where(sense != 0, np.arange(len(sense)), -1))
-        held = np.where(last >= 0, sense[last], better)
-        columns.append((held > 0).astype(np.int64))
+        is_held_high = np.where(last >= 0, sense[last], better)
+        columns.append((is_held_high > 0).astype(np.int64))
     rows = np.arange(len(division.parts))
     return float(division.errors[rows, columns[0], columns[1]].max())
 
@@ -360,22 +362,22 @@ def _cheapest(division: Division, begin: int) -> tuple[tuple[int, Cost], list[Ru
     for i, j, piece in pieces:
         greatest[j] = min(greatest[j], max(greatest[i], piece.error_mm))
     best: list[Cost] = [(0, 0.0, 0.0)] + [(len(places), 0.0, 0.0)] * (len(places) - 1)
-    came: list[tuple[int, RunPiece] | None] = [None] * len(places)
+    arrivals: list[tuple[int, RunPiece] | None] = [None] * len(places)
     for i, j, piece in pieces:
         count, spread, weight = best[i]
         cost = count + 1, spread + piece.spread_mm, weight + piece.weight_mm2
         if piece.error_mm <= greatest[-1] + ALIKE_MM and cost < best[j]:
-            best[j], came[j] = cost, (i, piece)
-    return (round(greatest[-1] / ALIKE_MM), best[-1]), _trace_back(came)
+            best[j], arrivals[j] = cost, (i, piece)
+    return (round(greatest[-1] / ALIKE_MM), best[-1]), _trace_back(arrivals)
 
 
-def _trace_back(came: Sequence[tuple[int, RunPiece] | None]) -> list[RunPiece]:
-    found: list[RunPiece] = []
-    step = came[-1]
+def _trace_back(arrivals: Sequence[tuple[int, RunPiece] | None]) -> list[RunPiece]:
+    pieces: list[RunPiece] = []
+    step = arrivals[-1]
     while step is not None:
-        found.append(step[1])
-        step = came[step[0]]
-    return found[::-1]
+        pieces.append(step[1])
+        step = arrivals[step[0]]
+    return pieces[::-1]
 
 
 def _possible_pieces(division: Division, places: list[int]) -> Iterator[tuple[int, int, RunPiece]]:
@@ -406,12 +408,12 @@ def _reaches(division: Division, places: Ints) -> Floats:
 def _division_places(division: Division, begin: int, end: int) -> list[int]:
     """Return the places between two places, these too, at which a path may be divided: the ends of
     all spans, and where an axis of an open path begins or ends to move."""
-    count, found = len(division.parts), {begin, end}
+    count, places = len(division.parts), {begin, end}
     for reversals in division.reversals:
-        found.update(reversals.first.tolist(), reversals.last.tolist(), reversals.moves or ())
+        places.update(reversals.first.tolist(), reversals.last.tolist(), reversals.moves or ())
     if division.parts.path.closed:
-        found |= {place + count for place in found} | {place + 2 * count for place in found}
-    return sorted(place for place in found if begin <= place <= end)
+        places |= {place + count for place in places} | {place + 2 * count for place in places}
+    return sorted(place for place in places if begin <= place <= end)
 
 
 class Parts(Struct, frozen=True, eq=False, dict=True):
@@ -443,23 +445,23 @@ class Parts(Struct, frozen=True, eq=False, dict=True):
         """
         index = np.arange(first, last) % len(self)
         row, count = self.row[index], len(index)
-        fresh = np.ones(count, dtype=np.bool_)
-        fresh[1:] = (row[1:] != row[:-1]) | (self.begin[index[1:]] != self.end[index[:-1]])
-        head = np.flatnonzero(fresh)
+        is_new = np.ones(count, dtype=np.bool_)
+        is_new[1:] = (row[1:] != row[:-1]) | (self.begin[index[1:]] != self.end[index[:-1]])
+        head = np.flatnonzero(is_new)
         tail = np.append(head[1:], count) - 1
         share = self.end[index[tail]] - self.begin[index[head]]
         bulge = np.append(_bulges(self.path, row[head], share), 0.0)
         places = self.places[np.append(index[head], index[-1] + 1)]
         return Polyline(np.column_stack([places, bulge]))
 
-    def with_vertices(self, at: Ints) -> tuple[Polyline, Ints]:
+    def with_vertices(self, places: Ints) -> tuple[Polyline, Ints]:
         """Return the closed path with vertices at these places, and the indices of these
         vertices."""
-        keep = np.union1d(np.flatnonzero(self.begin == 0.0), at)
+        keep = np.union1d(np.flatnonzero(self.begin == 0.0), places)
         last = np.append(keep[1:], len(self)) - 1
         bulge = _bulges(self.path, self.row[keep], self.end[last] - self.begin[keep])
         path = Polyline(np.column_stack([self.places[keep], bulge]), closed=True)
-        return path, np.searchsorted(keep, at)
+        return path, np.searchsorted(keep, places)
 
 
 def _bulges(path: Polyline, row: Ints, share: Floats) -> Floats:
@@ -481,13 +483,13 @@ def parts_of(path: Polyline) -> Parts:
     first = np.arctan2(chord[:, 1], chord[:, 0]) - 0.5 * sweep
     lowest = np.ceil(np.minimum(first, first + sweep) / quarter)
     tangents = (lowest[:, None] + np.arange(3.0)) * quarter
-    whole = np.where(segments.is_arc, sweep, 1.0)
-    share = (tangents - first[:, None]) / whole[:, None]
-    short = (POSITION_EPS_MM / segment_lengths(segments))[:, None]
-    inner = segments.is_arc[:, None] & (share > short) & (share < 1.0 - short)
-    arc, which = np.nonzero(inner)
+    total_sweep = np.where(segments.is_arc, sweep, 1.0)
+    share = (tangents - first[:, None]) / total_sweep[:, None]
+    min_share = (POSITION_EPS_MM / segment_lengths(segments))[:, None]
+    inner = segments.is_arc[:, None] & (share > min_share) & (share < 1.0 - min_share)
+    arc, tangent_index = np.nonzero(inner)
     row = np.concatenate([np.arange(len(segments)), arc])
-    begin = np.concatenate([np.zeros(len(segments)), share[arc, which]])
+    begin = np.concatenate([np.zeros(len(segments)), share[arc, tangent_index]])
     order = np.lexsort([begin, row])
     row, begin = row[order], begin[order]
     at_end = np.append(row[1:] != row[:-1], True)
@@ -528,8 +530,8 @@ class AxisReversals(Struct, frozen=True, eq=False):
 def no_reversals(count: int) -> AxisReversals:
     """Return the reversals of an axis that never moves, or does not matter, along `count`
     parts."""
-    none = np.empty(0, dtype=np.int64)
-    return AxisReversals(np.zeros(count, dtype=np.int64), none, none)
+    no_parts = np.empty(0, dtype=np.int64)
+    return AxisReversals(np.zeros(count, dtype=np.int64), no_parts, no_parts)
 
 
 def reversals_along(values: Floats, closed: bool, least_mm: float) -> AxisReversals:
@@ -562,21 +564,21 @@ def reversals_along(values: Floats, closed: bool, least_mm: float) -> AxisRevers
 def _extremes(values: list[float], least_mm: float) -> list[int]:
     """The places where the motion begins, reverses, and is furthest at last; [] when it is shorter
     than `least_mm` throughout."""
-    low = high = far = sense = 0
+    low = high = furthest = sense = 0
     extremes: list[int] = []
     for place, value in enumerate(values):
         if sense == 0:
             low = place if value < values[low] else low
             high = place if value > values[high] else high
             if values[high] - values[low] >= least_mm:
-                extremes, far = [min(low, high)], place
+                extremes, furthest = [min(low, high)], place
                 sense = 1 if place == high else -1
-        elif (value - values[far]) * sense > 0.0:
-            far = place
-        elif (values[far] - value) * sense >= least_mm:
-            extremes.append(far)
-            far, sense = place, -sense
-    return [*extremes, far] if extremes else []
+        elif (value - values[furthest]) * sense > 0.0:
+            furthest = place
+        elif (values[furthest] - value) * sense >= least_mm:
+            extremes.append(furthest)
+            furthest, sense = place, -sense
+    return [*extremes, furthest] if extremes else []
 
 
 def _flat(values: list[float], extreme: int, closed: bool, least_mm: float) -> tuple[int, int]:
@@ -648,8 +650,10 @@ class _Drive:
         """Return the position, mm, from which the axis comes to a run that takes it to these
         values: their first one when any will do. Afterwards the axis has made the run."""
         start, sense = values[0], self._first_sense(values)
-        since = self._since if sense == self._sense else self._at
-        engaged = (start - self._at) * sense >= 0.0 and (start - since) * sense >= self._need_mm
+        engaged_from = self._since if sense == self._sense else self._at
+        engaged = (start - self._at) * sense >= 0.0 and (
+            start - engaged_from
+        ) * sense >= self._need_mm
         come = start
         if self._residual.matters and not engaged:
             come = start - sense * self._need_mm

@@ -64,9 +64,9 @@ def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
     descent = operation.contract.descent
     in_one = descent == "helix" or operation.stage == "finish"
     try:
-        made = carved_levels if descent == "slopes" else levels
+        levels_of = carved_levels if descent == "slopes" else levels
         step, last = operation.step_down_mm, operation.last_pass_mm
-        passes = (-depth,) if in_one else made(depth, step, last)
+        passes = (-depth,) if in_one else levels_of(depth, step, last)
     except OptionError as error:
         error.where = f"{operation_name(operation)}, {error.where}"
         raise
@@ -83,10 +83,10 @@ def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
 def speed_of(operation: Operation, machine: Machine) -> float | None:
     """The operation's speed of the spindle, or the machine's, in rev/min; None where neither says
     any, and for 0, which is off. OptionError for a speed that the spindle does not have."""
-    spindle, given = machine.spindle, operation.spindle_rpm
-    if given is None:
+    spindle, rpm = machine.spindle, operation.spindle_rpm
+    if rpm is None:
         return spindle.default_rpm
-    if given == 0.0:
+    if rpm == 0.0:
         return None
     if spindle.switched == "none":
         raise OptionError(
@@ -94,22 +94,22 @@ def speed_of(operation: Operation, machine: Machine) -> float | None:
             where=key_of(operation, "spindle"),
             mend="leave the speed out",
         )
-    if not spindle.reaches(given):
-        most = "" if spindle.max_rpm is None else f" to {spindle.max_rpm:g}"
-        faster = [f"spindle.max_rpm={given:g}"]
+    if not spindle.reaches(rpm):
+        upper = "" if spindle.max_rpm is None else f" to {spindle.max_rpm:g}"
+        faster = [f"spindle.max_rpm={rpm:g}"]
         raise OptionError(
-            f"{given:g} rev/min is not in the range of the spindle, {spindle.min_rpm:g}{most}",
+            f"{rpm:g} rev/min is not in the range of the spindle, {spindle.min_rpm:g}{upper}",
             where=key_of(operation, "spindle"),
             mend="give a speed in it (--spindle)"
-            + (f"; {own_numbers(machine, faster)}" if given > spindle.min_rpm else ""),
+            + (f"; {own_numbers(machine, faster)}" if rpm > spindle.min_rpm else ""),
         )
-    return given
+    return rpm
 
 
 def _check_coolant(operation: Operation, machine: Machine) -> None:
     """OptionError for coolant that the machine has not."""
-    wanted = ("mist", "flood") if operation.coolant == "both" else (operation.coolant,)
-    for each in wanted:
+    kinds_needed = ("mist", "flood") if operation.coolant == "both" else (operation.coolant,)
+    for each in kinds_needed:
         if each != "off" and each not in machine.coolant.kinds:
             raise OptionError(
                 f"{machine.target.name} has no {each} coolant",
@@ -129,8 +129,8 @@ def depth_of(operation: Operation, machine: Machine) -> float:
     carved = operation.rest_of
     if carved is not None and carved.contract.rest == "floor":
         cone = Cone.of(carved)
-        wanted = machine.defaults.cut_depth_mm if carved.depth_mm is None else carved.depth_mm
-        return min(wanted, float(cone.depth_of(np.array(cone.widest_mm))))
+        wanted_mm = machine.defaults.cut_depth_mm if carved.depth_mm is None else carved.depth_mm
+        return min(wanted_mm, float(cone.depth_of(np.array(cone.widest_mm))))
     return machine.defaults.cut_depth_mm if operation.depth_mm is None else operation.depth_mm
 
 
@@ -141,17 +141,17 @@ def feeds_of(operation: Operation, machine: Machine) -> Feeds:
     that feed), or the highest that Z can.
     OptionError for feeds above what the machine takes at all, naming the highest.
     """
-    given = operation.plunge_feed_mm_min
+    given_feed = operation.plunge_feed_mm_min
     cut = operation.feed_mm_min
     cut = machine.feed.default_mm_min if cut is None else cut
-    plunge = given
+    plunge = given_feed
     if plunge is None:
         plunge = cut
         if machine.defaults.plunge_share is not None:
             plunge = _programmable(machine.defaults.plunge_share * cut, machine)
-    if given is None and exceeds(plunge, machine.max_plunge_mm_min):
+    if given_feed is None and exceeds(plunge, machine.max_plunge_mm_min):
         plunge = _programmable(machine.max_plunge_mm_min, machine)
-    lowered: dict[str, float] = {}
+    lowered_by_name: dict[str, float] = {}
     for name, flag, feed, highest in (
         ("feed", "--feed", cut, machine.max_feed_mm_min),
         ("plunge feed", "--plunge-feed", plunge, machine.max_plunge_mm_min),
@@ -164,8 +164,8 @@ def feeds_of(operation: Operation, machine: Machine) -> Feeds:
                 mend=f"use {flag} {_programmable(highest, machine):g} or less",
             )
         if exceeds(feed, highest):
-            lowered[name] = _programmable(highest, machine)
-    return Feeds(lowered.get("feed", cut), lowered.get("plunge feed", plunge))
+            lowered_by_name[name] = _programmable(highest, machine)
+    return Feeds(lowered_by_name.get("feed", cut), lowered_by_name.get("plunge feed", plunge))
 
 
 def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
@@ -174,22 +174,32 @@ def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
     reported: set[tuple[str, float]] = set()
     for operation in job.operations:
         cut = operation.feed_mm_min or machine.feed.default_mm_min
-        for name, given, highest, which in (
+        for name, given_feed, highest, axis_names in (
             ("feed", cut, machine.max_feed_mm_min, "xy"),
             ("plunge feed", operation.plunge_feed_mm_min, machine.max_plunge_mm_min, "z"),
         ):
-            if given is None or not exceeds(given, highest) or (name, given) in reported:
+            if (
+                given_feed is None
+                or not exceeds(given_feed, highest)
+                or (name, given_feed) in reported
+            ):
                 continue
-            reported.add((name, given))
-            slow = [n for n in which if exceeds(given, getattr(axes, n).max_rate_mm_min or given)]
+            reported.add((name, given_feed))
+            slow = [
+                n
+                for n in axis_names
+                if exceeds(given_feed, getattr(axes, n).max_rate_mm_min or given_feed)
+            ]
             yield FEED_ABOVE_LIMIT_IN_JOB(
                 where=operation_name(operation),
-                measured=given,
+                measured=given_feed,
                 limit=highest,
                 feed=name,
                 lowered=_programmable(highest, machine),
                 machine=machine.target.name,
-                mend=own_numbers(machine, [f"axes.{n}.max_rate_mm_min={given:g}" for n in slow]),
+                mend=own_numbers(
+                    machine, [f"axes.{n}.max_rate_mm_min={given_feed:g}" for n in slow]
+                ),
             )
 
 
@@ -255,9 +265,9 @@ def carved_levels(
     >>> carved_levels(0.9, 0.3, None)
     (-0.3, -0.45, -0.6, -0.75, -0.9)
     """
-    whole = levels(depth_mm, step_down_mm, last_pass_mm)
-    passes = list(whole[:1])
-    for above, z in pairwise(whole):
+    even_levels = levels(depth_mm, step_down_mm, last_pass_mm)
+    passes = list(even_levels[:1])
+    for above, z in pairwise(even_levels):
         if step_down_mm is not None and 2.0 * (above - z) > step_down_mm * (1.0 + PASS_SLACK):
             passes.append(0.5 * (above + z))
         passes.append(z)

@@ -85,22 +85,22 @@ class Sides(Struct, eq=False, dict=True):
     _known: dict[bytes, Seen] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, placed: Drawing, job: Job, default_depth_mm: float) -> Sides:
+    def of(cls, placed_drawing: Drawing, job: Job, default_depth_mm: float) -> Sides:
         """The sides of a drawing in the work frame, cut by this job."""
-        around, lines = placed.unchosen, placed.nesting.lines
+        unchosen, lines = placed_drawing.unchosen, placed_drawing.nesting.lines
         takes = np.zeros((len(job.operations), len(lines)), dtype=np.bool_)
-        names = list(zip(placed.layers, placed.colours, strict=True))
+        names = list(zip(placed_drawing.layers, placed_drawing.colours, strict=True))
         for number, operation in enumerate(job.operations):
-            known = {name: operation.takes(*name) for name in set(names)}
-            takes[number, : len(names)] = [known[name] for name in names]
-        layers = (*placed.layers, *around.layers)
-        types = (*placed.line_types, *around.line_types)
-        sources = (*placed.sources, *around.sources)
+            takes_by_name = {name: operation.takes(*name) for name in set(names)}
+            takes[number, : len(names)] = [takes_by_name[name] for name in names]
+        layers = (*placed_drawing.layers, *unchosen.layers)
+        types = (*placed_drawing.line_types, *unchosen.line_types)
+        sources = (*placed_drawing.sources, *unchosen.sources)
         sheet = {layer for layer in set(layers) if matches(job.frames, layer)}
         edges = np.array([kind.casefold() in CONTINUOUS for kind in types], dtype=np.bool_)
         framed = np.array([layer in sheet for layer in layers], dtype=np.bool_)
         if any(operation.selects for operation in job.operations):
-            traits = Traits(placed.nesting, sources, edges & ~framed)
+            traits = Traits(placed_drawing.nesting, sources, edges & ~framed)
             for number, operation in enumerate(job.operations):
                 takes[number] = traits.selected(operation, takes[number])
         # Bores take circles alone, whatever else is on their layers.
@@ -110,8 +110,10 @@ class Sides(Struct, eq=False, dict=True):
             if operation.contract.takes == "circles":
                 cuts[number] &= circles(lines, takes[number])
         return cls(
-            nesting=placed.nesting,
-            names=tuple(f"{layer}/{it}" for layer, it in zip(layers, sources, strict=True)),
+            nesting=placed_drawing.nesting,
+            names=tuple(
+                f"{layer}/{source}" for layer, source in zip(layers, sources, strict=True)
+            ),
             operations=job.operations,
             takes=takes,
             cuts=cuts,
@@ -162,8 +164,8 @@ class Sides(Struct, eq=False, dict=True):
             levels = self.nesting.levels_by(bounds)
             rim = levels.depth % 2 == 0
             less = self._rim(cut) if self.uncut.any() else rim
-            more = self._rim(bounds | self.frames) if self.frames.any() else rim
-            self._known[key] = Seen(rim, levels.parent, less != rim, more != rim, bounds)
+            more_rim = self._rim(bounds | self.frames) if self.frames.any() else rim
+            self._known[key] = Seen(rim, levels.parent, less != rim, more_rim != rim, bounds)
         return self._known[key]
 
     def sided(self) -> Bools:
@@ -172,11 +174,11 @@ class Sides(Struct, eq=False, dict=True):
 
     def kept_from(self, pocket: Operation) -> Bools:
         """(M,) the contours whose inside must stay, by profiles no deeper than a pocket."""
-        kept = np.zeros(len(self.lines), dtype=np.bool_)
+        is_kept = np.zeros(len(self.lines), dtype=np.bool_)
         for number, each in enumerate(self.operations):
             if runs_beside(each) and self._depth(each) <= self._depth(pocket):
-                kept |= self.takes[number] & self.lines.closed & self.holds(each)
-        return kept
+                is_kept |= self.takes[number] & self.lines.closed & self.holds(each)
+        return is_kept
 
     def holds(self, profile: Operation) -> Bools:
         """(M,) the contours within which all stays, where this profile runs beside them."""
@@ -188,19 +190,19 @@ class Sides(Struct, eq=False, dict=True):
     def beyond_mm(self) -> Floats:
         """(M, 2) how far profiles cut beyond contours, mm: where what is without them stays, and
         where what is within them stays."""
-        found = np.zeros((len(self.lines), 2))
+        beyond = np.zeros((len(self.lines), 2))
         for number, each in enumerate(self.operations):
             if each.beyond_mm and runs_beside(each):
                 rows = np.flatnonzero(self.cuts[number] & self.lines.closed)
-                np.maximum.at(found, (rows, self.holds(each)[rows].astype(int)), each.beyond_mm)
-        return found
+                np.maximum.at(beyond, (rows, self.holds(each)[rows].astype(int)), each.beyond_mm)
+        return beyond
 
     def _rim(self, bounds: Bools) -> Bools:
         return np.asarray(self.nesting.levels_by(bounds).depth % 2 == 0)
 
-    def _taken(self, chosen: Iterable[bool]) -> Bools:
+    def _taken(self, is_chosen: Iterable[bool]) -> Bools:
         """(M,) the closed contours that any of these operations takes."""
-        return np.asarray(self.lines.closed & self.cuts[list(chosen)].any(axis=0))
+        return np.asarray(self.lines.closed & self.cuts[list(is_chosen)].any(axis=0))
 
     def _depth(self, operation: Operation) -> float:
         return self.default_depth_mm if operation.depth_mm is None else operation.depth_mm
@@ -213,14 +215,14 @@ class Sides(Struct, eq=False, dict=True):
             return "the job says so"
         if not runs_beside(operation):
             return "the tool has no width"
-        seen = self.seen_by(operation)
-        holder = int(seen.holder[row])
-        frame = " except what is on the layer of a frame" if seen.by_frames[row] else ""
+        seen_sides = self.seen_by(operation)
+        holder = int(seen_sides.holder[row])
+        frame = " except what is on the layer of a frame" if seen_sides.by_frames[row] else ""
         if holder < 0:
             return f"nothing is around it{frame}"
         uncut = ", which is not cut" if self.uncut[holder] else ""
-        what = "hole" if seen.rim[row] else "part"
-        return f"within the {what} {self.names[holder]}{uncut}{frame}"
+        holder_kind = "hole" if seen_sides.rim[row] else "part"
+        return f"within the {holder_kind} {self.names[holder]}{uncut}{frame}"
 
 
 class Traits:
@@ -252,8 +254,8 @@ class Traits:
         """(M,) of which of the rows a word is true."""
         closed = self._lines.closed
         if word in ("circle", "not circle"):
-            found = circles(self._lines, rows)
-            return found if word == "circle" else ~found
+            is_circle = circles(self._lines, rows)
+            return is_circle if word == "circle" else ~is_circle
         if word in ("text", "not text"):
             text = np.array([is_text(source) for source in self._sources], dtype=np.bool_)
             return text if word == "text" else ~text
@@ -273,10 +275,10 @@ def circles(lines: Polylines, rows: Bools) -> Bools:
     """(M,) which of the rows (M,) of some paths are full circles."""
     from camtool.planning.holes import circle_of
 
-    found = np.zeros(len(rows), dtype=np.bool_)
+    is_circle = np.zeros(len(rows), dtype=np.bool_)
     for row in np.flatnonzero(rows & lines.closed).tolist():
-        found[row] = circle_of(lines[row]) is not None
-    return found
+        is_circle[row] = circle_of(lines[row]) is not None
+    return is_circle
 
 
 def _within(sizes: Floats, limits: tuple[float, float]) -> Bools:
@@ -303,16 +305,16 @@ def takes_mark(operation: Operation, mark: Mark) -> bool:
 
 def _selection(operation: Operation) -> str:
     """Describe in words what an operation selects."""
-    said = list(dict.fromkeys(operation.select))
+    words = list(dict.fromkeys(operation.select))
     for key, limits, unit in (
         ("size", operation.size_mm, "mm"),
         ("area", operation.area_mm2, "mm²"),
     ):
         if limits is not None:
-            said.append(f"of {key} {range_words(limits)} {unit}")
+            words.append(f"of {key} {range_words(limits)} {unit}")
     if operation.entities:
-        said.append(f"named {' or '.join(operation.entities)}")
-    return " and ".join(said)
+        words.append(f"named {' or '.join(operation.entities)}")
+    return " and ".join(words)
 
 
 def runs_beside(operation: Operation) -> bool:
@@ -325,20 +327,20 @@ def runs_beside(operation: Operation) -> bool:
 def _again(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
     """(M,) those of the uncut closed contours (`idle`) that run along one that is cut,
     or along one before them."""
-    found = np.zeros(len(lines), dtype=np.bool_)
-    others = np.flatnonzero((cut & lines.closed) | idle)
-    mine = np.flatnonzero(idle)
-    if len(mine) == 0:
-        return found
+    is_repeat = np.zeros(len(lines), dtype=np.bool_)
+    other_rows = np.flatnonzero((cut & lines.closed) | idle)
+    idle_rows = np.flatnonzero(idle)
+    if len(idle_rows) == 0:
+        return is_repeat
     boxes = path_extents(lines)
     corners = np.concatenate([boxes[:, :, 0], boxes[:, :, 0]], axis=1)  # as boxes of no size
-    for one, other in box_pairs(corners[mine], corners[others], reach_mm=SAME_CONTOUR_MM):
-        k, row = mine[one], others[other]
-        alike = np.abs(boxes[k] - boxes[row]).max(axis=(1, 2)) <= SAME_CONTOUR_MM
-        alike &= cut[row] | (row < k)
-        for each, along in zip(k[alike].tolist(), row[alike].tolist(), strict=True):
-            found[each] = found[each] or _runs_along(lines[each], lines[along])
-    return found
+    for one, other in box_pairs(corners[idle_rows], corners[other_rows], reach_mm=SAME_CONTOUR_MM):
+        k, row = idle_rows[one], other_rows[other]
+        is_alike = np.abs(boxes[k] - boxes[row]).max(axis=(1, 2)) <= SAME_CONTOUR_MM
+        is_alike &= cut[row] | (row < k)
+        for each, along in zip(k[is_alike].tolist(), row[is_alike].tolist(), strict=True):
+            is_repeat[each] = is_repeat[each] or _runs_along(lines[each], lines[along])
+    return is_repeat
 
 
 def _runs_along(path: Polyline, other: Polyline) -> bool:
@@ -380,22 +382,22 @@ def _nothing(drawing: Drawing, operation: Operation) -> OptionError:
     marks = drawing.marks
     layers = sorted({*drawing.layers, *(mark.layer for mark in marks)})
     colours = sorted({*drawing.colours, *(mark.colour for mark in marks)} - {""})
-    wanted = [f"the layers {', '.join(operation.layers)}"] if operation.layers else []
-    wanted += [f"the colours {', '.join(operation.colours)}"] if operation.colours else []
+    conditions = [f"the layers {', '.join(operation.layers)}"] if operation.layers else []
+    conditions += [f"the colours {', '.join(operation.colours)}"] if operation.colours else []
     if operation.selects:
-        where = f" on {' and '.join(wanted)}" if wanted else ""
+        place = f" on {' and '.join(conditions)}" if conditions else ""
         return OptionError(
-            f"nothing{where} is {_selection(operation)}",
+            f"nothing{place} is {_selection(operation)}",
             file=drawing.file,
             where=f"operation {operation.name!r}" if operation.name else "",
             mend="camtool check says what there is",
         )
-    has = f"the drawing has: {', '.join(layers)}"
+    contents = f"the drawing has: {', '.join(layers)}"
     if operation.colours:
-        has += f"; colours {', '.join(colours) or 'none'}"
+        contents += f"; colours {', '.join(colours) or 'none'}"
     return OptionError(
-        f"no path lies on {' and '.join(wanted)}",
+        f"no path lies on {' and '.join(conditions)}",
         file=drawing.file,
         where=f"operation {operation.name!r}" if operation.name else "",
-        mend=has,
+        mend=contents,
     )

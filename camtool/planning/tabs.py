@@ -116,8 +116,8 @@ class Tab(Struct, frozen=True):
 
     def height(self, length: float) -> float:
         """Return the lowest z that the tab allows at this length."""
-        apart = max(self.begin - length, length - self.end, 0.0)
-        return self.top_mm - (self.fall * apart if apart else 0.0)
+        distance = max(self.begin - length, length - self.end, 0.0)
+        return self.top_mm - (self.fall * distance if distance else 0.0)
 
 
 def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
@@ -134,21 +134,26 @@ def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
         return _with_tabs_by_hand(contours), []
     parts = [k for k, each in enumerate(contours) if each.path.closed and not _is_hole(each)]
     tabbed = {k for k in parts or range(len(contours)) if _is_long_enough(contours[k])}
-    bare = [each for k, each in enumerate(contours) if tabbed and k not in tabbed]
-    if not bare:
+    untabbed = [each for k, each in enumerate(contours) if tabbed and k not in tabbed]
+    if not untabbed:
         return contours, []
-    opens = sum(not each.path.closed for each in bare)
-    holes = sum(each.path.closed and _is_hole(each) for each in bare)
-    kinds = ((holes, "holes"), (opens, "open"), (len(bare) - holes - opens, "too short for them"))
+    opens = sum(not each.path.closed for each in untabbed)
+    holes = sum(each.path.closed and _is_hole(each) for each in untabbed)
+    kinds = (
+        (holes, "holes"),
+        (opens, "open"),
+        (len(untabbed) - holes - opens, "too short for them"),
+    )
     setting = contours[0].setting
     finding = TAB_LEFT_OUT_OF_ALL(
         where=operation_name(setting.operation),
-        measured=len(bare),
+        measured=len(untabbed),
         kinds=", ".join(f"{count} {kind}" for count, kind in kinds if count),
     )
-    without = replace(setting, operation=replace(setting.operation, tabs=None))
+    without_tabs = replace(setting, operation=replace(setting.operation, tabs=None))
     return [
-        each if k in tabbed else replace(each, setting=without) for k, each in enumerate(contours)
+        each if k in tabbed else replace(each, setting=without_tabs)
+        for k, each in enumerate(contours)
     ], [finding]
 
 
@@ -162,25 +167,25 @@ def _with_tabs_by_hand(contours: list[Contour]) -> list[Contour]:
     assert tabs.at_mm is not None
     limit = FAR_FROM_PLACE * max(operation.tool.diameter_mm, tabs.width_mm)
     lines = Segments.of(Polylines.of(contour.path for contour in contours))
-    near = nearest(np.array(tabs.at_mm), lines)
+    nearest_lines = nearest(np.array(tabs.at_mm), lines)
     places: dict[int, list[tuple[float, float]]] = {}
-    for place, apart, row in zip(
-        tabs.at_mm, near.distance.tolist(), near.segment.tolist(), strict=True
+    for place, distance, row in zip(
+        tabs.at_mm, nearest_lines.distance.tolist(), nearest_lines.segment.tolist(), strict=True
     ):
-        if apart > limit:
+        if distance > limit:
             raise OptionError(
-                f"the tab at X {place[0]:g} Y {place[1]:g} is {apart:.4g} mm from the nearest"
+                f"the tab at X {place[0]:g} Y {place[1]:g} is {distance:.4g} mm from the nearest"
                 f" contour that is cut, more than {limit:g} mm",
                 where=key_of(operation, "tabs"),
                 mend="give a place on a contour, in the work frame (after [place])",
             )
         places.setdefault(int(lines.path[row]), []).append(place)
-    made = []
+    contours_made = []
     for row, contour in enumerate(contours):
-        own = replace(tabs, at_mm=tuple(places[row])) if row in places else None
-        tabbed = replace(setting, operation=replace(operation, tabs=own))
-        made.append(replace(contour, setting=tabbed))
-    return made
+        own_tabs = replace(tabs, at_mm=tuple(places[row])) if row in places else None
+        tabbed = replace(setting, operation=replace(operation, tabs=own_tabs))
+        contours_made.append(replace(contour, setting=tabbed))
+    return contours_made
 
 
 def middle_of_longest_gap(
@@ -232,25 +237,25 @@ def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Find
         )
     model, foot = _model(operation, bottom)
     if tabs.at_mm is not None:
-        wanted = [along.nearest_to(place) for place in tabs.at_mm]
+        centres = [along.nearest_to(place) for place in tabs.at_mm]
         half = 0.5 * along.total_mm
-        ranges = [(length - half, length + half) for length in wanted]
+        ranges = [(length - half, length + half) for length in centres]
     else:
         count = _checked_tab_count(along.total_mm, operation, model.end + 2.0 * foot)
         size = along.total_mm / count
-        wanted = [(which + 0.5) * size for which in range(count)]
-        ranges = [(which * size, (which + 1) * size) for which in range(count)]
+        centres = [(number + 0.5) * size for number in range(count)]
+        ranges = [(number * size, (number + 1) * size) for number in range(count)]
     half_width = 0.5 * tabs.width_mm
     fitting = _Fitting(along, model, foot, half_width, _corners(along, operation))
-    found: list[Tab] = []
+    tabs_placed: list[Tab] = []
     findings = []
-    for centre, near in zip(wanted, ranges, strict=True):
-        tab = fitting.nearest(centre, near, found)
+    for centre, span in zip(centres, ranges, strict=True):
+        tab = fitting.nearest(centre, span, tabs_placed)
         if tab is None:
             findings.append(_left_out_finding(contour, along, centre))
         else:
-            found.append(tab)
-    return sorted(found, key=lambda tab: tab.begin), findings
+            tabs_placed.append(tab)
+    return sorted(tabs_placed, key=lambda tab: tab.begin), findings
 
 
 def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
@@ -276,28 +281,30 @@ def raise_profile(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> 
     result: ZProfile = []
     for (begin, z_begin), (end, z_end) in pairwise(points):
         # Only passes below its top know of a tab.
-        near = [
+        near_tabs = [
             tab
             for tab in _tabs_between(tabs, total_mm, min(begin, end), max(begin, end))
             if min(z_begin, z_end) < tab.top_mm - POSITION_EPS_MM
         ]
         if begin == end:
-            floor = max([tab.height(begin) for tab in near if tab.holds(begin)], default=-math.inf)
+            floor = max(
+                [tab.height(begin) for tab in near_tabs if tab.holds(begin)], default=-math.inf
+            )
             result += [(place, max(z, floor)) for place, z in ((begin, z_begin), (end, z_end))]
             continue
         slope = (z_end - z_begin) / (end - begin)  # infinite where the lengths hardly differ
         ends = {begin: z_begin, end: z_end}
         places = set(ends)
-        for tab in near:
+        for tab in near_tabs:
             places.update(_breaks(tab, begin, z_begin, slope))
         inside = sorted(p for p in places if min(begin, end) <= p <= max(begin, end))
         for p, q in pairwise(inside if begin < end else inside[::-1]):
             # The height of a straight tab jumps at its ends: the midpoint shows which side this
             # is.
-            over = [tab for tab in near if tab.height(0.5 * (p + q)) > -math.inf]
+            tabs_above = [tab for tab in near_tabs if tab.height(0.5 * (p + q)) > -math.inf]
             for place in (p, q):
                 line = ends[place] if place in ends else z_begin + slope * (place - begin)
-                result.append((place, max([line, *(tab.height(place) for tab in over)])))
+                result.append((place, max([line, *(tab.height(place) for tab in tabs_above)])))
     return [point for k, point in enumerate(result) if k == 0 or point != result[k - 1]]
 
 
@@ -320,8 +327,8 @@ def _breaks(tab: Tab, begin: float, z_begin: float, slope: float) -> list[float]
     for corner, fall in ((tab.begin, tab.fall), (tab.end, -tab.fall)):
         if fall != slope:
             # top + fall (s − corner) = z + slope (s − begin)
-            here = tab.top_mm + fall * (begin - corner) - z_begin
-            places.append(begin + here / (slope - fall))
+            height_gap = tab.top_mm + fall * (begin - corner) - z_begin
+            places.append(begin + height_gap / (slope - fall))
     return places
 
 
@@ -376,18 +383,18 @@ class _Fitting(Struct, frozen=True, eq=False):
     corners: _Corners
 
     def nearest(
-        self, centre: float, share: tuple[float, float], others: Sequence[Tab]
+        self, centre: float, share: tuple[float, float], other_tabs: Sequence[Tab]
     ) -> Tab | None:
         """Return the tab that is nearest to a length: on what is hardly bent before what is,
         within its share before elsewhere; and only where there is no such place where the bridge
         alone lies off the corners, and the tool is up on the arcs round them. None where it fits
         nowhere."""
-        within = self._places(centre, share)
+        own_places = self._places(centre, share)
         anywhere = self._places(centre, (0.0, self.along.total_mm))
         for clear in (self._is_straight, self._is_off_corners, self._is_bridge_off_corners):
-            for places in (within, anywhere):
+            for places in (own_places, anywhere):
                 for place in places[clear(places)].tolist():
-                    tab = self._tab_at(place, others)
+                    tab = self._tab_at(place, other_tabs)
                     if tab is not None:
                         return tab
         return None
@@ -402,12 +409,12 @@ class _Fitting(Struct, frozen=True, eq=False):
         total = self.along.total_mm
         if self.along.path.closed:
             places = np.where(places == total, total, places % total)
-        ahead = places - centre
+        offsets = places - centre
         if self.along.path.closed:
-            ahead = (ahead + 0.5 * total) % total - 0.5 * total
+            offsets = (offsets + 0.5 * total) % total - 0.5 * total
         # Of two that are as near the one ahead, whatever rounding says.
-        apart = np.round(np.abs(ahead) / total, PLACE_DECIMALS)
-        return np.asarray(places[np.lexsort([ahead < 0.0, apart])])
+        distances = np.round(np.abs(offsets) / total, PLACE_DECIMALS)
+        return np.asarray(places[np.lexsort([offsets < 0.0, distances])])
 
     def _is_straight(self, places: Floats) -> Bools:
         """Mask (P,) of the lengths at which a tab, its slopes included, lies across no corner and
@@ -446,7 +453,7 @@ class _Fitting(Struct, frozen=True, eq=False):
         part = (lengths - reach[row]) / np.diff(reach)[row]
         return np.asarray(heading[row] + segments.sweep[row] * np.clip(part, 0.0, 1.0))
 
-    def _tab_at(self, centre: float, others: Sequence[Tab]) -> Tab | None:
+    def _tab_at(self, centre: float, other_tabs: Sequence[Tab]) -> Tab | None:
         """Return the tab at a length, None where it has no room there beside others."""
         foot, total = self.foot_mm, self.along.total_mm
         half = _half_length(self.along, centre, self.model.end, min(centre, total - centre) - foot)
@@ -454,7 +461,7 @@ class _Fitting(Struct, frozen=True, eq=False):
             return None
         tab = Tab(centre - half, centre + half, self.model.top_mm, self.model.fall)
         room = 2.0 * foot - TAB_SLACK_MM
-        if any(tab.begin < each.end + room and each.begin < tab.end + room for each in others):
+        if any(tab.begin < each.end + room and each.begin < tab.end + room for each in other_tabs):
             return None
         return tab if _is_bridge_clear(self.along, tab) else None
 
@@ -464,15 +471,15 @@ def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
     reach, total = along.reach, along.total_mm
     bend = np.abs(along.turns)
 
-    def turning(least: float) -> Floats:
-        at = reach[: len(bend)][bend > least]
-        if along.path.closed and len(at) and at[0] == 0.0:
-            at = np.append(at, total)
-        return np.column_stack([at, at])
+    def turning(min_turn: float) -> Floats:
+        lengths = reach[: len(bend)][bend > min_turn]
+        if along.path.closed and len(lengths) and lengths[0] == 0.0:
+            lengths = np.append(lengths, total)
+        return np.column_stack([lengths, lengths])
 
-    away = operation.away_mm
+    clearance = operation.away_mm
     segments = along.segments
-    tight = segments.is_arc & (segments.radius <= ROUND_CORNER * away)
+    tight = segments.is_arc & (segments.radius <= ROUND_CORNER * clearance)
     if tight.all():  # a round path is no corner
         tight = np.zeros(len(segments), dtype=np.bool_)
     arcs = np.column_stack([reach[:-1], reach[1:]])[tight]
@@ -495,24 +502,24 @@ def _half_length(along: MeasuredPath, centre: float, chord: float, room: float) 
     low, high = half, room
     for _ in range(WIDTH_ROUNDS):
         tries = np.linspace(low, high, PLACES_PER_SIDE)
-        enough = np.flatnonzero(lacks(tries) <= 0.0)
-        if len(enough) == 0:
+        wide_enough = np.flatnonzero(lacks(tries) <= 0.0)
+        if len(wide_enough) == 0:
             return None
-        low, high = float(tries[max(enough[0] - 1, 0)]), float(tries[enough[0]])
+        low, high = float(tries[max(wide_enough[0] - 1, 0)]), float(tries[wide_enough[0]])
     return high
 
 
 def _is_bridge_clear(along: MeasuredPath, tab: Tab) -> bool:
     """True if no other part of the path comes nearer to the centre of the bridge than its ends."""
     ends = along.at(np.array([tab.begin, tab.end]))
-    rest = [(0.0, tab.begin), (tab.end, along.total_mm)]
+    other_spans = [(0.0, tab.begin), (tab.end, along.total_mm)]
     if along.path.closed:
-        rest = [(tab.end, tab.begin + along.total_mm)]
-    far = 0.5 * math.hypot(*(ends[1] - ends[0])) - TAB_SLACK_MM
-    for begin, end in rest:
+        other_spans = [(tab.end, tab.begin + along.total_mm)]
+    half_gap = 0.5 * math.hypot(*(ends[1] - ends[0])) - TAB_SLACK_MM
+    for begin, end in other_spans:
         piece = along.piece(begin, end)
         segments = Segments.between(piece[:-1, :2], piece[1:, :2], piece[:-1, 2])
-        if points_to_segments(ends.mean(axis=0)[None], segments).min() < far:
+        if points_to_segments(ends.mean(axis=0)[None], segments).min() < half_gap:
             return False
     return True
 
@@ -523,15 +530,15 @@ def _left_out_finding(contour: Contour, along: MeasuredPath, length: float) -> F
 
 def bridges_of(along: MeasuredPath, tabs: Sequence[Tab], tool: Tool, name: str) -> list[Bridge]:
     """Return the bridges of the tabs of a contour; none for a tool that cuts no width."""
-    found = []
+    bridges = []
     for tab in tabs if tool.radius_mm > 0.0 else ():
         a, b, centre = along.at(np.array([tab.begin, tab.end, 0.5 * (tab.begin + tab.end)]))
         size = math.hypot(*(b - a))
-        ahead = (b - a) / size
-        centre = centre + float((0.5 * (a + b) - centre) @ ahead) * ahead
+        direction = (b - a) / size
+        centre = centre + float((0.5 * (a + b) - centre) @ direction) * direction
         half = 0.5 * size - tool.radius_mm
-        found.append(Bridge(centre, ahead, half, tool.radius_mm, tab.top_mm, tab.fall, name))
-    return found
+        bridges.append(Bridge(centre, direction, half, tool.radius_mm, tab.top_mm, tab.fall, name))
+    return bridges
 
 
 class RaisedRuns(Struct, frozen=True, eq=False):
@@ -565,12 +572,14 @@ def raised_over_bridges(
         return RaisedRuns(runs, ())
     reach = operation.tool.radius_mm
     index = BoxIndex(np.array([_box(bridge, reach) for bridge in bridges]))
-    made, found = [], _RaisedBridges()
+    runs_made, raised = [], _RaisedBridges()
     for run in runs:
         _, rows = index.touching(np.concatenate(_extent(run))[None])
-        near = [bridges[row] for row in rows.tolist()]
-        made.append(_raise_run(run, near, operation.tool, feeds, found) if near else run)
-    return RaisedRuns(Runs.of(made), tuple(found.findings(operation)))
+        near_bridges = [bridges[row] for row in rows.tolist()]
+        runs_made.append(
+            _raise_run(run, near_bridges, operation.tool, feeds, raised) if near_bridges else run
+        )
+    return RaisedRuns(Runs.of(runs_made), tuple(raised.findings(operation)))
 
 
 class _RaisedBridges:
@@ -595,7 +604,7 @@ class _RaisedBridges:
 
 
 def _raise_run(
-    run: CutRun, near: Sequence[Bridge], tool: Tool, feeds: Feeds, found: _RaisedBridges
+    run: CutRun, near_bridges: Sequence[Bridge], tool: Tool, feeds: Feeds, raised: _RaisedBridges
 ) -> CutRun:
     """Return the run kept above the bridges near to it; itself when it is so already."""
     vertices = run.vertices
@@ -606,8 +615,8 @@ def _raise_run(
     last = np.append(np.flatnonzero(moves), len(vertices) - 1)
     path = vertices[last][:, [0, 1, 3]]
     if is_drilled or np.isnan(run.feed_mm_min).any():
-        for bridge in near:
-            _note_drilled(run, bridge, tool, found)
+        for bridge in near_bridges:
+            _note_drilled(run, bridge, tool, raised)
         return run
     along = MeasuredPath.of(Polyline(path))
     points: ZProfile = list(zip(along.reach[group].tolist(), vertices[:, 2].tolist(), strict=True))
@@ -616,23 +625,25 @@ def _raise_run(
         z = vertices[np.flatnonzero(moves) + end, 2]
         low = np.minimum(low, z)
     tabs: list[Tab] = []
-    for bridge in near:
-        own = list(_tabs_over(along, low, bridge, tool))
-        if own:
-            found.shared[id(bridge)] = (bridge, run.name)
-        tabs += own
+    for bridge in near_bridges:
+        own_tabs = list(_tabs_over(along, low, bridge, tool))
+        if own_tabs:
+            raised.shared[id(bridge)] = (bridge, run.name)
+        tabs += own_tabs
     if not tabs:
         return run
-    (made,) = lift_paths(along.paths, [along.index], [raise_profile(points, tabs, None)])
-    return replace(run, vertices=made, feed_mm_min=feeds_along(made, feeds))
+    (raised_vertices,) = lift_paths(
+        along.paths, [along.index], [raise_profile(points, tabs, None)]
+    )
+    return replace(run, vertices=raised_vertices, feed_mm_min=feeds_along(raised_vertices, feeds))
 
 
-def _note_drilled(run: CutRun, bridge: Bridge, tool: Tool, found: _RaisedBridges) -> None:
-    place, deep = run.vertices[:1, :2], float(run.vertices[:, 2].min())
+def _note_drilled(run: CutRun, bridge: Bridge, tool: Tool, raised: _RaisedBridges) -> None:
+    place, depth = run.vertices[:1, :2], float(run.vertices[:, 2].min())
     reach = tool.radius_mm - BRIDGE_SLACK_MM
-    through = deep < bridge.top_mm and reach > 0.0
-    if through and inside(place, Segments.of(_zone(bridge, reach)))[0]:
-        found.drilled[id(bridge)] = (bridge, run.name)
+    is_through = depth < bridge.top_mm and reach > 0.0
+    if is_through and inside(place, Segments.of(_zone(bridge, reach)))[0]:
+        raised.drilled[id(bridge)] = (bridge, run.name)
 
 
 def _tabs_over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab]:
@@ -645,40 +656,40 @@ def _tabs_over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> 
     if reach <= 0.0:
         return
     zone = Segments.of(_zone(bridge, reach))
-    boxes, around = segment_boxes(along.segments), segment_boxes(zone)
-    lowest, highest = around[:, :2].min(axis=0), around[:, 2:].max(axis=0)
+    boxes, zone_boxes = segment_boxes(along.segments), segment_boxes(zone)
+    lowest, highest = zone_boxes[:, :2].min(axis=0), zone_boxes[:, 2:].max(axis=0)
     rows = np.flatnonzero(((boxes[:, :2] <= highest) & (boxes[:, 2:] >= lowest)).all(axis=1))
     if not is_low[rows].any():
         return
-    meets = crossings(along.segments[rows], zone)
+    common = crossings(along.segments[rows], zone)
     spans: list[tuple[float, float, bool]] = []
     for k, row in enumerate(rows.tolist()):
-        parts = np.unique(np.concatenate([[0.0, 1.0], meets.ta[meets.row_a == k]]))
+        parts = np.unique(np.concatenate([[0.0, 1.0], common.ta[common.row_a == k]]))
         centres = 0.5 * (parts[:-1] + parts[1:])
-        within = inside(point_at(along.segments, np.full(len(centres), row), centres), zone)
+        is_inside = inside(point_at(along.segments, np.full(len(centres), row), centres), zone)
         begin, size = along.reach[row], along.reach[row + 1] - along.reach[row]
-        for i in np.flatnonzero(within).tolist():
+        for i in np.flatnonzero(is_inside).tolist():
             first, last = float(begin + size * parts[i]), float(begin + size * parts[i + 1])
-            deep = bool(is_low[row]) and last - first > POSITION_EPS_MM
+            is_deep = bool(is_low[row]) and last - first > POSITION_EPS_MM
             if spans and first - spans[-1][1] <= POSITION_EPS_MM:
-                first, _, was = spans.pop()
-                deep = deep or was
-            spans.append((first, last, deep))
+                first, _, was_deep = spans.pop()
+                is_deep = is_deep or was_deep
+            spans.append((first, last, is_deep))
     # What is up already, by a tab of its own, belongs to the piece: it does not go down between.
-    for first, last, deep in spans:
-        if deep:
+    for first, last, is_deep in spans:
+        if is_deep:
             yield Tab(first, last, bridge.top_mm, bridge.fall)
 
 
 def _zone(bridge: Bridge, reach_mm: float) -> Polyline:
     """Return the zone in which the centre of a tool of this radius would cut into a bridge."""
-    aside = np.array([-bridge.ahead[1], bridge.ahead[0]])
+    normal = np.array([-bridge.ahead[1], bridge.ahead[0]])
     w, s, r = bridge.half_width_mm, bridge.half_span_mm, reach_mm
     corners = [
         (w + r, -s, 0.0), (w + r, s, QUARTER), (w, s + r, 0.0), (-w, s + r, QUARTER),
         (-w - r, s, 0.0), (-w - r, -s, QUARTER), (-w, -s - r, 0.0), (w, -s - r, QUARTER),
     ]  # fmt: skip
-    rows = [[*(bridge.centre + t * bridge.ahead + n * aside), b] for t, n, b in corners]
+    rows = [[*(bridge.centre + t * bridge.ahead + n * normal), b] for t, n, b in corners]
     return Polyline(np.array(rows), closed=True)
 
 

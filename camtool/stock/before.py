@@ -77,21 +77,21 @@ class StockBefore(Struct, frozen=True, eq=False):
 
     def deepest_below(self, point: Floats) -> str:
         """Return the name of the set-up that has cut deepest from below over a point (2,)."""
-        deep = [each.tree.heights(each.turn.points(point[None]))[0][0] for each in self.below]
-        return self.below[int(np.argmin(deep))].name
+        depths = [each.tree.heights(each.turn.points(point[None]))[0][0] for each in self.below]
+        return self.below[int(np.argmin(depths))].name
 
-    def _raised(self, deep: Floats) -> Floats:
+    def _raised(self, depths: Floats) -> Floats:
         """Return the floors (J,) of heights (J,) as they are seen from the other face."""
-        return np.where(deep < TOP_MM, TOP_MM - self.thickness_mm - deep, -np.inf)
+        return np.where(depths < TOP_MM, TOP_MM - self.thickness_mm - depths, -np.inf)
 
 
 def _lowest(
-    cuts: Sequence[SetupCut], at: Floats, heights_of: Callable[[StockTree, Floats], Floats]
+    cuts: Sequence[SetupCut], squares: Floats, heights_of: Callable[[StockTree, Floats], Floats]
 ) -> Floats:
     """Return the lowest of the heights (J,) of all cuts at points or over squares (J, 2 or 3)."""
-    lowest = np.full(len(at), TOP_MM)
+    lowest = np.full(len(squares), TOP_MM)
     for each in cuts:
-        lowest = np.minimum(lowest, heights_of(each.tree, each.turn.points(at)))
+        lowest = np.minimum(lowest, heights_of(each.tree, each.turn.points(squares)))
     return lowest
 
 

@@ -133,7 +133,7 @@ def stock_request(
     """Return what a job asks of the stock, of the steps of its plan; for the rest see
     `StockRequest`."""
     cutting = [step for step in steps if step.runs]
-    said = {finding.code.name for step in steps for finding in step.findings}
+    codes = {finding.code.name for step in steps for finding in step.findings}
     closed = [step.chosen.lines.closed for step in cutting]
     parts = [
         step.chosen.rim & (runs_beside(step.operation) and step.operation.tabs is None)
@@ -148,7 +148,7 @@ def stock_request(
         tuple(step.operation for step in cutting),
         tuple(-step.setting.levels_mm[-1] for step in cutting),
         tuple(step.bridges for step in cutting),
-        "TAB_LEFT_OUT" in said,
+        "TAB_LEFT_OUT" in codes,
         job.keep_out,
         job.stock,
         before or WHOLE,
@@ -167,7 +167,7 @@ def stock_findings(
     `deep_mm`. `findings`: those of planning."""
     checks = _Checks(decoded, request, moves, deep_mm)
     gouged = any(each.code is ProgramCode.GOUGE for each in findings)
-    found = [
+    stock_faults = [
         *checks.too_deep(Severity.WARNING if gouged else Severity.ERROR),
         *checks.tabs(),
         *checks.loose(),
@@ -176,10 +176,10 @@ def stock_findings(
         *checks.not_known(),
     ]
     if request.is_whole:
-        found += [*checks.left(), *checks.passes(), *checks.bodies()]
+        stock_faults += [*checks.left(), *checks.passes(), *checks.bodies()]
     else:
-        found.append(STOCK_NOT_JUDGED_BEFORE())
-    return tuple(found)
+        stock_faults.append(STOCK_NOT_JUDGED_BEFORE())
+    return tuple(stock_faults)
 
 
 def proved_gouge(stock: CutStock, request: StockRequest, limit_mm: float) -> Bracket:
@@ -204,10 +204,10 @@ def _proved(
     """Bracket a value over the stock, the distance of the slides from their moves included."""
     slack_mm, beside_mm = PROVED_SHARE * limit_mm, stock.moves.beside_mm
     floor = max(limit_mm - slack_mm - beside_mm, 0.0)
-    found = greatest_value(
+    bracket = greatest_value(
         value, upper, stock.box_mm, slack_mm, floor=floor, max_squares=MAX_PROVED_SQUARES
     )
-    return Bracket(found.low, found.high + beside_mm, found.at_mm, found.squares)
+    return Bracket(bracket.low, bracket.high + beside_mm, bracket.at_mm, bracket.squares)
 
 
 Judgement = tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]
@@ -228,18 +228,18 @@ class _Judged(Struct, frozen=True, eq=False):
         solid = WantedSolid(request.solid.may, request.solid.must, wall_mm)
         return cls(tree, solid, request.before)
 
-    def tops(self, at: Floats, until: Ints | None = None) -> Floats:
+    def tops(self, points: Floats, until: Ints | None = None) -> Floats:
         """Return the heights (J,) of what is left over points (J, 2), after all moves or before
         the moves `until` (J,)."""
-        return np.minimum(self.tree.heights(at, until)[0], self.before.tops(at))
+        return np.minimum(self.tree.heights(points, until)[0], self.before.tops(points))
 
     @property
     def gouge(self) -> Judgement:
         """Depth of what is cut though it is to stay, mm."""
 
-        def value(at: Floats) -> Floats:
-            low = np.minimum(self.solid.bands(at)[:, 0], self.before.tops(at))
-            return low - np.maximum(self.tree.heights(at)[0], self.before.floors(at))
+        def value(points: Floats) -> Floats:
+            low = np.minimum(self.solid.bands(points)[:, 0], self.before.tops(points))
+            return low - np.maximum(self.tree.heights(points)[0], self.before.floors(points))
 
         def upper(squares: Floats) -> Floats:
             low = np.minimum(self.solid.bounds(squares)[:, 1], self.before.greatest_tops(squares))
@@ -251,8 +251,10 @@ class _Judged(Struct, frozen=True, eq=False):
     def leftover(self) -> Judgement:
         """Height of what is left though it is to go, mm."""
 
-        def value(at: Floats) -> Floats:
-            return self.tops(at) - np.maximum(self.solid.bands(at)[:, 1], self.before.floors(at))
+        def value(points: Floats) -> Floats:
+            return self.tops(points) - np.maximum(
+                self.solid.bands(points)[:, 1], self.before.floors(points)
+            )
 
         def upper(squares: Floats) -> Floats:
             top = np.minimum(self.tree.greatest(squares), self.before.greatest_tops(squares))
@@ -308,23 +310,23 @@ class _Checks:
         length = np.hypot(travel[:, 0], travel[:, 1])
         along_mm = max(ALONG_MM, float(length.sum()) / MAX_PLACES)
         count = np.ceil(length / along_mm).astype(np.int64) + 1
-        which = np.repeat(np.arange(len(rows)), count)
-        step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-        part = step / np.maximum(count[which] - 1, 1)
+        owners = np.repeat(np.arange(len(rows)), count)
+        step = np.arange(len(owners)) - np.repeat(np.cumsum(count) - count, count)
+        part = step / np.maximum(count[owners] - 1, 1)
         # Straight down the lower end is what cuts.
         straight = (length == 0.0) & (travel[:, 2] < 0.0)
-        part = np.where(straight[which], 1.0, part)
-        axis = start[which] + part[:, None] * travel[which]
-        ahead = np.divide(
+        part = np.where(straight[owners], 1.0, part)
+        axis = start[owners] + part[:, None] * travel[owners]
+        headings = np.divide(
             travel[:, :2],
             length[:, None],
             out=np.tile([1.0, 0.0], (len(rows), 1)),
             where=length[:, None] > 0.0,
         )
-        left = np.column_stack([-ahead[:, 1], ahead[:, 0]])[which]
-        off = np.maximum(share * radii[rows] - self.solid.wall_mm, 0.0)[which]
-        moved = [axis[:, :2] + side * off[:, None] * left for side in (0.0, -1.0, 1.0)]
-        return _Points(np.concatenate(moved), np.tile(rows[which], 3), np.tile(axis[:, 2], 3))
+        normals = np.column_stack([-headings[:, 1], headings[:, 0]])[owners]
+        offsets = np.maximum(share * radii[rows] - self.solid.wall_mm, 0.0)[owners]
+        shifted = [axis[:, :2] + side * offsets[:, None] * normals for side in (0.0, -1.0, 1.0)]
+        return _Points(np.concatenate(shifted), np.tile(rows[owners], 3), np.tile(axis[:, 2], 3))
 
     def _in_stock(self, points: Floats) -> Bools:
         """True (P,) for points within the stock, where its sides are known."""
@@ -336,28 +338,28 @@ class _Checks:
     def too_deep(self, severity: Severity) -> Iterator[Finding]:
         """Yield CUT_TOO_DEEP for places at which the stock is below the lowest that is allowed."""
 
-        deep, upper = self.stock.gouge
+        gouge_of, upper = self.stock.gouge
         points = self.cuts.at[self._in_stock(self.cuts.at)]
-        for place, more in self._worst(points, deep(points), deep, upper):
-            z, which = self.tree.heights(place[None])
-            row = int(self.moves.row[which[0]])
+        for place, other_count in self._worst(points, gouge_of(points), gouge_of, upper):
+            z, move_index = self.tree.heights(place[None])
+            row = int(self.moves.row[move_index[0]])
             low = float(self.solid.bands(place[None])[0, 0])
             name = self.solid.cut_by((float(place[0]), float(place[1])))
             yield CUT_TOO_DEEP(
                 where=self._where(row, place),
-                measured=float(deep(place[None])[0]),
+                measured=float(gouge_of(place[None])[0]),
                 limit=self.deep_mm,
                 severity=severity,
                 by=f"operation {name!r}: " if name else "",
                 z=float(z[0]),
                 low=low,
-                more=more,
+                more=other_count,
             )
 
     def left(self) -> Iterator[Finding]:
         """Yield MATERIAL_LEFT for places at which the stock is above the highest that is asked."""
 
-        standing, upper = self.stock.leftover
+        leftover_of, upper = self.stock.leftover
         boxes = [layer.curves.boxes for layer in self.solid.must if len(layer.lines)]
         if not boxes:
             return
@@ -368,33 +370,33 @@ class _Checks:
         x, y = (np.arange(low[k] + 0.5 * step, high[k], step) for k in (0, 1))
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         points = points[self._in_stock(points)]
-        for place, more in self._worst(points, standing(points), standing, upper):
+        for place, other_count in self._worst(points, leftover_of(points), leftover_of, upper):
             z, high_z = self.stock.tops(place[None]), self.solid.bands(place[None])[0, 1]
             yield MATERIAL_LEFT(
                 where=place_words(place),
-                measured=float(standing(place[None])[0]),
+                measured=float(leftover_of(place[None])[0]),
                 limit=self.deep_mm,
                 z=float(z[0]),
                 high=float(high_z),
-                more=more,
+                more=other_count,
             )
 
     def _worst(
         self,
         points: Floats,
-        found: Floats,
+        values: Floats,
         value: Callable[[Floats], Floats],
         upper: Callable[[Floats], Floats],
     ) -> Iterator[tuple[Floats, int]]:
         """Yield the places (2,) of the greatest of the values (P,) at points (P, 2) that are above
         the tolerance, each the greatest around it, and how many more there are."""
-        over = np.flatnonzero(found > self.deep_mm)
-        over = over[np.argsort(-found[over], kind="stable")]
+        exceeding = np.flatnonzero(values > self.deep_mm)
+        exceeding = exceeding[np.argsort(-values[exceeding], kind="stable")]
         places: list[Floats] = []
-        while len(over):
-            places.append(points[over[0]])
-            apart = np.hypot(*(points[over] - places[-1]).T)
-            over = over[apart > SAME_PLACE_MM]
+        while len(exceeding):
+            places.append(points[exceeding[0]])
+            distances = np.hypot(*(points[exceeding] - places[-1]).T)
+            exceeding = exceeding[distances > SAME_PLACE_MM]
         for number, place in enumerate(places[:FINDINGS_LISTED], start=1):
             (x, y), half = place.tolist(), 0.5 * ALONG_MM
             best = greatest_value(
@@ -404,32 +406,32 @@ class _Checks:
                 0.1 * self.deep_mm,
                 max_squares=REFINED_SQUARES,
             )
-            here = np.array([place, best.at_mm])
-            more = len(places) - FINDINGS_LISTED if number == FINDINGS_LISTED else 0
-            yield here[int(value(here).argmax())], more
+            two_places = np.array([place, best.at_mm])
+            other_count = len(places) - FINDINGS_LISTED if number == FINDINGS_LISTED else 0
+            yield two_places[int(value(two_places).argmax())], other_count
 
     def passes(self) -> Iterator[Finding]:
         """Yield PASS_TOO_DEEP for feeds that take more at once than their operation allows."""
         limit = self._chips_mm()
         feeds = ~self.moves.rapid[self.cuts.move] & self._in_stock(self.cuts.at)
-        at, move = np.ascontiguousarray(self.cuts.at[feeds]), self.cuts.move[feeds]
-        before = self.stock.tops(at, move)
+        points, move = np.ascontiguousarray(self.cuts.at[feeds]), self.cuts.move[feeds]
+        before = self.stock.tops(points, move)
         # No move cuts below its lower end.
         lowest = np.minimum(self.moves.start[move, 2], self.moves.end[move, 2])
         doubtful = before - lowest > limit[move] + self.deep_mm
-        at, move, before = at[doubtful], move[doubtful], before[doubtful]
-        after = np.maximum(self.stock.tops(at, move + 1), self.before.floors(at))
+        points, move, before = points[doubtful], move[doubtful], before[doubtful]
+        after = np.maximum(self.stock.tops(points, move + 1), self.before.floors(points))
         chip = before - after
-        over = chip - limit[move]
+        excess = chip - limit[move]
         blocks: dict[int, int] = {}
-        for k in np.argsort(-over, kind="stable").tolist():
-            if over[k] <= self.deep_mm:
+        for k in np.argsort(-excess, kind="stable").tolist():
+            if excess[k] <= self.deep_mm:
                 break
             blocks.setdefault(int(self.moves.row[move[k]]), k)
         for number, (row, k) in enumerate(list(blocks.items())[:FINDINGS_LISTED], start=1):
             operations = self._operations_of(row)
             yield PASS_TOO_DEEP(
-                where=self._where(row, at[k]),
+                where=self._where(row, points[k]),
                 measured=float(chip[k]),
                 limit=float(limit[move[k]]),
                 operation=operation_name(self.request.operations[operations[0]]),
@@ -438,22 +440,22 @@ class _Checks:
 
     def _operations_of(self, row: int) -> list[int]:
         """The operations that a row of the program may be of: its own, or all of its tool."""
-        planned = self.decoded.operations
-        if planned is not None and len(planned.notes) == len(self.request.operations):
-            turn = int(np.searchsorted(planned.begin, row, side="right")) - 1
+        plan = self.decoded.operations
+        if plan is not None and len(plan.notes) == len(self.request.operations):
+            turn = int(np.searchsorted(plan.begin, row, side="right")) - 1
             return [max(turn, 0)]
         move = int(np.searchsorted(self.moves.row, row))
         return self._with_cutter(int(self.moves.tool[min(move, len(self.moves) - 1)]))
 
     def _chips_mm(self) -> Floats:
         """The thickest chip that each move (M,) may take, mm."""
-        operations, planned = self.request.operations, self.decoded.operations
-        most = np.array(list(map(_chip_mm, operations, self.request.depths_mm)))
-        if planned is not None and len(planned.notes) == len(operations):
-            turn = np.searchsorted(planned.begin, self.moves.row, side="right") - 1
-            return np.asarray(most[turn.clip(min=0)])
+        operations, plan = self.request.operations, self.decoded.operations
+        max_chips = np.array(list(map(_chip_mm, operations, self.request.depths_mm)))
+        if plan is not None and len(plan.notes) == len(operations):
+            turn = np.searchsorted(plan.begin, self.moves.row, side="right") - 1
+            return np.asarray(max_chips[turn.clip(min=0)])
         of_cutter = [
-            max([most[k] for k in self._with_cutter(number)], default=math.inf)
+            max([max_chips[k] for k in self._with_cutter(number)], default=math.inf)
             for number in range(len(self.moves.cutters))
         ]
         return np.asarray(np.array(of_cutter)[self.moves.tool])
@@ -465,8 +467,8 @@ class _Checks:
 
     def tabs(self) -> Iterator[Finding]:
         """Yield TAB_MISSING and TAB_THIN for bridges that do not stand as the job asks."""
-        given = (self.request.operations, self.request.depths_mm, self.request.bridges)
-        for operation, depth_mm, bridges in zip(*given, strict=True):
+        requested = (self.request.operations, self.request.depths_mm, self.request.bridges)
+        for operation, depth_mm, bridges in zip(*requested, strict=True):
             tabs, name = operation.tabs, operation_name(operation)
             if tabs is None:
                 continue
@@ -497,12 +499,12 @@ class _Checks:
         above the floor of the cut, mm."""
         half = 0.5 * width_mm
         step = half * np.arange(-MIN_CHORDS, MIN_CHORDS + 1) / MIN_CHORDS
-        at = bridge.centre + step[:, None] * bridge.ahead
-        left = self.stock.tops(at) - np.maximum(self.before.floors(at), -depth_mm)
-        gone = left < height_mm - self.deep_mm
-        low, high = step[gone & (step <= 0.0)], step[gone & (step >= 0.0)]
+        points = bridge.centre + step[:, None] * bridge.ahead
+        standing = self.stock.tops(points) - np.maximum(self.before.floors(points), -depth_mm)
+        is_gone = standing < height_mm - self.deep_mm
+        low, high = step[is_gone & (step <= 0.0)], step[is_gone & (step >= 0.0)]
         wide = high.min(initial=half) - low.max(initial=-half)
-        return float(wide), float(left[MIN_CHORDS])
+        return float(wide), float(standing[MIN_CHORDS])
 
     def loose(self) -> Iterator[Finding]:
         """Yield LOOSE_PIECE for pieces that come loose, and for parts that are cut after that, in
@@ -511,34 +513,34 @@ class _Checks:
         if stock is None:
             return
         every = loose_pieces(self.moves, stock.thickness_mm, stock.box_mm, self.before)
-        found = [
+        pieces = [
             (piece, is_part)
             for piece in every
             for is_part in (self._is_part(piece),)
             if piece.move != BEFORE and (not is_part or piece.again >= 0)
         ]
-        for number, (piece, is_part) in enumerate(found[:FINDINGS_LISTED], start=1):
-            left, low, right, high = piece.box_mm
+        for number, (piece, is_part) in enumerate(pieces[:FINDINGS_LISTED], start=1):
+            left_x, low, right, high = piece.box_mm
             yield (LOOSE_PIECE_CUT if is_part else LOOSE_PIECE)(
                 where=self._where(
                     int(self.moves.row[piece.move]),
-                    np.array([0.5 * (left + right), 0.5 * (low + high)]),
+                    np.array([0.5 * (left_x + right), 0.5 * (low + high)]),
                 ),
                 measured=piece.area_mm2,
-                width=right - left,
+                width=right - left_x,
                 height=high - low,
                 again=block_of(self.decoded, int(self.moves.row[piece.again])),
-                more=max(len(found) - FINDINGS_LISTED, 0) if number == FINDINGS_LISTED else 0,
+                more=max(len(pieces) - FINDINGS_LISTED, 0) if number == FINDINGS_LISTED else 0,
             )
         for piece in every:
             z, move = self.tree.heights(piece.points)
             cut = z < self.before.tops(piece.points) - self.deep_mm
             if piece.move == BEFORE and cut.any():
-                left, low, right, high = piece.box_mm
+                left_x, low, right, high = piece.box_mm
                 yield LOOSE_PIECE_BEFORE(
                     where=self._where(int(self.moves.row[move[cut].min()]), piece.points[cut][0]),
                     measured=piece.area_mm2,
-                    width=right - left,
+                    width=right - left_x,
                     height=high - low,
                 )
 
@@ -549,14 +551,14 @@ class _Checks:
         if stock is None or not self.before.below:
             return
         box = stock.box_mm or cut_box(self.moves)
-        found = least_remaining(self.tree, self.before, box)
-        if not math.isfinite(found.low):
+        least = least_remaining(self.tree, self.before, box)
+        if not math.isfinite(least.low):
             return
-        where, other = place_words(found.at_mm), self.before.deepest_below(np.array(found.at_mm))
-        if found.low > MEETING_MM:
-            yield FACES_MEET(where=where, measured=found.low, other=other)
+        place, other = place_words(least.at_mm), self.before.deepest_below(np.array(least.at_mm))
+        if least.low > MEETING_MM:
+            yield FACES_MEET(where=place, measured=least.low, other=other)
         else:
-            yield FLOOR_LEFT(where=where, measured=max(-found.low, 0.0), other=other)
+            yield FLOOR_LEFT(where=place, measured=max(-least.low, 0.0), other=other)
 
     def _is_part(self, piece: LoosePiece) -> bool:
         """True if the innermost contour round most of a piece is the outline of a part."""
@@ -565,9 +567,9 @@ class _Checks:
             return False
         points = piece.points[:: max(1, len(piece.points) // PIECE_POINTS)]
         boxes, areas = path_extents(contours), np.abs(signed_areas(contours))
-        near = (boxes[:, :, 0] < points.max(axis=0)) & (boxes[:, :, 1] > points.min(axis=0))
+        is_near = (boxes[:, :, 0] < points.max(axis=0)) & (boxes[:, :, 1] > points.min(axis=0))
         innermost = np.full(len(points), -1, dtype=np.int64)
-        rows = np.flatnonzero(near.all(axis=1))
+        rows = np.flatnonzero(is_near.all(axis=1))
         for row in rows[np.argsort(-areas[rows])].tolist():
             innermost[inside(points, Segments.of(contours.select([row])))] = row
         parts = self.request.is_part[innermost] & (innermost >= 0)
@@ -591,22 +593,22 @@ class _Checks:
         start, travel = self.moves.start[rows], self.moves.end[rows] - self.moves.start[rows]
         step = BODY_SHARE * radius
         count = np.ceil(np.hypot(travel[:, 0], travel[:, 1]) / step).astype(np.int64) + 1
-        which = np.repeat(np.arange(len(rows)), count)
-        part = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-        part = np.where(count[which] > 1, part / np.maximum(count[which] - 1, 1), 1.0)
-        axis = start[which] + part[:, None] * travel[which]
+        owners = np.repeat(np.arange(len(rows)), count)
+        part = np.arange(len(owners)) - np.repeat(np.cumsum(count) - count, count)
+        part = np.where(count[owners] > 1, part / np.maximum(count[owners] - 1, 1), 1.0)
+        axis = start[owners] + part[:, None] * travel[owners]
         turn = np.arange(RIM_POINTS) * (math.tau / RIM_POINTS)
         rim = (radius - self.solid.wall_mm) * np.column_stack([np.cos(turn), np.sin(turn)])
         worst: dict[int, tuple[float, Floats]] = {}
         for offset in (*rim, *(0.5 * (rim + tool.radius_mm * rim / radius))):
-            at = np.ascontiguousarray(axis[:, :2] + offset)
-            floor = np.maximum(axis[:, 2] + begin, self.before.floors(at))
-            z = self.stock.tops(at, rows[which] + 1)
-            deep = np.where(self._in_stock(at), z - floor, -np.inf)
-            for k in np.flatnonzero(deep > self.deep_mm).tolist():
-                row = int(self.moves.row[rows[which[k]]])
-                if deep[k] > worst.get(row, (0.0,))[0]:
-                    worst[row] = (float(deep[k]), at[k])
+            points = np.ascontiguousarray(axis[:, :2] + offset)
+            floor = np.maximum(axis[:, 2] + begin, self.before.floors(points))
+            z = self.stock.tops(points, rows[owners] + 1)
+            depths = np.where(self._in_stock(points), z - floor, -np.inf)
+            for k in np.flatnonzero(depths > self.deep_mm).tolist():
+                row = int(self.moves.row[rows[owners[k]]])
+                if depths[k] > worst.get(row, (0.0,))[0]:
+                    worst[row] = (float(depths[k]), points[k])
         ordered = sorted(worst.items(), key=lambda each: -each[1][0])
         for row, (deep_mm, place) in ordered[:1]:
             yield TOOL_IN_STOCK(
@@ -628,13 +630,13 @@ class _Checks:
                     ("cutter", tool.radius_mm, 0.0, top),
                     *tool.bodies,
                 ):
-                    deep, place = self._entered(rows, box, (radius, begin, end))
-                    blocks = np.unique(self.moves.row[rows[deep > POSITION_EPS_MM]])
+                    depths, place = self._entered(rows, box, (radius, begin, end))
+                    blocks = np.unique(self.moves.row[rows[depths > POSITION_EPS_MM]])
                     if len(blocks):
-                        k = int(deep.argmax())
+                        k = int(depths.argmax())
                         yield KEEP_OUT_ENTERED(
                             where=self._where(int(self.moves.row[rows[k]]), place[k]),
-                            measured=float(deep[k]),
+                            measured=float(depths[k]),
                             limit=0.0,
                             body=body,
                             tool=tool_name(tool),
@@ -664,20 +666,20 @@ class _Checks:
         is_met &= parts[:, 0] <= parts[:, 1]
         a = start[:, :2] + parts[:, :1] * travel[:, :2]
         b = start[:, :2] + parts[:, 1:] * travel[:, :2]
-        away, place = _from_box(a, b, box)
-        return np.where(is_met, radius - away, -np.inf), place
+        distances, place = _from_box(a, b, box)
+        return np.where(is_met, radius - distances, -np.inf), place
 
     def not_known(self) -> Iterator[Finding]:
         """Yield TOOL_NOT_KNOWN where a job describes shanks, holders or boxes, for the tools whose
         shank or holder is not known."""
-        told = [{body for body, *_ in tool.bodies} for _, tool in self.tools]
-        if not self.request.keep_out and not any(told):
+        bodies_told = [{body for body, *_ in tool.bodies} for _, tool in self.tools]
+        if not self.request.keep_out and not any(bodies_told):
             return
         lacking = [
             f"{body} of {tool_name(tool)}"
-            for (_, tool), known in zip(self.tools, told, strict=True)
+            for (_, tool), known_bodies in zip(self.tools, bodies_told, strict=True)
             for body in ("shank", "holder")
-            if body not in known
+            if body not in known_bodies
         ]
         if lacking:
             yield TOOL_NOT_KNOWN(bodies=", ".join(lacking))
@@ -716,8 +718,8 @@ def _from_box(a: Floats, b: Floats, box: KeepOutBox) -> tuple[Floats, Floats]:
                 safe = np.where(travel[:, axis] != 0.0, travel[:, axis], 1.0)
                 shares.append(np.clip((side - a[:, axis]) / safe, 0.0, 1.0))
     places = a + np.stack(shares)[:, :, None] * travel
-    beyond = np.maximum(np.maximum(low - places, places - high), 0.0)
-    away = np.hypot(beyond[..., 0], beyond[..., 1])
-    best = away.argmin(axis=0)
+    overhangs = np.maximum(np.maximum(low - places, places - high), 0.0)
+    distances = np.hypot(overhangs[..., 0], overhangs[..., 1])
+    best = distances.argmin(axis=0)
     every = np.arange(len(a))
-    return away[best, every], places[best, every]
+    return distances[best, every], places[best, every]

@@ -66,16 +66,16 @@ class CutStock(Struct, frozen=True, eq=False):
     def bounds(self, points: Floats) -> Floats:
         """Return the lowest and the highest height (J, 2) mm that there may be over points (J, 2),
         since the slides may be `moves.beside_mm` beside the moves."""
-        beside = self.moves.beside_mm
-        low, _ = self.tree.heights(points, None, beside)
-        high, _ = self.tree.heights(points, None, -beside)
-        return np.column_stack([low - beside, np.minimum(high + beside, self.tree.top)])
+        beside_mm = self.moves.beside_mm
+        low, _ = self.tree.heights(points, None, beside_mm)
+        high, _ = self.tree.heights(points, None, -beside_mm)
+        return np.column_stack([low - beside_mm, np.minimum(high + beside_mm, self.tree.top)])
 
     def rows_at(self, points: Floats) -> Ints:
         """Return the row (J,) of the decoded toolpath that cuts deepest over points (J, 2); −1
         where nothing is cut."""
-        _, which = self.tree.heights(points)
-        return np.where(which >= 0, self.moves.row[which.clip(min=0)], -1)
+        _, move_index = self.tree.heights(points)
+        return np.where(move_index >= 0, self.moves.row[move_index.clip(min=0)], -1)
 
     def section(self, axis: str, at_mm: float) -> Floats:
         """Return the profile (P, 2) of the stock where an axis, "x" or "y", has a value: places
@@ -142,15 +142,15 @@ def cut_box(moves: StockMoves) -> Box:
     """Return the box of all that the tools cut, cones as wide as at their depth; that of all moves
     where nothing is cut."""
     cuts = np.minimum(moves.start[:, 2], moves.end[:, 2]) < 0.0
-    chosen = moves.select(cuts) if cuts.any() else moves
-    if not len(chosen):
+    chosen_moves = moves.select(cuts) if cuts.any() else moves
+    if not len(chosen_moves):
         return 0.0, 0.0, 1.0, 1.0
-    radius, flat, _, rise = chosen.table[chosen.tool].T
-    deep = -np.minimum(chosen.start[:, 2], chosen.end[:, 2]).clip(max=0.0)
-    cone = flat + deep / np.where(rise > 0.0, rise, 1.0)
+    radius, flat, _, rise = chosen_moves.table[chosen_moves.tool].T
+    depths = -np.minimum(chosen_moves.start[:, 2], chosen_moves.end[:, 2]).clip(max=0.0)
+    cone = flat + depths / np.where(rise > 0.0, rise, 1.0)
     wide = np.where(rise > 0.0, np.minimum(radius, cone), radius)[:, None]
-    low = (np.minimum(chosen.start, chosen.end)[:, :2] - wide).min(axis=0)
-    high = (np.maximum(chosen.start, chosen.end)[:, :2] + wide).max(axis=0)
+    low = (np.minimum(chosen_moves.start, chosen_moves.end)[:, :2] - wide).min(axis=0)
+    high = (np.maximum(chosen_moves.start, chosen_moves.end)[:, :2] + wide).max(axis=0)
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
@@ -178,11 +178,11 @@ def difference_of(first: CutStock, second: CutStock, limit_mm: float) -> StockDi
     box = box_around(first.box_mm, second.box_mm)
     slack_mm3 = DIFFERENCE_SHARE * max(first.removed_mm3().high, second.removed_mm3().high)
     # What both cut is no difference: of each only the moves that the other has not are compared.
-    more, less = _own_moves(second.moves, first.moves), _own_moves(first.moves, second.moves)
+    added_cuts, less = _own_moves(second.moves, first.moves), _own_moves(first.moves, second.moves)
     return StockDifference(
-        _distance(first.tree, more, box, limit_mm),
+        _distance(first.tree, added_cuts, box, limit_mm),
         _distance(second.tree, less, box, limit_mm),
-        _volume_between(first.tree, more, box, slack_mm3),
+        _volume_between(first.tree, added_cuts, box, slack_mm3),
         _volume_between(second.tree, less, box, slack_mm3),
     )
 
@@ -193,9 +193,9 @@ def _own_moves(moves: StockMoves, other: StockMoves) -> StockTree:
     def rows(each: StockMoves) -> Floats:
         return np.hstack([each.start, each.end, each.table[each.tool]])
 
-    known = set(map(bytes, rows(other)))
-    own = np.array([bytes(row) not in known for row in rows(moves)], dtype=np.bool_)
-    return stock_tree(moves.select(own))
+    other_rows = set(map(bytes, rows(other)))
+    is_own = np.array([bytes(row) not in other_rows for row in rows(moves)], dtype=np.bool_)
+    return stock_tree(moves.select(is_own))
 
 
 def box_around(one: Box, other: Box) -> Box:
@@ -208,7 +208,7 @@ def _distance(one: StockTree, other: StockTree, box: Box, limit_mm: float) -> Br
     """Return the greatest distance of what `other` cuts from what `one` cuts or leaves free."""
     tolerance_mm = TRIAL_SHARE * limit_mm
 
-    def beyond(distance: float, enough: float = math.inf) -> Bracket:
+    def bracket_beyond(distance: float, enough_value: float = math.inf) -> Bracket:
         return greatest_value(
             lambda at: one.heights(at, None, distance)[0] - distance - other.heights(at)[0],
             lambda squares: (
@@ -218,24 +218,24 @@ def _distance(one: StockTree, other: StockTree, box: Box, limit_mm: float) -> Br
             0.5 * tolerance_mm,
             floor=0.0,
             max_squares=MAX_TRIAL_SQUARES,
-            enough=enough,
+            enough_value=enough_value,
         )
 
-    found = beyond(limit_mm - tolerance_mm)
-    if found.low <= 0.0:
-        high = limit_mm - tolerance_mm + found.high
-        return Bracket(0.0, high, found.at_mm, found.squares)
+    bracket = bracket_beyond(limit_mm - tolerance_mm)
+    if bracket.low <= 0.0:
+        high = limit_mm - tolerance_mm + bracket.high
+        return Bracket(0.0, high, bracket.at_mm, bracket.squares)
     # No distance is more than a difference in depth; where it is less, a wall has moved.
-    low, place, squares = limit_mm - tolerance_mm, found.at_mm, found.squares
-    high = low + found.high
+    low, place, squares = limit_mm - tolerance_mm, bracket.at_mm, bracket.squares
+    high = low + bracket.high
     while high - low > tolerance_mm:
         middle = 2.0 * low if high > 4.0 * low else 0.5 * (low + high)
-        found = beyond(middle, 0.0)
-        squares += found.squares
-        if found.low > 0.0:
-            low, place = middle, found.at_mm
-        elif middle + found.high < high:
-            high = middle + found.high
+        bracket = bracket_beyond(middle, 0.0)
+        squares += bracket.squares
+        if bracket.low > 0.0:
+            low, place = middle, bracket.at_mm
+        elif middle + bracket.high < high:
+            high = middle + bracket.high
         else:
             break
     return Bracket(low, high, place, squares)
@@ -245,7 +245,7 @@ def _volume_between(one: StockTree, other: StockTree, box: Box, slack_mm3: float
     """Return the volume that `other` cuts below `one`, mm³, to 1 % or `slack_mm3`."""
 
     def extremes(squares: Floats) -> tuple[Floats, Floats]:
-        least = np.maximum(one.least(squares) - other.greatest(squares), 0.0)
-        return least, np.maximum(one.greatest(squares) - other.least(squares), 0.0)
+        lower = np.maximum(one.least(squares) - other.greatest(squares), 0.0)
+        return lower, np.maximum(one.greatest(squares) - other.least(squares), 0.0)
 
     return integral(extremes, extremes, box, slack=slack_mm3)

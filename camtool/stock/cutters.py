@@ -50,12 +50,12 @@ class CutterProfile(Struct, frozen=True):
     def heights(self, distance: Floats) -> Floats:
         """Return the heights of the surface over the tip at distances from the axis; inf beyond
         the radius."""
-        out = np.maximum(distance - self.flat_mm, 0.0)
+        beyond_flat = np.maximum(distance - self.flat_mm, 0.0)
         if self.corner_mm:
-            below = np.minimum(out, self.corner_mm)
+            below = np.minimum(beyond_flat, self.corner_mm)
             z = self.corner_mm - np.sqrt(np.maximum(self.corner_mm**2 - below**2, 0.0))
         else:
-            z = out * self.rise
+            z = beyond_flat * self.rise
         return np.where(distance <= self.radius_mm, z, np.inf)
 
 

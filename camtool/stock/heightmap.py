@@ -54,30 +54,30 @@ class HeightMap(Struct, frozen=True, eq=False):
 
 def height_map(moves: StockMoves, box: Box, cell_mm: float, *, owners: bool = False) -> HeightMap:
     """Cut the moves into a map that covers the box; ValueError for more than MAX_CELLS cells."""
-    left, bottom, right, top = box
-    columns = max(1, math.ceil((right - left) / cell_mm - 1e-9))
+    left_x, bottom, right, top = box
+    columns = max(1, math.ceil((right - left_x) / cell_mm - 1e-9))
     rows = max(1, math.ceil((top - bottom) / cell_mm - 1e-9))
     if columns * rows > MAX_CELLS:
         raise ValueError(f"{columns} × {rows} cells are more than {MAX_CELLS}")
-    found = HeightMap(
+    heights = HeightMap(
         np.zeros((rows, columns), dtype=np.float32),
         cell_mm,
-        (left, bottom),
+        (left_x, bottom),
         np.full((rows, columns), NO_MOVE, dtype=np.int32) if owners else None,
     )
-    add_moves(found, moves)
-    return found
+    add_moves(heights, moves)
+    return heights
 
 
 def add_moves(heights: HeightMap, moves: StockMoves, first: int = 0) -> None:
     """Cut more moves into a map, in place; their owners are numbered from `first` on."""
-    left, bottom = heights.corner_mm
+    left_x, bottom = heights.corner_mm
     half = 0.5 * heights.cell_mm
     owner = np.empty((0, 0), dtype=np.int32) if heights.owner is None else heights.owner
     cut_heights(
         heights.heights,
         owner,
-        (left + half, bottom + half, heights.cell_mm),
+        (left_x + half, bottom + half, heights.cell_mm),
         np.ascontiguousarray(moves.start),
         np.ascontiguousarray(moves.end),
         np.ascontiguousarray(moves.tool, dtype=np.int64),

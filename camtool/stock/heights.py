@@ -50,9 +50,9 @@ MIN_HALF_MM = 1e-9
 def stock_tree(moves: StockMoves, top_mm: float = TOP_MM) -> StockTree:
     """Index the moves for searches of heights; tools that cut no width are left out."""
     number = np.flatnonzero(moves.table[moves.tool, 0] > 0.0)
-    chosen = moves.select(number)
-    columns = move_columns(chosen)
-    order = hilbert_order(chosen.start[:, :2], chosen.end[:, :2]) if len(number) else number
+    selected = moves.select(number)
+    columns = move_columns(selected)
+    order = hilbert_order(selected.start[:, :2], selected.end[:, :2]) if len(number) else number
     return StockTree(
         np.ascontiguousarray(columns[order]),
         np.ascontiguousarray(moves.tool[number][order].astype(np.int64)),
@@ -65,17 +65,17 @@ def stock_tree(moves: StockMoves, top_mm: float = TOP_MM) -> StockTree:
 def move_columns(moves: StockMoves) -> Floats:
     """Return the moves (M, 7) as the compiled loops read them: start, direction and length in the
     plane, slope; of those straight up or down the lower end."""
-    start, apart = moves.start, moves.end - moves.start
-    length = np.hypot(apart[:, 0], apart[:, 1])
+    start, steps = moves.start, moves.end - moves.start
+    length = np.hypot(steps[:, 0], steps[:, 1])
     flat = length > 0.0
     safe = np.where(flat, length, 1.0)
     return np.column_stack(
         [
             start[:, :2],
             np.where(flat, start[:, 2], np.minimum(start[:, 2], moves.end[:, 2])),
-            np.where(flat[:, None], apart[:, :2] / safe[:, None], 0.0),
+            np.where(flat[:, None], steps[:, :2] / safe[:, None], 0.0),
             length,
-            np.where(flat, apart[:, 2] / safe, 0.0),
+            np.where(flat, steps[:, 2] / safe, 0.0),
         ]
     )
 
@@ -107,17 +107,17 @@ def greatest_value(
     tolerance: float = TOLERANCE_MM,
     floor: float = -np.inf,
     max_squares: int = MAX_SQUARES,
-    enough: float = np.inf,
+    enough_value: float = np.inf,
 ) -> Bracket:
     """Bracket the greatest value of a function over a box (low x, low y, high x, high y).
 
     `value` gives it at points (J, 2); `upper` gives upper bounds over squares, whose middle and
     half a side are the rows of (K, 3), −inf for squares that are of no interest. Values below
     `floor` are not of interest: where all are, the bracket is (−inf, floor). A value above
-    `enough` ends the search, and the bracket is then wider.
+    `enough_value` ends the search, and the bracket is then wider.
     """
     squares = _first_squares(box)
-    best, place, proved, seen = (
+    best, place, proved, examined = (
         -np.inf,
         (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])),
         floor,
@@ -135,13 +135,13 @@ def greatest_value(
             squares = squares[-SQUARES_AT_ONCE:]
         if not len(squares):
             continue
-        seen += len(squares)
-        found = value(squares[:, :2])
-        row = int(np.argmax(found))
-        if found[row] > best:
-            best, place = float(found[row]), (float(squares[row, 0]), float(squares[row, 1]))
-        bounds = np.maximum(upper(squares), found)
-        ends = (squares[:, 2] <= MIN_HALF_MM) | (seen >= max_squares) | (best > enough)
+        examined += len(squares)
+        values = value(squares[:, :2])
+        row = int(np.argmax(values))
+        if values[row] > best:
+            best, place = float(values[row]), (float(squares[row, 0]), float(squares[row, 1]))
+        bounds = np.maximum(upper(squares), values)
+        ends = (squares[:, 2] <= MIN_HALF_MM) | (examined >= max_squares) | (best > enough_value)
         open_ = (bounds > max(best, floor) + tolerance) & ~ends
         proved = max(proved, float(bounds[~open_].max(initial=-np.inf)))
         if open_.any():
@@ -152,7 +152,7 @@ def greatest_value(
             pile.append((quarters[order], bounds[order]))
     if best <= floor:
         best = -np.inf
-    return Bracket(best, max(proved, best), place, seen)
+    return Bracket(best, max(proved, best), place, examined)
 
 
 MeanBounds = Callable[[Floats], tuple[Floats, Floats]]
@@ -178,21 +178,21 @@ def integral(
     low, high = _parts(squares, means, extremes, box)
     while True:
         total = float(low.sum()), float(high.sum())
-        wanted = max(share * total[1], slack)
+        wanted_gap = max(share * total[1], slack)
         gaps = high - low
-        if total[1] - total[0] <= wanted or len(squares) >= max_squares:
+        if total[1] - total[0] <= wanted_gap or len(squares) >= max_squares:
             break
         order = np.argsort(gaps)
         # The squares with the smallest gaps stay, as long as these make half of what may stay.
-        small = np.cumsum(gaps[order]) <= 0.5 * wanted
+        is_small = np.cumsum(gaps[order]) <= 0.5 * wanted_gap
         room = max(1, (max_squares - len(squares)) // 3)
-        chosen = order[~small][-room:]
-        kept = np.ones(len(squares), dtype=np.bool_)
-        kept[chosen] = False
-        quarters = divided(squares[chosen])
+        divided_rows = order[~is_small][-room:]
+        is_kept = np.ones(len(squares), dtype=np.bool_)
+        is_kept[divided_rows] = False
+        quarters = divided(squares[divided_rows])
         lows, highs = _parts(quarters, means, extremes, box)
-        squares = np.concatenate([squares[kept], quarters])
-        low, high = np.append(low[kept], lows), np.append(high[kept], highs)
+        squares = np.concatenate([squares[is_kept], quarters])
+        low, high = np.append(low[is_kept], lows), np.append(high[is_kept], highs)
     x, y = squares[int(np.argmax(high)), :2].tolist()
     return Bracket(total[0], total[1], (x, y), len(squares))
 
@@ -208,10 +208,10 @@ def _parts(
     high = np.minimum(squares[:, :2] + squares[:, 2:], box[2:])
     sides = np.maximum(high - low, 0.0)
     size = sides[:, 0] * sides[:, 1]
-    whole = size >= 4.0 * squares[:, 2] ** 2 * (1.0 - 1e-9)
+    is_full = size >= 4.0 * squares[:, 2] ** 2 * (1.0 - 1e-9)
     bounds = np.zeros((2, len(squares)))
-    bounds[:, whole] = means(squares[whole])
-    part = ~whole & (size > 0.0)
+    bounds[:, is_full] = means(squares[is_full])
+    part = ~is_full & (size > 0.0)
     bounds[:, part] = extremes(squares[part])
     return size * bounds[0], size * bounds[1]
 

@@ -84,26 +84,26 @@ def stock_moves_of_toolpath(
     sweep[arcs] = toolpath.sweeps_of(arcs)
     spoke = toolpath.starts_of(arcs)[:, :2] - toolpath.centre[arcs]
     radius[arcs] = np.hypot(spoke[:, 0], spoke[:, 1])
-    most = 2.0 * np.arccos(1.0 - np.minimum(SAGITTA_MM / np.maximum(radius[arcs], 1e-9), 1.0))
-    count[arcs] = np.maximum(np.ceil(np.abs(sweep[arcs]) / most), 1.0)
+    max_angle = 2.0 * np.arccos(1.0 - np.minimum(SAGITTA_MM / np.maximum(radius[arcs], 1e-9), 1.0))
+    count[arcs] = np.maximum(np.ceil(np.abs(sweep[arcs]) / max_angle), 1.0)
     row = np.repeat(np.arange(len(toolpath)), count)
     step = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 1
     end = toolpath.end[row]
     # Ends of chords within an arc; the last one keeps the end that the program gives.
     inner = step < count[row]
-    of = row[inner]
-    part = step[inner] / count[of]
-    starts = toolpath.starts_of(of)
-    spoke = starts[:, :2] - toolpath.centre[of]
-    cosine, sine = np.cos(sweep[of] * part), np.sin(sweep[of] * part)
-    x = toolpath.centre[of, 0] + spoke[:, 0] * cosine - spoke[:, 1] * sine
-    y = toolpath.centre[of, 1] + spoke[:, 0] * sine + spoke[:, 1] * cosine
-    z = starts[:, 2] + part * (toolpath.end[of, 2] - starts[:, 2])
+    rows = row[inner]
+    part = step[inner] / count[rows]
+    starts = toolpath.starts_of(rows)
+    spoke = starts[:, :2] - toolpath.centre[rows]
+    cosine, sine = np.cos(sweep[rows] * part), np.sin(sweep[rows] * part)
+    x = toolpath.centre[rows, 0] + spoke[:, 0] * cosine - spoke[:, 1] * sine
+    y = toolpath.centre[rows, 1] + spoke[:, 0] * sine + spoke[:, 1] * cosine
+    z = starts[:, 2] + part * (toolpath.end[rows, 2] - starts[:, 2])
     end[inner] = np.round(np.column_stack([x, y, z]), ROUNDED_DECIMALS)
     start = np.empty_like(end)
     first = step == 1
     start[first] = toolpath.starts_of(row[first])
     start[~first] = end[:-1][~first[1:]]
     rapid = np.asarray(toolpath.kind[row] == Kind.RAPID)
-    beside = SAGITTA_MM if len(arcs) else 0.0
-    return StockMoves(start, end, row, rapid, tool[row], cutters, beside)
+    beside_mm = SAGITTA_MM if len(arcs) else 0.0
+    return StockMoves(start, end, row, rapid, tool[row], cutters, beside_mm)

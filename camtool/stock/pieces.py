@@ -109,10 +109,10 @@ def loose_pieces(
     if not across.any():
         return []
     radius = cuts.table[cuts.tool, 0]
-    narrow = float(radius[across].min())
+    min_radius = float(radius[across].min())
     low = np.minimum(cuts.start, cuts.end)[:, :2] - radius[:, None]
     high = np.maximum(cuts.start, cuts.end)[:, :2] + radius[:, None]
-    edge = 3.0 * narrow
+    edge = 3.0 * min_radius
     low, high = low.min(axis=0) - edge, high.max(axis=0) + edge
     if box_mm is not None and has_others:
         low, high = np.array(box_mm).reshape(2, 2)
@@ -121,20 +121,20 @@ def loose_pieces(
     if (low >= high).any():
         return []
     box = (*low.tolist(), *high.tolist())
-    most = MAX_PIECE_CELLS if has_others else MAX_RASTER_CELLS
-    cell = max(CELL_SHARE * 2.0 * narrow, cell_for(box, most))
+    max_cells = MAX_PIECE_CELLS if has_others else MAX_RASTER_CELLS
+    cell = max(CELL_SHARE * 2.0 * min_radius, cell_for(box, max_cells))
     raster = _Raster(levels, before, box, cell)
     time = raster.times(box, cell, math.sqrt(0.5) * cell)[1]
-    disc = math.pi * narrow**2
+    disc = math.pi * min_radius**2
     partings = list(_partings(time, MIN_PIECE_SHARE * disc / cell**2))
     cells = min(MAX_PIECE_CELLS, MAX_RASTER_CELLS // max(len(partings), 1))
-    found = []
+    pieces = []
     for parting in partings:
         piece = raster.measured(time, parting, cells)
         if piece is not None and piece.area_mm2 >= MIN_PIECE_SHARE * disc:
             is_cut = parting.cut * cell**2 >= MIN_CUT_SHARE * disc
-            found.append(piece if is_cut else replace(piece, again=-1))
-    return sorted(found, key=lambda each: each.move)
+            pieces.append(piece if is_cut else replace(piece, again=-1))
+    return sorted(pieces, key=lambda each: each.move)
 
 
 def _floors(moves: StockMoves, thickness_mm: float, before: StockBefore) -> list[float]:
@@ -158,14 +158,14 @@ def _through(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
     low = np.minimum(start[:, 2], end[:, 2]) <= bottom_mm
     low &= moves.table[moves.tool, 0] > 0.0
     number = np.flatnonzero(low)
-    chosen = moves.select(number).below(bottom_mm)
-    begin, finish = chosen.start, chosen.end
+    selected = moves.select(number).below(bottom_mm)
+    begin, finish = selected.start, selected.end
     # A cone is nowhere narrower along a move than at its higher end.
     higher = np.maximum(begin[:, 2], finish[:, 2])
-    radius, flat, corner, rise = chosen.table[chosen.tool].T
-    deep = np.maximum(bottom_mm - higher, 0.0)
-    cone = flat + deep / np.where(rise > 0.0, rise, 1.0)
-    round_ = flat + np.sqrt(np.maximum(corner**2 - np.maximum(corner - deep, 0.0) ** 2, 0.0))
+    radius, flat, corner, rise = selected.table[selected.tool].T
+    depths = np.maximum(bottom_mm - higher, 0.0)
+    cone = flat + depths / np.where(rise > 0.0, rise, 1.0)
+    round_ = flat + np.sqrt(np.maximum(corner**2 - np.maximum(corner - depths, 0.0) ** 2, 0.0))
     wide = np.where(rise > 0.0, cone, np.where(corner > 0.0, round_, radius))
     wide = np.floor(np.minimum(wide, radius) / WIDTH_STEP_MM) * WIDTH_STEP_MM
     begin[:, 2] = finish[:, 2] = LEVEL_MM
@@ -173,7 +173,13 @@ def _through(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
     cutters = tuple(CutterProfile(width, width) for width in widths.tolist())
     keep = wide > 0.0
     flat_moves = StockMoves(
-        begin, finish, chosen.row, chosen.rapid, tool.astype(np.int64), cutters, moves.beside_mm
+        begin,
+        finish,
+        selected.row,
+        selected.rapid,
+        tool.astype(np.int64),
+        cutters,
+        moves.beside_mm,
     )
     return flat_moves.select(keep), number[keep]
 
@@ -199,54 +205,56 @@ class _Raster(Struct, frozen=True, eq=False):
     ) -> tuple[HeightMap, Ints]:
         """Return a raster of a box, and the first move (NY, NX) that cuts each of its cells
         through, of those up to `until`, with tools that are slimmer by `inwards_mm`."""
-        found: Ints | None = None
+        first_cuts: Ints | None = None
         for level in self.levels:
-            chosen = level.number <= (STANDING if until is None else until)
-            cuts = level.cuts.select(chosen)
+            is_chosen = level.number <= (STANDING if until is None else until)
+            cuts = level.cuts.select(is_chosen)
             slim = [max(each.radius_mm - inwards_mm, 0.0) for each in cuts.cutters]
             cutters = tuple(CutterProfile(radius, radius) for radius in slim)
-            kept = np.flatnonzero(np.array(slim)[cuts.tool] > 0.0)
+            kept_moves = np.flatnonzero(np.array(slim)[cuts.tool] > 0.0)
             drawn = height_map(
-                replace(cuts, cutters=cutters).select(kept), box, cell_mm, owners=True
+                replace(cuts, cutters=cutters).select(kept_moves), box, cell_mm, owners=True
             )
             assert drawn.owner is not None
-            number = np.append(level.number[chosen][kept], STANDING)
+            number = np.append(level.number[is_chosen][kept_moves], STANDING)
             time = number[drawn.owner]  # the last for cells that nothing cuts
             if not (self.before.above or self.before.below):
                 return drawn, time
-            if found is None:
+            if first_cuts is None:
                 points = _centres(drawn)
                 floor = self.before.floors(points, -inwards_mm).reshape(time.shape)
                 top = self.before.tops(points, -inwards_mm).reshape(time.shape)
                 is_gone = np.maximum(floor, level.floor_mm) >= top - THROUGH_SLACK_MM
-            found = time if found is None else np.where(floor >= level.floor_mm, time, found)
-        assert found is not None
-        return drawn, np.where(is_gone, BEFORE, found)
+            first_cuts = (
+                time if first_cuts is None else np.where(floor >= level.floor_mm, time, first_cuts)
+            )
+        assert first_cuts is not None
+        return drawn, np.where(is_gone, BEFORE, first_cuts)
 
     def measured(self, time: Ints, parting: _Parting, cells: int) -> LoosePiece | None:
         """Return a piece as it is when a move frees it; None where all its cells are cut in
         part."""
-        (low, high), (left, right) = parting.rows, parting.columns
-        time = time[low : high + 1, left : right + 1]
+        (low, high), (left_column, right) = parting.rows, parting.columns
+        time = time[low : high + 1, left_column : right + 1]
         label = _labels(time > parting.time)
         row, column = parting.place
-        mine = label == label[row - low, column - left]
+        is_piece = label == label[row - low, column - left_column]
         cell = self.cell_mm
-        corner = np.array(self.box[:2]) + cell * np.array([left, low])
-        size = cell * np.array(mine.shape[::-1])
+        corner = np.array(self.box[:2]) + cell * np.array([left_column, low])
+        size = cell * np.array(is_piece.shape[::-1])
         box = (*corner.tolist(), *(corner + size).tolist())
         fine, cut = self.times(box, min(cell, cell_for(box, cells)), 0.0, parting.time)
         points = _centres(fine)[(cut == STANDING).ravel()]
         x, y = np.floor((points - corner) / cell).astype(np.int64).T
-        inside = mine[y.clip(max=len(mine) - 1), x.clip(max=mine.shape[1] - 1)]
+        inside = is_piece[y.clip(max=len(is_piece) - 1), x.clip(max=is_piece.shape[1] - 1)]
         points = points[inside]
         if not len(points):
             return None
         half = 0.5 * fine.cell_mm
         ends = (*(points.min(axis=0) - half).tolist(), *(points.max(axis=0) + half).tolist())
-        later = time[mine & (time != STANDING)]
-        again = int(later.min()) if len(later) else -1
-        return LoosePiece(parting.time, len(points) * fine.cell_mm**2, ends, points, again)
+        later = time[is_piece & (time != STANDING)]
+        next_cut = int(later.min()) if len(later) else -1
+        return LoosePiece(parting.time, len(points) * fine.cell_mm**2, ends, points, next_cut)
 
 
 def _centres(drawn: HeightMap) -> Floats:
@@ -254,9 +262,9 @@ def _centres(drawn: HeightMap) -> Floats:
     return np.stack(np.meshgrid(drawn.x, drawn.y), axis=-1).reshape(-1, 2)
 
 
-def _partings(time: Ints, least: float) -> Iterator[_Parting]:
-    """Yield each piece of `least` cells or more that comes loose. `time` (NY, NX): when each cell
-    is cut through."""
+def _partings(time: Ints, min_cells: float) -> Iterator[_Parting]:
+    """Yield each piece of `min_cells` cells or more that comes loose. `time` (NY, NX): when each
+    cell is cut through."""
     label = _labels(time == STANDING)
     count = int(label.max()) + 1
     size = np.bincount(label[label >= 0], minlength=count).tolist()
@@ -274,7 +282,7 @@ def _partings(time: Ints, least: float) -> Iterator[_Parting]:
     root, cut = list(range(count + len(cells))), [0] * (count + len(cells))
     size += [0] * len(cells)
     is_held += [False] * len(cells)
-    around = [dy * width + dx for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
+    neighbours = [dy * width + dx for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
 
     def top(one: int) -> int:
         while root[one] != one:
@@ -283,30 +291,30 @@ def _partings(time: Ints, least: float) -> Iterator[_Parting]:
         return one
 
     times = time[y, x].tolist()
-    for now, group in groupby(range(len(cells)), key=times.__getitem__):
+    for time_now, group in groupby(range(len(cells)), key=times.__getitem__):
         added = [count + k for k in group]
-        for mine in added:
-            cell = cells[mine - count]
-            owner[cell] = mine
-            for near in [owner[cell + step] for step in around]:
-                one, other = top(mine), top(near) if near >= 0 else -1
+        for added_index in added:
+            cell = cells[added_index - count]
+            owner[cell] = added_index
+            for neighbour in [owner[cell + step] for step in neighbours]:
+                one, other = top(added_index), top(neighbour) if neighbour >= 0 else -1
                 if other < 0 or one == other:
                     continue
                 if is_held[one] or (not is_held[other] and size[one] > size[other]):
                     one, other = other, one
                 left_over = size[one] if is_held[other] else size[one] - cut[one]
-                if left_over >= least and not is_held[one]:
-                    low, high, left, right = spans[one]
+                if left_over >= min_cells and not is_held[one]:
+                    low, high, left_column, right = spans[one]
                     place = divmod(sample[one], label.shape[1])
-                    yield _Parting(now, place, (low, high), (left, right), cut[one])
+                    yield _Parting(time_now, place, (low, high), (left_column, right), cut[one])
                 root[one] = other
                 size[other] += size[one]
                 cut[other] += cut[one]
                 a, b = spans[one], spans[other]
                 spans[other] = min(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), max(a[3], b[3])
-        for mine in added:
+        for added_index in added:
             # The cells of one move come back at once.
-            one = top(mine)
+            one = top(added_index)
             size[one] += 1
             cut[one] += 1
 
@@ -314,12 +322,12 @@ def _partings(time: Ints, least: float) -> Iterator[_Parting]:
 def _spans(label: Ints, count: int) -> list[tuple[int, int, int, int]]:
     """Return the least and the greatest row and column of each label."""
     y, x = np.nonzero(label >= 0)
-    of = label[y, x]
+    labels = label[y, x]
     ends = np.empty((4, count), dtype=np.int64)
     for k, column in ((0, y), (2, x)):
         ends[k], ends[k + 1] = label.size, -1
-        np.minimum.at(ends[k], of, column)
-        np.maximum.at(ends[k + 1], of, column)
+        np.minimum.at(ends[k], labels, column)
+        np.maximum.at(ends[k + 1], labels, column)
     return list(zip(*ends.tolist(), strict=True))
 
 
@@ -334,14 +342,14 @@ def _labels(standing: Bools) -> Ints:
     for shift in (-1, 0, 1):
         one = run[:-1, max(shift, 0) : run.shape[1] + min(shift, 0)]
         other = run[1:, max(-shift, 0) : run.shape[1] + min(-shift, 0)]
-        both = (one >= 0) & (other >= 0)
-        pairs.append(np.column_stack([one[both], other[both]]))
+        are_both = (one >= 0) & (other >= 0)
+        pairs.append(np.column_stack([one[are_both], other[are_both]]))
     pair = np.unique(np.concatenate(pairs), axis=0)
     label = np.arange(int((turns == 1).sum()))
     while len(pair):
-        least = label[pair].min(axis=1)
+        min_label = label[pair].min(axis=1)
         for side in (0, 1):
-            np.minimum.at(label, label[pair[:, side]], least)
+            np.minimum.at(label, label[pair[:, side]], min_label)
         label = label[label]
         pair = pair[label[pair[:, 0]] != label[pair[:, 1]]]
     while (label[label] != label).any():

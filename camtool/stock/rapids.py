@@ -81,10 +81,10 @@ def rapids_through_stock(
     rows = np.flatnonzero(moves.rapid & low & ~is_up)
     search = _Search(moves, rows, box_mm, tolerance_mm, before)
     doubtful = np.flatnonzero(~search.follow_a_feed())
-    found: list[RapidThroughStock] = []
+    touching_rapids: list[RapidThroughStock] = []
     for first in range(0, len(doubtful), RAPIDS_AT_ONCE):
-        found += search.touching(doubtful[first : first + RAPIDS_AT_ONCE])
-    return found
+        touching_rapids += search.touching(doubtful[first : first + RAPIDS_AT_ONCE])
+    return touching_rapids
 
 
 def rapid_findings(
@@ -97,17 +97,17 @@ def rapid_findings(
     """Yield RAPID_IN_STOCK for the rapids of a program that get farther than a tolerance into what
     is not cut before them; without the moves of its tools for all below the stock top that may."""
     if moves is None:
-        found = low_rapids(decoded)
+        rapids = low_rapids(decoded)
     else:
         box_mm = None if stock is None else stock.box_mm
-        found = rapids_through_stock(moves, box_mm, max(CLEARED_MM, tolerance_mm), before)
-    for number, one in enumerate(found[:FINDINGS_LISTED], start=1):
+        rapids = rapids_through_stock(moves, box_mm, max(CLEARED_MM, tolerance_mm), before)
+    for number, one in enumerate(rapids[:FINDINGS_LISTED], start=1):
         yield RAPID_IN_STOCK(
             where=f"{block_of(decoded, one.row)} {place_words(one.at_mm)}",
             measured=one.z_mm,
             limit=STOCK_TOP_MM,
             depth=STOCK_TOP_MM - one.z_mm,
-            more=max(len(found) - FINDINGS_LISTED, 0) if number == FINDINGS_LISTED else 0,
+            more=max(len(rapids) - FINDINGS_LISTED, 0) if number == FINDINGS_LISTED else 0,
         )
 
 
@@ -116,26 +116,26 @@ def low_rapids(toolpath: Toolpath) -> list[RapidThroughStock]:
     at the same XY before: all that can be said where tools are not known."""
     start, end = toolpath.starts, toolpath.end
     is_across = np.asarray((start[:, :2] != end[:, :2]).any(axis=1))
-    chosen = (toolpath.kind == Kind.RAPID) & are_below_top(toolpath)
-    chosen &= is_across | (end[:, 2] < start[:, 2])
-    if chosen.any():
-        chosen &= is_across | (_fed_depths(toolpath, is_across) > end[:, 2] + HEIGHT_EPS_MM)
-    found = []
-    for row in np.flatnonzero(chosen).tolist():
+    is_low = (toolpath.kind == Kind.RAPID) & are_below_top(toolpath)
+    is_low &= is_across | (end[:, 2] < start[:, 2])
+    if is_low.any():
+        is_low &= is_across | (_fed_depths(toolpath, is_across) > end[:, 2] + HEIGHT_EPS_MM)
+    rapids = []
+    for row in np.flatnonzero(is_low).tolist():
         x, y, z = end[row].tolist()
-        found.append(RapidThroughStock(row, min(float(start[row, 2]), z), (x, y)))
-    return found
+        rapids.append(RapidThroughStock(row, min(float(start[row, 2]), z), (x, y)))
+    return rapids
 
 
 def _fed_depths(toolpath: Toolpath, is_across: Bools) -> Floats:
     """Compute the lowest Z (N,) of feeds before each row since the tool last moved in XY."""
-    deep, deepest = np.empty(len(toolpath)), math.inf
+    fed_depths, deepest = np.empty(len(toolpath)), math.inf
     feeds = np.where(toolpath.is_feed, toolpath.end[:, 2], math.inf)
     moves = (is_across | toolpath.is_arc).tolist()
-    for row, (moved, z) in enumerate(zip(moves, feeds.tolist(), strict=True)):
-        deep[row] = deepest
-        deepest = z if moved else min(deepest, z)
-    return deep
+    for row, (has_moved, z) in enumerate(zip(moves, feeds.tolist(), strict=True)):
+        fed_depths[row] = deepest
+        deepest = z if has_moved else min(deepest, z)
+    return fed_depths
 
 
 class _Search:
@@ -173,29 +173,29 @@ class _Search:
             return fine
         for middle in (0.5 * (rapids.start + rapids.end), rapids.start, rapids.end):
             _, feed = self.tree.heights(middle[:, :2], self.before)
-            one, way = feeds.start[feed], feeds.end[feed] - feeds.start[feed]
-            square = (way[:, :2] ** 2).sum(axis=1)
-            good = (feed >= 0) & (feeds.tool[feed] == rapids.tool)
+            one, feed_steps = feeds.start[feed], feeds.end[feed] - feeds.start[feed]
+            square = (feed_steps[:, :2] ** 2).sum(axis=1)
+            is_fine = (feed >= 0) & (feeds.tool[feed] == rapids.tool)
             for point in (rapids.start, rapids.end):
-                share = ((point - one)[:, :2] * way[:, :2]).sum(axis=1)
+                share = ((point - one)[:, :2] * feed_steps[:, :2]).sum(axis=1)
                 share = np.clip(share / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-                share = np.where(square > 0.0, share, way[:, 2] < 0.0)
-                off = point - (one + share[:, None] * way)
-                good &= np.hypot(off[:, 0], off[:, 1]) <= self.room_mm
-                good &= off[:, 2] >= -HEIGHT_EPS_MM
-            fine |= good
+                share = np.where(square > 0.0, share, feed_steps[:, 2] < 0.0)
+                offsets = point - (one + share[:, None] * feed_steps)
+                is_fine &= np.hypot(offsets[:, 0], offsets[:, 1]) <= self.room_mm
+                is_fine &= offsets[:, 2] >= -HEIGHT_EPS_MM
+            fine |= is_fine
         return fine
 
     def touching(self, chosen: Ints) -> list[RapidThroughStock]:
         """Return those of these rapids that touch the stock."""
-        of, squares = self._first_squares(chosen)
+        rapid_of, squares = self._first_squares(chosen)
         touches = np.zeros(len(self.rapids), dtype=np.bool_)
-        while len(of):
-            touches[of[self._taken(of, squares) > HEIGHT_EPS_MM]] = True
-            open_ = ~touches[of] & (squares[:, 2] > self.least_mm)
-            of, squares = of[open_], squares[open_]
-            open_ = self._most_taken(of, squares) > HEIGHT_EPS_MM
-            of, squares = np.repeat(of[open_], 4), divided(squares[open_])
+        while len(rapid_of):
+            touches[rapid_of[self._taken(rapid_of, squares) > HEIGHT_EPS_MM]] = True
+            open_ = ~touches[rapid_of] & (squares[:, 2] > self.least_mm)
+            rapid_of, squares = rapid_of[open_], squares[open_]
+            open_ = self._most_taken(rapid_of, squares) > HEIGHT_EPS_MM
+            rapid_of, squares = np.repeat(rapid_of[open_], 4), divided(squares[open_])
         return [self._deepest(rapid) for rapid in chosen[touches[chosen]].tolist()]
 
     def _deepest(self, rapid: int) -> RapidThroughStock:
@@ -203,17 +203,17 @@ class _Search:
         show."""
         _, squares = self._first_squares(np.array([rapid]))
 
-        def taken(at: Floats) -> Floats:
-            return self._taken(np.full(len(at), rapid), at)
+        def taken_at(points: Floats) -> Floats:
+            return self._taken(np.full(len(points), rapid), points)
 
-        def most(at: Floats) -> Floats:
-            return self._most_taken(np.full(len(at), rapid), at)
+        def max_taken(squares: Floats) -> Floats:
+            return self._most_taken(np.full(len(squares), rapid), squares)
 
         wide = squares[:, 2:]
         low, high = (squares[:, :2] - wide).min(axis=0), (squares[:, :2] + wide).max(axis=0)
         low, high = np.maximum(low, self.low), np.minimum(high, self.high)
         best = greatest_value(
-            taken, most, (*low.tolist(), *high.tolist()), max_squares=SIZE_SQUARES
+            taken_at, max_taken, (*low.tolist(), *high.tolist()), max_squares=SIZE_SQUARES
         )
         place = best.at_mm
         z = heights_of_moves(
@@ -226,46 +226,48 @@ class _Search:
         the rapid (K,) of each."""
         begin, end = self.rapids.start[chosen], self.rapids.end[chosen]
         radius, flat, _, rise = self.tools[chosen].T
-        deep = STOCK_TOP_MM - np.minimum(begin[:, 2], end[:, 2])
-        cone = flat + deep / np.where(rise > 0.0, rise, 1.0)
+        depths = STOCK_TOP_MM - np.minimum(begin[:, 2], end[:, 2])
+        cone = flat + depths / np.where(rise > 0.0, rise, 1.0)
         wide = np.where(rise > 0.0, np.minimum(radius, cone), radius)
         length = np.hypot(*(end - begin)[:, :2].T)
         count = np.ceil(0.5 * length / wide).astype(np.int64).clip(min=1)
-        which = np.repeat(np.arange(len(chosen)), count)
-        step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-        share = (step + 0.5) / count[which]
-        middle = begin[which, :2] + share[:, None] * (end - begin)[which, :2]
-        half = (wide + 0.5 * length / count)[which]
-        return chosen[which], np.column_stack([middle, half])
+        owners = np.repeat(np.arange(len(chosen)), count)
+        step = np.arange(len(owners)) - np.repeat(np.cumsum(count) - count, count)
+        share = (step + 0.5) / count[owners]
+        middle = begin[owners, :2] + share[:, None] * (end - begin)[owners, :2]
+        half = (wide + 0.5 * length / count)[owners]
+        return chosen[owners], np.column_stack([middle, half])
 
-    def _taken(self, of: Ints, at: Floats) -> Floats:
+    def _taken(self, rapids: Ints, points_at: Floats) -> Floats:
         """Return by how much each rapid (K,) goes below the stock over its point, the first two
         columns of (K, …), mm."""
-        points = np.ascontiguousarray(at[:, :2])
-        stock, _ = self.tree.heights(points, self.before[of], self.room_mm)
-        mine = heights_of_moves(
-            self.columns[of], self.tools[of], points, np.full(len(of), -self.room_mm)
+        points = np.ascontiguousarray(points_at[:, :2])
+        stock, _ = self.tree.heights(points, self.before[rapids], self.room_mm)
+        own_heights = heights_of_moves(
+            self.columns[rapids], self.tools[rapids], points, np.full(len(rapids), -self.room_mm)
         )
-        within = ((points >= self.low) & (points <= self.high)).all(axis=1)
+        is_inside = ((points >= self.low) & (points <= self.high)).all(axis=1)
         stock = np.minimum(stock, self.others.tops(points, self.room_mm))
-        mine = np.maximum(mine, self.others.floors(points, self.room_mm))
-        return np.where(within, stock - mine, -np.inf)
+        own_heights = np.maximum(own_heights, self.others.floors(points, self.room_mm))
+        return np.where(is_inside, stock - own_heights, -np.inf)
 
-    def _most_taken(self, of: Ints, squares: Floats) -> Floats:
+    def _most_taken(self, rapids: Ints, squares: Floats) -> Floats:
         """Return upper bounds (K,) of the same over squares (K, 3)."""
         half = squares[:, 2:]
         reach = math.sqrt(2.0) * squares[:, 2]
-        mine = heights_of_moves(
-            self.columns[of], self.tools[of], squares[:, :2], reach - self.room_mm
+        own_heights = heights_of_moves(
+            self.columns[rapids], self.tools[rapids], squares[:, :2], reach - self.room_mm
         )
-        within = (squares[:, :2] + half > self.low) & (squares[:, :2] - half < self.high)
-        most = np.full(len(of), -np.inf)
-        near = np.flatnonzero(within.all(axis=1) & np.isfinite(mine))
-        stock = self.tree.greatest(squares[near], None, self.room_mm, self.before[of[near]])
-        stock = np.minimum(stock, self.others.greatest_tops(squares[near], self.room_mm))
-        floor = self.others.least_floors(squares[near], self.room_mm)
-        most[near] = stock - np.maximum(mine[near], floor)
-        return most
+        is_inside = (squares[:, :2] + half > self.low) & (squares[:, :2] - half < self.high)
+        max_taken = np.full(len(rapids), -np.inf)
+        near_squares = np.flatnonzero(is_inside.all(axis=1) & np.isfinite(own_heights))
+        stock = self.tree.greatest(
+            squares[near_squares], None, self.room_mm, self.before[rapids[near_squares]]
+        )
+        stock = np.minimum(stock, self.others.greatest_tops(squares[near_squares], self.room_mm))
+        floor = self.others.least_floors(squares[near_squares], self.room_mm)
+        max_taken[near_squares] = stock - np.maximum(own_heights[near_squares], floor)
+        return max_taken
 
 
 def _widened(cutter: CutterProfile, tolerance_mm: float) -> CutterProfile:

@@ -47,8 +47,8 @@ def tools_of_rows(
         row = np.searchsorted(decoded.operations.begin, np.arange(len(decoded)), side="right") - 1
         return _of_profiles([cutter_profile(note.tool) for note in notes], row.clip(min=0))
     tools = {each.tool: cutter_profile(each.tool) for each in (job.operations if job else ())}
-    planned = {cutter_profile(note.tool) for note in (plan.notes if plan else ())}
-    for profiles in (planned, set(tools.values())):
+    plan_profiles = {cutter_profile(note.tool) for note in (plan.notes if plan else ())}
+    for profiles in (plan_profiles, set(tools.values())):
         profile = next(iter(profiles), None)
         if len(profiles) == 1 and profile is not None and profile.radius_mm > 0.0:
             return _of_profiles([profile], np.zeros(len(decoded), dtype=np.int64))
@@ -60,17 +60,17 @@ def tools_of_rows(
             where=decoded.made_from,
             mend="give --tool-diameter, or the job that it was made with (--job)",
         )
-    called = [int(value) for value in decoded.value[changes].tolist()]
-    for number in called:
+    tool_numbers = [int(value) for value in decoded.value[changes].tolist()]
+    for number in tool_numbers:
         if number not in numbers:
-            known = ", ".join(map(str, sorted(numbers)))
+            numbers_known = ", ".join(map(str, sorted(numbers)))
             raise OptionError(
-                f"the program calls tool {number}; the job has {known}",
+                f"the program calls tool {number}; the job has {numbers_known}",
                 where=decoded.made_from,
                 mend=f"give an operation of the job a tool with number = {number}",
             )
     # Before the first change the tool of the first operation is mounted.
-    mounted = [next(iter(tools.values())), *(numbers[number] for number in called)]
+    mounted = [next(iter(tools.values())), *(numbers[number] for number in tool_numbers)]
     return _of_profiles(mounted, np.searchsorted(changes, np.arange(len(decoded)), side="right"))
 
 
@@ -102,18 +102,18 @@ def slide_moves(
     for chunk in target.simulate(decoded, options):
         if len(chunk.row):
             last = points[-1][-1] * weight
-            kept = thinned(chunk.slide * weight, chunk.row, last, beside_mm)
-            points.append(chunk.slide[kept])
-            rows.append(chunk.row[kept])
+            kept_rows = thinned(chunk.slide * weight, chunk.row, last, beside_mm)
+            points.append(chunk.slide[kept_rows])
+            rows.append(chunk.row[kept_rows])
     path, row = np.concatenate(points), np.concatenate(rows)[1:].astype(np.int64)
-    moved = (path[1:] != path[:-1]).any(axis=1)
+    has_moved = (path[1:] != path[:-1]).any(axis=1)
     bend_mm = _bend_mm(decoded, target.model.spacing_mm(decoded, machine))
     return StockMoves(
-        path[:-1][moved],
-        path[1:][moved],
-        row[moved],
-        (decoded.kind == Kind.RAPID)[row[moved]],
-        tools.index[row[moved]],
+        path[:-1][has_moved],
+        path[1:][has_moved],
+        row[has_moved],
+        (decoded.kind == Kind.RAPID)[row[has_moved]],
+        tools.index[row[has_moved]],
         tools.cutters,
         beside_mm + bend_mm,
     )

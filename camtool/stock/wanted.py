@@ -122,25 +122,27 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
         if not len(self.lines):
             return np.full(len(points), FAR_MM if self.side == OUTSIDE else -FAR_MM)
         points = np.ascontiguousarray(points, dtype=np.float64)
-        away = nearest_distances(points, self.curves.rows, self.curves.tree)
+        distances = nearest_distances(points, self.curves.rows, self.curves.tree)
         if self.side == ABOUT:
-            return np.asarray(self.shift_mm - away)
+            return np.asarray(self.shift_mm - distances)
         bulge = np.ascontiguousarray(self.segments.bulge)
-        within = insides(points, self.curves.rows, bulge, self.curves.tree)
-        return np.asarray(self.shift_mm + np.where(within == (self.side == INSIDE), away, -away))
+        is_inside = insides(points, self.curves.rows, bulge, self.curves.tree)
+        return np.asarray(
+            self.shift_mm + np.where(is_inside == (self.side == INSIDE), distances, -distances)
+        )
 
-    def depths(self, least: Floats, most: Floats, wall_mm: float) -> tuple[Floats, Floats]:
-        """Return the least and the greatest depth (N,), mm, for s between `least` and `most` (N,),
-        with ends that are moved outwards by `wall_mm`; −inf where the layer says nothing: as least
-        if it says nothing for some s, as greatest if for all."""
-        low, high = least + wall_mm, most + wall_mm
+    def depths(self, min_s: Floats, max_s: Floats, wall_mm: float) -> tuple[Floats, Floats]:
+        """Return the least and the greatest depth (N,), mm, for s between `min_s` and `max_s`
+        (N,), with ends that are moved outwards by `wall_mm`; −inf where the layer says nothing: as
+        least if it says nothing for some s, as greatest if for all."""
+        low, high = min_s + wall_mm, max_s + wall_mm
         shallow = np.minimum(self.base_mm + self.rise * np.maximum(low, 0.0), self.depth_mm)
         deepest = np.maximum(np.minimum(high, self.reach_mm), 0.0)
-        deep = np.minimum(self.base_mm + self.rise * deepest, self.depth_mm)
+        depths = np.minimum(self.base_mm + self.rise * deepest, self.depth_mm)
         end = self.reach_mm + 2.0 * wall_mm
         return (
             np.where((low >= 0.0) & (high <= end), np.maximum(shallow, 0.0), -np.inf),
-            np.where((high >= 0.0) & (low <= end), np.maximum(deep, 0.0), -np.inf),
+            np.where((high >= 0.0) & (low <= end), np.maximum(depths, 0.0), -np.inf),
         )
 
 
@@ -170,20 +172,20 @@ class WantedSolid(Struct, frozen=True, eq=False):
         for layers, edges, wall_mm in self._sides(low, high):
             for layer in layers:
                 s = layer.inwards(squares[:, :2])
-                shallow, deep = layer.depths(s - half, s + half, wall_mm)
-                np.minimum(edges, -np.stack([deep, shallow]), out=edges)
+                shallow, deep_edge = layer.depths(s - half, s + half, wall_mm)
+                np.minimum(edges, -np.stack([deep_edge, shallow]), out=edges)
         return np.column_stack([*low, *high])
 
     def cut_by(self, point: tuple[float, float]) -> str:
         """Return the name of the operation that may cut the lowest at a point (x, y) mm, or else
         of the one whose edge is nearest; "" without operations."""
-        at = np.array([point])
-        found = [
+        points = np.array([point])
+        candidates = [
             (*(-each[0] for each in layer.depths(s, s, self.wall_mm)[:0:-1]), -s[0], layer.name)
             for layer in self.may
-            for s in (layer.inwards(at),)
+            for s in (layer.inwards(points),)
         ]
-        return min(found)[-1] if found else ""
+        return min(candidates)[-1] if candidates else ""
 
     def _sides(
         self, low: Floats, high: Floats
@@ -242,17 +244,17 @@ class _Layers:
         elif runs_beside(operation):
             yield from self._waste()
             yield from self._reliefs()
-            yield from self._grooves(self._lines(closed=False), self._leads_mm, whole=True)
+            yield from self._grooves(self._lines(closed=False), self._leads_mm, is_full=True)
         else:
-            yield from self._grooves(self._lines(), self._leads_mm, whole=True)
+            yield from self._grooves(self._lines(), self._leads_mm, is_full=True)
 
     def must(self) -> Iterator[WantedLayer]:
         """Yield the layers of what must be cut."""
         operation, contract, tool = self.operation, self.operation.contract, self.operation.tool
         if contract.cuts == "over":
             if self.stock is not None and self.stock.box_mm is not None and tool.kind in MILLS:
-                left, low, right, high = self.stock.box_mm
-                corners = [[left, low, 0], [right, low, 0], [right, high, 0], [left, high, 0]]
+                left_x, low, right, high = self.stock.box_mm
+                corners = [[left_x, low, 0], [right, low, 0], [right, high, 0], [left_x, high, 0]]
                 box = Polyline(np.array(corners, dtype=np.float64), closed=True)
                 yield self._straight(Polylines.of([box]), INSIDE, self._floor_mm)
         elif contract.cuts == "at":
@@ -266,10 +268,10 @@ class _Layers:
         elif contract.cuts == "within":
             yield self._carved(0.5 * tool.tip_diameter_mm, to_walls=True)
         elif runs_beside(operation):
-            yield from self._grooves(self._centre_paths(), 0.0, whole=False)
-            yield from self._grooves(self._lines(closed=False), 0.0, whole=False)
+            yield from self._grooves(self._centre_paths(), 0.0, is_full=False)
+            yield from self._grooves(self._lines(closed=False), 0.0, is_full=False)
         else:
-            yield from self._grooves(self._lines(), 0.0, whole=False)
+            yield from self._grooves(self._lines(), 0.0, is_full=False)
 
     def _straight(
         self, lines: Polylines, side: int, depth_mm: float, **more: float
@@ -291,9 +293,11 @@ class _Layers:
         nesting = self.chosen.nesting.among(self.closed)
         if self.operation.contract.takes != "circles":
             return oriented(nesting)
-        least = 2.0 * self.operation.away_mm + HOLE_SIZE_MM
+        min_diameter = 2.0 * self.operation.away_mm + HOLE_SIZE_MM
         circles = [(row, circle_of(path)) for row, path in enumerate(nesting.lines)]
-        wide = np.array([row for row, each in circles if each and each[1] > least], dtype=np.int64)
+        wide = np.array(
+            [row for row, each in circles if each and each[1] > min_diameter], dtype=np.int64
+        )
         bored = nesting.among(wide)
         outer = bored.lines.select(np.flatnonzero(bored.levels.depth == 0).tolist())
         return reverse_lines(outer, signed_areas(outer) < 0.0)
@@ -329,7 +333,7 @@ class _Layers:
             Polyline(np.array([[x, y, 0.0], [x + POINT_MM, y, 0.0]])) for x, y in
             (hole.at_mm for hole in holes)
         ]  # fmt: skip
-        return self._grooves(Polylines.of(points), 0.0, whole=True)
+        return self._grooves(Polylines.of(points), 0.0, is_full=True)
 
     def _carved(self, tip_mm: float, *, to_walls: bool) -> WantedLayer:
         """The slopes of a carving, less the flat tip of its bit; `to_walls`: only as far from the
@@ -371,34 +375,36 @@ class _Layers:
         contours that were not chosen; where the job names the side, those of each depth of
         nesting do, so that a contour in another one is cut on that side too.
         """
-        chosen, closed = self.chosen, self.closed
-        depth, rim = chosen.nesting.among(closed).levels.depth, chosen.rim[closed]
+        selection, closed = self.chosen, self.closed
+        depth, rim = selection.nesting.among(closed).levels.depth, selection.rim[closed]
         if self.operation.side == "auto":
-            turned = (depth % 2 == 0) != rim
-            groups = [(~turned, OUTSIDE), (turned, INSIDE)]
+            is_reversed = (depth % 2 == 0) != rim
+            groups = [(~is_reversed, OUTSIDE), (is_reversed, INSIDE)]
         else:
             groups = [
                 ((depth == level) & (rim == is_rim), OUTSIDE if is_rim else INSIDE)
                 for level in np.unique(depth).tolist()
                 for is_rim in (True, False)
             ]
-        for mine, side in groups:
-            if mine.any():
-                yield chosen.lines.select(closed[mine].tolist()), side
+        for is_group, side in groups:
+            if is_group.any():
+                yield selection.lines.select(closed[is_group].tolist()), side
 
     def _centre_paths(self) -> Polylines:
         """The paths of the tool's centre beside the walls."""
-        operation, made = self.operation, list[Polylines]()
+        operation, paths_made = self.operation, list[Polylines]()
         joins, limit = operation.joins, operation.mitre_limit
         for lines, side in self._walls():
             nested = Nesting(lines)
-            kept = oriented(nested) if side == OUTSIDE else reverse_lines(oriented(nested))
+            kept_side = oriented(nested) if side == OUTSIDE else reverse_lines(oriented(nested))
             if operation.side == "auto":
-                paths = offset_shape(kept, -operation.away_mm, joins=joins, mitre_limit=limit)
+                paths = offset_shape(kept_side, -operation.away_mm, joins=joins, mitre_limit=limit)
             else:
-                paths, _ = offset_each(kept, -operation.away_mm, joins=joins, mitre_limit=limit)
-            made.append(paths)
-        return Polylines.joined(made)
+                paths, _ = offset_each(
+                    kept_side, -operation.away_mm, joins=joins, mitre_limit=limit
+                )
+            paths_made.append(paths)
+        return Polylines.joined(paths_made)
 
     def _reliefs(self) -> Iterator[WantedLayer]:
         """Yield the grooves of reliefs, which enter the part at its inner corners."""
@@ -407,21 +413,23 @@ class _Layers:
             return
         paths, walls = self._centre_paths(), self._lines(closed=True)
         near_mm = operation.tool.radius_mm - operation.beyond_mm
-        nothing = Polylines.of([])
+        no_paths = Polylines.of([])
         for one, other in near_paths(paths, walls, operation.away_mm + POSITION_EPS_MM):
             path, kind = paths[one], operation.corners
-            relieved = add_reliefs(path, walls[other], near_mm, kind, nothing).path.vertices
-            own = {tuple(place) for place in path.vertices[:, :2].tolist()}
+            relieved = add_reliefs(path, walls[other], near_mm, kind, no_paths).path.vertices
+            own_places = {tuple(place) for place in path.vertices[:, :2].tolist()}
             ends = np.roll(relieved, -1, axis=0)
             moves += [
-                Polyline(np.array([here, there]))
-                for here, there in zip(relieved, ends, strict=True)
-                if tuple(there[:2].tolist()) not in own
+                Polyline(np.array([corner, tip]))
+                for corner, tip in zip(relieved, ends, strict=True)
+                if tuple(tip[:2].tolist()) not in own_places
             ]
-        yield from self._grooves(Polylines.of(moves), 0.0, whole=True)
+        yield from self._grooves(Polylines.of(moves), 0.0, is_full=True)
 
-    def _grooves(self, lines: Polylines, more_mm: float, *, whole: bool) -> Iterator[WantedLayer]:
-        """Yield the groove of the tool about lines: the `whole` one and `more_mm` to both sides,
+    def _grooves(
+        self, lines: Polylines, more_mm: float, *, is_full: bool
+    ) -> Iterator[WantedLayer]:
+        """Yield the groove of the tool about lines: the `is_full` one and `more_mm` to both sides,
         or what of it must be cut: higher by the tabs, and not the foot of a round nose."""
         if not len(lines):
             return
@@ -431,12 +439,12 @@ class _Layers:
         if profile.rise and not more_mm:
             radius = min(profile.radius_mm, profile.flat_mm + depth / profile.rise)
             base, rise = depth - (radius - profile.flat_mm) * profile.rise, profile.rise
-        elif profile.corner_mm and not whole:
-            beside = NOSE_SHARE * (radius - profile.flat_mm)
-            radius = profile.flat_mm + beside
+        elif profile.corner_mm and not is_full:
+            half_width = NOSE_SHARE * (radius - profile.flat_mm)
+            radius = profile.flat_mm + half_width
             corner = profile.corner_mm
-            depth -= corner - math.sqrt(corner * corner - beside * beside)
+            depth -= corner - math.sqrt(corner * corner - half_width * half_width)
             base = depth
-        if not whole:
+        if not is_full:
             base, depth = base - self.tabs_mm, max(depth - self.tabs_mm, 0.0)
         yield WantedLayer(self.name, lines, ABOUT, radius + more_mm, base, rise, depth)

@@ -12,57 +12,61 @@ HALF = 0.5
 ENTRY = ("entry", '"helix:3deg"', "how steeply it goes down")
 
 
-def propose(left: Remaining) -> list[Part]:
+def propose(remaining: Remaining) -> list[Part]:
     """Return one operation for the circles in which the tool has room to go round."""
-    tool, least = left.proposal.tool_mm, left.proposal.tool_mm + HOLE_SIZE_MM
-    if not tool or left.habit == "pocket":
+    tool, min_width = remaining.proposal.tool_mm, remaining.proposal.tool_mm + HOLE_SIZE_MM
+    if not tool or remaining.habit == "pocket":
         return []
-    widths = {row: width for row, width in left.holes.items() if width > least}
+    widths = {row: width for row, width in remaining.holes.items() if width > min_width}
     wider = tuple(widths)
     keys = (
         ("select", '["inner", "circle"]', ""),
-        ("select_size", f'"{least:.6g}mm.."', "wider than the tool"),
+        ("select_size", f'"{min_width:.6g}mm.."', "wider than the tool"),
         ENTRY,
     )
-    narrow = sum(width < tool * (1.0 + MIN_HELIX_SHARE) for width in widths.values())
+    narrow_count = sum(width < tool * (1.0 + MIN_HELIX_SHARE) for width in widths.values())
     plunged = (
-        f"; {narrow} of them hardly wider: plunged in pecks, then once round" if narrow else ""
+        f"; {narrow_count} of them hardly wider: plunged in pecks, then once round"
+        if narrow_count
+        else ""
     )
-    why = f"circles wider than the mill are bored{plunged}"
-    found = _stepped(left)
+    reason = f"circles wider than the mill are bored{plunged}"
+    parts = _stepped(remaining)
     if wider:
-        found.append(Part(f"{left.title} holes", "bore", wider, 0, keys, "", "", why))
-    return found
+        parts.append(Part(f"{remaining.title} holes", "bore", wider, 0, keys, "", "", reason))
+    return parts
 
 
-def _stepped(left: Remaining) -> list[Part]:
+def _stepped(remaining: Remaining) -> list[Part]:
     """Return the counterbores of the stock whose thickness is known, and the holes in them and in
     countersinks."""
-    found = [counterbore(left, wide)] if (wide := _wider(left)) else []
-    holes = [row for row in left.rows if row in left.steps.holes]
-    bored = {row: circle_of(left.drawing.paths[row]) for row in holes}
+    parts = [counterbore(remaining, wide)] if (wide := _wider(remaining)) else []
+    holes = [row for row in remaining.rows if row in remaining.steps.holes]
+    bored = {row: circle_of(remaining.drawing.paths[row]) for row in holes}
     widths = {row: circle[1] for row, circle in bored.items() if circle}
-    drills = {tool.name: tool.diameter_mm for tool in left.proposal.tools("drill")}
-    drills[""] = left.proposal.tool_mm
-    name = f"{left.title} stepped holes"
-    said = "the hole in a counterbore or countersink goes on through the stock"
+    drills = {tool.name: tool.diameter_mm for tool in remaining.proposal.tools("drill")}
+    drills[""] = remaining.proposal.tool_mm
+    name = f"{remaining.title} stepped holes"
+    reason = "the hole in a counterbore or countersink goes on through the stock"
     for drill, width in drills.items():
         fits = tuple(row for row, hole in widths.items() if abs(hole - width) <= HOLE_SIZE_MM)
         if fits:
-            found.append(Part(name, "drill", fits, 0, (), "", drill, said))
+            parts.append(Part(name, "drill", fits, 0, (), "", drill, reason))
         widths = {row: hole for row, hole in widths.items() if row not in fits}
     if widths:
-        found.append(Part(name, "bore", tuple(widths), 0, (ENTRY,), "", "", said))
-    return found
+        parts.append(Part(name, "bore", tuple(widths), 0, (ENTRY,), "", "", reason))
+    return parts
 
 
-def _wider(left: Remaining) -> tuple[int, ...]:
-    return tuple(row for row in left.rows if row in left.steps.bored)
+def _wider(remaining: Remaining) -> tuple[int, ...]:
+    return tuple(row for row in remaining.rows if row in remaining.steps.bored)
 
 
-def counterbore(left: Remaining, rows: tuple[int, ...]) -> Part:
+def counterbore(remaining: Remaining, rows: tuple[int, ...]) -> Part:
     """Return the operation for the wider circles of counterbores."""
-    deep = left.depth_mm or HALF * left.proposal.thickness_mm
-    why = f"two circles about one centre are a counterbore; the wider is {deep:g} mm deep"
-    keys = (("depth", f'"{deep:g}mm"', "of the counterbore"), ENTRY)
-    return Part(f"{left.title} counterbored", "bore", rows, 0, keys, why=why, others=("profile",))
+    depth = remaining.depth_mm or HALF * remaining.proposal.thickness_mm
+    reason = f"two circles about one centre are a counterbore; the wider is {depth:g} mm deep"
+    keys = (("depth", f'"{depth:g}mm"', "of the counterbore"), ENTRY)
+    return Part(
+        f"{remaining.title} counterbored", "bore", rows, 0, keys, why=reason, others=("profile",)
+    )

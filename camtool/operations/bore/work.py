@@ -85,32 +85,37 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
             where=key_of(operation, "tool"),
             mend="give the tool a diameter",
         )
-    circles, others = circles_of(chosen)
-    least = 2.0 * operation.away_mm + HOLE_SIZE_MM
-    wide = [hole for hole in circles if _diameter(hole) > least]
-    small = [hole for hole in circles if _diameter(hole) <= least]
+    circles, other_names = circles_of(chosen)
+    min_diameter = 2.0 * operation.away_mm + HOLE_SIZE_MM
+    wide = [hole for hole in circles if _diameter(hole) > min_diameter]
+    small_circles = [hole for hole in circles if _diameter(hole) <= min_diameter]
     holes = _outermost(wide)
-    findings = [*_no_circles(others), *_too_small(small, operation), *_inner(wide, holes)]
+    findings = [
+        *_no_circles(other_names),
+        *_too_small(small_circles, operation),
+        *_inner(wide, holes),
+    ]
     findings += _cut_away_between(holes, operation)
     if not holes:
         findings.append(NOTHING_DRAWN_TO_BORE(where=operation_name(operation)))
     if operation.stage == "finish":
         return Work(_walls(holes, setting), tuple(findings))
-    narrow = [hole for hole in holes if _is_narrow(hole, operation)]
-    refuse_endless_pecks(-setting.levels_mm[-1], _peck_mm(operation), narrow, operation)
+    narrow_holes = [hole for hole in holes if _is_narrow(hole, operation)]
+    refuse_endless_pecks(-setting.levels_mm[-1], _peck_mm(operation), narrow_holes, operation)
     items = []
     for hole in holes:
-        runs, changed = (_plunged if hole in narrow else _runs)(hole, setting)
+        runs, change_findings = (_plunged if hole in narrow_holes else _runs)(hole, setting)
         items.append(Fixed(runs, setting, hole.name, hole.source, hole.outline))
-        findings += changed
+        findings += change_findings
     return Work(tuple(items), tuple(findings))
 
 
 def _walls(holes: list[Hole], setting: Setting) -> list[Contour]:
     """The contours along the walls of the bores."""
-    away = setting.operation.away_mm
+    clearance = setting.operation.away_mm
     rings = [
-        helix(hole.at_mm, 0.5 * _diameter(hole) - away, 0.0, 0)[:4, [0, 1, 3]] for hole in holes
+        helix(hole.at_mm, 0.5 * _diameter(hole) - clearance, 0.0, 0)[:4, [0, 1, 3]]
+        for hole in holes
     ]
     paths = Polylines.of(Polyline(ring, closed=True) for ring in rings)
     names, sources = [hole.name for hole in holes], [hole.source for hole in holes]
@@ -138,13 +143,13 @@ def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Findin
     wide = 0.5 * _diameter(hole) - operation.away_mm
     step = operation.step_over * operation.tool.diameter_mm
     depth = -setting.levels_mm[-1]
-    runs, found = [], list[Finding]()
+    runs, steep_findings = [], list[Finding]()
     for radius in radii(wide, operation.tool.radius_mm, step):
-        wanted = _turns(radius, depth, operation)
-        turns = min(wanted, MAX_TURNS)
-        if wanted > turns and not found:
+        turns_wanted = _turns(radius, depth, operation)
+        turns = min(turns_wanted, MAX_TURNS)
+        if turns_wanted > turns and not steep_findings:
             angle = math.degrees(math.atan2(depth / turns, 2.0 * math.pi * radius))
-            found.append(
+            steep_findings.append(
                 ENTRY_CHANGED_STEEPER(
                     where=at_place(hole.name, hole.at_mm),
                     measured=angle,
@@ -156,7 +161,7 @@ def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Findin
         feeds = setting.feeds
         along = feeds_along(vertices, feeds)
         runs.append(CutRun(vertices, along, feeds.plunge_mm_min, hole.name))
-    return tuple(runs), found
+    return tuple(runs), steep_findings
 
 
 def _turned(vertices: Floats, hole: Hole, operation: Operation) -> Floats:
@@ -184,11 +189,11 @@ def _plunged(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Fin
     operation, feeds = setting.operation, setting.feeds
     wide = 0.5 * _diameter(hole) - operation.away_mm
     depths = peck_depths(-setting.levels_mm[-1], _peck_mm(operation))
-    down, down_feeds = pecks(hole.at_mm, depths, setting)
+    way_down, down_feeds = pecks(hole.at_mm, depths, setting)
     round_ = _turned(helix(hole.at_mm, wide, 0.0, 0), hole, operation)
     round_[:, 2] = -depths[-1]
     along = [*down_feeds, *[feeds.cut_mm_min] * len(round_)]
-    vertices = np.concatenate([down, round_])
+    vertices = np.concatenate([way_down, round_])
     finding = ENTRY_CHANGED_IN_NARROW_BORE(
         where=at_place(hole.name, hole.at_mm),
         measured=_diameter(hole),
@@ -228,12 +233,12 @@ def _outermost(circles: list[Hole]) -> list[Hole]:
         return []
     places = np.array([hole.at_mm for hole in circles])
     radius = 0.5 * np.array([_diameter(hole) for hole in circles])
-    kept: list[int] = []
+    kept_rows: list[int] = []
     for k in np.argsort(-radius, kind="stable").tolist():
-        away = np.hypot(*(places[kept] - places[k]).T)
-        if not (away + radius[k] <= radius[kept] + SAME_HOLE_MM).any():
-            kept.append(k)
-    return [circles[k] for k in sorted(kept)]
+        distances = np.hypot(*(places[kept_rows] - places[k]).T)
+        if not (distances + radius[k] <= radius[kept_rows] + SAME_HOLE_MM).any():
+            kept_rows.append(k)
+    return [circles[k] for k in sorted(kept_rows)]
 
 
 def _inner(circles: list[Hole], bored: list[Hole]) -> Iterator[Finding]:
@@ -257,22 +262,22 @@ def _cut_away_between(holes: list[Hole], operation: Operation) -> list[Finding]:
     """Bores that are cut beyond their circles, of which two leave nothing between them."""
     if not operation.beyond_mm or not holes:
         return []
-    most, found = 2.0 * operation.beyond_mm, list[Finding]()
+    max_distance, findings = 2.0 * operation.beyond_mm, list[Finding]()
     circles = Polylines.of(hole.outline for hole in holes if hole.outline is not None)
-    for one, other in near_paths(circles, circles, most):
+    for one, other in near_paths(circles, circles, max_distance):
         first, second = holes[one], holes[other]
-        apart = math.dist(first.at_mm, second.at_mm)
-        gap = apart - 0.5 * (_diameter(first) + _diameter(second))
-        if one < other and 0.0 < gap < most:
-            found.append(
+        distance = math.dist(first.at_mm, second.at_mm)
+        gap = distance - 0.5 * (_diameter(first) + _diameter(second))
+        if one < other and 0.0 < gap < max_distance:
+            findings.append(
                 GOUGE_BEYOND(
                     where=at_place(first.name, first.at_mm),
-                    measured=most,
+                    measured=max_distance,
                     tool=tool_name(operation.tool),
                     amount=operation.beyond_mm,
                 )
             )
-    return shortened_list(found, GOUGE_MORE)
+    return shortened_list(findings, GOUGE_MORE)
 
 
 def _no_circles(names: list[str]) -> Iterator[Finding]:

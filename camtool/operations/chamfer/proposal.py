@@ -10,15 +10,15 @@ from camtool.jobs.template import Part, Remaining
 from camtool.operations.bore.proposal import counterbore
 
 
-def propose(left: Remaining) -> list[Part]:
+def propose(remaining: Remaining) -> list[Part]:
     """Return one operation for the countersinks of each width, and each bit. The holes in them are
     left to the kinds that follow."""
-    alike = defaultdict(list)
-    for row, sink in left.steps.sunk.items():
-        if sink.hole in left.rows:
-            alike[round(sink.width_mm, 3), sink.bit.name, sink.is_named].append((row, sink))
-    found = []
-    for (width, name, is_named), pairs in alike.items():
+    groups = defaultdict(list)
+    for row, sink in remaining.steps.sunk.items():
+        if sink.hole in remaining.rows:
+            groups[round(sink.width_mm, 3), sink.bit.name, sink.is_named].append((row, sink))
+    parts = []
+    for (width, name, is_named), pairs in groups.items():
         wide = tuple(row for row, _ in pairs)
         holes = tuple(sink.hole for _, sink in pairs)
         angle = math.degrees(pairs[0][1].bit.tip_angle_rad or 0.0)
@@ -31,13 +31,13 @@ def propose(left: Remaining) -> list[Part]:
             if is_named
             else "heads of countersunk screws have such widths; a counterbore would take more away"
         )
-        why = (
+        explanation = (
             f"two circles about one centre are a countersink of {angle:.3g}° with {name}, since"
             f" {reason}"
         )
-        called = f"{left.title} countersunk"
-        part = Part(called, "chamfer", holes, 0, keys, "", name, why, is_shared=True)
-        if not is_named and set(wide) <= set(left.sunk):
-            part = part.in_doubt(counterbore(left, wide))
-        found.append(part)
-    return found
+        title = f"{remaining.title} countersunk"
+        part = Part(title, "chamfer", holes, 0, keys, "", name, explanation, is_shared=True)
+        if not is_named and set(wide) <= set(remaining.sunk):
+            part = part.in_doubt(counterbore(remaining, wide))
+        parts.append(part)
+    return parts

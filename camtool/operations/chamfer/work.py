@@ -41,11 +41,11 @@ def chamfered(operation: Operation, _: Stock | None) -> Operation:
     D = o + w / tan α deep.
     OptionError without a width, for a tool that is no V bit, and for one too narrow.
     """
-    where = f"operation {operation.name or operation.kind!r}, key chamfer"
+    place = f"operation {operation.name or operation.kind!r}, key chamfer"
     if operation.chamfer_mm is None:
         raise OptionError(
             "a chamfer has no width",
-            where=where,
+            where=place,
             mend='say how wide it is, seen from above: chamfer = "0.5mm"',
         )
     tool = operation.tool
@@ -62,14 +62,14 @@ def chamfered(operation: Operation, _: Stock | None) -> Operation:
         raise OptionError(
             f"a chamfer of {width:g} mm, the tip {offset:g} mm below it,"
             f" needs a bit of {needed:.4g} mm, and this one has {tool.diameter_mm:g} mm",
-            where=where,
+            where=place,
             mend="give a smaller chamfer or tip_offset, or a wider bit",
         )
     if operation.depth_mm is not None and abs(operation.depth_mm - depth) > MIN_POSITIVE:
         raise OptionError(
             f"a depth of {operation.depth_mm:g} mm is given too, but the chamfer makes it"
             f" {depth:.4g} mm",
-            where=where,
+            where=place,
             mend="leave the depth out",
         )
     return replace(operation, depth_mm=depth)

@@ -42,11 +42,11 @@ def drill(chosen: Chosen, setting: Setting) -> Work:
     is left that is an error.
     """
     operation = setting.operation
-    holes, large, others = drilled_holes(chosen, operation)
+    holes, large, other_names = drilled_holes(chosen, operation)
     limit = largest_hole_mm(operation)
     findings = [
         *_too_large(large, limit),
-        *_no_circles(others),
+        *_no_circles(other_names),
         *_other_sizes(holes, operation),
         *_nothing(holes, operation),
     ]
@@ -64,8 +64,8 @@ def _run(hole: Hole, setting: Setting) -> CutRun:
     operation = setting.operation
     depths = peck_depths(-setting.levels_mm[-1], operation.peck_mm)
     vertices, feeds = pecks(hole.at_mm, depths, setting)
-    down = setting.feeds.plunge_mm_min
-    return CutRun(vertices, np.array(feeds), down, hole.name, operation.dwell_s)
+    plunge_feed = setting.feeds.plunge_mm_min
+    return CutRun(vertices, np.array(feeds), plunge_feed, hole.name, operation.dwell_s)
 
 
 def _too_large(holes: list[Hole], limit: float) -> Iterator[Finding]:
@@ -85,13 +85,13 @@ def _no_circles(names: list[str]) -> Iterator[Finding]:
 
 def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
     """Yield one finding for each diameter that is not the drill's."""
-    wanted = operation.tool.diameter_mm
+    drill_mm = operation.tool.diameter_mm
     by_size: dict[float, list[str]] = {}
     for hole in holes:
-        if wanted and hole.diameter_mm and abs(hole.diameter_mm - wanted) > HOLE_SIZE_MM:
+        if drill_mm and hole.diameter_mm and abs(hole.diameter_mm - drill_mm) > HOLE_SIZE_MM:
             by_size.setdefault(round(hole.diameter_mm, 3), []).append(hole.name)
     for size, names in sorted(by_size.items()):
-        yield HOLE_SIZE(where=named(names), measured=wanted, limit=size, count=len(names))
+        yield HOLE_SIZE(where=named(names), measured=drill_mm, limit=size, count=len(names))
 
 
 def _nothing(holes: list[Hole], operation: Operation) -> Iterator[Finding]:

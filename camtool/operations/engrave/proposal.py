@@ -18,71 +18,94 @@ MAX_LINES = 1000
 """Of more lines the narrowest place is not looked for: the finest bit is taken."""
 
 
-def propose(left: Remaining) -> list[Part]:
+def propose(remaining: Remaining) -> list[Part]:
     """Engravings of the letters, of the open paths, of what the mills are too wide for, or of all
     that is left."""
-    sources, closed = left.drawing.sources, left.drawing.paths.closed
-    found: list[Part] = []
-    text = tuple(row for row in left.rows if is_text(sources[row]))
+    sources, closed = remaining.drawing.sources, remaining.drawing.paths.closed
+    parts: list[Part] = []
+    text = tuple(row for row in remaining.rows if is_text(sources[row]))
     if text:
         keys = (("select", '["text"]', ""),)
-        part = Part(f"{left.title} text", "engrave", text, 0, keys, "not text")
-        found.append(_cut(left, part, "text is engraved", always_deep=True))
-    left = left.without([Part("", "", text, excludes="not text")])
-    open_ = tuple(row for row in left.rows if not closed[row])
-    is_named = left.habit == "engrave"
-    if (left.rows or left.marks) and (is_named or (open_ and len(open_) == len(left.rows))):
-        why = f"{left.title} is called so" if is_named else "open lines are engraved"
-        found.append(_cut(left, Part(left.title, "engrave", left.rows, left.marks), why))
-        return found
+        part = Part(f"{remaining.title} text", "engrave", text, 0, keys, "not text")
+        parts.append(_cut(remaining, part, "text is engraved", always_deep=True))
+    remaining = remaining.without([Part("", "", text, excludes="not text")])
+    open_ = tuple(row for row in remaining.rows if not closed[row])
+    is_named = remaining.habit == "engrave"
+    if (remaining.rows or remaining.marks) and (
+        is_named or (open_ and len(open_) == len(remaining.rows))
+    ):
+        reason = f"{remaining.title} is called so" if is_named else "open lines are engraved"
+        parts.append(
+            _cut(
+                remaining,
+                Part(remaining.title, "engrave", remaining.rows, remaining.marks),
+                reason,
+            )
+        )
+        return parts
     if open_:
         select = (("select", '["open"]', ""),)
-        part = Part(f"{left.title} open", "engrave", open_, 0, select)
-        found.append(_cut(left, part, "open lines are engraved"))
-    if not left.proposal.tool_mm or left.habit == "pocket":
-        return found
-    branched = [row for row in left.branched if closed[row]]
-    mills = [tool.diameter_mm for tool in left.proposal.finer_mills]
-    finest = mills[-1] if mills else left.proposal.tool_mm
-    drilled = [row for row, width in left.holes.items() if left.proposal.has_drill(width)]
-    small = tuple(row for row in left.crowded(finest) if row not in drilled)
-    if small:
-        part = Part(f"{left.title} fine", "engrave", small)
-        why = f"lines too near to each other, or too small within, for a mill of {finest:g} mm"
-        found.append(replace(_cut(left, part, f"{why}: marked"), others=("profile",)))
-    unclear = tuple(row for row in branched if row not in small)
+        part = Part(f"{remaining.title} open", "engrave", open_, 0, select)
+        parts.append(_cut(remaining, part, "open lines are engraved"))
+    if not remaining.proposal.tool_mm or remaining.habit == "pocket":
+        return parts
+    branched = [row for row in remaining.branched if closed[row]]
+    mills = [tool.diameter_mm for tool in remaining.proposal.finer_mills]
+    finest = mills[-1] if mills else remaining.proposal.tool_mm
+    drilled = [
+        row for row, width in remaining.holes.items() if remaining.proposal.has_drill(width)
+    ]
+    crowded_rows = tuple(row for row in remaining.crowded(finest) if row not in drilled)
+    if crowded_rows:
+        part = Part(f"{remaining.title} fine", "engrave", crowded_rows)
+        reason = f"lines too near to each other, or too small within, for a mill of {finest:g} mm"
+        parts.append(replace(_cut(remaining, part, f"{reason}: marked"), others=("profile",)))
+    unclear = tuple(row for row in branched if row not in crowded_rows)
     if unclear:
-        part = Part(f"{left.title} branched", "engrave", unclear)
-        why = "more than two ends meet, so that it is not clear what they enclose: marked"
-        found.append(replace(_cut(left, part, why), others=("profile",)))
-    return found
+        part = Part(f"{remaining.title} branched", "engrave", unclear)
+        reason = "more than two ends meet, so that it is not clear what they enclose: marked"
+        parts.append(replace(_cut(remaining, part, reason), others=("profile",)))
+    return parts
 
 
-def _cut(left: Remaining, part: Part, why: str, *, always_deep: bool = False) -> Part:
+def _cut(remaining: Remaining, part: Part, reason: str, *, always_deep: bool = False) -> Part:
     """The part with the bit that fits between its lines, its depth, and why."""
-    bits = left.proposal.tools("v")
+    bits = remaining.proposal.tools("v")
     if not bits and not always_deep:
-        return Part(part.name, part.kind, part.rows, part.marks, part.keys, part.excludes, why=why)
+        return Part(
+            part.name, part.kind, part.rows, part.marks, part.keys, part.excludes, why=reason
+        )
     remark = "" if bits else "a V bit makes finer letters"
     keys = (*part.keys, ("depth", f'"{TEXT_DEPTH_MM:g}mm"', remark))
-    bit = _fitting(left, part.rows, bits) if bits else None
-    said = "" if bit is None else f" with {bit.name}, {_width(bit):.2g} mm wide at this depth"
-    name = "" if bit is None else bit.name
+    bit_tool = _fitting(remaining, part.rows, bits) if bits else None
+    with_bit = (
+        ""
+        if bit_tool is None
+        else f" with {bit_tool.name}, {_width(bit_tool):.2g} mm wide at this depth"
+    )
+    name = "" if bit_tool is None else bit_tool.name
     return Part(
-        part.name, part.kind, part.rows, part.marks, keys, part.excludes, name, f"{why}{said}"
+        part.name,
+        part.kind,
+        part.rows,
+        part.marks,
+        keys,
+        part.excludes,
+        name,
+        f"{reason}{with_bit}",
     )
 
 
-def _fitting(left: Remaining, rows: Sequence[int], bits: Sequence[Tool]) -> Tool:
+def _fitting(remaining: Remaining, rows: Sequence[int], bits: Sequence[Tool]) -> Tool:
     """The bit of the widest groove that keeps what is between the lines, or else the finest."""
-    lines = left.drawing.paths.select(rows)
+    lines = remaining.drawing.paths.select(rows)
     widest = sorted(bits, key=_width, reverse=True)
     if len(rows) <= MAX_LINES:
-        for bit in widest:
-            if leaves_all(lines, _width(bit)):
-                return bit
+        for bit_tool in widest:
+            if leaves_all(lines, _width(bit_tool)):
+                return bit_tool
     return widest[-1]
 
 
-def _width(bit: Tool) -> float:
-    return 2.0 * bit.radius_at(TEXT_DEPTH_MM)
+def _width(bit_tool: Tool) -> float:
+    return 2.0 * bit_tool.radius_at(TEXT_DEPTH_MM)

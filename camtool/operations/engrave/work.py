@@ -56,10 +56,10 @@ def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
     """Yield one finding for the lines under the tool that are nearer to each other than it is
     wide at the depth of its tip: lines that do not touch, and what touching lines enclose."""
     width = 2.0 * setting.operation.tool.radius_at(-setting.levels_mm[-1])
-    found = widest_groove(chosen.lines, width)
-    if found is None:
+    groove = widest_groove(chosen.lines, width)
+    if groove is None:
         return
-    fits, place, row, count = found
+    fits, place, row, count = groove
     yield LINES_RUN_TOGETHER(
         where=at_place(chosen.names[row], (place.x, place.y)),
         measured=width,
@@ -81,12 +81,12 @@ def widest_groove(lines: Polylines, width: float) -> tuple[float, Any, int, int]
     if width == 0.0 or not len(lines):
         return None
     chords = np.array([*_chords(lines)], dtype=object)
-    found = narrow = _narrow_places(chords, lines.closed, width)
+    all_places = narrow_places = _narrow_places(chords, lines.closed, width)
     fits = None
-    while narrow:  # what touches in a wide groove may be apart in a narrower one
-        fits = min(narrow, key=lambda each: each[0])
-        narrow = _narrow_places(chords, lines.closed, fits[0])
-    return None if fits is None else (*fits, len(found))
+    while narrow_places:  # what touches in a wide groove may be apart in a narrower one
+        fits = min(narrow_places, key=lambda each: each[0])
+        narrow_places = _narrow_places(chords, lines.closed, fits[0])
+    return None if fits is None else (*fits, len(all_places))
 
 
 def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float, Any, int]]:
@@ -94,37 +94,39 @@ def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float,
     width of that, mm, its middle, and the row of one of the lines."""
     import shapely
 
-    near, other = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=width)
-    once = near < other
-    near, other = near[once], other[once]
-    gaps = shapely.distance(lines[near], lines[other])
-    spans = shapely.shortest_line(lines[near], lines[other])
+    near_rows, other = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=width)
+    is_first = near_rows < other
+    near_rows, other = near_rows[is_first], other[is_first]
+    gaps = shapely.distance(lines[near_rows], lines[other])
+    spans = shapely.shortest_line(lines[near_rows], lines[other])
     ends = np.stack([shapely.get_point(lines, 0), shapely.get_point(lines, -1)], axis=1)
     ends[closed] = None
-    at_end = np.zeros(len(near), dtype=np.bool_)
-    for rows in (near, other):
+    at_end = np.zeros(len(near_rows), dtype=np.bool_)
+    for rows in (near_rows, other):
         for end in (0, 1):
-            away = shapely.distance(ends[rows, end], spans)
-            at_end |= np.where(np.isnan(away), False, away < POSITION_EPS_MM)
+            end_distances = shapely.distance(ends[rows, end], spans)
+            at_end |= np.where(np.isnan(end_distances), False, end_distances < POSITION_EPS_MM)
     at_end &= gaps < MIN_GAP_SHARE_AT_ENDS * width
-    beside = [
+    side_gaps = [
         shapely.length(
             shapely.intersection(lines[a], shapely.buffer(lines[b], 1.5 * gaps[at_end]))
         )
-        for a, b in ((near[at_end], other[at_end]), (other[at_end], near[at_end]))
+        for a, b in ((near_rows[at_end], other[at_end]), (other[at_end], near_rows[at_end]))
     ]
     # A line that ends there leaves at once; parallel ones stay beside each other.
-    at_end[at_end] = np.minimum(*beside) <= 2.0 * gaps[at_end]
+    at_end[at_end] = np.minimum(*side_gaps) <= 2.0 * gaps[at_end]
     touching = at_end | (gaps < MIN_GAP_SHARE * width)
-    group = _connected(len(lines), near[touching], other[touching])
-    apart = (group[near] != group[other]) & (gaps < width * (1.0 - WIDTH_SLACK))
-    found = [
+    group = _connected(len(lines), near_rows[touching], other[touching])
+    is_apart = (group[near_rows] != group[other]) & (gaps < width * (1.0 - WIDTH_SLACK))
+    places = [
         (float(gap), shapely.centroid(span), int(row))
-        for gap, span, row in zip(gaps[apart], spans[apart], near[apart].tolist(), strict=True)
+        for gap, span, row in zip(
+            gaps[is_apart], spans[is_apart], near_rows[is_apart].tolist(), strict=True
+        )
     ]
     for row in np.unique(group).tolist():
-        found += [(*each, row) for each in _enclosed(lines[group == row], width)]
-    return found
+        places += [(*each, row) for each in _enclosed(lines[group == row], width)]
+    return places
 
 
 def _enclosed(lines: Any, width: float) -> Iterator[tuple[float, Any]]:
@@ -132,16 +134,16 @@ def _enclosed(lines: Any, width: float) -> Iterator[tuple[float, Any]]:
     each, mm, and its middle."""
     import shapely
 
-    least = MIN_GAP_SHARE * width
-    thin = shapely.buffer(shapely.multilinestrings(list(lines)), 0.5 * least)
+    min_gap = MIN_GAP_SHARE * width
+    thin = shapely.buffer(shapely.multilinestrings(list(lines)), 0.5 * min_gap)
     rings = [hole for part in shapely.get_parts(thin) for hole in shapely.get_rings(part)[1:]]
     faces = shapely.polygons(rings) if rings else np.empty(0, dtype=object)
     # A disc of radius r fits into every face whose area is r times the length of its edge.
-    slim = shapely.area(faces) < 0.5 * (width - least) * shapely.length(faces)
+    slim = shapely.area(faces) < 0.5 * (width - min_gap) * shapely.length(faces)
     for face in faces[slim]:
         spoke = shapely.maximum_inscribed_circle(face, tolerance=0.005 * width)
-        wide = 2.0 * float(shapely.length(spoke)) + least
-        if 2.0 * least < wide < width * (1.0 - WIDTH_SLACK):
+        wide = 2.0 * float(shapely.length(spoke)) + min_gap
+        if 2.0 * min_gap < wide < width * (1.0 - WIDTH_SLACK):
             yield wide, shapely.get_point(spoke, 0)
 
 
@@ -149,13 +151,13 @@ def _connected(count: int, one: Any, other: Any) -> Any:
     """(N,) the least index of what is connected with each of N things, by pairs of these."""
     label = np.arange(count)
     while True:
-        least = label.copy()
-        np.minimum.at(least, one, label[other])
-        np.minimum.at(least, other, label[one])
-        least = least[least]
-        if (least == label).all():
+        min_label = label.copy()
+        np.minimum.at(min_label, one, label[other])
+        np.minimum.at(min_label, other, label[one])
+        min_label = min_label[min_label]
+        if (min_label == label).all():
             return label
-        label = least
+        label = min_label
 
 
 def _chords(lines: Polylines) -> Iterator[Any]:

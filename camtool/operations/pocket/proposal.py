@@ -13,36 +13,44 @@ SPLINTER_SHARE = 4.0
 """Windows that are nowhere wider than so many times the tool are cleared."""
 
 
-def propose(left: Remaining) -> list[Part]:
+def propose(remaining: Remaining) -> list[Part]:
     """Return one operation for a layer of pockets, or for the small windows of another one."""
-    tool, paths = left.proposal.tool_mm, left.drawing.paths
+    tool, paths = remaining.proposal.tool_mm, remaining.drawing.paths
     if not tool:
         return []
-    if left.habit == "pocket" and left.contours:
-        thickness = left.proposal.thickness_mm
-        deep = left.depth_mm or HALF * thickness
-        why = f"{left.title} is called so: all within is cleared"
+    if remaining.habit == "pocket" and remaining.contours:
+        thickness = remaining.proposal.thickness_mm
+        depth = remaining.depth_mm or HALF * thickness
+        reason = f"{remaining.title} is called so: all within is cleared"
         keys: tuple[tuple[str, str, str], ...] = ()
-        if left.is_divided:
+        if remaining.is_divided:
             keys = (("select", '["closed"]', ""),)
-        if left.depth_mm is None and thickness:
-            why += f"; its name says no depth, as POCKET 2mm would: {deep:g} mm, half the stock"
-            keys = (*keys, ("depth", f'"{deep:g}mm"', "half the stock"))
-        others = ("profile",) if left.depth_mm is None else ()
-        return [Part(left.title, "pocket", left.contours, 0, keys, "", "", why, others)]
-    windows = left.contours_that_are("inner")
+        if remaining.depth_mm is None and thickness:
+            reason += (
+                f"; its name says no depth, as POCKET 2mm would: {depth:g} mm, half the stock"
+            )
+            keys = (*keys, ("depth", f'"{depth:g}mm"', "half the stock"))
+        other_kinds = ("profile",) if remaining.depth_mm is None else ()
+        return [
+            Part(
+                remaining.title, "pocket", remaining.contours, 0, keys, "", "", reason, other_kinds
+            )
+        ]
+    windows = remaining.contours_that_are("inner")
     if not windows:
         return []
     lines = paths.select(windows)
-    parents = set(left.drawing.nesting.levels.parent.tolist())
-    too_fine = set(left.crowded(tool))
-    small = ~has_room(lines, 0.5 * SPLINTER_SHARE * tool) & ~is_slot(lines, tool)
-    rows = [row for row, fits in zip(windows, small.tolist(), strict=True) if fits]
+    parents = set(remaining.drawing.nesting.levels.parent.tolist())
+    too_fine = set(remaining.crowded(tool))
+    is_splinter = ~has_room(lines, 0.5 * SPLINTER_SHARE * tool) & ~is_slot(lines, tool)
+    rows = [row for row, fits in zip(windows, is_splinter.tolist(), strict=True) if fits]
     rows = [row for row in rows if row not in parents and row not in too_fine]
     keys = (("select", '["inner"]', ""), ("entry", '"ramp:3deg"', ""))
-    why = (
+    reason = (
         f"windows no wider than {SPLINTER_SHARE:g} mills are cleared, so that no piece comes loose"
     )
     return (
-        [Part(f"{left.title} small", "pocket", tuple(rows), 0, keys, "", "", why)] if rows else []
+        [Part(f"{remaining.title} small", "pocket", tuple(rows), 0, keys, "", "", reason)]
+        if rows
+        else []
     )

@@ -114,19 +114,19 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
     findings: list[Finding] = []
     for each in pockets(chosen):
         radius = setting.operation.tool.radius_mm
-        wanted = offset_shape(each.region, _left_mm(setting))
-        slots = slot_paths(wanted, radius)
+        centre_region = offset_shape(each.region, _left_mm(setting))
+        slots = slot_paths(centre_region, radius)
         cleared = _cleared(slots, each, setting)
         if not cleared.runs:
-            nothing = _too_small if setting.operation.rest_of is None else _no_rest
-            findings.append(nothing(each, setting.operation))
+            finding_for = _too_small if setting.operation.rest_of is None else _no_rest
+            findings.append(finding_for(each, setting.operation))
             continue
         outline = each.region[0]
         items.append(Fixed(tuple(cleared.runs), setting, each.name, each.source, outline))
         findings += [_changed(each, *change) for change in cleared.changed.items()]
         findings += [_slot(each, slot, setting.operation) for slot in slots]
         hair_mm = 2.0 * SLOT_TOLERANCE * setting.operation.tool.diameter_mm if slots else 0.0
-        findings += unreached_findings(wanted, setting, hair_mm=hair_mm)
+        findings += unreached_findings(centre_region, setting, hair_mm=hair_mm)
     findings += cut_away_findings(kept_by(chosen), setting.operation)
     return Work(tuple(items), tuple(findings))
 
@@ -137,13 +137,13 @@ def _walls(chosen: Chosen, setting: Setting) -> Work:
     paths, names, sources = list[Polyline](), list[str](), list[int]()
     findings: list[Finding] = []
     for each in pockets(chosen):
-        wanted = offset_shape(each.region, operation.allowance_mm)
+        centre_region = offset_shape(each.region, operation.allowance_mm)
         region = _without_lost_islands(each.region, operation.beyond_mm)
         walls = offset_shape(region, operation.away_mm)
         paths += walls
         names += [each.name] * len(walls)
         sources += [each.source] * len(walls)
-        findings += unreached_findings(wanted, setting)
+        findings += unreached_findings(centre_region, setting)
     findings += cut_away_findings(kept_by(chosen), operation)
     return Work(along_walls(Polylines.of(paths), setting, names, sources), tuple(findings))
 
@@ -164,20 +164,20 @@ def pockets(chosen: Chosen) -> list[Pocket]:
 def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
     """The runs of one region: each connected tool centre region, then the slots."""
     groups: list[list[CutRun]] = []
-    changed: dict[str, CutRun] = {}
+    changed_runs: dict[str, CutRun] = {}
     for part in _tool_regions(each.region, setting):
-        whole, runs = ConnectedRegion(part), list[CutRun]()
-        for path, around in clearing_paths(part, setting.operation):
-            down = down_for(path, around, whole, setting)
-            runs += lowered(path, down, over_floor(whole), setting, each.name)
-            changed.setdefault(down.changed, runs[0])
+        connected, runs = ConnectedRegion(part), list[CutRun]()
+        for path, region in clearing_paths(part, setting.operation):
+            way_down = down_for(path, region, connected, setting)
+            runs += lowered(path, way_down, over_floor(connected), setting, each.name)
+            changed_runs.setdefault(way_down.changed, runs[0])
         groups.append(runs)
     for path in slots:
-        down = down_for(path, None, None, setting)
-        groups.append(lowered(path, down, back_along(path), setting, each.name))
-        changed.setdefault(down.changed, groups[-1][0])
-    changed.pop("", None)
-    return Cleared(_nearest_next(groups), changed)
+        way_down = down_for(path, None, None, setting)
+        groups.append(lowered(path, way_down, back_along(path), setting, each.name))
+        changed_runs.setdefault(way_down.changed, groups[-1][0])
+    changed_runs.pop("", None)
+    return Cleared(_nearest_next(groups), changed_runs)
 
 
 def _left_mm(setting: Setting) -> float:
@@ -221,22 +221,22 @@ def _without_lost_islands(region: Polylines, beyond_mm: float) -> Polylines:
     if not beyond_mm:
         return region
     islands = region.select(range(1, len(region)))
-    kept = [
+    kept_islands = [
         row
         for row, island in enumerate(reverse_lines(islands), start=1)
         if len(offset_shape(Polylines.of([island]), beyond_mm))
     ]
-    return region.select([0, *kept])
+    return region.select([0, *kept_islands])
 
 
 def _nearest_next(groups: list[list[CutRun]]) -> list[CutRun]:
     """All runs, after those of one connected region those of the one whose begin is nearest."""
     runs: list[CutRun] = []
-    left = list(groups)
-    while left:
-        here = runs[-1].vertices[-1, :2] if runs else left[0][0].vertices[0, :2]
-        begins = np.array([group[0].vertices[0, :2] for group in left])
-        runs += left.pop(int(np.hypot(*(begins - here).T).argmin()))
+    remaining = list(groups)
+    while remaining:
+        tool_place = runs[-1].vertices[-1, :2] if runs else remaining[0][0].vertices[0, :2]
+        begins = np.array([group[0].vertices[0, :2] for group in remaining])
+        runs += remaining.pop(int(np.hypot(*(begins - tool_place).T).argmin()))
     return runs
 
 
@@ -260,7 +260,7 @@ def clearing_paths(
 
 def _check(chosen: Chosen, operation: Operation) -> None:
     """OptionError for what cannot be a pocket."""
-    where = operation_name(operation)
+    operation_place = operation_name(operation)
     if operation.tool.radius_mm == 0.0 and len(chosen.lines):
         raise OptionError(
             "a pocket needs a tool that cuts a width",
@@ -272,19 +272,19 @@ def _check(chosen: Chosen, operation: Operation) -> None:
         place = at_place(chosen.names[row], chosen.lines[row].start.tolist())
         raise OptionError(
             f"the path {place} is open, so it cannot be a pocket",
-            where=where,
+            where=operation_place,
             mend="close it (perhaps with --gap), or leave it out by layer or colour",
         )
     segments = Segments.of(chosen.lines)
-    found = self_crossings(segments)
-    met, crosses = meetings(segments, found.row_a, found.row_b)
+    crossings = self_crossings(segments)
+    common, crosses = meetings(segments, crossings.row_a, crossings.row_b)
     if crosses.any():
         first = int(np.argmax(crosses))
-        one, other = (int(segments.path[rows[first]]) for rows in (met.row_a, met.row_b))
+        one, other = (int(segments.path[rows[first]]) for rows in (common.row_a, common.row_b))
         raise OptionError(
             f"paths of a pocket cross, so that its inside is not clear: {chosen.names[one]} and"
-            f" {at_place(chosen.names[other], met.point[first].tolist())}",
-            where=where,
+            f" {at_place(chosen.names[other], common.point[first].tolist())}",
+            where=operation_place,
             mend="join or separate them in the drawing",
         )
 
@@ -343,58 +343,63 @@ class Down(Struct, frozen=True, eq=False):
 
 
 def down_for(
-    path: Floats, around: ConnectedRegion | None, whole: ConnectedRegion | None, setting: Setting
+    path: Floats,
+    region: ConnectedRegion | None,
+    full_region: ConnectedRegion | None,
+    setting: Setting,
 ) -> Down:
     """Choose what fits of the entry that is asked for: a helix about the pole of a region that
     keeps to the whole region; else a ramp along the path; else a plunge."""
     entry = setting.operation.entry
     if entry.kind == "plunge":
         return Down()
-    if entry.kind == "helix" and around is not None and whole is not None:
+    if entry.kind == "helix" and region is not None and full_region is not None:
         radius = setting.operation.tool.radius_mm
-        wanted = MAX_HELIX_SHARE * radius if entry.radius_mm is None else entry.radius_mm
-        centre = pole(around.boundary)
-        room = float(points_to_segments(centre[None, :], whole.segments).min())
-        fits = min(wanted, room)
+        wanted_mm = MAX_HELIX_SHARE * radius if entry.radius_mm is None else entry.radius_mm
+        centre = pole(region.boundary)
+        room = float(points_to_segments(centre[None, :], full_region.segments).min())
+        fits = min(wanted_mm, room)
         turns = _descent(setting) / (2.0 * math.pi * max(fits, POSITION_EPS_MM))
-        if fits >= min(MIN_HELIX_SHARE * radius, wanted) and turns <= MAX_HELIX_TURNS:
-            smaller = entry.radius_mm is not None and fits < wanted
-            changed = f"a helix of {fits:.4g} mm instead of {wanted:g} mm" if smaller else ""
-            return Down(centre, fits, changed=changed)
-    changed = "a ramp instead of a helix" if entry.kind == "helix" else ""
+        if fits >= min(MIN_HELIX_SHARE * radius, wanted_mm) and turns <= MAX_HELIX_TURNS:
+            smaller = entry.radius_mm is not None and fits < wanted_mm
+            change_words = (
+                f"a helix of {fits:.4g} mm instead of {wanted_mm:g} mm" if smaller else ""
+            )
+            return Down(centre, fits, changed=change_words)
+    change_words = "a ramp instead of a helix" if entry.kind == "helix" else ""
     if 0.5 * _descent(setting) <= MAX_RAMP_LAPS * MeasuredPath.of(Polyline(path)).total_mm:
-        return Down(ramp=True, changed=changed)
+        return Down(ramp=True, changed=change_words)
     return Down(changed=f"a plunge instead of a {entry.kind}")
 
 
-def lowered(path: Floats, down: Down, link: Link, setting: Setting, name: str) -> list[CutRun]:
+def lowered(path: Floats, way_down: Down, link: Link, setting: Setting, name: str) -> list[CutRun]:
     """The runs that follow a path (n, 3) at all levels: one, unless there is no link back."""
     runs: list[CutRun] = []
     parts: list[Floats] = []
     for above, level in pairwise((0.0, *setting.levels_mm)):
-        entry = _entry(path, down, link, (above, level), setting)
-        back = link(path[-1, :2], entry[0, :2]) if parts else None
-        if parts and back is None:
+        entry = _entry(path, way_down, link, (above, level), setting)
+        link_back = link(path[-1, :2], entry[0, :2]) if parts else None
+        if parts and link_back is None:
             runs.append(_run(parts, setting, name))
             parts = []
-        if back is not None:
-            parts.append(_at(back, above))
+        if link_back is not None:
+            parts.append(_at(link_back, above))
         parts += [entry, _at(path, level)]
     return [*runs, _run(parts, setting, name)]
 
 
 def _entry(
-    path: Floats, down: Down, link: Link, heights: tuple[float, float], setting: Setting
+    path: Floats, way_down: Down, link: Link, heights: tuple[float, float], setting: Setting
 ) -> Floats:
     """(k, 4) from the floor above down to the beginning of the path."""
     above, level = heights
     begin = path[0, :2]
     drop = above - level
     slope = math.tan(setting.operation.entry.angle_rad)
-    if down.ramp:
+    if way_down.ramp:
         return _ramp(path, drop / slope, heights)
-    if down.centre is not None:
-        helix = _helix(down.centre, down.radius_mm, begin, drop / slope)
+    if way_down.centre is not None:
+        helix = _helix(way_down.centre, way_down.radius_mm, begin, drop / slope)
         across = link(helix[-1, :2], begin)
         if across is not None:
             flat = _at(across, level)
@@ -435,9 +440,9 @@ def _descent(setting: Setting) -> float:
 
 def _sloping(flat: Floats, heights: tuple[float, float]) -> Floats:
     """(k,) z of an open path (k, 3) that slopes evenly from one height to another."""
-    done = MeasuredPath.of(Polyline(flat)).reach
+    lengths = MeasuredPath.of(Polyline(flat)).reach
     above, level = heights
-    return np.asarray(above + (level - above) * done / done[-1])
+    return np.asarray(above + (level - above) * lengths / lengths[-1])
 
 
 def _at(flat: Floats, z: float) -> Floats:

@@ -79,32 +79,36 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
     operation = setting.operation
     closed = np.flatnonzero(chosen.lines.closed).tolist()
     opens = np.flatnonzero(~chosen.lines.closed).tolist()
-    found = _Found()
+    line_set = _Found()
     if operation.stage == "finish":  # open ones have no wall
         opens = []
     if not runs_beside(operation):
         opens = list(range(len(chosen.lines)))
     elif operation.side == "auto":
-        _together(chosen, closed, setting, found)
+        _together(chosen, closed, setting, line_set)
     else:
-        _each(chosen, closed, setting, found)
-        found.findings += (_no_side(chosen, k, operation.side) for k in opens)
+        _each(chosen, closed, setting, line_set)
+        line_set.findings += (_no_side(chosen, k, operation.side) for k in opens)
     if not runs_beside(operation):
-        found.findings += run_together(chosen, setting)
+        line_set.findings += run_together(chosen, setting)
     if operation.joins != "round":
-        found.findings += shortened_list(list(_far(chosen, setting, found.lines)), CORNER_FAR_MORE)
+        line_set.findings += shortened_list(
+            list(_far(chosen, setting, line_set.lines)), CORNER_FAR_MORE
+        )
     if operation.corners != "none":
-        found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
+        line_set.lines = [
+            _relieved(line, chosen, setting, line_set.findings) for line in line_set.lines
+        ]
     names, sources = [chosen.names[k] for k in opens], chosen.source[opens].tolist()
     on_line = contours_along(chosen.lines.select(opens), setting, names, sources)
-    items = [*_beside(found.lines, chosen, setting), *on_line]
-    return Work(sorted(items, key=lambda each: each.source), tuple(found.findings))
+    items = [*_beside(line_set.lines, chosen, setting), *on_line]
+    return Work(sorted(items, key=lambda each: each.source), tuple(line_set.findings))
 
 
-def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) -> None:
+def _together(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
     """Round the shapes of all closed paths, each shape at once."""
-    for of in _shapes(chosen, closed):
-        _shape(chosen, of, setting, found)
+    for path_rows in _shapes(chosen, closed):
+        _shape(chosen, path_rows, setting, line_set)
 
 
 def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
@@ -115,35 +119,35 @@ def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
     """
     if not closed:
         return []
-    alone = chosen.nesting.levels.depth[closed] % 2 == 0
-    turned = alone != chosen.rim[closed]
+    is_even = chosen.nesting.levels.depth[closed] % 2 == 0
+    is_reversed = is_even != chosen.rim[closed]
     rows = np.array(closed)
-    return [each.tolist() for each in (rows[~turned], rows[turned]) if len(each)]
+    return [each.tolist() for each in (rows[~is_reversed], rows[is_reversed]) if len(each)]
 
 
-def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> None:
+def _shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set: _Found) -> None:
     """Round a shape of these paths."""
     from camtool.geometry.offset import offset_shape
     from camtool.planning.reach import cut_away_findings, unreached_findings
 
-    lines = chosen.lines.select(of)
+    lines = chosen.lines.select(path_rows)
     ccw = signed_areas(lines) > 0.0
-    shape = reverse_lines(lines, ccw != chosen.rim[of])
-    before = len(found.lines)
-    _round(chosen, of, shape, setting, found)
-    made = found.lines[before:]
-    joined = [each for line in made for each in _joined(chosen, line.of, setting)]
-    found.findings += shortened_list(joined, UNREACHED_BETWEEN_MORE)
-    free = reverse_lines(shape)
-    found.findings += cut_away_findings(shape, setting.operation)
+    shape = reverse_lines(lines, ccw != chosen.rim[path_rows])
+    before = len(line_set.lines)
+    _round(chosen, path_rows, shape, setting, line_set)
+    lines_made = line_set.lines[before:]
+    joined = [each for line in lines_made for each in _joined(chosen, line.of, setting)]
+    line_set.findings += shortened_list(joined, UNREACHED_BETWEEN_MORE)
+    free_side = reverse_lines(shape)
+    line_set.findings += cut_away_findings(shape, setting.operation)
     if setting.operation.beyond_mm:  # it reaches where it is to cut beyond the lines
-        free = offset_shape(free, -setting.operation.beyond_mm)
-    as_wide = any(finding.code == PlanningCode.SLOT_AS_WIDE for finding in found.findings)
+        free_side = offset_shape(free_side, -setting.operation.beyond_mm)
+    as_wide = any(finding.code == PlanningCode.SLOT_AS_WIDE for finding in line_set.findings)
     hair_mm = 2.0 * SLOT_TOLERANCE_MM if as_wide else 0.0
-    found.findings += unreached_findings(free, setting, hair_mm=hair_mm)
+    line_set.findings += unreached_findings(free_side, setting, hair_mm=hair_mm)
 
 
-def _each(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) -> None:
+def _each(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
     """Round or within each of the closed paths, whatever the others are."""
     from camtool.geometry.offset import offset_each
     from camtool.planning.reach import cut_away_findings
@@ -151,40 +155,40 @@ def _each(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) ->
     lines = chosen.lines.select(closed)
     shapes = reverse_lines(lines, (signed_areas(lines) > 0.0) != chosen.rim[closed])
     operation = setting.operation
-    paths, of = offset_each(
+    paths, owners = offset_each(
         shapes, -operation.away_mm, joins=operation.joins, mitre_limit=operation.mitre_limit
     )
-    ends = np.searchsorted(of, np.arange(len(closed) + 1)).tolist()
+    ends = np.searchsorted(owners, np.arange(len(closed) + 1)).tolist()
     for place, k in enumerate(closed):
-        found.findings += cut_away_findings(shapes.select([place]), operation)
-        found.lines += (
+        line_set.findings += cut_away_findings(shapes.select([place]), operation)
+        line_set.lines += (
             _Line(paths[row], True, (k,)) for row in range(ends[place], ends[place + 1])
         )
         if ends[place] == ends[place + 1]:
-            _missing(chosen, [k], shapes.select([place]), {0}, setting, found)
+            _missing(chosen, [k], shapes.select([place]), {0}, setting, line_set)
 
 
 def _round(
-    chosen: Chosen, of: list[int], shape: Polylines, setting: Setting, found: _Found
+    chosen: Chosen, path_rows: list[int], shape: Polylines, setting: Setting, line_set: _Found
 ) -> None:
     """Lines round a shape (on the left of its paths, which are these of the chosen ones)."""
     paths = _offset(shape, setting.operation.away_mm, setting)
     sources = _sources(paths, shape)
     for path, along in zip(paths, sources, strict=True):
-        found.lines.append(_Line(path, True, tuple(of[k] for k in along)))
-    missing = set(range(len(of))).difference(*sources)
+        line_set.lines.append(_Line(path, True, tuple(path_rows[k] for k in along)))
+    missing = set(range(len(path_rows))).difference(*sources)
     missing -= {place for place in missing if _is_double(shape, place)}
     if missing:
-        _missing(chosen, of, shape, missing, setting, found)
+        _missing(chosen, path_rows, shape, missing, setting, line_set)
 
 
 def _missing(
     chosen: Chosen,
-    of: list[int],
+    path_rows: list[int],
     shape: Polylines,
     missing: set[int],
     setting: Setting,
-    found: _Found,
+    line_set: _Found,
 ) -> None:
     """Lines along paths of a shape where a tool that is thinner by a hair has room, and findings
     for the others."""
@@ -193,10 +197,12 @@ def _missing(
     for path, along in zip(paths, _sources(paths, shape), strict=True):
         if missing.issuperset(along):
             missing.difference_update(along)
-            found.lines.append(_Line(path, True, tuple(of[k] for k in along)))
-            found.findings.append(_as_wide(chosen, of[along[0]], setting))
+            line_set.lines.append(_Line(path, True, tuple(path_rows[k] for k in along)))
+            line_set.findings.append(_as_wide(chosen, path_rows[along[0]], setting))
     ccw = signed_areas(shape) > 0.0
-    found.findings += (_no_room(chosen, of[k], bool(ccw[k]), setting) for k in sorted(missing))
+    line_set.findings += (
+        _no_room(chosen, path_rows[k], bool(ccw[k]), setting) for k in sorted(missing)
+    )
 
 
 def _offset(shape: Polylines, away_mm: float, setting: Setting) -> Polylines:
@@ -213,23 +219,23 @@ def _sources(paths: Polylines, shape: Polylines) -> list[tuple[int, ...]]:
     if len(paths) == 0:
         return []
     source, segments = Segments.of(shape), Segments.of(paths)
-    of = source.path[nearest(midpoints(segments), source).segment]
-    pairs, count = np.unique(segments.path * len(shape) + of, return_counts=True)
-    path, which = np.divmod(pairs, len(shape))
-    order = np.lexsort((which, -count, path))
-    found: list[tuple[int, ...]] = []
+    owners = source.path[nearest(midpoints(segments), source).segment]
+    pairs, count = np.unique(segments.path * len(shape) + owners, return_counts=True)
+    path, indices = np.divmod(pairs, len(shape))
+    order = np.lexsort((indices, -count, path))
+    sources: list[tuple[int, ...]] = []
     for begin, end in pairwise(np.searchsorted(path, np.arange(len(paths) + 1)).tolist()):
-        found.append(tuple(which[order[begin:end]].tolist()))
-    return found
+        sources.append(tuple(indices[order[begin:end]].tolist()))
+    return sources
 
 
 def _is_double(shape: Polylines, place: int) -> bool:
     """True if an earlier path of the shape runs along all of this one."""
     segments = Segments.of(shape)
-    mine, earlier = segments[segments.path == place], segments[segments.path < place]
+    own_segments, earlier = segments[segments.path == place], segments[segments.path < place]
     if len(earlier) == 0:
         return False
-    points = np.concatenate([mine.start, midpoints(mine)])
+    points = np.concatenate([own_segments.start, midpoints(own_segments)])
     return bool((nearest(points, earlier).distance <= POSITION_EPS_MM).all())
 
 
@@ -250,25 +256,25 @@ def _box_centre(chosen: Chosen, k: int) -> str:
     return at_place(chosen.names[k], extents(chosen.lines.select([k])).mean(axis=1))
 
 
-def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[Finding]:
+def _joined(chosen: Chosen, path_rows: tuple[int, ...], setting: Setting) -> Iterator[Finding]:
     """Findings of a line that runs round several paths at once: between them nothing is cut."""
-    if len(of) == 1:
+    if len(path_rows) == 1:
         return
     room = 2.0 * setting.operation.away_mm
-    lines = chosen.lines.select(of)
+    lines = chosen.lines.select(path_rows)
     for one, other in sorted(near_paths(lines, lines, room)):
         if one >= other:
             continue
-        near = approach(lines[one], lines[other])
-        if near.distance >= room - ROOM_TOLERANCE_MM:
+        nearest_approach = approach(lines[one], lines[other])
+        if nearest_approach.distance >= room - ROOM_TOLERANCE_MM:
             continue
         yield UNREACHED_BETWEEN(
-            where=at_place(chosen.names[of[one]], near.point),
-            measured=near.distance,
+            where=at_place(chosen.names[path_rows[one]], nearest_approach.point),
+            measured=nearest_approach.distance,
             limit=room,
             tool=width_name(setting.operation),
-            one=chosen.names[of[one]],
-            other=chosen.names[of[other]],
+            one=chosen.names[path_rows[one]],
+            other=chosen.names[path_rows[other]],
         )
 
 
@@ -278,14 +284,14 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
 
     tool, path = setting.operation.tool, line.path
     for k in line.of:
-        others = (np.arange(len(chosen.lines)) != k) & chosen.lines.closed
-        keep_out = chosen.lines.select(np.flatnonzero(others).tolist())
+        is_other = (np.arange(len(chosen.lines)) != k) & chosen.lines.closed
+        keep_out = chosen.lines.select(np.flatnonzero(is_other).tolist())
         kind, near_mm = setting.operation.corners, tool.radius_mm - setting.operation.beyond_mm
-        done = add_reliefs(path, chosen.lines[k], near_mm, kind, keep_out)
-        path = done.path
+        relieved = add_reliefs(path, chosen.lines[k], near_mm, kind, keep_out)
+        path = relieved.path
         findings += (
             NOT_RELIEVED(where=at_place(chosen.names[k], corner), tool=tool_name(tool))
-            for corner in done.left.tolist()
+            for corner in relieved.left.tolist()
         )
     return replace(line, path=path, plain=line.path)
 
@@ -293,17 +299,17 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
 def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contour]:
     """The lines as the operation's direction has them: climbing, what is to stay is on the
     right."""
-    wanted = setting.operation.direction
-    paths, left = (
+    direction = setting.operation.direction
+    paths, left_flags = (
         Polylines.of(line.path for line in lines),
         np.array([line.left for line in lines], dtype=np.bool_),
     )
     first = [line.of[0] for line in lines]
-    if wanted == "drawn":
+    if direction == "drawn":
         ccw = signed_areas(chosen.lines) > 0.0
         turn = (signed_areas(paths) > 0.0) != ccw[first]
     else:
-        turn = left == (wanted == "climb")
+        turn = left_flags == (direction == "climb")
     paths = reverse_lines(paths, turn)
     return [
         Contour(
@@ -314,18 +320,20 @@ def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contou
             starts=_starts(path, line.plain),
             material_left=is_left,
         )
-        for path, line, is_left in zip(paths, lines, (left != turn).tolist(), strict=True)
+        for path, line, is_left in zip(paths, lines, (left_flags != turn).tolist(), strict=True)
     ]
 
 
-def _starts(path: Polyline, plain: Polyline | None) -> Ints:
+def _starts(path: Polyline, plain_path: Polyline | None) -> Ints:
     """The vertices at which a path with reliefs may begin: not at the tip of one."""
-    if plain is None:
+    if plain_path is None:
         return NO_STARTS
-    own = {tuple(place) for place in plain.vertices[:, :2].tolist()}
+    own_places = {tuple(place) for place in plain_path.vertices[:, :2].tolist()}
     joint = joints(Polylines.of([path]))
     places = enumerate(path.vertices[:, :2].tolist())
-    return np.array([k for k, place in places if joint[k] and tuple(place) in own], dtype=np.int64)
+    return np.array(
+        [k for k, place in places if joint[k] and tuple(place) in own_places], dtype=np.int64
+    )
 
 
 def _no_side(chosen: Chosen, k: int, side: str) -> Finding:
@@ -339,15 +347,15 @@ def _far(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Findi
 
     At a corner of the angle α the straight sides meet at away / sin(α/2) from it.
     """
-    most = FAR_CORNER * setting.operation.away_mm
+    max_distance = FAR_CORNER * setting.operation.away_mm
     for line in lines:
         drawn = Segments.of(chosen.lines.select(line.of))
         corners = line.path.vertices[:, :2]
         distance = nearest(corners, drawn).distance
-        for k in np.flatnonzero(distance > most).tolist():
+        for k in np.flatnonzero(distance > max_distance).tolist():
             yield CORNER_FAR(
                 where=at_place(chosen.names[line.of[0]], corners[k].tolist()),
                 measured=distance[k],
-                limit=most,
+                limit=max_distance,
                 joins=setting.operation.joins,
             )

@@ -117,11 +117,11 @@ def vcarve(chosen: Chosen, setting: Setting) -> Work:
     findings: list[Finding] = []
     for region in _regions(chosen):
         try:
-            item, found = _carved(region, setting, cone)
+            item, region_findings = _carved(region, setting, cone)
         except GeometryError as error:
             return Work((), (_no_region(region, error),))
         items.extend(item)
-        findings.extend(found)
+        findings.extend(region_findings)
     return Work(tuple(items), tuple(findings))
 
 
@@ -138,16 +138,16 @@ def _refuse_open(chosen: Chosen, operation: Operation) -> None:
 def _crossings(chosen: Chosen) -> Iterator[Finding]:
     """The places where paths cross themselves or each other."""
     segments = Segments.of(chosen.lines)
-    rows, nothing = np.arange(len(segments)), np.zeros(len(segments), dtype=np.int64)
+    rows, zeros = np.arange(len(segments)), np.zeros(len(segments), dtype=np.int64)
     every = np.ones(len(segments), dtype=np.bool_)
     boxes = segment_boxes(segments)
-    one, other = touching_boxes(boxes, nothing, rows, every, max_pairs=MAX_PAIRS)
+    one, other = touching_boxes(boxes, zeros, rows, every, max_pairs=MAX_PAIRS)
     if len(one) == 0:
         return
-    meets, crosses = meetings(segments, one, other)
+    common, crosses = meetings(segments, one, other)
     for row in np.flatnonzero(crosses).tolist():
-        a, b = (chosen.names[segments.path[i[row]]] for i in (meets.row_a, meets.row_b))
-        x, y = meets.point[row].tolist()
+        a, b = (chosen.names[segments.path[i[row]]] for i in (common.row_a, common.row_b))
+        x, y = common.point[row].tolist()
         yield SELF_CROSSING_CARVED(
             where=at_place(a, (x, y)), contour=a, other="itself" if a == b else b
         )
@@ -171,14 +171,14 @@ def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed],
     for limit in sorted(set(limits)):
         trace = with_level(boundary, trace, limit)
     # Walking a piece twice takes no longer than coming down from safe z does.
-    again = setting.safe_z_mm * setting.feeds.cut_mm_min / setting.feeds.plunge_mm_min
+    repeat_mm = setting.safe_z_mm * setting.feeds.cut_mm_min / setting.feeds.plunge_mm_min
     paths: list[Floats] = []
     floor: list[Floats] = []
     for low, high in pairwise(limits):
         if high > low:
             band = Band(low, high, CARVE_TOLERANCE_MM)
             floor = walls(boundary, trace, high)
-            paths += _walks(trace, floor, band, again)
+            paths += _walks(trace, floor, band, repeat_mm)
     findings = [*_too_narrow(region, trace, cone), *_limited(region, trace, floor, limits[-1])]
     runs = tuple(_run(path, setting, cone, region.name) for path in paths)
     outline = region.lines[0]
@@ -259,21 +259,23 @@ class Band(Struct, frozen=True):
 
 def with_level(boundary: Boundary, trace: MedialTrace, level_mm: float) -> MedialTrace:
     """The trace with a row of exactly this radius wherever the radius passes it."""
-    near = np.abs(trace.rho - level_mm) <= LEVEL_EPS_MM
-    trace = _with_radius(trace, np.where(near, level_mm, trace.rho))
+    is_level = np.abs(trace.rho - level_mm) <= LEVEL_EPS_MM
+    trace = _with_radius(trace, np.where(is_level, level_mm, trace.rho))
     above = np.sign(trace.rho - level_mm)
-    same = trace.element[1:] == trace.element[:-1]
-    at = np.flatnonzero(same & (above[1:] * above[:-1] < 0.0))
-    guess = np.column_stack([trace.partner[at], trace.partner[at + 1]])
-    low, high = trace.t[at].copy(), trace.t[at + 1].copy()
+    same_element = trace.element[1:] == trace.element[:-1]
+    crossing_rows = np.flatnonzero(same_element & (above[1:] * above[:-1] < 0.0))
+    guess = np.column_stack([trace.partner[crossing_rows], trace.partner[crossing_rows + 1]])
+    low, high = trace.t[crossing_rows].copy(), trace.t[crossing_rows + 1].copy()
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        rho = discs_at(boundary, trace.element[at], middle, guess).rho
-        is_low = np.sign(rho - level_mm) == above[at]
+        rho = discs_at(boundary, trace.element[crossing_rows], middle, guess).rho
+        is_low = np.sign(rho - level_mm) == above[crossing_rows]
         low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
-    found = discs_at(boundary, trace.element[at], low, guess)
-    both = concatenated([trace, _with_radius(found, np.full(len(at), level_mm))])
-    return both.rows(np.lexsort((both.t, both.element)))
+    level_discs = discs_at(boundary, trace.element[crossing_rows], low, guess)
+    merged = concatenated(
+        [trace, _with_radius(level_discs, np.full(len(crossing_rows), level_mm))]
+    )
+    return merged.rows(np.lexsort((merged.t, merged.element)))
 
 
 def _with_radius(trace: MedialTrace, rho: Floats) -> MedialTrace:
@@ -287,24 +289,32 @@ def grooves(trace: MedialTrace, band: Band) -> list[Floats]:
     `trace` has rows at both limits of the band.
     """
     rho = trace.rho
-    least, most = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
-    same = (trace.element[1:] == trace.element[:-1]) & (trace.partner[1:] == trace.partner[:-1])
+    low_rho, high_rho = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
+    same_pair = (trace.element[1:] == trace.element[:-1]) & (
+        trace.partner[1:] == trace.partner[:-1]
+    )
     # Every piece is traced from both its sides: it is taken from the first one.
-    own = trace.element[1:] < trace.partner[1:]
-    wanted = same & own & (least >= band.low_mm) & (most <= band.high_mm) & (most > band.low_mm)
+    is_first_pass = trace.element[1:] < trace.partner[1:]
+    is_wanted = (
+        same_pair
+        & is_first_pass
+        & (low_rho >= band.low_mm)
+        & (high_rho <= band.high_mm)
+        & (high_rho > band.low_mm)
+    )
     tolerance = FIT_SHARE * band.tolerance_mm
-    return [_fitted(trace.discs[i : j + 1], tolerance) for i, j in _index_runs(trace, wanted)]
+    return [_fitted(trace.discs[i : j + 1], tolerance) for i, j in _index_runs(trace, is_wanted)]
 
 
 def walls(boundary: Boundary, trace: MedialTrace, high_mm: float) -> list[Floats]:
     """Pieces (2, 4) of x, y, rho, bulge beside the boundary where discs are larger than high."""
     rho = trace.rho
-    least, most = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
-    same = trace.element[1:] == trace.element[:-1]
-    wanted = same & (least >= high_mm) & (most > high_mm)
+    low_rho, high_rho = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
+    same_element = trace.element[1:] == trace.element[:-1]
+    is_wanted = same_element & (low_rho >= high_mm) & (high_rho > high_mm)
     return [
         _wall(boundary, int(trace.element[i]), (float(trace.t[i]), float(trace.t[j])), high_mm)
-        for i, j in _index_runs(trace, wanted, partners=False)
+        for i, j in _index_runs(trace, is_wanted, partners=False)
     ]
 
 
@@ -320,13 +330,15 @@ def floor_area(pieces: list[Floats]) -> float:
     return total
 
 
-def _index_runs(trace: MedialTrace, wanted: Bools, partners: bool = True) -> list[tuple[int, int]]:
+def _index_runs(
+    trace: MedialTrace, is_wanted: Bools, partners: bool = True
+) -> list[tuple[int, int]]:
     """First and last rows of the runs of wanted gaps, within an element (and one partner)."""
-    is_joined = wanted[1:] & wanted[:-1] & (trace.element[2:] == trace.element[:-2])
+    is_joined = is_wanted[1:] & is_wanted[:-1] & (trace.element[2:] == trace.element[:-2])
     if partners:
         is_joined &= trace.partner[2:] == trace.partner[:-2]
-    first = np.flatnonzero(wanted & ~np.append(False, is_joined))
-    last = np.flatnonzero(wanted & ~np.append(is_joined, False))
+    first = np.flatnonzero(is_wanted & ~np.append(False, is_joined))
+    last = np.flatnonzero(is_wanted & ~np.append(is_joined, False))
     return list(zip(first.tolist(), (last + 1).tolist(), strict=True))
 
 
@@ -378,14 +390,14 @@ def _bulge(discs: Floats, tolerance_mm: float) -> float | None:
 def _off_arc(inner: Floats, begin: Floats, end: Floats, bulge: float) -> float:
     """Distances of discs from an arc along which the radius changes evenly with the sweep."""
     chord = end[:2] - begin[:2]
-    turned = np.array([-chord[1], chord[0]])
-    centre = 0.5 * (begin[:2] + end[:2]) + (1.0 - bulge**2) / (4.0 * bulge) * turned
+    normal = np.array([-chord[1], chord[0]])
+    centre = 0.5 * (begin[:2] + end[:2]) + (1.0 - bulge**2) / (4.0 * bulge) * normal
     arm, first = inner[:, :2] - centre, begin[:2] - centre
     angle = np.arctan2(first[0] * arm[:, 1] - first[1] * arm[:, 0], arm @ first)
     part = np.clip(angle / (4.0 * np.arctan(bulge)), 0.0, 1.0)
     radius = begin[2] + part * (end[2] - begin[2])
-    aside = np.abs(np.hypot(arm[:, 0], arm[:, 1]) - np.hypot(*first))
-    return float((aside + np.abs(inner[:, 2] - radius)).max())
+    deviations = np.abs(np.hypot(arm[:, 0], arm[:, 1]) - np.hypot(*first))
+    return float((deviations + np.abs(inner[:, 2] - radius)).max())
 
 
 class Graph(Struct, frozen=True, eq=False):
@@ -420,26 +432,26 @@ def pruned(graph: Graph, tolerance_mm: float) -> Graph:
     pieces these add up at most.
     """
     degree = np.bincount(graph.ends.ravel(), minlength=len(graph.places))
-    beyond = np.zeros(len(graph.places))
-    kept: Bools = np.ones(len(graph.pieces), dtype=np.bool_)
+    reach = np.zeros(len(graph.places))
+    is_kept: Bools = np.ones(len(graph.pieces), dtype=np.bool_)
     at_place = _pieces_at(graph)
     waiting = sorted(np.flatnonzero(degree == 1).tolist(), key=lambda v: graph.places[v, 2])
     while waiting:
         leaf = waiting.pop(0)
-        row = next((row for row in at_place[leaf] if kept[row]), None)
+        row = next((row for row in at_place[leaf] if is_kept[row]), None)
         if row is None:
             continue
         inner = int(graph.ends[row].sum()) - leaf
         step = graph.places[leaf] - graph.places[inner]
-        out = beyond[leaf] + np.hypot(step[0], step[1]) + step[2]
-        if out > tolerance_mm:
+        total_reach = reach[leaf] + np.hypot(step[0], step[1]) + step[2]
+        if total_reach > tolerance_mm:
             continue
-        kept[row] = False
-        beyond[inner] = max(beyond[inner], out)
+        is_kept[row] = False
+        reach[inner] = max(reach[inner], total_reach)
         degree[inner] -= 1
         if degree[inner] == 1:
             waiting.append(inner)
-    rows = np.flatnonzero(kept)
+    rows = np.flatnonzero(is_kept)
     return Graph([graph.pieces[row] for row in rows], graph.ends[rows], graph.places)
 
 
@@ -468,9 +480,12 @@ def walks(graph: Graph, again_mm: float) -> list[Floats]:
     result = []
     for circuit in _circuits(ends, len(graph.places)):
         for rows in _cut(circuit, len(graph.pieces)):
-            pieces = [(graph.pieces[row], back) for row, back in rows]
+            pieces = [(graph.pieces[row], is_reversed) for row, is_reversed in rows]
             walk = join_paths(
-                [reverse_vertices(piece) if back else piece for piece, back in pieces]
+                [
+                    reverse_vertices(piece) if is_reversed else piece
+                    for piece, is_reversed in pieces
+                ]
             )
             result.append(reverse_vertices(walk) if walk[-1, 2] < walk[0, 2] else walk)
     return result
@@ -481,14 +496,14 @@ def _doubled(graph: Graph, again_mm: float) -> Graph:
     ends; the shortest first, each place once."""
     odd = np.bincount(graph.ends.ravel(), minlength=len(graph.places)) % 2 == 1
     lengths = [float(lengths_of(piece).sum()) for piece in graph.pieces]
-    again = []
+    repeated = []
     for row in sorted(range(len(lengths)), key=lambda row: (lengths[row], row)):
         a, b = graph.ends[row].tolist()
         if lengths[row] <= again_mm and a != b and odd[a] and odd[b]:
             odd[[a, b]] = False
-            again.append(row)
-    pieces = [*graph.pieces, *(graph.pieces[row] for row in again)]
-    return Graph(pieces, np.concatenate([graph.ends, graph.ends[again]]), graph.places)
+            repeated.append(row)
+    pieces = [*graph.pieces, *(graph.pieces[row] for row in repeated)]
+    return Graph(pieces, np.concatenate([graph.ends, graph.ends[repeated]]), graph.places)
 
 
 def lengths_of(path: Floats) -> Floats:
@@ -509,8 +524,8 @@ def _jumps(graph: Graph) -> Ints:
     while odd:
         one = odd.pop(0)
         mates = [v for v in odd if component[v] == component[one]]
-        apart = graph.places[mates, :2] - graph.places[one, :2]
-        mate = mates[int(np.argmin((apart**2).sum(axis=1)))]
+        arms = graph.places[mates, :2] - graph.places[one, :2]
+        mate = mates[int(np.argmin((arms**2).sum(axis=1)))]
         odd.remove(mate)
         pairs.append((one, mate))
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
@@ -538,25 +553,25 @@ def _circuits(ends: Ints, count: int) -> Iterator[list[tuple[int, bool]]]:
     for row, (a, b) in enumerate(ends.tolist()):
         edges[a].append(row)
         edges[b].append(row)
-    used = [False] * len(ends)
+    is_used = [False] * len(ends)
     for start in range(count):
-        done: list[tuple[int, bool]] = []
+        steps_done: list[tuple[int, bool]] = []
         stack: list[tuple[int, tuple[int, bool] | None]] = [(start, None)]
         while stack:
-            place, came = stack[-1]
-            while edges[place] and used[edges[place][-1]]:
+            place, arrival = stack[-1]
+            while edges[place] and is_used[edges[place][-1]]:
                 edges[place].pop()
             if edges[place]:
                 row = edges[place].pop()
-                used[row] = True
+                is_used[row] = True
                 a, b = ends[row].tolist()
                 stack.append((b, (row, False)) if a == place else (a, (row, True)))
             else:
                 stack.pop()
-                if came is not None:
-                    done.append(came)
-        if done:
-            yield done[::-1]
+                if arrival is not None:
+                    steps_done.append(arrival)
+        if steps_done:
+            yield steps_done[::-1]
 
 
 def _cut(circuit: list[tuple[int, bool]], count: int) -> list[list[tuple[int, bool]]]:
@@ -565,9 +580,9 @@ def _cut(circuit: list[tuple[int, bool]], count: int) -> list[list[tuple[int, bo
     if first is None:
         return [circuit]
     parts: list[list[tuple[int, bool]]] = [[]]
-    for row, back in circuit[first + 1 :] + circuit[:first]:
+    for row, is_reversed in circuit[first + 1 :] + circuit[:first]:
         if row >= count:
             parts.append([])
         else:
-            parts[-1].append((row, back))
+            parts[-1].append((row, is_reversed))
     return [part for part in parts if part]
