@@ -46,41 +46,42 @@ of 700 suits programs that run long; loading the libraries and reading a small D
 search, make fewer than this."""
 
 
-COMMANDS = (
-    "batch",
-    "calibrate",
-    "check",
-    "completion",
-    "console",
-    "convert",
-    "coupon",
-    "diff",
-    "filter",
-    "home",
-    "init",
-    "job",
-    "jog",
-    "measure",
-    "meet",
-    "panel",
-    "ports",
-    "post",
-    "preview",
-    "send",
-    "stale",
-    "targets",
-    "tolerances",
-    "tools",
-    "twin",
-    "unlock",
-    "verify",
-    "zero",
-)
-"""Each is a function of the same name in a module of the same name."""
+COMMANDS = {
+    "batch": "Many drawings to verified programs.",
+    "calibrate": "A machine's numbers from measured coupons.",
+    "check": "What is in a drawing.",
+    "completion": "Completion for bash, zsh or fish.",
+    "console": "Type to a controller.",
+    "convert": "A program of one machine as that of another.",
+    "coupon": "Drawings to cut and measure.",
+    "diff": "What two programs or jobs cut differently.",
+    "filter": "LinuxCNC opens a drawing.",
+    "home": "Home a machine.",
+    "init": "A machine file of your own.",
+    "job": "Job files: begin one, or see what one says.",
+    "jog": "Move a machine by so much.",
+    "measure": "Depths of the stock after a program.",
+    "meet": "What would make its dimensions hold.",
+    "panel": "Show a page that moves the machine by hand and sends PROGRAM.",
+    "ports": "List the serial ports.",
+    "post": "Drawing to verified program.",
+    "preview": "Picture of a drawing, toolpath or program.",
+    "send": "Send a program to its machine.",
+    "stale": "Programs that are out of date.",
+    "targets": "The machines, and everything about one.",
+    "tolerances": "Dimensions and their limits: begin a file, or see what one says.",
+    "tools": "The tools that jobs may name.",
+    "twin": "A virtual machine at a port.",
+    "unlock": "Unlock a controller.",
+    "verify": "Simulate and judge a program.",
+    "zero": "Make this place part zero.",
+}
+"""The commands with their lines in the help, which is shown without importing them. Each is a
+function of the same name in a module of the same name, whose docstring begins with its line."""
 
 
 class _Commands(click.Group):
-    """The group of `COMMANDS`, each of which is imported when it is called or shown."""
+    """The group of `COMMANDS`, each of which is imported when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of the commands."""
@@ -93,6 +94,11 @@ class _Commands(click.Group):
             if name not in self.commands:
                 self.add_command(getattr(import_module(f"camtool.cli.{name}"), name))
         return super().get_command(ctx, cmd_name)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of the commands."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
 
 @click.group(

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 
@@ -89,10 +90,13 @@ def test_nothing_is_told_twice(page: Path) -> None:
     assert sorted(set(found)) == sorted(found)
 
 
-def test_the_help_lists_every_command() -> None:
+def test_the_help_lists_every_command_with_the_line_that_begins_its_own_help() -> None:
     """The README sends its readers there."""
     text = CliRunner().invoke(cli, ["--help"]).output.partition("\nCommands:\n")[2]
-    assert set(re.findall(r"^  ([\w-]+)  ", text, re.MULTILINE)) == set(COMMANDS)
+    assert dict(re.findall(r"^  ([\w-]+)  +(.+)$", text, re.MULTILINE)) == COMMANDS
+    commands = {name: cli.get_command(click.Context(cli), name) for name in COMMANDS}
+    lines = {name: each.get_short_help_str(200) for name, each in commands.items() if each}
+    assert lines == COMMANDS
 
 
 def test_the_changelog_has_every_command() -> None:

@@ -116,6 +116,7 @@ def test_targets_load_no_library_of_drawings() -> None:
         (("targets", "--json"), {"targets"}),
         (("verify", "samples/circle-30-steps.pic", "-t", "pic-mmh", "-q"), {"verify"}),
         (("--version",), set()),
+        (("--help",), set()),
     ],
 )
 def test_a_command_loads_no_other_command(arguments: tuple[str, ...], wanted: set[str]) -> None:
