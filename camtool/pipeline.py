@@ -27,11 +27,13 @@ from camtool.errors import OptionError, ProgramError
 from camtool.findings import Finding, Severity, worst
 from camtool.geometry.turn import UNTURNED
 from camtool.planning.job import Job
-from camtool.planning.naming import tool_words
+from camtool.planning.naming import setup_words, tool_words
 from camtool.progress import Progress
 from camtool.records import replace
 from camtool.run import Run
 from camtool.simulation.motion import ALL
+from camtool.stock.findings import STOCK_NOT_JUDGED_TOOLS
+from camtool.toolpath.lower import at_feed, carried_over, within_feeds, without_coolant
 from camtool.toolpath.moves import Kind, feeds_below_top, mounted_before, toolpath_extents
 from camtool.toolpath.program import Program
 from camtool.toolpath.touching import untouched_place
@@ -44,6 +46,7 @@ from camtool.verification.case import (
     nose_of,
     tool_mm,
 )
+from camtool.verification.cuts import is_flat, rapid_length_mm
 from camtool.verification.report import (
     BaselineReport,
     Planned,
@@ -307,9 +310,7 @@ def _post_plan(
         findings = _merge_findings(findings, stock_findings)
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
-    from camtool.planning.naming import setup_words
     from camtool.stock.checks import stock_request
-    from camtool.verification.cuts import rapid_length_mm
 
     plain_result = plain_run()
     # Contours that are divided at reversals are judged as the whole contours of the drawing.
@@ -451,7 +452,6 @@ def _register_drawing(case: Case, drawing: Drawing, job: Job, *, align: bool) ->
     """Return the case with the parts of the drawing that its program cuts as the wanted moves, and
     the job with the place of the drawing and the tool that were found in the program."""
     from camtool.planning.place import place
-    from camtool.verification.cuts import is_flat
     from camtool.verification.registration import register
 
     placed_drawing = place(drawing, job)
@@ -503,8 +503,6 @@ def convert_program(
     become its highest feed; `feed_mm_min` replaces all feeds. ProgramError names file, block and
     column.
     """
-    from camtool.toolpath.lower import at_feed, carried_over, within_feeds, without_coolant
-
     progress = progress or Progress()
     progress.begin(f"reading {PurePath(file).name}")
     decoded = _decode(data, source, file)
@@ -693,8 +691,6 @@ def _cut_mm(wanted_path: Toolpath) -> tuple[float, float, float, float] | None:
     None where nothing is cut, or nobody knows by which operation."""
     import numpy as np
 
-    from camtool.verification.cuts import is_flat
-
     operations = wanted_path.operations
     if operations is None:
         return None
@@ -826,7 +822,6 @@ def _stock_findings(
     """Return the findings of a program in its stock: of the path that its controller decodes, or
     of the slides where that is bent against the mechanics. Where tools are not known, or cut no
     width, or nothing is asked for (`request` None), only rapids are looked at."""
-    from camtool.stock.findings import STOCK_NOT_JUDGED_TOOLS
     from camtool.stock.moves import stock_moves_of_toolpath
     from camtool.stock.rapids import rapid_findings
     from camtool.stock.slides import slide_moves, tools_of_rows

@@ -16,6 +16,7 @@ from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags
 from camtool.findings import Finding, Severity
 from camtool.plain import one_line
+from camtool.planning.job import job_of
 from camtool.records import replace
 
 if TYPE_CHECKING:
@@ -74,7 +75,6 @@ class PostWork:
         """Load the modules that every drawing needs."""
         from camtool.importers.read import read_bytes
         from camtool.pipeline import post_drawing
-        from camtool.planning.job import job_of
 
         drawing = read_bytes(SMALL_JOB, "small.svg")
         post_drawing(drawing, job_of(), self.target, check=self.check)

@@ -12,6 +12,7 @@ from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.plain import one_line, to_json
+from camtool.tables import read_table
 
 
 @click.command(cls=SectionedCommand, short_help="A machine's numbers from measured coupons.")
@@ -67,6 +68,4 @@ def calibrate(
 
 def _own_table(machine: str | None, target: str) -> dict[str, Any]:
     """Return the table of the user's machine file; without one, only its key `extends`."""
-    from camtool.tables import read_table
-
     return {"extends": target} if machine is None else read_table(Path(machine))

@@ -16,6 +16,8 @@ from camtool.cli.files import STDOUT, check_new, check_places, display_name, rea
 from camtool.cli.messages import say
 from camtool.cli.options import decorate, talk_options
 from camtool.errors import MachineError, OptionError
+from camtool.project import FILE, MACHINES, NAME, names_machine, text_naming_machine, user_folder
+from camtool.tables import parse_table
 from camtool.units import parse_feed, parse_length
 
 if TYPE_CHECKING:
@@ -167,8 +169,6 @@ def init(
     It is kept in your configuration folder, or with --project in this one, whose camtool.toml
     then names it. The first machine is the one that commands without --target are for.
     """
-    from camtool.project import FILE, names_machine, text_naming_machine, user_folder
-
     if settings is not None and port is not None:
         raise click.UsageError("--settings and --port contradict each other")
     if project and output is not None:
@@ -317,7 +317,6 @@ def machine_text(
 ) -> str:
     """Return the text of the machine file. MachineError, which names the source of the value, for
     a value out of range."""
-    from camtool.tables import parse_table
     from camtool.target.registry import list_target, loaded_target
     from camtool.target.template import machine_template
 
@@ -351,8 +350,6 @@ def _is_about(error: MachineError, key: str) -> bool:
 
 def _place(name: str, output: str | None, *, project: bool) -> Path:
     """Return the file of the machine; an invalid name is refused."""
-    from camtool.project import FILE, MACHINES, NAME, user_folder
-
     if not NAME.fullmatch(name) or name == Path(FILE).stem:
         raise OptionError(
             f"{name!r} is no name for a machine", mend="use small letters, digits and hyphens"

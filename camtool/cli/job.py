@@ -25,8 +25,10 @@ from camtool.cli.options import (
 from camtool.cli.picture_options import PictureFlags, picture_name
 from camtool.cli.preview import SceneSource
 from camtool.errors import OptionError
+from camtool.jobs.tools import read_library, tool_of
 from camtool.plain import one_line, to_json
 from camtool.planning.job import above_zero
+from camtool.project import project_of
 from camtool.records import replace
 
 if TYPE_CHECKING:
@@ -85,7 +87,6 @@ def new(
     from camtool.geometry.drawing import is_text
     from camtool.jobs.proposal import Proposal
     from camtool.jobs.template import job_template, proposed
-    from camtool.project import project_of
 
     above_zero("tool diameter", tool_diameter, "mm")
     above_zero("thickness", thickness, "mm")
@@ -149,9 +150,6 @@ def _asked(each: Proposed) -> Proposed | None:
 def _with_library(proposal: Proposal) -> Proposal:
     """Return the proposal with the tools of the libraries that may cut its material; of a job that
     names no tool and no diameter, the first end mill is its tool."""
-    from camtool.jobs.tools import read_library, tool_of
-    from camtool.project import project_of
-
     every: dict[str, Tool] = {}
     for file in project_of(Path.cwd()).libraries:
         every = {
@@ -199,7 +197,6 @@ def check(
     """Check the job FILE, and say what each operation does; with --against, to which paths, on
     which side of them, and why."""
     from camtool.jobs.description import described
-    from camtool.project import project_of
 
     if preview is not None and (against is None or machine.name() is None):
         raise click.UsageError("--preview needs --against and --target")

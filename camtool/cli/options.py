@@ -29,7 +29,9 @@ from camtool.errors import DrawingError, MachineError, OptionError
 from camtool.importers.options import Flag, ReadOptions, Selection, flags_of, options_of
 from camtool.jobs.keys import FLAGS, flag_name
 from camtool.keys import Given, Key
+from camtool.project import project_of
 from camtool.records import replace
+from camtool.tables import read_table
 from camtool.units import parse_feed, parse_length, parse_time
 
 if TYPE_CHECKING:
@@ -172,7 +174,6 @@ class MachineFlags:
         """Resolve the flags. The name of a machine is replaced by its file; so is the name of a
         target, if the user has a machine so called. Without either flag the default of the project
         applies, else that of the user."""
-        from camtool.project import project_of
         from camtool.target.registry import target_names
 
         project = project_of(Path.cwd())
@@ -598,8 +599,6 @@ class JobFlags:
     def _named_file(self, key: str) -> str | None:
         """Return the file that a flag or a key of the job file names; None without one, and if the
         job file cannot be read: `job` reports that."""
-        from camtool.tables import read_table
-
         if self.file is None or key in self.given:
             return self.given.get(key)
 
@@ -656,8 +655,6 @@ def job_options(command: Command) -> Command:
     def make_flags(
         job: str | None, operation: tuple[str, ...], setup: str | None, **keys: Any
     ) -> JobFlags:
-        from camtool.project import project_of
-
         given_keys = {name: value for name, value in keys.items() if value is not None}
         project = project_of(Path.cwd())
         default = project.job if job is None else None

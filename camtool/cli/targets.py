@@ -16,6 +16,7 @@ from camtool.cli.messages import in_colour, say, show_text
 from camtool.cli.options import MachineFlags, talk_options
 from camtool.errors import CamtoolError
 from camtool.plain import one_line, to_json
+from camtool.project import project_of
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -141,7 +142,6 @@ def _list(as_json: bool) -> None:
 
 def _own_machines(broken: list[CamtoolError]) -> Iterator[dict[str, Any]]:
     """Return the user's machines as rows; errors are appended to `broken`."""
-    from camtool.project import project_of
     from camtool.target.loader import extended_by
 
     try:

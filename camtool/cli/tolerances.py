@@ -23,6 +23,7 @@ from camtool.cli.options import (
 from camtool.findings import Finding, Severity
 from camtool.importers.findings import DrawingCode
 from camtool.plain import one_line, to_json
+from camtool.project import project_of
 
 if TYPE_CHECKING:
     from camtool.inspection.dimensions import Dimension
@@ -65,7 +66,6 @@ def new(
     --job the depths of its pockets, grooves and blind holes, and what is left under its floors.
     """
     from camtool.inspection.proposal import propose_file
-    from camtool.project import project_of
 
     output = output or FILE
     flags = JobFlags(job_file, project=project_of(Path.cwd()))

@@ -13,8 +13,10 @@ from camtool.cli.messages import say, show_text
 from camtool.cli.options import talk_options
 from camtool.errors import OptionError
 from camtool.jobs.keys import PRESET, TOOL
+from camtool.jobs.tools import read_library, tool_of
 from camtool.patterns import guess
 from camtool.plain import one_line, to_json
+from camtool.project import FILE, TOOLS, project_of, user_folder
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -99,8 +101,6 @@ def new(project: bool, output: str | None, quiet: bool, verbose: bool) -> None:
     """
     from importlib import resources
 
-    from camtool.project import FILE, TOOLS, user_folder
-
     text = resources.files("camtool.jobs").joinpath(TOOLS).read_bytes()
     place = str((Path() if project else user_folder()) / TOOLS) if output is None else output
     check_new(place)
@@ -117,9 +117,6 @@ def new(project: bool, output: str | None, quiet: bool, verbose: bool) -> None:
 
 def _all_tools() -> dict[str, tuple[Described, Path]]:
     """Return all tools by name, the nearest of each, with their files."""
-    from camtool.jobs.tools import read_library
-    from camtool.project import project_of
-
     every: dict[str, tuple[Described, Path]] = {}
     for file in project_of(Path.cwd()).libraries:
         tools = {name: (each, file) for name, each in read_library(file).items()}
@@ -148,8 +145,6 @@ def _row(name: str, described: Described, file: Path) -> dict[str, Any]:
 
 
 def _tool(name: str, described: Described) -> Tool:
-    from camtool.jobs.tools import tool_of
-
     return tool_of(name, described)
 
 

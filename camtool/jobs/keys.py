@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from camtool.errors import OptionError
-from camtool.importers.options import TEXTS
+from camtool.importers.options import TEXTS, colour_named
 from camtool.keys import (
     ANGLE,
     COUNT,
@@ -132,8 +132,6 @@ def _range(
 
 def colours(value: object) -> tuple[str, ...]:
     """Patterns of colours, "#rrggbb" as drawings have them; names and numbers are converted."""
-    from camtool.importers.options import colour_named
-
     if isinstance(value, list | tuple):
         value = [str(item) if type(item) is int else item for item in value]
     return tuple(

@@ -59,6 +59,7 @@ from camtool.geometry.polylines import (
     reverse_lines,
 )
 from camtool.kernels.move_tree import hilbert_order
+from camtool.kernels.offsets import insides, nearest_distances
 from camtool.planning.checks import ridge_mm
 from camtool.planning.findings import PlanningCode
 from camtool.planning.holes import HOLE_SIZE_MM, circle_of, drilled_holes
@@ -117,8 +118,6 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
 
     def inwards(self, points: Floats) -> Floats:
         """Return the distances s (N,) of points (N, 2), mm: the shift included."""
-        from camtool.kernels.offsets import insides, nearest_distances
-
         if not len(self.lines):
             return np.full(len(points), FAR_MM if self.side == OUTSIDE else -FAR_MM)
         points = np.ascontiguousarray(points, dtype=np.float64)

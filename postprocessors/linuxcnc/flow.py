@@ -19,6 +19,7 @@ from msgspec import Struct
 from camtool.errors import ProgramError
 
 from ..gcode.faults import LineFault
+from .expressions import Scanner, evaluate, whole_number
 from .lines import ParsedLine, column_of
 from .parameters import ARGUMENTS, Parameters
 from .texts import Folder, ProgramText
@@ -343,8 +344,6 @@ class Flow:
         self.text, self.at = place.text, place.line
 
     def _condition(self, line: ParsedLine, word: _Word) -> float:
-        from .expressions import Scanner, evaluate
-
         if word.condition is None:
             if line.text[word.rest : word.rest + 1] != "[":
                 raise LineFault(f"{word.kind} without its [condition]", word.rest)
@@ -437,8 +436,6 @@ class Flow:
         return seek
 
     def _arguments(self, word: _Word) -> list[float]:
-        from .expressions import Scanner, evaluate
-
         line = self.current
         assert line is not None  # it has the call
         if word.condition is None:
@@ -463,23 +460,17 @@ class Flow:
         if self._defining is not None:
             return
         if word.kind != "M99" and line.text[word.rest : word.rest + 1] == "[":
-            from .expressions import Scanner, evaluate
-
             if word.condition is None:
                 scanner = Scanner(line.text, word.rest)
                 word.condition = scanner.expression()
                 word.rest = scanner.at
             self.returned = evaluate(word.condition, self.given)
         elif word.condition is not None:
-            from .expressions import evaluate
-
             self.returned = evaluate(word.condition, self.given)
         else:
             self.returned = None
 
     def _m98_label(self, word: _Word) -> str:
-        from .expressions import whole_number
-
         assert word.words is not None
         words = word.words.block(self.given).words
         if "p" not in words:
@@ -584,8 +575,6 @@ def _word_of(line: ParsedLine) -> _Word:
         if digits > begin and text[digits : digits + 1] != ".":
             label, begin = str(int(text[begin:digits])), digits
         else:
-            from .expressions import Scanner
-
             scanner = Scanner(text, begin)
             label = scanner.whole_number()
             label = str(label) if isinstance(label, int) else label

@@ -404,7 +404,9 @@ def test_contours_of_one_name_have_one_allowance(tmp_path: Path, apart: bool) ->
     one = {"name": "one", "kind": "distance", "from": [5, 10], "to": [15, 10]}
     two = {"name": "two", "kind": "distance", "from": [20, 10], "to": [30, 10]}
     asked = [limited(one, "+0.06/+0.02"), limited(two, "-0.02/-0.06")]
-    found = meet(case(tmp_path, asked, svg=svg, job='kind = "profile"\nside = "inside"'), max_trials=3)
+    found = meet(
+        case(tmp_path, asked, svg=svg, job='kind = "profile"\nside = "inside"'), max_trials=3
+    )
     assert found.holds == apart
     if not apart:
         assert found.certificate is not None
