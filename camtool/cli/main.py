@@ -62,7 +62,7 @@ COMMANDS = {
     "jog": "Move a machine by so much.",
     "measure": "Depths of the stock after a program.",
     "meet": "What would make its dimensions hold.",
-    "panel": "Show a page that moves the machine by hand and sends PROGRAM.",
+    "panel": "A page that moves the machine.",
     "ports": "List the serial ports.",
     "post": "Drawing to verified program.",
     "preview": "Picture of a drawing, toolpath or program.",
@@ -77,7 +77,7 @@ COMMANDS = {
     "zero": "Make this place part zero.",
 }
 """The commands with their lines in the help, which is shown without importing them. Each is a
-function of the same name in a module of the same name, whose docstring begins with its line."""
+function of the same name in a module of the same name, whose short help is its line."""
 
 
 class _Commands(click.Group):
