@@ -151,7 +151,7 @@ class _Talk:
         elif time_s - self._heard > QUIET_S:
             self._show(terminal.flush())
         wish = wishes()
-        if wish is not None:
+        if wish is not None and not callable(wish):
             return self._stop(wish, by_hand=wishes.by_hand)
         if not self._shows and self._code is None:
             return self._halt(1)
@@ -171,7 +171,7 @@ class _Talk:
         text = self._next.pop()
         if text is None:
             wish = wishes()  # a terminal that is closed ends its lines too
-            if wish is not None:
+            if wish is not None and not callable(wish):
                 return self._stop(wish, by_hand=wishes.by_hand)
             if terminal.runs_on:
                 self._say("it would go on without an end: it is told to stop")

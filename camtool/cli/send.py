@@ -22,6 +22,7 @@ from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
+    from camtool.cli.wishes import AtStop
     from camtool.sending.journal import JournalState
     from camtool.sending.line import Port
     from camtool.sending.live import LivePage
@@ -51,6 +52,11 @@ NAME_WIDTH = 11
     help="With --resume: where it was left, at part zero, or as the controller says.",
 )
 @click.option("--single", is_flag=True, help="Wait after every block.")
+@click.option(
+    "--at-stop",
+    metavar="wait|fail|COMMAND",
+    help="At M0 without a terminal: stop the machine, or run a command and go on if it ends well.",
+)
 @click.option("--home", is_flag=True, help="Home the machine first.")
 @UNLOCK
 @click.option("--journal", metavar="FILE", help="Where it says how far it is  [PROGRAM.journal]")
@@ -73,6 +79,7 @@ def send(
     resume: bool,
     tool_at: ToolAt,
     single: bool,
+    at_stop: str | None,
     home: bool,
     unlock: bool,
     journal: str | None,
@@ -87,8 +94,8 @@ def send(
     First the program is verified, and what will be done is said; nothing goes out before --yes or
     an answer. Without --port that is all. Ctrl-C stops the machine as its protocol can, and so
     does all else that would end camtool; a second one does not wait until it stands. On a
-    terminal: p pauses, r goes on, s does a single block, q stops. Exit code 1 when the program
-    was not finished.
+    terminal: p pauses, r goes on, s does a single block, q stops; + and - change the feed, ] and [
+    the spindle by 10 %, = brings back 100 %. Exit code 1 when the program was not finished.
     """
     from camtool.sending.prepare import consignment, lines_of, port_of, wire_of
 
@@ -139,13 +146,16 @@ def send(
     if port is None:
         return 0
     if not sys.stdin.isatty():
-        _refuse_waiting(one, single=single)
+        _refuse_waiting(one, single=single, at_stop=at_stop)
     line = port_of(port, baud, one.wire, target)
     if speed != 1.0 and not line.is_virtual:
         raise OptionError("a real machine has only its own speed", where="--speed")
     if not yes and not _confirm():
         return 1
-    job = _Sending(program, one, target, line, place, live, resume, as_json, quiet)
+    from camtool.cli.wishes import AtStop
+
+    answer = None if at_stop in (None, "wait") else AtStop(at_stop or "")
+    job = _Sending(program, one, target, line, place, live, resume, as_json, quiet, answer)
     return job.run(single=single, home=home, unlock=unlock, speed=speed, yes=yes)
 
 
@@ -209,15 +219,16 @@ def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
     return state
 
 
-def _refuse_waiting(one: Consignment, *, single: bool) -> None:
-    """Refuse programs that would wait for an answer if nobody can answer."""
+def _refuse_waiting(one: Consignment, *, single: bool, at_stop: str | None) -> None:
+    """Refuse programs that would wait for an answer if nobody can answer; with `at_stop`, their
+    stops are answered or are to be waited for."""
     asks = sum(bool(packet.ask) for packet in one.packets[1:])
     if asks:
         raise click.UsageError(f"it waits for an answer {asks} times: run it at a terminal")
     if single:
         raise click.UsageError("--single waits behind every block: run it at a terminal")
     stops = [packet for packet in one.packets if packet.waits]
-    if stops:
+    if stops and at_stop is None:
         named = ", ".join(
             f"block {one.block_of(packet.block) + 1} ({packet.data.strip().decode('latin-1')})"
             for packet in stops[:MAX_NAMED]
@@ -225,7 +236,7 @@ def _refuse_waiting(one: Consignment, *, single: bool) -> None:
         suffix = f" and {len(stops) - MAX_NAMED} more" if len(stops) > MAX_NAMED else ""
         raise click.UsageError(
             f"the program stops until somebody lets it go on, in {named}{suffix}: run it at a "
-            "terminal, or take the stops out"
+            "terminal, give --at-stop, or take the stops out"
         )
 
 
@@ -254,6 +265,7 @@ class _Sending:
     more: bool
     as_json: bool
     quiet: bool
+    answer: AtStop | None
     _tell: Callable[[str], None] = field(default=lambda text: None, init=False)
     _shown: dict[str, Any] = field(default_factory=dict, init=False)
     _left: list[float] = field(default_factory=list, init=False)
@@ -262,9 +274,14 @@ class _Sending:
 
     def run(self, *, single: bool, home: bool, unlock: bool, speed: float, yes: bool) -> int:
         """Send the program; return the exit code."""
-        from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
+        from camtool.cli.wishes import (
+            Messages,
+            UserRequests,
+            keys_of_terminal,
+            override_orders,
+        )
         from camtool.sending.carry import SendOptions, carry_program, program_conversation
-        from camtool.sending.drive import Request
+        from camtool.sending.drive import Order, Request
         from camtool.sending.line import opened_line
         from camtool.sending.live import LivePage
 
@@ -295,8 +312,14 @@ class _Sending:
             file=self._program_file(),
         )
         conversation = program_conversation(one, self.target, self.port, options)
-        keys = {"p": Request.PAUSE, " ": Request.PAUSE, "r": Request.RESUME, "\n": Request.RESUME}
+        keys: dict[str, Request | Order] = {
+            "p": Request.PAUSE,
+            " ": Request.PAUSE,
+            "r": Request.RESUME,
+            "\n": Request.RESUME,
+        }
         keys |= {"s": Request.STEP, "q": Request.STOP}
+        keys |= override_orders()
         with opened_line(self.port) as line, keys_of_terminal() as key:
             wishes = UserRequests(key, keys)
             self._tell = tell = Messages(quiet=self.quiet)
@@ -308,15 +331,21 @@ class _Sending:
                     line,
                     options,
                     conversation=conversation,
-                    wish=wishes,
+                    wish=lambda: wishes() or (self.answer and self.answer()) or None,
                     watch=self._watch,
                     tell=tell,
                 )
         tell.rest()
+        if self.answer is not None:
+            self.answer.end()
         if sent.is_finished:
             say(f"camtool: finished: {len(one.packets)} packets", quiet=self.quiet)
             return 0
-        say(f"camtool: error: {one.run.source}: {sent.words}; --resume goes on", quiet=False)
+        trouble = f"{self.answer.trouble}; " if self.answer and self.answer.trouble else ""
+        say(
+            f"camtool: error: {one.run.source}: {trouble}{sent.words}; --resume goes on",
+            quiet=False,
+        )
         return 1
 
     def _program_file(self) -> str:
@@ -366,7 +395,10 @@ class _Sending:
         )
         signs.done = conversation.acknowledged
         if conversation.state.value == "waiting" and before.get("state") != "waiting":
-            self._tell(f"waiting: {conversation.why} (r goes on)")
+            answers = self.answer is not None and conversation.is_program_stop
+            self._tell(f"waiting: {conversation.why}{'' if answers else ' (r goes on)'}")
+            if self.answer is not None and answers:
+                self.answer.begin(conversation.why)
 
     def _show_page(self, conversation: Conversation, left_s: float) -> None:
         """Update the live page, once a second and when the state changes. A page that cannot be

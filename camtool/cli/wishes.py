@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import select
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -18,7 +19,8 @@ from typing import TextIO
 
 from camtool.cli.messages import say
 from camtool.plain import one_line
-from camtool.sending.drive import Request
+from camtool.sending.drive import Order, Request
+from camtool.target.wire import Conversation, Override
 
 ENDING = ("SIGINT", "SIGQUIT", "SIGBREAK", "SIGTERM", "SIGHUP")
 """Signals that would end camtool; not all systems have all of them."""
@@ -35,6 +37,82 @@ SUSPEND = "SIGTSTP"
 """Ctrl-Z. A sender that slept would leave its machine alone."""
 
 
+MAX_OVERRIDE, OVERRIDE_STEP = 200, 10
+"""Largest override, and the change by a key, %."""
+
+OVERRIDE_KEYS: Mapping[str, tuple[Override, int]] = {
+    "+": ("feed", OVERRIDE_STEP),
+    "-": ("feed", -OVERRIDE_STEP),
+    "]": ("spindle", OVERRIDE_STEP),
+    "[": ("spindle", -OVERRIDE_STEP),
+}
+"""Keys of a terminal, what they change and by how much; "=" brings back 100 %."""
+
+
+def override_orders() -> dict[str, Request | Order]:
+    """Return the orders of the keys that change overrides."""
+
+    def changed(name: Override, by: int) -> Order:
+        def order(talk: Conversation, now: float) -> None:
+            percent = talk.overrides.get(name, 100) + by
+            talk.override(name, min(max(percent, OVERRIDE_STEP), MAX_OVERRIDE), now)
+
+        return order
+
+    def reset(talk: Conversation, now: float) -> None:
+        for name in talk.overrides:
+            talk.override(name, 100, now)
+
+    return {**{key: changed(*change) for key, change in OVERRIDE_KEYS.items()}, "=": reset}
+
+
+class AtStop:
+    """The answer to a program that waits for an operator (M0, a tool change) where none is asked:
+    "fail" stops the machine, any other text is a command of the shell. The program goes on when
+    the command ends with exit code 0, and the machine is stopped when it ends with another.
+
+    The command has the reason in its environment (`CAMTOOL_WHY`), never in its text: that comes
+    from the program's comments.
+    """
+
+    def __init__(self, command: str) -> None:
+        self._command = command
+        self._running: subprocess.Popen[bytes] | None = None
+        self._stops = False
+        self.trouble = ""
+        """Why the machine is being stopped, "" if it is not."""
+
+    def begin(self, why: str) -> None:
+        """Begin to answer: the program waits."""
+        if self._command == "fail":
+            self._stops, self.trouble = True, "it waits, and --at-stop is fail"
+            return
+        values = {**os.environ, "CAMTOOL_WHY": one_line(why)}
+        self._running = subprocess.Popen(  # the user's own command
+            self._command, shell=True, env=values, stdin=subprocess.DEVNULL
+        )
+
+    def __call__(self) -> Request | None:
+        """Return the request that follows from the command, once it has ended."""
+        if self._stops:
+            self._stops = False
+            return Request.STOP
+        code = None if self._running is None else self._running.poll()
+        if code is None:
+            return None
+        self._running = None
+        if code == 0:
+            return Request.RESUME
+        self.trouble = f"the command of --at-stop ended with exit code {code}"
+        return Request.STOP
+
+    def end(self) -> None:
+        """End a command that still runs: nobody needs its answer any more."""
+        if self._running is not None:
+            self._running.terminate()
+            self._running = None
+
+
 class UserRequests:
     """Return the next request each time it is called, None without one. `key` returns the pressed
     key, and `keys` maps it to a request; interrupts within `one_s` count as one."""
@@ -42,7 +120,7 @@ class UserRequests:
     def __init__(
         self,
         key: Callable[[], str] = lambda: "",
-        keys: Mapping[str, Request] | None = None,
+        keys: Mapping[str, Request | Order] | None = None,
         *,
         one_s: float = ONE_S,
     ) -> None:
@@ -54,7 +132,7 @@ class UserRequests:
         """True if the last wish came from a person at the keyboard who is still there."""
         self._watched = {each for each in _streams() if not _is_lost(each)}
 
-    def __call__(self) -> Request | None:
+    def __call__(self) -> Request | Order | None:
         self.by_hand = not self._ended
         if self._closes:
             self._closes = self._stops = 0

@@ -68,7 +68,7 @@ class MachineState(Struct, frozen=True):
     says: str = ""
     runs: bool = False
     place_mm: Place | None = None
-    overrides: Mapping[str, int] = {}
+    overrides: Mapping[Override, int] = {}
     sent: int = 0
     acknowledged: int = 0
     done: int = 0
@@ -292,7 +292,7 @@ class Session:
                 says=getattr(talk, "says", ""),
                 runs=one is not None,
                 place_mm=talk.place_mm if one is None else one.place_of(talk),
-                overrides=dict(getattr(talk, "overrides", {})),
+                overrides=dict(talk.overrides),
                 sent=talk.sent,
                 acknowledged=talk.acknowledged,
                 done=talk.done,

@@ -238,6 +238,10 @@ class Conversation(ABC):
         self.why = ""
         self.sent = self.acknowledged = self.done = 0
         self.place_mm: Place | None = None
+        self.is_program_stop = False
+        """True where it was last WAITING because the program stops for an operator (M0)."""
+        self.overrides: dict[Override, int] = {}
+        """Overrides in %, as the controller reports them or was told last."""
         self.next_s = NEVER
         """The time at which it wants `tick`; whoever calls earlier does no harm."""
         self._out: list[Action] = []

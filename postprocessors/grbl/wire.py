@@ -327,8 +327,6 @@ class GrblConversation(Conversation):
         self._feed = 0.0
         self._moves = 0  # reports in a row that it moves, while it should stop
         self._jogs = any(each.startswith(b"$J=") for each in commands)
-        self.overrides: dict[Override, int] = {}
-        """Overrides in %, as it has reported them."""
 
     @property
     def at_mm(self) -> Place | None:
@@ -609,13 +607,16 @@ class GrblConversation(Conversation):
                 self.resume(now)
         elif state.startswith("Door") and self.state is WireState.SENDING:
             self.state, self.why = WireState.WAITING, "its door is open: close it and go on"
+            self.is_program_stop = False
         elif self.state is WireState.SENDING and state == "Hold:0":
             if stale:
                 return
             if self._stops():
                 self.state, self.why = WireState.WAITING, self._stop_note()
+                self.is_program_stop = True
             elif self._holds >= MIN_HOLD_REPORTS:
                 self.state, self.why = WireState.WAITING, "it is held"
+                self.is_program_stop = False
         elif self.state is WireState.WAITING and state in ("Run", "Idle"):
             self.state, self.why = (
                 WireState.SENDING,

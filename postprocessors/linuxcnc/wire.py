@@ -26,6 +26,7 @@ from camtool.target.wire import (
     Conversation,
     Forecast,
     Manner,
+    Override,
     Packet,
     Place,
     Wire,
@@ -86,6 +87,7 @@ class LinuxcncWire(Wire):
     )
     stopping = "the program is aborted: the slides slow down and stand"
     by_hand = frozenset({"home", "zero", "jog", "line"})
+    overrides = ("feed", "spindle")
 
     def packets(
         self, data: bytes, machine: LinuxcncMachine, forecast: Forecast
@@ -174,6 +176,8 @@ class LinuxcncConversation(Conversation):
         self._skips = ""
         """Answers that begin otherwise are passed over."""
         self._begun = self._aborting = self._pausing = self._going_on = False
+        self._changes: dict[Override, int] = {}
+        """Overrides that it is to be told, %."""
         self._why_aborted = ""
         self._said = ""
         """Errors that it has reported."""
@@ -196,6 +200,13 @@ class LinuxcncConversation(Conversation):
         if self.state in HALTS or self.state is WireState.PAUSING:
             self._pausing, self._going_on = False, True
             self.state, self.why = WireState.SENDING, ""
+
+    def override(self, name: Override, percent: int, now: float) -> None:
+        """`set feed_override` or `set spindle_override` at the next turn."""
+        if name == "rapid":
+            super().override(name, percent, now)
+        else:
+            self._changes[name] = self.overrides[name] = percent
 
     def stop(self, now: float) -> None:
         """Abort."""
@@ -396,6 +407,9 @@ class LinuxcncConversation(Conversation):
 
     def _obey(self, status: str, is_still: bool) -> Script:
         """Send the user's pause or resume, and follow the status of the running program."""
+        while self._changes:
+            name, percent = self._changes.popitem()
+            yield from self._set(f"{name}_override {percent}")
         if self._pausing:
             self._pausing = False
             yield from self._set("pause")
@@ -409,6 +423,7 @@ class LinuxcncConversation(Conversation):
                 self.state, self.why = WireState.PAUSED, "single block"
             elif self.state is WireState.SENDING:
                 self.state, self.why = WireState.WAITING, "the program waits"
+                self.is_program_stop = True
         elif status == "RUNNING" and self.state in HALTS:
             self.state, self.why = (
                 WireState.SENDING,
