@@ -325,6 +325,8 @@ class GrblConversation(Conversation):
         self._reset_sent = self._slows = False
         self._acted = False  # whether anything but questions was sent
         self._feed = 0.0
+        self._aims: dict[Override, int] = {}  # overrides that are wanted, %
+        self._steered = 0  # reports since the last byte on the way there
         self._moves = 0  # reports in a row that it moves, while it should stop
         self._jogs = any(each.startswith(b"$J=") for each in commands)
 
@@ -392,10 +394,18 @@ class GrblConversation(Conversation):
             self._reset(now)
 
     def override(self, name: Override, percent: int, now: float) -> None:
-        """Real-time bytes, from the override that it reported last; they wait for nothing."""
-        before = self.overrides.get(name, 100)
-        self._write(override_bytes(name, percent, before))
-        self.overrides[name] = percent
+        """Real-time bytes, one after another as it reports them carried out."""
+        self._aims[name] = override_aim(name, percent)
+        self._steer(name)
+
+    def _steer(self, name: Override) -> None:
+        """Send the next byte on the way to the override that is wanted."""
+        step = override_step(name, self._aims[name], self.overrides.get(name, 100))
+        if step:
+            self._write(step)
+            self._steered = 0
+        else:
+            del self._aims[name]
 
     def _fail(self, reason: str, now: float) -> None:
         """Stop, and say why."""
@@ -646,9 +656,14 @@ class GrblConversation(Conversation):
         feed, before = values.get("FS", values.get("F", "")).partition(",")[0], self._feed
         self._feed = float(feed) if _FEED.fullmatch(feed) else 0.0
         self._slows = self._feed < before
-        if _OVERRIDES.fullmatch(values.get("Ov", "")):
+        reports_overrides = bool(_OVERRIDES.fullmatch(values.get("Ov", "")))
+        if reports_overrides:
             names: tuple[Override, ...] = ("feed", "rapid", "spindle")
             self.overrides = dict(zip(names, map(int, values["Ov"].split(",")), strict=True))
+        self._steered += 1
+        if self._aims and (reports_overrides or self._steered >= MAX_REPORTS_DUE):
+            for override in list(self._aims):
+                self._steer(override)
         closed = values.get("Pn", "")
         if closed and closed != self._closed and self._phase != "greeting":
             self._tell(f"it reports closed switches: {_switches(closed)}")
@@ -946,19 +961,28 @@ RAPIDS: Final = {100: 0x95, 50: 0x96, 25: 0x97}
 OVERRIDE_RANGE: Final = (10, 200)
 
 
-def override_bytes(name: Override, percent: int, before: int) -> bytes:
-    """Return the bytes that bring an override from one share of 100 % to another; rapids know 25,
-    50 and 100 %, and take the nearest of them."""
-    reset, changes = OVERRIDE_BYTES[name]
+def override_step(name: Override, percent: int, before: int) -> bytes:
+    """Return the next byte on the way of an override from one share of 100 % to another, b"" at
+    its end. grbl keeps a flag for each of these bytes and no count (system.c), so that a second
+    one is lost unless the first has been carried out."""
+    if percent == before:
+        return b""
     if name == "rapid":
-        return bytes([RAPIDS[min(RAPIDS, key=lambda known: abs(known - percent))]])
-    low, high = OVERRIDE_RANGE
-    percent = min(max(percent, low), high)
-    if percent == 100:
+        return bytes([RAPIDS[percent]])
+    reset, changes = OVERRIDE_BYTES[name]
+    by = percent - before
+    if abs(percent - 100) < abs(by):
         return bytes([reset])
-    tens, ones = divmod(abs(percent - before), 10)
-    sense = 1 if percent > before else -1
-    return bytes([changes[10 * sense]] * tens + [changes[sense]] * ones)
+    size = 10 if abs(by) >= 10 else 1
+    return bytes([changes[size if by > 0 else -size]])
+
+
+def override_aim(name: Override, percent: int) -> int:
+    """Return the override, %, that grbl can have and that is the nearest one."""
+    if name == "rapid":
+        return min(RAPIDS, key=lambda known: abs(known - percent))
+    low, high = OVERRIDE_RANGE
+    return min(max(percent, low), high)
 
 
 class GrblHand(GrblConversation, Hand):

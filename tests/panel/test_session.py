@@ -180,3 +180,20 @@ def test_a_program_with_errors_needs_an_explicit_yes(tmp_path: Path) -> None:
         loaded.prepared(single=False, first=0, resumes=False, despite_errors=False, speed=1.0)
     one, _ = loaded.prepared(single=False, first=0, resumes=False, despite_errors=True, speed=1.0)
     assert len(one.packets) == 3
+
+
+def test_an_override_is_what_the_controller_reports(tmp_path: Path) -> None:
+    """Each step goes out when grbl has reported the one before: it counts no flags twice."""
+    loaded = program(tmp_path, b"G21 G90\nG1 X150 F50\nG1 X0\n")
+    with at_panel("grbl") as at:
+        at.until_state("ready")
+        start(at, loaded)
+        at.until_state("sending")
+        for percent in (57, 200, 100):
+            at.session.override("feed", percent)
+            at.until(lambda percent=percent: at.session.state.overrides.get("feed") == percent)  # type: ignore[misc]
+            assert at.twin._feed_percent == percent
+        at.session.override("rapid", 30)
+        at.until(lambda: at.session.state.overrides.get("rapid") == 25)
+        at.session.stop()
+        at.until(lambda: any("can be resumed" in each for each in at.told))
