@@ -103,6 +103,9 @@ def proposed(drawing: Drawing, proposal: Proposal) -> list[Proposed]:
         for group in groups
         for part in _parts(drawing, group, size, proposal, steps)
     ]
+    operations = [
+        Proposed(each.group, _sided(drawing, each.part, operations)) for each in operations
+    ]
     operations.sort(key=_turn)
     names = set[str]()
     for row, each in enumerate(operations):
@@ -113,10 +116,29 @@ def proposed(drawing: Drawing, proposal: Proposal) -> list[Proposed]:
     return operations
 
 
+def _sided(drawing: Drawing, part: Part, operations: Sequence[Proposed]) -> Part:
+    """Return the part; of profiles within contours that are marked, which by themselves bound
+    nothing, with the side on which the drawing has them."""
+    if not kind_named(part.kind).runs_beside or any(key == "side" for key, _, _ in part.keys):
+        return part
+    marked = {row for each in operations if each.part.kind == "engrave" for row in each.part.rows}
+    levels = drawing.nesting.levels
+    for row in part.rows:
+        holder = int(levels.parent[row])
+        while holder >= 0 and holder not in marked:
+            holder = int(levels.parent[holder])
+        if holder >= 0:
+            side = "outside" if levels.depth[part.rows[0]] % 2 == 0 else "inside"
+            said = ("side", f'"{side}"', "what is around it is only marked")
+            return replace(part, keys=(*part.keys, said))
+    return part
+
+
 def _turn(each: Proposed) -> tuple[int, bool]:
-    """Return when a part is cut: what frees parts comes last, and edges are broken before."""
+    """Return when a part is cut: what frees parts comes last. Edges are broken after engraving,
+    for which the same bit may be in."""
     kind = kind_named(each.part.kind)
-    return CUTTING_ORDER.index(kind.cuts), kind.leaves_walls
+    return CUTTING_ORDER.index("along" if kind.breaks_edges else kind.cuts), kind.breaks_edges
 
 
 def job_template(

@@ -34,12 +34,13 @@ from camtool.geometry.polylines import Polylines, Segments, next_vertices, rever
 from camtool.kernels.offsets import distances_from, segments_within
 from camtool.planning.items import Contour, Runs, Setting, Step, contours_of
 from camtool.planning.job import Operation, Tool
-from camtool.planning.sides import runs_beside
+from camtool.planning.sides import regions_of, runs_beside
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.wanted import NO_EDGE, DrawnEdges, ProtectedRegion
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
+    from camtool.geometry.nesting import Nesting
 
 
 PLACES = (0.03, 0.25, 0.5, 0.75, 0.97)
@@ -295,42 +296,44 @@ def _kept(step: Step) -> Iterator[ProtectedRegion]:
     if operation.contract.takes == "circles":
         bored = [item.source for item in step.items]
         closed = closed[np.isin(chosen.source[closed], bored)]
-    depth = chosen.nesting.among(closed).levels.depth
-    order = np.argsort(depth, kind="stable")
-    rows, depth = closed[order], depth[order]
+    nesting = chosen.nesting.among(closed)
+    depth = nesting.levels.depth
     if operation.contract.cuts == "within":
-        lines = chosen.lines.select(rows.tolist())
+        order = np.argsort(depth, kind="stable")
+        lines = chosen.lines.select(closed[order].tolist())
         runs = tuple(run.vertices for run in step.runs)
-        yield ProtectedRegion(runs, lines, depth % 2 == 1, True, operation.beyond_mm)
+        yield ProtectedRegion(runs, lines, depth[order] % 2 == 1, True, operation.beyond_mm)
         return
-    leaves_walls = operation.contract.leaves_walls and runs_beside(operation)
-    leaves_walls = leaves_walls and operation.corners == "none"
-    for level in _levels(operation, depth) if leaves_walls else ():
-        level_rows = rows[level]
-        lines, stays = chosen.lines.select(level_rows.tolist()), chosen.rim[level_rows]
+    beside = operation.contract.leaves_walls and runs_beside(operation)
+    beside = beside and operation.corners == "none"
+    rim, judged = chosen.rim[closed], closed if beside else closed[:0]
+    for mine in _regions(operation, nesting, rim) if beside else ():
+        order = np.flatnonzero(mine)[np.argsort(depth[mine], kind="stable")]
+        rows, stays = closed[order], rim[order]
         # Beside a rim the rest of the stock is waste; beside a hole it is part.
-        for rim in (True, False):
-            names = {chosen.names[row] for row in level_rows[stays == rim].tolist()}
-            runs = _contour_runs(step, names)
-            yield ProtectedRegion(runs, lines, stays, not rim, operation.beyond_mm)
-    judged_names = {chosen.names[row] for row in rows.tolist()} if leaves_walls else set()
+        for is_rim in (True, False):
+            runs = _runs_of(step, chosen.source[rows[stays == is_rim]])
+            lines = chosen.lines.select(rows.tolist())
+            yield ProtectedRegion(runs, lines, stays, not is_rim, operation.beyond_mm)
     # Open contours are cut on their lines, wherever these are; other runs leave nothing either.
-    free_runs = tuple(run.vertices for run in step.runs if run.name not in judged_names)
-    yield ProtectedRegion(free_runs, Polylines.of([]), np.empty(0, dtype=np.bool_), False)
+    free = _runs_of(step, chosen.source[judged], others=True)
+    yield ProtectedRegion(free, Polylines.of([]), np.empty(0, dtype=np.bool_), False)
 
 
-def _levels(operation: Operation, depth: Ints) -> Iterator[Bools]:
-    """Yield masks of the closed contours that make one region, of their depths of nesting. With
-    the sides of the nesting all do. Where the job names the side, a contour in another one is cut
-    on that side too, whatever the outer one keeps: those of each depth are a region of their
-    own."""
+def _regions(operation: Operation, nesting: Nesting, rim: Bools) -> Iterator[Bools]:
+    """Yield masks of the closed contours that make one region. Where the job names the side, a
+    contour in another one is cut on that side too, whatever the outer one keeps: those of each
+    depth are a region of their own."""
     if operation.side == "auto":
-        yield np.ones(len(depth), dtype=np.bool_)
+        yield from regions_of(nesting, rim)
         return
+    depth = nesting.levels.depth
     for each in np.unique(depth).tolist():
         yield depth == each
 
 
-def _contour_runs(step: Step, names: set[str]) -> tuple[Floats, ...]:
-    """The runs of a step that are contours of these names."""
-    return tuple(run.vertices for run in step.runs if run.name in names)
+def _runs_of(step: Step, sources: Ints, *, others: bool = False) -> tuple[Floats, ...]:
+    """Return the runs of a step that are of these contours of the drawing, or of all others."""
+    source = np.array([item.source for item in step.items], dtype=np.int64)
+    of_these = np.isin(source[step.owner], sources) != others
+    return tuple(step.runs[row].vertices for row in np.flatnonzero(of_these).tolist())

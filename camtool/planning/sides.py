@@ -19,7 +19,7 @@ Not every contour bounds material, though. These do not count:
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -347,6 +347,30 @@ def _runs_along(path: Polyline, other: Polyline) -> bool:
     segments = Segments.of(path)
     points = np.concatenate([segments.start, midpoints(segments)])
     return bool((nearest(points, Segments.of(other)).distance <= SAME_CONTOUR_MM).all())
+
+
+def regions_of(nesting: Nesting, rim: Bools) -> Iterator[Bools]:
+    """Yield masks of closed contours that bound one region together: those on whose waste side the
+    nesting agrees with `rim` (whether each is the edge of a part), those on which it says the
+    contrary because of contours that were not chosen, and what is left by depth and side."""
+    left = np.ones(len(rim), dtype=np.bool_)
+    for even in (True, False):
+        mine = left.copy()
+        while mine.any():
+            rows = np.flatnonzero(mine)
+            depth = nesting.among(rows).levels.depth
+            wrong = ((depth % 2 == 0) == even) != rim[rows]
+            if not wrong.any():
+                yield mine
+                break
+            mine[rows[wrong]] = False
+        left &= ~mine
+    depth = nesting.levels.depth
+    for level in np.unique(depth[left]).tolist():
+        for is_rim in (True, False):
+            mine = left & (depth == level) & (rim == is_rim)
+            if mine.any():
+                yield mine
 
 
 def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:

@@ -365,11 +365,13 @@ def _tab_count(total_mm: float, operation: Operation) -> int:
 
 class _Corners(Struct, frozen=True, eq=False):
     """The corners of a path, (C, 2) mm each, from and to: `vertices` where it turns at all, those
-    where it turns `sharply`, and `arcs` on which it goes round corners of the drawing."""
+    where it turns `sharply`, and `arcs` on which it goes round corners of the drawing, of which
+    the `sharp_arcs` turn sharply."""
 
     vertices: Floats
     sharply: Floats
     arcs: Floats
+    sharp_arcs: Floats
 
 
 class _Fitting(Struct, frozen=True, eq=False):
@@ -430,9 +432,10 @@ class _Fitting(Struct, frozen=True, eq=False):
 
     def _is_bridge_off_corners(self, places: Floats) -> Bools:
         """Mask (P,) of the lengths at which a tab lies across no sharp corner, and its bridge not
-        round one."""
+        round one. Circles that are drawn as polygons have no sharp ones."""
         clear = self._is_clear(places, self._reach, self.corners.sharply)
-        return np.asarray(clear & self._is_clear(places, self.half_width_mm, self.corners.arcs))
+        arcs = self.corners.sharp_arcs
+        return np.asarray(clear & self._is_clear(places, self.half_width_mm, arcs))
 
     @property
     def _reach(self) -> float:
@@ -483,7 +486,8 @@ def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
     if tight.all():  # a round path is no corner
         tight = np.zeros(len(segments), dtype=np.bool_)
     arcs = np.column_stack([reach[:-1], reach[1:]])[tight]
-    return _Corners(turning(TAB_CORNER_RAD), turning(GENTLE_RAD), arcs)
+    sharply = np.abs(segments.sweep[tight]) > GENTLE_RAD
+    return _Corners(turning(TAB_CORNER_RAD), turning(GENTLE_RAD), arcs, arcs[sharply])
 
 
 def _half_length(along: MeasuredPath, centre: float, chord: float, room: float) -> float | None:

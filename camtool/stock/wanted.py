@@ -67,7 +67,7 @@ from camtool.planning.items import Chosen, Step
 from camtool.planning.job import MILLS, Operation
 from camtool.planning.reliefs import add_reliefs
 from camtool.planning.settings import Cone
-from camtool.planning.sides import runs_beside
+from camtool.planning.sides import regions_of, runs_beside
 from camtool.stock.cutters import cutter_profile
 from camtool.toolpath.moves import STOCK_TOP_MM
 
@@ -368,26 +368,25 @@ class _Layers:
             yield self._straight(lines, side, self.depth_mm, shift_mm=shift, reach_mm=reach_mm)
 
     def _walls(self) -> Iterator[tuple[Polylines, int]]:
-        """Yield closed lines that bound one region, and the side of them where the waste is.
-
-        With the sides of the nesting all do, but those whose side is the other one because of
-        contours that were not chosen; where the job names the side, those of each depth of
-        nesting do, so that a contour in another one is cut on that side too.
-        """
-        selection, closed = self.chosen, self.closed
-        depth, rim = selection.nesting.among(closed).levels.depth, selection.rim[closed]
+        """Yield closed lines that bound one region, and the side of them where the waste is. Where
+        the job names the side, those of each depth do, so that a contour in another one is cut on
+        that side too."""
+        chosen, closed = self.chosen, self.closed
+        nesting, rim = chosen.nesting.among(closed), chosen.rim[closed]
         if self.operation.side == "auto":
-            is_reversed = (depth % 2 == 0) != rim
-            groups = [(~is_reversed, OUTSIDE), (is_reversed, INSIDE)]
+            groups = list(regions_of(nesting, rim))
         else:
+            depth = nesting.levels.depth
             groups = [
-                ((depth == level) & (rim == is_rim), OUTSIDE if is_rim else INSIDE)
+                (depth == level) & (rim == is_rim)
                 for level in np.unique(depth).tolist()
                 for is_rim in (True, False)
             ]
-        for is_group, side in groups:
-            if is_group.any():
-                yield selection.lines.select(closed[is_group].tolist()), side
+        for mine in groups:
+            if mine.any():
+                outermost = nesting.among(np.flatnonzero(mine)).levels.depth == 0
+                side = OUTSIDE if rim[mine][outermost].any() else INSIDE
+                yield chosen.lines.select(closed[mine].tolist()), side
 
     def _centre_paths(self) -> Polylines:
         """The paths of the tool's centre beside the walls."""

@@ -15,6 +15,7 @@ from camtool.geometry.polylines import Polyline, Polylines
 from camtool.jobs.build import job_of_file
 from camtool.jobs.template import Proposal, job_template, proposed
 from camtool.jobs.widths import crowded, is_slot
+from camtool.pipeline import post_drawing
 from camtool.planning.job import Tool
 from camtool.planning.plan import plan, planned
 from camtool.records import replace
@@ -374,7 +375,7 @@ def test_a_ring_of_countersinks_is_one_operation(tmp_path: Path) -> None:
     assert [found[row] for row in (2, 4, 6)] == [("drill", "drill-42")] * 3
     assert found[8] == ("bore", "mill")
     kinds = [each.part.kind for each in proposed(drawing, proposal)]
-    assert kinds == ["drill", "bore", "chamfer", "chamfer", "profile"]
+    assert kinds == ["drill", "chamfer", "chamfer", "bore", "profile"]
 
 
 def test_entities_of_one_name_are_told_apart_by_their_size(tmp_path: Path) -> None:
@@ -425,6 +426,72 @@ def test_layers_are_named_by_habit(layer: str, kind: str, key: str) -> None:
     assert chosen(drawing, proposal)[0][0] == kind
     lines = job_template(drawing, None, proposal).splitlines()
     assert any(line.startswith(key) for line in lines)
+
+
+def polygon(x: float, y: float, diameter: float, sides: int = 64) -> Polyline:
+    """A circle as programs without arcs draw it."""
+    turn = np.arange(sides) * (2.0 * math.pi / sides)
+    rows = [
+        (x + 0.5 * diameter * math.cos(t), y + 0.5 * diameter * math.sin(t), 0.0) for t in turn
+    ]
+    return Polyline(np.array(rows), True)
+
+
+def test_washers_in_a_ring_are_cut_and_judged_as_parts(tmp_path: Path) -> None:
+    """The outlines of both are one operation, the window between them another: what the first
+    cuts around the washer is no fault. All are entities of one name, as a path of SVG has them."""
+    drawing = drawn(*(polygon(30, 30, each) for each in (60, 50, 24, 14)))
+    drawing = replace(drawing, sources=("path ring",) * 4)
+    proposal = with_mill()
+    kinds = {0: "profile", 1: "profile", 2: "profile", 3: "profile"}
+    assert {row: each[0] for row, each in chosen(drawing, proposal).items()} == kinds
+    (tmp_path / "tools.toml").write_text(TOOLS, encoding="utf-8")
+    text = 'tool_library = "tools.toml"\n' + job_template(drawing, None, proposal)
+    (tmp_path / "made.toml").write_text(text, encoding="utf-8")
+    run = post_drawing(drawing, job_of_file(tmp_path / "made.toml"), load_target("linuxcnc"))
+    told = {each.code.name for each in run.findings if each.severity >= Severity.WARNING}
+    assert not told & {"CUT_TOO_DEEP", "OVERCUT", "MATERIAL_LEFT", "LOOSE_PIECE", "TAB_LEFT_OUT"}
+    assert not run.failed
+
+
+def test_windows_of_a_part_that_is_only_marked_are_cut_within(tmp_path: Path) -> None:
+    """Two plates 1 mm apart are marked: the mill has no room. Their windows are still windows, and
+    what stands in one is still a part."""
+    plates = box(0, 0, 100, 60), box(101, 0, 100, 60)
+    within = box(20, 15, 30, 30), box(130, 10, 40, 40), box(140, 20, 20, 20), circle(80, 30, 8)
+    drawing, proposal = drawn(*plates, *within), with_mill(BIT)
+    found = chosen(drawing, proposal)
+    assert [found[row][0] for row in range(6)] == ["engrave"] * 2 + ["profile"] * 3 + ["bore"]
+    assert errors_of(drawing, proposal, tmp_path) == []
+    made = plan(drawing, job_of_file(tmp_path / "made.toml"), load_target("linuxcnc").machine)
+    deep = made.end[made.end[:, 2] < -1.0]
+    wall = shapely.unary_union([shapely.LinearRing(path.vertices[:, :2]) for path in within[:3]])
+    waste = shapely.unary_union(
+        [
+            shapely.box(20, 15, 50, 45),
+            shapely.box(130, 10, 170, 50).difference(shapely.box(140, 20, 160, 40)),
+            shapely.Point(80, 30).buffer(4.0),
+        ]
+    )
+    for x, y in deep[:, :2].tolist():
+        assert waste.buffer(1e-3).contains(shapely.Point(x, y))
+        if x < 60.0 or x > 120.0:
+            assert wall.distance(shapely.Point(x, y)) >= 0.5 * MILL_MM - 1e-3
+
+
+def test_each_size_of_outline_has_as_many_tabs_as_it_has_room_for() -> None:
+    """A small part beside a large one does not take its tabs."""
+    drawing = drawn(
+        box(0, 0, 200, 100),
+        *(polygon(230 + 30 * row, 20, 9 + 4 * row) for row in (0, 1)),
+        box(260, 60, 60, 30),
+    )
+    found = {
+        each.part.rows: {key: value for key, value, _ in each.part.keys}.get("tabs")
+        for each in proposed(drawing, with_mill())
+        if each.part.kind == "profile"
+    }
+    assert found == {(1, 2): '"2:6mm:1.3mm"', (0, 3): '"4:6mm:1.3mm"'}
 
 
 def test_circles_of_a_layer_for_holes_are_holes() -> None:

@@ -55,12 +55,13 @@ def propose(remaining: Remaining) -> list[Part]:
     drilled = [
         row for row, width in remaining.holes.items() if remaining.proposal.has_drill(width)
     ]
-    crowded_rows = tuple(row for row in remaining.crowded(finest) if row not in drilled)
-    if crowded_rows:
-        part = Part(f"{remaining.title} fine", "engrave", crowded_rows)
-        reason = f"lines too near to each other, or too small within, for a mill of {finest:g} mm"
-        parts.append(replace(_cut(remaining, part, f"{reason}: marked"), others=("profile",)))
-    unclear = tuple(row for row in branched if row not in crowded_rows)
+    small = tuple(row for row in remaining.crowded(finest) if row not in drilled)
+    if small:
+        part = Part(f"{remaining.title} fine", "engrave", small)
+        why = f"lines too near to each other, or too small within, for a mill of {finest:g} mm"
+        why += ": marked (a finer mill in the library, or more room, would cut them)"
+        parts.append(replace(_cut(remaining, part, why), others=("profile",)))
+    unclear = tuple(row for row in branched if row not in small)
     if unclear:
         part = Part(f"{remaining.title} branched", "engrave", unclear)
         reason = "more than two ends meet, so that it is not clear what they enclose: marked"

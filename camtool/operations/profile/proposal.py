@@ -6,7 +6,9 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 
-from camtool.geometry.measure import path_lengths
+import numpy as np
+
+from camtool.geometry.measure import path_extents, path_lengths
 from camtool.jobs.template import Part, Remaining
 from camtool.jobs.widths import SLOT_MM, is_slot
 from camtool.planning.job import Tool
@@ -53,19 +55,20 @@ def propose(remaining: Remaining) -> list[Part]:
         main = tuple(row for row in rows if row not in crowd and row not in slots)
         fine = tuple(row for row in rows if row in crowd)
         head: Keys = (("select", words, ""), ("entry", '"ramp:3deg"', ""))
-        if main:
-            tabs = _tabs(remaining, main, tool)
-            edge_words = "windows" if name == "inner" else "outlines"
-            reason = f"{edge_words} are cut along the line{', held by tabs' if tabs else ''}"
+        what = "windows" if name == "inner" else "outlines"
+        for tabs, some in _by_tabs(remaining, main, tool) if main else ():
+            why = f"{what} are cut along the line{', held by tabs' if tabs else ''}"
+            keys = (*head, *tabs)
             subject.append(
-                Part(f"{remaining.title} {name}", "profile", main, 0, (*head, *tabs), why=reason)
+                Part(f"{remaining.title} {name}", "profile", tuple(some), 0, keys, why=why)
             )
         if fine and mill is not None:
-            reason = f"there is no room for a mill of {tool:g} mm, but for {mill.name}"
-            tabs = _tabs(remaining, fine, mill.diameter_mm)
-            title = f"{remaining.title} fine {name}"
-            part = Part(title, "profile", fine, 0, (*head, *tabs), "", mill.name, reason)
-            subject.append(part)
+            why = f"there is no room for a mill of {tool:g} mm, but for {mill.name}"
+            called = f"{remaining.title} fine {name}"
+            for tabs, some in _by_tabs(remaining, fine, mill.diameter_mm):
+                keys = (*head, *tabs)
+                part = Part(called, "profile", tuple(some), 0, keys, "", mill.name, why)
+                subject.append(part)
     return subject
 
 
@@ -83,16 +86,29 @@ def _finer(remaining: Remaining, rows: Collection[int]) -> Tool | None:
     return None
 
 
-def _tabs(remaining: Remaining, outlines: Sequence[int], tool: float) -> Keys:
-    """The key for tabs of twice the tool's diameter: as many as each outline has room for, at most
-    MAX_TABS, so that they leave it at least as much as they take."""
+def _by_tabs(
+    remaining: Remaining, rows: Sequence[int], tool: float
+) -> list[tuple[Keys, list[int]]]:
+    """Return the key for tabs of twice the tool's diameter, and the contours that it is for: as
+    many as each has room for, at most MAX_TABS, so that they leave it at least as much as they
+    take. Larger contours have as many or more, so that their sizes tell the operations apart."""
     thickness = remaining.proposal.thickness_mm
-    shortest = float(path_lengths(remaining.drawing.paths.select(outlines)).min()) + math.pi * tool
-    count = min(MAX_TABS, int(0.5 * shortest / (3.0 * tool)))
-    if not thickness or not count:
-        return ()
+    if not thickness:
+        return [((), list(rows))]
+    lines = remaining.drawing.paths.select(rows)
+    sizes, of = np.unique(
+        np.ptp(path_extents(lines), axis=2).max(axis=1).round(3), return_inverse=True
+    )
+    room = 0.5 * (path_lengths(lines) + math.pi * tool) / (3.0 * tool)
+    least = np.full(len(sizes), MAX_TABS, dtype=np.int64)
+    np.minimum.at(least, of, room.astype(np.int64))
+    counts = np.minimum.accumulate(least[::-1])[::-1][of]
     # Tabs are measured from the full depth of the cut, which is below the stock.
     height = min(max(thickness / 3.0, MIN_TAB_HEIGHT_MM), thickness)
     height += remaining.proposal.breakthrough_mm
-    tabs = f'"{count}:{2.0 * tool:.3g}mm:{height:.3g}mm"'
-    return (("tabs", tabs, "so that it stays where it is; cut them by hand"),)
+    made: list[tuple[Keys, list[int]]] = []
+    for count in np.unique(counts).tolist():
+        tabs = f'"{count}:{2.0 * tool:.3g}mm:{height:.3g}mm"'
+        key = (("tabs", tabs, "so that it stays where it is; cut them by hand"),)
+        made.append((key if count else (), np.array(rows)[counts == count].tolist()))
+    return made
