@@ -55,6 +55,8 @@ RING = 8.0
 
 RAPID_LINE: Look = {"stroke": RAPID, "stroke-width": 1.4, "stroke-dasharray": "7 5"}
 STOCK_LINE: Look = {"stroke": STOCK, "stroke-width": 2.0}
+FLIP_LINE: Look = {"stroke": INK, "stroke-width": 1.6, "stroke-dasharray": "14 4 3 4"}
+PIN_MARK: Look = {"r": 5.0, "fill": STOCK, "stroke": INK, "stroke-width": 1.6}
 PLUNGE_MARK: Look = {"r": 5.0, "fill": PLUNGE, "stroke": PAPER, "stroke-width": 1.6}
 START_MARK: Look = {"r": 5.0, "fill": PAPER, "stroke": FEED, "stroke-width": 2.2}
 REVERSAL_MARK: Look = {"r": 3.4, "fill": REVERSAL, "stroke": PAPER, "stroke-width": 1.0}
@@ -336,16 +338,23 @@ def _travel_legend(content: Content, view: View) -> Iterator[LegendEntry]:
 
 
 def _stock(content: Content) -> list[Part]:
-    """The outline of the stock, where the job says where it lies."""
-    if content.scene.stock_mm is None:
-        return []
-    left, low, right, high = content.scene.stock_mm
-    name = f"stock {right - left:g} × {high - low:g} mm"
-    parts: list[Part] = [LineGroup("stock", name, content.stock, STOCK_LINE)]
-    if content.scene.swept_mm is not None:
+    """The outline of the stock, where the job says where it lies, and the line about which the
+    part is turned over."""
+    scene, parts = content.scene, list[Part]()
+    if scene.stock_mm is not None:
+        left, low, right, high = scene.stock_mm
+        name = f"stock {right - left:g} × {high - low:g} mm"
+        parts.append(LineGroup("stock", name, content.stock, STOCK_LINE))
+    if scene.stock_mm is not None and scene.swept_mm is not None:
         line = {**STOCK_LINE, "stroke-dasharray": "6 5"}
         parts.append(LineGroup("passed-over", "no clamps within", content.passed_over, line))
+    flips = content.straight(scene.flips)
+    parts.append(LineGroup("flips", "turned over about this line", flips, FLIP_LINE))
     return parts
+
+
+def _pins(content: Content) -> list[Part]:
+    return [DotGroup("pins", "alignment pin", content.scene.pins, PIN_MARK)]
 
 
 def _feeds(content: Content, plot: Plot) -> str:
@@ -495,6 +504,14 @@ LAYERS = (
         place=12,
         needs="drawing",
         hint="; [stock] of a job file says its corner and size",
+    ),
+    Layer(
+        "pins",
+        _pins,
+        height=6,
+        place=12,
+        needs="drawing",
+        hint="; pins of [[setups]] of a job file say where they are",
     ),
     Layer(
         "rapids",

@@ -88,17 +88,23 @@ def closeups(scene: Scene, options: PictureOptions) -> Iterator[tuple[str, Pictu
         yield caption, replace(usual, polar=number)
 
 
-LAID = frozenset({"drawing", "stock", "zero"})
+LAID = frozenset({"drawing", "stock", "pins", "zero"})
 """The layers of a picture that shows how the stock lies on the machine."""
 
 
 def on_stock(
     scene: Scene, swept_mm: tuple[float, float, float, float] | None = None
 ) -> tuple[Scene, PictureOptions] | None:
-    """The scene of the drawing on its stock, with part zero and the box that tools and holders
-    pass over, and its options; None without a drawing."""
+    """Return the scene of the drawing on its stock, with part zero, pins, the line about which it
+    is turned over, and the box that tools and holders pass over, and its options; None without a
+    drawing."""
     if scene.drawing is None:
         return None
-    return Scene(
-        drawing=scene.drawing, stock_mm=scene.stock_mm, swept_mm=swept_mm
-    ), PictureOptions(layers=LAID)
+    laid = Scene(
+        drawing=scene.drawing,
+        stock_mm=scene.stock_mm,
+        swept_mm=swept_mm,
+        pins=scene.pins,
+        flips=scene.flips,
+    )
+    return laid, PictureOptions(layers=LAID)

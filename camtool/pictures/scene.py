@@ -50,7 +50,8 @@ class Scene:
     trace_error_mm (T,) its distance from the wanted path, trace_cutting (T,) whether the tool cuts
     between the point before and this one (None: always); errors count only there. travel_mm is the
     size of the table's travel from (0, 0), stock_mm the stock's left, lower, right and upper edge,
-    swept_mm those of what tools and holders pass over; thickness_mm the stock's thickness.
+    swept_mm those of what tools and holders pass over; thickness_mm the stock's thickness; `pins`
+    are places of alignment pins, mm, `flips` the ends of lines about which the part is turned over.
     `tools` are the tools with the first row of the turn of each, ()
     where they are not known.
     `wanted` are the lines and arcs with which the trace
@@ -86,6 +87,8 @@ class Scene:
     stock_mm: tuple[float, float, float, float] | None = None
     swept_mm: tuple[float, float, float, float] | None = None
     thickness_mm: float | None = None
+    pins: tuple[tuple[float, float], ...] = ()
+    flips: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
     tools: tuple[tuple[int, Tool], ...] = ()
     tabs: tuple[tuple[float, float], ...] = ()
     inspected: tuple[InspectedReport, ...] = ()
@@ -254,6 +257,7 @@ def scene_of(
         from camtool.planning.place import place
 
         drawing = place(drawing, job)
+    from camtool.planning.naming import pins_of
     from camtool.verification.case import nose_of
 
     trace = verification.trace if verification is not None else None
@@ -271,6 +275,8 @@ def scene_of(
         travel_mm=_travel(toolpath, machine),
         stock_mm=None if job is None or job.stock is None else job.stock.box_mm,
         thickness_mm=None if job is None or job.stock is None else job.stock.thickness_mm,
+        pins=() if job is None else pins_of(job),
+        flips=() if job is None else _flips(job),
         tools=_turns(job, toolpath) if job and toolpath else (),
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
@@ -290,6 +296,27 @@ def scene_of(
             target if verification is not None else None,
             _bands(drawn, job, wanted_path, machine),
         ),
+    )
+
+
+FLIP_SHARE = 0.04
+"""Lines about which a part is turned over end so far beyond the stock, a share of its size."""
+
+
+def _flips(job: Job) -> tuple[tuple[tuple[float, float], tuple[float, float]], ...]:
+    """Return the ends of the lines about which the part is turned over, over all of the stock."""
+    from camtool.planning.naming import flip_lines_of
+
+    box = None if job.stock is None else job.stock.box_mm
+    if box is None:
+        return ()
+    left, low, right, high = box
+    out_x, out_y = FLIP_SHARE * (right - left), FLIP_SHARE * (high - low)
+    return tuple(
+        ((place, low - out_y), (place, high + out_y))
+        if axis == "y"
+        else ((left - out_x, place), (right + out_x, place))
+        for axis, place in flip_lines_of(job)
     )
 
 

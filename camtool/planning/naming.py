@@ -106,16 +106,15 @@ def setup_heading(job: Job) -> tuple[str, ...]:
     to it from the face that is drawn; () for a job that is no set-up."""
     if job.setup_of is None:
         return ()
-    part_job, setup = job.setup_of
-    line_mm, turn = part_job.flip_line_mm(setup), job.placement.turn
-    if line_mm is None or setup.flip is None:
+    setup = job.setup_of[1]
+    if setup.flip is None:
         return f"set-up {setup.name}", "the face that is drawn is up"
-    across, sides = (0, "left and right") if setup.flip == "y" else (1, "front and back")
-    line = turn.point((line_mm, line_mm))[across]
+    ((axis, place),) = flip_lines_of(job)
+    how = "X{:g} so that left and right" if axis == "y" else "Y{:g} so that front and back"
     return (
         f"set-up {setup.name}",
         "the other face is up",
-        f"turned over about {'XY'[across]}{line:g} so that {sides} change places",
+        f"turned over about {how.format(place)} change places",
     )
 
 
@@ -131,10 +130,7 @@ def setup_words(job: Job) -> str:
     if setup.flip is not None:
         error_mm = setup.flip_error_mm
         length = "an unknown length" if error_mm is None else f"up to {error_mm:g} mm"
-        words.append(
-            f"its cuts lie {length} beside those of the other face (flip_error), which is in no "
-            "error"
-        )
+        words.append(f"its cuts lie {length} beside those of the other face (flip_error)")
     return "; ".join(words)
 
 
@@ -144,3 +140,18 @@ def pins_of(job: Job) -> tuple[tuple[float, float], ...]:
         return ()
     places = dict.fromkeys(pin for setup in job.setup_of[0].setups for pin in setup.pins_mm)
     return tuple(map(job.placement.turn.point, places))
+
+
+def flip_lines_of(job: Job) -> tuple[tuple[str, float], ...]:
+    """Return the lines about which the part is turned over to a set-up, or from it to others,
+    each along "x" or "y", with its place in the frame of the set-up, mm."""
+    if job.setup_of is None:
+        return ()
+    whole, own = job.setup_of
+    lines: dict[tuple[str, float], None] = {}
+    for setup in whole.setups if own.flip is None else (own,):
+        place = whole.flip_line_mm(setup)
+        if setup.flip is not None and place is not None:
+            across = 0 if setup.flip == "y" else 1
+            lines[setup.flip, job.placement.turn.point((place, place))[across]] = None
+    return tuple(lines)

@@ -38,6 +38,8 @@ MILLED = replace(
     scene_of_toolpath(followed(plate()), title="", drawing=plate()),
     tool_mm=0.5,
     stock_mm=(-1.0, -1.0, 6.0, 4.0),
+    pins=((2.5, -0.5), (2.5, 3.7)),
+    flips=(((2.5, -1.2), (2.5, 4.2)),),
     tabs=((1.0, 0.5),),
     inspected=tuple(
         InspectedReport(
@@ -62,7 +64,8 @@ JUDGED = replace(SCENES["result"], worst=((4.5, 2.5), (2.5, 0.5), (4.5, 2.5)))
 GROUPS = {
     "drawing": ("drawing",),
     "swept": ("swept",),
-    "stock": ("stock",),
+    "stock": ("stock", "flips"),
+    "pins": ("pins",),
     "rapids": ("rapids",),
     "feeds": ("feeds",),
     "plunges": ("plunges",),
