@@ -61,6 +61,11 @@ def job() -> None:
 @click.option("--tool", metavar="NAME", help="The end mill; see camtool tools.")
 @click.option("--material", metavar="NAME", help="What is cut, for which the tool has a preset.")
 @click.option("--thickness", callback=length, metavar="LENGTH", help="Of the stock: cut through.")
+@click.option(
+    "--two-sided",
+    type=click.Choice(["x", "y"]),
+    help="Cut from both faces, turned over about a line along X or Y, with pins.",
+)
 @click.option("--ask", is_flag=True, help="Ask what is meant where that is in doubt.")
 @machine_options
 @drawing_options
@@ -72,6 +77,7 @@ def new(
     tool: str | None,
     material: str | None,
     thickness: float | None,
+    two_sided: str | None,
     ask: bool,
     machine: MachineFlags,
     drawing: DrawingFlags,
@@ -86,7 +92,7 @@ def new(
     """
     from camtool.geometry.drawing import is_text
     from camtool.jobs.proposal import Proposal
-    from camtool.jobs.template import job_template, proposed
+    from camtool.jobs.template import job_template, pin_words, proposed
 
     above_zero("tool diameter", tool_diameter, "mm")
     above_zero("thickness", thickness, "mm")
@@ -94,6 +100,8 @@ def new(
         raise click.UsageError("--tool has a diameter: leave --tool-diameter out")
     if material is not None and tool is None:
         raise click.UsageError("--material is for the presets of a tool: give --tool too")
+    if two_sided is not None and thickness is None:
+        raise click.UsageError("--two-sided needs the thickness of the stock: give --thickness")
     proposal = Proposal(tool_diameter or 0.0, thickness or 0.0)
     if tool is not None:
         named_values = {"tool": tool} if material is None else {"tool": tool, "material": material}
@@ -106,7 +114,9 @@ def new(
             first_tool.materials,
             material or "",
         )
-    proposal = _with_library(proposal)
+    proposal = replace(_with_library(proposal), flip=two_sided or "")
+    if two_sided is not None and not proposal.tool_mm:
+        raise click.UsageError("--two-sided needs an end mill: give --tool or --tool-diameter")
     if ask and (source == STDOUT or not sys.stdin.isatty()):
         raise click.UsageError(
             "--ask needs a terminal: leave it out, and read above each operation why it is so"
@@ -131,6 +141,8 @@ def new(
             say(
                 one_line(f"{each.part.name}: {each.part.kind}, since {each.part.why}"), quiet=quiet
             )
+    if proposal.flip:
+        say(pin_words(read, proposal), quiet=quiet)
     place = "stdout" if output == STDOUT else output
     say(f"written: {place}; look at the kinds, the tool and the depth", quiet=quiet)
 

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import math
+
 from msgspec import Struct
 
 from camtool.planning.holes import HOLE_SIZE_MM
 from camtool.planning.job import Stock, Tool
+from camtool.planning.pins import PIN_MM, ROOM_SHARE
 
 BREAKTHROUGH_MM = 0.3
 """Through cuts are proposed to go so far below the stock."""
+
+
+MAX_PIN_MM = 6.5
+"""Pins are no wider, where the library has other drills."""
+
+PIN_DEPTH_SHARE = 1.5
+"""Holes of pins go into the board below by so many of their diameters."""
 
 
 class Proposal(Struct, frozen=True):
     """The known sizes of the cut, mm, 0 where it is not: the tool's diameter, the stock's
     thickness. `tool`: its name in a library, and the materials that it has presets for, which say
     how deep passes are; `material`: the one of them that is cut, where that is said. `library`:
-    all tools that the job may name for it."""
+    all tools that the job may name for it; `flip`: the part is turned over about a line along "x"
+    or "y", "" for one that is cut from one face."""
 
     tool_mm: float = 0.0
     thickness_mm: float = 0.0
@@ -23,6 +34,29 @@ class Proposal(Struct, frozen=True):
     materials: tuple[str, ...] = ()
     material: str = ""
     library: tuple[Tool, ...] = ()
+    flip: str = ""
+
+    @property
+    def pin_drill(self) -> Tool | None:
+        """The drill for the holes of alignment pins; None where the library has none, and the tool
+        of the job drills them."""
+        return next((tool for tool in self.tools("drill") if tool.diameter_mm <= MAX_PIN_MM), None)
+
+    @property
+    def pin_mm(self) -> float:
+        """Diameter of the alignment pins."""
+        return self.pin_drill.diameter_mm if self.pin_drill else self.tool_mm or PIN_MM
+
+    @property
+    def pin_depth_mm(self) -> float:
+        """Depth of the holes of pins below the stock, without the point of their drill."""
+        return math.ceil(PIN_DEPTH_SHARE * self.pin_mm)
+
+    @property
+    def margin_mm(self) -> float:
+        """Waste of the stock all round a part that is turned over: room for the pins, and for the
+        tool that cuts the part out."""
+        return math.ceil(self.tool_mm + ROOM_SHARE * self.pin_mm)
 
     def tools(self, kind: str) -> list[Tool]:
         """Return the tools of this kind in the library, the widest first. Where the materials are

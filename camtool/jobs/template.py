@@ -25,6 +25,7 @@ from msgspec import Struct
 
 from camtool.geometry.facts import drawing_extents
 from camtool.geometry.measure import extents, path_extents
+from camtool.geometry.turn import Box
 from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, is_known
 from camtool.jobs.proposal import Proposal
 from camtool.jobs.stepped import SteppedHoles, stepped_holes
@@ -33,6 +34,7 @@ from camtool.keys import Given, Key
 from camtool.planning.holes import circle_of
 from camtool.planning.job import Operation, Stock
 from camtool.planning.kinds import SELECTING_KEYS, function_of, installed_kinds, kind_named
+from camtool.planning.pins import Pin, pins_text, proposed_pins
 from camtool.planning.sides import CONTINUOUS, Traits
 from camtool.records import replace
 from camtool.tables import toml_string
@@ -174,8 +176,12 @@ def job_template(
             _row(f'diameter = "{proposal.tool_mm:.6g}mm"', TOOL["diameter"].help),
             *_comments(TOOL),
         ]
+    if proposal.flip:
+        lines += ["", *_pins(proposal)]
     for each in parts:
         lines += ["", *_text(drawing, each.group, each.part, proposal)]
+    if proposal.flip:
+        lines += ["", *_setups(size, proposal, parts)]
     return "\n".join(lines) + "\n"
 
 
@@ -187,17 +193,101 @@ def _stock(
     thickness = f"{proposal.thickness_mm:.6g}" if is_known_thickness else "1"
     remark = "its top is Z0; the corner is its lower left one"
     yield _row("[stock]" if is_known_thickness else "# [stock]", remark)
-    yield '# corner = ["0mm", "0mm"]'
-    yield f'# size = ["{size[0]:.6g}mm", "{size[1]:.6g}mm"]'
+    if proposal.flip:
+        left, low, right, high = two_sided_stock(size, proposal)
+        yield _row(f'corner = ["{left:g}mm", "{low:g}mm"]', "waste all round, with the pins in it")
+        yield f'size = ["{right - left:.6g}mm", "{high - low:.6g}mm"]'
+    else:
+        yield '# corner = ["0mm", "0mm"]'
+        yield f'# size = ["{size[0]:.6g}mm", "{size[1]:.6g}mm"]'
     yield f'{"" if is_known_thickness else "# "}thickness = "{thickness}mm"'
     points = {tool.name: tool.point_mm for tool in proposal.library}
     drilled = [points.get(each.part.tool, 0.0) for each in parts if each.part.kind == "drill"]
     depth = proposal.breakthrough_mm + max(drilled, default=0.0)
+    if proposal.flip:
+        point = proposal.pin_drill.point_mm if proposal.pin_drill else 0.0
+        depth = max(depth, proposal.pin_depth_mm + point)
     if is_known_thickness and depth > Stock(proposal.thickness_mm).through_mm:
         board = math.ceil(10.0 * depth) / 10.0
-        yield _row(f'spoilboard = "{board:g}mm"', "so deep goes the point of the drill below it")
+        yield _row(f'spoilboard = "{board:g}mm"', "so deep go drills below it")
     else:
         yield '# spoilboard = "0.5mm"'
+
+
+BACK = ("back", "bottom", "rear", "under")
+"""Beginnings of words in the names of layers that are cut from the other face."""
+
+
+def two_sided_stock(size: tuple[float, float], proposal: Proposal) -> Box:
+    """Return the box of the stock for a part of this size that is turned over."""
+    margin = proposal.margin_mm
+    return -margin, -margin, size[0] + margin, size[1] + margin
+
+
+def two_sided_pins(size: tuple[float, float], proposal: Proposal) -> tuple[Pin, Pin]:
+    """Return the places of the alignment pins of a part of this size."""
+    line = 0.5 * size[0 if proposal.flip == "y" else 1]
+    stock, part = two_sided_stock(size, proposal), (0.0, 0.0, *size)
+    flip = proposal.flip, line
+    pins = proposed_pins(stock, part, flip, proposal.pin_mm, proposal.tool_mm)
+    assert pins is not None, "the margin has room for them"
+    return pins
+
+
+def pin_words(drawing: Drawing, proposal: Proposal) -> str:
+    """Return where the alignment pins are, and how deep they stand in the board."""
+    (left, right), (low, high) = drawing_extents(drawing).tolist()
+    pins = two_sided_pins((right - left, high - low), proposal)
+    places = " and ".join(f"X{x:g} Y{y:g}" for x, y in pins)
+    return (
+        f"pins: holes of {proposal.pin_mm:g} mm at {places}, in the waste of the stock, drilled "
+        f"{proposal.pin_depth_mm:g} mm into the board below it; turned over they meet again"
+    )
+
+
+def _pins(proposal: Proposal) -> Iterator[str]:
+    """Yield the operation that drills the holes of alignment pins."""
+    drill = proposal.pin_drill
+    name = drill.name if drill else proposal.tool or TOOL_NAME
+    yield "# the pins of [[setups]] meet again when the part is turned over"
+    yield "[[operations]]"
+    yield 'name = "pins"'
+    yield 'kind = "pins"'
+    yield f"tool = {toml_string(name)}"
+    through = f'breakthrough = "{proposal.pin_depth_mm:g}mm"'
+    yield _row(through, "so far the pins stand in the board below")
+    if drill is None:
+        yield f'peck = "{0.5 * proposal.pin_mm:.3g}mm"'
+
+
+def _setups(
+    size: tuple[float, float], proposal: Proposal, parts: Sequence[Proposed]
+) -> Iterator[str]:
+    """Yield the two set-ups: what the names of layers say is cut from the other face, and what
+    frees the part; all else from the face that is drawn."""
+    first, second = ["pins"], list[str]()
+    for each in parts:
+        words = re.split(r"[^a-z]+", each.group.name.casefold())
+        is_back = any(word.startswith(BACK) for word in words)
+        (second if is_back or _frees(each.part) else first).append(each.part.name)
+    if not second:  # without outlines the last operation frees most
+        second.append(first.pop())
+    for name, operations in (("top", first), ("bottom", second)):
+        yield "[[setups]]"
+        yield f'name = "{name}"'
+        yield f"operations = [{', '.join(map(toml_string, operations))}]"
+        if name == "top":
+            yield ""
+    sides = "left and right" if proposal.flip == "y" else "front and back"
+    yield _row(f'flip = "{proposal.flip}"', f"turned over: {sides} change places")
+    yield pins_text(two_sided_pins(size, proposal))
+    yield _row('# flip_error = "0.05mm"', "how far the faces may lie beside each other")
+    yield _row('# zero = "stock-lower-left"', "where X0 Y0 is then, if not where it was")
+
+
+def _frees(part: Part) -> bool:
+    """True for the outlines of parts, which come last."""
+    return part.kind == "profile" and not any('"inner"' in value for _, value, _ in part.keys)
 
 
 def _head(drawing: Drawing, size: tuple[float, float], machine: Machine | None) -> Iterator[str]:

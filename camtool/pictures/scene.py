@@ -51,13 +51,12 @@ class Scene:
     between the point before and this one (None: always); errors count only there. travel_mm is the
     size of the table's travel from (0, 0), stock_mm the stock's left, lower, right and upper edge,
     swept_mm those of what tools and holders pass over; thickness_mm the stock's thickness; `pins`
-    are places of alignment pins, mm, `flips` the ends of lines about which the part is turned over.
-    `tools` are the tools with the first row of the turn of each, ()
-    where they are not known.
-    `wanted` are the lines and arcs with which the trace
-    was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
-    diameter of the tool, if there is only one, and `nose` a tool that is as wide as it is deep,
-    where that changes along the path; `faults` are the places of findings of the stock, mm;
+    are places of alignment pins, mm, `flips` the ends of lines about which a part is turned over.
+    `tools` are the tools with the first row of the turn of each, () where they are not known.
+    `wanted` are the lines and arcs with which the trace was compared, `worst` the places of its
+    largest errors, mm, the largest first; `tool_mm` is the diameter of the tool, if there is only
+    one, and `nose` a tool that is as wide as it is deep, where that changes along the path;
+    `faults` are the places of findings of the stock, mm;
     `turns` are the tools of several, each with the row of the
     toolpath from which on it cuts; `rounds` are full circles with their errors.
     `tabs` are the places of tabs, mm; `inspected` the dimensions with their verdicts. `playback`

@@ -236,11 +236,11 @@ def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
     is_whole = chosen.lines.closed & (chosen.rim if contract.runs_beside else True)
     is_whole = np.asarray(is_whole & (not contract.clears))
     subjects = [contract.cut_name or ("part" if rim else "hole") for rim in chosen.rim.tolist()]
-    if contract.takes in ("circles", "holes"):
+    if contract.takes in ("circles", "holes", "pins"):
         items = [item for item in step.items if isinstance(item, Fixed)]
         is_own = np.isin(chosen.source, [item.source for item in items])
         boxes, names = boxes[is_own], [names[row] for row in np.flatnonzero(is_own).tolist()]
-        points = chosen.points if contract.takes == "holes" else chosen.points[:0]
+        points = chosen.points[:0] if contract.takes == "circles" else chosen.points
         boxes = np.concatenate([boxes, np.repeat(points[:, :, None], 2, axis=2)])
         names += chosen.point_names[: len(points)]
         is_whole, subjects = np.zeros(len(boxes), dtype=np.bool_), ["hole"] * len(boxes)

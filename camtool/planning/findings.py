@@ -110,6 +110,13 @@ class PlanningCode(Code):
         "a path chosen for `drill` is not a circle, or is larger than `max_hole`: it is left out",
         "another operation for it, or a larger `max_hole`",
     )
+    PINS_PROPOSED = (
+        236,
+        INFO,
+        "a set-up turns the part over, and has no `pins`; places are proposed where two holes "
+        "would meet again, in the waste of the stock",
+        "the pins in `[[setups]]`, and an operation of the kind `pins` in the first set-up",
+    )
     HOLE_SIZE = (
         217,
         WARNING,
@@ -232,6 +239,11 @@ class PlanningCode(Code):
 NOTHING_DRAWN = Sentence(PlanningCode.NOTHING_DRAWN, "no contour is left to cut")
 NOTHING_DRAWN_BUT_PATHS = Sentence(
     PlanningCode.NOTHING_DRAWN, "no contour is left to cut: use a smaller tool, or --side on"
+)
+PINS_PROPOSED = Sentence(
+    PlanningCode.PINS_PROPOSED,
+    "the part is turned over without alignment pins; holes of {diameter:.4g} mm would meet again "
+    "at {pins}",
 )
 NOTHING_DRAWN_TO_DRILL = Sentence(
     PlanningCode.NOTHING_DRAWN,

@@ -844,7 +844,7 @@ class Operation:
         """True if paths of this layer and colour are cut, as far as it does not select them by
         what they are."""
         return (
-            self.contract.takes != "nothing"
+            self.contract.takes_drawn
             and (not self.layers or matches(self.layers, layer))
             and (not self.colours or matches(self.colours, colour))
         )
@@ -1194,7 +1194,7 @@ class Job:
     @property
     def layers(self) -> tuple[str, ...]:
         """The patterns of the layers of all operations; empty when one of them takes all."""
-        taking = [each for each in self.operations if each.contract.takes != "nothing"]
+        taking = [each for each in self.operations if each.contract.takes_drawn]
         if not all(operation.layers for operation in taking):
             return ()
         every = (pattern for operation in taking for pattern in operation.layers)

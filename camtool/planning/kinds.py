@@ -28,7 +28,7 @@ GROUP = "camtool.operations"
 OWN_PACKAGE = "camtool.operations."
 """The prefix of camtool's own kinds: exceptions in them are faults of camtool itself."""
 
-TAKES = ("paths", "circles", "holes", "nothing")
+TAKES = ("paths", "circles", "holes", "pins", "nothing")
 CUTS = ("beside", "within", "along", "at", "over")
 DESCENTS = ("passes", "helix", "pecks", "slopes")
 RESTS = ("", "corners", "floor")
@@ -72,9 +72,10 @@ class OperationKind:
     takes of a layer what those before it have left.
 
     The drawing: `takes` is "paths" (all that are selected), "circles" among them, "holes" (circles
-    and single points), or "nothing". `cuts` is where the tool runs: "beside" closed contours,
-    "within" them (all inside is cleared or carved), "along" the lines, "at" single places, or
-    "over" the stock. `leaves_walls`: what it cuts beside or within are walls, straight down.
+    and single points), the alignment "pins" of the set-ups, or "nothing". `cuts` is where the tool
+    runs: "beside" closed contours, "within" them (all inside is cleared or carved), "along" the
+    lines, "at" single places, or "over" the stock. `leaves_walls`: what it cuts beside or within
+    are walls, straight down.
     `rest` says what an operation with `rest` may clear after it: "corners", a "floor", or nothing.
     `path_error_mm`: its centre paths may be off the drawing's by this much.
 
@@ -112,6 +113,11 @@ class OperationKind:
         ):
             if value not in words:
                 raise ValueError(f"{value!r} is none of {', '.join(words)}")
+
+    @property
+    def takes_drawn(self) -> bool:
+        """True if it takes something of the drawing."""
+        return self.takes not in ("pins", "nothing")
 
     @property
     def runs_beside(self) -> bool:

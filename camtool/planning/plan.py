@@ -62,6 +62,7 @@ from camtool.planning.order import (
     must_precede,
     travel_mm,
 )
+from camtool.planning.pins import pin_findings, with_pins
 from camtool.planning.place import SCALE_SHARE, collapse_findings, place
 from camtool.planning.settings import setting_of
 from camtool.planning.sides import Sides, choose, runs_beside, takes_mark
@@ -157,6 +158,7 @@ def _linked(
     findings += [finding for step in steps for finding in step.findings]
     findings += _left_over(placed_drawing, full_job, any(step.runs for step in steps))
     findings += _coarse(drawing, placed_drawing)
+    findings += pin_findings(placed_drawing, job)
     findings += checked(toolpath, job, machine, steps)
     made_from = PurePath(drawing.file).name
     toolpath = replace(
@@ -241,6 +243,7 @@ def _step(
     point of its `ends` and goes to the second (None: stays). `rough`: what has cleared the way,
     where it is a finishing pass."""
     chosen = choose(placed_drawing, setting.operation, sides)
+    chosen = with_pins(chosen, placed_drawing, job, setting.operation)
     work: Work = function_of(setting.operation.contract.work)(chosen, setting)
     items, tab_findings = work.items, list[Finding]()
     if contours := contours_of(items):

@@ -381,8 +381,8 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
     """
     index = np.flatnonzero(sides.taken_by(operation)).tolist()
     marks = [mark for mark in drawing.marks if takes_mark(operation, mark)]
-    takes_nothing = operation.contract.takes == "nothing"
-    if not (index or marks or takes_nothing) and (len(drawing.paths) or drawing.marks):
+    is_owed = operation.contract.takes_drawn
+    if is_owed and not (index or marks) and (len(drawing.paths) or drawing.marks):
         raise _nothing(drawing, operation)
     return Chosen(
         nesting=sides.nesting.among(np.array(index, dtype=np.int64)),

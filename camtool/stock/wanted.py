@@ -217,6 +217,10 @@ def _tabs_mm(operation: Operation) -> float:
     return 0.0 if operation.tabs is None else operation.tabs.height_mm
 
 
+DRILLED = ("holes", "pins")
+"""What operations take that drill it."""
+
+
 class _Layers:
     """The layers of an operation, on whose path tabs stand up to a height, mm."""
 
@@ -234,7 +238,7 @@ class _Layers:
         operation, contract, depth = self.operation, self.operation.contract, self.depth_mm
         if contract.cuts == "over":
             yield self._straight(Polylines.of([]), OUTSIDE, depth)
-        elif contract.cuts == "at" and contract.takes == "holes":
+        elif contract.cuts == "at" and contract.takes in DRILLED:
             yield from self._holes()
         elif contract.cuts == "within" and contract.leaves_walls:
             yield self._straight(self._region(), INSIDE, depth, shift_mm=-self._left_mm)
@@ -257,7 +261,7 @@ class _Layers:
                 box = Polyline(np.array(corners, dtype=np.float64), closed=True)
                 yield self._straight(Polylines.of([box]), INSIDE, self._floor_mm)
         elif contract.cuts == "at":
-            if contract.takes == "holes":  # others may cut anywhere along their lines
+            if contract.takes in DRILLED:  # others may cut anywhere along their lines
                 yield from self._holes()
         elif contract.cuts == "within" and contract.leaves_walls:
             if tool.kind in MILLS:

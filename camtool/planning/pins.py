@@ -1,0 +1,104 @@
+"""Places of alignment pins: two holes in the waste of the stock that meet again when the part is
+turned over.
+
+The two lie on both sides of the line, as far apart as the stock is wide, in the wider of the two
+strips beside the part that the line crosses. So they meet in no other way: turned over about the
+other axis, or turned about by half, the part has them in the other strip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from camtool.errors import OptionError
+from camtool.findings import Finding
+from camtool.geometry.drawing import Drawing
+from camtool.geometry.measure import extents
+from camtool.geometry.polylines import Polylines
+from camtool.geometry.turn import Box
+from camtool.planning.findings import PINS_PROPOSED
+from camtool.planning.items import Chosen
+from camtool.planning.job import Job, Operation
+from camtool.planning.naming import flip_lines_of, key_of, pins_of
+from camtool.records import replace
+
+ROOM_SHARE = 2.0
+"""A pin has a strip that is so many times as wide as it is."""
+
+PIN_MM = 3.0
+"""Diameter of pins for which no drill of the job says one."""
+
+Pin = tuple[float, float]
+
+
+def proposed_pins(
+    stock_mm: Box, part_mm: Box, flip: tuple[str, float], diameter_mm: float, cut_mm: float
+) -> tuple[Pin, Pin] | None:
+    """Return places of two pins in the stock, for a part that is cut out with a tool `cut_mm`
+    wide, and turned over about a line along "x" or "y", so far from zero; None without room."""
+    across = 0 if flip[0] == "y" else 1
+    along, room = 1 - across, ROOM_SHARE * diameter_mm
+    ends = [
+        (stock_mm[along], part_mm[along] - cut_mm),
+        (part_mm[along + 2] + cut_mm, stock_mm[along + 2]),
+    ]
+    low, high = max(ends, key=lambda end: end[1] - end[0])
+    half = min(flip[1] - stock_mm[across], stock_mm[across + 2] - flip[1]) - 0.5 * room
+    if high - low < room or half < room:
+        return None
+    level = round(0.5 * (low + high), 2)
+    first, second = flip[1] - half, flip[1] + half
+    return ((first, level), (second, level)) if along else ((level, first), (level, second))
+
+
+def with_pins(chosen: Chosen, placed: Drawing, job: Job, operation: Operation) -> Chosen:
+    """Return what an operation takes, with the pins of the job for one that drills these;
+    OptionError where there are none, with a proposal."""
+    if operation.contract.takes != "pins":
+        return chosen
+    pins = pins_of(job)
+    if not pins:
+        found = _proposed_for(placed, job)
+        raise OptionError(
+            "there are no alignment pins to drill",
+            where=key_of(operation, "kind"),
+            mend="write them in the [[setups]] that is turned over: "
+            + (pins_text(found) if found else "pins = [[x, y], [x, y]]"),
+        )
+    names = tuple(f"alignment pin {number}" for number in range(1, len(pins) + 1))
+    return replace(chosen, points=np.array(pins), point_names=names)
+
+
+def pin_findings(placed: Drawing, job: Job) -> list[Finding]:
+    """Return a remark that proposes pins, where a set-up turns the part over without any."""
+    if job.setup_of is None or job.setup_of[1].flip is None or pins_of(job):
+        return []
+    found = _proposed_for(placed, job)
+    return [PINS_PROPOSED(pins=pins_text(found), diameter=_pin_mm(job))] if found else []
+
+
+def pins_text(pins: Sequence[Pin]) -> str:
+    """Return pins as a job file says them."""
+    return f"pins = [{', '.join(f'[{x:g}, {y:g}]' for x, y in pins)}]"
+
+
+def _proposed_for(placed: Drawing, job: Job) -> list[Pin]:
+    """Return pins for a part in the frame of the face that is drawn, [] where there is no room, or
+    nobody knows."""
+    stock = None if job.stock is None else job.stock.box_mm
+    lines = flip_lines_of(job)
+    drawn = [each for each in (placed.paths, placed.unchosen.paths) if len(each)]
+    if stock is None or len(lines) != 1 or not drawn:
+        return []
+    (left, right), (low, high) = extents(Polylines.joined(drawn)).tolist()
+    wide = max(each.tool.diameter_mm for each in job.whole.operations)
+    found = proposed_pins(stock, (left, low, right, high), lines[0], _pin_mm(job), wide)
+    return sorted(map(job.placement.turn.back.point, found or ()))
+
+
+def _pin_mm(job: Job) -> float:
+    """Return the diameter of pins: that of the widest drill of the job."""
+    drills = [each.tool for each in job.whole.operations if each.tool.kind == "drill"]
+    return max((tool.diameter_mm for tool in drills), default=0.0) or PIN_MM
