@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from camtool.simulation.motion import Effects
     from camtool.stock.before import StockBefore
     from camtool.stock.checks import StockRequest
+    from camtool.stock.cut import CutStock
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.moves import CompensatedToolpath, Toolpath
     from camtool.toolpath.program import Program
@@ -854,23 +855,26 @@ def _stock_gates(
     """Return a finding for each limit of the stock that the moves of the slides exceed."""
     if gates is None or (gates.gouge_mm is None and gates.leftover_mm is None):
         return ()
-    from camtool.stock.checks import proved_gouge, proved_leftover
     from camtool.stock.cut import cut_stock
+    from camtool.stock.proofs import proved_gouge, proved_leftover
 
-    stock = None
-    with suppress(OptionError):
-        stock = cut_stock(case.decoded, case.target, job, case.simulation)
+    @cache
+    def cut(thin_mm: float) -> CutStock:
+        return cut_stock(case.decoded, case.target, job, case.simulation, thin_mm)
+
     gate_findings: list[Finding] = []
-    if gates.gouge_mm is not None:
-        limit_mm, gouge = gates.gouge_mm, None
-        if stock is not None and request is not None:
-            gouge = proved_gouge(stock, request, limit_mm)
-        gate_findings += stock_gate_findings("gouge", limit_mm, gouge)
-    if gates.leftover_mm is not None:
-        limit_mm, leftover = gates.leftover_mm, None
-        if stock is not None and request is not None and request.is_whole:
-            leftover = proved_leftover(stock, request, limit_mm)
-        gate_findings += stock_gate_findings("leftover", limit_mm, leftover)
+    for subject, limit_mm, proved in (
+        ("gouge", gates.gouge_mm, proved_gouge),
+        ("leftover", gates.leftover_mm, proved_leftover),
+    ):
+        if limit_mm is None:
+            continue
+        bracket = None
+        # What other programs have cut before is not left.
+        if request is not None and (request.is_whole or subject == "gouge"):
+            with suppress(OptionError):
+                bracket = proved(cut, request.solid, limit_mm, request.before)
+        gate_findings += stock_gate_findings(subject, limit_mm, bracket)
     return tuple(gate_findings)
 
 

@@ -1,7 +1,12 @@
 from camtool.arrays import Bools, Floats, Indices, Ints
 
+APART: int
 HELD: int
+MORE: int
+MORE_BEYOND: int
 ON_LINE: int
+SLOPE_X: int
+SLOPE_Y: int
 TA: int
 TB: int
 X: int
@@ -15,6 +20,8 @@ def kite_boxes(kites: Floats) -> Floats: ...
 Near = tuple[Floats, Floats, Floats, Floats]
 
 def nearest_distances(points: Floats, curves: Floats, tree: Floats) -> Floats: ...
+def chord_distances(middles: Floats, halves: Floats, curves: Floats, tree: Floats) -> Floats: ...
+def disc_tangents(points: Floats, reach: Floats, curves: Floats, tree: Floats) -> Floats: ...
 def curves_within(points: Floats, reach: Floats, curves: Floats, tree: Floats) -> Ints: ...
 
 class SegmentTree:

@@ -368,6 +368,218 @@ cpdef nearest_distances(double[:, ::1] points, double[:, ::1] curves, double[:, 
     return np.asarray(found)
 
 
+# Linear bounds of the distance from the nearest curve, along chords and over discs.
+#
+# What makes them exact: the distance from a line with ends is a convex function of the point, so
+# it lies above its tangent; the distance from the circle of an arc is convex outside of it and
+# concave inside, where it lies above its own chords. The distance from an arc is no less than that
+# from its circle, and no distance changes by more than the way.
+
+
+cdef bint faces(double[:, ::1] curves, Int i, double x, double y) noexcept:
+    """True if the nearest place of the whole line or circle of row i lies on the row itself."""
+    return bool(
+        (x - curves[i, AX]) * curves[i, TX] + (y - curves[i, AY]) * curves[i, TY] >= 0.0
+        and (x - curves[i, BX]) * curves[i, UX] + (y - curves[i, BY]) * curves[i, UY] <= 0.0
+    )
+
+
+cdef inline double power_of(double[:, ::1] curves, Int i, double x, double y) noexcept:
+    """Power of a point about the whole line or circle of row i, times the curvature: below 0 on
+    the left."""
+    qx, qy = x - curves[i, AX], y - curves[i, AY]
+    return float(
+        curves[i, BEND] * (qx * qx + qy * qy) - 2.0 * (qy * curves[i, TX] - qx * curves[i, TY])
+    )
+
+
+cdef (double, double, double) away_from(double[:, ::1] curves, Int i, double x, double y) noexcept:
+    """Distance of a point from row i, and the direction from the nearest place to the point; 0
+    where it lies there."""
+    cdef double px, py, apart, bend = curves[i, BEND], qx, qy, rx, ry
+    qx, qy = x - curves[i, AX], y - curves[i, AY]
+    rx, ry = x - curves[i, BX], y - curves[i, BY]
+    if not faces(curves, i, x, y):
+        if rx * rx + ry * ry < qx * qx + qy * qy:
+            qx, qy = rx, ry
+        apart = math.sqrt(qx * qx + qy * qy)
+        return (apart, qx / apart, qy / apart) if apart > 0.0 else (0.0, 0.0, 0.0)
+    # n − k q is k times the way from the point to the centre, and n on the line itself.
+    px, py = -curves[i, TY] - bend * qx, curves[i, TX] - bend * qy
+    rx, ry = -curves[i, TY], curves[i, TX]
+    apart = math.sqrt(px * px + py * py)
+    if apart > 0.0:
+        rx, ry = px / apart, py / apart
+    if power_of(curves, i, x, y) > 0.0:
+        rx, ry = -rx, -ry
+    return gap_to(curves, i, x, y), rx, ry
+
+
+cdef (double, double) least_along(
+    double[:, ::1] curves, Int i, double x, double y, double dx, double dy
+) noexcept:
+    """Values at the ends of a chord, with the middle (x, y) and half of it (dx, dy), of a linear
+    function that is nowhere on it more than the distance from row i."""
+    cdef double apart, nx, ny, low, high, ox, oy, radius, bend = curves[i, BEND], out
+    apart, nx, ny = away_from(curves, i, x, y)
+    out = apart - math.sqrt(dx * dx + dy * dy)
+    if bend == 0.0:
+        low = nx * dx + ny * dy
+        return apart - low, apart + low
+    radius = 1.0 / abs(bend)
+    ox, oy = x - curves[i, AX] + curves[i, TY] / bend, y - curves[i, AY] - curves[i, TX] / bend
+    apart = math.sqrt(ox * ox + oy * oy)
+    if apart < radius:
+        low = radius - math.sqrt((ox - dx) * (ox - dx) + (oy - dy) * (oy - dy))
+        high = radius - math.sqrt((ox + dx) * (ox + dx) + (oy + dy) * (oy + dy))
+    else:
+        low = (ox * dx + oy * dy) / apart
+        low, high = apart - radius - low, apart - radius + low
+    return (low, high) if min(low, high) > out else (out, out)
+
+
+cdef (double, double) most_along(
+    double[:, ::1] curves, Int i, double x, double y, double dx, double dy
+) noexcept:
+    """Values at the ends of a chord, as in `least_along`, of a linear function that is nowhere on
+    it less than the distance from row i."""
+    cdef double ox, oy, low, high, slope, apart, radius, bend = curves[i, BEND]
+    if bend == 0.0:
+        return distance_to(curves, i, x - dx, y - dy), distance_to(curves, i, x + dx, y + dy)
+    if not (faces(curves, i, x - dx, y - dy) and faces(curves, i, x + dx, y + dy)):
+        apart = distance_to(curves, i, x, y) + math.sqrt(dx * dx + dy * dy)
+        return apart, apart
+    radius = 1.0 / abs(bend)
+    ox, oy = x - curves[i, AX] + curves[i, TY] / bend, y - curves[i, AY] - curves[i, TX] / bend
+    apart = math.sqrt(ox * ox + oy * oy)
+    slope = (ox * dx + oy * dy) / apart if apart > 0.0 else 0.0
+    low = math.sqrt((ox - dx) * (ox - dx) + (oy - dy) * (oy - dy)) - radius
+    high = math.sqrt((ox + dx) * (ox + dx) + (oy + dy) * (oy + dy)) - radius
+    return max(low, radius - apart + slope), max(high, radius - apart - slope)
+
+
+cdef void nearest_two(
+    double[:, ::1] curves, double[:, ::1] tree, double x, double y, Int[::1] stack, Int[::1] row,
+    double[::1] apart
+) noexcept:
+    """Store the two curves nearest to a point and their distances; −1 and inf where there is none."""
+    cdef Int leaves = len(tree) // 2, height = 1, node, low, i
+    cdef double away
+    row[0], row[1], apart[0], apart[1] = -1, -1, math.INFINITY, math.INFINITY
+    stack[0] = 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        if apart_square(tree, node, x, y) >= apart[1] * apart[1]:
+            continue
+        if node < leaves:
+            height = wait_for_children(tree, node, x, y, stack, height)
+            continue
+        low = (node - leaves) * LEAF
+        for i in range(low, min(low + LEAF, len(curves))):
+            away = distance_to(curves, i, x, y)
+            if away < apart[0]:
+                row[1], apart[1] = row[0], apart[0]
+                row[0], apart[0] = i, away
+            elif away < apart[1]:
+                row[1], apart[1] = i, away
+
+
+cpdef chord_distances(
+    double[:, ::1] middles, double[:, ::1] halves, double[:, ::1] curves, double[:, ::1] tree
+):
+    """(K, 4) bounds of the distance from the nearest curve along chords, whose middles and half
+    ways from start to end are (K, 2): at both ends the least, at both ends the most. Between the
+    ends the distance lies between the lines through these. Along a chord that may meet a curve the
+    least is what the distance may be on either side of it, counted below 0 on the other one."""
+    cdef double[:, ::1] found = np.empty((len(middles), 4))
+    cdef Int[::1] stack = np.empty(DEPTH, np.int64), row = np.empty(2, np.int64)
+    cdef double[::1] apart = np.empty(2)
+    cdef Int k, i, leaves = len(tree) // 2, height, node, low
+    cdef double x, y, dx, dy, long_, limit, one, other
+    for k in range(len(middles)):
+        x, y, dx, dy = middles[k, 0], middles[k, 1], halves[k, 0], halves[k, 1]
+        nearest_two(curves, tree, x, y, stack, row, apart)
+        found[k, 2], found[k, 3] = most_along(curves, row[0], x, y, dx, dy)
+        long_ = math.sqrt(dx * dx + dy * dy)
+        if apart[0] <= long_:
+            found[k, 0] = found[k, 1] = apart[0] - long_
+            continue
+        limit = apart[0] + 2.0 * long_
+        found[k, 0], found[k, 1] = least_along(curves, row[0], x, y, dx, dy)
+        if apart[1] > limit:
+            continue
+        height, stack[0] = 1, 1
+        while height > 0:
+            height -= 1
+            node = stack[height]
+            if apart_square(tree, node, x, y) > limit * limit:
+                continue
+            if node < leaves:
+                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+                height += 2
+                continue
+            low = (node - leaves) * LEAF
+            for i in range(low, min(low + LEAF, len(curves))):
+                if i != row[0] and distance_to(curves, i, x, y) <= limit:
+                    one, other = least_along(curves, i, x, y, dx, dy)
+                    found[k, 0], found[k, 1] = min(found[k, 0], one), min(found[k, 1], other)
+    return np.asarray(found)
+
+
+cpdef enum:
+    # The columns of `disc_tangents` for each of two curves: the distance, its slope in x and y, and
+    # how much more than linear it may be, on the point's own side of the curve and on the other.
+    APART, SLOPE_X, SLOPE_Y, MORE, MORE_BEYOND, TANGENT_COLUMNS
+
+
+cpdef disc_tangents(
+    double[:, ::1] points, double[::1] reach, double[:, ::1] curves, double[:, ::1] tree
+):
+    """(P, 2, 5) upper bounds of the distance from the two curves nearest to each point (P, 2), within
+    `reach` (P,) of it; the distance of a second one that does not exist is inf."""
+    cdef double[:, :, ::1] found = np.zeros((len(points), 2, TANGENT_COLUMNS))
+    cdef Int[::1] stack = np.empty(DEPTH, np.int64), row = np.empty(2, np.int64)
+    cdef double[::1] apart = np.empty(2)
+    cdef double x, y, r, bend, away, radius, margin
+    cdef bint is_within
+    cdef Int k, j, i
+    for k in range(len(points)):
+        x, y, r = points[k, 0], points[k, 1], reach[k]
+        nearest_two(curves, tree, x, y, stack, row, apart)
+        for j in range(2):
+            i = row[j]
+            found[k, j, APART] = apart[j]
+            if i < 0:
+                continue
+            away, found[k, j, SLOPE_X], found[k, j, SLOPE_Y] = away_from(curves, i, x, y)
+            found[k, j, MORE], found[k, j, MORE_BEYOND] = bulge_of(away, r), math.INFINITY
+            bend = curves[i, BEND]
+            if not faces(curves, i, x, y):
+                continue
+            away = arc_length_at(
+                curves, i, x - away * found[k, j, SLOPE_X], y - away * found[k, j, SLOPE_Y]
+            )
+            margin = min(away, curves[i, LENGTH] - away)
+            if bend == 0.0:
+                if margin >= r:
+                    found[k, j, MORE] = found[k, j, MORE_BEYOND] = 0.0
+                continue
+            radius = 1.0 / abs(bend)
+            is_within = (power_of(curves, i, x, y) < 0.0) == (bend > 0.0)
+            away = radius - apart[j] if is_within else radius + apart[j]
+            if margin * away < 0.5 * math.M_PI * r * radius:
+                continue
+            found[k, j, MORE] = 0.0 if is_within else bulge_of(away, r)
+            found[k, j, MORE_BEYOND] = bulge_of(away, r) if is_within else 0.0
+    return np.asarray(found)
+
+
+cdef double bulge_of(double apart, double reach) noexcept:
+    """By how much the distance from a point, so far away, is more than linear within a disc."""
+    return reach * reach / (2.0 * apart) if reach <= 2.0 * apart else 2.0 * reach
+
+
 cdef twice_the_room(Int[:, ::1] found):
     """The same pairs (J, 2), and room for as many more."""
     cdef Int[:, ::1] more

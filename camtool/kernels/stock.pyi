@@ -16,6 +16,14 @@ class StockTree:
         grow: float = 0.0,
         before: Ints | None = None,
     ) -> Floats: ...
+    def greatest_over(
+        self,
+        corners: Floats,
+        values: Floats,
+        grow: float = 0.0,
+        before: Ints | None = None,
+        enough: float = ...,
+    ) -> Floats: ...
     def means(self, squares: Floats, bottom: float = ...) -> tuple[Floats, Floats]: ...
 
 def heights_of_moves(moves: Floats, tools: Floats, points: Floats, grow: Floats) -> Floats: ...

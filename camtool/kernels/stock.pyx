@@ -33,8 +33,7 @@ from camtool.arrays import Floats, Ints
 cdef enum:
     FAN = 8  # children of a node, and moves of a leaf
     DEPTH = 24  # levels of a tree, at most: 8 to the 24 is more than any computer holds
-    NEAREST = 8  # moves that are kept for the means of pairs
-    MAX_CORNERS = 6  # of a square that a line cuts
+    MAX_CORNERS = 8  # of a polygon
 
 # Columns of a move: start, unit direction in the plane, length in the plane, slope.
 cdef enum:
@@ -51,6 +50,8 @@ cdef enum:
 
 # A sloping move of a bull nose: halvings of the place on the move at which it is lowest.
 cdef int HALVINGS = 54
+
+CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 cdef double BEND_MM = 1e-9  # a place of a cone nearer than this to its tip or flat lies on its bend
 
@@ -250,20 +251,48 @@ cdef class StockTree:
         """(K,) an upper bound of the heights over each square: middle and half a side (K, 3);
         after the first `before` (K,) moves only. With `tilt` (K, 2) it is one of the heights over
         the plane through 0 at the middle that rises so much for each mm of x and y."""
-        cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
-        cdef double[:, ::1] slope
+        ways = squares[:, 2, None, None] * CORNERS
+        values = np.zeros(ways.shape[:2])
+        if tilt is not None:
+            values = -(ways * tilt[:, None]).sum(axis=2)
+        return self.greatest_over(squares[:, None, :2] + ways, values, grow, before)
+
+    def greatest_over(
+        self,
+        corners: Floats,
+        values: Floats,
+        double grow=0.0,
+        before: Ints | None = None,
+        double enough=-math.INFINITY,
+    ):
+        """(K,) an upper bound of the height plus a linear function, which has `values` (K, C) at the
+        corners (K, C, 2) of convex polygons or of chords, over each of them; after the first
+        `before` (K,) moves only. Any bound no more than `enough` will do."""
+        cdef double[:, :, ::1] at = np.ascontiguousarray(corners, dtype=np.float64)
+        cdef double[:, ::1] more = np.ascontiguousarray(values, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
         cdef double[::1] found = np.empty(count)
         cdef Int[::1] until
         cdef bint timed = before is not None
         cdef Int last = -1
-        slope = np.zeros((count, 2)) if tilt is None else np.ascontiguousarray(tilt)
+        cdef int c, corner_count
+        cdef double[3][MAX_CORNERS] polygon
+        if at.shape[1] > MAX_CORNERS:
+            raise ValueError(f"{at.shape[1]} corners are more than {MAX_CORNERS}")
         if timed:
             until = np.ascontiguousarray(before, dtype=np.int64)
         with nogil:
             for k in range(count):
+                corner_count = 0
+                for c in range(at.shape[1]):
+                    if c and at[k, c, 0] == at[k, c - 1, 0] and at[k, c, 1] == at[k, c - 1, 1]:
+                        continue
+                    polygon[0][corner_count] = at[k, c, 0]
+                    polygon[1][corner_count] = at[k, c, 1]
+                    polygon[2][corner_count] = more[k, c]
+                    corner_count += 1
                 found[k] = self.bound(
-                    &at[k, 0], &slope[k, 0], grow, until[k] if timed else -1, &last
+                    corner_count, polygon, grow, until[k] if timed else -1, enough, &last
                 )
         return np.asarray(found)
 
@@ -291,16 +320,19 @@ cdef class StockTree:
         cdef int levels[FAN * DEPTH]
         cdef double x = square[0], y = square[1], half = square[2]
         cdef double room = half * math.sqrt(2.0), best, floor, z, average
-        cdef double[2] level
         cdef double[2] slope
-        cdef double[4] now
+        cdef double[MAX_CORNERS] now
+        cdef double[3][MAX_CORNERS] whole
         cdef double[4] least
         cdef int count, depth, k
         cdef Int node, child, end, row = -1
         cdef double[2] way
         cdef double cover = -math.INFINITY, part
-        level[0], level[1] = 0.0, 0.0
         way[0], way[1] = 0.0, 0.0
+        for k in range(4):
+            whole[0][k] = x + (half if k & 1 else -half)
+            whole[1][k] = y + (half if k & 2 else -half)
+            whole[2][k] = 0.0
         low[0], high[0] = self.top, self.top
         if self.height == 0:
             return
@@ -308,7 +340,7 @@ cdef class StockTree:
         best = self.top
         if row >= 0:
             guess[0] = row
-            z = self.corners(row, square, level, 0.0, now)
+            z = self.corners(row, 4, whole, 0.0, now)
             if z <= best:
                 best, average = z, 0.0
                 for k in range(4):
@@ -371,7 +403,7 @@ cdef class StockTree:
                         + (half if k & 1 else -half) * slope[0]
                         + (half if k & 2 else -half) * slope[1],
                     )
-                if self.corners(child, square, level, 0.0, now) == math.INFINITY:
+                if self.corners(child, 4, whole, 0.0, now) == math.INFINITY:
                     continue
                 average = 0.0
                 for k in range(4):
@@ -511,26 +543,59 @@ cdef class StockTree:
         return self.levels[level] - self.levels[level - 1]
 
     cdef double bound(
-        self, const double* square, const double* tilt, double grow, Int before, Int* guess
+        self,
+        int corner_count,
+        double[3][MAX_CORNERS] polygon,
+        double grow,
+        Int before,
+        double enough,
+        Int* guess,
     ) noexcept nogil:
-        """Upper bound of the heights over a square, and over a plane."""
-        cdef double x = square[0], y = square[1], half = square[2]
-        cdef double steep = half * (math.fabs(tilt[0]) + math.fabs(tilt[1]))
+        """Upper bound of the heights and a linear function over a polygon: by the moves that are
+        lowest at its corners and in its middle, by the means of two of these, and by any move that
+        covers all of it."""
         cdef Int stack[FAN * DEPTH]
         cdef int levels[FAN * DEPTH]
-        cdef double corner[NEAREST][4]
-        cdef double now[4]
-        cdef double mean[NEAREST]
-        cdef int count = 0, level, kept = 0, k, j
-        cdef Int node, child, end, row, middle = -1
-        cdef double best = self.top + steep, z, room = half * math.sqrt(2.0), average
-        if self.height == 0:
+        cdef double now[MAX_CORNERS]
+        cdef double corner[MAX_CORNERS + 1][MAX_CORNERS]
+        cdef Int[MAX_CORNERS + 1] known
+        cdef int kept = 0, k, j, count, level
+        cdef Int row, node, child, end
+        cdef double best = -math.INFINITY, x = 0.0, y = 0.0, z
+        for k in range(corner_count):
+            x += polygon[0][k] / corner_count
+            y += polygon[1][k] / corner_count
+            best = max(best, self.top + polygon[2][k])
+        for k in range(-1, corner_count):
+            if best <= enough:
+                return best
+            row = -1
+            if k < 0:
+                self.lowest(x, y, grow, self.top, before, &row, guess[0])
+                if row >= 0:
+                    guess[0] = row
+            else:
+                self.lowest(
+                    polygon[0][k], polygon[1][k], grow, self.top, before, &row, guess[0]
+                )
+            for j in range(kept):
+                if known[j] == row:
+                    row = -1
+                    break
+            if row < 0:
+                continue
+            known[kept] = row
+            z = self.corners(row, corner_count, polygon, grow, corner[kept])
+            if z < math.INFINITY:
+                best = min(best, z)
+                kept += 1
+        for k in range(kept):
+            for j in range(k):
+                if best <= enough:
+                    return best
+                best = mean_bound(corner_count, corner[k], corner[j], best)
+        if best <= enough or self.height == 0:
             return best
-        self.lowest(x, y, grow, self.top, before, &middle, guess[0])
-        if middle < 0:
-            return best
-        guess[0] = middle
-        best = min(best, self.corners(middle, square, tilt, grow, now))
         stack[0], levels[0], count = 0, self.height - 1, 1
         while count:
             count -= 1
@@ -538,56 +603,33 @@ cdef class StockTree:
             row = self.levels[level] + node
             if before >= 0 and self.nodes[row, EARLIEST] >= before:
                 continue
-            if not self.nearer(&self.nodes[row, 0], x, y, room, grow) - steep < best:
-                continue
-            end = min(FAN * (node + 1), self.members(level))
-            if level:
+            for k in range(corner_count):
+                z = self.nearer(&self.nodes[row, 0], polygon[0][k], polygon[1][k], 0.0, grow)
+                if z + polygon[2][k] >= best:
+                    break
+            else:
+                end = min(FAN * (node + 1), self.members(level))
                 for child in range(FAN * node, end):
-                    stack[count], levels[count] = child, level - 1
-                    count += 1
-                continue
-            for child in range(FAN * node, end):
-                if self.moves[child, AZ] + min(
-                    self.moves[child, SLOPE] * self.moves[child, LONG], 0.0
-                ) - steep >= best or (before >= 0 and self.number[child] >= before):
-                    continue
-                z = self.corners(child, square, tilt, grow, now)
-                if z == math.INFINITY:
-                    continue
-                best = min(best, z)
-                # The moves that are lowest on the whole are kept for the means.
-                average = now[0] + now[1] + now[2] + now[3]
-                k = kept if kept < NEAREST else NEAREST - 1
-                if kept == NEAREST and average >= mean[k]:
-                    continue
-                while k > 0 and mean[k - 1] > average:
-                    mean[k] = mean[k - 1]
-                    for j in range(4):
-                        corner[k][j] = corner[k - 1][j]
-                    k -= 1
-                mean[k] = average
-                for j in range(4):
-                    corner[k][j] = now[j]
-                if kept < NEAREST:
-                    kept += 1
-        for k in range(kept):
-            for j in range(k):
-                best = mean_bound(corner[k], corner[j], best)
+                    if level:
+                        stack[count], levels[count] = child, level - 1
+                        count += 1
+                    elif before < 0 or self.number[child] < before:
+                        best = min(best, self.corners(child, corner_count, polygon, grow, now))
+                        if best <= enough:
+                            return best
         return best
 
     cdef inline double corners(
-        self, Int move, const double* square, const double* tilt, double grow, double* found
+        self, Int move, int count, double[3][MAX_CORNERS] polygon, double grow, double* found
     ) noexcept nogil:
-        """Heights of a move over a plane at the corners of a square, and the greatest of them."""
+        """Heights of a move plus the given values at the corners of a polygon, and the greatest."""
         cdef double* tool = &self.tools[self.tool[move], 0]
         cdef double* columns = &self.moves[move, 0]
-        cdef double most = -math.INFINITY, dx, dy
+        cdef double most = -math.INFINITY
         cdef int k
-        for k in range(4):
-            dx = square[2] if k & 1 else -square[2]
-            dy = square[2] if k & 2 else -square[2]
-            found[k] = height_of(columns, tool, square[0] + dx, square[1] + dy, grow)
-            found[k] -= tilt[0] * dx + tilt[1] * dy
+        for k in range(count):
+            found[k] = height_of(columns, tool, polygon[0][k], polygon[1][k], grow)
+            found[k] += polygon[2][k]
             most = max(most, found[k])
             if most == math.INFINITY:
                 break
@@ -654,12 +696,14 @@ cdef double half_plane_mean(
     return top + fan_integral(count, at) / (4.0 * half * half)
 
 
-cdef inline double mean_bound(const double* one, const double* other, double best) noexcept nogil:
-    """Least over all means of two moves of the greatest value at four corners, or `best` where
+cdef inline double mean_bound(
+    int count, const double* one, const double* other, double best
+) noexcept nogil:
+    """Least over all means of two moves of the greatest value at the corners, or `best` where
     that is less: at an end or where the lines of two corners cross."""
     cdef double share, rise, most, value
     cdef int k, j, c
-    for k in range(4):
+    for k in range(count):
         for j in range(k):
             rise = (one[k] - other[k]) - (one[j] - other[j])
             if rise == 0.0:
@@ -668,7 +712,7 @@ cdef inline double mean_bound(const double* one, const double* other, double bes
             if not 0.0 < share < 1.0:
                 continue
             most = -math.INFINITY
-            for c in range(4):
+            for c in range(count):
                 value = other[c] + share * (one[c] - other[c])
                 most = max(most, value)
             best = min(best, most)

@@ -26,7 +26,7 @@ from camtool.planning.naming import operation_name, tool_name
 from camtool.planning.sides import runs_beside
 from camtool.simulation.rows import block_of
 from camtool.stock.before import WHOLE, StockBefore, least_remaining
-from camtool.stock.cut import CutStock, cut_box
+from camtool.stock.cut import cut_box
 from camtool.stock.cutters import cutter_profile
 from camtool.stock.findings import (
     CUT_TOO_DEEP,
@@ -47,9 +47,10 @@ from camtool.stock.findings import (
     TOOL_NOT_KNOWN,
     place_words,
 )
-from camtool.stock.heights import Bracket, greatest_value, stock_tree
+from camtool.stock.heights import greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
 from camtool.stock.pieces import BEFORE, LoosePiece, loose_pieces
+from camtool.stock.proofs import JudgedStock
 from camtool.stock.wanted import WantedSolid, wanted_solid
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
@@ -76,12 +77,6 @@ SAME_PLACE_MM = 5.0
 
 REFINED_SQUARES = 20_000
 """The worst place is searched for in no more squares than this."""
-
-PROVED_SHARE = 0.05
-"""Of a limit, the width to which a value is bracketed at it."""
-
-MAX_PROVED_SQUARES = 2_000_000
-"""A limit that is not proved within so many squares counts as exceeded."""
 
 BODY_SHARE = 0.25
 """Shank and holder are looked at in steps of this part of their radius."""
@@ -182,88 +177,6 @@ def stock_findings(
     return tuple(stock_faults)
 
 
-def proved_gouge(stock: CutStock, request: StockRequest, limit_mm: float) -> Bracket:
-    """Return the greatest depth, mm, to which the slides cut below the wanted solid, outside of a
-    band of `limit_mm` beside its walls, between proved bounds; depths below the limit are not
-    searched further."""
-    return _proved(stock, limit_mm, *_Judged.of(stock.tree, request, limit_mm).gouge)
-
-
-def proved_leftover(stock: CutStock, request: StockRequest, limit_mm: float) -> Bracket:
-    """Return the greatest height, mm, to which material stands above what must be cut, as
-    `proved_gouge` does."""
-    return _proved(stock, limit_mm, *_Judged.of(stock.tree, request, limit_mm).leftover)
-
-
-def _proved(
-    stock: CutStock,
-    limit_mm: float,
-    value: Callable[[Floats], Floats],
-    upper: Callable[[Floats], Floats],
-) -> Bracket:
-    """Bracket a value over the stock, the distance of the slides from their moves included."""
-    slack_mm, beside_mm = PROVED_SHARE * limit_mm, stock.moves.beside_mm
-    floor = max(limit_mm - slack_mm - beside_mm, 0.0)
-    bracket = greatest_value(
-        value, upper, stock.box_mm, slack_mm, floor=floor, max_squares=MAX_PROVED_SQUARES
-    )
-    return Bracket(bracket.low, bracket.high + beside_mm, bracket.at_mm, bracket.squares)
-
-
-Judgement = tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]
-"""A value at points (J, 2), and upper bounds of it over squares (K, 3)."""
-
-
-class _Judged(Struct, frozen=True, eq=False):
-    """The stock after a program, of which set-ups before have cut `before`, beside what is wanted
-    of it."""
-
-    tree: StockTree
-    solid: WantedSolid
-    before: StockBefore
-
-    @classmethod
-    def of(cls, tree: StockTree, request: StockRequest, wall_mm: float) -> _Judged:
-        """Return the stock beside what a job asks for, outside of a band beside its walls."""
-        solid = WantedSolid(request.solid.may, request.solid.must, wall_mm)
-        return cls(tree, solid, request.before)
-
-    def tops(self, points: Floats, until: Ints | None = None) -> Floats:
-        """Return the heights (J,) of what is left over points (J, 2), after all moves or before
-        the moves `until` (J,)."""
-        return np.minimum(self.tree.heights(points, until)[0], self.before.tops(points))
-
-    @property
-    def gouge(self) -> Judgement:
-        """Depth of what is cut though it is to stay, mm."""
-
-        def value(points: Floats) -> Floats:
-            low = np.minimum(self.solid.bands(points)[:, 0], self.before.tops(points))
-            return low - np.maximum(self.tree.heights(points)[0], self.before.floors(points))
-
-        def upper(squares: Floats) -> Floats:
-            low = np.minimum(self.solid.bounds(squares)[:, 1], self.before.greatest_tops(squares))
-            return low - np.maximum(self.tree.least(squares), self.before.least_floors(squares))
-
-        return value, upper
-
-    @property
-    def leftover(self) -> Judgement:
-        """Height of what is left though it is to go, mm."""
-
-        def value(points: Floats) -> Floats:
-            return self.tops(points) - np.maximum(
-                self.solid.bands(points)[:, 1], self.before.floors(points)
-            )
-
-        def upper(squares: Floats) -> Floats:
-            top = np.minimum(self.tree.greatest(squares), self.before.greatest_tops(squares))
-            lowest = self.solid.bounds(squares)[:, 2]
-            return top - np.maximum(lowest, self.before.least_floors(squares))
-
-        return value, upper
-
-
 class _Points(Struct, frozen=True, eq=False):
     """Points (P, 2) beside the axes of moves, the move of each (P,), and the height of the tool's
     surface there (P,), mm."""
@@ -294,7 +207,7 @@ class _Checks:
         self.solid, self.deep_mm = request.solid, deep_mm
         self.tree: StockTree = stock_tree(moves)
         self.before: StockBefore = request.before
-        self.stock = _Judged(self.tree, self.solid, self.before)
+        self.stock = JudgedStock(self.tree, self.solid, self.before)
         lowest = np.minimum(moves.start[:, 2], moves.end[:, 2])
         self.low: Ints = np.flatnonzero(lowest < STOCK_TOP_MM - POSITION_EPS_MM)
         every = max(1, math.ceil(len(self.low) / MAX_CUTS))

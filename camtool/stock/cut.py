@@ -127,11 +127,17 @@ def _across(axis: str, at_mm: float, place: Floats) -> Floats:
 
 
 def cut_stock(
-    decoded: Toolpath, target: LoadedTarget, job: Job | None, options: Options | None = None
+    decoded: Toolpath,
+    target: LoadedTarget,
+    job: Job | None,
+    options: Options | None = None,
+    thin_mm: float | None = None,
 ) -> CutStock:
-    """Simulate a program and return the stock after it. OptionError where the tools are not known;
-    raises besides what `LoadedTarget.simulate` raises."""
-    moves = slide_moves(decoded, target, tools_of_rows(decoded, job), options)
+    """Simulate a program and return the stock after it; `thin_mm`: how far its moves may be beside
+    the slides (None: a step). OptionError where the tools are not known; raises besides what
+    `LoadedTarget.simulate` raises."""
+    tools = tools_of_rows(decoded, job)
+    moves = slide_moves(decoded, target, tools, options, thin_mm=thin_mm)
     stock = None if job is None else job.stock
     box = None if stock is None else stock.box_mm
     bottom = None if stock is None else -stock.thickness_mm

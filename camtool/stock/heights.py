@@ -9,6 +9,7 @@ squares that are done.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -147,9 +148,11 @@ def greatest_value(
         if open_.any():
             quarters = divided(squares[open_])
             bounds = np.repeat(bounds[open_], 4)
-            # The most promising squares are looked at first: they raise the best value soon.
-            order = np.argsort(bounds, kind="stable")
-            pile.append((quarters[order], bounds[order]))
+            if math.isinf(enough_value):
+                # The most promising squares are looked at first: they raise the best value soon.
+                order = np.argsort(bounds, kind="stable")
+                quarters, bounds = quarters[order], bounds[order]
+            pile.append((quarters, bounds))
     if best <= floor:
         best = -np.inf
     return Bracket(best, max(proved, best), place, examined)

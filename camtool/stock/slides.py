@@ -89,14 +89,16 @@ def slide_moves(
     options: Options | None = None,
     *,
     z_weight: float = 1.0,
+    thin_mm: float | None = None,
 ) -> StockMoves:
     """Simulate a program and return the moves of the tips that its slides make; they are
-    `z_weight` times nearer to the slides in Z than in the plane. Raises what
+    `z_weight` times nearer to the slides in Z than in the plane, and no farther from them than
+    `thin_mm` (None: THIN_MM or a step). Raises what
     `LoadedTarget.simulate` raises."""
     machine = target.machine
     axes = (machine.axes.x, machine.axes.y, machine.axes.z)
     step_mm = max(abs(axis.coded_step_mm) for axis in axes)
-    beside_mm = max(THIN_MM, THIN_STEPS * step_mm)
+    beside_mm = max(THIN_MM, THIN_STEPS * step_mm) if thin_mm is None else thin_mm
     weight = np.array([1.0, 1.0, z_weight])
     points, rows = [decoded.start[None]], [np.zeros(1, dtype=np.int64)]
     for chunk in target.simulate(decoded, options):

@@ -45,10 +45,10 @@ from functools import cached_property
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import IndexedCurves
 from camtool.geometry.distance import near_paths
-from camtool.geometry.measure import signed_areas
+from camtool.geometry.measure import point_at, signed_areas
 from camtool.geometry.nesting import Nesting, oriented
 from camtool.geometry.offset import SHARP_LIMIT, offset_each, offset_shape
 from camtool.geometry.polylines import (
@@ -59,7 +59,7 @@ from camtool.geometry.polylines import (
     reverse_lines,
 )
 from camtool.kernels.move_tree import hilbert_order
-from camtool.kernels.offsets import insides, nearest_distances
+from camtool.kernels.offsets import chord_distances, disc_tangents, insides, nearest_distances
 from camtool.planning.checks import ridge_mm
 from camtool.planning.findings import PlanningCode
 from camtool.planning.holes import HOLE_SIZE_MM, circle_of, drilled_holes
@@ -68,7 +68,7 @@ from camtool.planning.job import MILLS, Operation
 from camtool.planning.reliefs import add_reliefs
 from camtool.planning.settings import Cone
 from camtool.planning.sides import regions_of, runs_beside
-from camtool.stock.cutters import cutter_profile
+from camtool.stock.cutters import CutterProfile, cutter_profile
 from camtool.toolpath.moves import STOCK_TOP_MM
 
 INSIDE, OUTSIDE, ABOUT = 1, -1, 0
@@ -104,6 +104,8 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
     rise: float
     depth_mm: float
     reach_mm: float = math.inf
+    cutter: CutterProfile | None = None
+    """The tool whose groove about its lines the layer is."""
 
     @cached_property
     def segments(self) -> Segments:
@@ -122,12 +124,50 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
             return np.full(len(points), FAR_MM if self.side == OUTSIDE else -FAR_MM)
         points = np.ascontiguousarray(points, dtype=np.float64)
         distances = nearest_distances(points, self.curves.rows, self.curves.tree)
+        is_inwards = self._are_inwards(points)
+        return np.asarray(self.shift_mm + np.where(is_inwards, distances, -distances))
+
+    def _are_inwards(self, points: Floats) -> Bools:
+        """True (N,) for points from which distances are counted inwards."""
         if self.side == ABOUT:
-            return np.asarray(self.shift_mm - distances)
+            return np.zeros(len(points), dtype=np.bool_)
         bulge = np.ascontiguousarray(self.segments.bulge)
         is_inside = insides(points, self.curves.rows, bulge, self.curves.tree)
-        return np.asarray(
-            self.shift_mm + np.where(is_inside == (self.side == INSIDE), distances, -distances)
+        return np.asarray(is_inside == (self.side == INSIDE))
+
+    def along(self, middle: Floats, half: Floats) -> tuple[Floats, Floats]:
+        """Return the values at the ends (K, 2) of two linear functions between which s lies along
+        chords, with these middles and half ways (K, 2)."""
+        if not len(self.lines):
+            far = np.full(middle.shape, FAR_MM if self.side == OUTSIDE else -FAR_MM)
+            return far, far
+        middle, half = np.ascontiguousarray(middle), np.ascontiguousarray(half)
+        bounds = chord_distances(middle, half, self.curves.rows, self.curves.tree)
+        least, most = bounds[:, :2], bounds[:, 2:]
+        is_inwards = self._are_inwards(middle)[:, None]
+        return (
+            self.shift_mm + np.where(is_inwards, least, -most),
+            self.shift_mm + np.where(is_inwards, most, -least),
+        )
+
+    def tangents(self, points: Floats, reach: Floats) -> Floats:
+        """Return the upper bounds of `camtool.kernels.offsets.disc_tangents` of the distances from
+        the two nearest lines, within `reach` (N,) of points (N, 2)."""
+        curves = self.curves
+        return disc_tangents(np.ascontiguousarray(points), reach, curves.rows, curves.tree)
+
+    def chords(self, sagitta_mm: float) -> tuple[Floats, Floats]:
+        """Return the ends (J, 2), (J, 2) of chords of the lines and arcs, which lie no farther
+        from these than a sagitta."""
+        segments = self.segments
+        cosine = 1.0 - np.minimum(sagitta_mm / segments.radius.clip(min=sagitta_mm), 1.0)
+        parts = np.abs(segments.sweep) / np.where(segments.is_arc, 2.0 * np.arccos(cosine), 1.0)
+        count = np.ceil(parts).clip(min=1.0).astype(np.int64)
+        row = np.repeat(np.arange(len(segments)), count)
+        step = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        return (
+            point_at(segments, row, step / count[row]),
+            point_at(segments, row, (step + 1.0) / count[row]),
         )
 
     def depths(self, min_s: Floats, max_s: Floats, wall_mm: float) -> tuple[Floats, Floats]:
@@ -277,11 +317,18 @@ class _Layers:
             yield from self._grooves(self._lines(), 0.0, is_full=False)
 
     def _straight(
-        self, lines: Polylines, side: int, depth_mm: float, **more: float
+        self,
+        lines: Polylines,
+        side: int,
+        depth_mm: float,
+        *,
+        shift_mm: float = 0.0,
+        reach_mm: float = math.inf,
     ) -> WantedLayer:
         """A layer with vertical walls."""
-        shift = more.pop("shift_mm", 0.0)
-        return WantedLayer(self.name, lines, side, shift, depth_mm, 0.0, depth_mm, **more)
+        return WantedLayer(
+            self.name, lines, side, shift_mm, depth_mm, 0.0, depth_mm, reach_mm=reach_mm
+        )
 
     def _lines(self, *, closed: bool | None = None) -> Polylines:
         """The chosen lines; the open or the closed ones alone."""
@@ -449,4 +496,6 @@ class _Layers:
             base = depth
         if not is_full:
             base, depth = base - self.tabs_mm, max(depth - self.tabs_mm, 0.0)
-        yield WantedLayer(self.name, lines, ABOUT, radius + more_mm, base, rise, depth)
+        own = None if more_mm else profile
+        shift = radius + more_mm
+        yield WantedLayer(self.name, lines, ABOUT, shift, base, rise, depth, cutter=own)

@@ -378,13 +378,12 @@ ABOVE_GATE_GOUGED = Sentence(
 )
 ABOVE_GATE_STOCK = Sentence(
     VerificationCode.ABOVE_GATE,
-    "the {what} is {measured:.2f} µm at X {x:.3f} Y {y:.3f}, and proved to be {most:.2f} µm at "
-    "most; {limit:.2f} µm is allowed",
+    "the {what} is {measured:.2f} µm at X {x:.3f} Y {y:.3f}{most}; {limit:.2f} µm is allowed",
     "um",
 )
 ABOVE_GATE_NOT_PROVED = Sentence(
     VerificationCode.ABOVE_GATE,
-    "no {what} above {limit:.2f} µm was found, but only {measured:.2f} µm is proved",
+    "no {what} above {limit:.2f} µm was found, but {proved} is proved",
     "um",
 )
 ABOVE_GATE_NO_STOCK = Sentence(

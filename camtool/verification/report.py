@@ -609,7 +609,9 @@ def stock_gate_findings(
     flag, limit_um = f"--max-{subject}", limit_mm * UM_PER_MM
     if bracket is None:
         yield ABOVE_GATE_NO_STOCK(where=flag, limit=limit_um, what=subject)
-    elif bracket.low > limit_mm:
+        return
+    high_um = bracket.high * UM_PER_MM if math.isfinite(bracket.high) else None
+    if bracket.low > limit_mm:
         yield ABOVE_GATE_STOCK(
             where=flag,
             measured=bracket.low * UM_PER_MM,
@@ -617,11 +619,12 @@ def stock_gate_findings(
             what=subject,
             x=bracket.at_mm[0],
             y=bracket.at_mm[1],
-            most=bracket.high * UM_PER_MM,
+            most="" if high_um is None else f", and proved to be {high_um:.2f} µm at most",
         )
     elif bracket.high > limit_mm:
+        proved = "nothing" if high_um is None else f"only {high_um:.2f} µm"
         yield ABOVE_GATE_NOT_PROVED(
-            where=flag, measured=bracket.high * UM_PER_MM, limit=limit_um, what=subject
+            where=flag, measured=high_um, limit=limit_um, what=subject, proved=proved
         )
 
 

@@ -22,8 +22,6 @@ from camtool.planning.plan import Plan, planned
 from camtool.records import replace
 from camtool.stock.checks import (
     StockRequest,
-    proved_gouge,
-    proved_leftover,
     stock_findings,
     stock_request,
 )
@@ -31,7 +29,9 @@ from camtool.stock.cut import cut_stock
 from camtool.stock.cutters import cutter_profile
 from camtool.stock.findings import StockCode
 from camtool.stock.moves import stock_moves_of_toolpath
+from camtool.stock.proofs import proved_gouge, proved_leftover
 from camtool.stock.slides import tools_of_rows
+from camtool.stock.wanted import wanted_solid
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.report import Gates
@@ -259,12 +259,11 @@ def test_a_gouge_is_bracketed(deeper: float, limit: float) -> None:
     plan = plan_of(Operation(kind="pocket", tool=MILL, depth_mm=2.0))
     change = lowered(plan.toolpath, lambda z: np.where(z == -2.0, -2.0 - deeper, z))
     target = load_target("linuxcnc")
-    stock = cut_stock(change, target, plan.job)
-    found = proved_gouge(stock, stock_request(plan.steps, plan.job, 0.01), limit)
-    slack = 0.05 * limit + stock.moves.beside_mm
+    stock = cut_stock(change, target, plan.job, None, 1e-4)
+    found = proved_gouge(lambda _: stock, wanted_solid(plan.steps), limit)
     if deeper > limit:
-        assert found.low == pytest.approx(deeper, abs=stock.moves.beside_mm)
-        assert found.low <= deeper + stock.moves.beside_mm <= found.high + slack
+        assert found.low <= deeper <= found.high
+        assert found.high - found.low <= 0.2 * deeper
     else:
         assert found.low < limit
         assert found.high <= limit + 1e-9
@@ -273,13 +272,13 @@ def test_a_gouge_is_bracketed(deeper: float, limit: float) -> None:
 def test_what_is_left_is_bracketed() -> None:
     plan = plan_of(Operation(kind="pocket", tool=MILL, depth_mm=2.0))
     higher = lowered(plan.toolpath, lambda z: np.where(z == -2.0, -1.9, z))
-    stock = cut_stock(higher, load_target("linuxcnc"), plan.job)
-    request = stock_request(plan.steps, plan.job, 0.01)
-    found = proved_leftover(stock, request, 0.05)
-    assert found.low == pytest.approx(0.1, abs=stock.moves.beside_mm)
-    assert found.high >= 0.1
-    exact = cut_stock(plan.toolpath, load_target("linuxcnc"), plan.job)
-    assert proved_leftover(exact, request, 0.05).high <= 0.05
+    target, solid = load_target("linuxcnc"), wanted_solid(plan.steps)
+    stock = cut_stock(higher, target, plan.job, None, 1e-4)
+    found = proved_leftover(lambda _: stock, solid, 0.05)
+    assert found.low <= 0.1 <= found.high
+    assert found.high - found.low <= 0.02
+    exact = cut_stock(plan.toolpath, target, plan.job, None, 1e-4)
+    assert proved_leftover(lambda _: exact, solid, 0.05).high <= 0.05
 
 
 def test_limits_of_the_stock_are_gates() -> None:
