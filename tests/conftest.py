@@ -1,5 +1,6 @@
 """Settings shared by all tests."""
 
+import gc
 import os
 import signal
 
@@ -21,6 +22,10 @@ os.fsync = lambda handle: None
 # depends on the tests that ran before in the same process: examples would differ between runs.
 providers.is_local_module_file = lambda path: False
 
+# Of a run, a quarter would be searches for garbage, each of which looks at thousands of tests that
+# are kept. Commands search as seldom as this.
+gc.set_threshold(150_000)
+
 # No deadline: speed is no matter of tests here.
 settings.register_profile(
     "default",
@@ -31,6 +36,11 @@ settings.register_profile(
 )
 settings.register_profile("nightly", parent=settings.get_profile("default"), max_examples=2000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
+
+
+def pytest_collection_finish() -> None:
+    """The tests that were collected are kept to the end: no search looks at them."""
+    gc.freeze()
 
 
 def pytest_configure() -> None:
