@@ -407,15 +407,11 @@ def verify_program(
         progress.begin(PLANNING)
         plan = planned(drawing, job_used, machine)
         compensation = _compensate(plan.toolpath, machine) if job_used.compensate else None
-        request = _program_request(job_used, target, plan.toolpath, compensation)
+        order = _program_request(job_used, target, plan.toolpath, compensation)
         if compensation is None and _without_measures(job_used) != job_used:
             plan = planned(drawing, job_used, machine, undivided=True)
         case = replace(
-            case,
-            wanted=plan.toolpath,
-            drawing=plan.placed,
-            compensated=compensation,
-            asked=request,
+            case, wanted=plan.toolpath, drawing=plan.placed, compensated=compensation, asked=order
         )
         protected = kept_of(plan.steps)
         before = _stock_before(drawing, job_used, machine)

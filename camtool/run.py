@@ -102,13 +102,9 @@ class Run(Shown):
             return None
 
         def listing() -> Listing | None:
-            target_listing = target.target.listing(program.data, target.machine)
+            text = target.target.listing(program.data, target.machine)
             last = int(decoded.block.max(initial=-1))
-            return (
-                target_listing
-                if target_listing is not None and last < len(target_listing.blocks)
-                else None
-            )
+            return text if text is not None and last < len(text.blocks) else None
 
         return listing
 

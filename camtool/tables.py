@@ -204,21 +204,17 @@ def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
     return f"{guess(key, known_keys)}known keys: {', '.join(known_keys)}"
 
 
-def _refuse_infinite(value: object, file: str, prefix: str) -> None:
+def _refuse_infinite(value: object, file: str, path: str) -> None:
     """Raise MachineError for inf and nan, which TOML allows and no machine has."""
     if isinstance(value, float) and not math.isfinite(value):
-        raise MachineError(
-            "is not finite", file=file, where=f"key {prefix}", mend="write a number"
-        )
+        raise MachineError("is not finite", file=file, where=f"key {path}", mend="write a number")
     items: Callable[[], Any] | None = getattr(value, "items", None)
     if items is not None:
         for key, item in items():
-            _refuse_infinite(item, file, f"{prefix}.{key}" if prefix else str(key))
+            _refuse_infinite(item, file, f"{path}.{key}" if path else str(key))
     elif isinstance(value, list):
         for number, item in enumerate(value, 1):
-            _refuse_infinite(
-                item, file, f"{prefix} {number}" if isinstance(item, dict) else prefix
-            )
+            _refuse_infinite(item, file, f"{path} {number}" if isinstance(item, dict) else path)
 
 
 # Tables as text again.

@@ -326,20 +326,16 @@ def _estimates(model: Model, solution: Solution, machine: Machine) -> list[Estim
         if not solution.free[column]:
             continue
         before, value = float(start[column]), float(solution.values[column])
-        deviation = solution.uncertainty([column])
+        sigma = solution.uncertainty([column])
         quantity = parameter.what
         if parameter == SQUARENESS:
-            before, value, deviation = (
-                math.atan(before),
-                math.atan(value),
-                deviation / (1.0 + value**2),
-            )
+            before, value, sigma = (math.atan(before), math.atan(value), sigma / (1.0 + value**2))
         elif quantity == "scale":
             axis: Axis = getattr(machine.axes, parameter.axis)
             coded, quantity = axis.coded_step_mm, "step"
-            before, value, deviation = axis.real_step_mm, value * coded, deviation * coded
+            before, value, sigma = axis.real_step_mm, value * coded, sigma * coded
         count = int(depends[:, column].sum())
-        stated = deviation if math.isfinite(deviation) else None
+        stated = sigma if math.isfinite(sigma) else None
         estimates.append(
             Estimate(quantity, parameter.axis, parameter.region, before, value, stated, count)
         )

@@ -106,13 +106,9 @@ def new(
     if tool is not None:
         named_values = {"tool": tool} if material is None else {"tool": tool, "material": material}
         named = JobFlags(given=named_values, project=project_of(Path.cwd())).job(drawing)
-        first_tool = named.operations[0].tool
+        cutter = named.operations[0].tool
         proposal = Proposal(
-            first_tool.diameter_mm,
-            proposal.thickness_mm,
-            tool,
-            first_tool.materials,
-            material or "",
+            cutter.diameter_mm, proposal.thickness_mm, tool, cutter.materials, material or ""
         )
     proposal = replace(_with_library(proposal), flip=two_sided or "")
     if two_sided is not None and not proposal.tool_mm:

@@ -180,17 +180,12 @@ class MachineFlags:
         if machine is not None:
             return cls(target, str(project.machine_named(machine)), settings)
         if target is None:
-            own_machine = project.machine
-            by_default = own_machine is not None or project.target is not None
-            return cls(
-                project.target,
-                None if own_machine is None else str(own_machine),
-                settings,
-                by_default,
-            )
-        own_machine = project.find(target)
-        if own_machine is not None and target not in target_names():
-            return cls(None, str(own_machine), settings)
+            file = project.machine
+            by_default = file is not None or project.target is not None
+            return cls(project.target, None if file is None else str(file), settings, by_default)
+        file = project.find(target)
+        if file is not None and target not in target_names():
+            return cls(None, str(file), settings)
         return cls(target, None, settings)
 
     def load(self) -> LoadedTarget:

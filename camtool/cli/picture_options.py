@@ -311,12 +311,8 @@ class Painter:
         from camtool.pictures.draw import render
         from camtool.pictures.picture import on_stock
 
-        scene_and_options = on_stock(self.scenes[-1], swept_mm)
-        return (
-            None
-            if scene_and_options is None
-            else render(scene_and_options[0], CLOSEUP, scene_and_options[1])
-        )
+        picture = on_stock(self.scenes[-1], swept_mm)
+        return None if picture is None else render(picture[0], CLOSEUP, picture[1])
 
     def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
         """Yield warnings about empty layers, and about errors if nothing could be judged."""

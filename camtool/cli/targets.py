@@ -177,34 +177,29 @@ def _table(rows: list[dict[str, Any]], machines: list[dict[str, Any]]) -> None:
 
 
 def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bool) -> None:
-    loaded_target = MachineFlags.of(name, machine, settings).load()
-    values = loaded_target.values()
+    target = MachineFlags.of(name, machine, settings).load()
+    values = target.values()
     if as_json:
         write_all({STDOUT: to_json(values).encode()})
         return
     for key, value in flat_lines("", values):
         show_text(f"{key} = {to_json(value, indent=0)}".rstrip("\n"))
-    for name, cells in (
-        ("x", loaded_target.machine.play_map.x),
-        ("y", loaded_target.machine.play_map.y),
-    ):
+    for name, cells in (("x", target.machine.play_map.x), ("y", target.machine.play_map.y)):
         if cells is not None:
-            show_text(
-                "\n" + "\n".join(_backlash_table(name, cells, loaded_target.machine)), err=True
-            )
+            show_text("\n" + "\n".join(_backlash_table(name, cells, target.machine)), err=True)
     unknown = [key for key, value in flat_lines("", values["uncertainty"]) if value is None]
     if unknown:
         show_text(f"\nuncertainties that are not known: {', '.join(unknown)}", err=True)
-    for code in loaded_target.target.codes:
+    for code in target.target.codes:
         grave = " or ".join(severity.name.lower() for severity in code.severities)
         show_text(f"\n{code.name} ({grave}): {code.means}; to fix it: {code.mend}", err=True)
     show_text(
-        f"\nhighest feed {_speed(loaded_target.machine.max_feed_mm_min)}, "
-        f"rapids {_speed(loaded_target.machine.rapid_mm_min)}; "
+        f"\nhighest feed {_speed(target.machine.max_feed_mm_min)}, "
+        f"rapids {_speed(target.machine.rapid_mm_min)}; "
         "every number's source is in the target's own file:",
         err=True,
     )
-    say(f"{loaded_target.file}", quiet=False)
+    say(f"{target.file}", quiet=False)
 
 
 def _backlash_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[str]:

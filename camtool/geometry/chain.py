@@ -148,18 +148,13 @@ def _sorted_chains(
 def _closed_gaps(lots: Sequence[JoinedChains], layers: Sequence[str]) -> list[Gap]:
     """Return the bridged gaps, in the order of the first members of their chains."""
     numbered_gaps: list[tuple[int, Gap]] = []
-    for joined_lot in lots:
-        paths = joined_lot.chains.entries // 2
+    for batch in lots:
+        paths = batch.chains.entries // 2
         first_members = (
-            np.minimum.reduceat(paths, joined_lot.chains.begins[:-1])
-            if len(joined_lot.chains)
-            else paths
+            np.minimum.reduceat(paths, batch.chains.begins[:-1]) if len(batch.chains) else paths
         )
         for chain_of, place, size in zip(
-            joined_lot.gap_chain.tolist(),
-            joined_lot.gap_at.tolist(),
-            joined_lot.gap_size.tolist(),
-            strict=True,
+            batch.gap_chain.tolist(), batch.gap_at.tolist(), batch.gap_size.tolist(), strict=True
         ):
             path = int(first_members[chain_of])
             numbered_gaps.append((path, Gap((place[0], place[1]), size, layers[path])))

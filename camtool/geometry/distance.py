@@ -120,12 +120,10 @@ def approach(a: Polyline, b: Polyline) -> NearestApproach:
     return best
 
 
-def near_paths(
-    lines: Polylines, other_lines: Polylines, reach_mm: float
-) -> Iterator[tuple[int, int]]:
+def near_paths(lines: Polylines, targets: Polylines, reach_mm: float) -> Iterator[tuple[int, int]]:
     """Yield pairs of paths whose boxes come within `reach_mm` of each other."""
     one, other = (
-        path_extents(each).transpose(0, 2, 1).reshape(-1, 4) for each in (lines, other_lines)
+        path_extents(each).transpose(0, 2, 1).reshape(-1, 4) for each in (lines, targets)
     )
     for rows, columns in box_pairs(one, other, reach_mm=reach_mm):
         yield from zip(rows.tolist(), columns.tolist(), strict=True)

@@ -324,13 +324,9 @@ def _neighbours(segments: Segments) -> tuple[Ints, Ints]:
     return before, after
 
 
-def _one_passage(crossings: Crossings, segments: Segments) -> Bools:
+def _one_passage(pairs: Crossings, segments: Segments) -> Bools:
     """True for the vertex that a row shares with the next one of its path."""
     _, after = _neighbours(segments)
-    a_first = (
-        (after[crossings.row_a] == crossings.row_b) & (crossings.ta == 1.0) & (crossings.tb == 0.0)
-    )
-    b_first = (
-        (after[crossings.row_b] == crossings.row_a) & (crossings.tb == 1.0) & (crossings.ta == 0.0)
-    )
+    a_first = (after[pairs.row_a] == pairs.row_b) & (pairs.ta == 1.0) & (pairs.tb == 0.0)
+    b_first = (after[pairs.row_b] == pairs.row_a) & (pairs.tb == 1.0) & (pairs.ta == 0.0)
     return np.asarray(a_first | b_first)

@@ -187,12 +187,8 @@ def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
 
 def _seen_from_partners(boundary: Boundary, trace: MedialTrace) -> MedialTrace:
     """Discs at the touching points on partners that show no such partner next to that place."""
-    has_other_partner = trace.partner != trace.element
-    element, t, partner = (
-        trace.partner[has_other_partner],
-        trace.u[has_other_partner],
-        trace.element[has_other_partner],
-    )
+    is_pair = trace.partner != trace.element
+    element, t, partner = (trace.partner[is_pair], trace.u[is_pair], trace.element[is_pair])
     # Numbers that sort as element and place do; places lie in 0 … 1.
     key, wanted_keys = 2.0 * trace.element + trace.t, 2.0 * element + t
     after = np.clip(np.searchsorted(key, wanted_keys), 1, len(trace) - 1)

@@ -284,21 +284,15 @@ def shape_stages(lines: Polylines, offset: Offset) -> Stages:
     trimmed = trim_raw(raw, source, offset)
     elements, cutting_elements = trimmed.elements, None
     # Only where paths meet can what is on their right end what is on their left.
-    meeting_paths = _touching_paths(lines)
-    if len(meeting_paths):
+    pairs = _touching_paths(lines)
+    if len(pairs):
         right = raw_offset(reverse_lines(lines), replace(offset, limit=math.inf))
         cutting_elements = trim_raw(right, source, offset).elements
     slices = slice_elements(elements, cutting_elements)
     valid = valid_slices(slices, elements, source, offset)
     final_slices = without_dead_ends(without_doubles(slices[valid], elements))
     return Stages(
-        raw,
-        trimmed,
-        slices,
-        valid,
-        final_slices,
-        trace_loops(final_slices, elements),
-        meeting_paths,
+        raw, trimmed, slices, valid, final_slices, trace_loops(final_slices, elements), pairs
     )
 
 

@@ -122,28 +122,19 @@ def _intervals(lines: Polylines, groups: Ints, tolerance: float) -> Intervals:
     )
 
 
-def _remaining_spans(
-    intervals: Intervals, coverings: Covers, tolerance: float
-) -> dict[int, _Spans]:
+def _remaining_spans(items: Intervals, laps: Covers, tolerance: float) -> dict[int, _Spans]:
     """Return the remaining spans of each loose interval that is covered by what stays."""
-    rank = _ranks(intervals, np.unique(np.concatenate([coverings.a, coverings.b])))
+    rank = _ranks(items, np.unique(np.concatenate([laps.a, laps.b])))
     # A loose interval yields to what is not loose, and to loose ones that rank before it.
-    yields = ~intervals.loose[coverings.b] | (rank[coverings.b] < rank[coverings.a])
-    order = np.argsort(rank[coverings.a], kind="stable")
+    yields = ~items.loose[laps.b] | (rank[laps.b] < rank[laps.a])
+    order = np.argsort(rank[laps.a], kind="stable")
     order = order[yields[order]]
-    columns = (
-        coverings.a,
-        coverings.b,
-        coverings.begin,
-        coverings.end,
-        coverings.shift,
-        coverings.sense,
-    )
+    columns = (laps.a, laps.b, laps.begin, laps.end, laps.shift, laps.sense)
     remaining: dict[int, _Spans] = {}
     for a, b, begin, end, shift, sense in zip(
         *(column[order].tolist() for column in columns), strict=True
     ):
-        spans = remaining.get(a, [(0.0, float(intervals.length[a]))])
+        spans = remaining.get(a, [(0.0, float(items.length[a]))])
         if b in remaining:
             other_spans = [
                 sorted((shift + sense * low, shift + sense * high)) for low, high in remaining[b]
@@ -154,9 +145,7 @@ def _remaining_spans(
         for low, high in hidden:
             spans = _subtract_span(spans, low, high, tolerance)
         remaining[a] = spans
-    untouched = {
-        a for a, spans in remaining.items() if spans == [(0.0, float(intervals.length[a]))]
-    }
+    untouched = {a for a, spans in remaining.items() if spans == [(0.0, float(items.length[a]))]}
     return {a: spans for a, spans in remaining.items() if a not in untouched}
 
 
@@ -296,29 +285,21 @@ def covers(all_of: Intervals, within_mm: float) -> Covers:
     return Covers(*map(np.concatenate, zip(*map(astuple, every), strict=True)))
 
 
-def _on_lines(intervals: Intervals, within_mm: float) -> Iterator[Covers]:
+def _on_lines(items: Intervals, within_mm: float) -> Iterator[Covers]:
     """Bin by bin: lines of nearly one direction, turned level so that their boxes are flat."""
-    lines = np.flatnonzero(~np.isnan(intervals.direction[:, 0]))
-    angle = np.arctan2(intervals.direction[lines, 1], intervals.direction[lines, 0])
+    lines = np.flatnonzero(~np.isnan(items.direction[:, 0]))
+    angle = np.arctan2(items.direction[lines, 1], items.direction[lines, 0])
     of_bin = np.round(angle / (np.pi / BINS)).astype(np.int64) % BINS
-    for number in np.unique(of_bin[intervals.loose[lines]]).tolist():
-        bin_lines = lines[(of_bin - number + 1) % BINS <= 2]
-        is_searched = intervals.loose[bin_lines] & (
-            of_bin[(of_bin - number + 1) % BINS <= 2] == number
-        )
-        boxes = _level_boxes(intervals, bin_lines, number * np.pi / BINS, 0.5 * within_mm)
+    for number in np.unique(of_bin[items.loose[lines]]).tolist():
+        rows = lines[(of_bin - number + 1) % BINS <= 2]
+        is_searched = items.loose[rows] & (of_bin[(of_bin - number + 1) % BINS <= 2] == number)
+        boxes = _level_boxes(items, rows, number * np.pi / BINS, 0.5 * within_mm)
         pairs = touching_boxes(
-            boxes,
-            intervals.group[bin_lines],
-            intervals.path[bin_lines],
-            is_searched,
-            max_pairs=MAX_PAIRS,
+            boxes, items.group[rows], items.path[rows], is_searched, max_pairs=MAX_PAIRS
         )
         for a, b in (pairs, pairs[::-1]):
             is_loose = is_searched[a]
-            yield _shared_line(
-                intervals, bin_lines[a[is_loose]], bin_lines[b[is_loose]], within_mm
-            )
+            yield _shared_line(items, rows[a[is_loose]], rows[b[is_loose]], within_mm)
 
 
 def _level_boxes(intervals: Intervals, rows: Ints, angle: float, margin: float) -> Floats:

@@ -344,11 +344,9 @@ def _crossing_findings(crossings: Sequence[SelfCrossing]) -> list[Finding]:
     first = {crossing.path: crossing for crossing in reversed(crossings)}
     findings = []
     for path, count in sorted(times.items())[:MAX_PLACES]:
-        first_crossing = first[path]
+        place = first[path]
         findings.append(
-            SELF_CROSSING(
-                where=_where(first_crossing.layer, first_crossing.at_mm), measured=count, limit=0.0
-            )
+            SELF_CROSSING(where=_where(place.layer, place.at_mm), measured=count, limit=0.0)
         )
     extra = len(times) - MAX_PLACES
     if extra > 0:

@@ -312,26 +312,19 @@ def distance_from_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
     rows = segment_rows(lines).astype(np.int32)
     result = _Joined(lines.vertices, rows, next_vertices(lines.offsets)[rows].astype(np.int32))
     drawn_as, made_as = drawn.numbers(), result.numbers()
-    is_unchanged, is_gone = _is_among(made_as, drawn_as), ~_is_among(drawn_as, made_as)
-    if not drawn_off.any() and not is_gone.any() and is_unchanged.all():
+    stays, is_gone = _is_among(made_as, drawn_as), ~_is_among(drawn_as, made_as)
+    if not drawn_off.any() and not is_gone.any() and stays.all():
         return zeros
     distances = np.zeros((len(lines.vertices), 2))
     if drawn_off.any():
         order = np.argsort(drawn_as, kind="stable")
         numbers, first = np.unique(drawn_as[order], return_index=True)
         max_distances = np.maximum.reduceat(drawn_off[drawn.begin[order]], first, axis=0)
-        distances[rows[is_unchanged]] = max_distances[
-            np.searchsorted(numbers, made_as[is_unchanged])
-        ]
-    if is_gone.any() or not is_unchanged.all():
+        distances[rows[stays]] = max_distances[np.searchsorted(numbers, made_as[stays])]
+    if is_gone.any() or not stays.all():
         del drawn_as, made_as  # the index takes their room
         _add_distances(
-            drawn,
-            drawn_off,
-            result,
-            np.flatnonzero(is_gone),
-            np.flatnonzero(~is_unchanged),
-            distances,
+            drawn, drawn_off, result, np.flatnonzero(is_gone), np.flatnonzero(~stays), distances
         )
     return distances
 

@@ -186,13 +186,8 @@ class _Face(Struct, frozen=True, order=True):
     def distance(self, request: WantedFont) -> tuple[bool, int, int, str]:
         """Smaller is more alike."""
         weight = _BOLD if request.bold else _REGULAR
-        has_other_slant = self.italic is not request.italic
-        return (
-            has_other_slant,
-            abs(self.weight - weight),
-            abs(self.width - _NORMAL_WIDTH),
-            self.path,
-        )
+        slant = self.italic is not request.italic
+        return (slant, abs(self.weight - weight), abs(self.width - _NORMAL_WIDTH), self.path)
 
 
 @lru_cache(maxsize=1)

@@ -535,11 +535,9 @@ def closed_form(
 
     limits = np.array([_limits_mm(each)[::-1] for _, each in rows])
     standards = np.array([_standard_mm(each) for _, each in rows])
-    allowances = np.round(_best_left(sizes, limits, standards, max_allowances), LEFT_DIGITS)
+    left_mm = np.round(_best_left(sizes, limits, standards, max_allowances), LEFT_DIGITS)
     return (
-        {name: float(allowances[index]) for name, index in head_rows.items()}
-        if allowances.any()
-        else {}
+        {name: float(left_mm[index]) for name, index in head_rows.items()} if left_mm.any() else {}
     )
 
 
@@ -562,27 +560,22 @@ def _best_left(
     ]
     allowances = np.zeros(count)
     for _ in range(ROUNDS):
-        base_sizes = sizes(allowances)
+        base = sizes(allowances)
         slopes = np.stack(
-            [
-                (sizes(allowances + STEP_MM * step) - base_sizes) / STEP_MM
-                for step in np.eye(count)
-            ],
+            [(sizes(allowances + STEP_MM * step) - base) / STEP_MM for step in np.eye(count)],
             axis=2,
         )  # (D, 2, C)
         for side, sign in ((0, 1.0), (1, -1.0)):
             # sign·size(a) + u t ≤ sign·limit, with size(a) = here + slopes·(a − left).
-            is_finite = np.isfinite(limits[:, side]) & np.isfinite(base_sizes[:, side])
+            is_finite = np.isfinite(limits[:, side]) & np.isfinite(base[:, side])
             slope = sign * slopes[is_finite, side]
             row = np.hstack([-standards[is_finite, None] * unit[is_finite], -slope, slope])
-            bound = (
-                sign * (base_sizes[is_finite, side] - limits[is_finite, side]) - slope @ allowances
-            )
+            bound = sign * (base[is_finite, side] - limits[is_finite, side]) - slope @ allowances
             conditions.append((row, bound))
         rows, bounds = zip(*conditions, strict=True)
         x = minimise(goal, np.vstack(rows), np.hstack(bounds))
         solution = x[dims : dims + count] - x[dims + count :]
-        expected = base_sizes + slopes @ (solution - allowances)
+        expected = base + slopes @ (solution - allowances)
         allowances = solution
         if np.nanmax(np.abs(sizes(allowances) - expected), initial=0.0) <= SETTLED:
             break

@@ -136,44 +136,25 @@ def _turned(direction: float) -> str:
 
 def _sizes(features: Iterable[Feature], closed: Sequence[bool]) -> Iterator[Dimension]:
     """Yield the sizes of all paths, path by path: circles, slots, outlines."""
-    paths = [
-        list(features_of_path) for _, features_of_path in groupby(features, lambda each: each.path)
-    ]
+    paths = [list(group) for _, group in groupby(features, lambda each: each.path)]
     circles = [
-        features_of_path[0]
-        for features_of_path in paths
-        if len(features_of_path) == 1 and isinstance(features_of_path[0], CircleFeature)
+        group[0] for group in paths if len(group) == 1 and isinstance(group[0], CircleFeature)
     ]
     closed_circles = [each for each in circles if each.is_closed]
-    shapes = [
-        features_of_path
-        for features_of_path in paths
-        if closed[features_of_path[0].path] and features_of_path[0] not in closed_circles
-    ]
+    shapes = [group for group in paths if closed[group[0].path] and group[0] not in closed_circles]
     for number, circle in enumerate(closed_circles, 1):
         name, size = f"circle {number}", 2.0 * circle.radius_mm
         yield Dimension(name, "diameter", (circle.centre_mm,), "", nominal_mm=size)
-    slots = [
-        (features_of_path, slot)
-        for features_of_path in shapes
-        if (slot := _slot(features_of_path)) is not None
-    ]
+    slots = [(group, slot) for group in shapes if (slot := _slot(group)) is not None]
     for number, (_, slot) in enumerate(slots, 1):
-        for measure, (first, second, direction) in zip(("width", "length"), slot, strict=True):
+        for word, (first, second, direction) in zip(("width", "length"), slot, strict=True):
             yield Dimension(
-                f"slot {number} {measure}",
-                "distance",
-                (first, second),
-                "",
-                direction_rad=direction,
+                f"slot {number} {word}", "distance", (first, second), "", direction_rad=direction
             )
-    is_slot = {id(features_of_path) for features_of_path, _ in slots}
-    outlines = [
-        features_of_path for features_of_path in shapes if id(features_of_path) not in is_slot
-    ]
+    is_slot = {id(group) for group, _ in slots}
+    outlines = [group for group in shapes if id(group) not in is_slot]
     yield from chain.from_iterable(
-        _overall(f"outline {number}", features_of_path)
-        for number, features_of_path in enumerate(outlines, 1)
+        _overall(f"outline {number}", group) for number, group in enumerate(outlines, 1)
     )
 
 

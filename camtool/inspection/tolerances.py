@@ -131,15 +131,11 @@ def _duplicate_finding(one: Dimension, holds: Dimension, file: str) -> Finding:
     """Return the finding that two dimensions measure the same: a warning if both are of the
     drawing and their limits differ."""
     place = f"{file}, {one.source}"
-    own_limits, other_limits = one.limits, holds.limits
-    if (
-        own_limits is None
-        or other_limits is None
-        or _deviations(own_limits) == _deviations(other_limits)
-    ):
+    own, other_limits = one.limits, holds.limits
+    if own is None or other_limits is None or _deviations(own) == _deviations(other_limits):
         return DIMENSION_TWICE(where=place, holds=holds.source)
     return DIMENSION_TWICE_DIFFERS(
-        where=place, limits=own_limits.said, holds=holds.source, others=other_limits.said
+        where=place, limits=own.said, holds=holds.source, others=other_limits.said
     )
 
 

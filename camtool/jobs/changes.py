@@ -81,11 +81,9 @@ def together(file: JobTables, flags: JobTables, folder: Path) -> Values:
             for name, each in file.tools.items()
         }
     rows = file.operations or (Table(),)
-    carved = {
-        str(_raw(own_table).get("name")) for own_table in rows if _leaves_floor(_raw(own_table))
-    }
+    carved = {str(_raw(table).get("name")) for table in rows if _leaves_floor(_raw(table))}
     tables["operations"] = [
-        _operation(own_table, file.defaults, flags.defaults, carved) for own_table in rows
+        _operation(table, file.defaults, flags.defaults, carved) for table in rows
     ]
     return tables
 

@@ -116,21 +116,15 @@ def sinking_bit(proposal: Proposal, width_mm: float, *, is_named: bool) -> Tool 
     return min(fits, key=lambda each: each[0])[1] if fits else None
 
 
-def _circles_about_one_centre(
-    drawing: Drawing,
-) -> list[tuple[int, int, tuple[float, float]]]:
+def _circles_about_one_centre(drawing: Drawing) -> list[tuple[int, int, tuple[float, float]]]:
     """Return the rows of circles that hold one circle about the same centre and nothing else, the
     row of that, and the diameters of both, mm."""
     parent = drawing.nesting.levels.parent
-    child_counts = np.bincount(parent[parent >= 0], minlength=len(parent))
+    counts = np.bincount(parent[parent >= 0], minlength=len(parent))
     pairs = []
     for inner_row in np.flatnonzero(parent >= 0).tolist():
         wide = int(parent[inner_row])
-        if (
-            child_counts[wide] != 1
-            or child_counts[inner_row]
-            or max(wide, inner_row) >= len(drawing.paths)
-        ):
+        if counts[wide] != 1 or counts[inner_row] or max(wide, inner_row) >= len(drawing.paths):
             continue
         one, other = (circle_of(drawing.paths[row]) for row in (wide, inner_row))
         if one and other and math.dist(one[0], other[0]) <= SAME_HOLE_MM:

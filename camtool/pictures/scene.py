@@ -505,20 +505,16 @@ def _playback(
 
     def playback() -> Playback:
         if verification is None:
-            playback = by_feed(toolpath, machine.rapid_mm_min)
+            times = by_feed(toolpath, machine.rapid_mm_min)
         else:
-            playback = Playback(
+            times = Playback(
                 seconds=verification.rows.seconds,
                 error_mm=verification.rows.total,
                 trace_row=verification.trace.row,
                 tables=tuple(_tables(verification.report)),
             )
         lines = None if listing is None else listing()
-        return (
-            playback
-            if lines is None
-            else replace(playback, blocks=lines.blocks, binary=lines.binary)
-        )
+        return times if lines is None else replace(times, blocks=lines.blocks, binary=lines.binary)
 
     return playback
 

@@ -87,17 +87,10 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
         lines.append(edges.line + before)
         columns.append((edges.nominal, edges.planned, edges.followed, edges.cleared))
         first += len(step.runs)
-    nominal, planned_boxes, followed, cleared = map(np.concatenate, zip(*columns, strict=True))
+    nominal, boxes, followed, cleared = map(np.concatenate, zip(*columns, strict=True))
     line = np.concatenate(lines)
     return DrawnEdges(
-        off_mm,
-        edge,
-        nominal,
-        planned_boxes,
-        line,
-        followed,
-        cleared,
-        datum_off_mm=placed.datum_off_mm,
+        off_mm, edge, nominal, boxes, line, followed, cleared, datum_off_mm=placed.datum_off_mm
     )
 
 

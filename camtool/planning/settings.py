@@ -174,32 +174,24 @@ def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
     reported: set[tuple[str, float]] = set()
     for operation in job.operations:
         cut = operation.feed_mm_min or machine.feed.default_mm_min
-        for name, given_feed, highest, axis_names in (
+        for name, feed, highest, axis_names in (
             ("feed", cut, machine.max_feed_mm_min, "xy"),
             ("plunge feed", operation.plunge_feed_mm_min, machine.max_plunge_mm_min, "z"),
         ):
-            if (
-                given_feed is None
-                or not exceeds(given_feed, highest)
-                or (name, given_feed) in reported
-            ):
+            if feed is None or not exceeds(feed, highest) or (name, feed) in reported:
                 continue
-            reported.add((name, given_feed))
+            reported.add((name, feed))
             slow = [
-                n
-                for n in axis_names
-                if exceeds(given_feed, getattr(axes, n).max_rate_mm_min or given_feed)
+                n for n in axis_names if exceeds(feed, getattr(axes, n).max_rate_mm_min or feed)
             ]
             yield FEED_ABOVE_LIMIT_IN_JOB(
                 where=operation_name(operation),
-                measured=given_feed,
+                measured=feed,
                 limit=highest,
                 feed=name,
                 lowered=_programmable(highest, machine),
                 machine=machine.target.name,
-                mend=own_numbers(
-                    machine, [f"axes.{n}.max_rate_mm_min={given_feed:g}" for n in slow]
-                ),
+                mend=own_numbers(machine, [f"axes.{n}.max_rate_mm_min={feed:g}" for n in slow]),
             )
 
 

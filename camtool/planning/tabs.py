@@ -134,20 +134,20 @@ def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
         return _with_tabs_by_hand(contours), []
     parts = [k for k, each in enumerate(contours) if each.path.closed and not _is_hole(each)]
     tabbed = {k for k in parts or range(len(contours)) if _is_long_enough(contours[k])}
-    untabbed = [each for k, each in enumerate(contours) if tabbed and k not in tabbed]
-    if not untabbed:
+    tabless = [each for k, each in enumerate(contours) if tabbed and k not in tabbed]
+    if not tabless:
         return contours, []
-    opens = sum(not each.path.closed for each in untabbed)
-    holes = sum(each.path.closed and _is_hole(each) for each in untabbed)
+    opens = sum(not each.path.closed for each in tabless)
+    holes = sum(each.path.closed and _is_hole(each) for each in tabless)
     kinds = (
         (holes, "holes"),
         (opens, "open"),
-        (len(untabbed) - holes - opens, "too short for them"),
+        (len(tabless) - holes - opens, "too short for them"),
     )
     setting = contours[0].setting
     finding = TAB_LEFT_OUT_OF_ALL(
         where=operation_name(setting.operation),
-        measured=len(untabbed),
+        measured=len(tabless),
         kinds=", ".join(f"{count} {kind}" for count, kind in kinds if count),
     )
     without_tabs = replace(setting, operation=replace(setting.operation, tabs=None))

@@ -156,7 +156,7 @@ def round_to_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
         )
 
 
-def _centre_arcs(rounded: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:
+def _centre_arcs(path: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:
     """Move the centres of the rows `arcs` (J,), which turn by `sweep` (J,) rad, to the same
     distance from their rounded ends and starts.
 
@@ -166,23 +166,19 @@ def _centre_arcs(rounded: Toolpath, arcs: Ints, sweep: Floats, machine: Machine)
     far to one side: for more than half a turn the chord must therefore be at least the radius.
     """
     step = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-    begin, end, centre = (
-        rounded.starts_of(arcs)[:, :2],
-        rounded.end[arcs, :2],
-        rounded.centre[arcs],
-    )
+    begin, end, centre = (path.starts_of(arcs)[:, :2], path.end[arcs, :2], path.centre[arcs])
     chord, start_arm, end_arm = end - begin, begin - centre, end - centre
     length, radius = np.hypot(chord[:, 0], chord[:, 1]), np.hypot(start_arm[:, 0], start_arm[:, 1])
     spread = np.abs(radius - np.hypot(end_arm[:, 0], end_arm[:, 1]))
     apt = (length >= MIN_CHORD_STEPS * step) & (spread <= SPREAD_STEPS * step)
     apt &= (sweep <= np.pi) | (length >= radius)
     if not apt.any():
-        return rounded
+        return path
     u = chord[apt] / length[apt, None]
     offsets = ((centre[apt] - 0.5 * (begin + end)[apt]) * u).sum(axis=1)
-    new = rounded.centre.copy()
+    new = path.centre.copy()
     new[arcs[apt]] -= offsets[:, None] * u
-    return replace(rounded, centre=read_only(new))
+    return replace(path, centre=read_only(new))
 
 
 def _restore_turned_arcs(rounded: Toolpath, inside_out: Ints, is_small: Bools) -> Toolpath:

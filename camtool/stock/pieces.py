@@ -158,11 +158,11 @@ def _through(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
     low = np.minimum(start[:, 2], end[:, 2]) <= bottom_mm
     low &= moves.table[moves.tool, 0] > 0.0
     number = np.flatnonzero(low)
-    selected = moves.select(number).below(bottom_mm)
-    begin, finish = selected.start, selected.end
+    cuts = moves.select(number).below(bottom_mm)
+    begin, finish = cuts.start, cuts.end
     # A cone is nowhere narrower along a move than at its higher end.
     higher = np.maximum(begin[:, 2], finish[:, 2])
-    radius, flat, corner, rise = selected.table[selected.tool].T
+    radius, flat, corner, rise = cuts.table[cuts.tool].T
     depths = np.maximum(bottom_mm - higher, 0.0)
     cone = flat + depths / np.where(rise > 0.0, rise, 1.0)
     round_ = flat + np.sqrt(np.maximum(corner**2 - np.maximum(corner - depths, 0.0) ** 2, 0.0))
@@ -173,13 +173,7 @@ def _through(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
     cutters = tuple(CutterProfile(width, width) for width in widths.tolist())
     keep = wide > 0.0
     flat_moves = StockMoves(
-        begin,
-        finish,
-        selected.row,
-        selected.rapid,
-        tool.astype(np.int64),
-        cutters,
-        moves.beside_mm,
+        begin, finish, cuts.row, cuts.rapid, tool.astype(np.int64), cutters, moves.beside_mm
     )
     return flat_moves.select(keep), number[keep]
 

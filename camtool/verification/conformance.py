@@ -535,19 +535,14 @@ def _feed_findings(setting_pairs: _SettingPairs, request: ProgramRequest) -> Ite
 
 
 def _by_severity(
-    rows: Ints, written_rows: Ints, is_requested: Bools
+    rows: Ints, twins: Ints, is_requested: Bools
 ) -> Iterator[tuple[bool, int, int, int]]:
-    """Divide rows (R,), compared with written rows `written_rows` (R,), into those whose setting
+    """Divide rows (R,), compared with written rows `twins` (R,), into those whose setting
     the job asks for, `is_requested` (R,), and the others: yield for each part that has any whether
     it is asked for, its first row, the written row of that, and the number of its rows."""
     for is_asked, is_part in ((True, is_requested), (False, ~is_requested)):
         if is_part.any():
-            yield (
-                is_asked,
-                int(rows[is_part][0]),
-                int(written_rows[is_part][0]),
-                int(is_part.sum()),
-            )
+            yield (is_asked, int(rows[is_part][0]), int(twins[is_part][0]), int(is_part.sum()))
 
 
 def _air_feed_findings(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
@@ -707,15 +702,11 @@ def _dwell_findings(
 
 
 def _long_dwell_findings(
-    decoded: Toolpath,
-    written: Toolpath,
-    decoded_dwells: Ints,
-    written_dwells: Ints,
-    limits: Floats,
+    decoded: Toolpath, written: Toolpath, decoded_dwells: Ints, goals: Ints, limits: Floats
 ) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS where the tool dwells for longer than was asked; `decoded_dwells` and
-    `written_dwells` are the rows of dwells."""
-    one, other = decoded_dwells, written_dwells
+    `goals` are the rows of dwells."""
+    one, other = decoded_dwells, goals
     longer: dict[bool, list[tuple[int, float, float]]] = {True: [], False: []}
     visited: set[int] = set()
     for row in one.tolist():

@@ -130,18 +130,14 @@ def cover(
     (docs/decisions/0037-own-rows-first.md).
     """
     cuts, limits = decoded.cuts, (goal.limit_mm, goal.depth_mm)
-    own_contour, became = _contours_from(cuts, wanted.cuts, row_from)
+    source, became = _contours_from(cuts, wanted.cuts, row_from)
     holes = compare_holes(decoded, wanted, limits)
     match, rounding, extra = empty_match(len(cuts.contour)), Figure(), list[UncoveredContour]()
     alike_rows = _rows_alike(cuts, wanted.cuts, limits, row_from)
     for samples in samples_by_parts(
-        cuts,
-        spacing_mm,
-        cuts.is_cut,
-        SAMPLES_AT_ONCE,
-        _judged_together(cuts, own_contour, alike_rows),
+        cuts, spacing_mm, cuts.is_cut, SAMPLES_AT_ONCE, _judged_together(cuts, source, alike_rows)
     ):
-        nearest_wanted, belongs = _nearest_in_own_contour(cuts, samples, own_contour, goal)
+        nearest_wanted, belongs = _nearest_in_own_contour(cuts, samples, source, goal)
         other = np.flatnonzero(belongs == ANY_CONTOUR)
         nearest_other, is_wrong = nearest_at_height(samples.of(other), None, wanted.moves, limits)
         wrong_depth = np.zeros(len(nearest_wanted.distance), dtype=np.bool_)

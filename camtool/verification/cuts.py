@@ -281,12 +281,8 @@ def _sample_batches(
     last = np.append(
         np.diff(rows_of_segments if group is None else group[rows_of_segments]) != 0, True
     )[: len(rows_of_segments)]
-    batch_numbers = np.cumsum(parts + 1, dtype=np.int64)[last] // at_once
-    return (
-        segments,
-        parts,
-        (np.flatnonzero(last)[np.flatnonzero(np.diff(batch_numbers))] + 1).tolist(),
-    )
+    number = np.cumsum(parts + 1, dtype=np.int64)[last] // at_once
+    return (segments, parts, (np.flatnonzero(last)[np.flatnonzero(np.diff(number))] + 1).tolist())
 
 
 def _parts(lengths: Floats, spacing_mm: float) -> Ints:

@@ -191,25 +191,20 @@ def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
     listed = np.ones(count, dtype=np.bool_)
     if drawn is not None and (edge >= 0).any():
         with_edge = np.flatnonzero(edge >= 0)
-        edges_used = edge[with_edge]
+        numbers = edge[with_edge]
         low, high = np.full((2, int(drawn.line.max()) + 1, 2), np.inf)
         np.minimum.at(low, drawn.line, drawn.planned[:, :, 0])
         np.minimum.at(high, drawn.line, -drawn.planned[:, :, 1])
-        drawn_boxes = np.stack([low, -high], axis=2)[drawn.line[edges_used]]
-        nominal[with_edge] = drawn.nominal[edges_used]
-        predicted[with_edge] = drawn.planned[edges_used] + slide[with_edge] - centre[with_edge]
-        rough[with_edge] = np.abs(drawn_boxes - drawn.nominal[edges_used]).max(axis=(1, 2))
-        followed[with_edge], cleared[with_edge] = (
-            drawn.followed[edges_used],
-            drawn.cleared[edges_used],
-        )
-        makes = np.abs(drawn.planned[edges_used] - drawn_boxes) <= SAME_MM
+        drawn_boxes = np.stack([low, -high], axis=2)[drawn.line[numbers]]
+        nominal[with_edge] = drawn.nominal[numbers]
+        predicted[with_edge] = drawn.planned[numbers] + slide[with_edge] - centre[with_edge]
+        rough[with_edge] = np.abs(drawn_boxes - drawn.nominal[numbers]).max(axis=(1, 2))
+        followed[with_edge], cleared[with_edge] = (drawn.followed[numbers], drawn.cleared[numbers])
+        makes = np.abs(drawn.planned[numbers] - drawn_boxes) <= SAME_MM
         own_boxes[with_edge] = np.where(
-            makes.all(axis=(1, 2))[:, None, None],
-            drawn.nominal[edges_used],
-            drawn.planned[edges_used],
+            makes.all(axis=(1, 2))[:, None, None], drawn.nominal[numbers], drawn.planned[numbers]
         )
-        listed[with_edge] = makes.any(axis=(1, 2)) | ~drawn.cleared[edges_used]
+        listed[with_edge] = makes.any(axis=(1, 2)) | ~drawn.cleared[numbers]
     return _Edges(
         edge >= UNKNOWN_EDGE, nominal, predicted, rough, followed, cleared, own_boxes, listed
     )

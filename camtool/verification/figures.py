@@ -375,16 +375,10 @@ class WorstRows:
         """Add the next rows and their largest `errors` (R,) of interpolation and mechanics, and in
         all."""
         inner, lag, total = errors
-        known_rows = np.flatnonzero(~np.isnan(total))
-        known_rows = known_rows[np.lexsort((known_rows, -total[known_rows]))][: self._count]
-        place = block.columns[known_rows][:, [at.TOTAL_X, at.TOTAL_Y]]
-        columns = [
-            block.low + known_rows,
-            total[known_rows],
-            inner[known_rows],
-            lag[known_rows],
-            place,
-        ]
+        rows = np.flatnonzero(~np.isnan(total))
+        rows = rows[np.lexsort((rows, -total[rows]))][: self._count]
+        place = block.columns[rows][:, [at.TOTAL_X, at.TOTAL_Y]]
+        columns = [block.low + rows, total[rows], inner[rows], lag[rows], place]
         candidates = np.concatenate([self.found, np.column_stack(columns)])
         self.found = candidates[np.lexsort((candidates[:, 0], -candidates[:, 1]))][: self._count]
 

@@ -78,16 +78,12 @@ def own_match(cuts: CutMoves, circles: list[FullCircle]) -> Match:
     return Match(row, cuts.contour, cuts.contour, circle, np.broadcast_to(0.0, count))
 
 
-def match_through_compensation(match: Match, wanted_rows: Ints, goal: Goal) -> Match:
+def match_through_compensation(match: Match, rows: Ints, goal: Goal) -> Match:
     """Return the match with the wanted rows from a match with the rows of a compensated toolpath:
-    `wanted_rows` (S,) is the wanted row of each compensated row. Compensation may divide contours
+    `rows` (S,) is the wanted row of each compensated row. Compensation may divide contours
     and circles."""
     is_known = match.row >= 0
-    row = (
-        np.where(is_known, wanted_rows[np.maximum(match.row, 0)], -1)
-        if len(wanted_rows)
-        else match.row
-    )
+    row = np.where(is_known, rows[np.maximum(match.row, 0)], -1) if len(rows) else match.row
     contour = np.where(is_known, goal.moves.cuts.contour[np.maximum(row, 0)], -1)
     circle = goal.circle_of_row
     drawn_off = np.where(is_known, goal.off_mm[np.maximum(row, 0)], 0.0)

@@ -129,14 +129,9 @@ def arcs_accepted(
     limit = dialect.arc_full_turn_rad / RULE_MARGIN
     same_ends = (start == end).all(axis=1)
     vague = ~same_ends & ((turn <= limit) | (turn >= 2.0 * math.pi - limit))
-    has_direction = np.abs(turn - sweep_rad) < math.pi
+    agrees = np.abs(turn - sweep_rad) < math.pi
     return np.asarray(
-        ~wide
-        & (gap <= dialect.arc_most_difference_mm)
-        & ~is_small
-        & ~vague
-        & has_direction
-        & (r1 > 0.0)
+        ~wide & (gap <= dialect.arc_most_difference_mm) & ~is_small & ~vague & agrees & (r1 > 0.0)
     )
 
 

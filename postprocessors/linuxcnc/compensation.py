@@ -100,14 +100,10 @@ class Compensation:
                 "the move onto the compensated path is no longer than the tool's radius"
             )
         normal = math.atan2(direction[1], direction[0]) + self.side * _HALF
-        normal_xy = math.cos(normal), math.sin(normal)
-        end = [
-            target[0] + self.radius * normal_xy[0],
-            target[1] + self.radius * normal_xy[1],
-            target[2],
-        ]
+        unit = math.cos(normal), math.sin(normal)
+        end = [target[0] + self.radius * unit[0], target[1] + self.radius * unit[1], target[2]]
         self._from = centre[0], centre[1]
-        self._canon.wait(Queued(kind, end, direction=normal_xy))
+        self._canon.wait(Queued(kind, end, direction=unit))
         self.first, self.programmed = False, list(target)
         return list(end)
 

@@ -289,33 +289,23 @@ class LinuxcncSamples(CountedSamples):
         move = self._row_of[row]
         along = self._into[row] + share * self._row_length[row]
         leftover = np.maximum(self._length[move] - along, 0.0)
-        before_corner = np.flatnonzero(leftover < self._reach[move + 1])
-        after_corner = np.flatnonzero(along < self._reach_on[move])
-        corner = move[before_corner] + 1
-        self._on_blends(
-            points,
-            before_corner,
-            corner,
-            0.5 - 0.5 * leftover[before_corner] / self._reach[corner],
-        )
-        corner = move[after_corner]
-        self._on_blends(
-            points, after_corner, corner, 0.5 + 0.5 * along[after_corner] / self._reach_on[corner]
-        )
-        before_corner = np.flatnonzero(leftover < self._before[move + 1])
-        after_corner = np.flatnonzero(along < self._behind[move])
-        corner = move[before_corner] + 1
+        ends = np.flatnonzero(leftover < self._reach[move + 1])
+        begins = np.flatnonzero(along < self._reach_on[move])
+        corner = move[ends] + 1
+        self._on_blends(points, ends, corner, 0.5 - 0.5 * leftover[ends] / self._reach[corner])
+        corner = move[begins]
+        self._on_blends(points, begins, corner, 0.5 + 0.5 * along[begins] / self._reach_on[corner])
+        ends = np.flatnonzero(leftover < self._before[move + 1])
+        begins = np.flatnonzero(along < self._behind[move])
+        corner = move[ends] + 1
         turn = self._turn[corner]
         self._put_overlaps(
-            points,
-            before_corner,
-            corner,
-            turn * (1.0 - leftover[before_corner] / self._before[corner]),
+            points, ends, corner, turn * (1.0 - leftover[ends] / self._before[corner])
         )
-        corner = move[after_corner]
+        corner = move[begins]
         turn = self._turn[corner]
-        later = (1.0 - turn) * along[after_corner] / self._behind[corner]
-        self._put_overlaps(points, after_corner, corner, turn + later)
+        later = (1.0 - turn) * along[begins] / self._behind[corner]
+        self._put_overlaps(points, begins, corner, turn + later)
 
     def _put_overlaps(self, points: Floats, rows: Ints, corner: Ints, x: Floats) -> None:
         """Put points (K, 3) where moves overlap: while the first slows down evenly over its last
@@ -912,26 +902,21 @@ def _meet(
         zeros[0], zeros[1], zeros[2], zeros[3], zeros[4], zeros[5], np.zeros((3, count, 3)),
         zeros[6], zeros[7], zeros[8], zeros[9],
     )  # fmt: skip
-    every_move = np.arange(count)
-    before = moves.mode[every_move - 1]
+    rows = np.arange(count)
+    before = moves.mode[rows - 1]
     turn = bends.after - bends.before
     is_reversal = np.linalg.norm(bends.after + bends.before, axis=1) < STRAIGHT_BACK_RAD
     # The move before a corner says how it is met; both say how far a blend may leave it.
-    is_free = (
-        ~moves.waits[every_move]
-        & moves.like[every_move]
-        & ~is_reversal
-        & ~rules.modes.stop(before)
-    )
+    is_free = ~moves.waits[rows] & moves.like[rows] & ~is_reversal & ~rules.modes.stop(before)
     # A kink: the change of velocity within one period, as a part of what each axis can do.
-    highest = np.minimum(moves.speed[every_move - 1], moves.speed[every_move])
-    jolt = highest / rules.period_s + moves.acceleration[every_move]
+    highest = np.minimum(moves.speed[rows - 1], moves.speed[rows])
+    jolt = highest / rules.period_s + moves.acceleration[rows]
     part = (np.abs(turn) * jolt[:, None] / rules.acceleration).max(axis=1, initial=0.0)
-    curved = moves.is_arc[every_move] | moves.is_arc[every_move - 1]
+    curved = moves.is_arc[rows] | moves.is_arc[rows - 1]
     part = np.where(curved, part / TANGENT_RATIO, part)
     smooth = is_free & (part < rules.kink_ratio)
-    corners.speed[every_move] = np.where(smooth, np.inf, 0.0)
-    corners.lost[every_move] = np.where(smooth, part, 0.0)
+    corners.speed[rows] = np.where(smooth, np.inf, 0.0)
+    corners.lost[rows] = np.where(smooth, part, 0.0)
     blends = is_free & ~smooth & rules.modes.blend(before)
     normal = np.cross(bends.before, bends.after)
     flat = np.hypot(normal[:, 0], normal[:, 1]) <= COPLANAR * np.linalg.norm(normal, axis=1)

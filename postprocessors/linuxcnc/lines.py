@@ -157,17 +157,15 @@ class ParsedLine:
     def __init__(self, raw: str) -> None:
         self.text = text = close_up(raw)
         self.delete = text[:1] == "/"
-        position = 1 if self.delete else 0
-        if text[position : position + 1] == "n":
-            match = _BLOCK_NUMBER.match(text, position)
+        place = 1 if self.delete else 0
+        if text[place : place + 1] == "n":
+            match = _BLOCK_NUMBER.match(text, place)
             if match is None:
-                raise LineFault("no number after N", position + 1)
-            position = match.end()
-        self.begin = position
+                raise LineFault("no number after N", place + 1)
+            place = match.end()
+        self.begin = place
         self.flow = (
-            position
-            if text[position : position + 1] in ("o", "m") and _FLOW.match(text, position)
-            else None
+            place if text[place : place + 1] in ("o", "m") and _FLOW.match(text, place) else None
         )
         self.word: Any = None
         """Its O word, which flow has read."""

@@ -191,7 +191,7 @@ class _Reader:
         if moves.count:
             path.source = self.flow.caller if self.flow.level else ""
             has_moved = moves.add_to(path, self._fast)
-            machine.continue_from(*moves.last, path.position, has_moved=has_moved)
+            machine.continue_from(*moves.last, path.position, moves=has_moved)
         return moves.count
 
     # What is said of the program
@@ -273,13 +273,11 @@ def _lengths(mounted: list[Mounted], path: Toolpath) -> Iterator[Finding]:
     if len({each.tool for each in cutting}) < 2:
         return
     # What is off by the same length for all tools is part of where the zero was set.
-    differences = [each.own_mm - each.length_mm for each in cutting if each.own_mm is not None]
-    spread = max(differences) - min(differences) if differences else 0.0
+    errors = [each.own_mm - each.length_mm for each in cutting if each.own_mm is not None]
+    spread = max(errors) - min(errors) if errors else 0.0
     if spread > LENGTHS_EQUAL_MM:
         index = next(
-            k
-            for k, each in enumerate(differences)
-            if abs(each - differences[0]) > LENGTHS_EQUAL_MM
+            k for k, each in enumerate(errors) if abs(each - errors[0]) > LENGTHS_EQUAL_MM
         )
         first = [each for each in cutting if each.own_mm is not None][index]
         yield TOOL_LENGTH_WRONG(where=f"block {first.block + 1}", tool=first.tool, measured=spread)

@@ -163,12 +163,7 @@ class InterpreterState:
         )
 
     def continue_from(
-        self,
-        motion: int | None,
-        feed: float,
-        position: tuple[float, float, float],
-        *,
-        has_moved: bool,
+        self, motion: int | None, feed: float, position: tuple[float, float, float], *, moves: bool
     ) -> None:
         """Adopt motion and feed (mm/min) in force, and position (mm), behind blocks of plain moves
         that were read by columns."""
@@ -177,7 +172,7 @@ class InterpreterState:
         self.feed_mm = feed
         x, y, z = position
         self.position[:] = x / mm, y / mm, z / mm
-        if has_moved:
+        if moves:
             self.canon.moved = True
             if self._first_frame is None:
                 self._first_frame = self._frame

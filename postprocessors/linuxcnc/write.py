@@ -59,11 +59,9 @@ def _path_mode(mode: PathMode, unit: Unit) -> str:
     corner, merging = (
         format_number(length / unit.mm, style) for length in (mode.tolerance_mm, mode.merging_mm)
     )
-    has_merging = mode.merging_mm != mode.tolerance_mm
+    merges = mode.merging_mm != mode.tolerance_mm
     return (
-        "G64"
-        + (f" P{corner}" if mode.tolerance_mm else "")
-        + (f" Q{merging}" if has_merging else "")
+        "G64" + (f" P{corner}" if mode.tolerance_mm else "") + (f" Q{merging}" if merges else "")
     )
 
 

@@ -125,14 +125,8 @@ def _text(rows: PlainRows, dialect: ValcncDialect) -> bytes:
     arc = is_sent & rows.is_arc
     columns = [
         WordColumn("G", rows.kind, is_sent, digits=2),
-        *(
-            word_of(axis, rows.end[:, axis_index], is_sent, style)
-            for axis_index, axis in enumerate("XYZ")
-        ),
-        *(
-            word_of(axis, rows.offset[:, axis_index], arc, style)
-            for axis_index, axis in enumerate("IJ")
-        ),
+        *(word_of(axis, rows.end[:, k], is_sent, style) for k, axis in enumerate("XYZ")),
+        *(word_of(axis, rows.offset[:, k], arc, style) for k, axis in enumerate("IJ")),
     ]
     return texts_of(columns, blanks=True).data
 

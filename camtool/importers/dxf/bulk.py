@@ -171,23 +171,19 @@ def _vertices(tags: Tags, begins: Ints, ends: Ints, is_other: Bools) -> dict[str
     rows_by_handle: dict[str, Floats] = {}
     for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
         codes = tags.codes[begin:end]
-        x, *other_columns = (np.flatnonzero(codes == code) for code in _VERTEX)
+        x, *columns = (np.flatnonzero(codes == code) for code in _VERTEX)
         handle, subclass = (np.flatnonzero(codes == code) for code in (_HANDLE, _SUBCLASS))
-        if (
-            len(x) < MIN_VERTICES
-            or not np.array_equal(x + 1, other_columns[0])
-            or len(handle) != 1
-        ):
+        if len(x) < MIN_VERTICES or not np.array_equal(x + 1, columns[0]) or len(handle) != 1:
             continue
         if not {*codes[: handle[0]].tolist()}.isdisjoint(_DIVISIONS):
             continue
-        first = min(places.min(initial=end) for places in (x, *other_columns))
+        first = min(places.min(initial=end) for places in (x, *columns))
         if first < x[0] or not len(subclass) or subclass[-1] > x[0] or (codes == _HEIGHT).any():
             continue
         rows = np.zeros((len(x), len(_VERTEX)))
         rows[:, 0] = tags.numbers(begin + x)
-        for column, places in enumerate(other_columns, 1):
+        for column, places in enumerate(columns, 1):
             rows[np.searchsorted(x, places) - 1, column] = tags.numbers(begin + places)
         rows_by_handle[str(tags.value(begin + int(handle[0])))] = rows
-        is_other[begin + np.concatenate([x, *other_columns])] = False
+        is_other[begin + np.concatenate([x, *columns])] = False
     return rows_by_handle

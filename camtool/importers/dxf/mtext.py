@@ -165,8 +165,8 @@ class _Reader:
     def _paragraph(
         self, cells: list[MTextCell], context: Any, share: float, ends_column: bool
     ) -> Paragraph:
-        attributes = context.paragraph
-        align = attributes.align.name
+        style = context.paragraph
+        align = style.align.name
         share = {"LEFT": 0.0, "RIGHT": 1.0, "CENTER": 0.5}.get(align, share)
         justified = align in ("JUSTIFIED", "DISTRIBUTED")
         unit = self._look.height
@@ -174,17 +174,13 @@ class _Reader:
             (float(stop[1:]) * unit, _TAB_SHARES[stop[0]])
             if isinstance(stop, str)
             else (float(stop) * unit, 0.0)
-            for stop in attributes.tab_stops
+            for stop in style.tab_stops
         ]
         return Paragraph(
             cells=tuple(cells),
             share=0.0 if justified else share,
             justified=justified,
-            indents=(
-                (attributes.left + attributes.indent) * unit,
-                attributes.left * unit,
-                attributes.right * unit,
-            ),
+            indents=((style.left + style.indent) * unit, style.left * unit, style.right * unit),
             stops=tuple(sorted(stops)),
             tab=TAB_HEIGHTS * unit,
             blank=float(context.cap_height),
@@ -378,17 +374,13 @@ def _tab_position(x: float, text_width: float, paragraph: Paragraph) -> float:
 
 
 def _line(
-    paragraph: Paragraph,
-    placed_cells: list[tuple[float, MTextCell]],
-    left_edge: float,
-    *,
-    stretch: bool,
+    paragraph: Paragraph, row: list[tuple[float, MTextCell]], left_edge: float, *, stretch: bool
 ) -> MTextLine:
     """A line without the spaces at its end."""
-    count = len(placed_cells)
-    while count and placed_cells[count - 1][1].glue is Glue.SPACE:
+    count = len(row)
+    while count and row[count - 1][1].glue is Glue.SPACE:
         count -= 1
-    cells = tuple(placed_cells[:count])
+    cells = tuple(row[:count])
     height = max((cell.height for _, cell in cells), default=0.0) or paragraph.blank
     right = cells[-1][0] + cells[-1][1].width if cells else left_edge
     return MTextLine(cells, height, right, paragraph.indents[2], paragraph.share, stretch)

@@ -255,14 +255,10 @@ def _round(
 
 
 def circle_or_arc(
-    plane: Plane,
-    circle: tuple[float, float, float],
-    start: float,
-    sweep: float,
-    tolerance_mm: float,
+    plane: Plane, disc: tuple[float, float, float], start: float, sweep: float, tolerance_mm: float
 ) -> DxfShape:
     """Circle or arc of a centre and a radius (x, y, r) in a plane; angles in rad, either way."""
-    x, y, radius = circle
+    x, y, radius = disc
     centre = plane.origin + x * plane.u + y * plane.v
     if not plane.scale:
         axes = np.array([centre, radius * plane.u, radius * plane.v])

@@ -576,20 +576,17 @@ class DxfLooks(Struct):
             )
         return look
 
-    def _resolved(self, attributes: dict[str, Any], block: DxfLook, inside: bool) -> DxfLook:
-        name = printable(str(attributes.get("layer") or "0"))
+    def _resolved(self, fields: dict[str, Any], block: DxfLook, inside: bool) -> DxfLook:
+        name = printable(str(fields.get("layer") or "0"))
         if inside and name == "0":
             name = block.layer
         layer_look = self.layers.get(block_key(name), DxfLook(name))
-        line_type = printable(str(attributes.get("linetype") or "BYLAYER"))
+        line_type = printable(str(fields.get("linetype") or "BYLAYER"))
         inherited = {"BYLAYER": layer_look.line_type, "BYBLOCK": block.line_type}
         return DxfLook(
             layer_look.layer,
             _colour(
-                attributes.get("color"),
-                attributes.get("true_color"),
-                layer_look.colour,
-                block.colour,
+                fields.get("color"), fields.get("true_color"), layer_look.colour, block.colour
             ),
             inherited.get(line_type.upper(), line_type),
             layer_look.hidden,

@@ -117,16 +117,10 @@ class CssRules(Struct):
         when the sheets would take too long to apply."""
         if not self._count:
             return []
-        rule_lists = [
-            self._by_tag[""],
-            self._by_tag.get(node.tag, []),
-            self._by_id.get(node.get("id")),
-        ]
-        rule_lists += [
-            self._by_class.get(name) for name in dict.fromkeys(node.get("class").split())
-        ]
+        lists = [self._by_tag[""], self._by_tag.get(node.tag, []), self._by_id.get(node.get("id"))]
+        lists += [self._by_class.get(name) for name in dict.fromkeys(node.get("class").split())]
         rules_found: list[_Rule] = []
-        for rules in rule_lists:
+        for rules in lists:
             if rules:
                 self._matches += sum(rule.cost for rule in rules)
                 if self._matches > MAX_MATCHES:

@@ -88,13 +88,9 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
     circles, other_names = circles_of(chosen)
     min_diameter = 2.0 * operation.away_mm + HOLE_SIZE_MM
     wide = [hole for hole in circles if _diameter(hole) > min_diameter]
-    small_circles = [hole for hole in circles if _diameter(hole) <= min_diameter]
+    rejects = [hole for hole in circles if _diameter(hole) <= min_diameter]
     holes = _outermost(wide)
-    findings = [
-        *_no_circles(other_names),
-        *_too_small(small_circles, operation),
-        *_inner(wide, holes),
-    ]
+    findings = [*_no_circles(other_names), *_too_small(rejects, operation), *_inner(wide, holes)]
     findings += _cut_away_between(holes, operation)
     if not holes:
         findings.append(NOTHING_DRAWN_TO_BORE(where=operation_name(operation)))

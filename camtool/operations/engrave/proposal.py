@@ -18,54 +18,50 @@ MAX_LINES = 1000
 """Of more lines the narrowest place is not looked for: the finest bit is taken."""
 
 
-def propose(remaining: Remaining) -> list[Part]:
+def propose(paths: Remaining) -> list[Part]:
     """Engravings of the letters, of the open paths, of what the mills are too wide for, or of all
     that is left."""
-    sources, closed = remaining.drawing.sources, remaining.drawing.paths.closed
+    sources, closed = paths.drawing.sources, paths.drawing.paths.closed
     parts: list[Part] = []
-    text = tuple(row for row in remaining.rows if is_text(sources[row]))
+    text = tuple(row for row in paths.rows if is_text(sources[row]))
     if text:
         keys = (("select", '["text"]', ""),)
-        part = Part(f"{remaining.title} text", "engrave", text, 0, keys, "not text")
-        parts.append(_cut(remaining, part, "text is engraved", always_deep=True))
-    remaining = remaining.without([Part("", "", text, excludes="not text")])
-    open_ = tuple(row for row in remaining.rows if not closed[row])
-    is_named = remaining.habit == "engrave"
-    if (remaining.rows or remaining.marks) and (
-        is_named or (open_ and len(open_) == len(remaining.rows))
-    ):
-        reason = f"{remaining.title} is called so" if is_named else "open lines are engraved"
+        part = Part(f"{paths.title} text", "engrave", text, 0, keys, "not text")
+        parts.append(_cut(paths, part, "text is engraved", always_deep=True))
+    paths = paths.without([Part("", "", text, excludes="not text")])
+    open_ = tuple(row for row in paths.rows if not closed[row])
+    is_named = paths.habit == "engrave"
+    if (paths.rows or paths.marks) and (is_named or (open_ and len(open_) == len(paths.rows))):
+        reason = f"{paths.title} is called so" if is_named else "open lines are engraved"
         parts.append(
             _cut(
-                remaining,
-                Part(remaining.title, "engrave", remaining.rows, remaining.marks),
+                paths,
+                Part(paths.title, "engrave", paths.rows, paths.marks),
                 reason,
             )
         )
         return parts
     if open_:
         select = (("select", '["open"]', ""),)
-        part = Part(f"{remaining.title} open", "engrave", open_, 0, select)
-        parts.append(_cut(remaining, part, "open lines are engraved"))
-    if not remaining.proposal.tool_mm or remaining.habit == "pocket":
+        part = Part(f"{paths.title} open", "engrave", open_, 0, select)
+        parts.append(_cut(paths, part, "open lines are engraved"))
+    if not paths.proposal.tool_mm or paths.habit == "pocket":
         return parts
-    branched = [row for row in remaining.branched if closed[row]]
-    mills = [tool.diameter_mm for tool in remaining.proposal.finer_mills]
-    finest = mills[-1] if mills else remaining.proposal.tool_mm
-    drilled = [
-        row for row, width in remaining.holes.items() if remaining.proposal.has_drill(width)
-    ]
-    small = tuple(row for row in remaining.crowded(finest) if row not in drilled)
+    branched = [row for row in paths.branched if closed[row]]
+    mills = [tool.diameter_mm for tool in paths.proposal.finer_mills]
+    finest = mills[-1] if mills else paths.proposal.tool_mm
+    drilled = [row for row, width in paths.holes.items() if paths.proposal.has_drill(width)]
+    small = tuple(row for row in paths.crowded(finest) if row not in drilled)
     if small:
-        part = Part(f"{remaining.title} fine", "engrave", small)
+        part = Part(f"{paths.title} fine", "engrave", small)
         why = f"lines too near to each other, or too small within, for a mill of {finest:g} mm"
         why += ": marked (a finer mill in the library, or more room, would cut them)"
-        parts.append(replace(_cut(remaining, part, why), others=("profile",)))
+        parts.append(replace(_cut(paths, part, why), others=("profile",)))
     unclear = tuple(row for row in branched if row not in small)
     if unclear:
-        part = Part(f"{remaining.title} branched", "engrave", unclear)
+        part = Part(f"{paths.title} branched", "engrave", unclear)
         reason = "more than two ends meet, so that it is not clear what they enclose: marked"
-        parts.append(replace(_cut(remaining, part, reason), others=("profile",)))
+        parts.append(replace(_cut(paths, part, reason), others=("profile",)))
     return parts
 
 
@@ -78,13 +74,9 @@ def _cut(remaining: Remaining, part: Part, reason: str, *, always_deep: bool = F
         )
     remark = "" if bits else "a V bit makes finer letters"
     keys = (*part.keys, ("depth", f'"{TEXT_DEPTH_MM:g}mm"', remark))
-    bit_tool = _fitting(remaining, part.rows, bits) if bits else None
-    with_bit = (
-        ""
-        if bit_tool is None
-        else f" with {bit_tool.name}, {_width(bit_tool):.2g} mm wide at this depth"
-    )
-    name = "" if bit_tool is None else bit_tool.name
+    vbit = _fitting(remaining, part.rows, bits) if bits else None
+    words = "" if vbit is None else f" with {vbit.name}, {_width(vbit):.2g} mm wide at this depth"
+    name = "" if vbit is None else vbit.name
     return Part(
         part.name,
         part.kind,
@@ -93,7 +85,7 @@ def _cut(remaining: Remaining, part: Part, reason: str, *, always_deep: bool = F
         keys,
         part.excludes,
         name,
-        f"{reason}{with_bit}",
+        f"{reason}{words}",
     )
 
 

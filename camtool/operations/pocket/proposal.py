@@ -21,19 +21,17 @@ def propose(remaining: Remaining) -> list[Part]:
     if remaining.habit == "pocket" and remaining.contours:
         thickness = remaining.proposal.thickness_mm
         depth = remaining.depth_mm or HALF * thickness
-        reason = f"{remaining.title} is called so: all within is cleared"
+        cause = f"{remaining.title} is called so: all within is cleared"
         keys: tuple[tuple[str, str, str], ...] = ()
         if remaining.is_divided:
             keys = (("select", '["closed"]', ""),)
         if remaining.depth_mm is None and thickness:
-            reason += (
-                f"; its name says no depth, as POCKET 2mm would: {depth:g} mm, half the stock"
-            )
+            cause += f"; its name says no depth, as POCKET 2mm would: {depth:g} mm, half the stock"
             keys = (*keys, ("depth", f'"{depth:g}mm"', "half the stock"))
         other_kinds = ("profile",) if remaining.depth_mm is None else ()
         return [
             Part(
-                remaining.title, "pocket", remaining.contours, 0, keys, "", "", reason, other_kinds
+                remaining.title, "pocket", remaining.contours, 0, keys, "", "", cause, other_kinds
             )
         ]
     windows = remaining.contours_that_are("inner")
@@ -46,11 +44,11 @@ def propose(remaining: Remaining) -> list[Part]:
     rows = [row for row, fits in zip(windows, is_splinter.tolist(), strict=True) if fits]
     rows = [row for row in rows if row not in parents and row not in too_fine]
     keys = (("select", '["inner"]', ""), ("entry", '"ramp:3deg"', ""))
-    reason = (
+    cause = (
         f"windows no wider than {SPLINTER_SHARE:g} mills are cleared, so that no piece comes loose"
     )
     return (
-        [Part(f"{remaining.title} small", "pocket", tuple(rows), 0, keys, "", "", reason)]
+        [Part(f"{remaining.title} small", "pocket", tuple(rows), 0, keys, "", "", cause)]
         if rows
         else []
     )

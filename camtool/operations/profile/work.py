@@ -79,30 +79,26 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
     operation = setting.operation
     closed = np.flatnonzero(chosen.lines.closed).tolist()
     opens = np.flatnonzero(~chosen.lines.closed).tolist()
-    line_set = _Found()
+    lines = _Found()
     if operation.stage == "finish":  # open ones have no wall
         opens = []
     if not runs_beside(operation):
         opens = list(range(len(chosen.lines)))
     elif operation.side == "auto":
-        _together(chosen, closed, setting, line_set)
+        _together(chosen, closed, setting, lines)
     else:
-        _each(chosen, closed, setting, line_set)
-        line_set.findings += (_no_side(chosen, k, operation.side) for k in opens)
+        _each(chosen, closed, setting, lines)
+        lines.findings += (_no_side(chosen, k, operation.side) for k in opens)
     if not runs_beside(operation):
-        line_set.findings += run_together(chosen, setting)
+        lines.findings += run_together(chosen, setting)
     if operation.joins != "round":
-        line_set.findings += shortened_list(
-            list(_far(chosen, setting, line_set.lines)), CORNER_FAR_MORE
-        )
+        lines.findings += shortened_list(list(_far(chosen, setting, lines.lines)), CORNER_FAR_MORE)
     if operation.corners != "none":
-        line_set.lines = [
-            _relieved(line, chosen, setting, line_set.findings) for line in line_set.lines
-        ]
+        lines.lines = [_relieved(line, chosen, setting, lines.findings) for line in lines.lines]
     names, sources = [chosen.names[k] for k in opens], chosen.source[opens].tolist()
     on_line = contours_along(chosen.lines.select(opens), setting, names, sources)
-    items = [*_beside(line_set.lines, chosen, setting), *on_line]
-    return Work(sorted(items, key=lambda each: each.source), tuple(line_set.findings))
+    items = [*_beside(lines.lines, chosen, setting), *on_line]
+    return Work(sorted(items, key=lambda each: each.source), tuple(lines.findings))
 
 
 def _together(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
