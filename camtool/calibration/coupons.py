@@ -23,6 +23,7 @@ import io
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -211,7 +212,12 @@ def sheet(
     if kind != "lines" and regions != (1, 1):
         raise OptionError(f"{kind} have no regions", mend="leave --regions out")
     grid = grid_of(min(size[0] / regions[0], size[1] / regions[1]), machine)
-    layouts = {"lines": _lines, "squares": _squares, "circles": _circles, "steps": _steps}
+    layouts: dict[str, Callable[[CouponCell, CouponGrid], Made]] = {
+        "lines": partial(_along_both, _two_lines),
+        "squares": _squares,
+        "circles": _circles,
+        "steps": partial(_along_both, _ruler),
+    }
     paths: list[SheetPath] = []
     tables: list[tuple[str, dict[str, Any]]] = []
     for name, cell in cells_of(size, regions, grid.unit):
@@ -225,16 +231,6 @@ def sheet(
 Coupon = tuple[SheetPath, dict[str, Any]]
 Made = Iterator[Coupon]
 AlongAxis = Callable[[str, Point, float, CouponGrid], Coupon]
-
-
-def _lines(cell: CouponCell, grid: CouponGrid) -> Made:
-    """Lay out two lines along X at the bottom of the cell and two along Y at its left side."""
-    return _along_both(_two_lines, cell, grid)
-
-
-def _steps(cell: CouponCell, grid: CouponGrid) -> Made:
-    """Lay out a ruler along X at the bottom and one along Y at the left side."""
-    return _along_both(_ruler, cell, grid)
 
 
 def _along_both(one: AlongAxis, cell: CouponCell, grid: CouponGrid) -> Made:

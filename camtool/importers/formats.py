@@ -30,26 +30,14 @@ XML_HEAD_BYTES = 1 << 20
 DOCTYPE."""
 
 _EXTENSIONS = {
-    ".dxf": "dxf",
-    ".svg": "svg",
-    ".svgz": "svg",
-    ".csv": "points",
-    ".tsv": "points",
-    ".txt": "points",
-    ".dat": "points",
-    ".xy": "points",
-    ".json": "points",
-    ".npy": "points",
-    ".npz": "points",
-    ".m": "points",
-    ".step": "solid",
-    ".stp": "solid",
-    ".brep": "solid",
-    ".brp": "solid",
-    ".py": "solid",
-    ".png": "bitmap",
-    ".jpg": "bitmap",
-    ".jpeg": "bitmap",
+    "dxf": ".dxf",
+    "svg": ".svg .svgz",
+    "points": ".csv .tsv .txt .dat .xy .json .npy .npz .m",
+    "solid": ".step .stp .brep .brp .py",
+    "bitmap": ".png .jpg .jpeg",
+}
+_FORMAT_BY_SUFFIX = {
+    suffix: name for name, suffixes in _EXTENSIONS.items() for suffix in suffixes.split()
 }
 
 _PICTURES = (b"\x89PNG", b"\xff\xd8\xff")
@@ -159,8 +147,8 @@ def _by_text(data: bytes, suffix: str, file: str) -> str | None:
     if start in ("[", "{") or _ROUTER.search(head):
         return "points"
     _refuse_program(head, file)
-    if suffix in _EXTENSIONS:
-        return _EXTENSIONS[suffix]
+    if suffix in _FORMAT_BY_SUFFIX:
+        return _FORMAT_BY_SUFFIX[suffix]
     return "points" if _looks_like_points(head) else None
 
 

@@ -436,11 +436,6 @@ TOOL_KEYS = {f"tool_{name}": key for name, key in TOOL.items() if key.help}
 """The tool of an operation that names none, key by key."""
 
 
-def _as_given(given: Given) -> Any:
-    """The value itself: which tool it names is for the tools of the job to say."""
-    return given.value
-
-
 OPERATION = {
     "name": Key("name", TEXT),
     "kind": Key("kind", Value(kind, choices=tuple(installed_kinds())), "What is done.  [profile]"),
@@ -480,7 +475,7 @@ OPERATION = {
     "finish": Key("finish_mm", LENGTH, "Left for a last pass.", '"0.1mm"'),
     "finish_feed": Key("finish_feed_mm_min", FEED, "Of that pass."),
     "finish_spindle": Key("finish_spindle_rpm", Value(plain(number), "SPEED"), "Of that pass."),
-    FINISH_TOOL: Key("finish_tool", Value(_as_given, "NAME"), "Of that pass."),
+    FINISH_TOOL: Key("finish_tool", Value(lambda given: given.value, "NAME"), "Of that pass."),
     "feed": Key("feed_mm_min", FEED, "In mm/min.", '"90mm/min"'),
     "plunge_feed": Key("plunge_feed_mm_min", FEED, "In mm/min.", '"30mm/min"'),
     "spindle": Key(

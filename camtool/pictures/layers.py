@@ -246,10 +246,6 @@ def map_swatch(width: float) -> str:
 # Drawings.
 
 
-def _body(content: Content, plot: Plot) -> str:
-    return plot.body(content.outlines)
-
-
 def _drawing(content: Content, plot: Plot) -> str:
     """The lines of the drawing, a group for each of its layers."""
     is_alone = content.is_drawing_alone
@@ -321,10 +317,6 @@ def swept_words(scene: Scene) -> str:
     words = [f"{wide:.4g} mm" for wide in sorted(widths)]
     words += ["V bit"] * any(tool.kind == "v" for tool in tools)
     return f"cuts: {', '.join(words)}" if words else ""
-
-
-def _travel(content: Content, plot: Plot) -> str:
-    return plot.frame("travel", content.scene.travel_mm or (0.0, 0.0), TRAVEL)
 
 
 def _travel_legend(content: Content, view: View) -> Iterator[LegendEntry]:
@@ -469,7 +461,7 @@ LAYERS = (
         holds=lambda content: content.outlines,
         draw=_drawing,
         legend=_drawing_legend,
-        ground=_body,
+        ground=lambda content, plot: plot.body(content.outlines),
         in_mm=True,
         height=3,
         place=0,
@@ -489,7 +481,9 @@ LAYERS = (
     Layer(
         "travel",
         holds=lambda content: content.scene.travel_mm,
-        draw=_travel,
+        draw=lambda content, plot: plot.frame(
+            "travel", content.scene.travel_mm or (0.0, 0.0), TRAVEL
+        ),
         legend=_travel_legend,
         in_mm=True,
         height=2,

@@ -75,7 +75,10 @@ def lines_by_step(trace: ErrorTrace, window_mm: float) -> list[list[Floats]]:
     """For each step of the map, its lines: arrays (n, 2) of points, n ≥ 2."""
     keep = _kept(trace, MERGED_SHARE * window_mm)
     drawn_part = ErrorTrace(
-        trace.points[keep], _worst_between(trace, keep), trace.cutting[keep], trace.top_um
+        trace.points[keep],
+        np.maximum.reduceat(trace.error_um, keep),
+        trace.cutting[keep],
+        trace.top_um,
     )
     bins = bins_of(drawn_part)
     lines: list[list[Floats]] = [[] for _ in range(BINS)]
@@ -102,11 +105,6 @@ def _kept(trace: ErrorTrace, apart_mm: float) -> Ints:
             kept_rows.append(index)
             last_x, last_y = x, y
     return np.array(kept_rows, dtype=np.int64)
-
-
-def _worst_between(trace: ErrorTrace, keep: Ints) -> Floats:
-    """(kept,) the largest error from each kept point up to the next: no error is hidden."""
-    return np.maximum.reduceat(trace.error_um, keep)
 
 
 def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:

@@ -18,7 +18,7 @@ from camtool.arrays import Bools, Floats
 from camtool.findings import Finding, Sentence, Severity
 from camtool.geometry.measure import path_extents
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, exceeds
 from camtool.planning.findings import (
     CUT_DOUBTFUL,
     CUT_DOUBTFUL_BEYOND,
@@ -78,9 +78,6 @@ from camtool.toolpath.moves import (
 
 LIMIT_SLACK = 1e-6
 """A chip load or surface speed may be beyond its limits by this part of them, by rounding."""
-
-FEED_TOLERANCE = 1e-6
-"""A feed may exceed its limit by this part of it, by rounding alone."""
 
 MAX_BEYOND_SHARE = 0.25
 """An allowance that takes a tool farther beyond a line than this part of its radius looks like a
@@ -401,7 +398,7 @@ def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Findin
         ("along Z", along, machine.max_plunge_mm_min),
     ):
         speed = feed * part
-        if len(speed) == 0 or speed.max() <= limit * (1.0 + FEED_TOLERANCE):
+        if not exceeds(speed, limit).any():
             continue
         row = int(speed.argmax())
         yield (FEED_ABOVE_LIMIT_ON_SLOPE if across[row] else FEED_ABOVE_LIMIT)(

@@ -93,7 +93,6 @@ class _ToolpathMapper:
         plane = matrix[:2, :2]
         sizes = np.linalg.svd(plane, compute_uv=False)
         self._unround = float(sizes[0] - sizes[-1])
-        self._scale = float(sizes.mean())
         self._b = ToolpathBuilder(self._to(tuple(toolpath.start.tolist())))
 
     def compensate_moves(self) -> CompensatedToolpath:

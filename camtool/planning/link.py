@@ -69,7 +69,8 @@ def link(
         if not runs:
             continue
         builder.source = ""
-        changes = _is_tool_change(tool, operation.tool)
+        number = operation.tool.number
+        changes = number is not None and (tool is None or tool.number != number)
         if changes:
             cooled = _set_coolant(builder, cooled, "off")
             speed = _set_spindle(builder, speed, None, spindle)
@@ -91,11 +92,6 @@ def link(
     _set_coolant(builder, cooled, "off")
     _set_spindle(builder, speed, None, spindle)
     return builder.rapid(*machine.defaults.park_mm).event(Kind.END)
-
-
-def _is_tool_change(before: Tool | None, tool: Tool) -> bool:
-    """True if the program must ask for this tool: it has a number, and another was in."""
-    return tool.number is not None and (before is None or before.number != tool.number)
 
 
 def _go_to_tool_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: float) -> None:

@@ -92,7 +92,7 @@ def fewer_reversals(items: Items, machine: Machine) -> tuple[Items, tuple[Findin
     """
     residual = residuals(machine)
     if not any(each.matters for each in residual):
-        return items, (_no_backlash(machine),)
+        return items, (PLAY_NOT_KNOWN_TO_SAVE(where="axes x, y", machine=machine.target.name),)
     counts = _Counts()
     items_made: list[Item] = []
     for item in items:
@@ -223,10 +223,6 @@ def _findings(counts: _Counts) -> Iterator[Finding]:
         )
     for reason, names in counts.whole.items():
         yield REVERSALS_IN_AIR_NOT(where=names[0], measured=len(names), reason=reason)
-
-
-def _no_backlash(machine: Machine) -> Finding:
-    return PLAY_NOT_KNOWN_TO_SAVE(where="axes x, y", machine=machine.target.name)
 
 
 class RunPiece(Struct, frozen=True):

@@ -59,11 +59,6 @@ class Faults:
             raise OptionError(f"{text!r} has a time below 0")
         return cls(**values)
 
-    @property
-    def is_faultless(self) -> bool:
-        """True if the line is without faults."""
-        return self == Faults()
-
     def __str__(self) -> str:
         return ", ".join(
             f"{each.name}={value:g}"

@@ -211,11 +211,9 @@ class _Checks:
         lowest = np.minimum(moves.start[:, 2], moves.end[:, 2])
         self.low: Ints = np.flatnonzero(lowest < STOCK_TOP_MM - POSITION_EPS_MM)
         every = max(1, math.ceil(len(self.low) / MAX_CUTS))
-        self.cuts: _Points = self._beside(self.low[::every], self._radii(), EDGE_SHARE)
-
-    def _radii(self) -> Floats:
-        """Radius of the cutter of each move (M,), mm."""
-        return np.asarray(self.moves.table[self.moves.tool, 0])
+        self.cuts: _Points = self._beside(
+            self.low[::every], self.moves.table[self.moves.tool, 0], EDGE_SHARE
+        )
 
     def _beside(self, rows: Ints, radii: Floats, share: float) -> _Points:
         """Return points along moves, on the axis and on both sides of it."""

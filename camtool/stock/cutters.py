@@ -42,11 +42,6 @@ class CutterProfile(Struct, frozen=True):
         """Radius, flat, corner and rise: a row of the table that the compiled loops read."""
         return self.radius_mm, self.flat_mm, self.corner_mm, self.rise
 
-    @property
-    def full_mm(self) -> float:
-        """Height above the tip at which the tool is as wide as its radius, mm."""
-        return self.corner_mm or (self.radius_mm - self.flat_mm) * self.rise
-
     def heights(self, distance: Floats) -> Floats:
         """Return the heights of the surface over the tip at distances from the axis; inf beyond
         the radius."""

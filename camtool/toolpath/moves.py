@@ -69,6 +69,19 @@ class Kind(IntEnum):
     COOLANT_OFF = 22
 
 
+EVENTS_AT_REST = (
+    Kind.DWELL,
+    Kind.SPINDLE_CW,
+    Kind.SPINDLE_CCW,
+    Kind.SPINDLE_OFF,
+    Kind.TOOL_CHANGE,
+    Kind.COOLANT_MIST,
+    Kind.COOLANT_FLOOD,
+    Kind.COOLANT_OFF,
+    Kind.END,
+)
+"""Before these a controller of G-code comes to rest."""
+
 Corners = Literal["blend", "exact-path", "exact-stop"]
 
 

@@ -291,7 +291,9 @@ class ReportBuilder(Struct, frozen=True, eq=False):
             findings=finding_reports(findings),
             contours=self.cuts.contour_count,
             time_split_s=_time_split(tally, link_s),
-            interpolator=_interpolator(case),
+            interpolator=case.target.model.interpolation(
+                case.decoded, case.machine, case.simulation
+            ),
             camtool_version=version_of("camtool"),
             contour_errors=self._contours(),
             bidirectional=self._both_ways(),
@@ -506,11 +508,6 @@ def _max_rms(figure: Figure) -> record.MaxRms:
     return record.MaxRms(
         rounded_or_none(figure.max, UM_PER_MM), rounded_or_none(figure.rms, UM_PER_MM)
     )
-
-
-def _interpolator(case: Case) -> str:
-    """Return a word for how the controller interpolates lines and arcs."""
-    return case.target.model.interpolation(case.decoded, case.machine, case.simulation)
 
 
 def _blocks(case: Case) -> int | None:

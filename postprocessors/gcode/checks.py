@@ -8,7 +8,7 @@ import numpy as np
 
 from camtool.arrays import Ints
 from camtool.findings import Finding
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, exceeds
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
@@ -21,9 +21,8 @@ MAX_MM: Final = 99_999.0
 ARC_RADIUS_SPREAD_MM: Final = 0.05
 """The radii at the start and at the end of a wanted arc may differ by this much, no more."""
 
-FEED_TOLERANCE: Final = 1e-6
-"""A feed within this part of a limit is at it, and an F word within this much of a whole number is
-whole."""
+WHOLE_TOLERANCE: Final = 1e-6
+"""An F word within this much of a whole number is whole."""
 
 
 def check(toolpath: Toolpath, machine: Machine) -> None:
@@ -43,7 +42,7 @@ def feed_units(
     scale = 10.0 ** (feed_decimals(machine) + unit.more_decimals) / unit.mm
     exact_units = np.where(toolpath.is_feed, toolpath.feed, 0.0) * scale
     rounded = np.rint(exact_units)
-    exact = np.abs(exact_units - rounded) <= FEED_TOLERANCE
+    exact = np.abs(exact_units - rounded) <= WHOLE_TOLERANCE
     units = np.where(exact, rounded, np.floor(exact_units)).astype(np.int64)
     refuse(
         toolpath,
@@ -76,7 +75,7 @@ def _check_feeds(toolpath: Toolpath, machine: Machine) -> None:
         limit = machine.max_feed_mm_min
         refuse(
             toolpath,
-            is_feed & (feed > limit * (1.0 + FEED_TOLERANCE)),
+            is_feed & exceeds(feed, limit),
             lambda row: (
                 f"a feed of {feed[row]:g} mm/min is above the machine's highest, {limit:g}"
             ),

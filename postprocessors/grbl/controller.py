@@ -40,7 +40,7 @@ from camtool.simulation.speed_plan import (
     axis_limits,
     max_along,
 )
-from camtool.toolpath.moves import Kind, Toolpath, are_arcs
+from camtool.toolpath.moves import EVENTS_AT_REST, Kind, Toolpath, are_arcs
 
 from .dialect import GrblController, GrblDialect
 from .steps import step_lines_fill, steps_taken
@@ -210,20 +210,6 @@ STRAIGHT_COS = 0.999999
 MIN_SPEED_MM_S = 1.0 / 60.0
 """No block is slower (MINIMUM_FEED_RATE, config.h)."""
 
-WAITS = (
-    Kind.DWELL,
-    Kind.SPINDLE_CW,
-    Kind.SPINDLE_CCW,
-    Kind.SPINDLE_OFF,
-    Kind.TOOL_CHANGE,
-    Kind.COOLANT_MIST,
-    Kind.COOLANT_FLOOD,
-    Kind.COOLANT_OFF,
-    Kind.END,
-)
-"""Before these the machine comes to rest (`protocol_buffer_synchronize`), but not where they say
-what holds already, and in laser mode not before a new power alone."""
-
 SPINDLE = (Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.SPINDLE_OFF)
 COOLANT = (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD, Kind.COOLANT_OFF)
 
@@ -390,7 +376,7 @@ def stops_of(path: Toolpath, controller: GrblController) -> Stops:
     """Events that say what holds already stop nothing. In laser mode neither does another power,
     but a target without a step stops a laser of constant power (M3), which is then set at once
     (`mc_line`)."""
-    rows = np.isin(path.kind, WAITS)
+    rows = np.isin(path.kind, EVENTS_AT_REST)
     coolant = np.flatnonzero(np.isin(path.kind, COOLANT))
     kind = np.append(Kind.COOLANT_OFF, path.kind[coolant])
     rows[coolant[kind[1:] == kind[:-1]]] = False

@@ -77,7 +77,8 @@ def settings_of(text: str) -> list[ControllerSetting] | None:
     missing = [f"${number}" for number in _KEYS.values() if number not in values]
     if missing:
         raise MachineError(
-            f"the listing is not whole: {', '.join(missing)} {_verb(missing)} missing",
+            f"the listing is not whole: {', '.join(missing)} "
+            f"{'is' if len(missing) == 1 else 'are'} missing",
             mend="give all that grbl answers to $$",
         )
     settings = [
@@ -259,7 +260,3 @@ def _lines(port: Any, patience_s: float, *ends: str) -> list[str]:
             if rows[-1].startswith(ends):
                 return rows
     return rows
-
-
-def _verb(things: list[str]) -> str:
-    return "is" if len(things) == 1 else "are"

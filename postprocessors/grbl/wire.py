@@ -307,7 +307,6 @@ class GrblConversation(Conversation):
         self._due = self._stale = 0  # reports that are due; those of them that are of before a ~
         self._resumes = False  # whether it is to go on as soon as it stands
         self._polled = self._answered = 0.0
-        self._waits_since = 0.0  # when the answer that is due began to be due
         self._waiting = False  # a report is asked for that has not come
         self._resets = 0  # banners that are due
         self._begun = 0.0  # since then

@@ -50,7 +50,15 @@ from camtool.simulation.speed_plan import (
     axis_limits,
     max_along,
 )
-from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, are_arcs, read_only
+from camtool.toolpath.moves import (
+    EVENTS_AT_REST,
+    Kind,
+    PathMode,
+    PolarArcs,
+    Toolpath,
+    are_arcs,
+    read_only,
+)
 
 from .dialect import LinuxcncController, LinuxcncDialect
 from .steps import MAX_CHAIN_POINTS, merge_lines
@@ -500,19 +508,6 @@ TANGENT_RATIO = 0.5
 MIN_PERIODS = 1.02
 """Servo periods that the shortest move lasts (TP_MIN_SEGMENT_CYCLES, tp_types.h)."""
 
-WAITS = (
-    Kind.DWELL,
-    Kind.SPINDLE_CW,
-    Kind.SPINDLE_CCW,
-    Kind.SPINDLE_OFF,
-    Kind.TOOL_CHANGE,
-    Kind.COOLANT_MIST,
-    Kind.COOLANT_FLOOD,
-    Kind.COOLANT_OFF,
-    Kind.END,
-)
-"""Before these the machine comes to rest (their preconditions in emctaskmain.cc)."""
-
 
 def halve_arcs(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     """Replace each arc that bows out by less than `tolerance_mm` (N,) of its row by two lines over
@@ -651,7 +646,7 @@ def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> PlannerMove
     highest = np.minimum(highest, length / (MIN_PERIODS * period_s))
     cuts = path.is_feed[lead]
     speed = np.minimum(np.where(cuts, path.feed[lead], np.inf) / 60.0, highest)
-    waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
+    waits = np.diff(np.cumsum(np.isin(path.kind, EVENTS_AT_REST))[lead], prepend=-1) > 0
     same_kind = cuts == np.roll(cuts, 1)
     mode = path.mode[lead]
     return PlannerMoves(
@@ -955,13 +950,10 @@ def _choose(
 
 
 class _Overlaps(Struct, frozen=True, eq=False):
-    """Speeds mm/s of both moves while they overlap, their accelerations mm/s², and half the angle
-    between them, each (K,)."""
+    """Speeds mm/s of both moves while they overlap, and half the angle between them, (K,)."""
 
     first: Floats
     second: Floats
-    slowing: Floats
-    speeding: Floats
     theta: Floats
 
 
@@ -994,7 +986,7 @@ def _overlaps(
     tolerance_speed = 2.0 * np.sqrt(one * tolerance / np.where(bends, cosine, 1.0))
     tolerance_speed = np.where(bends, tolerance_speed, np.inf)
     return _Overlaps(
-        np.minimum(first, tolerance_speed), np.minimum(second, tolerance_speed), one, other, theta
+        np.minimum(first, tolerance_speed), np.minimum(second, tolerance_speed), theta
     )
 
 

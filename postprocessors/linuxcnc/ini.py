@@ -144,7 +144,9 @@ def _axis(ini: _Ini, letter: str, joint: str, unit: float) -> list[ControllerSet
         origin = f"{entry} of [{section}]" + (", from inches" if unit == _INCH_MM else "")
         place = ini.where(section, entry)
         settings.append(
-            ControllerSetting(f"axes.{letter.lower()}.{key}", _clean(value), origin, place)
+            ControllerSetting(
+                f"axes.{letter.lower()}.{key}", float(f"{value:.12g}"), origin, place
+            )
         )
 
     scale = "SCALE" if ini.text(joint, "SCALE") is not None else "INPUT_SCALE"
@@ -186,11 +188,6 @@ def _limit(ini: _Ini, axis: str, joint: str, key: str) -> tuple[float, str] | No
         if value is not None:
             return value, section
     return None
-
-
-def _clean(value: float) -> float:
-    """Without the digits that a change of units adds."""
-    return float(f"{value:.12g}")
 
 
 def _remedy(ini: _Ini) -> str:

@@ -315,7 +315,6 @@ class Interpreter(BlockMoves):
         compensation.radius = abs(radius)
         self.given.compensating = True
         self.canon.nose = _nose(orientation, compensation.radius)
-        self._orientation = orientation
 
     def _tool_for_radius(self, words: dict[str, float]) -> ToolTableEntry:
         number = self._loaded

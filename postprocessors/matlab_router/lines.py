@@ -49,7 +49,7 @@ TIE_TOLERANCE: Final = 1e-6
 """A coordinate within this part of the grid of half-way between two of its lines counts as
 half-way, and goes to the farther one."""
 
-FEED_TOLERANCE: Final = 1e-6
+UNIT_TOLERANCE: Final = 1e-6
 """A feed within this many counts of the limit is on it."""
 
 MAX_SPEED_COUNTS: Final = 1023
@@ -115,7 +115,7 @@ class _Maker:
         self._unit = machine.feed.unit_mm_min
         self._least = max(CHUNK_UNITS, dialect.grid_units)
         self._most_counts = min(
-            MAX_SPEED_COUNTS, int(machine.max_feed_mm_min / self._unit + FEED_TOLERANCE)
+            MAX_SPEED_COUNTS, int(machine.max_feed_mm_min / self._unit + UNIT_TOLERANCE)
         )
 
     def lines(self, cuts: CutLines) -> SlaveLines:

@@ -66,7 +66,7 @@ def read_jobs(data: bytes, machine: MatlabRouterMachine) -> Iterator[ReadJob]:
     if streamed != (dialect.format == "stream"):
         if streamed:
             raise ProgramError("this is a serial stream", mend="use --set dialect.format=stream")
-        if data and _looks_like_text(data):
+        if data and re.match(rb"\s*(?:%|[a-z])", data):
             raise ProgramError("this is no serial stream", mend="use --set dialect.format=m")
     read = read_stream if dialect.format == "stream" else read_text
     yield from read(data, dialect)
@@ -78,10 +78,6 @@ def path_of(jobs: Iterable[ReadJob], machine: MatlabRouterMachine) -> Toolpath:
     for job in jobs:
         moves.add(job)
     return moves.finish()
-
-
-def _looks_like_text(data: bytes) -> bool:
-    return re.match(rb"\s*(?:%|[a-z])", data) is not None
 
 
 class _Moves:

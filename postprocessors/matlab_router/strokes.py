@@ -157,15 +157,12 @@ def _events(toolpath: Toolpath) -> list[Finding]:
         "a tool change between cuts",
         "post a program for each tool (--split tool)",
     )
+    has_speed = np.asarray((kind == Kind.SPINDLE_CW) & np.isfinite(toolpath.value))
     return [
         *_left_out(toolpath, kind == Kind.DWELL, EVENT_LEFT_OUT_DWELL),
         *_left_out(toolpath, kind == Kind.TOOL_CHANGE, EVENT_LEFT_OUT_TOOL),
-        *_left_out(toolpath, _with_speed(toolpath), EVENT_LEFT_OUT_SPEED),
+        *_left_out(toolpath, has_speed, EVENT_LEFT_OUT_SPEED),
     ]
-
-
-def _with_speed(toolpath: Toolpath) -> Bools:
-    return np.asarray((toolpath.kind == Kind.SPINDLE_CW) & np.isfinite(toolpath.value))
 
 
 def _left_out(toolpath: Toolpath, rows: Bools, sentence: Sentence) -> list[Finding]:

@@ -32,7 +32,7 @@ HALF_STEP_TOLERANCE: Final = 1e-6
 UNITS_PER_MM: Final = {"example": 100_000, "annex": 1_000}
 MAX_UNITS: Final = {"example": 9_999_999, "annex": 99_999}
 
-FEED_TOLERANCE: Final = 1e-6
+UNIT_TOLERANCE: Final = 1e-6
 """A feed within this much (in units of the feed word) of a limit or a whole unit is on it."""
 
 MAX_FEED_UNITS: Final = 99
@@ -203,7 +203,7 @@ def _feed_units(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[Ints, Findi
     (L3196-3199); F00 would make the controller divide by 0.
     """
     unit = machine.feed.unit_mm_min
-    max_units = min(MAX_FEED_UNITS, math.floor(machine.max_feed_mm_min / unit + FEED_TOLERANCE))
+    max_units = min(MAX_FEED_UNITS, math.floor(machine.max_feed_mm_min / unit + UNIT_TOLERANCE))
     mend = f"the highest feed is {max_units * unit:g} mm/min, the lowest {unit:g} mm/min"
     is_cut = toolpath.is_feed
     feed = np.where(is_cut, toolpath.feed, unit)
@@ -211,14 +211,14 @@ def _feed_units(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[Ints, Findi
     refuse(toolpath, ~(feed > 0.0), lambda row: f"a feed of {feed[row]:g} mm/min", mend)
     refuse(
         toolpath,
-        feed > highest + FEED_TOLERANCE * unit,
+        feed > highest + UNIT_TOLERANCE * unit,
         lambda row: f"feed {feed[row]:g} mm/min is above what the link to the machine allows",
         mend,
     )
-    units = np.floor(feed / unit + FEED_TOLERANCE).astype(np.int64)
+    units = np.floor(feed / unit + UNIT_TOLERANCE).astype(np.int64)
     refuse(toolpath, units < 1, lambda row: f"feed {feed[row]:g} mm/min would be F00", mend)
     excess = feed - units * unit
-    rounded = excess > FEED_TOLERANCE * unit
+    rounded = excess > UNIT_TOLERANCE * unit
     units = np.where(is_cut, units, 0)
     if not rounded.any():
         return units, None

@@ -18,6 +18,7 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.bounds import refuse_too_long
 from camtool.findings import Finding
+from camtool.machine.model import FEED_TOLERANCE
 from camtool.records import replace
 from camtool.toolpath.lower import LoweredToolpath, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
@@ -45,8 +46,6 @@ UNSAID: Final = (
     Kind.SPINDLE_OFF,
     Kind.TOOL_CHANGE,
 )
-FEED_TOLERANCE: Final = 1e-6
-"""A feed within this part of the machine's only speed is that speed."""
 
 MAX_UNITS: Final = 99_999.0
 """An arc becomes lines when its centre is farther from its start (in units of the program)."""

@@ -335,7 +335,11 @@ def wrap_paragraph(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
             cells.append((x, group[0]))
             x += size
         else:
-            if width > 0.0 and x + size > limit and any(_is_word(cell) for _, cell in cells):
+            if (
+                width > 0.0
+                and x + size > limit
+                and any(cell.glue is Glue.NONE for _, cell in cells)
+            ):
                 yield _line(paragraph, cells, first_indent, stretch=paragraph.justified)
                 first_indent, x, cells = following, following, []
             for cell in group:
@@ -343,10 +347,6 @@ def wrap_paragraph(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
                 x += cell.width
     last = _line(paragraph, cells, first_indent, stretch=False)
     yield replace(last, ends_column=paragraph.ends_column)
-
-
-def _is_word(cell: MTextCell) -> bool:
-    return cell.glue is Glue.NONE
 
 
 def _unbreakable(cells: Sequence[MTextCell]) -> Iterator[tuple[MTextCell, ...]]:

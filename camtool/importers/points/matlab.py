@@ -267,7 +267,11 @@ class _Parser:
                     pass
                 continue
             if token.text not in self.names:
-                self._fail(f"{token.text!r} is none of the known arrays", token, self._known())
+                self._fail(
+                    f"{token.text!r} is none of the known arrays",
+                    token,
+                    f"known: {', '.join(self.names)}; {_ONLY_NUMBERS}",
+                )
             if token.text in arrays:
                 self._fail(f"{token.text} is assigned twice", token, "give one job a file")
             arrays[token.text] = MatlabArray(self._value(token.text), token.line)
@@ -331,9 +335,6 @@ class _Parser:
         token = self._now
         self._now = next(self._rest, token)
         return token
-
-    def _known(self) -> str:
-        return f"known: {', '.join(self.names)}; {_ONLY_NUMBERS}"
 
     def _fail(self, message: str, token: _Token, mend: str = "") -> NoReturn:
         raise DrawingError(message, file=self.file, where=f"line {token.line}", mend=mend)

@@ -240,7 +240,9 @@ class _Pen(Struct):
         """Ends the subpath, if one is begun; the pen stands at its start when it is closed."""
         self._flush()
         if self.segments:
-            self.done.append(Subpath(_point(self.start), tuple(self.segments), closed))
+            self.done.append(
+                Subpath(np.array([self.start.real, self.start.imag]), tuple(self.segments), closed)
+            )
             self.segments = []
         if closed:
             self.here = self.start
@@ -309,10 +311,6 @@ def _bounded(place: complex) -> complex:
     if not (abs(place.real) <= MAX_NUMBER and abs(place.imag) <= MAX_NUMBER):
         raise DrawingError("path data lead to a place that is too far away")
     return place
-
-
-def _point(z: complex) -> Floats:
-    return np.array([z.real, z.imag])
 
 
 def _pairs(points: list[complex]) -> Floats:
