@@ -150,9 +150,11 @@ def post_drawing(
     `trace_points` of the slides' path are kept (None: the default). `progress` is told of each
     stage. Raises OptionError, MachineError, and PostError for what the target cannot write.
     """
+    from camtool.stock.before import planned_before
+
     posting = _Posting(check, gates, trace_points, brief, progress=progress or Progress())
     posting.progress.begin(PLANNING)
-    posting = replace(posting, before=_stock_before(drawing, job, target.machine))
+    posting = replace(posting, before=planned_before(drawing, job, target.machine))
     return _post_drawing(drawing, job, target, posting)
 
 
@@ -193,11 +195,12 @@ def post_by_tool(
     complete and judged alone, against what its operations ask for.
     """
     from camtool.planning.plan import parted, planned, turns_of_tools
+    from camtool.stock.before import planned_before
 
     posting = _Posting(check, gates, trace_points, progress=progress or Progress())
     machine = target.machine
     posting.progress.begin(PLANNING)
-    posting = replace(posting, before=_stock_before(drawing, job, machine))
+    posting = replace(posting, before=planned_before(drawing, job, machine))
     every = planned(drawing, job, machine)
     turns = turns_of_tools(every)
     posting = replace(posting, is_whole=len(turns) == 1)
@@ -255,22 +258,6 @@ def post_by_setup(
         if run.wanted is not None:
             cut.append((setup_job, run.wanted))
     return tuple(runs)
-
-
-def _stock_before(drawing: Drawing, job: Job, machine: Machine) -> StockBefore:
-    """Return what the set-ups before that of a job leave of the stock."""
-    from camtool.planning.plan import planned
-    from camtool.stock.before import WHOLE, stock_before
-
-    if job.setup_of is None:
-        return WHOLE
-    full_job, whole_job = job.setup_of
-    earlier = [
-        full_job.setup(each.name) for each in full_job.setups[: full_job.setups.index(whole_job)]
-    ]
-    return stock_before(
-        job, [(each, planned(drawing, each, machine).toolpath) for each in earlier]
-    )
 
 
 def _kth_of(several: Callable[[], tuple[T, ...]], k: int) -> T:
@@ -401,6 +388,7 @@ def verify_program(
     elif drawing is not None:
         from camtool.planning.drawn import kept_of
         from camtool.planning.plan import planned
+        from camtool.stock.before import planned_before
         from camtool.stock.checks import stock_request
 
         job_used, machine = job or Job(), target.machine
@@ -414,7 +402,7 @@ def verify_program(
             case, wanted=plan.toolpath, drawing=plan.placed, compensated=compensation, asked=order
         )
         protected = kept_of(plan.steps)
-        before = _stock_before(drawing, job_used, machine)
+        before = planned_before(drawing, job_used, machine)
         asked_of_stock = stock_request(plan.steps, job_used, _beside_mm(case), before=before)
     options = VerifyOptions(
         interpolator=judging.interpolator,

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,7 @@ from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.planning.job import Job, Tool
+    from camtool.stock.before import StockBefore
     from camtool.stock.moves import StockMoves
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.program import Listing
@@ -148,7 +150,7 @@ class StockPair(Struct, frozen=True, eq=False):
     this block; otherwise it is as large as the cuts need. `against`: a word for what should be.
     `bands` makes, of a distance from walls, mm, in which nothing is judged, the function that
     gives the least and the greatest height (N, 2) mm that drawing and job allow at points (N, 2);
-    None without a drawing."""
+    None without a drawing. `before`: what set-ups before have cut, None where nothing has."""
 
     moves: StockMoves
     wanted: StockMoves | None
@@ -157,6 +159,7 @@ class StockPair(Struct, frozen=True, eq=False):
     known: bool
     against: str = "wanted"
     bands: Callable[[float], Callable[[Floats], Floats]] | None = None
+    before: StockBefore | None = None
 
 
 class TableLine(Struct, frozen=True):
@@ -294,8 +297,20 @@ def scene_of(
             wanted_path,
             target if verification is not None else None,
             _bands(drawn, job, wanted_path, machine),
+            _before(drawn, job, machine),
         ),
     )
+
+
+def _before(
+    drawing: Drawing | None, job: Job | None, machine: Machine | None
+) -> Callable[[], StockBefore] | None:
+    """Return the function that gives what set-ups before that of a job have cut."""
+    if drawing is None or job is None or machine is None or job.setup_of is None:
+        return None
+    from camtool.stock.before import planned_before
+
+    return partial(planned_before, drawing, job, machine)
 
 
 FLIP_SHARE = 0.04
@@ -342,6 +357,7 @@ def _stock_pair(
     wanted_path: Toolpath | None,
     target: LoadedTarget | None,
     bands: Callable[[float], Callable[[Floats], Floats]] | None,
+    before: Callable[[], StockBefore] | None,
 ) -> Callable[[], StockPair] | None:
     """The function that gives the moves that cut the stock."""
     if toolpath is None:
@@ -362,7 +378,9 @@ def _stock_pair(
         pair = stock_pair(moves, box, None if stock is None else stock.thickness_mm)
         other = wanted_path is not None and wanted_path is not toolpath
         wanted_moves = _as_planned(wanted_path, job) if other and wanted_path is not None else None
-        return replace(pair, wanted=wanted_moves, bands=bands)
+        return replace(
+            pair, wanted=wanted_moves, bands=bands, before=None if before is None else before()
+        )
 
     return pair
 

@@ -124,12 +124,13 @@ GHOST_PEN, GHOST_ALPHA = 1.3, "8c"
 
 class Solid(Struct, frozen=True, eq=False):
     """The content of a picture of the stock: the block and its moves, the map of the part that is
-    shown, where that part ends in X and Y, and how much (NY, NX) mm it is higher or lower than
-    wanted, None if not asked for."""
+    shown, where that part ends in X and Y, how deep the moves cut there, mm, and how much (NY, NX)
+    mm it is higher or lower than wanted, None if not asked for."""
 
     pair: StockPair
     found: HeightMap
     ends_mm: tuple[float, float]
+    cut_mm: float
     off_mm: Floats | None = None
 
     @property
@@ -184,12 +185,16 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
     cells = MAP_CELLS if options.view not in BAR_NAMES else MAX_COMPARED
     cell = max(side / pixels, cell_for(box, cells))
     map_found = height_map(pair.moves, box, cell, owners=True)
+    cut_mm = -float(map_found.heights.min(initial=0.0))
+    left = map_found if pair.before is None else pair.before.shown_in(map_found)
     if options.view not in BAR_NAMES:
-        return Solid(pair, map_found, box[2:])
+        return Solid(pair, left, box[2:], cut_mm)
     lowest, highest = _wanted(pair, map_found, box, options)
-    heights = map_found.heights.clip(-pair.thickness_mm)
+    heights = left.heights.clip(-pair.thickness_mm)
     deviations = heights - highest if options.view == "leftover" else lowest - heights
-    return Solid(pair, map_found, box[2:], deviations.astype(np.float64))
+    # What was gone before is neither left nor cut.
+    deviations = np.where(left.heights == map_found.heights, deviations, 0.0)
+    return Solid(pair, left, box[2:], cut_mm, deviations.astype(np.float64))
 
 
 def _wanted(
@@ -237,8 +242,8 @@ def _notes(solid: Solid, options: PictureOptions) -> tuple[str, ...]:
     sizes = (right - left, top - bottom, solid.pair.thickness_mm)
     size_text = " × ".join(number(size, 2) for size in sizes)
     guessed = "" if solid.pair.known else ", as large as the cuts need"
-    depth = number(-float(solid.found.heights.min(initial=0.0)), 3)
-    is_through = solid.pair.known and solid.deepest_mm >= solid.pair.thickness_mm
+    depth = number(solid.cut_mm, 3)
+    is_through = solid.pair.known and solid.cut_mm >= solid.pair.thickness_mm
     notes = [
         f"stock {size_text} mm{guessed}; cut {depth} mm deep{', through it' if is_through else ''}"
     ]

@@ -10,16 +10,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import numpy.typing as npt
 from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
+from camtool.geometry.drawing import Drawing
 from camtool.geometry.turn import Box, Turn
 from camtool.kernels.stock import StockTree
+from camtool.machine.model import Machine
 from camtool.planning.job import Job
 from camtool.planning.naming import setup_name
+from camtool.records import replace
+from camtool.stock.heightmap import HeightMap, add_moves
 from camtool.stock.heights import TOP_MM, Bracket, greatest_value, stock_tree
-from camtool.stock.moves import stock_moves_of_toolpath
+from camtool.stock.moves import StockMoves, stock_moves_of_toolpath
 from camtool.stock.slides import tools_of_rows
 from camtool.toolpath.moves import Toolpath
 
@@ -31,11 +36,25 @@ MAX_REMAINING_SQUARES = 200_000
 
 
 class SetupCut(Struct, frozen=True, eq=False):
-    """The cuts of a set-up: its name, its moves, and the map into its frame."""
+    """The cuts of a set-up: its name, its moves with their index, and the map into its frame."""
 
     name: str
+    moves: StockMoves
     tree: StockTree
     turn: Turn
+
+    @classmethod
+    def of(cls, name: str, moves: StockMoves, turn: Turn) -> SetupCut:
+        """Return the cuts of a set-up whose feeds make these moves."""
+        return cls(name, moves, stock_tree(moves), turn)
+
+    def heights_in(self, drawn: HeightMap) -> npt.NDArray[np.float32]:
+        """Return the heights (NY, NX) mm that the cuts leave in the cells of a map, as they are
+        seen from its own face."""
+        start, end = map(self.turn.back.points, (self.moves.start, self.moves.end))
+        found = replace(drawn, heights=np.zeros_like(drawn.heights), owner=None)
+        add_moves(found, replace(self.moves, start=start, end=end))
+        return found.heights
 
 
 class StockBefore(Struct, frozen=True, eq=False):
@@ -75,6 +94,17 @@ class StockBefore(Struct, frozen=True, eq=False):
         """Return upper bounds (K,) of the floors over squares (K, 3)."""
         return self._raised(_lowest(self.below, squares, lambda tree, at: tree.least(at)))
 
+    def shown_in(self, drawn: HeightMap) -> HeightMap:
+        """Return a map of what is left of a stock; where it is gone it has its bottom."""
+        heights = drawn.heights
+        for each in self.above:
+            heights = np.minimum(heights, each.heights_in(drawn))
+        for each in self.below:
+            floors = self._raised(each.heights_in(drawn).astype(np.float64))
+            is_gone = floors >= heights - THROUGH_SLACK_MM
+            heights = np.where(is_gone, np.float32(TOP_MM - self.thickness_mm), heights)
+        return replace(drawn, heights=heights)
+
     def deepest_below(self, point: Floats) -> str:
         """Return the name of the set-up that has cut deepest from below over a point (2,)."""
         depths = [each.tree.heights(each.turn.points(point[None]))[0][0] for each in self.below]
@@ -113,9 +143,23 @@ def stock_before(job: Job, earlier: Sequence[tuple[Job, Toolpath]]) -> StockBefo
         except OptionError:  # a set-up that cuts nothing: its own findings say so
             continue
         moves = stock_moves_of_toolpath(toolpath, tools.index, tools.cutters)
-        cut = SetupCut(setup_name(other), stock_tree(moves.select(~moves.rapid)), turn)
+        cut = SetupCut.of(setup_name(other), moves.select(~moves.rapid), turn)
         (below if turn.is_over else above).append(cut)
     return StockBefore(tuple(above), tuple(below), job.stock.thickness_mm)
+
+
+def planned_before(drawing: Drawing, job: Job, machine: Machine) -> StockBefore:
+    """Return what the set-ups before that of a job leave of the stock."""
+    if job.setup_of is None:
+        return WHOLE
+    from camtool.planning.plan import planned  # all of planning, for set-ups alone
+
+    part_job, own = job.setup_of
+    names = [each.name for each in part_job.setups]
+    earlier = [part_job.setup(name) for name in names[: names.index(own.name)]]
+    return stock_before(
+        job, [(each, planned(drawing, each, machine).toolpath) for each in earlier]
+    )
 
 
 def least_remaining(tree: StockTree, before: StockBefore, box_mm: Box) -> Bracket:

@@ -20,6 +20,7 @@ from camtool.planning.plan import planned
 from camtool.records import replace
 from camtool.stock.before import SetupCut, StockBefore, least_remaining, stock_before
 from camtool.stock.checks import stock_findings, stock_request
+from camtool.stock.heightmap import height_map
 from camtool.stock.heights import stock_tree
 from camtool.stock.moves import StockMoves, stock_moves_of_toolpath
 from camtool.stock.rapids import rapids_through_stock
@@ -62,7 +63,7 @@ def test_columns_are_the_literal_ones_and_bounds_hold(
     seed: int, turns: list[str], size: float
 ) -> None:
     cuts = [(random_moves(seed + k, 12), turn) for k, turn in enumerate(turns)]
-    made = [SetupCut(turn, stock_tree(moves), MAPS[turn]) for moves, turn in cuts]
+    made = [SetupCut.of(turn, moves, MAPS[turn]) for moves, turn in cuts]
     before = StockBefore(
         tuple(each for each in made if each.name == "same"),
         tuple(each for each in made if each.name != "same"),
@@ -80,6 +81,23 @@ def test_columns_are_the_literal_ones_and_bounds_hold(
         for values, least, most in zip((floor, top), low, high, strict=True):
             assert (least <= values + 2e-8).all()
             assert (values <= most + 2e-8).all()
+
+
+@settings(max_examples=8)
+@given(seed=st.integers(0, 10_000), turn=st.sampled_from(sorted(TURNS)))
+def test_a_map_shows_what_is_left(seed: int, turn: str) -> None:
+    """Cell by cell, of two programs from either face, against the literal columns."""
+    first, own = random_moves(seed, 12), random_moves(seed + 1, 12)
+    cut = SetupCut.of(turn, first, MAPS[turn])
+    above, below = ((cut,), ()) if turn == "same" else ((), (cut,))
+    drawn = height_map(own, (0.0, 0.0, 10.0, 11.0), 0.37)
+    left = StockBefore(above, below, THICK).shown_in(drawn)
+    points = np.stack(np.meshgrid(drawn.x, drawn.y), axis=-1).reshape(-1, 2)
+    floor, top = literal_column([(first, turn)], points)
+    z = np.minimum(np.minimum(slow.heights(own, points), 0.0), top)
+    wanted = np.where(floor >= z, -THICK, z).reshape(left.heights.shape)
+    # A cell at a wall may fall on its other side.
+    assert (np.abs(left.heights - wanted) < 1e-4).mean() > 0.99
 
 
 @settings(max_examples=40)
@@ -102,7 +120,7 @@ def slot(y: float, z: float, x: tuple[float, float] = (2.0, 8.0), radius: int = 
 
 
 def from_below(moves: StockMoves, turn: Turn = MAPS["x"]) -> StockBefore:
-    return StockBefore((), (SetupCut("first", stock_tree(moves), turn),), THICK)
+    return StockBefore((), (SetupCut.of("first", moves, turn),), THICK)
 
 
 @pytest.mark.parametrize(("deep", "other"), [(1.5, 1.0), (2.5, 1.2), (2.5, 2.0)])
@@ -129,11 +147,11 @@ def test_a_rapid_through_what_another_set_up_has_cleared_is_fine() -> None:
         (from_below(slot(5.5, -1.9)), 1),  # a floor of 0.1 mm above the tip, and more, is left
         (from_below(slot(5.5, -4.1, (2.0, 5.0))), 1),  # gone in the half of it
         (from_below(slot(3.5, -4.1)), 1),  # gone beside it
-        (StockBefore((SetupCut("", stock_tree(slot(5.5, -2.0)), Turn()),), (), THICK), 0),
-        (StockBefore((SetupCut("", stock_tree(slot(5.5, -1.8)), Turn()),), (), THICK), 1),
+        (StockBefore((SetupCut.of("", slot(5.5, -2.0), Turn()),), (), THICK), 0),
+        (StockBefore((SetupCut.of("", slot(5.5, -1.8), Turn()),), (), THICK), 1),
         (
             StockBefore(
-                (SetupCut("", stock_tree(slot(5.5, -1.0)), Turn()),),
+                (SetupCut.of("", slot(5.5, -1.0), Turn()),),
                 from_below(slot(5.5, -3.0)).below,
                 THICK,
             ),
