@@ -40,6 +40,7 @@ from camtool.stock.findings import (
     MATERIAL_LEFT,
     PASS_TOO_DEEP,
     STOCK_NOT_JUDGED_BEFORE,
+    STOCK_NOT_JUDGED_NARROW,
     TAB_MISSING,
     TAB_MISSING_ALL,
     TAB_THIN,
@@ -423,7 +424,10 @@ class _Checks:
         stock = self.request.stock
         if stock is None:
             return
-        every = loose_pieces(self.moves, stock.thickness_mm, stock.box_mm, self.before)
+        found = loose_pieces(self.moves, stock.thickness_mm, stock.box_mm, self.before)
+        every = found.pieces
+        if found.narrowest_mm < found.seen_mm - POSITION_EPS_MM:
+            yield STOCK_NOT_JUDGED_NARROW(measured=found.narrowest_mm, limit=found.seen_mm)
         pieces = [
             (piece, is_part)
             for piece in every

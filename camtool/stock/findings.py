@@ -176,6 +176,12 @@ STOCK_NOT_JUDGED_BEFORE = Sentence(
     "what other programs of this job cut is not known here: material that is left, passes, shanks "
     "and holders are not judged, and pieces only if this program alone cuts them off",
 )
+STOCK_NOT_JUDGED_NARROW = Sentence(
+    StockCode.STOCK_NOT_JUDGED,
+    "the stock is too large to look for pieces that come loose within cuts of {measured:.3g} mm: "
+    "those within cuts of {limit:.3g} mm or more are found",
+    "mm",
+)
 TOOL_NOT_KNOWN = Sentence(StockCode.TOOL_NOT_KNOWN, "not known, and not judged: {bodies}")
 FACES_MEET = Sentence(
     StockCode.FACES_MEET,

@@ -17,13 +17,12 @@ two only the smaller part counts, and only if something is left of it at the end
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from itertools import groupby
 
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Floats, Ints
+from camtool.kernels.pieces import CUT, partings, piece_at
 from camtool.records import replace
 from camtool.stock.before import THROUGH_SLACK_MM, WHOLE, StockBefore
 from camtool.stock.cutters import CutterProfile
@@ -34,7 +33,8 @@ CELL_SHARE = 1.0 / 3.0
 """Of the width of the narrowest cut through the stock, the width of a cell."""
 
 MAX_RASTER_CELLS = 4_000_000
-"""Cells are wider where there would be more; pieces within narrower cuts are then missed."""
+"""Cells are wider where there would be more; pieces within narrower cuts are then missed, which
+`LoosePieces.seen_mm` says."""
 
 MIN_PIECE_SHARE = 0.25
 """The smallest piece that comes loose, as a share of the area of the narrowest tool's disc:
@@ -74,15 +74,13 @@ class LoosePiece(Struct, frozen=True, eq=False):
     again: int
 
 
-class _Parting(Struct, frozen=True):
-    """A piece of cells that comes loose: its time, the row and column of a cell of it, the least
-    and the greatest of all its rows and columns, and how many of its cells are cut later."""
+class LoosePieces(Struct, frozen=True, eq=False):
+    """The pieces that come loose, in the order of time. Those within cuts narrower than
+    `seen_mm` are not looked for; the narrowest cut is `narrowest_mm` wide."""
 
-    time: int
-    place: tuple[int, int]
-    rows: tuple[int, int]
-    columns: tuple[int, int]
-    cut: int
+    pieces: list[LoosePiece]
+    seen_mm: float = 0.0
+    narrowest_mm: float = 0.0
 
 
 class _Level(Struct, frozen=True, eq=False):
@@ -96,9 +94,9 @@ class _Level(Struct, frozen=True, eq=False):
 
 def loose_pieces(
     moves: StockMoves, thickness_mm: float, box_mm: Box | None, before: StockBefore = WHOLE
-) -> list[LoosePiece]:
+) -> LoosePieces:
     """Return the pieces that come loose of a stock with this thickness and these sides (None:
-    without limits), which set-ups have cut before, in the order of time."""
+    without limits), which set-ups have cut before."""
     levels = [
         _Level(floor, *_through(moves, floor)) for floor in _floors(moves, thickness_mm, before)
     ]
@@ -107,7 +105,7 @@ def loose_pieces(
     cuts = moves.select(moves.table[moves.tool, 0] > 0.0) if has_others else levels[0].cuts
     across = (cuts.start[:, :2] != cuts.end[:, :2]).any(axis=1)
     if not across.any():
-        return []
+        return LoosePieces([])
     radius = cuts.table[cuts.tool, 0]
     min_radius = float(radius[across].min())
     low = np.minimum(cuts.start, cuts.end)[:, :2] - radius[:, None]
@@ -119,22 +117,23 @@ def loose_pieces(
     elif box_mm is not None:
         low, high = np.maximum(low, box_mm[:2]), np.minimum(high, box_mm[2:])
     if (low >= high).any():
-        return []
+        return LoosePieces([])
     box = (*low.tolist(), *high.tolist())
     max_cells = MAX_PIECE_CELLS if has_others else MAX_RASTER_CELLS
     cell = max(CELL_SHARE * 2.0 * min_radius, cell_for(box, max_cells))
     raster = _Raster(levels, before, box, cell)
     time = raster.times(box, cell, math.sqrt(0.5) * cell)[1]
     disc = math.pi * min_radius**2
-    partings = list(_partings(time, MIN_PIECE_SHARE * disc / cell**2))
-    cells = min(MAX_PIECE_CELLS, MAX_RASTER_CELLS // max(len(partings), 1))
+    rows = partings(time, STANDING, MIN_PIECE_SHARE * disc / cell**2)
+    cells = min(MAX_PIECE_CELLS, MAX_RASTER_CELLS // max(len(rows), 1))
     pieces = []
-    for parting in partings:
+    for parting in rows:
         piece = raster.measured(time, parting, cells)
         if piece is not None and piece.area_mm2 >= MIN_PIECE_SHARE * disc:
-            is_cut = parting.cut * cell**2 >= MIN_CUT_SHARE * disc
+            is_cut = parting[CUT] * cell**2 >= MIN_CUT_SHARE * disc
             pieces.append(piece if is_cut else replace(piece, again=-1))
-    return sorted(pieces, key=lambda each: each.move)
+    pieces.sort(key=lambda each: each.move)
+    return LoosePieces(pieces, cell / CELL_SHARE, 2.0 * min_radius)
 
 
 def _floors(moves: StockMoves, thickness_mm: float, before: StockBefore) -> list[float]:
@@ -225,19 +224,18 @@ class _Raster(Struct, frozen=True, eq=False):
         assert first_cuts is not None
         return drawn, np.where(is_gone, BEFORE, first_cuts)
 
-    def measured(self, time: Ints, parting: _Parting, cells: int) -> LoosePiece | None:
-        """Return a piece as it is when a move frees it; None where all its cells are cut in
-        part."""
-        (low, high), (left_column, right) = parting.rows, parting.columns
+    def measured(self, time: Ints, parting: Ints, cells: int) -> LoosePiece | None:
+        """Return a piece as it is when a move frees it, by its row of
+        `camtool.kernels.pieces.partings`; None where all its cells are cut in part."""
+        now, place, low, high, left_column, right = parting[:CUT].tolist()
+        row, column = divmod(place, time.shape[1])
         time = time[low : high + 1, left_column : right + 1]
-        label = _labels(time > parting.time)
-        row, column = parting.place
-        is_piece = label == label[row - low, column - left_column]
+        is_piece = piece_at(time > now, row - low, column - left_column)
         cell = self.cell_mm
         corner = np.array(self.box[:2]) + cell * np.array([left_column, low])
         size = cell * np.array(is_piece.shape[::-1])
         box = (*corner.tolist(), *(corner + size).tolist())
-        fine, cut = self.times(box, min(cell, cell_for(box, cells)), 0.0, parting.time)
+        fine, cut = self.times(box, min(cell, cell_for(box, cells)), 0.0, now)
         points = _centres(fine)[(cut == STANDING).ravel()]
         x, y = np.floor((points - corner) / cell).astype(np.int64).T
         inside = is_piece[y.clip(max=len(is_piece) - 1), x.clip(max=is_piece.shape[1] - 1)]
@@ -248,107 +246,9 @@ class _Raster(Struct, frozen=True, eq=False):
         ends = (*(points.min(axis=0) - half).tolist(), *(points.max(axis=0) + half).tolist())
         later = time[is_piece & (time != STANDING)]
         next_cut = int(later.min()) if len(later) else -1
-        return LoosePiece(parting.time, len(points) * fine.cell_mm**2, ends, points, next_cut)
+        return LoosePiece(now, len(points) * fine.cell_mm**2, ends, points, next_cut)
 
 
 def _centres(drawn: HeightMap) -> Floats:
     """Return the centres (P, 2) of all cells of a raster, row by row."""
     return np.stack(np.meshgrid(drawn.x, drawn.y), axis=-1).reshape(-1, 2)
-
-
-def _partings(time: Ints, min_cells: float) -> Iterator[_Parting]:
-    """Yield each piece of `min_cells` cells or more that comes loose. `time` (NY, NX): when each
-    cell is cut through."""
-    label = _labels(time == STANDING)
-    count = int(label.max()) + 1
-    size = np.bincount(label[label >= 0], minlength=count).tolist()
-    edges = np.concatenate([label[0], label[-1], label[:, 0], label[:, -1]])
-    is_held = np.isin(np.arange(count), edges).tolist()
-    y, x = np.nonzero(time != STANDING)
-    order = np.argsort(-time[y, x], kind="stable")
-    y, x = y[order], x[order]
-    node = np.pad(label, 1, constant_values=-1)
-    width = node.shape[1]
-    spans = [*_spans(label, count), *zip(*np.stack([y, y, x, x]).tolist(), strict=True)]
-    owner, cells = node.ravel().tolist(), ((y + 1) * width + x + 1).tolist()
-    _, first = np.unique(label, return_index=True)
-    sample = [*first[-count:].tolist(), *(y * label.shape[1] + x).tolist()]
-    root, cut = list(range(count + len(cells))), [0] * (count + len(cells))
-    size += [0] * len(cells)
-    is_held += [False] * len(cells)
-    neighbours = [dy * width + dx for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
-
-    def top(one: int) -> int:
-        while root[one] != one:
-            root[one] = root[root[one]]
-            one = root[one]
-        return one
-
-    times = time[y, x].tolist()
-    for time_now, group in groupby(range(len(cells)), key=times.__getitem__):
-        added = [count + k for k in group]
-        for added_index in added:
-            cell = cells[added_index - count]
-            owner[cell] = added_index
-            for neighbour in [owner[cell + step] for step in neighbours]:
-                one, other = top(added_index), top(neighbour) if neighbour >= 0 else -1
-                if other < 0 or one == other:
-                    continue
-                if is_held[one] or (not is_held[other] and size[one] > size[other]):
-                    one, other = other, one
-                left_over = size[one] if is_held[other] else size[one] - cut[one]
-                if left_over >= min_cells and not is_held[one]:
-                    low, high, left_column, right = spans[one]
-                    place = divmod(sample[one], label.shape[1])
-                    yield _Parting(time_now, place, (low, high), (left_column, right), cut[one])
-                root[one] = other
-                size[other] += size[one]
-                cut[other] += cut[one]
-                a, b = spans[one], spans[other]
-                spans[other] = min(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), max(a[3], b[3])
-        for added_index in added:
-            # The cells of one move come back at once.
-            one = top(added_index)
-            size[one] += 1
-            cut[one] += 1
-
-
-def _spans(label: Ints, count: int) -> list[tuple[int, int, int, int]]:
-    """Return the least and the greatest row and column of each label."""
-    y, x = np.nonzero(label >= 0)
-    labels = label[y, x]
-    ends = np.empty((4, count), dtype=np.int64)
-    for k, column in ((0, y), (2, x)):
-        ends[k], ends[k + 1] = label.size, -1
-        np.minimum.at(ends[k], labels, column)
-        np.maximum.at(ends[k + 1], labels, column)
-    return list(zip(*ends.tolist(), strict=True))
-
-
-def _labels(standing: Bools) -> Ints:
-    """Return the number of the piece (NY, NX) of each standing cell, −1 elsewhere: cells that
-    touch at an edge or a corner are one piece."""
-    padded = np.pad(standing, ((0, 0), (1, 1)))
-    turns = np.diff(padded.astype(np.int8), axis=1)
-    run = np.cumsum((turns == 1).ravel()).reshape(turns.shape)[:, :-1] - 1
-    run[~standing] = -1
-    pairs = []
-    for shift in (-1, 0, 1):
-        one = run[:-1, max(shift, 0) : run.shape[1] + min(shift, 0)]
-        other = run[1:, max(-shift, 0) : run.shape[1] + min(-shift, 0)]
-        are_both = (one >= 0) & (other >= 0)
-        pairs.append(np.column_stack([one[are_both], other[are_both]]))
-    pair = np.unique(np.concatenate(pairs), axis=0)
-    label = np.arange(int((turns == 1).sum()))
-    while len(pair):
-        min_label = label[pair].min(axis=1)
-        for side in (0, 1):
-            np.minimum.at(label, label[pair[:, side]], min_label)
-        label = label[label]
-        pair = pair[label[pair[:, 0]] != label[pair[:, 1]]]
-    while (label[label] != label).any():
-        label = label[label]
-    _, label = np.unique(label, return_inverse=True)
-    if not len(label):
-        return np.full(standing.shape, -1, dtype=np.int64)
-    return np.where(standing, label[run.clip(min=0)], -1).astype(np.int64)

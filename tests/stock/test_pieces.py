@@ -13,17 +13,19 @@ from hypothesis import strategies as st
 
 from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline
+from camtool.kernels import pieces as kernel
 from camtool.planning.job import Job, Operation, Stock, Tabs, Tool
 from camtool.planning.plan import planned
 from camtool.records import replace
 from camtool.stock.checks import stock_findings, stock_request
 from camtool.stock.cutters import CutterProfile
 from camtool.stock.moves import stock_moves_of_toolpath
-from camtool.stock.pieces import loose_pieces
+from camtool.stock.pieces import STANDING, loose_pieces
 from camtool.stock.slides import tools_of_rows
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
+from tests.oracles import stock_pieces as slow
 from tests.oracles.path_machine import path_machine
 
 
@@ -33,17 +35,21 @@ def box(x: float, y: float, width: float, height: float) -> Polyline:
 
 
 def loose(job: Job, *paths: Polyline, layers: list[str] | None = None) -> list[Finding]:
+    return [each for each in found_in(job, *paths, layers=layers) if each.code == LOOSE]
+
+
+def found_in(job: Job, *paths: Polyline, layers: list[str] | None = None) -> tuple[Finding, ...]:
     made = planned(drawing_of(paths, layers), job, path_machine())
     tools = tools_of_rows(made.toolpath, job)
     moves = stock_moves_of_toolpath(made.toolpath, tools.index, tools.cutters)
-    findings = stock_findings(made.toolpath, moves, stock_request(made.steps, job, 0.01), 0.01)
-    return [each for each in findings if each.code == ProgramCode.LOOSE_PIECE]
+    return stock_findings(made.toolpath, moves, stock_request(made.steps, job, 0.01), 0.01)
 
 
 def size_of(finding: Finding) -> list[float]:
     return list(map(float, re.findall(r"([\d.]+) by ([\d.]+) mm", finding.message)[0]))
 
 
+LOOSE = ProgramCode.LOOSE_PIECE
 SHEET = Stock(3.0)
 THROUGH = Operation(tool=Tool(3.0), depth_mm=3.2)
 
@@ -167,16 +173,54 @@ def test_the_thinnest_bridge_holds_a_piece_and_none_does_not(gap: float, turn: f
     held = stock_moves_of_toolpath(path.finish(), np.zeros(4, dtype=np.int64), (cutter,))
     bent = 2.0 * radius * math.sin(0.5 * (2.0 + gap) / radius) - 2.0
     if bent > 0.0:
-        assert loose_pieces(held, 3.0, None) == []
+        assert loose_pieces(held, 3.0, None).pieces == []
     back = path.line(z=-2.99, feed=1)
     back.line(radius * math.cos(turn), radius * math.sin(turn), feed=1)
     raised = stock_moves_of_toolpath(back.finish(), np.zeros(6, dtype=np.int64), (cutter,))
     if bent > 0.0:
-        assert loose_pieces(raised, 3.0, None) == []
+        assert loose_pieces(raised, 3.0, None).pieces == []
     through = back.line(z=-3.0, feed=1).line(*to, feed=1)
     free = stock_moves_of_toolpath(through.finish(), np.zeros(8, dtype=np.int64), (cutter,))
-    (piece,) = loose_pieces(free, 3.0, None)
+    (piece,) = loose_pieces(free, 3.0, None).pieces
     assert int(free.row[piece.move]) >= 3
     assert piece.area_mm2 == pytest.approx(math.pi * 9.0**2, abs=2.0)
     x0, y0, x1, y1 = piece.box_mm
     assert [x0, y0, x1, y1] == pytest.approx([-9.0, -9.0, 9.0, 9.0], abs=0.4)  # a chord
+
+
+@pytest.mark.checked
+@settings(max_examples=80)
+@given(seed=st.integers(0, 100_000))
+def test_pieces_of_rasters_are_those_of_the_twin(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ny, nx = rng.integers(1, 14, 2)
+    time = rng.integers(0, int(rng.integers(1, 30)), (ny, nx))
+    time[rng.random((ny, nx)) < rng.random()] = STANDING
+    least = float(rng.integers(1, 4))
+    rows = kernel.partings(time, STANDING, least)
+    wanted = slow.partings(time, STANDING, least)
+    sizes = (kernel.TIME, kernel.LOW, kernel.HIGH, kernel.LEFT, kernel.RIGHT, kernel.CUT)
+    assert [tuple(row) for row in rows[:, list(sizes)].tolist()] == wanted
+    for now, cell, low, high, left, right, _ in rows.tolist():
+        row, column = divmod(cell, int(nx))
+        stands = time > now
+        piece = kernel.piece_at(stands, row, column)
+        assert (piece == slow.piece_at(stands, row, column)).all()
+        y, x = np.nonzero(piece)
+        # The box may have cells of the move itself.
+        assert low <= y.min() <= y.max() <= high
+        assert left <= x.min() <= x.max() <= right
+
+
+def test_cuts_that_are_too_narrow_for_the_raster_are_said() -> None:
+    """A raster of a stock of 2 m with cells for a mill of 1 mm would have 36 million."""
+    operation = Operation(tool=Tool(1.0), depth_mm=3.2, side="outside")
+    for size, is_said in ((100.0, False), (2000.0, True)):
+        job = Job((operation,), stock=Stock(3.0, (0.0, 0.0), (size, size)))
+        paths = box(20.0, 20.0, 20.0, 20.0), box(size - 40.0, size - 40.0, 20.0, 20.0)
+        found = [each for each in found_in(job, *paths) if each.code.name == "STOCK_NOT_JUDGED"]
+        assert len(found) == is_said
+        for each in found:
+            assert each.measured == 1.0
+            assert each.limit is not None
+            assert 1.0 < each.limit < 4.0
