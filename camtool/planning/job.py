@@ -732,9 +732,14 @@ class Operation:
         )
         lead = Lead("arc", self.finish_mm)
         feed, speed = self.finish_feed_mm_min, self.finish_spindle_rpm
+        # An overcut before the finishing pass would go into the wall; a dog-bone does not.
+        corners = "dogbone" if self.corners == "overcut" else self.corners
         return (
             replace(
-                without_finish, stage="rough", allowance_mm=self.allowance_mm + self.finish_mm
+                without_finish,
+                stage="rough",
+                allowance_mm=self.allowance_mm + self.finish_mm,
+                corners=corners,
             ),
             replace(
                 without_finish,

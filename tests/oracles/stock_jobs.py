@@ -115,7 +115,9 @@ def _watched(asked: Asked, moves: list[Move], walls: Walls) -> Seen:
 
 
 def _thickest(asked: Asked) -> float:
-    """The thickest chip that may be taken at once."""
+    """The thickest chip that may be taken at once: a finishing pass takes all of the depth."""
+    if "finish_mm" in asked.settings:
+        return asked.depth
     step = asked.peck if asked.kind == "drill" else asked.step
     return asked.depth if step is None else step
 
@@ -498,7 +500,17 @@ def random_job(rng: Rng) -> Asked:
     paths = tuple(
         rounded(reversed_path(path) if rng.random() < 0.3 else path) for path in made.paths
     )
-    return replace(made, paths=paths)
+    # A generator of its own, so that all other choices stay those of the seed.
+    return _finished(replace(made, paths=paths), rng.spawn(1)[0])
+
+
+def _finished(asked: Asked, rng: Rng) -> Asked:
+    """With a finishing pass at the wall or without, and another allowance."""
+    if asked.kind not in ("profile", "pocket") or asked.side == "on" or rng.random() < 0.5:
+        return asked
+    finish = float(rng.choice([0.05, 0.1, 0.2])) * 2.0 * asked.cutter.radius
+    allowance = float(rng.choice([asked.allowance, 0.0, 0.1, -0.1]))
+    return replace(asked, allowance=allowance, settings=asked.settings | {"finish_mm": finish})
 
 
 def _depth(rng: Rng) -> tuple[float, float | None, dict[str, Any]]:

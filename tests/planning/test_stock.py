@@ -30,6 +30,7 @@ from tests.oracles.stock_jobs import (
     circle,
     complaints,
     described,
+    ell,
     moved,
     random_job,
     rectangle,
@@ -189,6 +190,9 @@ FAILED = {
         SQUARES, 3.0, 3.0, Tabs(count=4, width_mm=3.0, height_mm=1.0, ramped=True)
     ),
     "allowance of a neighbour": profile(SQUARES, 2.6, 2.0, allowance=0.4),
+    "an overcut before a finishing pass": profile(
+        (ell(12.0, 10.0, 5.0),), 1.0, 6.0, corners="overcut", finish_mm=0.2
+    ),
     "sharp joins at needles": profile(
         (star(5, 2.0, 20.0),), 3.0, 1.0, joins="sharp",
     ),
