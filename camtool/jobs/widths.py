@@ -6,15 +6,24 @@ waste must be at least as far from each other as the tool is wide, or it cuts in
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from camtool.arrays import Bools
+from camtool.arrays import Bools, Ints
 from camtool.errors import GeometryError
-from camtool.geometry.distance import approach, near_paths
+from camtool.geometry.boxes import BoxIndex
+from camtool.geometry.distance import paired_distances
 from camtool.geometry.drawing import Drawing, is_text
-from camtool.geometry.measure import path_extents, signed_areas
+from camtool.geometry.measure import path_extents, segment_boxes, signed_areas
 from camtool.geometry.offset import offset_each
-from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, reverse_lines
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polylines,
+    Segments,
+    reverse_lines,
+    segment_rows,
+)
 
 SLOT_MM = 0.01
 """A slot is as wide as a tool when a tool so much smaller in radius goes through it, and one so
@@ -23,6 +32,9 @@ much larger does not: walls of such slots are cut so far beyond the line."""
 LETTER_SHARE = 10.0
 """A crowded contour no larger than so many widths of the tool takes along all that lies in it, as
 letters take their counters."""
+
+SEGMENTS_AT_A_TIME = 1 << 10
+"""Segments whose neighbours are looked at together: what they find is not looked at again."""
 
 NEAR_SHARE = 1e-6
 """Contours that are nearer than the width by this part of it are not crowded, by rounding."""
@@ -55,6 +67,7 @@ def is_slot(lines: Polylines, width_mm: float) -> Bools:
     return np.asarray(has_room(lines, radius - SLOT_MM) & ~has_room(lines, radius + SLOT_MM))
 
 
+@lru_cache(maxsize=8)
 def crowded(drawing: Drawing, width_mm: float) -> frozenset[int]:
     """Rows of the closed paths, letters aside, that a tool of this width cannot run beside or
     within without cutting into a neighbour, and of those that cross others; small ones with all
@@ -71,17 +84,31 @@ def crowded(drawing: Drawing, width_mm: float) -> frozenset[int]:
     is_crowded[~is_outer] = ~has_room(
         lines.select(np.flatnonzero(~is_outer)), 0.5 * width_mm - SLOT_MM
     )
-    min_distance = width_mm * (1.0 - NEAR_SHARE)
-    for one, other in near_paths(lines, lines, width_mm):
-        if one >= other or (is_crowded[one] and is_crowded[other]):
-            continue
-        distance = approach(lines[one], lines[other]).distance
-        # Contours of which one crosses the other bound no waste that anybody could name.
-        if distance < (min_distance if waste[one] == waste[other] else POSITION_EPS_MM):
-            is_crowded[one] = is_crowded[other] = True
+    _add_near(lines, waste, width_mm, is_crowded)
     sizes = np.ptp(path_extents(lines), axis=2).max(axis=1)
     is_small = sizes <= LETTER_SHARE * width_mm
     for row in np.argsort(levels.depth, kind="stable").tolist():  # holders before what they hold
         parent = int(levels.parent[row])
         is_crowded[row] |= bool(parent >= 0 and is_crowded[parent] and is_small[parent])
     return frozenset(rows[is_crowded].tolist())
+
+
+def _add_near(lines: Polylines, waste: Ints, width_mm: float, is_crowded: Bools) -> None:
+    """Mark the closed paths (N,) as crowded that are nearer to each other than this width, where
+    they bound the same `waste`, and those that cross."""
+    segments = Segments.leaving(lines, segment_rows(lines))
+    path, boxes = segments.path, segment_boxes(segments)
+    index, grown = BoxIndex(boxes), boxes + np.array([-1.0, -1.0, 1.0, 1.0]) * width_mm
+    min_distance = width_mm * (1.0 - NEAR_SHARE)
+    for first in range(0, len(boxes), SEGMENTS_AT_A_TIME):
+        for one, other in index.pairs(grown[first : first + SEGMENTS_AT_A_TIME]):
+            one = one + first
+            a, b = path[one], path[other]
+            # Contours of which one crosses the other bound no waste that anybody could name.
+            reach = np.where(waste[a] == waste[b], min_distance, POSITION_EPS_MM)
+            low = np.maximum(boxes[one, :2], boxes[other, :2])
+            high = np.minimum(boxes[one, 2:], boxes[other, 2:])
+            is_open = (a < b) & ~(is_crowded[a] & is_crowded[b])
+            rows = np.flatnonzero(is_open & ((low - high).max(axis=1) < reach))
+            near = paired_distances(segments[one[rows]], segments[other[rows]])[0] < reach[rows]
+            is_crowded[a[rows[near]]] = is_crowded[b[rows[near]]] = True
