@@ -134,9 +134,8 @@ def new(
     say_findings(read.findings, quiet=quiet, verbose=verbose)
     for each in parts:
         if each.part.why:
-            say(
-                one_line(f"{each.part.name}: {each.part.kind}, since {each.part.why}"), quiet=quiet
-            )
+            done = "not cut" if each.part.is_left else each.part.kind
+            say(one_line(f"{each.part.name}: {done}, since {each.part.why}"), quiet=quiet)
     if proposal.flip:
         say(pin_words(read, proposal), quiet=quiet)
     place = "stdout" if output == STDOUT else output
@@ -145,14 +144,16 @@ def new(
 
 def _asked(each: Proposed) -> Proposed | None:
     """Ask for the kind of operation of a part that is in doubt; None if it is not to be cut."""
-    if not each.part.others:
+    part = each.part
+    if not part.others and not part.is_left:
         return each
-    kinds = (each.part.kind, *each.part.others, NOT_CUT)
+    kinds: tuple[str, ...] = (part.kind, *part.others, NOT_CUT)
+    kinds = (NOT_CUT, part.kind) if part.is_left else kinds
     text = one_line(f"{each.part.name}: {each.part.why}. How is it cut")
     kind = click.prompt(text, kinds[0], type=click.Choice(kinds), err=True)
     if kind == NOT_CUT:
         return None
-    return each if kind == each.part.kind else each.of_kind(kind)
+    return each.cut() if kind == part.kind else each.of_kind(kind)
 
 
 def _with_library(proposal: Proposal) -> Proposal:

@@ -179,9 +179,13 @@ def job_template(
     if proposal.flip:
         lines += ["", *_pins(proposal)]
     for each in parts:
-        lines += ["", *_text(drawing, each.group, each.part, proposal)]
+        if each.part.is_left:
+            lines += ["", f"# {_commented(f'{each.part.name} is not cut: {each.part.why}')}"]
+        else:
+            lines += ["", *_text(drawing, each.group, each.part, proposal)]
     if proposal.flip:
-        lines += ["", *_setups(size, proposal, parts)]
+        cut = [each for each in parts if not each.part.is_left]
+        lines += ["", *_setups(size, proposal, cut)]
     return "\n".join(lines) + "\n"
 
 
@@ -339,7 +343,8 @@ class Part(Struct, frozen=True):
     word by which the other operations of the group leave these paths out. `tool`: one of the
     library, "" for that of the job. `why`: the reason, in a few words, "" where there is none.
     `others`: kinds that may be meant as well, of a part that is in doubt; `instead`: the part of
-    one of them, where it takes other paths. `is_shared`: another operation takes its paths too."""
+    one of them, where it takes other paths. `is_shared`: another operation takes its paths too.
+    `is_left`: it is not cut, unless that is asked for."""
 
     name: str
     kind: str
@@ -352,6 +357,7 @@ class Part(Struct, frozen=True):
     others: tuple[str, ...] = ()
     instead: Part | None = None
     is_shared: bool = False
+    is_left: bool = False
 
     def in_doubt(self, instead: Part) -> Part:
         """Return the part, of which this one may be meant instead."""
@@ -370,6 +376,10 @@ class Proposed(Struct, frozen=True):
 
     group: _Group
     part: Part
+
+    def cut(self) -> Proposed:
+        """Return the same, also where it would have been left."""
+        return Proposed(self.group, replace(self.part, is_left=False))
 
     def of_kind(self, kind: str) -> Proposed:
         """Return the same, cut by another kind of operation."""

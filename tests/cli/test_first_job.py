@@ -25,6 +25,7 @@ from tests.feeding import made
 from tests.oracles.grbl_firmware import built, run, source
 from tests.oracles.rs274 import RS274, run_rs274
 from tests.oracles.stock import Cutter, Stock, moves_of
+from tests.postprocessors.golden import GOLDEN, compare_golden
 
 WIDE, HIGH, THICK = 90.0, 60.0, 6.0
 CORNER = 5.0
@@ -207,6 +208,18 @@ def test_the_part_is_what_was_drawn(camtool: Run, tmp_path: Path, name: str) -> 
         assert 0.95 * tabs * 6.35 * 2.9 < area < 1.6 * tabs * 6.35 * 3.0
     beyond = shapely.box(-7.9, -7.9, WIDE + 7.9, HIGH + 7.9) - part.buffer(3.175 + sure)
     assert heights_of(beyond).min() == 0.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_recipe_is_the_golden_one(
+    camtool: Run, tmp_path: Path, name: str, bless: bool
+) -> None:
+    """What the job says, without its comments."""
+    first_program(camtool, tmp_path, name)
+    lines = (tmp_path / "job.toml").read_text(encoding="utf-8").splitlines()
+    said = [line.split("   #")[0].rstrip() for line in lines if not line.startswith("#")]
+    recipe = "\n".join(line for line in said if line) + "\n"
+    compare_golden(GOLDEN / f"first-job-{name[-3:]}.toml", recipe.encode(), bless=bless)
 
 
 def blocks_of(program: str) -> list[tuple[str, dict[str, float], dict[str, float]]]:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.findings import Severity
-from camtool.geometry.drawing import Branch, Drawing, Healing, Units
+from camtool.geometry.drawing import Branch, Drawing, Healing, Units, is_text
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.jobs.build import job_of_file
 from camtool.jobs.template import Proposal, job_template, proposed
@@ -477,6 +477,34 @@ def test_windows_of_a_part_that_is_only_marked_are_cut_within(tmp_path: Path) ->
         assert waste.buffer(1e-3).contains(shapely.Point(x, y))
         if x < 60.0 or x > 120.0:
             assert wall.distance(shapely.Point(x, y)) >= 0.5 * MILL_MM - 1e-3
+
+
+def test_text_beside_parts_is_not_cut(tmp_path: Path) -> None:
+    """Notes beside a part, and text across its edge, are left; what lies within is engraved, and
+    so is all on a layer for it, and text without parts."""
+    plate, label = box(0, 0, 60, 40), stroke((10, 10), (20, 10), (20, 14))
+    note, across = stroke((70, 5), (90, 5)), stroke((50, 30), (66, 30))
+    drawing = drawn(plate, label, note, across)
+    names = ("LWPOLYLINE 1", "TEXT 2", "TEXT 3", "MTEXT 4")
+    assert all(is_text(name) for name in names[1:])
+    drawing = replace(drawing, sources=names)
+    made = proposed(drawing, with_mill(BIT))
+    assert {each.part.rows: each.part.is_left for each in made if each.part.kind == "engrave"} == {
+        (1,): False,
+        (2, 3): True,
+    }
+    assert errors_of(drawing, with_mill(BIT), tmp_path) == []
+    text = (tmp_path / "made.toml").read_text(encoding="utf-8")
+    assert "# 0 text beside parts is not cut: it does not lie within a part" in text
+    assert text.count("[[operations]]") == 2
+    cut = plan(drawing, job_of_file(tmp_path / "made.toml"), load_target("linuxcnc").machine).end
+    assert cut[cut[:, 2] < 0.0, 0].max() <= 60.0 + 0.5 * MILL_MM + 1e-6
+    (left,) = (each for each in made if each.part.is_left)
+    assert not left.cut().part.is_left
+    on_layer = replace(drawing, layers=("0", *("ENGRAVE",) * 3))
+    assert not any(each.part.is_left for each in proposed(on_layer, with_mill(BIT)))
+    alone = replace(drawn(label, note, across), sources=names[1:])
+    assert not any(each.part.is_left for each in proposed(alone, with_mill(BIT)))
 
 
 def test_each_size_of_outline_has_as_many_tabs_as_it_has_room_for() -> None:

@@ -6,8 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from camtool.geometry.drawing import is_text
-from camtool.jobs.template import Part, Remaining
+import numpy as np
+
+from camtool.geometry.drawing import Drawing, is_text
+from camtool.geometry.measure import extents, signed_areas
+from camtool.jobs.template import COLOURS, Part, Remaining
 from camtool.operations.engrave.work import leaves_all
 from camtool.planning.job import Tool
 from camtool.records import replace
@@ -24,22 +27,28 @@ def propose(paths: Remaining) -> list[Part]:
     sources, closed = paths.drawing.sources, paths.drawing.paths.closed
     parts: list[Part] = []
     text = tuple(row for row in paths.rows if is_text(sources[row]))
-    if text:
-        keys = (("select", '["text"]', ""),)
-        part = Part(f"{paths.title} text", "engrave", text, 0, keys, "not text")
-        parts.append(_cut(paths, part, "text is engraved", always_deep=True))
+    beside = _text_beside_parts(paths.drawing, text) if paths.habit != "engrave" else set()
+    keys = (("select", '["text"]', ""),)
+    for rows, is_left in (
+        (tuple(row for row in text if row not in beside), False),
+        (tuple(row for row in text if row in beside), True),
+    ):
+        if rows:
+            name = f"{paths.title} text{' beside parts' if is_left else ''}"
+            part = Part(name, "engrave", rows, 0, keys, "not text", is_left=is_left)
+            part = _cut(paths, part, "text is engraved", always_deep=True)
+            said = "it does not lie within a part; engrave it with --ask"
+            parts.append(replace(part, why=said) if is_left else part)
     paths = paths.without([Part("", "", text, excludes="not text")])
     open_ = tuple(row for row in paths.rows if not closed[row])
     is_named = paths.habit == "engrave"
     if (paths.rows or paths.marks) and (is_named or (open_ and len(open_) == len(paths.rows))):
         reason = f"{paths.title} is called so" if is_named else "open lines are engraved"
-        parts.append(
-            _cut(
-                paths,
-                Part(paths.title, "engrave", paths.rows, paths.marks),
-                reason,
-            )
-        )
+        is_colour = is_named and paths.name in COLOURS
+        reason = "lines of this colour are marked" if is_colour else reason
+        others = ("profile",) if is_colour and len(open_) < len(paths.rows) else ()
+        part = Part(paths.title, "engrave", paths.rows, paths.marks, others=others)
+        parts.append(_cut(paths, part, reason))
         return parts
     if open_:
         select = (("select", '["open"]', ""),)
@@ -65,28 +74,45 @@ def propose(paths: Remaining) -> list[Part]:
     return parts
 
 
+def _text_beside_parts(drawing: Drawing, text: Sequence[int]) -> set[int]:
+    """Return the rows of texts that lie beside the parts, or across their edges, as notes do,
+    where a part is larger than they are."""
+    lines, levels = drawing.paths, drawing.nesting.levels
+    lettered = np.array([is_text(source) for source in drawing.sources], dtype=np.bool_)
+    edges = np.flatnonzero(lines.closed & ~lettered)
+    largest = np.abs(signed_areas(lines.select(edges))).max(initial=0.0)
+    by_source: dict[str, list[int]] = {}
+    for row in text:
+        by_source.setdefault(drawing.sources[row], []).append(row)
+    beside = set[int]()
+    for rows in by_source.values():
+        size = np.ptp(extents(lines.select(rows)), axis=1)
+        if float(size.prod()) >= largest:
+            continue
+        for row in rows:
+            holder = int(levels.parent[row])
+            while 0 <= holder < len(lettered) and lettered[holder]:
+                holder = int(levels.parent[holder])
+            if holder < 0:
+                beside.update(rows)
+    return beside
+
+
 def _cut(remaining: Remaining, part: Part, reason: str, *, always_deep: bool = False) -> Part:
     """The part with the bit that fits between its lines, its depth, and why."""
     bits = remaining.proposal.tools("v")
     if not bits and not always_deep:
-        return Part(
-            part.name, part.kind, part.rows, part.marks, part.keys, part.excludes, why=reason
-        )
+        return replace(part, why=reason)
     remark = "" if bits else "a V bit makes finer letters"
     keys = (*part.keys, ("depth", f'"{TEXT_DEPTH_MM:g}mm"', remark))
-    vbit = _fitting(remaining, part.rows, bits) if bits else None
-    words = "" if vbit is None else f" with {vbit.name}, {_width(vbit):.2g} mm wide at this depth"
-    name = "" if vbit is None else vbit.name
-    return Part(
-        part.name,
-        part.kind,
-        part.rows,
-        part.marks,
-        keys,
-        part.excludes,
-        name,
-        f"{reason}{words}",
+    bit_tool = _fitting(remaining, part.rows, bits) if bits else None
+    with_bit = (
+        ""
+        if bit_tool is None
+        else f" with {bit_tool.name}, {_width(bit_tool):.2g} mm wide at this depth"
     )
+    name = "" if bit_tool is None else bit_tool.name
+    return replace(part, keys=keys, tool=name, why=f"{reason}{with_bit}")
 
 
 def _fitting(remaining: Remaining, rows: Sequence[int], bits: Sequence[Tool]) -> Tool:
