@@ -60,6 +60,14 @@ CAUSES = {
 
 CHORDS = "arcs in XZ and YZ are chords in a toolpath"
 SHORT = "moves of one to ten periods: LinuxCNC joins lines to blends, and speeds up evenly"
+STOPS = {
+    "interp_state/sloc_testing": "stops, each of them late on a busy computer",
+    "quick-tests/axis_letter": "0.08 s lost at the first stop, on a busy computer",
+    "quick-tests/zero_length_move": "0.3 s in all: two stops, 6 ms",
+}
+"""Programs whose times scatter by 2 %: LinuxCNC's task comes late to each stop, by as much as the
+computer is busy."""
+
 OF_PLANNER = {
     "arc-feed/arc_time": CHORDS,
     "arc-intersections/arc-arc-planeswitch": CHORDS,
@@ -81,9 +89,7 @@ OF_PLANNER = {
     "performance/random_lines_0.001in": SHORT,
     "performance/wheels": SHORT,
     "diagnostic/lineno-test": "a dwell before the first move, which the recording leaves out",
-    "interp_state/sloc_testing": "stops, each of them late on a busy computer",
-    "quick-tests/axis_letter": "0.08 s lost at the first stop, on a busy computer",
-    "quick-tests/zero_length_move": "0.3 s in all: two stops, 6 ms",
+    **STOPS,
 }
 """Why LinuxCNC's own programs for its planner are off by more, by folder and name."""
 
@@ -123,6 +129,8 @@ SCATTER_PLACES = 15.0
 
 APART = {("", "paths apart, µm"): 100.0}
 """More places for paths: on a busy computer their samples scatter. The aim is asked beside it."""
+
+OF_STOPS = APART | {(name, head): 200.0 for name in STOPS for head in ("LinuxCNC, s", "%")}
 
 LATE = APART | {("plate-holes", "LinuxCNC, s"): 70.0, ("plate-holes", "%"): 70.0}
 """And for the times of a program that stops so often that they scatter by 0.6 %: on a busy
@@ -244,8 +252,8 @@ def test_linuxcnc_live(bless: bool, tmp_path: Path) -> None:
         missed = beside > PATH_UM or (abs(part) > TIME_PART and not late)
         misses += [name] if missed else []
         cells = [mm(wanted_s, 2), mm(found_s, 2), signed(100.0 * part, 2), mm(beside, 1)]
-        rows.append([name, *cells, CAUSES.get(name, "") if missed else ""])
-    heads = ["program", "LinuxCNC, s", "model, s", "%", "paths apart, µm", "cause of a miss"]
+        rows.append([name, *cells, CAUSES.get(name, "")])
+    heads = ["program", "LinuxCNC, s", "model, s", "%", "paths apart, µm", "cause where it misses"]
     check("live-linuxcnc", heads, rows, bless, SCATTER_PLACES, LATE)
     assert len(misses) <= MOST_MISSES, misses
     assert set(misses) <= set(CAUSES), misses
@@ -289,7 +297,7 @@ def test_programs_of_linuxcnc_s_planner(bless: bool, tmp_path: Path) -> None:
         missed = beside > PATH_UM or abs(part) > TIME_PART
         misses += [name] if missed else []
         cells = [mm(wanted_s, 2), mm(found_s, 2), signed(100.0 * part, 2), mm(beside, 1)]
-        rows.append([name, *cells, OF_PLANNER.get(name, "") if missed else ""])
-    heads = ["program", "LinuxCNC, s", "model, s", "%", "paths apart, µm", "cause of a miss"]
-    check("live-planner", heads, rows, bless, SCATTER_PLACES, APART)
+        rows.append([name, *cells, OF_PLANNER.get(name, "")])
+    heads = ["program", "LinuxCNC, s", "model, s", "%", "paths apart, µm", "cause where it misses"]
+    check("live-planner", heads, rows, bless, SCATTER_PLACES, OF_STOPS)
     assert set(misses) <= set(OF_PLANNER), misses
