@@ -36,6 +36,7 @@ from camtool.stock.findings import STOCK_NOT_JUDGED_TOOLS
 from camtool.toolpath.lower import at_feed, carried_over, within_feeds, without_coolant
 from camtool.toolpath.moves import Kind, feeds_below_top, mounted_before, toolpath_extents
 from camtool.toolpath.program import Program
+from camtool.toolpath.surface import Surface, follow
 from camtool.toolpath.touching import untouched_place
 from camtool.verification.case import (
     TRACE_POINTS,
@@ -478,6 +479,7 @@ def convert_program(
     *,
     file: str,
     feed_mm_min: float | None = None,
+    surface: Surface | None = None,
     check: bool = True,
     progress: Progress | None = None,
 ) -> Run:
@@ -485,8 +487,8 @@ def convert_program(
 
     The second program shall make the moves that the first controller decodes. Setting part zero
     is left out, since a program begins there. Feeds that are too fast for the second machine
-    become its highest feed; `feed_mm_min` replaces all feeds. ProgramError names file, block and
-    column.
+    become its highest feed; `feed_mm_min` replaces all feeds. With a `surface` the cuts follow it,
+    within the machine's tolerance for curves. ProgramError names file, block and column.
     """
     progress = progress or Progress()
     progress.begin(f"reading {PurePath(file).name}")
@@ -499,6 +501,8 @@ def convert_program(
         wanted_path = at_feed(wanted_path, feed_mm_min)
     else:
         wanted_path = within_feeds(wanted_path, target.machine)
+    if surface is not None:
+        wanted_path = follow(wanted_path, surface, target.machine.defaults.fit_tolerance_mm)
     run = Run(source=file, target=target, wanted=wanted_path)
     if worst(wanted_path.findings) >= Severity.ERROR:
         return replace(run, findings=wanted_path.findings)

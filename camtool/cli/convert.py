@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from camtool.cli.files import display_name, read_bytes
@@ -16,6 +18,9 @@ from camtool.cli.picture_options import (
 )
 from camtool.cli.post import RequestedOutputs, finish
 from camtool.cli.report import ReportOutputs, report_option
+
+if TYPE_CHECKING:
+    from camtool.toolpath.surface import Surface
 
 
 @click.command(cls=SectionedCommand, short_help="A program of one machine as that of another.")
@@ -32,6 +37,7 @@ from camtool.cli.report import ReportOutputs, report_option
 @click.option(
     "--feed", "feed_mm_min", callback=feed, metavar="FEED", help="For all cuts, in mm/min."
 )
+@click.option("--surface", metavar="FILE", help="Let the cuts follow this probed surface.")
 @click.option(
     "--preview",
     metavar="FILE",
@@ -53,6 +59,7 @@ def convert(
     from_machine: str | None,
     from_set: tuple[str, ...],
     feed_mm_min: float | None,
+    surface: str | None,
     preview: str | None,
     report: str | None,
     page: str | None,
@@ -64,14 +71,16 @@ def convert(
     """Turn PROGRAM (- is stdin) of one machine into the program of another.
 
     The moves that the first controller decodes are written for the second one, read back,
-    simulated and compared with them. Exit code 1 (and no file) when something is wrong.
+    simulated and compared with them. Exit code 1 (and no file) when something is wrong. With
+    --surface (camtool probe writes it) the cuts follow the measured top of the blank; --from and
+    --to may be the same machine.
     """
     outputs = ReportOutputs(preview, report, page)
     picture.check(outputs.pictures, UNVERIFIED if no_verify else RESULT)
     before = MachineFlags(source, from_machine, from_set).load()
     after = MachineFlags(target, machine, settings).load()
     reads = [program, str(before.file), str(after.file)]
-    reads += [file for file in (from_machine, machine) if file is not None]
+    reads += [file for file in (from_machine, machine, surface) if file is not None]
     requested = RequestedOutputs(program, output, outputs, reads)
     requested.check(after.machine.target.extension, verified=not no_verify)
 
@@ -83,8 +92,16 @@ def convert(
         after,
         file=display_name(program),
         feed_mm_min=feed_mm_min,
+        surface=None if surface is None else _surface(surface),
         check=not no_verify,
         progress=progress(),
     )
     painter = picture.painter(lambda: [run.scene()], quiet=quiet)
     return finish(run, requested, picture=painter, quiet=quiet, verbose=verbose)
+
+
+def _surface(name: str) -> Surface:
+    """Read a file of a surface."""
+    from camtool.toolpath.surface import surface_of_text
+
+    return surface_of_text(read_bytes(name).decode("utf-8", "replace"), display_name(name))

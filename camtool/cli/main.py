@@ -66,6 +66,7 @@ COMMANDS = {
     "ports": "List the serial ports.",
     "post": "Drawing to verified program.",
     "preview": "Picture of a drawing, toolpath or program.",
+    "probe": "Measure the top of the blank.",
     "send": "Send a program to its machine.",
     "stale": "Programs that are out of date.",
     "targets": "The machines, and everything about one.",
@@ -119,6 +120,7 @@ def cli() -> None:
     camtool send    logo.pic -t pic-mmh --port /dev/ttyUSB0
     camtool panel   logo.pic -t pic-mmh --port /dev/ttyUSB0   the same, from a page
     camtool ports                               where machines may be
+    camtool probe   logo.nc -t grbl --port /dev/ttyUSB0   the top of the blank, for --surface
     camtool home, jog, zero, unlock             a machine moved by hand
     camtool console grbl /dev/ttyUSB0           type to a controller
     camtool filter  logo.dxf                    LinuxCNC opens the drawing

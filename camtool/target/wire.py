@@ -510,6 +510,16 @@ class Hand(Conversation):
             )
 
 
+class ProbePlan(Struct, frozen=True):
+    """Places to probe: `points` (x, y) mm in the work frame, in this order; between them the probe
+    is lifted to `clear_mm`, and it goes down to `lowest_mm` at most, by `feed` mm/min."""
+
+    points: tuple[tuple[float, float], ...]
+    clear_mm: float
+    lowest_mm: float
+    feed: float
+
+
 class CommandHand(Hand):
     """A machine moved by the commands of its wire: each order is a conversation of its own."""
 
@@ -728,6 +738,17 @@ class Wire(ABC):
     def hand(self, machine: Machine[Any, Any], manner: Manner) -> Hand:
         """Return the conversation that moves the machine by hand."""
         return CommandHand(self, machine, manner)
+
+    def probing(
+        self, plan: ProbePlan, machine: Machine[Any, Any], manner: Manner
+    ) -> tuple[Conversation, list[float]]:
+        """Return the conversation that probes, and the list to which it adds the height in the
+        work frame of each point that was touched. MachineError where the controller has no
+        probe."""
+        raise MachineError(
+            f"{machine.target.name} has no command to probe over its line",
+            mend="measure the heights by hand, and write them into a file of a surface",
+        )
 
     def terminal(self, machine: Machine[Any, Any]) -> Terminal:
         """Return the terminal that translates typed lines into bytes and explains answers."""

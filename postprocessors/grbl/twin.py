@@ -170,11 +170,14 @@ class GrblTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
     """Set-up of a virtual grbl. `homing`: "on" has switches at both ends of the travel, and locks
     it until `$H` or `$X` ($22). `opening`: whether DTR resets the board when its port is opened,
     as that of an Uno, which then forgets its place. `probe_mm`: at or below this height on the
-    machine, as it is when the power comes on, the probe is closed."""
+    machine, as it is when the power comes on, the probe is closed; `probe_slope_x` and
+    `probe_slope_y`: how much higher that is for each mm of X and Y (a blank that lies aslant)."""
 
     homing: Literal["off", "on"] = "off"
     opening: Literal["reset", "nothing"] = "reset"
     probe_mm: float = NEVER_CLOSED
+    probe_slope_x: float = 0.0
+    probe_slope_y: float = 0.0
 
 
 class _Planned(Struct, eq=False):
@@ -1342,9 +1345,17 @@ class GrblTwin(Twin):
 
     def _touches_probe(self) -> bool:
         """True if the probe counts as touching; $6, and G38.4 and G38.5, invert it."""
-        height = self._choices.probe_mm + self._machine.controller.machine_zero_mm[2]
-        closed = self.slides.commanded_mm[2] <= height + 0.5 * self._slide_step_mm[2]
-        return (bool(closed) != self._is_set(6)) != self._away
+        closed = bool(self._closes_probe(self.slides.commanded_mm))
+        return (closed != self._is_set(6)) != self._away
+
+    def _closes_probe(self, mm: Floats) -> Bools:
+        """Mask (…) of the places (…, 3) at which the probe is on the blank, or in it."""
+        choices = self._choices
+        slope = np.array([choices.probe_slope_x, choices.probe_slope_y])
+        height = (
+            choices.probe_mm + self._machine.controller.machine_zero_mm[2] + mm[..., :2] @ slope
+        )
+        return np.asarray(mm[..., 2] <= height + 0.5 * self._slide_step_mm[2])
 
     def _has_touched(self) -> bool:
         """True once the probing move under way has ended at the probe."""
@@ -1409,11 +1420,9 @@ class GrblTwin(Twin):
         each."""
         start, times = self.slides.commanded_mm, list[float]()
         path = np.concatenate([start[None, :], commanded])
-        eps = 0.5 * self._slide_step_mm
         masks = list[Bools]()
         if self._probing is not None:
-            height = self._choices.probe_mm + self._machine.controller.machine_zero_mm[2]
-            masks.append(path[:, 2] <= height + eps[2])
+            masks.append(self._closes_probe(path))
         if self._ends_mm is not None and self._is_set(21):
             masks += list(self._beyond_switches(path, self._ends_mm).T)
         for mask in masks:

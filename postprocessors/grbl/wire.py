@@ -33,6 +33,7 @@ from camtool.target.wire import (
     Override,
     Packet,
     Place,
+    ProbePlan,
     Wire,
     WireState,
 )
@@ -103,6 +104,7 @@ _STATUS = re.compile(
 )
 _PLACE = re.compile(r"-?\d+\.\d+(?:,-?\d+\.\d+){2,}")
 _OVERRIDES = re.compile(r"\d{1,3},\d{1,3},\d{1,3}")
+_PROBED = re.compile(r"\[PRB:[-\d.]+,[-\d.]+,(-?\d+\.\d+)(?:,[-\d.]+)*:1\]")
 _FEED = re.compile(r"\d{1,9}(?:\.\d*)?")
 _SETTING = re.compile(r"\$\d{1,3}=[^\s=]+")
 _PUSHED = re.compile(r"\[[A-Za-z0-9]{1,6}:.*\]")
@@ -230,6 +232,13 @@ class GrblWire(Wire):
         if action == "unlock":
             return GrblConversation((), machine, replace(manner, unlock=True))
         return GrblConversation((), machine, manner, (hand_line(action, values).rstrip(b"\n"),))
+
+    def probing(
+        self, plan: ProbePlan, machine: GrblMachine, manner: Manner
+    ) -> tuple[Conversation, list[float]]:
+        """G38.2 at each point."""
+        probing = GrblProbing(plan, machine, manner)
+        return probing, probing.heights
 
     def hand(self, machine: GrblMachine, manner: Manner) -> GrblHand:
         """Return one conversation for all orders: `command` would reset grbl before each."""
@@ -982,6 +991,27 @@ def override_aim(name: Override, percent: int) -> int:
         return min(RAPIDS, key=lambda known: abs(known - percent))
     low, high = OVERRIDE_RANGE
     return min(max(percent, low), high)
+
+
+class GrblProbing(GrblConversation):
+    """The lines that probe, and the heights that grbl reports of them (`[PRB:x,y,z:1]`, in the
+    frame of the machine)."""
+
+    def __init__(self, plan: ProbePlan, machine: GrblMachine, manner: Manner) -> None:
+        self.heights: list[float] = []
+        clear = f"G90G21G0Z{plan.clear_mm:.3f}\n".encode()
+        lines = [clear]
+        for x, y in plan.points:
+            lines.append(f"G0X{x:.3f}Y{y:.3f}\n".encode())
+            lines.append(f"G38.2Z{plan.lowest_mm:.3f}F{plan.feed:.1f}\n".encode())
+            lines.append(clear)
+        super().__init__([Packet(line) for line in lines], machine, manner)
+
+    def _line(self, line: str, now: float) -> None:
+        found = _PROBED.fullmatch(line)
+        if found is not None and self._phase == "commands" and self._frame is not None:
+            self.heights.append(float(found[1]) - self._frame[2])
+        super()._line(line, now)
 
 
 class GrblHand(GrblConversation, Hand):
