@@ -27,7 +27,7 @@ from camtool.errors import OptionError, ProgramError
 from camtool.findings import Finding, Severity, worst
 from camtool.geometry.turn import UNTURNED
 from camtool.planning.job import Job
-from camtool.planning.naming import setup_words, tool_words
+from camtool.planning.naming import pins_of, setup_words, tool_words
 from camtool.progress import Progress
 from camtool.records import replace
 from camtool.run import Run
@@ -338,6 +338,8 @@ def _post_plan(
         swept_mm=_swept_mm(wanted_path, judged_plan.steps),
         touch_mm=_touch_mm(wanted_path),
         setup=setup_words(job),
+        pins_mm=pins_of(job),
+        flip_error_mm=None if job.setup_of is None else job.setup_of[1].flip_error_mm,
     )
     request = stock_request(
         judged_plan.steps, job, _beside_mm(case), before=posting.before, is_whole=posting.is_whole

@@ -93,6 +93,12 @@ DIMENSION_NOT_CUT = Sentence(
     "{name} is not inspected: the program does not cut its {what}",
     severity=WARNING,
 )
+DIMENSION_NOT_CUT_ACROSS = Sentence(
+    InspectionCode.DIMENSION_NOT_CUT,
+    "{name} is not inspected: its {what} is cut in set-up {other!r}, and what is cut there lies "
+    "{beside} beside what is cut here (flip_error)",
+    severity=WARNING,
+)
 DIMENSION_NOT_CUT_THERE = Sentence(
     InspectionCode.DIMENSION_NOT_CUT,
     "{name} is not inspected: the slides leave what is drawn by too much, or may leave it",

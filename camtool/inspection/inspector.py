@@ -21,6 +21,7 @@ from camtool.inspection.dimensions import DEPTHS, Dimension
 from camtool.inspection.features import BoundDimension, EdgeFeature, bind, features_of
 from camtool.inspection.findings import (
     DIMENSION_NOT_CUT,
+    DIMENSION_NOT_CUT_ACROSS,
     DIMENSION_NOT_CUT_NARROW,
     DIMENSION_NOT_CUT_NO_FLOOR,
     DIMENSION_NOT_CUT_NO_STOCK,
@@ -45,7 +46,8 @@ from camtool.inspection.uncertainty import (
     without_scatter,
 )
 from camtool.machine.model import Axis, Machine
-from camtool.planning.job import Job, Tool
+from camtool.planning.job import Job, JobSetup, Tool
+from camtool.planning.naming import flip_error_words
 from camtool.planning.place import SCALE_SHARE, placements
 from camtool.planning.plan import planned
 from camtool.records import replace
@@ -343,12 +345,33 @@ def _inspected(
                 yield candidate
                 continue
             missing = placed_bound.features[cuts.index(None)]
-            finding = DIMENSION_NOT_CUT(
-                where=f"{run.drawing.file}, {dimension.source}",
-                name=candidate.name,
-                what="edge" if isinstance(missing, EdgeFeature) else "circle",
-            )
+            source = f"{run.drawing.file}, {dimension.source}"
+            kind = "edge" if isinstance(missing, EdgeFeature) else "circle"
+            other = _setup_that_cuts(run, missing.path)
+            finding = DIMENSION_NOT_CUT(where=source, name=candidate.name, what=kind)
+            if other is not None and run.job.setup_of is not None:
+                finding = DIMENSION_NOT_CUT_ACROSS(
+                    where=source,
+                    name=candidate.name,
+                    what=kind,
+                    other=other.name,
+                    beside=flip_error_words(other, run.job.setup_of[1]),
+                )
             not_inspected.append((dimension, finding))
+
+
+def _setup_that_cuts(run: Run, path: int) -> JobSetup | None:
+    """Return the other set-up of the part that cuts a path of the drawing; None if none does."""
+    assert run.drawing is not None
+    assert run.job is not None
+    if run.job.setup_of is None:
+        return None
+    part_job, own = run.job.setup_of
+    layer, colour = run.drawing.layers[path], run.drawing.colours[path]
+    for setup in part_job.setups:
+        if setup != own and part_job.setup(setup.name).takes(layer, colour):
+            return setup
+    return None
 
 
 def _floors(run: Run) -> Floors:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
-from camtool.planning.job import Job, Operation, Tool
+from camtool.planning.job import Job, JobSetup, Operation, Tool
 from camtool.toolpath.wanted import TOOL_SHAPES
 
 MAX_LISTED = 12
@@ -128,10 +128,16 @@ def setup_words(job: Job) -> str:
     if pins := pins_of(job):
         words.append("pins at " + ", ".join(f"X{x:g} Y{y:g}" for x, y in pins))
     if setup.flip is not None:
-        error_mm = setup.flip_error_mm
-        length = "an unknown length" if error_mm is None else f"up to {error_mm:g} mm"
+        length = flip_error_words(setup)
         words.append(f"its cuts lie {length} beside those of the other face (flip_error)")
     return "; ".join(words)
+
+
+def flip_error_words(*setups: JobSetup) -> str:
+    """Return in words how far what is cut in these set-ups may lie beside each other."""
+    errors = [setup.flip_error_mm for setup in setups if setup.flip is not None]
+    known = [error for error in errors if error is not None]
+    return f"up to {max(known):g} mm" if known and known == errors else "an unknown length"
 
 
 def pins_of(job: Job) -> tuple[tuple[float, float], ...]:

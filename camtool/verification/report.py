@@ -423,7 +423,9 @@ class Planned(msgspec.Struct, frozen=True):
     `cut_mm`: left, lower, right and upper end of what the tools cut, `swept_mm` of what tools and
     holders pass over, at any height; `touch_mm`: for each tool that is mounted in the program, a
     place (x, y) mm where the top of the stock is not cut yet, None where there is none; `setup`:
-    which set-up of the part this is, in words."""
+    which set-up of the part this is, in words; `pins_mm`: places of its alignment pins;
+    `flip_error_mm`: how far its cuts may lie beside those of the other face, None if that is not
+    known."""
 
     rapid_drawn_mm: float
     rapid_mm: float
@@ -435,6 +437,8 @@ class Planned(msgspec.Struct, frozen=True):
     swept_mm: tuple[float, float, float, float] | None = None
     touch_mm: tuple[tuple[float, float] | None, ...] = ()
     setup: str = ""
+    pins_mm: tuple[tuple[float, float], ...] = ()
+    flip_error_mm: float | None = None
 
 
 class BaselineReport(msgspec.Struct, frozen=True):

@@ -413,3 +413,37 @@ def test_a_job_with_set_ups_is_no_program() -> None:
     square = Polyline(np.array([[0.0, 0, 0], [9, 0, 0], [9, 9, 0]]), True)
     with pytest.raises(OptionError, match="several set-ups"):
         planned(drawing_of([square]), job, load_target("grbl").machine)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [('flip_error = "0.05mm"', "up to 0.05 mm"), ("", "an unknown length")],
+)
+def test_a_dimension_between_two_faces_says_how_far_they_lie_apart(
+    camtool: Run, tmp_path: Path, error: str, words: str
+) -> None:
+    """The pocket is cut in the one set-up, the edge in the other; within one it is inspected."""
+    write_part(tmp_path)
+    text = (tmp_path / "part.toml").read_text(encoding="utf-8")
+    text = text.replace('flip_error = "0.05mm"', f"{error}\npins = [[30, 2], [30, 37]]")
+    (tmp_path / "part.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "tolerances.toml").write_text(
+        '[[dimension]]\nname = "across"\nkind = "distance"\nfrom = [5, 20]\nto = [10, 20]\n'
+        'direction = "x"\nlimits = "±0.1"\n'
+        '[[dimension]]\nname = "wide"\nkind = "distance"\nfrom = [5, 20]\nto = [55, 20]\n'
+        'direction = "x"\nlimits = "±0.1"\n',
+        encoding="utf-8",
+    )
+    flags = ("-t", "grbl", "--job", "part.toml", "--setup", "bottom", "--json", "said.json")
+    done = camtool("post", "part.dxf", *flags, "--tolerances", "tolerances.toml")
+    assert done.returncode == 0, done.stderr
+    said = json.loads((tmp_path / "said.json").read_text(encoding="utf-8"))
+    (finding,) = [each for each in said["findings"] if each["code"] == "DIMENSION_NOT_CUT"]
+    assert finding["message"].startswith("across ")
+    assert (
+        f"is cut in set-up 'top', and what is cut there lies {words} beside"
+        in (finding["message"])
+    )
+    assert [each["name"] for each in said["inspection"]] == ["wide"]
+    assert said["planned"]["flip_error_mm"] == (0.05 if error else None)
+    assert said["planned"]["pins_mm"] == [[30.0, 2.0], [30.0, 37.0]]
