@@ -479,6 +479,13 @@ def test_windows_of_a_part_that_is_only_marked_are_cut_within(tmp_path: Path) ->
             assert wall.distance(shapely.Point(x, y)) >= 0.5 * MILL_MM - 1e-3
 
 
+def test_holes_without_a_drill_say_what_to_add() -> None:
+    drawing = drawn(box(0, 0, 60, 40), circle(10, 10, 2.5), circle(20, 10, 2.5), circle(30, 10, 1))
+    (made,) = (each.part for each in proposed(drawing, with_mill(BIT)) if each.part.others)
+    assert (made.kind, made.rows) == ("engrave", (1, 2, 3))
+    assert "no drill of 1, 2.5 mm with presets for the material; add one" in made.why
+
+
 def test_text_beside_parts_is_not_cut(tmp_path: Path) -> None:
     """Notes beside a part, and text across its edge, are left; what lies within is engraved, and
     so is all on a layer for it, and text without parts."""

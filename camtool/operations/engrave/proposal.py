@@ -4,7 +4,7 @@ lines."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from camtool.planning.job import Tool
 from camtool.records import replace
 
 TEXT_DEPTH_MM = 0.2
+
+SIZES_TOLD = 4
+"""At most so many diameters of holes are told."""
 
 MAX_LINES = 1000
 """Of more lines the narrowest place is not looked for: the finest bit is taken."""
@@ -61,17 +64,36 @@ def propose(paths: Remaining) -> list[Part]:
     finest = mills[-1] if mills else paths.proposal.tool_mm
     drilled = [row for row, width in paths.holes.items() if paths.proposal.has_drill(width)]
     small = tuple(row for row in paths.crowded(finest) if row not in drilled)
-    if small:
-        part = Part(f"{paths.title} fine", "engrave", small)
-        why = f"lines too near to each other, or too small within, for a mill of {finest:g} mm"
-        why += ": marked (a finer mill in the library, or more room, would cut them)"
-        parts.append(replace(_cut(paths, part, why), others=("profile",)))
+    holes = {row: width for row, width in paths.holes.items() if row in small and width < finest}
+    for rows, name, reason in (
+        (tuple(holes), "holes", _undrilled(holes.values(), finest)),
+        (
+            tuple(row for row in small if row not in holes),
+            "fine",
+            f"lines too near to each other, or too small within, for a mill of {finest:g} mm:"
+            " marked (a finer mill in the library, or more room, would cut them)",
+        ),
+    ):
+        if rows:
+            part = _cut(paths, Part(f"{paths.title} {name}", "engrave", rows), reason)
+            parts.append(replace(part, others=("profile",)))
     unclear = tuple(row for row in branched if row not in small)
     if unclear:
         part = Part(f"{paths.title} branched", "engrave", unclear)
         reason = "more than two ends meet, so that it is not clear what they enclose: marked"
         parts.append(replace(_cut(paths, part, reason), others=("profile",)))
     return parts
+
+
+def _undrilled(widths_mm: Collection[float], mill_mm: float) -> str:
+    """Return why holes are only marked, and the drills that would make them."""
+    sizes = sorted({round(width, 2) for width in widths_mm})
+    told = ", ".join(f"{size:g}" for size in sizes[:SIZES_TOLD])
+    more = ", …" if len(sizes) > SIZES_TOLD else ""
+    return (
+        f"holes narrower than the mill of {mill_mm:g} mm are marked: the library has no drill of"
+        f" {told}{more} mm with presets for the material; add one to drill them"
+    )
 
 
 def _text_beside_parts(drawing: Drawing, text: Sequence[int]) -> set[int]:
