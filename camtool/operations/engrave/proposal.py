@@ -20,8 +20,8 @@ TEXT_DEPTH_MM = 0.2
 SIZES_TOLD = 4
 """At most so many diameters of holes are told."""
 
-MAX_LINES = 1000
-"""Of more lines the narrowest place is not looked for: the finest bit is taken."""
+MAX_POINTS = 4000
+"""In drawings of more vertices the narrowest place is not looked for: the finest bit is taken."""
 
 
 def propose(paths: Remaining) -> list[Part]:
@@ -141,7 +141,7 @@ def _fitting(remaining: Remaining, rows: Sequence[int], bits: Sequence[Tool]) ->
     """The bit of the widest groove that keeps what is between the lines, or else the finest."""
     lines = remaining.drawing.paths.select(rows)
     widest = sorted(bits, key=_width, reverse=True)
-    if len(rows) <= MAX_LINES:
+    if len(lines.vertices) <= MAX_POINTS:
         for bit_tool in widest:
             if leaves_all(lines, _width(bit_tool)):
                 return bit_tool
