@@ -367,12 +367,12 @@ def meet(
     from camtool.inspection.tolerances import dimensions_of
     from camtool.inspection.verdicts import Tolerances
     from camtool.jobs.build import JobTables, read_job_file
-    from camtool.jobs.changes import job_of_tables, together
+    from camtool.jobs.changes import job_of_tables, merged_tables
     from camtool.jobs.tools import Shop
 
     loaded_target, place = as_target(target), Path("job.toml" if job is None else job)
     file = JobTables() if job is None else read_job_file(place)
-    tables = together(file, JobTables(), place.parent)
+    tables = merged_tables(file, JobTables(), place.parent)
     job_of = partial(job_of_tables, place=place, shop=Shop())
     read = as_drawing(drawing, loaded_target, job_of(tables))
     tolerances_file = None if tolerances is None else Path(tolerances)

@@ -232,7 +232,7 @@ def fraction(value: object) -> float:
     return number(text[:-1]) / 100.0 if text.endswith("%") else number(text)
 
 
-def whole(value: object) -> int:
+def whole_number(value: object) -> int:
     """A whole number."""
     text = number_text(value).strip()
     if not re.fullmatch(r"[+-]?\d{1,9}", text):
@@ -292,7 +292,7 @@ LENGTH = Value(plain(length), "LENGTH")
 ANGLE = Value(plain(angle), "ANGLE")
 FEED = Value(plain(feed), "FEED")
 TIME = Value(plain(time), "TIME")
-COUNT = Value(plain(whole), "COUNT")
+COUNT = Value(plain(whole_number), "COUNT")
 FACTOR = Value(plain(number), "FACTOR")
 TEXT = Value(plain(text))
 PATTERNS_OF_NAMES = Value(plain(patterns))

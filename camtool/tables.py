@@ -63,13 +63,13 @@ def parse_table(text: str) -> Table:
         raise tomllib.TOMLDecodeError("it is nested too deeply") from None
     level: list[Any] = [table]
     for _ in range(MAX_DEPTH):
-        level = [each for value in level for each in _within(value)]
+        level = [each for value in level for each in _items_within(value)]
         if not level:
             return table
     raise tomllib.TOMLDecodeError(f"it is nested more than {MAX_DEPTH} deep")
 
 
-def _within(value: Any) -> Iterable[Any]:
+def _items_within(value: Any) -> Iterable[Any]:
     if isinstance(value, dict):
         return value.values()
     return value if isinstance(value, list) else ()

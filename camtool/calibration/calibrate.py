@@ -303,7 +303,7 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
         uncertainty_mm=_norm(uncertainties) / math.sqrt(len(uncertainties))
         if len(uncertainties) == len(readings)
         else None,
-        known=_known(model, solution),
+        known=_known_uncertainty(model, solution),
     )
 
 
@@ -365,7 +365,7 @@ def _mean_backlash(model: Model, solution: Solution, machine: Machine) -> list[E
     return estimates
 
 
-def _known(model: Model, solution: Solution) -> Uncertainty:
+def _known_uncertainty(model: Model, solution: Solution) -> Uncertainty:
     """Compute the standard uncertainties of the estimates and their correlations.
 
     With J the derivatives of the machine's values by the parameters, their covariance is J C Jᵀ.

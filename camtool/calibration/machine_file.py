@@ -46,7 +46,7 @@ def machine_file(
     _set_map(table, notes, calibration, measurements, machine)
     _set_uncertainty(table, notes, calibration)
     head = (
-        f"# {machine.target.name}, calibrated from {_plain(calibration.file)}.",
+        f"# {machine.target.name}, calibrated from {_without_path(calibration.file)}.",
         "# ± is the standard uncertainty.",
         "",
     )
@@ -75,7 +75,9 @@ def _set_map(
             worst = max(
                 filter(None, (each.uncertainty for each in plays.values() if each)), default=None
             )
-            notes[f"play_map.{axis}.play_mm"] = f"{_within(worst)}, {_plain(calibration.file)}"
+            notes[f"play_map.{axis}.play_mm"] = (
+                f"{_uncertainty_words(worst)}, {_without_path(calibration.file)}"
+            )
         elif unmapped is not None and machine.play_map.use and getattr(machine.play_map, axis):
             _set(table, "play_map.use", False)
             notes["play_map.use"] = f"the play of {axis} was measured as a whole since"
@@ -99,7 +101,7 @@ def _set_uncertainty(file_table: Table, notes: dict[str, str], calibration: Cali
         standard = uncertainty.standard(key)
         if standard is not None:
             _set(file_table, f"uncertainty.{key}", float(f"{standard:.{UNCERTAINTY_DIGITS}g}"))
-            notes[f"uncertainty.{key}"] = _plain(calibration.file)
+            notes[f"uncertainty.{key}"] = _without_path(calibration.file)
     for axis in ("x", "y"):
         if uncertainty.standard(f"{axis}.compensation_mm") is not None:
             _set(file_table, f"uncertainty.{axis}.compensation_mm", 0.0)
@@ -131,16 +133,16 @@ def _rounded(estimate: Estimate | None) -> float:
 def _note(estimate: Estimate, calibration: Calibration) -> str:
     readings = f"{estimate.readings} reading{'s' if estimate.readings != 1 else ''}"
     return (
-        f"{_within(estimate.uncertainty)}, {readings} of {_plain(calibration.file)}; "
-        f"{estimate.before:.6g} before"
+        f"{_uncertainty_words(estimate.uncertainty)}, {readings} of "
+        f"{_without_path(calibration.file)}; {estimate.before:.6g} before"
     )
 
 
-def _within(uncertainty: float | None) -> str:
+def _uncertainty_words(uncertainty: float | None) -> str:
     return "uncertainty not known" if uncertainty is None else f"± {uncertainty:.2g}"
 
 
-def _plain(file: str) -> str:
+def _without_path(file: str) -> str:
     """Return the name of a file for a comment: without its folder, with printable characters
     only."""
     return "".join(char if char.isprintable() else "?" for char in Path(file).name)

@@ -242,7 +242,7 @@ class Model:
 
     def start(self, machine: Machine) -> Floats:
         """Return the values (P,) of the machine's file."""
-        return np.array([_said(parameter, machine) for parameter in self.parameters])
+        return np.array([_value_in_file(parameter, machine) for parameter in self.parameters])
 
     def predict(self, values: Floats) -> Floats:
         """Predict the readings (n,) mm for values (P,) of the parameters."""
@@ -272,7 +272,7 @@ def _regions(courses: Sequence[CutAxis], axis: str) -> Iterator[str]:
     yield from named or ("",)
 
 
-def _said(parameter: Parameter, machine: Machine) -> float:
+def _value_in_file(parameter: Parameter, machine: Machine) -> float:
     if parameter == SQUARENESS:
         return math.tan(machine.mechanics.squareness_rad)
     axis: Axis = getattr(machine.axes, parameter.axis)

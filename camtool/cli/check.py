@@ -198,7 +198,7 @@ def _layers(facts: dict[str, Any], max_rows: int | None) -> _Rows:
     for name, layer in _first(list(facts["layers"].items()), max_rows):
         points = f", {layer['marks']} points" if layer["marks"] else ""
         yield "layer", f"{name}: {layer['closed']} closed, {layer['open']} open{points}"
-    yield from _more("layer", facts["layers"], max_rows)
+    yield from _rows_left_out("layer", facts["layers"], max_rows)
     for key, name, no_word in (
         ("colours", "colour", "none"),
         ("line_types", "line type", "plain"),
@@ -231,21 +231,24 @@ def _places(facts: dict[str, Any], max_rows: int | None) -> _Rows:
     """Yield gaps, branches, crossings and open ends, with their places."""
     for key, state in (("gaps", "stays open"), ("closed_gaps", "was closed")):
         for gap in _first(facts[key], max_rows):
-            yield "gap", f"{gap['size_mm']:.4g} mm at {_at(gap)} on {gap['layer']}, {state}"
-        yield from _more("gap", facts[key], max_rows)
+            yield (
+                "gap",
+                f"{gap['size_mm']:.4g} mm at {_place_words(gap)} on {gap['layer']}, {state}",
+            )
+        yield from _rows_left_out("gap", facts[key], max_rows)
     for item in _first(facts["branches"], max_rows):
-        yield "branch", f"{item['ends']} ends at {_at(item)} on {item['layer']}"
-    yield from _more("branch", facts["branches"], max_rows)
+        yield "branch", f"{item['ends']} ends at {_place_words(item)} on {item['layer']}"
+    yield from _rows_left_out("branch", facts["branches"], max_rows)
     for item in _first(facts["crossings"], max_rows):
-        yield "crossing", f"of a contour with itself at {_at(item)} on {item['layer']}"
-    yield from _more("crossing", facts["crossings"], max_rows)
+        yield "crossing", f"of a contour with itself at {_place_words(item)} on {item['layer']}"
+    yield from _rows_left_out("crossing", facts["crossings"], max_rows)
     ends = list(zip(facts["open_ends"][::2], facts["open_ends"][1::2], strict=True))
     for begin, end in _first(ends, max_rows):
-        yield "open", f"from {_at(begin)} to {_at(end)} on {begin['layer']}"
-    yield from _more("open", ends, max_rows)
+        yield "open", f"from {_place_words(begin)} to {_place_words(end)} on {begin['layer']}"
+    yield from _rows_left_out("open", ends, max_rows)
 
 
-def _at(item: dict[str, Any]) -> str:
+def _place_words(item: dict[str, Any]) -> str:
     x, y = item["at_mm"]
     return f"{x:.4f}, {y:.4f}"
 
@@ -254,7 +257,7 @@ def _first(items: list[Any], max_rows: int | None) -> list[Any]:
     return items if max_rows is None else items[:max_rows]
 
 
-def _more(name: str, items: Any, max_rows: int | None) -> _Rows:
+def _rows_left_out(name: str, items: Any, max_rows: int | None) -> _Rows:
     """Return a line with the number of rows that are not shown."""
     if max_rows is not None and len(items) > max_rows:
         yield name, f"and {len(items) - max_rows} more (-v shows all)"

@@ -126,7 +126,7 @@ def new(
     has_text = any(is_text(name) for name in read.sources)
     parts = proposed(read, proposal)
     if ask:
-        parts = [part for each in parts if (part := _asked(each)) is not None]
+        parts = [part for each in parts if (part := _ask_kind(each)) is not None]
         if not parts:
             raise OptionError("nothing is left to cut", mend="let one operation cut something")
     job_text = job_template(read, target, proposal, parts, text if has_text else "")
@@ -142,7 +142,7 @@ def new(
     say(f"written: {place}; look at the kinds, the tool and the depth", quiet=quiet)
 
 
-def _asked(each: Proposed) -> Proposed | None:
+def _ask_kind(each: Proposed) -> Proposed | None:
     """Ask for the kind of operation of a part that is in doubt; None if it is not to be cut."""
     part = each.part
     if not part.others and not part.is_left:

@@ -548,7 +548,7 @@ class JobFlags:
         Of one operation `--layer` is a part of it. A usage error for `--operation`.
         """
         from camtool.jobs.build import JobTables, read_job_file, tables_of_flags
-        from camtool.jobs.changes import job_of_tables, together
+        from camtool.jobs.changes import job_of_tables, merged_tables
 
         if self.operations or self.setup is not None:
             flag = "--operation" if self.operations else "--setup"
@@ -559,7 +559,7 @@ class JobFlags:
             if self.file is None
             else read_job_file(Path(self.file), self._piped_content)
         )
-        tables = together(file, tables_of_flags(self.given), place.parent)
+        tables = merged_tables(file, tables_of_flags(self.given), place.parent)
         if drawing.layers and len(job_used.operations) == 1:
             tables["operations"][0]["layers"] = list(drawing.layers)
         read = functools.partial(job_of_tables, place=place, shop=self._tools_and_defaults())

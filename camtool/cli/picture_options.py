@@ -280,7 +280,7 @@ class Painter:
         """Draw the picture, for a file of this name."""
         scenes, options = self.scenes, self.flags.options()
         progress().begin("drawing the picture")
-        if not _judged(scenes):  # the findings say why; the picture shows what there is
+        if not _is_judged(scenes):  # the findings say why; the picture shows what there is
             options = replace(options, polar=None)
         if len(scenes) > 1:
             from camtool.pictures.beside import render_beside
@@ -319,7 +319,7 @@ class Painter:
         for name in self._missing(scenes):
             yield f"--layers {name}: nothing in this picture{layer_of(name).hint}"
         for flag in ("--exaggerate", "--polar"):
-            if flag in self.flags.given and not _judged(scenes):
+            if flag in self.flags.given and not _is_judged(scenes):
                 yield f"{flag}: the part cannot be judged; the picture shows what is planned"
 
     def _missing(self, scenes: Sequence[Scene]) -> list[str]:
@@ -335,6 +335,6 @@ class Painter:
         return [name for name in named if name not in present_layers]
 
 
-def _judged(scenes: Sequence[Scene]) -> bool:
+def _is_judged(scenes: Sequence[Scene]) -> bool:
     """True if all scenes have a predicted path."""
     return all(scene.trace_points is not None for scene in scenes)

@@ -230,14 +230,14 @@ class Ends(Struct, frozen=True, eq=False):
 class Joints(Struct, frozen=True, eq=False):
     """`mates` (2M,): the end that each end is joined to, −1 for none. `node` (2M,): the number of
     the branch at which an end lies, −1 for none; `branches` has for each such number the first end
-    by place and how many ends meet there, and `bridged` the numbers of those with gaps. `alone`
+    by place and how many ends meet there, and `bridged` the numbers of those with gaps. `single`
     (2M,): the ends that meet no other one exactly."""
 
     mates: Ints
     node: Ints
     branches: dict[int, tuple[int, int]]
     bridged: frozenset[int]
-    alone: Bools
+    single: Bools
 
     def named(
         self,
@@ -257,7 +257,7 @@ class Joints(Struct, frozen=True, eq=False):
             result[list(paths)] = index
         matters = set(self.bridged)
         leads_nowhere = np.zeros(len(closed), dtype=np.bool_)
-        leads_nowhere[result[np.flatnonzero(self.alone & (self.mates < 0)) // 2]] = True
+        leads_nowhere[result[np.flatnonzero(self.single & (self.mates < 0)) // 2]] = True
         meeting = np.flatnonzero(self.node >= 0)
         path = result[meeting // 2]
         is_harmless = np.where(self.mates[meeting] < 0, leads_nowhere[path], closed[path])

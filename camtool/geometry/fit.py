@@ -233,11 +233,11 @@ def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
     inner = np.linspace(breaks[:-1], breaks[1:], each, endpoint=False, axis=1).ravel()
     t = np.append(inner, breaks[-1])
     directions = _Directions(curve, t, breaks)
-    nodes = _NodeColumns(t, _finite(curve.point(t)), *directions.both(t))
+    nodes = _NodeColumns(t, _finite(curve.point(t)), *directions.both_sides(t))
     is_break = np.arange(len(t)) % each == 0
     for side, column in ((-1.0, nodes.arrive), (1.0, nodes.leave)):
         # A derivative at a corner is the one of either side.
-        one_sided, derivative = directions.aside(breaks, side), column[is_break]
+        one_sided, derivative = directions.one_sided(breaks, side), column[is_break]
         differs = turns(one_sided, derivative) > CORNER_ANGLE_RAD
         column[is_break] = np.where(differs[:, None], one_sided, derivative)
     _refine(nodes, curve, directions, tolerance_mm)
@@ -260,21 +260,21 @@ class _Directions:
         self.curve = curve
         self.breaks = breaks
         lengths = np.hypot(*_finite(curve.tangent(t)).T)
-        self.least = VANISHING_TANGENT * float(lengths.max())
+        self.min_length = VANISHING_TANGENT * float(lengths.max())
 
-    def both(self, t: Floats) -> tuple[Floats, Floats]:
+    def both_sides(self, t: Floats) -> tuple[Floats, Floats]:
         """Directions (n, 2) just before and just after each t."""
         tangent = _finite(self.curve.tangent(t))
         length = np.hypot(tangent[:, 0], tangent[:, 1])
-        is_regular = length > self.least
+        is_regular = length > self.min_length
         unit = tangent / np.where(is_regular, length, 1.0)[:, None]
         before, after = unit.copy(), unit.copy()
         if not is_regular.all():
-            before[~is_regular] = self.aside(t[~is_regular], -1.0)
-            after[~is_regular] = self.aside(t[~is_regular], 1.0)
+            before[~is_regular] = self.one_sided(t[~is_regular], -1.0)
+            after[~is_regular] = self.one_sided(t[~is_regular], 1.0)
         return before, after
 
-    def aside(self, t: Floats, side: float) -> Floats:
+    def one_sided(self, t: Floats, side: float) -> Floats:
         """Directions (n, 2) a little before (−1) or after (+1) each t, inside the curve."""
         place = np.searchsorted(self.breaks, t, side="left" if side < 0.0 else "right")
         place = np.clip(place, 1, len(self.breaks) - 1)
@@ -286,7 +286,7 @@ class _Directions:
         for share in _ASIDE:
             tangent = self.curve.tangent(np.clip(t + share * room, begin, end))
             length = np.hypot(tangent[:, 0], tangent[:, 1])
-            is_resolved = missing & (length > self.least)
+            is_resolved = missing & (length > self.min_length)
             tangents[is_resolved] = tangent[is_resolved] / length[is_resolved][:, None]
             missing &= ~is_resolved
             if not missing.any():
@@ -313,7 +313,7 @@ def _refine(
         point = points[0]
         is_coarse = _too_coarse(nodes, rows, points, tolerance_mm)
         rows, middle, point = rows[is_coarse], middle[is_coarse], point[is_coarse]
-        before, after = directions.both(middle)
+        before, after = directions.both_sides(middle)
         nodes.t = np.insert(nodes.t, rows + 1, middle)
         nodes.point = np.insert(nodes.point, rows + 1, point, axis=0)
         nodes.arrive = np.insert(nodes.arrive, rows + 1, before, axis=0)

@@ -237,14 +237,16 @@ class Offset(Struct, frozen=True):
 def _left_of(lines: Polylines, offset: Offset) -> tuple[Polylines, Ints]:
     """Return the offset to the left, and the path that each of its loops (J,) begins along."""
     stages = shape_stages(lines, offset)
-    offset_lines, loop_rows = paths_of(stages.loops, stages.kept, stages.trimmed.elements)
+    offset_lines, loop_rows = paths_of(stages.loops, stages.final_slices, stages.trimmed.elements)
     begins = np.array([loop[0] for loop in stages.loops], dtype=np.int64)[loop_rows]
-    source = stages.trimmed.source[stages.kept.element[begins]]
+    source = stages.trimmed.source[stages.final_slices.element[begins]]
     sources = Segments.of(lines).path[source]
-    if len(stages.met) == 0:
+    if len(stages.meeting_paths) == 0:
         return offset_lines, sources
     is_simple = np.ones(len(lines), dtype=np.bool_)
-    is_simple[stages.met[stages.met[:, 0] == stages.met[:, 1]]] = False
+    is_simple[stages.meeting_paths[stages.meeting_paths[:, 0] == stages.meeting_paths[:, 1]]] = (
+        False
+    )
     turns = _turns_about(
         offset_lines.vertices[offset_lines.offsets[:-1], :2], lines.select(is_simple.nonzero()[0])
     )
@@ -271,9 +273,9 @@ class Stages(Struct, frozen=True, eq=False):
     trimmed: RawOffset
     slices: Slices
     valid: Bools
-    kept: Slices
+    final_slices: Slices
     loops: list[Ints]
-    met: Ints
+    meeting_paths: Ints
     """(J, 2) the paths at each common point of two, other than between neighbours."""
 
 

@@ -385,16 +385,16 @@ def _add_distances(
     """Add to `off_mm` (N, 2), of the segment that leaves each vertex, what `is_gone` of the drawn
     segments, and which of the made ones are `new`, says of it, measured both there and back."""
     # What was drawn, to what is there now: the nearest of it, and what is about as near.
-    for rows, distances, point, row in _near(drawn, is_gone, result, 2.0):
+    for rows, distances, point, row in _near_segments(drawn, is_gone, result, 2.0):
         total = distances[point, None] + drawn_off[drawn.begin[rows[point]]]
         np.maximum.at(off_mm, result.begin[row], total)
     # What is there now, to what was drawn.
-    for rows, distances, point, row in _near(result, new, drawn, 1.0):
+    for rows, distances, point, row in _near_segments(result, new, drawn, 1.0):
         total = distances[point, None] + drawn_off[drawn.begin[row]]
         np.maximum.at(off_mm, result.begin[rows[point]], total)
 
 
-def _near(
+def _near_segments(
     segments: _Joined, indices: Ints, other_segments: _Joined, times: float
 ) -> Iterator[tuple[Ints, Floats, Ints, Ints]]:
     """For some of the segments `indices` at a time: which of them (P,) each point along them is

@@ -266,11 +266,11 @@ def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension 
     nearby = features.at(dimension.places_mm[0])
     if dimension.kind == "straightness":
         candidates: list[Feature] = [
-            each for each in nearby if isinstance(each, EdgeFeature) and _near(each, dimension)
+            each for each in nearby if isinstance(each, EdgeFeature) and _is_near(each, dimension)
         ]
         return _single(dimension, candidates, 0.0, file)
     if dimension.kind == "profile":
-        paths = sorted({each.path for each in nearby if _near(each, dimension)})
+        paths = sorted({each.path for each in nearby if _is_near(each, dimension)})
         if len(paths) != 1:
             return _unbound(dimension, len(paths), file)
         outline = OutlineFeature(
@@ -299,7 +299,7 @@ def _closed_circle_first(circles: list[CircleFeature]) -> list[CircleFeature]:
     return closed if len(closed) == 1 else circles
 
 
-def _near(feature: Feature, dimension: Dimension) -> bool:
+def _is_near(feature: Feature, dimension: Dimension) -> bool:
     return all(feature.distance_mm(place) <= BIND_MM for place in dimension.places_mm)
 
 

@@ -183,7 +183,7 @@ def _numbers(text: str, mm_per_unit: float) -> LimitsText:
     if not signed and not zero:
         is_upwards = match["between"] in _UPWARDS
         return LimitsText(
-            sizes_mm=_ordered(*_up(first, second, is_upwards), text, sizes=True), unit=unit
+            sizes_mm=_ordered(*_ascending(first, second, is_upwards), text, sizes=True), unit=unit
         )
     if not {*signed, *zero} >= {"a", "b"} or not signed:
         raise OptionError(
@@ -192,7 +192,7 @@ def _numbers(text: str, mm_per_unit: float) -> LimitsText:
     return LimitsText(deviations_mm=_ordered(second, first, text), unit=unit)
 
 
-def _up(first: float, second: float, upwards: bool) -> tuple[float, float]:
+def _ascending(first: float, second: float, upwards: bool) -> tuple[float, float]:
     return (first, second) if upwards else (second, first)
 
 

@@ -59,7 +59,7 @@ from camtool.inspection.verdicts import (
     inspect,
     verdicts_of,
 )
-from camtool.jobs.changes import LEFT_DIGITS, Change, Left, changed, text_of
+from camtool.jobs.changes import LEFT_DIGITS, Change, Left, changed_tables_of, text_of
 from camtool.jobs.keys import OPERATION, is_known
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
@@ -363,7 +363,7 @@ def levers(bench: Bench, before: MeetingTrial) -> list[list[JobChanges]]:
         *(_slower_feeds(row, each, machine) for row, each in own_rows),
     ]
     for key, values in target.target.ways.items():
-        value_now = _at(machine, key)
+        value_now = _value_at(machine, key)
         lever_list.append(
             [JobChanges(settings=(f'{key}="{each}"',)) for each in values if each != value_now]
         )
@@ -655,7 +655,7 @@ class Bench(Struct, eq=False, dict=True):
 
     def tables_of(self, proposal: JobChanges) -> Table:
         """Return the tables of the job file of a proposal."""
-        return changed(self.case.tables, proposal.changes, proposal.left)
+        return changed_tables_of(self.case.tables, proposal.changes, proposal.left)
 
     def _target(self, proposal: JobChanges) -> LoadedTarget:
         return self.case.target.with_settings(proposal.settings)
@@ -838,7 +838,7 @@ def _standards(machine: Machine, binding: InspectedReport) -> Iterator[_Number]:
     for each in binding.contributions:
         scatter = each.input.endswith(REPEATABILITY)
         key = f"{'axes' if scatter else 'uncertainty'}.{each.input}"
-        present = _at(machine, key)
+        present = _value_at(machine, key)
         if isinstance(present, float) and present > 0.0:
             yield _Number(key, present, 0.0)
 
@@ -847,7 +847,7 @@ REPEATABILITY = "repeatability_mm"
 """The input whose standard uncertainty is a number of the axis itself."""
 
 
-def _at(record: object, key: str) -> object:
+def _value_at(record: object, key: str) -> object:
     """Return the value at a key such as "axes.x.backlash_mm"."""
     for name in key.split("."):
         record = getattr(record, name)

@@ -105,7 +105,7 @@ def _row(each: Dimension) -> str:
         first, second = each.places_mm
         lines += [f"from = {_pair(first)}", f"to = {_pair(second)}"]
         if each.direction_rad is not None:
-            lines.append(f"direction = {_turned(each.direction_rad)}")
+            lines.append(f"direction = {_direction_text(each.direction_rad)}")
     else:
         lines.append(f"at = {_pair(each.places_mm[0])}")
     if each.nominal_mm is not None:
@@ -125,7 +125,7 @@ def _pair(place: Place) -> str:
     return f"[{_number(place[0])}, {_number(place[1])}]"
 
 
-def _turned(direction: float) -> str:
+def _direction_text(direction: float) -> str:
     """Format a direction: x, y or degrees."""
     degrees = math.degrees(direction) % 180.0
     for name, angle in (("x", 0.0), ("y", 90.0), ("x", 180.0)):

@@ -170,12 +170,12 @@ def _list_of_tables(
             mend=f"begin each with [[{key}]]",
         )
     return tuple(
-        table_of(row, known_keys, f"table [[{key}]] {_called(n, row)}", file)
+        table_of(row, known_keys, f"table [[{key}]] {_name_words(n, row)}", file)
         for n, row in enumerate(rows, start=1)
     )
 
 
-def _called(number: int, row: object) -> str:
+def _name_words(number: int, row: object) -> str:
     name = row.get("name") if isinstance(row, dict) else None
     return f"{number} {name!r}" if isinstance(name, str) else str(number)
 
@@ -206,7 +206,7 @@ def build_job(
         for n, own_table in enumerate(tables, start=1)
     ]
     operations = [
-        _deep(operation, (file.defaults, own_table, flags.defaults), stock)
+        _settled(operation, (file.defaults, own_table, flags.defaults), stock)
         for operation, own_table in zip(operations, tables, strict=True)
     ]
     _refuse_equal_names(operations, tables)
@@ -268,7 +268,7 @@ def _operation(
 ) -> Operation:
     """Operation `number` of `count`: its own keys over the defaults, flags over both."""
     defaults, own_table, flags = layers
-    merged = _nearest((defaults, own_table, flags)).only(OPERATION)
+    merged = _merged_layers((defaults, own_table, flags)).only(OPERATION)
     record_of(
         operation_of, OPERATION, own_table.only(_RECORDED)
     )  # keys that flags override must be right too
@@ -317,7 +317,7 @@ def _tooled(operation: Operation, known_keys: Table, tool_used: Used, tools: Too
         raise keys[named[1]].refused(error.message, error.mend) from error
 
 
-def _nearest(layers: Sequence[Table]) -> Table:
+def _merged_layers(layers: Sequence[Table]) -> Table:
     """The keys of all layers, the nearest of which is last; a depth in it takes the place of
     another layer's breakthrough, and the other way round, where the operation knows both."""
     merged = layers[0]
@@ -332,13 +332,13 @@ def _nearest(layers: Sequence[Table]) -> Table:
     return merged
 
 
-def _deep(operation: Operation, layers: Sequence[Table], stock: Stock | None) -> Operation:
+def _settled(operation: Operation, layers: Sequence[Table], stock: Stock | None) -> Operation:
     """The operation as its kind and the stock settle it; errors at the key that is wrong."""
     try:
         return operation.settled(stock)
     except OptionError as error:
         # The last pass may be what is wrong with the depth.
-        key_values = _nearest(layers).given
+        key_values = _merged_layers(layers).given
         named = re.search(r"key (\w+)$", error.where or "")
         keys = (named[1] if named else "", "breakthrough", "kind")
         stated = (key for key in keys if key in key_values and is_known(key, operation.kind))

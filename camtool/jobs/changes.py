@@ -52,18 +52,18 @@ class Left(Struct, frozen=True):
     entities: tuple[str, ...] = ()
 
 
-def together(file: JobTables, flags: JobTables, folder: Path) -> Values:
+def merged_tables(file: JobTables, flags: JobTables, folder: Path) -> Values:
     """The tables of a job file in `folder` that says what a file and flags say together.
 
     OptionError for flags of a tool beside operations that name one: a file says either.
     """
-    job_values = _raw(_over(flags.whole, file.whole))
+    job_values = _raw(_merged(flags.whole, file.whole))
     for key in FILES:
         key_value = flags.whole.given.get(key) or file.whole.given.get(key)
         if key_value is not None:
             job_values[key] = _relative(key_value, file.folder, folder)
     tables: Values = {**job_values, **_raw(file.defaults)}
-    place = _raw(_over(flags.place, file.place))
+    place = _raw(_merged(flags.place, file.place))
     if place:
         tables["place"] = place
     if file.stock is not None:
@@ -102,7 +102,7 @@ def _operation(own_table: Table, defaults: Table, flags: Table, carved: set[str]
             "change the tool in the job file",
         )
     known_keys = [name for name in flags.given if name not in OPERATION or is_known(name, named)]
-    return _raw(_over(flags.only(known_keys), own_table))
+    return _raw(_merged(flags.only(known_keys), own_table))
 
 
 def _leaves_floor(table: Values) -> bool:
@@ -111,7 +111,7 @@ def _leaves_floor(table: Values) -> bool:
     return isinstance(kind, str) and kind_named(kind).rest == "floor"
 
 
-def _over(above: Table, below: Table) -> Table:
+def _merged(above: Table, below: Table) -> Table:
     """The keys of both; the upper ones say instead of the lower what contradicts them."""
     overridden = {EITHER[name] for name in above.given if name in EITHER}
     if TOOL_NAME in above.given:
@@ -133,7 +133,9 @@ def _relative(given: Given, old_folder: Path, folder: Path) -> str:
     return Path(os.path.relpath(named.absolute(), folder.absolute())).as_posix()
 
 
-def changed(tables: Values, changes: Sequence[Change], own_parts: Sequence[Left] = ()) -> Values:
+def changed_tables_of(
+    tables: Values, changes: Sequence[Change], own_parts: Sequence[Left] = ()
+) -> Values:
     """The tables with these changes. An operation with several `own_parts` becomes as many, in
     their order: together they name all entities that it takes."""
     changed_tables = {

@@ -87,7 +87,7 @@ def refuse_unmatched(drawing: Drawing, job: Job) -> None:
                     raise OptionError(
                         f"no {subject} matches {pattern!r}",
                         file=drawing.file,
-                        where=f"{_called(operation, number)}key {subject}s",
+                        where=f"{_name_words(operation, number)}key {subject}s",
                         mend=f"{guess(pattern, names)}it has {_listed(names)}",
                     )
 
@@ -95,13 +95,15 @@ def refuse_unmatched(drawing: Drawing, job: Job) -> None:
 def _unmatched(error: NoMatchError, job: Job) -> OptionError:
     """The reader's error about a layer of the job, with the operation that names it."""
     rows = enumerate(job.operations, start=1)
-    operation_place = next(_called(each, n) for n, each in rows if error.pattern in each.layers)
+    operation_place = next(
+        _name_words(each, n) for n, each in rows if error.pattern in each.layers
+    )
     return OptionError(
         error.message, file=error.file, where=f"{operation_place}key layers", mend=error.mend
     )
 
 
-def _called(operation: Operation, number: int) -> str:
+def _name_words(operation: Operation, number: int) -> str:
     return f"operation {number} {operation.name!r}, " if operation.name else ""
 
 

@@ -42,7 +42,7 @@ from camtool.keys import (
     record_of,
     refuse_idle,
     text,
-    whole,
+    whole_number,
     word,
 )
 from camtool.patterns import guess
@@ -120,7 +120,7 @@ def _range(
     value: object, convert: Callable[[object], float], min_value: float = 0.0
 ) -> tuple[float, float]:
     if not isinstance(value, str):
-        return _two(value, convert, '["3mm", "8mm"]')
+        return _pair(value, convert, '["3mm", "8mm"]')
     one, dots, high = (part.strip() for part in value.partition(".."))
     if not dots or not (one or high):
         raise OptionError(f"{value!r} is no range", mend='write it like "3..8mm"')
@@ -148,7 +148,7 @@ def lengths(value: object) -> tuple[float, float]:
         one, second = match.groups()
         unit = _UNIT.search(second)
         return length(one if unit is None or _UNIT.search(one) else one + unit[0]), length(second)
-    return _two(value, length, '["12mm", "9mm"]')
+    return _pair(value, length, '["12mm", "9mm"]')
 
 
 def counts(value: object) -> tuple[int, int]:
@@ -157,8 +157,8 @@ def counts(value: object) -> tuple[int, int]:
         match = _PAIR.fullmatch(value.strip())
         if match is None:
             raise OptionError(f"{value!r} is no pair of counts", mend='write it like "3x2"')
-        return whole(match[1]), whole(match[2])
-    return _two(value, whole, "[3, 2]")
+        return whole_number(match[1]), whole_number(match[2])
+    return _pair(value, whole_number, "[3, 2]")
 
 
 def origin(value: object) -> str | tuple[float, float]:
@@ -180,7 +180,7 @@ def places(value: object) -> tuple[tuple[float, float], ...]:
     """A list of places [x, y]."""
     if not isinstance(value, list | tuple):
         raise OptionError(f"{value!r} is no list of places", mend="write it like [[10, 5]]")
-    return tuple(_two(each, length, '["10mm", "5mm"]') for each in value)
+    return tuple(_pair(each, length, '["10mm", "5mm"]') for each in value)
 
 
 def kind(given: Given) -> str:
@@ -253,7 +253,7 @@ def _word_or_place(value: object, words: Sequence[str]) -> str | tuple[float, fl
     """Return one of the words, or a place given as a list of two lengths or a text with a
     comma."""
     if isinstance(value, list | tuple):
-        return _two(value, length, '["10mm", "5mm"]')
+        return _pair(value, length, '["10mm", "5mm"]')
     name = text(value)
     if name in words:
         return name
@@ -266,7 +266,7 @@ def _word_or_place(value: object, words: Sequence[str]) -> str | tuple[float, fl
     return length(places[0]), length(places[1])
 
 
-def _two(value: object, convert: Callable[[object], _T], example: str) -> tuple[_T, _T]:
+def _pair(value: object, convert: Callable[[object], _T], example: str) -> tuple[_T, _T]:
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise OptionError(f"{value!r} is no list of two", mend=f"write it like {example}")
     return convert(value[0]), convert(value[1])

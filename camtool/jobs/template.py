@@ -297,7 +297,7 @@ def _frees(part: Part) -> bool:
 def _head(drawing: Drawing, size: tuple[float, float], machine: Machine | None) -> Iterator[str]:
     name = _commented(PurePath(drawing.file).name)
     target = machine.target.name if machine else "NAME"
-    yield f"# How {name} is cut: {size[0]:.6g} by {size[1]:.6g} mm, {_counted(drawing.paths)}"
+    yield f"# How {name} is cut: {size[0]:.6g} by {size[1]:.6g} mm, {_count_words(drawing.paths)}"
     yield "# Take the # away from what you need. docs/jobs.md explains every key."
     yield f"# camtool post DRAWING --target {target} --job THIS-FILE"
     if machine is not None:
@@ -317,12 +317,12 @@ def _head(drawing: Drawing, size: tuple[float, float], machine: Machine | None) 
 
 def _groups(drawing: Drawing) -> list[_Group]:
     """By layer, names that differ in case alone together; by colour when there is one layer."""
-    layers = _by(drawing.layers, [mark.layer for mark in drawing.marks], "layers")
-    colours = _by(drawing.colours, [mark.colour for mark in drawing.marks], "colours")
+    layers = _groups_by(drawing.layers, [mark.layer for mark in drawing.marks], "layers")
+    colours = _groups_by(drawing.colours, [mark.colour for mark in drawing.marks], "colours")
     return colours if len(layers) == 1 and len(colours) > 1 else layers
 
 
-def _by(names: Sequence[str], of_marks: Sequence[str], key: str) -> list[_Group]:
+def _groups_by(names: Sequence[str], of_marks: Sequence[str], key: str) -> list[_Group]:
     groups: dict[str, tuple[str, list[int], list[int]]] = {}
     for row, name in enumerate(names):
         groups.setdefault(name.casefold(), (name, [], []))[1].append(row)
@@ -577,7 +577,8 @@ def _text(drawing: Drawing, group: _Group, part: Part, proposal: Proposal) -> li
         f"name = {toml_string(part.name)}",
         f'kind = "{part.kind}"',
         _row(
-            f"{group.key} = [{toml_string(pattern_of(group.name))}]", f"{_counted(lines)}{marks}"
+            f"{group.key} = [{toml_string(pattern_of(group.name))}]",
+            f"{_count_words(lines)}{marks}",
         ),
         *(_row(f"{key} = {value}", remark) for key, value, remark in part.keys),
         f"tool = {toml_string(part.tool or proposal.tool or TOOL_NAME)}",
@@ -606,7 +607,7 @@ def _text(drawing: Drawing, group: _Group, part: Part, proposal: Proposal) -> li
     return [*text, *_comments(known_values)]
 
 
-def _counted(lines: Polylines) -> str:
+def _count_words(lines: Polylines) -> str:
     closed = np.count_nonzero(lines.closed)
     return f"{closed} closed and {len(lines.closed) - closed} open paths"
 

@@ -77,14 +77,14 @@ def _words(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _tool(words: dict[str, str], remark: str, line: int) -> TableTool:
-    number, _ = (_whole(words, letter) for letter in "TP")
+    number, _ = (_whole_number(words, letter) for letter in "TP")
     diameter = float(words["D"]) if "D" in words else None
     if diameter is not None and not 0.0 <= diameter < math.inf:
         raise OptionError(f"D{diameter:g} is no diameter", mend="give a D of 0 or more")
     return TableTool(number, diameter, remark, line)
 
 
-def _whole(words: dict[str, str], letter: str) -> int:
+def _whole_number(words: dict[str, str], letter: str) -> int:
     """The number of a word that must be there, and whole."""
     if letter not in words:
         raise OptionError(

@@ -444,7 +444,7 @@ class Machine(
         """SHA-256, hex, of all that a file must say to get this machine: equal for equal machines,
         on every computer, wherever their records stand in the code. How well its numbers are known
         is no part of it: no program depends on that."""
-        values = {key: value for key, value in _given(self).items() if key != "uncertainty"}
+        values = {key: value for key, value in _given_values(self).items() if key != "uncertainty"}
         data = msgspec.json.encode(values, order="deterministic")
         return hashlib.sha256(data).hexdigest()
 
@@ -499,7 +499,7 @@ class Machine(
         yield from (axis.max_rate_mm_min for axis in axes if axis.max_rate_mm_min is not None)
 
 
-def _given(record: msgspec.Struct) -> dict[str, Any]:
+def _given_values(record: msgspec.Struct) -> dict[str, Any]:
     """The values of a record that are not its defaults, with its tag."""
     config, values = record.__struct_config__, dict[str, Any]()
     if config.tag_field is not None:
@@ -511,7 +511,7 @@ def _given(record: msgspec.Struct) -> dict[str, Any]:
             continue
         if not isinstance(value, msgspec.Struct):
             values[field.encode_name] = value
-        elif (inner := _given(value)) or not isinstance(field.default, msgspec.Struct):
+        elif (inner := _given_values(value)) or not isinstance(field.default, msgspec.Struct):
             values[field.encode_name] = inner
     return values
 

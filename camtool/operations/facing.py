@@ -109,7 +109,7 @@ def faced(_: Chosen, setting: Setting) -> Work:
     import numpy as np
 
     from camtool.geometry.polylines import Polyline, Polylines
-    from camtool.operations.pocket.work import clearing_paths, down_for, lowered, over_floor
+    from camtool.operations.pocket.work import clearing_paths, down_for, lowered_runs, over_floor
     from camtool.planning.clearing import ConnectedRegion
     from camtool.planning.items import CutRun, Fixed, Work
     from camtool.planning.naming import key_of
@@ -136,5 +136,5 @@ def faced(_: Chosen, setting: Setting) -> Work:
     for path, _region in clearing_paths(region, operation):
         inwards = reverse_vertices(path)
         way_down = down_for(inwards, None, None, setting)
-        runs += lowered(inwards, way_down, floor, setting, "stock")
+        runs += lowered_runs(inwards, way_down, floor, setting, "stock")
     return Work((Fixed(tuple(runs), setting, "stock"),))

@@ -81,7 +81,7 @@ def draw_beside(scenes: Sequence[Scene], options: PictureOptions = AS_USUAL) -> 
         )
     if options.polar is not None:
         return _polars(scenes, options.polar, options)
-    contents = _alike([content_of(scene, options) for scene in scenes])
+    contents = _unified([content_of(scene, options) for scene in scenes])
     grid, views = _views(contents, options)
     view, ticks = views[0], ticks_of(views[0])
     panels = [
@@ -129,7 +129,7 @@ def _top_um(contents: Sequence[Content]) -> float | None:
     return max((one.trace.top_um for one in contents if one.trace is not None), default=None)
 
 
-def _alike(contents: Sequence[Content]) -> list[Content]:
+def _unified(contents: Sequence[Content]) -> list[Content]:
     """The contents with one window, one map of errors, and one colour for each name of a layer."""
     top_um = _top_um(contents)
     window = union([one.window for one in contents if not one.is_empty])

@@ -104,7 +104,7 @@ def moves_of(toolpath: Toolpath) -> MoveChains:
     return MoveChains(
         feeds=_chains(toolpath, cuts & ~slopes),
         ramps=_chains(toolpath, slopes),
-        rapids=_once(toolpath.starts_of(rapids)[:, :2], toolpath.end[rapids, :2]),
+        rapids=_single_chains(toolpath.starts_of(rapids)[:, :2], toolpath.end[rapids, :2]),
         plunges=_places(toolpath.end[is_downward & ~follows, :2]),
         starts=_places(toolpath.starts_of(begins)[:, :2]),
         begin=toolpath.start[:2],
@@ -190,7 +190,7 @@ def _first_times(toolpath: Toolpath, rows: Ints) -> Ints:
     return np.sort(order[first])
 
 
-def _once(begin: Floats, end: Floats) -> tuple[Chain, ...]:
+def _single_chains(begin: Floats, end: Floats) -> tuple[Chain, ...]:
     """Straight moves, each once in either direction: dashes over dashes would look like a line."""
     chains: dict[tuple[tuple[float, ...], ...], Chain] = {}
     for a, b in zip(begin, end, strict=True):
@@ -339,11 +339,11 @@ class _Pieces(Struct, frozen=True, eq=False):
 def reversals_of(toolpath: Toolpath) -> Floats:
     """(R, 2) mm: the places of reversals, in order; both axes may reverse at one."""
     pieces = _pieces(toolpath)
-    is_reversal = _turned(pieces.signs[:, 0]) | _turned(pieces.signs[:, 1])
+    is_reversal = _sign_changes(pieces.signs[:, 0]) | _sign_changes(pieces.signs[:, 1])
     return np.asarray(pieces.begin[is_reversal & toolpath.is_feed[pieces.row]])
 
 
-def _turned(signs: Ints) -> Bools:
+def _sign_changes(signs: Ints) -> Bools:
     """(P,) whether the sign differs from the last one before it that was not 0."""
     changes: Bools = np.zeros(len(signs), dtype=np.bool_)
     moving = np.flatnonzero(signs)

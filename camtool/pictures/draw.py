@@ -65,7 +65,7 @@ def draw(scene: Scene, options: PictureOptions = AS_USUAL) -> str:
         mat(view.box, *sizes),
         page.head,
         axes_around(view, page.ticks),
-        *_beside(content, page),
+        *_scales_and_legend(content, page),
     )
 
 
@@ -106,7 +106,7 @@ def _plot(content: Content, view: View) -> list[str]:
     return [*layers, text.label("nothing to draw", middle, TextStyle(16.0, QUIET, "middle"))]
 
 
-def _beside(content: Content, page: PageLayout) -> list[str]:
+def _scales_and_legend(content: Content, page: PageLayout) -> list[str]:
     """Colour bar, legend and scale bar."""
     box, parts = page.view.box, []
     if content.trace is not None:

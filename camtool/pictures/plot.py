@@ -166,7 +166,7 @@ class Plot(Struct, frozen=True):
         labels = labels_beside(ranks, places, self.view)
         rings = []
         for label in labels:
-            circle: Look = {"cx": number(label.at[0]), "cy": number(label.at[1])}
+            circle: Look = {"cx": number(label.place[0]), "cy": number(label.place[1])}
             rings.append(element("circle", {**circle, **look}))
         return _group(name, [*rings, *(_written(label, str(look["stroke"])) for label in labels)])
 
@@ -200,7 +200,7 @@ class Label(Struct, frozen=True):
     right, bottom."""
 
     text: str
-    at: tuple[float, float]
+    place: tuple[float, float]
     box: tuple[float, float, float, float]
 
 
@@ -212,14 +212,14 @@ def labels_beside(texts: Sequence[str], places: Sequence[Place], view: View) -> 
             continue
         page_place = view.page(*place)
         for direction in DIRECTIONS:
-            box = _beside(words, page_place, direction)
+            box = _label_box(words, page_place, direction)
             if _inside(box, view) and not any(_touch(box, label.box) for label in labels):
                 labels.append(Label(words, page_place, box))
                 break
     return labels
 
 
-def _beside(
+def _label_box(
     words: str, place: tuple[float, float], direction: tuple[float, float]
 ) -> tuple[float, float, float, float]:
     """The box of a text to the right or left of a place, and below or above it."""

@@ -56,11 +56,11 @@ GLOSS = 0.05
 
 
 class Camera(Struct, frozen=True):
-    """A view along the horizontal direction `away` (x, y) of length 1, from above the table by the
-    angle with this `sine`; the lamp stands in the direction `lamp` (to the right, away from the
-    viewer), `rise` times as high as it is far away."""
+    """A view along the horizontal direction `direction` (x, y) of length 1, from above the table
+    by the angle with this `sine`; the lamp stands in the direction `lamp` (to the right, away from
+    the viewer), `rise` times as high as it is far away."""
 
-    away: tuple[float, float]
+    direction: tuple[float, float]
     sine: float
     lamp: tuple[float, float]
     rise: float
@@ -71,13 +71,13 @@ class Camera(Struct, frozen=True):
 
     def place(self, x: float, y: float, z: float) -> tuple[float, float]:
         """The place on the picture, mm, to the right and up."""
-        fx, fy = self.away
+        fx, fy = self.direction
         return x * fy - y * fx, z * self.cosine + (x * fx + y * fy) * self.sine
 
     @property
     def light(self) -> tuple[float, float, float]:
         """Direction to the lamp, of length 1."""
-        (fx, fy), (right, distance) = self.away, self.lamp
+        (fx, fy), (right, distance) = self.direction, self.lamp
         x, y = right * fy + distance * fx, distance * fy - right * fx
         size = math.sqrt((x * x + y * y) * (1.0 + self.rise * self.rise))
         return x / size, y / size, self.rise / math.sqrt(1.0 + self.rise * self.rise)
@@ -185,7 +185,7 @@ def picture_of(
         stage.heights,
         (stage.corner_mm[0] + half, stage.corner_mm[1] + half, stage.cell_mm),
         (
-            *camera.away,
+            *camera.direction,
             camera.sine,
             camera.cosine,
             window[0] + 0.5 * pixel,

@@ -150,7 +150,7 @@ def _lines(section: StockSection, view: View, factor: float) -> list[str]:
         element("path", {"id": "material", "d": str(body), **fill}),
         element("path", {"id": "surface", "d": str(surface), **pen}),
     ]
-    wanted_line = _wanted(section, view, factor)
+    wanted_line = _wanted_heights(section, view, factor)
     if wanted_line:
         dashed: Look = {**pen, "stroke": FEED, "stroke-width": 2.0}
         dashed["stroke-dasharray"] = WANTED_DASHES
@@ -158,7 +158,7 @@ def _lines(section: StockSection, view: View, factor: float) -> list[str]:
     return parts
 
 
-def _wanted(section: StockSection, view: View, factor: float) -> str:
+def _wanted_heights(section: StockSection, view: View, factor: float) -> str:
     """The path data of the wanted heights; interrupted where there is no limit."""
     data = PathData()
     if section.wanted is None:

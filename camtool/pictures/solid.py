@@ -128,7 +128,7 @@ class Solid(Struct, frozen=True, eq=False):
     mm it is higher or lower than wanted, None if not asked for."""
 
     pair: StockPair
-    found: HeightMap
+    height_map: HeightMap
     ends_mm: tuple[float, float]
     cut_mm: float
     off_mm: Floats | None = None
@@ -136,7 +136,7 @@ class Solid(Struct, frozen=True, eq=False):
     @property
     def deepest_mm(self) -> float:
         """Depth of the deepest cut that is shown, mm; no more than the thickness."""
-        return min(-float(self.found.heights.min(initial=0.0)), self.pair.thickness_mm)
+        return min(-float(self.height_map.heights.min(initial=0.0)), self.pair.thickness_mm)
 
 
 def draw_solid(scene: Scene, options: PictureOptions) -> str:
@@ -186,18 +186,18 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
     cell = max(side / pixels, cell_for(box, cells))
     map_found = height_map(pair.moves, box, cell, owners=True)
     cut_mm = -float(map_found.heights.min(initial=0.0))
-    left = map_found if pair.before is None else pair.before.shown_in(map_found)
+    material = map_found if pair.before is None else pair.before.shown_in(map_found)
     if options.view not in BAR_NAMES:
-        return Solid(pair, left, box[2:], cut_mm)
-    lowest, highest = _wanted(pair, map_found, box, options)
-    heights = left.heights.clip(-pair.thickness_mm)
+        return Solid(pair, material, box[2:], cut_mm)
+    lowest, highest = _wanted_heights(pair, map_found, box, options)
+    heights = material.heights.clip(-pair.thickness_mm)
     deviations = heights - highest if options.view == "leftover" else lowest - heights
     # What was gone before is neither left nor cut.
-    deviations = np.where(left.heights == map_found.heights, deviations, 0.0)
-    return Solid(pair, left, box[2:], cut_mm, deviations.astype(np.float64))
+    deviations = np.where(material.heights == map_found.heights, deviations, 0.0)
+    return Solid(pair, material, box[2:], cut_mm, deviations.astype(np.float64))
 
 
-def _wanted(
+def _wanted_heights(
     pair: StockPair, stock_map: HeightMap, box: Box, options: PictureOptions
 ) -> tuple[Floats, Floats]:
     """The least and the greatest height (NY, NX) mm that are wanted in each cell."""
@@ -253,10 +253,10 @@ def _notes(solid: Solid, options: PictureOptions) -> tuple[str, ...]:
         extent = f"nowhere more than {number(MIN_SHOWN_MM, 3)} mm {word} than {solid.pair.against}"
         if max_mm > MIN_SHOWN_MM:
             row, column = divmod(int(solid.off_mm.argmax()), solid.off_mm.shape[1])
-            x, y = solid.found.x[column], solid.found.y[row]
+            x, y = solid.height_map.x[column], solid.height_map.y[row]
             than = f"{number(max_mm, 3)} mm {word} than {solid.pair.against}"
             extent = f"up to {than}, at ({x:.2f}, {y:.2f}) mm"
-        cell = number(solid.found.cell_mm, 3)
+        cell = number(solid.height_map.cell_mm, 3)
         notes.append(f"{extent}; walls beside their place by less than {cell} mm are not shown")
     return tuple(notes)
 
@@ -332,14 +332,14 @@ def _on_the_stock(marks: DotGroup, solid: Solid, camera: Camera) -> DotGroup:
     """Return marks at (x, y) mm moved to where the camera sees their places on the stock; those
     beside the stock are left out. Marks behind a higher part of the stock are seen through it."""
     at = np.array(marks.places, dtype=np.float64).reshape(-1, 2)
-    heights = solid.found.at(at).clip(-solid.pair.thickness_mm)
+    heights = solid.height_map.at(at).clip(-solid.pair.thickness_mm)
     rows = np.column_stack([at, heights])[~np.isnan(heights)].tolist()
     return replace(marks, places=tuple(camera.place(*row) for row in rows))
 
 
 def _stage(solid: Solid, bar: MmBar, options: PictureOptions) -> Stage:
     """The stage of the picture, with the colours of differences."""
-    stage = stage_of(solid.found, solid.pair.thickness_mm, solid.pair.moves, BOARD_SHARE)
+    stage = stage_of(solid.height_map, solid.pair.thickness_mm, solid.pair.moves, BOARD_SHARE)
     if solid.off_mm is None:
         return stage
     index = np.minimum((solid.off_mm / bar.top * BINS).astype(np.int64), BINS - 1)
@@ -393,11 +393,11 @@ def _ghost(scene: Scene, camera: Camera, view: View) -> str:
 
 def _deepest(solid: Solid, camera: Camera, view: View) -> str:
     """The face of the block, and the outline of the deepest cuts behind it, dashed."""
-    front = camera.away[0] == 0.0
-    low = solid.found.heights.min(axis=0 if front else 1).clip(-solid.pair.thickness_mm)
+    front = camera.direction[0] == 0.0
+    low = solid.height_map.heights.min(axis=0 if front else 1).clip(-solid.pair.thickness_mm)
     begins = np.concatenate([[0], np.flatnonzero(np.diff(low)) + 1])
-    first = solid.found.corner_mm[0 if front else 1]
-    edges = first + solid.found.cell_mm * np.append(begins, len(low))
+    first = solid.height_map.corner_mm[0 if front else 1]
+    edges = first + solid.height_map.cell_mm * np.append(begins, len(low))
     edges[-1] = solid.ends_mm[0 if front else 1]
     data, before = PathData(), 0.0
     for left, right, z in zip(edges[:-1], edges[1:], low[begins].tolist(), strict=True):
@@ -441,7 +441,7 @@ def _corners(solid: Solid, camera: Camera) -> Floats:
 def _extents(solid: Solid) -> tuple[tuple[float, float], tuple[float, float]]:
     """Ends of the block that is shown in X and in Y, mm; the map may reach beyond it by less than
     a cell."""
-    left, bottom = solid.found.corner_mm
+    left, bottom = solid.height_map.corner_mm
     right, top = solid.ends_mm
     return (left, right), (bottom, top)
 
@@ -480,12 +480,13 @@ def _thickness(solid: Solid) -> str:
 
 
 class MmBar(Struct, frozen=True, eq=False):
-    """A bar of colours (N, 3) for 0 to `top` mm, with its name; `down`: 0 is at its upper end."""
+    """A bar of colours (N, 3) for 0 to `top` mm, with its name; `is_downward`: 0 is at its upper
+    end."""
 
     name: str
     top: float
     colours: Octets
-    down: bool
+    is_downward: bool
 
     @property
     def labels(self) -> list[tuple[float, str]]:
@@ -509,12 +510,12 @@ class MmBar(Struct, frozen=True, eq=False):
         height = min(box.height - 2.0 * NAME_LIFT, MAX_BAR)
         left, top = box.right + BAR_GAP, 0.5 * (box.top + box.bottom - height)
         sides: Look = {"x": left, "y": top, "width": BAR_WIDTH, "height": height}
-        column = self.colours if self.down else self.colours[::-1]
+        column = self.colours if self.is_downward else self.colours[::-1]
         pixels = np.repeat(column[:, None, :], 2, axis=1)
         look: Look = {"preserveAspectRatio": "none", "href": data_uri(png_of(pixels))}
         ticks, parts = PathData(), [element("image", {**sides, **look})]
         for value, name in self.labels:
-            share = value / self.top if self.down else 1.0 - value / self.top
+            share = value / self.top if self.is_downward else 1.0 - value / self.top
             y = top + share * height
             ticks.move(left + BAR_WIDTH, y)
             ticks.line(left + BAR_WIDTH + 5.0, y)

@@ -73,7 +73,7 @@ def bins_of(trace: ErrorTrace) -> Ints:
 
 def lines_by_step(trace: ErrorTrace, window_mm: float) -> list[list[Floats]]:
     """For each step of the map, its lines: arrays (n, 2) of points, n ≥ 2."""
-    keep = _kept(trace, MERGED_SHARE * window_mm)
+    keep = _kept_rows(trace, MERGED_SHARE * window_mm)
     drawn_part = ErrorTrace(
         trace.points[keep],
         np.maximum.reduceat(trace.error_um, keep),
@@ -91,7 +91,7 @@ def lines_by_step(trace: ErrorTrace, window_mm: float) -> list[list[Floats]]:
     return lines
 
 
-def _kept(trace: ErrorTrace, apart_mm: float) -> Ints:
+def _kept_rows(trace: ErrorTrace, apart_mm: float) -> Ints:
     """Rows of the points to draw: those at least `apart_mm` from the one before, and all ends of
     cuts."""
     cutting = trace.cutting

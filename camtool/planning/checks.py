@@ -205,7 +205,7 @@ def _beside_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     stock, cuts = job.stock, feeds_below_top(toolpath)
     if stock is None or stock.box_mm is None or not cuts.any():
         return
-    is_beside = _beside(toolpath, stock.box_mm, _radii(toolpath, job))
+    is_beside = _is_beside(toolpath, stock.box_mm, _radii(toolpath, job))
     stay = np.cumsum((toolpath.kind == Kind.RAPID) & (toolpath.end[:, 2] >= STOCK_TOP_MM))
     touching_stays = np.unique(stay[cuts & ~is_beside])
     outside = cuts & ~np.isin(stay, touching_stays)
@@ -322,7 +322,7 @@ def _leads_off_stock(step: Step, stock: Stock | None) -> list[Finding]:
     return shortened_list(findings, OUT_OF_STOCK_MORE_LEADS)
 
 
-def _beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:
+def _is_beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:
     """(N,) true where the tool, of `radius` (N,) mm, stays beside the stock's box: by the boxes
     of the moves, of arcs by those of their circles."""
     begin, end = toolpath.starts[:, :2], toolpath.end[:, :2]

@@ -174,7 +174,7 @@ def _inside_out(root: Cell, linked: LinkedPath) -> Iterator[tuple[Cell, Cell]]:
             outer_cell = None
             continue
         outer_cell = outer_cell or cell
-        next_cell = remaining.pop(_pick(remaining, linked.here))
+        next_cell = remaining.pop(_pick(remaining, linked.end_place))
         stack.append((next_cell, list(next_cell.inner)))
 
 
@@ -330,7 +330,7 @@ def slot_paths(region: Polylines, tool_radius_mm: float) -> list[Floats]:
     paths: list[Polyline] = []
     for band in bands:
         if not _covered(band, paths, BEYOND * hair * diameter):
-            paths.append(_once(band, BEYOND * hair * diameter))
+            paths.append(_along_band(band, BEYOND * hair * diameter))
     return [_without_specks(path.vertices, BEYOND * hair * diameter) for path in paths]
 
 
@@ -355,7 +355,7 @@ def _covered(path: Polyline, other_paths: list[Polyline], near_mm: float) -> boo
     )
 
 
-def _once(band: Polyline, near_mm: float) -> Polyline:
+def _along_band(band: Polyline, near_mm: float) -> Polyline:
     """An open path along a band: one side of it where the other one is beside it; else round."""
     if not band.closed:
         return band
@@ -386,7 +386,7 @@ class LinkedPath:
         self._done: list[Floats] = []
 
     @property
-    def here(self) -> Floats | None:
+    def end_place(self) -> Floats | None:
         """Place of the tool (2,); None before the first stroke."""
         return self._parts[-1][-1, :2] if self._parts else None
 
@@ -395,7 +395,7 @@ class LinkedPath:
 
         Where rounding hides the link (`route`) the tool comes up: another path begins.
         """
-        tool_place = self.here
+        tool_place = self.end_place
         self.join(None if tool_place is None else route(tool_place, stroke[0, :2], region), stroke)
 
     def join(self, link: Floats | None, stroke: Floats) -> None:
@@ -436,8 +436,8 @@ class LinkedPath:
 
     def _near(self, path: Polyline) -> Floats:
         """Place of the tool, or where it would go down, or else the start of a path."""
-        if self.here is not None:
-            return self.here
+        if self.end_place is not None:
+            return self.end_place
         return path.start if self.begin is None else self.begin
 
     def paths(self) -> list[Floats]:

@@ -175,7 +175,7 @@ class _Drive(Struct):
 
     axis: Axis
     residual: Residual
-    at: float
+    position: float
     sense: int
     step_mm: float
 
@@ -195,8 +195,10 @@ class _Drive(Struct):
         it."""
         for sense in (self.sense_of(begin, end), -self.sense_of(begin, end)):
             target = self.position_for(end, sense)
-            if (target - self.at) * sense > 0.0 or (sense == self.sense and target == self.at):
-                self.at, self.sense = target, sense
+            if (target - self.position) * sense > 0.0 or (
+                sense == self.sense and target == self.position
+            ):
+                self.position, self.sense = target, sense
                 return
 
 
@@ -276,7 +278,7 @@ class _BacklashCompensator:
             drive.residual = axis_residual
 
     def _place(self) -> Point:
-        x, y, z = (drive.at for drive in self._drives)
+        x, y, z = (drive.position for drive in self._drives)
         return x, y, z
 
     def _line(self, move: Move) -> None:
@@ -290,8 +292,8 @@ class _BacklashCompensator:
         for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             drive.sense = drive.sense_of(begin, end)
             ask = drive.position_for(begin, drive.sense)
-            if (ask - drive.at) * drive.sense > AHEAD_MM:
-                drive.at = ask
+            if (ask - drive.position) * drive.sense > AHEAD_MM:
+                drive.position = ask
         self._line(move)
         shares = [self._follow_share(index, segment) for index in range(3)]
         low = 0.0
@@ -305,17 +307,17 @@ class _BacklashCompensator:
         reversing = []
         for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             sense = drive.sense_of(begin, end)
-            excess = (drive.at - drive.position_for(begin, sense)) * sense
+            excess = (drive.position - drive.position_for(begin, sense)) * sense
             if sense != drive.sense and excess > AHEAD_MM:
                 thrown = (
                     drive.position_for(begin, drive.sense) - drive.position_for(begin, sense)
                 ) * sense
-                drive.at -= max(excess - (1.0 - OVERSHOOT) * thrown, 0.0) * sense
+                drive.position -= max(excess - (1.0 - OVERSHOOT) * thrown, 0.0) * sense
                 reversing.append((drive, sense))
         if reversing:
             self._line(move)
             for drive, sense in reversing:
-                drive.at += drive.step_mm * sense
+                drive.position += drive.step_mm * sense
                 drive.sense = sense
             self._line(move)
 
@@ -324,12 +326,12 @@ class _BacklashCompensator:
         ahead."""
         drive = self._drives[index]
         begin, end = segment.begin[index], segment.end[index]
-        distance = (drive.at - drive.position_for(begin, drive.sense)) * drive.sense
+        distance = (drive.position - drive.position_for(begin, drive.sense)) * drive.sense
         if distance <= AHEAD_MM:
             return 0.0
         if distance >= abs(end - begin):
             return 1.0
-        return segment.share_at(index, drive.at + drive.residual.error_mm(drive.sense))
+        return segment.share_at(index, drive.position + drive.residual.error_mm(drive.sense))
 
     def _follow(self, part: MonotoneSegment, follows: list[bool], move: Move) -> None:
         """Add a part of a segment on which each axis either follows or holds."""
@@ -339,7 +341,7 @@ class _BacklashCompensator:
         ):
             offsets.append(drive.position_for(0.0, drive.sense))
             if moves and begin != end:
-                drive.at = drive.position_for(end, drive.sense)
+                drive.position = drive.position_for(end, drive.sense)
         if part.centre is None or not (follows[0] and follows[1]):
             self._line(move)
             return
@@ -352,9 +354,9 @@ class _BacklashCompensator:
         _add_event(self._b, move, self._toolpath)
         for index in homes:
             drive = self._drives[index]
-            if drive.at != self._home[index]:
-                drive.sense = 1 if self._home[index] > drive.at else -1
-            drive.at = self._home[index]
+            if drive.position != self._home[index]:
+                drive.sense = 1 if self._home[index] > drive.position else -1
+            drive.position = self._home[index]
         self._b.set_position(*self._place())
 
 

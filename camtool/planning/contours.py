@@ -160,10 +160,10 @@ def _closed_passes(
         profiles = [profile]
     ends = profiles[0][0][0], profiles[-1][-1][0]
     leads = leads_of(contour, along, ends, keep_out)
-    if len(leads.away) == 0 and angle is not None:
+    if len(leads.way_out) == 0 and angle is not None:
         profiles, stops = [spiral(total, levels, overlap, angle)], []
         leads = leads_of(contour, along, (profiles[0][0][0], ends[1]), keep_out)
-    elif len(leads.away) == len(leads.to) == 0:
+    elif len(leads.way_out) == len(leads.way_in) == 0:
         profiles = [laps(total, levels, overlap)]
     parts = [_split_profile(raise_profile(profile, tabs, total), stops) for profile in profiles]
     return [_Pass(along, each, leads) for each in parts], leads
@@ -183,17 +183,17 @@ def _split_profile(points: ZProfile, stops: list[float]) -> list[ZProfile]:
 def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
     """Return the run (n, 4) along parts (n, 4) of a contour: the lead-in before the first of them,
     the lead-out behind the last, and out and back between two."""
-    if len(leads.to) == len(leads.away) == 0:
+    if len(leads.way_in) == len(leads.way_out) == 0:
         return parts[0]
-    rows = [np.insert(leads.to[:-1], 2, parts[0][0, 2], axis=1)]
+    rows = [np.insert(leads.way_in[:-1], 2, parts[0][0, 2], axis=1)]
     for part in parts[:-1]:
-        way_out = np.insert(leads.away[1:], 2, part[-1, 2], axis=1)
-        part[-1, 3] = leads.away[0, 2]
-        way_out[-1, 3] = 0.0 - leads.away[0, 2]
+        way_out = np.insert(leads.way_out[1:], 2, part[-1, 2], axis=1)
+        part[-1, 3] = leads.way_out[0, 2]
+        way_out[-1, 3] = 0.0 - leads.way_out[0, 2]
         rows += [part, way_out]
     last = parts[-1]
-    last[-1, 3] = leads.away[0, 2] if len(leads.away) else 0.0
-    return np.concatenate([*rows, last, np.insert(leads.away[1:], 2, last[-1, 2], axis=1)])
+    last[-1, 3] = leads.way_out[0, 2] if len(leads.way_out) else 0.0
+    return np.concatenate([*rows, last, np.insert(leads.way_out[1:], 2, last[-1, 2], axis=1)])
 
 
 def _open_passes(
@@ -205,12 +205,12 @@ def _open_passes(
     levels = contour.setting.levels_mm
     leads = leads_of(contour, along, (0.0, along.total_mm), keep_out)
     track = along
-    if len(leads.to) or len(leads.away):
+    if len(leads.way_in) or len(leads.way_out):
         vertices = along.path.vertices.copy()
-        vertices[-1, 2] = leads.away[0, 2] if len(leads.away) else 0.0
-        rows = [leads.to[:-1], vertices, leads.away[1:]]
+        vertices[-1, 2] = leads.way_out[0, 2] if len(leads.way_out) else 0.0
+        rows = [leads.way_in[:-1], vertices, leads.way_out[1:]]
         track = MeasuredPath.of(Polyline(np.concatenate(rows)))
-        before = float(track.reach[len(leads.to[:-1])])
+        before = float(track.reach[len(leads.way_in[:-1])])
         tabs = [tab.moved(before) for tab in tabs]
     above = (0.0, *levels)
     passes = [levels] if contour.reversible else [(z,) for z in levels]

@@ -73,7 +73,7 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
     for number, (step, later) in enumerate(zip_longest(steps, steps[1:])):
         rows = np.flatnonzero((runs >= first) & (runs < first + len(step.runs)))
         feed_rows = rows[toolpath.is_feed[rows]]
-        for batch, values in _off(toolpath, feed_rows, step, placed):
+        for batch, values in _path_offsets(toolpath, feed_rows, step, placed):
             off_mm = off_mm if off_mm.flags.writeable else off_mm.copy()
             off_mm[batch] = values
         edges = _edges(step, later, placed)
@@ -85,7 +85,7 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
         before = max((int(line.max(initial=-1)) + 1 for line in lines), default=0)
         before = before_of.setdefault(step.operation.rest or step.operation.name or number, before)
         lines.append(edges.line + before)
-        columns.append((edges.nominal, edges.planned, edges.followed, edges.cleared))
+        columns.append((edges.nominal, edges.planned_boxes, edges.followed, edges.cleared))
         first += len(step.runs)
     nominal, boxes, followed, cleared = map(np.concatenate, zip(*columns, strict=True))
     line = np.concatenate(lines)
@@ -94,7 +94,7 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
     )
 
 
-def _off(
+def _path_offsets(
     toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing
 ) -> Iterator[tuple[Ints, Floats]]:
     """Yield some of the rows (R,) at a time, and (R, 2) how far what was drawn lies from the lines
@@ -150,7 +150,7 @@ class _Edges(Struct, frozen=True, eq=False):
 
     of_run: Ints
     nominal: Floats
-    planned: Floats
+    planned_boxes: Floats
     line: Ints
     followed: Bools
     cleared: Bools
@@ -280,10 +280,10 @@ def kept_of(steps: Sequence[Step]) -> tuple[ProtectedRegion, ...]:
     drilling and chamfers leave nothing in particular. Where reliefs go into the corners of the
     part, they are meant to, and such an operation leaves nothing in particular.
     """
-    return tuple(each for step in steps for each in _kept(step))
+    return tuple(each for step in steps for each in _protected_regions(step))
 
 
-def _kept(step: Step) -> Iterator[ProtectedRegion]:
+def _protected_regions(step: Step) -> Iterator[ProtectedRegion]:
     operation, chosen = step.operation, step.chosen
     closed = np.flatnonzero(chosen.lines.closed)
     if operation.contract.takes == "circles":

@@ -144,7 +144,7 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         is_asked = operation.side != "auto" and (other in own_rows or _cross(drawn, wall))
         amount = reach - nearest_approach.distance
         if nearest_approach.distance <= POSITION_EPS_MM:
-            amount = reach + _beyond(item.path, wall, drawn)
+            amount = reach + _overshoot(item.path, wall, drawn)
         yield (GOUGE if is_kept else GOUGE_OF_UNCUT)(
             where=at_place(item.name, nearest_approach.point),
             measured=nearest_approach.distance,
@@ -207,10 +207,10 @@ def _witnesses(path: Polyline) -> Floats:
 def _parts(path: Polyline, wall: Polyline) -> tuple[Bools, Floats]:
     """(P,), (P,) of the witnesses of a path: whether each is within a closed one, and how far
     from its line, mm."""
-    return _within(_witnesses(path), wall)
+    return _side_and_distance(_witnesses(path), wall)
 
 
-def _within(points: Floats, wall: Polyline) -> tuple[Bools, Floats]:
+def _side_and_distance(points: Floats, wall: Polyline) -> tuple[Bools, Floats]:
     ring = Segments.of(wall)
     return inside(points, ring), nearest(points, ring).distance
 
@@ -231,11 +231,11 @@ def _cross(one: Polyline, other: Polyline) -> bool:
     return False
 
 
-def _beyond(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
+def _overshoot(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
     """Greatest distance of the tool's centre across a closed line, mm; the side on which most of
     the drawn contour lies is this side of it."""
     length = float(path_lengths(Polylines.of([path]))[0])
-    is_inside, distances = _within(sample(path, length / SAMPLES_ROUND), wall)
+    is_inside, distances = _side_and_distance(sample(path, length / SAMPLES_ROUND), wall)
     home, clear = _parts(drawn, wall)
     mostly_in = bool((np.where(home, 1.0, -1.0) * (clear > GOUGE_TOLERANCE_MM)).sum() > 0.0)
     return float(distances[is_inside != mostly_in].max(initial=0.0))

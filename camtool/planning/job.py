@@ -152,12 +152,12 @@ def above_zero(name: str, value: float | None, unit: str) -> None:
         return
     if not (math.isfinite(value) and value > 0.0):
         raise OptionError(
-            f"{_said(name, value, unit)} is not above 0",
+            f"{_quantity(name, value, unit)} is not above 0",
             mend=f"give a {name} above 0, or leave it out",
         )
     if value < MIN_POSITIVE:
         raise OptionError(
-            f"{_said(name, value, unit)} is less than {MIN_POSITIVE:g}",
+            f"{_quantity(name, value, unit)} is less than {MIN_POSITIVE:g}",
             mend=f"give a larger {name}",
         )
     _at_most(name, value, unit, None)
@@ -173,7 +173,7 @@ def at_least_zero(name: str, value: float, unit: str, max_value: float | None = 
     """Refuse a number below 0, or not plausible."""
     if not (math.isfinite(value) and value >= 0.0):
         raise OptionError(
-            f"{_said(name, value, unit)} is not 0 or more",
+            f"{_quantity(name, value, unit)} is not 0 or more",
             mend=f"give a {name} of 0 or more",
         )
     _at_most(name, value, unit, max_value)
@@ -182,7 +182,7 @@ def at_least_zero(name: str, value: float, unit: str, max_value: float | None = 
 def finite(name: str, value: float, unit: str, max_value: float | None = None) -> None:
     """Refuse what is no number, or not plausible."""
     if not math.isfinite(value):
-        raise OptionError(f"{_said(name, value, unit)} is no number", mend=f"give a {name}")
+        raise OptionError(f"{_quantity(name, value, unit)} is no number", mend=f"give a {name}")
     _at_most(name, abs(value), unit, max_value)
 
 
@@ -214,11 +214,11 @@ def _at_most(name: str, value: float, unit: str, max_value: float | None) -> Non
     limit = MAX_BY_UNIT[unit] if max_value is None else max_value
     if value > limit:
         raise OptionError(
-            f"{_said(name, value, unit)} is more than {limit:g}", mend=f"give a smaller {name}"
+            f"{_quantity(name, value, unit)} is more than {limit:g}", mend=f"give a smaller {name}"
         )
 
 
-def _said(name: str, value: float, unit: str) -> str:
+def _quantity(name: str, value: float, unit: str) -> str:
     return f"{name} {value:g} {unit}".rstrip()
 
 

@@ -149,7 +149,7 @@ class _Broken:
 
 
 @cache
-def _loaded() -> tuple[dict[str, OperationKind], dict[str, _Broken]]:
+def _load_kinds() -> tuple[dict[str, OperationKind], dict[str, _Broken]]:
     """The kinds that can be loaded, in order, and the others."""
     kinds: list[OperationKind] = []
     broken: dict[str, _Broken] = {}
@@ -185,17 +185,17 @@ def _load(point: EntryPoint) -> OperationKind:
 
 def installed_kinds() -> Mapping[str, OperationKind]:
     """The kinds of operation that are installed, by name, in the order of lists."""
-    return _loaded()[0]
+    return _load_kinds()[0]
 
 
 def broken_kinds() -> Collection[str]:
     """The names of kinds that are installed and cannot be loaded."""
-    return _loaded()[1].keys()
+    return _load_kinds()[1].keys()
 
 
 def kind_named(name: str) -> OperationKind:
     """The kind of this name; OptionError for an unknown one, and for one that cannot be loaded."""
-    kinds, broken = _loaded()
+    kinds, broken = _load_kinds()
     if name in broken:
         raise OptionError(
             f"the kind of operation {name!r} cannot be loaded ({broken[name].reason})",

@@ -115,8 +115,8 @@ class Leads(Struct, frozen=True, eq=False):
     """The lead-in and lead-out of a contour, (k, 3) x, y, bulge, k = 0 or 2, both with the place
     at the contour; and what did not fit."""
 
-    to: Floats
-    away: Floats
+    way_in: Floats
+    way_out: Floats
     findings: tuple[Finding, ...]
 
 

@@ -174,12 +174,12 @@ def _set_coolant(builder: ToolpathBuilder, coolant_now: str, wanted_coolant: str
 
 
 class _Lot(Struct, frozen=True, eq=False):
-    """A part of the runs, from run `first` on; `begun`: its first run began in the lot before;
+    """A part of the runs, from run `first` on; `is_begun`: its first run began in the lot before;
     `goes_on`: its last run continues in the next lot, from the vertex with which this one ends."""
 
     runs: Runs
     first: int
-    begun: bool
+    is_begun: bool
     goes_on: bool
 
 
@@ -228,7 +228,7 @@ def _add_cuts(
     vertices, first = runs.vertices, runs.first
     cut = cuts(vertices, runs.feed_mm_min, first)
     begins, ends = np.ones(count, dtype=np.bool_), np.ones(count, dtype=np.bool_)
-    begins[0], ends[-1] = not run_lot.begun, not run_lot.goes_on
+    begins[0], ends[-1] = not run_lot.is_begun, not run_lot.goes_on
     heads = np.flatnonzero(begins)
     come = [] if approach is None else [approach(runs[k]) for k in heads.tolist()]
     places = [place for place in come if place is not None]

@@ -88,7 +88,7 @@ def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
     reached = opened(region, tool_radius_mm)
     min_area = MIN_FOOT_SHARE * np.pi * tool_radius_mm**2
     parting = PARTING * math.sqrt(2.0 * tool_radius_mm * TOGETHER_MM)
-    nesting = Nesting(_without(region, reached, min_area, parting))
+    nesting = Nesting(_difference(region, reached, min_area, parting))
     pieces = [piece for _, piece in regions(nesting)]
     areas = [float(signed_areas(piece).sum()) for piece in pieces]
     large = [(area, piece) for area, piece in zip(areas, pieces, strict=True) if area >= min_area]
@@ -116,7 +116,7 @@ def _far_places(pieces: Sequence[Polylines], reached: Polylines) -> list[tuple[f
     return places
 
 
-def _without(
+def _difference(
     region: Polylines, reached: Polylines, least_mm2: float, parting_mm: float
 ) -> Polylines:
     """The closed paths around what is in the region and not in `reached`, a part of it.
@@ -125,14 +125,14 @@ def _without(
     """
     if len(reached) == 0:
         return region
-    inner = _apart(reached, region, least_mm2)
-    sections = [*_apart(region, reached, least_mm2), *map(reverse, inner)]
+    inner = _separate_sections(reached, region, least_mm2)
+    sections = [*_separate_sections(region, reached, least_mm2), *map(reverse, inner)]
     closed_paths = [path for path in sections if path.closed]
     opens = [path for path in sections if not path.closed]
     return Polylines.of([*closed_paths, *_closed(opens, parting_mm)])
 
 
-def _apart(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polyline]:
+def _separate_sections(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polyline]:
     """The sections of closed paths that do not run together with others: closed where whole.
 
     They begin and end at vertices, their own and those of the others that are on a path: where
@@ -164,17 +164,17 @@ class _Parts(Struct, frozen=True, eq=False):
     which of them are wanted."""
 
     length: Floats
-    away: Floats
-    wanted: Bools
+    distances: Floats
+    is_wanted: Bools
 
     def sections(self, path: Polyline, least_mm2: float) -> list[Polyline]:
         """The runs of wanted parts, but those that surely go round less than `least_mm2`."""
-        if self.wanted.all():
+        if self.is_wanted.all():
             return [path]
-        turn = int(np.argmin(self.wanted))
-        length, distances = np.roll(self.length, -turn), np.roll(self.away, -turn)
+        turn = int(np.argmin(self.is_wanted))
+        length, distances = np.roll(self.length, -turn), np.roll(self.distances, -turn)
         begin = np.concatenate([[0.0], np.cumsum(length)]) + self.length[:turn].sum()
-        first, last = true_ranges(np.roll(self.wanted, -turn))
+        first, last = true_ranges(np.roll(self.is_wanted, -turn))
         # The path begins with a part that is not wanted, so that every other one is wanted.
         edges = np.column_stack([first, last]).ravel()
         farthest = np.maximum.reduceat(np.append(distances, 0.0), edges)[::2]

@@ -141,7 +141,7 @@ class Sides(Struct, eq=False, dict=True):
     @cached_property
     def _idle(self) -> Bools:
         idle = np.asarray(self.lines.closed & self.edges & ~self.worked)
-        return np.asarray(idle & ~_again(self.lines, self.worked, idle))
+        return np.asarray(idle & ~_is_repeated(self.lines, self.worked, idle))
 
     def taken_by(self, operation: Operation) -> Bools:
         """(M,) the contours that one of the operations takes."""
@@ -239,12 +239,12 @@ class Traits:
         for word in operation.select:
             rows &= self._are(word, rows)
         if operation.size_mm is not None:
-            rows &= _within(
+            rows &= _is_within(
                 np.ptp(path_extents(self._lines), axis=2).max(axis=1), operation.size_mm
             )
         if operation.area_mm2 is not None:
             areas = np.where(self._lines.closed, np.abs(signed_areas(self._lines)), np.nan)
-            rows &= _within(areas, operation.area_mm2)
+            rows &= _is_within(areas, operation.area_mm2)
         if operation.entities:
             for row in np.flatnonzero(rows).tolist():
                 rows[row] = is_named(operation, self._sources[row])
@@ -281,7 +281,7 @@ def circles(lines: Polylines, rows: Bools) -> Bools:
     return is_circle
 
 
-def _within(sizes: Floats, limits: tuple[float, float]) -> Bools:
+def _is_within(sizes: Floats, limits: tuple[float, float]) -> Bools:
     """(M,) which sizes are in a range, its ends included; NaN is in none."""
     low, high = limits
     return np.asarray((sizes >= low * (1.0 - SIZE_SHARE)) & (sizes <= high * (1.0 + SIZE_SHARE)))
@@ -324,7 +324,7 @@ def runs_beside(operation: Operation) -> bool:
     return operation.away_mm > 0.0
 
 
-def _again(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
+def _is_repeated(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
     """(M,) those of the uncut closed contours (`idle`) that run along one that is cut,
     or along one before them."""
     is_repeat = np.zeros(len(lines), dtype=np.bool_)
@@ -383,7 +383,7 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
     marks = [mark for mark in drawing.marks if takes_mark(operation, mark)]
     is_owed = operation.contract.takes_drawn
     if is_owed and not (index or marks) and (len(drawing.paths) or drawing.marks):
-        raise _nothing(drawing, operation)
+        raise _nothing_selected(drawing, operation)
     return Chosen(
         nesting=sides.nesting.among(np.array(index, dtype=np.int64)),
         source=np.array(index, dtype=np.int64),
@@ -402,7 +402,7 @@ def _rim(operation: Operation, sides: Sides, index: list[int]) -> Bools:
     return np.full(len(index), operation.side == "outside")
 
 
-def _nothing(drawing: Drawing, operation: Operation) -> OptionError:
+def _nothing_selected(drawing: Drawing, operation: Operation) -> OptionError:
     marks = drawing.marks
     layers = sorted({*drawing.layers, *(mark.layer for mark in marks)})
     colours = sorted({*drawing.colours, *(mark.colour for mark in marks)} - {""})

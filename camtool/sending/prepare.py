@@ -207,7 +207,7 @@ def consignment(
         return Consignment(run, wire, _no_forecast(run), ())
     decoded, rest_program = run.decoded, None
     assert decoded is not None
-    resume_point = None if state is None else _standing(state, decoded, tool_at)
+    resume_point = None if state is None else _resume_point(state, decoded, tool_at)
     begin_mm = None
     if (
         resume_point is not None
@@ -233,7 +233,7 @@ def consignment(
     return Consignment(run, wire, forecast, packets, rest_program, resume_point)
 
 
-def _standing(state: JournalState, decoded: Toolpath, tool_at: ToolAt) -> ResumePoint:
+def _resume_point(state: JournalState, decoded: Toolpath, tool_at: ToolAt) -> ResumePoint:
     """Return the point at which the program was left; if it was not stopped, some of the sent
     blocks are done."""
     under_way = (decoded.block >= state.block - 1) & (decoded.block <= state.last)

@@ -182,7 +182,7 @@ class _Points(Struct, frozen=True, eq=False):
     """Points (P, 2) beside the axes of moves, the move of each (P,), and the height of the tool's
     surface there (P,), mm."""
 
-    at: Floats
+    points: Floats
     move: Ints
     z: Floats
 
@@ -251,7 +251,7 @@ class _Checks:
         """Yield CUT_TOO_DEEP for places at which the stock is below the lowest that is allowed."""
 
         gouge_of, upper = self.stock.gouge
-        points = self.cuts.at[self._in_stock(self.cuts.at)]
+        points = self.cuts.points[self._in_stock(self.cuts.points)]
         for place, other_count in self._worst(points, gouge_of(points), gouge_of, upper):
             z, move_index = self.tree.heights(place[None])
             row = int(self.moves.row[move_index[0]])
@@ -325,8 +325,8 @@ class _Checks:
     def passes(self) -> Iterator[Finding]:
         """Yield PASS_TOO_DEEP for feeds that take more at once than their operation allows."""
         limit = self._chips_mm()
-        feeds = ~self.moves.rapid[self.cuts.move] & self._in_stock(self.cuts.at)
-        points, move = np.ascontiguousarray(self.cuts.at[feeds]), self.cuts.move[feeds]
+        feeds = ~self.moves.rapid[self.cuts.move] & self._in_stock(self.cuts.points)
+        points, move = np.ascontiguousarray(self.cuts.points[feeds]), self.cuts.move[feeds]
         before = self.stock.tops(points, move)
         # No move cuts below its lower end.
         lowest = np.minimum(self.moves.start[move, 2], self.moves.end[move, 2])

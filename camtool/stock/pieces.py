@@ -98,7 +98,8 @@ def loose_pieces(
     """Return the pieces that come loose of a stock with this thickness and these sides (None:
     without limits), which set-ups have cut before."""
     levels = [
-        _Level(floor, *_through(moves, floor)) for floor in _floors(moves, thickness_mm, before)
+        _Level(floor, *_through_cuts(moves, floor))
+        for floor in _floors(moves, thickness_mm, before)
     ]
     # Of whole stock only what is cut through can come loose.
     has_others = bool(before.above or before.below)
@@ -150,7 +151,7 @@ def _floors(moves: StockMoves, thickness_mm: float, before: StockBefore) -> list
     return [-thickness_mm, *floors[:: max(1, math.ceil(len(floors) / MAX_LEVELS))].tolist()]
 
 
-def _through(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
+def _through_cuts(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
     """Return the parts of moves that cut through the stock, as level moves of flat tools that are
     as wide there as the tool is at the bottom, and the number of each among all moves."""
     start, end = moves.start, moves.end

@@ -287,7 +287,7 @@ _EXTRA = EXTRA_CUT_ELSEWHERE, EXTRA_CUT_OTHER_DEPTH, EXTRA_CUT_NOTHING_ASKED
 
 def _missing_findings(pairs: NearPairs, undrilled: Bools, limits: Limits) -> Iterator[Finding]:
     """Yield CONTOUR_MISSING for written contours, at the block that cuts nearest."""
-    decoded = pairs.others.cuts
+    decoded = pairs.other_moves.cuts
 
     def block(part: UncoveredContour) -> str:
         has_nearest = part.nearest >= 0
@@ -314,7 +314,7 @@ def _uncovered_findings(
 ) -> Iterator[Finding]:
     """Yield a finding for each contour of which a sample is near nothing on the other side."""
     samples = pairs.samples.of(np.flatnonzero(np.isinf(pairs.distance)))
-    nearest_moves = nearest_at_height(samples, None, pairs.others, limits)
+    nearest_moves = nearest_at_height(samples, None, pairs.other_moves, limits)
     parts = list(uncovered_contours(pairs.cuts, samples, nearest_moves, drilled, limits))
     return uncovered_findings(parts, pairs.cuts, limits[0], sentences, place)
 
@@ -326,7 +326,7 @@ def _plunge_findings(
     are compared by `hole_findings`."""
     toolpath = side.toolpath
     rows = np.flatnonzero(side.plunges & ~matching.in_written)
-    rows = rows[~_is_at_place(toolpath.end[rows, :2], side.holes.at)]
+    rows = rows[~_is_at_place(toolpath.end[rows, :2], side.holes.places)]
     fine = np.zeros(len(rows), dtype=np.bool_)
     for other in other_sides:
         ends = toolpath.end[rows]

@@ -436,11 +436,11 @@ def _contour_name(cuts: CutMoves, part: UncoveredContour) -> str:
 
 
 class Holes(Struct, frozen=True, eq=False):
-    """H holes of `toolpath`: their positions `at` (H, 2) mm, the heights of their bottoms (H,) mm,
-    and the rows (H,) that first reach them."""
+    """H holes of `toolpath`: their positions `places` (H, 2) mm, the heights of their bottoms (H,)
+    mm, and the rows (H,) that first reach them."""
 
     toolpath: Toolpath
-    at: Floats
+    places: Floats
     bottom_mm: Floats
     row: Ints
 
@@ -484,7 +484,7 @@ def contours_drilled(cuts: CutMoves, holes: Holes, limits_mm: Limits) -> tuple[B
     bottom = np.minimum.reduceat(cuts.z[:, 0], begin)
     room = limits_mm[0] - 0.5 * np.hypot(*(high - low).T)
     tiny = np.flatnonzero(room >= 0.0)
-    one, hole = near_points(0.5 * (low + high)[tiny], holes.at, room[tiny])
+    one, hole = near_points(0.5 * (low + high)[tiny], holes.places, room[tiny])
     same_depth = np.abs(bottom[tiny[one]] - holes.bottom_mm[hole]) <= limits_mm[1]
     drilled[contour[begin[tiny[one[same_depth]]]]] = True
     is_contour[hole[same_depth]] = True
@@ -532,7 +532,7 @@ def _unpaired_findings(
     for hole, other_count in first_items(unpaired):
         row = int(holes.row[hole])
         yield (other_depth if has_position[hole] else no_hole)(
-            where=f"{block_name(holes.toolpath, row)} at {at_point(holes.at[hole])}",
+            where=f"{block_name(holes.toolpath, row)} at {at_point(holes.places[hole])}",
             measured=STOCK_TOP_MM - holes.bottom_mm[hole],
             more=other_count,
         )
@@ -545,7 +545,7 @@ def _has_hole(holes: Holes, other_holes: Holes, limits_mm: Limits) -> tuple[Bool
         np.zeros(len(holes), dtype=np.bool_),
         np.zeros(len(holes), dtype=np.bool_),
     )
-    hole_rows, other_rows = near_points(holes.at, other_holes.at, limits_mm[0])
+    hole_rows, other_rows = near_points(holes.places, other_holes.places, limits_mm[0])
     has_position[hole_rows] = True
     is_same_depth = (
         np.abs(holes.bottom_mm[hole_rows] - other_holes.bottom_mm[other_rows]) <= limits_mm[1]
@@ -654,7 +654,7 @@ class NearPairs(Struct, eq=False):
     sample to the nearest move, inf where none is near."""
 
     cuts: CutMoves
-    others: MoveIndex
+    other_moves: MoveIndex
     samples: CutSamples
     point: Ints
     move: Ints
@@ -674,7 +674,7 @@ class NearPairs(Struct, eq=False):
     def rows_along(self) -> Ints:
         """Return (P, 2) rows of both sides that lie on each other and have the same direction."""
         along = self.cosine > MIN_SAME_COSINE
-        other_rows = self.others.cuts.row[self.move[along]]
+        other_rows = self.other_moves.cuts.row[self.move[along]]
         return np.unique(np.column_stack([self.rows[self.point[along]], other_rows]), axis=0)
 
 
@@ -720,7 +720,7 @@ def reversed_samples(compared: NearPairs, round_trip: Bools, limits: Limits) -> 
     is_along = np.zeros(count, dtype=np.bool_)
     is_along[compared.point[compared.cosine > MIN_SAME_COSINE]] = True
     long = MIN_DIRECTION_LIMITS * limits[0]
-    is_other_long = segment_lengths(compared.others.cuts.segments)[compared.move] > long
+    is_other_long = segment_lengths(compared.other_moves.cuts.segments)[compared.move] > long
     is_against = np.zeros(count, dtype=np.bool_)
     is_against[
         compared.point[(compared.cosine < -MIN_SAME_COSINE) & round_trip & is_other_long]

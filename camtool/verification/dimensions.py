@@ -156,7 +156,7 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Pre
         followed = edges.followed[index : index + 1]
         yield from _axis_sizes(
             f"contour {index + 1}",
-            _joint_size(edges.own[index : index + 1], followed),
+            _joint_size(edges.own_boxes[index : index + 1], followed),
             _joint_size(edges.predicted[index : index + 1], followed),
         )
 
@@ -164,9 +164,9 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Pre
 class _Edges(Struct, frozen=True, eq=False):
     """The edges of C contours: which of them `counts` in sizes (C,), boxes (C, 2, 2) mm of the
     `nominal` edge and of the `predicted` one, the distance `rough` (C,) mm that the line to which
-    it belongs is planned to keep from its nominal edge, and what `DrawnEdges` says of each. `own`:
-    the nominal box of what the contour cuts of its line; `listed` (C,): it is no ring within
-    that."""
+    it belongs is planned to keep from its nominal edge, and what `DrawnEdges` says of each.
+    `own_boxes`: the nominal box of what the contour cuts of its line; `listed` (C,): it is no ring
+    within that."""
 
     counts: Bools
     nominal: Floats
@@ -174,7 +174,7 @@ class _Edges(Struct, frozen=True, eq=False):
     rough: Floats
     followed: Bools
     cleared: Bools
-    own: Floats
+    own_boxes: Floats
     listed: Bools
 
 

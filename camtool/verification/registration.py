@@ -254,7 +254,7 @@ class _Path(Struct, frozen=True, eq=False):
             tool[row],
             _boxes_of(cuts, limit_mm),
             np.unique(cuts.segments[arcs].centre.round(3), axis=0),
-            program.holes.at,
+            program.holes.places,
         )
 
     def transform(self, matrix: Floats) -> _Path:
@@ -786,7 +786,11 @@ class _Follower(Struct, frozen=True, eq=False):
         rows = np.zeros(len(wanted), dtype=np.bool_)
         if followed is not None:
             follow = _RowTracks.of(self.cuts, followed, self.path)
-            wanted, offsets, rows = _with_tracks(self, followed, follow), follow.off, follow.rows
+            wanted, offsets, rows = (
+                _with_tracks(self, followed, follow),
+                follow.offsets,
+                follow.rows,
+            )
         if followed is not None or drilled.any():
             findings += self._not_cut_findings(followed, drilled)
         if followed is not None:
@@ -1089,14 +1093,14 @@ def _side_counts(followed: _FollowedTracks | None, drilled: Bools, count: int) -
 
 class _RowTracks(Struct, frozen=True, eq=False):
     """The rows (N,) that follow a track: the track of each (N,), and the lengths (N,), (N,) mm
-    along it at their starts and ends, the end counted on from the start; `off` (J,) mm: the
+    along it at their starts and ends, the end counted on from the start; `offsets` (J,) mm: the
     distances of their samples from the tracks."""
 
     rows: Bools
     track: Ints
     begin: Floats
     end: Floats
-    off: Floats
+    offsets: Floats
 
     @classmethod
     def of(cls, cuts: CutMoves, followed: _FollowedTracks, path: _Path) -> _RowTracks:

@@ -113,7 +113,7 @@ class SlidePass:
         self._task = self._tasks.of(0, min(ROWS_AT_ONCE, len(self._is_cut)))
         slots = int(self._slot.max(initial=-1)) + 1
         self._sums = _sums(len(self._is_cut), slots, trace)
-        self._start, self._most = trace.start, trace.most
+        self._start, self._most = trace.start, trace.max_points
 
     def add(self, chunk: Chunk) -> None:
         """Judge the next samples of the program."""
@@ -272,7 +272,7 @@ class Tasks:
 
 
 def _sums(rows: int, slots: int, trace: TraceSize) -> Sums:
-    room = 2 * trace.most + rows if trace.stride else 0
+    room = 2 * trace.max_points + rows if trace.stride else 0
     return Sums(
         rows=empty_columns(min(rows, ROWS_AT_ONCE)),
         histograms=np.zeros((2, 4 * BINS), dtype=np.int64),
@@ -384,7 +384,7 @@ class TraceSize(Struct, frozen=True, eq=False):
 
     start: Floats
     stride: int
-    most: int
+    max_points: int
 
 
 def trace_size(decoded: Toolpath, spacing_mm: float, max_points: int) -> TraceSize:

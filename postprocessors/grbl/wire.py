@@ -343,7 +343,7 @@ class GrblConversation(Conversation):
         """By its machine position, so that frames that the program sets do not matter."""
         if self._frame is None or self._machine_mm is None:
             return None
-        return _without(self._machine_mm, self._frame)
+        return _difference(self._machine_mm, self._frame)
 
     @property
     def is_still(self) -> bool:
@@ -689,10 +689,10 @@ class GrblConversation(Conversation):
                 self._offset = (x, y, z)
             elif name == "WPos":
                 self.place_mm = (x, y, z)
-                self._machine_mm = _without(self.place_mm, _without((0.0, 0.0, 0.0), offset))
+                self._machine_mm = _difference(self.place_mm, _difference((0.0, 0.0, 0.0), offset))
             else:
                 self._machine_mm = (x, y, z)
-                self.place_mm = _without(self._machine_mm, offset)
+                self.place_mm = _difference(self._machine_mm, offset)
 
     def _check_first_report(self, state: str, now: float) -> None:
         """Handle its first report: begin only with a controller at rest, and reset it, so that
@@ -738,13 +738,13 @@ class GrblConversation(Conversation):
         """Begin, unless the program is to go on where the controller does not take it to stand."""
         if self._standing is not None:
             place_said, stated_place = self._machine_mm, self._standing.said_mm
-            place = _without(place_said, self._offset) if place_said and self._offset else None
+            place = _difference(place_said, self._offset) if place_said and self._offset else None
             reason = self._standing.refusal(place, restarted=self._restarted)
             if place_said is None or reason:
                 self._end(WireState.FAILED, reason or "it does not say where it stands")
                 return
             if stated_place is not None:  # until the next reset: what it remembers stays as it is
-                self._frame = _without(place_said, stated_place)
+                self._frame = _difference(place_said, stated_place)
                 words = "".join(
                     f"{axis}{value:.4f}" for axis, value in zip("XYZ", stated_place, strict=True)
                 )
@@ -1297,7 +1297,7 @@ class GrblTerminal(Terminal):
         return ""
 
 
-def _without(one: Place, other: Place) -> Place:
+def _difference(one: Place, other: Place) -> Place:
     (a, b, c), (x, y, z) = one, other
     return a - x, b - y, c - z
 

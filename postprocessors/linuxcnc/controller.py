@@ -262,7 +262,7 @@ class LinuxcncSamples(CountedSamples):
         )
         self._shape = corners.shape
         self._before = np.append(corners.before, 0.0)
-        self._behind = np.append(corners.behind, 0.0)
+        self._behind = np.append(corners.after, 0.0)
         self._ramp = np.append(corners.ramp, 1.0)
         self._turn = _turn_of(self._before, self._behind, self._ramp)
         self._blends = bool(corners.reach.any() or corners.before.any())
@@ -367,11 +367,11 @@ def _speeds(
     moves, corners = window_plan.moves, window_plan.corners
     own_length = moves.length - corners.reach_on
     own_length -= np.append(corners.reach[1:], 0.0)
-    path_lengths = _in_turns(corners.way, np.maximum(own_length, 0.0, out=own_length))
+    path_lengths = _in_turns(corners.length, np.maximum(own_length, 0.0, out=own_length))
     lasting = np.zeros(len(path_lengths), dtype=np.bool_)
     lasting[places] = path_lengths[places] > MIN_LENGTH_MM
     along, fastest = _along_moves(moves, modes, corners)
-    entry_speed = np.where(corners.way > 0.0, np.inf, corners.speed)
+    entry_speed = np.where(corners.length > 0.0, np.inf, corners.speed)
     entered = np.minimum(entry_speed, np.where(moves.last, np.sqrt(along * own_length), np.inf))
     return lasting, SpeedPlan(
         path_lengths[lasting],
@@ -410,7 +410,7 @@ def _along_moves(
     """(M,) mm/s² along the moves, less what bends at their ends and a last stop take; and (M,)
     mm/s, how fast arcs may be with that. An arc before a wait was never finished for its next
     move, and keeps half for turning."""
-    lost_share = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
+    lost_share = np.maximum(corners.lost_share, np.append(corners.lost_share[1:], 0.0))
     last = moves.last
     overlapped = corners.overlap > 0.0
     overlapped |= np.append(overlapped[1:], False)
@@ -604,7 +604,7 @@ class PlannerMoves(Struct, frozen=True, eq=False):
     highest: Floats
     bend: Floats
     waits: Bools
-    like: Bools
+    same_kind: Bools
 
     @property
     def last(self) -> Bools:
@@ -808,23 +808,24 @@ MIN_BEND_RAD = 1e-3
 
 
 class PlannerCorners(Struct, frozen=True, eq=False):
-    """Corners at the starts of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,): the part of
-    the acceleration that a bend takes from the moves on both sides; `reach` and `reach_on` (M,)
-    mm: how far from the corner a blend begins on the move before, and ends on the move behind, 0
-    without one; `acceleration` (M,) mm/s² along blends; `way` (M,) mm along them; `shape` (3, M,
-    3): their centres, and from there to where they begin and end. Where moves overlap: `before`
-    and `behind` (M,) mm, how far from the corner they do, `overlap` (M,) s, for how long, and
-    `ramp` (M,), in which part of that time the second of them speeds up; 0 elsewhere."""
+    """Corners at the starts of M moves: `speed` (M,) mm/s, 0 for a stop; `lost_share` (M,): the
+    part of the acceleration that a bend takes from the moves on both sides; `reach` and `reach_on`
+    (M,) mm: how far from the corner a blend begins on the move before, and ends on the move
+    behind, 0 without one; `acceleration` (M,) mm/s² along blends; `length` (M,) mm along them;
+    `shape` (3, M, 3): their centres, and from there to where they begin and end. Where moves
+    overlap: `before` and `after` (M,) mm, how far from the corner they do, `overlap` (M,) s, for
+    how long, and `ramp` (M,), in which part of that time the second of them speeds up; 0
+    elsewhere."""
 
     speed: Floats
-    lost: Floats
+    lost_share: Floats
     reach: Floats
     reach_on: Floats
     acceleration: Floats
-    way: Floats
+    length: Floats
     shape: Floats
     before: Floats
-    behind: Floats
+    after: Floats
     overlap: Floats
     ramp: Floats
 
@@ -902,7 +903,7 @@ def _meet(
     turn = bends.after - bends.before
     is_reversal = np.linalg.norm(bends.after + bends.before, axis=1) < STRAIGHT_BACK_RAD
     # The move before a corner says how it is met; both say how far a blend may leave it.
-    is_free = ~moves.waits[rows] & moves.like[rows] & ~is_reversal & ~rules.modes.stop(before)
+    is_free = ~moves.waits[rows] & moves.same_kind[rows] & ~is_reversal & ~rules.modes.stop(before)
     # A kink: the change of velocity within one period, as a part of what each axis can do.
     highest = np.minimum(moves.speed[rows - 1], moves.speed[rows])
     jolt = highest / rules.period_s + moves.acceleration[rows]
@@ -911,7 +912,7 @@ def _meet(
     part = np.where(curved, part / TANGENT_RATIO, part)
     smooth = is_free & (part < rules.kink_ratio)
     corners.speed[rows] = np.where(smooth, np.inf, 0.0)
-    corners.lost[rows] = np.where(smooth, part, 0.0)
+    corners.lost_share[rows] = np.where(smooth, part, 0.0)
     blends = is_free & ~smooth & rules.modes.blend(before)
     normal = np.cross(bends.before, bends.after)
     flat = np.hypot(normal[:, 0], normal[:, 1]) <= COPLANAR * np.linalg.norm(normal, axis=1)
@@ -941,12 +942,12 @@ def _choose(
     overlap = _worth(moves, tangents, rows, used_mm, rules)
     overlaps = (overlap >= kink) & (overlap >= arc)
     bends = ~overlaps & (kink >= arc)
-    for column in (corners.reach, corners.reach_on, corners.way):
+    for column in (corners.reach, corners.reach_on, corners.length):
         column[rows[overlaps | bends]] = 0.0
     corners.speed[rows[overlaps]] = 0.0
     _overlap(corners, moves, tangents, rows[overlaps], rules)
     corners.speed[rows[bends]] = kink[bends]
-    corners.lost[rows[bends]] = rules.kink_ratio
+    corners.lost_share[rows[bends]] = rules.kink_ratio
 
 
 class _Overlaps(Struct, frozen=True, eq=False):
@@ -1026,18 +1027,19 @@ def _overlap(
     reached = np.minimum(moves.speed[rows], seconds * other)
     corners.overlap[rows], corners.ramp[rows] = seconds, reached / other / seconds
     corners.before[rows] = 0.5 * overlaps.first * seconds
-    corners.behind[rows] = reached * (seconds - 0.5 * reached / other)
+    corners.after[rows] = reached * (seconds - 0.5 * reached / other)
 
 
 class _Rounds(Struct, frozen=True, eq=False):
     """Blends as they are wanted, each (K,): `theta` of the corners as the planner takes it; the
-    `tolerance` mm; radius mm; speed mm/s; and the acceleration `whole` mm/s² in their plane."""
+    `tolerance` mm; radius mm; speed mm/s; and the acceleration `acceleration` mm/s² in their
+    plane."""
 
     theta: Floats
     tolerance: Floats
     radius: Floats
     speed: Floats
-    whole: Floats
+    acceleration: Floats
 
 
 def _rounds(
@@ -1094,8 +1096,8 @@ def _fill(
     lasting = length / (MIN_PERIODS * rules.period_s)
     corners.speed[rows] = np.minimum(rounds.speed[is_valid], lasting)
     corners.reach[rows], corners.reach_on[rows] = reach[0][is_valid], reach[1][is_valid]
-    corners.acceleration[rows] = TANGENT_RATIO * rounds.whole[is_valid]
-    corners.way[rows] = length
+    corners.acceleration[rows] = TANGENT_RATIO * rounds.acceleration[is_valid]
+    corners.length[rows] = length
     corners.shape[:, rows] = shape
 
 
@@ -1148,15 +1150,15 @@ MIN_THETA_RAD = np.pi / 12.0
 class _Side(Struct, frozen=True, eq=False):
     """Either of the two moves at K corners, in the plane as complex numbers: its tangent there, of
     arcs the circle that touches it (`centre`, `radius`), the `sign` by which a blend's radius
-    counts where it touches it from inside (−1) or outside (1), and the angle `most` that a blend
-    may use; so much of the move counts, `longest` mm, and by so much θ is `less`."""
+    counts where it touches it from inside (−1) or outside (1), and the angle `max_angle` that a
+    blend may use; so much of the move counts, `longest` mm, and by so much θ is `less`."""
 
     is_arc: Bools
     tangent: Floats
     centre: Floats
     radius: Floats
     sign: Floats
-    most: Floats
+    max_angle: Floats
     longest: Floats
     less: Floats
 
@@ -1195,13 +1197,13 @@ def _side(
         centre=np.zeros(count, dtype=np.complex128),
         radius=np.zeros(count),
         sign=np.zeros(count),
-        most=np.zeros(count),
+        max_angle=np.zeros(count),
         longest=LINE_PART * moves.length[rows],
         less=np.zeros(count),
     )
     if ends:
         side.longest[:] = np.minimum(side.longest, moves.length[rows] - used_mm[rows])
-    side.centre[arcs], side.radius[arcs], side.most[arcs] = centre, radius, max_angle
+    side.centre[arcs], side.radius[arcs], side.max_angle[arcs] = centre, radius, max_angle
     side.sign[arcs] = np.where(convex, -1.0, 1.0)
     side.longest[arcs] = np.where(convex, np.sin(0.25 * max_angle), max_angle) * radius
     side.less[arcs] = np.where(convex, 0.25 * max_angle, 0.0)
@@ -1251,7 +1253,7 @@ def _round_arcs(
         (first, rows - 1, turns[0], True),
         (last, rows, turns[1], False),
     ):
-        is_valid &= ~side.is_arc | (turn <= side.most)
+        is_valid &= ~side.is_arc | (turn <= side.max_angle)
         distance, point = turn.copy(), corner + (-turn if ends else turn) * side.tangent
         arcs = np.flatnonzero(side.is_arc)
         arm = tangents.arm_of(moves.row[side_rows[arcs]])

@@ -329,7 +329,7 @@ def group_words(items: list[Item], comment: str | None) -> LinuxcncBlock:
             if letter in NEVER_NEGATIVE and value < 0.0:
                 raise LineFault(f"{NEVER_NEGATIVE[letter]} below 0", item.at)
             if letter in WHOLE_WORDS:
-                value = float(_whole(value, item.at))
+                value = float(_whole_number(value, item.at))
                 if letter == "h" and value < -1:
                     raise LineFault("a tool below 0", item.at)
             words[letter] = value
@@ -355,7 +355,7 @@ def g_code(value: float, column: int) -> int:
 def m_code(value: float, column: int) -> int:
     """The code of an M word."""
     try:
-        code = _whole(value, column)
+        code = _whole_number(value, column)
     except LineFault:
         code = -1
     if code not in M_GROUPS:
@@ -363,7 +363,7 @@ def m_code(value: float, column: int) -> int:
     return code
 
 
-def _whole(value: float, column: int) -> int:
+def _whole_number(value: float, column: int) -> int:
     if value == value // 1:
         return int(value)
     from .expressions import whole_number

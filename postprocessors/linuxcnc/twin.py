@@ -130,8 +130,8 @@ class LinuxcncTwin(Twin):
 
     def _get(self, name: str) -> str | None:
         answers: dict[str, Callable[[], str]] = {
-            "estop": lambda: _on(self._estop),
-            "machine": lambda: _on(self._on),
+            "estop": lambda: _on_off(self._estop),
+            "machine": lambda: _on_off(self._on),
             "mode": lambda: self._mode,
             "program_status": lambda: self._status,
             "program": lambda: self._file or "NONE",
@@ -150,9 +150,9 @@ class LinuxcncTwin(Twin):
             "operator_display": lambda: "OK",
             "linear_unit_conversion": lambda: "MM",
             "feed_override": lambda: "100",
-            "echo": lambda: _on(self._echo),
-            "verbose": lambda: _on(self._verbose),
-            "enable": lambda: _on(self._enabled),
+            "echo": lambda: _on_off(self._echo),
+            "verbose": lambda: _on_off(self._verbose),
+            "enable": lambda: _on_off(self._enabled),
         }
         return answers[name]() if name in answers else None
 
@@ -379,7 +379,7 @@ def _has_words(line: bytes) -> bool:
     return bool(re.sub(rb"^[Nn]\d+(?:\.\d*)?", b"", content))
 
 
-def _on(value: bool) -> str:
+def _on_off(value: bool) -> str:
     return "ON" if value else "OFF"
 
 

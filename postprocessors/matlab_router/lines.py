@@ -312,7 +312,7 @@ class LineLimits(Struct, frozen=True):
 
     tolerance: float
     grid: int
-    least: int
+    min_units: int
 
 
 def bends(larger: Floats, smaller: Ints, counts: Ints, tolerance: float) -> Bools:
@@ -359,7 +359,7 @@ def _pieces(longer: int, shorter: int, counts: int, limits: LineLimits) -> list[
     if bend <= limits.tolerance:
         return [(longer, shorter)]
     grid = limits.grid
-    if shorter >= 2 * limits.least:
+    if shorter >= 2 * limits.min_units:
         along, across = longer // 2 // grid * grid, shorter // 2 // grid * grid
         return [
             *_pieces(along, across, counts, limits),
@@ -369,7 +369,7 @@ def _pieces(longer: int, shorter: int, counts: int, limits: LineLimits) -> list[
         return [(longer, shorter)]
     straight = longer - shorter * counts
     before = straight // 2 // grid * grid
-    before = before if before >= limits.least else 0
+    before = before if before >= limits.min_units else 0
     parts = [(before, 0), (shorter * counts, shorter), (straight - before, 0)]
     return [part for part in parts if part != (0, 0)]
 

@@ -156,10 +156,10 @@ class _Moves:
 
 
 class Executed(Struct, frozen=True, eq=False):
-    """`points` (n+1, 2) units where the machine comes to stand, and where it was `asked` to."""
+    """`points` (n+1, 2) units where the machine comes to stand, and where it was `listed` to."""
 
     points: Ints
-    asked: Ints
+    listed: Ints
 
 
 def execute(job: ReadJob, dialect: ResolvedDialect) -> Executed:
@@ -295,7 +295,7 @@ class JobFindings(Struct):
         place = f"job {job.number}"
         odd = int((job.length % 2).sum() + (job.first % 2).sum())
         if self.dialect.odd == "truncated" and odd:
-            drift = result.points - result.asked
+            drift = result.points - result.listed
             if self.dialect.master_y == "fixed":
                 drift[:, 1] -= drift[0, 1]
             self.odd.add(odd, float(np.abs(drift).max()) * UNIT_MM, place)

@@ -122,7 +122,7 @@ class _Writer:
         own."""
         points = self._points()
         events = self._events(points)
-        is_sent = points.sent
+        is_sent = points.is_sent
         refuse_too_long(int(np.count_nonzero(is_sent)) + len(events) + 3, "block")  # G54 G90 M30
         texts = texts_of(self._words(points), end=";\n")
         rows = self._row[points.row[is_sent]]
@@ -152,8 +152,8 @@ class _Writer:
 
     def _words(self, points: Points) -> list[WordColumn]:
         """The words of all points, none where nothing is sent."""
-        row, is_sent = points.row, points.sent
-        flat = is_sent & ~points.deep
+        row, is_sent = points.row, points.is_sent
+        flat = is_sent & ~points.is_deep
         arc = flat & points.is_arc
         annex = self._dialect.form == "annex"
         decimals = 0 if annex else 2
@@ -169,7 +169,7 @@ class _Writer:
             WordColumn("G", code, is_sent, digits=2),
             coordinate("X", points.units[:, 0], flat),
             coordinate("Y", points.units[:, 1], flat),
-            coordinate("Z", self._numbers.end_units[row, 2], is_sent & points.deep),
+            coordinate("Z", self._numbers.end_units[row, 2], is_sent & points.is_deep),
             coordinate("I", centre[:, 0], arc),
             coordinate("J", centre[:, 1], arc),
             WordColumn("F", feed, is_sent & (feed > 0), digits=2),
@@ -260,8 +260,8 @@ class _Writer:
             row=row,
             units=units,
             before=np.concatenate([known_units[:1], units])[first[arcs.row]],
-            sent=is_sent & ~outside,
-            deep=is_deep,
+            is_sent=is_sent & ~outside,
+            is_deep=is_deep,
             is_arc=is_arc,
             misfit=int(misfit[0]) if len(misfit) else len(path),
         )
@@ -294,7 +294,7 @@ class _Writer:
 
     def _check_ends(self, arcs: StepArcs, points: Points) -> None:
         """The numbers of each arc, taken as the controller takes them, must be its landing."""
-        rows = np.flatnonzero(points.is_arc & points.sent)
+        rows = np.flatnonzero(points.is_arc & points.is_sent)
         arc_rows = np.searchsorted(arcs.row, points.row[rows])
         is_wrong = (self._grid.steps(points.units[rows]) != arcs.stop[arc_rows]).any(axis=1)
         if is_wrong.any() and points.row[rows[is_wrong.argmax()]] < points.misfit:
@@ -310,7 +310,7 @@ class _Writer:
         landed = np.zeros(len(arcs.row), dtype=np.bool_)
         landed[np.searchsorted(arcs.row, points.row[points.is_arc])] = True
         changes.arcs_as_lines = int((~landed).sum())
-        is_still = path.is_motion[points.row] & ~points.sent & ~path.is_arc[points.row]
+        is_still = path.is_motion[points.row] & ~points.is_sent & ~path.is_arc[points.row]
         # Parts of slopes and of far arcs may be small.
         is_still &= ~self._split[self._row[points.row]]
         changes.dropped = int(is_still.sum()) + len(arcs.nothing)
@@ -439,8 +439,8 @@ class Points(Struct, frozen=True, eq=False):
     row: Ints
     units: Ints
     before: Ints
-    sent: Bools
-    deep: Bools
+    is_sent: Bools
+    is_deep: Bools
     is_arc: Bools
     misfit: int
 

@@ -302,7 +302,7 @@ def test_stages_can_be_looked_at() -> None:
     assert raw.elements.centre[raw.join] == pytest.approx(joins, abs=1e-9)
     assert len(stages.slices) > len(raw.elements)
     assert len(stages.valid) == len(stages.slices)
-    assert sorted(np.concatenate(stages.loops)) == list(range(len(stages.kept)))
+    assert sorted(np.concatenate(stages.loops)) == list(range(len(stages.final_slices)))
     # Each slice is nowhere too near, or nowhere far enough.
     for slices, valid in (
         (stages.slices[stages.valid], True),

@@ -9,7 +9,7 @@ import pytest
 
 from camtool.errors import OptionError
 from camtool.jobs.build import JobTables, build_job, read_job_file, tables_of, tables_of_flags
-from camtool.jobs.changes import Change, Left, changed, text_of, together
+from camtool.jobs.changes import Change, Left, changed_tables_of, merged_tables, text_of
 from camtool.tables import parse_table
 
 SAMPLES = [
@@ -54,7 +54,7 @@ tabs = {count = 2, width = "3mm"}
 
 
 def written(file: JobTables, flags: JobTables, folder: Path) -> str:
-    return text_of(together(file, flags, folder))
+    return text_of(merged_tables(file, flags, folder))
 
 
 def read(text: str, folder: Path) -> JobTables:
@@ -107,7 +107,7 @@ def test_files_are_named_from_the_new_folder(
     monkeypatch.chdir(tmp_path)
     values = {"tool_library": "lib.toml", "tool": "v"}
     file = tables_of(values, tmp_path / "jobs" / "job.toml")
-    tables = together(file, tables_of_flags({"tool_table": "tool.tbl"}), tmp_path / "out")
+    tables = merged_tables(file, tables_of_flags({"tool_table": "tool.tbl"}), tmp_path / "out")
     assert tables["tool_library"] == "../jobs/lib.toml"
     assert tables["tool_table"] == "../tool.tbl"
     job = build_job(tables_of(tables, tmp_path / "out" / "made.toml"), JobTables())
@@ -116,7 +116,7 @@ def test_files_are_named_from_the_new_folder(
 
 def test_changes_take_the_place_of_what_was_said(tmp_path: Path) -> None:
     tables = parse_table(KEYED)
-    made = changed(tables, [Change("approach", True), Change("direction", "climb", 1)])
+    made = changed_tables_of(tables, [Change("approach", True), Change("direction", "climb", 1)])
     job = build_job(tables_of(made, tmp_path / "job.toml"), JobTables())
     assert job.approach
     assert [each.direction for each in job.operations] == ["drawn", "climb"]
@@ -125,10 +125,10 @@ def test_changes_take_the_place_of_what_was_said(tmp_path: Path) -> None:
 
 def test_what_is_left_divides_an_operation(tmp_path: Path) -> None:
     tables = parse_table(KEYED + 'name = "outline"\nallowance = "0.1mm"\n')
-    whole = changed(tables, [], [Left(1, 0.02)])
+    whole = changed_tables_of(tables, [], [Left(1, 0.02)])
     assert [each.get("allowance") for each in whole["operations"]] == [None, "0.12mm"]
     parts = [Left(1, -0.25, ("CIRCLE 2F",)), Left(1, 0.0, ("LINE [3]", "LINE 4"))]
-    made = changed(tables, [], parts)["operations"]
+    made = changed_tables_of(tables, [], parts)["operations"]
     assert [each["name"] for each in made] == ["holes", "outline", "outline (2)"]
     assert [each.get("allowance") for each in made[1:]] == ["-0.15mm", "0.1mm"]
     assert made[2]["select_entities"] == ["LINE [[]3]", "LINE 4"]

@@ -318,7 +318,7 @@ def test_the_raster_lies_on_whole_pixels_of_the_picture() -> None:
 def literal(heights: Pixels, cell: float, camera: Camera, u: float, v: float) -> float:
     """Height of the point that is seen at (u, v), by a walk in tiny steps; NaN beside the map, and
     for its outermost sides."""
-    fx, fy = camera.away
+    fx, fy = camera.direction
     rows, columns = heights.shape
     for t in np.arange(-20.0, 25.0, 0.002):
         x, y = u * fy + t * fx, t * fy - u * fx
@@ -339,7 +339,7 @@ def test_each_pixel_shows_what_a_ray_meets_first(seed: int, view: str) -> None:
     number = np.empty((12, 14), dtype=np.int32)
     level = np.empty((12, 14), dtype=np.float32)
     u0, v0, pixel = rng.uniform(-9.0, -4.0), rng.uniform(-4.0, 0.0), 0.9
-    at = (*camera.away, camera.sine, camera.cosine, u0, v0, pixel)
+    at = (*camera.direction, camera.sine, camera.cosine, u0, v0, pixel)
     project(heights, (0.5, 0.5, cell), at, 0.1, number, level)
     agree = []
     for row, column in rng.integers(0, (12, 14), (25, 2)).tolist():
@@ -353,7 +353,7 @@ def test_each_pixel_shows_what_a_ray_meets_first(seed: int, view: str) -> None:
 
 def test_the_lamp_and_the_view_have_directions_of_length_one() -> None:
     for camera in CAMERAS.values():
-        assert math.hypot(*camera.away) == pytest.approx(1.0)
+        assert math.hypot(*camera.direction) == pytest.approx(1.0)
         assert math.hypot(*camera.light) == pytest.approx(1.0)
         assert camera.light[2] > 0.0
     iso = CAMERAS["iso"]

@@ -55,37 +55,37 @@ def test_arcs_come_from_the_free_side_along_the_tangent() -> None:
     """Quarter arcs, told by their far ends."""
     quarter = math.tan(math.pi / 8.0)
     outside, inside = leads(MIDDLE, True), leads(MIDDLE, False)
-    assert outside.to == pytest.approx(np.array([[3, -2, -quarter], [5, 0, 0]]))
-    assert outside.away == pytest.approx(np.array([[5, 0, -quarter], [7, -2, 0]]))
-    assert inside.to == pytest.approx(np.array([[3, 2, quarter], [5, 0, 0]]))
-    assert inside.away == pytest.approx(np.array([[5, 0, quarter], [7, 2, 0]]))
+    assert outside.way_in == pytest.approx(np.array([[3, -2, -quarter], [5, 0, 0]]))
+    assert outside.way_out == pytest.approx(np.array([[5, 0, -quarter], [7, -2, 0]]))
+    assert inside.way_in == pytest.approx(np.array([[3, 2, quarter], [5, 0, 0]]))
+    assert inside.way_out == pytest.approx(np.array([[5, 0, quarter], [7, 2, 0]]))
     assert outside.findings == inside.findings == ()
 
 
 def test_lines_go_on_along_the_tangent() -> None:
     made = leads(SQUARE, True, lead_in=LINE, lead_out=LINE)
-    assert made.to == pytest.approx(np.array([[-2, 0, 0], [0, 0, 0.0]]))
-    assert made.away == pytest.approx(np.array([[0, 0, 0], [0, -2, 0.0]]))
+    assert made.way_in == pytest.approx(np.array([[-2, 0, 0], [0, 0, 0.0]]))
+    assert made.way_out == pytest.approx(np.array([[0, 0, 0], [0, -2, 0.0]]))
 
 
 def test_engraved_lines_have_no_free_side() -> None:
     made = leads(OPEN, None)
-    assert made.to == pytest.approx(np.array([[-2, 0, 0], [0, 0, 0.0]]))
-    assert made.away == pytest.approx(np.array([[10, 5, 0], [10, 7, 0.0]]))
+    assert made.way_in == pytest.approx(np.array([[-2, 0, 0], [0, 0, 0.0]]))
+    assert made.way_out == pytest.approx(np.array([[10, 5, 0], [10, 7, 0.0]]))
 
 
 @pytest.mark.parametrize("which", ["lead_in", "lead_out"])
 def test_each_end_has_its_own(which: str) -> None:
     other = {"lead_in": "lead_out", "lead_out": "lead_in"}[which]
     made = leads(MIDDLE, True, **{which: Lead()})
-    assert len(made.to) == (0 if which == "lead_in" else 2)
-    assert len(made.away) == (0 if other == "lead_in" else 2)
+    assert len(made.way_in) == (0 if which == "lead_in" else 2)
+    assert len(made.way_out) == (0 if other == "lead_in" else 2)
     assert made.findings == ()
 
 
 def test_inside_a_corner_a_line_would_cut_the_part_and_is_left_out() -> None:
     made = leads(SQUARE, False, lead_in=LINE, lead_out=Lead())
-    assert len(made.to) == 0
+    assert len(made.way_in) == 0
     (finding,) = made.findings
     assert finding.code == PlanningCode.LEAD_LEFT_OUT
     assert finding.measured == 0.0
@@ -97,15 +97,15 @@ def test_a_large_arc_in_a_small_hole_is_halved() -> None:
     hole = Polyline(np.array([[-1, 0, 1.0], [1, 0, 1.0]]), True)
     made = leads(hole, False, lead_out=Lead())
     # The arc of 2 mm lies outside of the circle of 1 mm, that of 1 mm just within.
-    assert math.dist(made.to[0, :2], made.to[1, :2]) == pytest.approx(math.sqrt(2.0))
-    assert np.hypot(*made.to[0, :2]) <= 1.0
+    assert math.dist(made.way_in[0, :2], made.way_in[1, :2]) == pytest.approx(math.sqrt(2.0))
+    assert np.hypot(*made.way_in[0, :2]) <= 1.0
     assert [each.measured for each in made.findings] == [1.0]
 
 
 def test_halving_ends_at_a_least_size() -> None:
     wall = Polyline(np.array([[-20, -0.51, 0], [20, -0.51, 0.0]]))
     made = leads(MIDDLE, True, [wall])
-    assert len(made.to) == len(made.away) == 0
+    assert len(made.way_in) == len(made.way_out) == 0
     near = Polyline(np.array([[-20, -0.5 - 2.0 / 2**LEAD_HALVINGS, 0], [20, -0.625, 0.0]]))
     made = leads(MIDDLE, True, [near])
     assert {each.measured for each in made.findings} == {2.0 / 2**LEAD_HALVINGS}
@@ -127,7 +127,7 @@ def test_a_lead_does_not_cross_a_finger_of_its_own_contour() -> None:
     comb = Polyline(np.column_stack([np.array(part, dtype=np.float64), np.zeros(8)]), True)
     made = leads(comb, True, radius=0.0, lead_in=Lead(), lead_out=Lead("line", 3.0))
     assert [each.measured for each in made.findings] == [0.75]
-    assert made.away[1, :2] == pytest.approx([4.75, 0.0])
+    assert made.way_out[1, :2] == pytest.approx([4.75, 0.0])
 
 
 def test_an_engraved_line_may_lie_in_what_is_kept() -> None:
@@ -178,7 +178,7 @@ def test_no_point_of_a_lead_does_harm(
     made = leads(
         path, left, [other], radius=radius, lead_in=Lead(kind, size), lead_out=Lead(kind, size)
     )
-    for lead in (made.to, made.away):
+    for lead in (made.way_in, made.way_out):
         if not len(lead):
             continue
         points = _dense(lead)
@@ -192,7 +192,7 @@ def test_no_point_of_a_lead_does_harm(
     short = sum(each.code == PlanningCode.LEAD_LEFT_OUT for each in made.findings)
     assert short == len(made.findings)
     if not clear:
-        assert len(made.to) == len(made.away) == 0
+        assert len(made.way_in) == len(made.way_out) == 0
 
 
 @given(contours(), st.integers(0, 11), st.booleans())
@@ -201,8 +201,8 @@ def test_leads_meet_the_contour_along_its_tangent(path: Polyline, start: int, le
     along = MeasuredPath.of(path)
     made = leads(path, left, lead_in=Lead("arc", 0.2), lead_out=Lead("arc", 0.2))
     for lead, wanted, at in (
-        (made.to, along.directions(np.zeros(1))[0], 1.0),
-        (made.away, along.arrivals(np.array([along.total_mm]))[0], 0.0),
+        (made.way_in, along.directions(np.zeros(1))[0], 1.0),
+        (made.way_out, along.arrivals(np.array([along.total_mm]))[0], 0.0),
     ):
         if len(lead):
             meets = MeasuredPath.of(Polyline(lead))
@@ -284,7 +284,7 @@ def test_a_part_of_a_contour_keeps_to_the_whole_one() -> None:
     drawn = Contour(half, alone.setting, "part", 0, material_left=True, outline=reverse(SQUARE))
     ends = (0.0, 15.0)
     free = leads_of(alone, MeasuredPath.of(half), ends, NOTHING)
-    assert free.away == pytest.approx(np.array([[10, 10, 0], [10, 12, 0.0]]))
+    assert free.way_out == pytest.approx(np.array([[10, 10, 0], [10, 12, 0.0]]))
     inner = Contour(half, alone.setting, "part", 0, material_left=False, outline=SQUARE)
     for each in (whole, drawn):
         assert leads_of(each, MeasuredPath.of(half), ends, NOTHING).findings == ()

@@ -155,7 +155,7 @@ def drilled(*depths: float) -> Toolpath:
 
 def test_holes_are_found_and_no_contour_begins_as_one() -> None:
     holes = holes_of(drilled(2.0, 3.0))
-    assert holes.at.tolist() == [[5.0, 5.0], [10.0, 5.0]]
+    assert holes.places.tolist() == [[5.0, 5.0], [10.0, 5.0]]
     assert holes.bottom_mm.tolist() == [-2.0, -3.0]
     assert holes.row.tolist() == [5, 12]
     made = shop()

@@ -72,11 +72,12 @@ MIN_RUN_POINTS = 3
 
 
 class _Shape(Struct, frozen=True, eq=False):
-    """A line through `at` along the unit vector `way`, or an arc about `at` with a `radius`, which
-    turns by `sweep` (rad, CCW positive); its largest and mean (rms) distance from its points."""
+    """A line through `place` along the unit vector `direction`, or an arc about `place` with a
+    `radius`, which turns by `sweep` (rad, CCW positive); its largest and mean (rms) distance from
+    its points."""
 
-    at: Floats
-    way: Floats
+    place: Floats
+    direction: Floats
     radius: float
     sweep: float
     largest: float
@@ -84,19 +85,19 @@ class _Shape(Struct, frozen=True, eq=False):
 
     def nearest(self, place: Floats) -> Floats:
         """Its place nearest to another one."""
-        arm = place - self.at
+        arm = place - self.place
         if self.radius == 0.0:
-            return self.at + float(arm @ self.way) * self.way
-        return self.at + arm * (self.radius / (math.hypot(*arm) or 1.0))
+            return self.place + float(arm @ self.direction) * self.direction
+        return self.place + arm * (self.radius / (math.hypot(*arm) or 1.0))
 
     def squares(self, points: Floats) -> Floats:
         """(n,) the squares of the distances of points from it."""
-        x, y = (points - self.at).T
+        x, y = (points - self.place).T
         if self.radius > 0.0:
             return np.asarray((np.hypot(x, y) - self.radius) ** 2)
-        if not self.way.any():
+        if not self.direction.any():
             return np.asarray(x * x + y * y)
-        return np.asarray((x * self.way[1] - y * self.way[0]) ** 2)
+        return np.asarray((x * self.direction[1] - y * self.direction[0]) ** 2)
 
 
 class PixelStrokes(Struct, frozen=True, eq=False):
@@ -243,7 +244,7 @@ def _best(points: Floats, limit: float) -> _Shape | None:
 
 def _goes_back(points: Floats, line: _Shape) -> bool:
     """True if the points turn back along the line by more than BACK_PX."""
-    along = points @ line.way
+    along = points @ line.direction
     return bool((np.maximum.accumulate(along) - along).max() > BACK_PX)
 
 
@@ -354,7 +355,7 @@ class _Run(Struct, frozen=True, eq=False):
         """Its vertices (n, 3) between two places, that of the end last."""
         shape, bulge = self.shape, 0.0
         if shape.radius > 0.0:
-            one, last = begin - shape.at, end - shape.at
+            one, last = begin - shape.place, end - shape.place
             turn = math.atan2(one[0] * last[1] - one[1] * last[0], float(one @ last))
             turn += 2.0 * math.pi * round((shape.sweep - turn) / (2.0 * math.pi))
             bulge = math.tan(0.25 * turn) if turn * shape.sweep > 0.0 else 0.0

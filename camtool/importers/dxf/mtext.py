@@ -78,7 +78,7 @@ def write_mtext(
     return ink, reader.fonts
 
 
-def _plain(content: str) -> str:
+def _without_codes(content: str) -> str:
     """Codes that MTextParser takes for others: carets that are no control code, and %%nnn."""
     content = _STACK_CARET.sub(r"\1^ ", content)
     content = _BARE_CARET.sub("^ ", content)
@@ -94,7 +94,7 @@ def plain_text(content: str) -> str:
 
     text = ""
     try:
-        for token in MTextParser(_plain(content)):
+        for token in MTextParser(_without_codes(content)):
             if token.type == TokenType.STACK:
                 upper, lower, bar = token.data
                 fraction = bar != "^" and upper.strip().isdigit() and lower.strip().isdigit()
@@ -140,7 +140,7 @@ class _Reader:
         cells: list[MTextCell] = []
         is_ended, context = False, start
         breaks = (TokenType.NEW_PARAGRAPH, TokenType.NEW_COLUMN, TokenType.WRAP_AT_DIMLINE)
-        for token in MTextParser(_plain(content), start):
+        for token in MTextParser(_without_codes(content), start):
             context, is_ended = token.ctx, token.type in breaks
             if is_ended:
                 last = token.type == TokenType.NEW_COLUMN

@@ -405,12 +405,12 @@ def spline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
             if entity.dxf.hasattr(name)
         ]
         fit = numbers([tuple(point) for point in entity.fit_points]).reshape(-1, 3)
-        degree, knots, control = through(fit, ends, bool(entity.closed))
+        degree, knots, control = spline_through(fit, ends, bool(entity.closed))
         weights = np.empty(0)
     return [spline_of(degree, knots, frame.flat(control), weights, tolerance_mm)]
 
 
-def through(
+def spline_through(
     fit_points: Floats, tangents: list[tuple[float, ...]], closed: bool
 ) -> tuple[int, Floats, Floats]:
     """Degree, knots and control points (n, 3) of the spline that CAD programs draw through points.
@@ -551,7 +551,7 @@ def _spline_edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
         points = numbers([(*tuple(point)[:2], 0.0) for point in edge.fit_points]).reshape(-1, 3)
         tangents = [edge.start_tangent, edge.end_tangent]
         ends = [(*tuple(end)[:2], 0.0) for end in tangents if end is not None]
-        degree, knots, control = through(points, ends, closed=False)
+        degree, knots, control = spline_through(points, ends, closed=False)
         weights = np.empty(0)
     return spline_of(degree, knots, plane.points(control), weights, tolerance_mm)
 

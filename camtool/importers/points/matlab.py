@@ -119,7 +119,7 @@ class _Job:
         if value is None:
             return parts
         array = value.array if self.sideways else value.array.T
-        if parts is not None and not _same(array, parts[0]):
+        if parts is not None and not _are_same(array, parts[0]):
             self._fail(f"{name} is not what {' and '.join(_PARTS[name])} are", value)
         return array, value.line
 
@@ -160,7 +160,7 @@ class _Job:
     ) -> None:
         """DrawingError when lines, directions, count or first point are not those of xy."""
         steps = np.diff(points, axis=0)
-        if lengths is not None and not _same(lengths[0], np.abs(steps)):
+        if lengths is not None and not _are_same(lengths[0], np.abs(steps)):
             self._fail_at("lxy are not the lengths of the lines of xy", lengths[1])
         if speeds is not None and (
             speeds[0].shape != steps.shape or (speeds[0] * steps < 0.0).any()
@@ -187,7 +187,7 @@ class _Job:
         raise DrawingError(message, file=self.file, where=f"line {line}", mend=mend)
 
 
-def _same(one: Floats, other: Floats) -> bool:
+def _are_same(one: Floats, other: Floats) -> bool:
     return one.shape == other.shape and bool((np.abs(one - other) <= AGREES_UNITS).all())
 
 

@@ -234,7 +234,7 @@ def edge_path(edge: Any, tolerance: float) -> EdgePath:
     start, end = curve.FirstParameter(), curve.LastParameter()
     exact = _exact(curve, start, end)
     if exact is None:
-        fit = fit_curve(_free(curve, start, end), tolerance)
+        fit = fit_curve(_fitted_curve(curve, start, end), tolerance)
         exact, error_mm = fit.vertices, fit.off_mm
     else:
         error_mm = np.zeros((len(exact), 2))
@@ -293,7 +293,7 @@ def _exact(curve: Any, start: float, end: float) -> Floats | None:
     return arc_vertices(centre, circle.Radius(), angle, sweep)
 
 
-def _free(curve: Any, start: float, end: float) -> Curve:
+def _fitted_curve(curve: Any, start: float, end: float) -> Curve:
     """The curve as `fit_curve` takes it, seen from above."""
     from OCP.GeomAbs import (
         GeomAbs_BezierCurve,

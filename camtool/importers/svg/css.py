@@ -87,7 +87,7 @@ class _Rule(Struct, frozen=True):
                 parents = [place.parent for place in places if place.parent is not None]
             else:
                 # What lies around the inmost place lies around all others, or is one.
-                parents = _around(places[0])
+                parents = _ancestors(places[0])
             places = [place for place in parents if step.matches(place)]
         return bool(places)
 
@@ -235,7 +235,7 @@ def _passes_test(node: Node, test: _Test) -> bool:
     return content.endswith(value) if sign == "$=" else value in content
 
 
-def _around(node: Node) -> list[Node]:
+def _ancestors(node: Node) -> list[Node]:
     """Parent, its parent and so on."""
     ancestors: list[Node] = []
     while node.parent is not None:

@@ -38,14 +38,14 @@ from camtool.importers.svg.shapes import (
 )
 from camtool.importers.svg.style import LIMITS, StyleSheet, SvgStyle
 from camtool.importers.svg.transform import Affine, translation
-from camtool.importers.svg.tree import MAX_DEPTH, Node, parse_tree, ready, writer_dpi
+from camtool.importers.svg.tree import MAX_DEPTH, Node, as_safe_utf8, parse_tree, writer_dpi
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     """The Drawing of an SVG, also a gzipped one; DrawingError naming element and line when it
     cannot be read. What is wrong in one element alone leaves that element out, with a finding."""
     try:
-        content = ready(data)
+        content = as_safe_utf8(data)
         root = parse_tree(content)
         page = page_of(root, options, writer_dpi(content))
         walk = SvgWalk(root, page, options)

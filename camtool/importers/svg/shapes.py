@@ -140,7 +140,7 @@ def parse_path(data: str) -> tuple[list[Subpath], str]:
     pen = _Pen()
     fault = _drawn(data, pen)
     pen.lift(closed=False)
-    return pen.done, fault
+    return pen.subpaths, fault
 
 
 def _drawn(data: str, pen: _Pen) -> str:
@@ -197,11 +197,11 @@ class _Pen(Struct):
     yet among them.
     """
 
-    here: complex = 0j
+    place: complex = 0j
     start: complex = 0j
     corners: list[complex] = field(default_factory=list)
     segments: list[Segment] = field(default_factory=list)
-    done: list[Subpath] = field(default_factory=list)
+    subpaths: list[Subpath] = field(default_factory=list)
 
     def command(self, letter: str, words: list[str]) -> None:
         """Any command but A, with whole sets of numbers; "M" without numbers draws nothing."""
@@ -214,8 +214,8 @@ class _Pen(Struct):
             numbers = _floats(words)
             if kind == "M":
                 self.lift(closed=False)
-                self.start = self.here = _bounded(
-                    complex(numbers[0], numbers[1]) + (self.here if relative else 0j)
+                self.start = self.place = _bounded(
+                    complex(numbers[0], numbers[1]) + (self.place if relative else 0j)
                 )
                 numbers = numbers[2:]
             if numbers:
@@ -225,47 +225,47 @@ class _Pen(Struct):
         self, radii: complex, turn: float, flags: int, end_point: complex, relative: bool
     ) -> None:
         """Add an arc; without a radius it is a line, and nothing if it ends at its start."""
-        end = _bounded(end_point + self.here if relative else end_point)
+        end = _bounded(end_point + self.place if relative else end_point)
         if not max(abs(radii.real), abs(radii.imag), abs(turn)) <= MAX_NUMBER:
             raise DrawingError("path data have an arc that is too large")
-        if radii.real == 0.0 or radii.imag == 0.0 or end == self.here:
+        if radii.real == 0.0 or radii.imag == 0.0 or end == self.place:
             self._to([end])
             return
         angle = math.radians(math.fmod(turn, 360.0))
         self._flush()
-        self.segments.append(arc_between(self.here, end, radii, angle, flags))
-        self.here = end
+        self.segments.append(arc_between(self.place, end, radii, angle, flags))
+        self.place = end
 
     def lift(self, *, closed: bool) -> None:
         """Ends the subpath, if one is begun; the pen stands at its start when it is closed."""
         self._flush()
         if self.segments:
-            self.done.append(
+            self.subpaths.append(
                 Subpath(np.array([self.start.real, self.start.imag]), tuple(self.segments), closed)
             )
             self.segments = []
         if closed:
-            self.here = self.start
+            self.place = self.start
         else:
-            self.start = self.here
+            self.start = self.place
 
     def _straight(self, kind: str, relative: bool, n: list[float]) -> None:
         """L, H, V, and the pairs after the first one of M."""
         if kind == "H":
-            other_axis = self.here.imag if not relative else 0.0
+            other_axis = self.place.imag if not relative else 0.0
             ends = [complex(x, other_axis) for x in n]
         elif kind == "V":
-            other_axis = self.here.real if not relative else 0.0
+            other_axis = self.place.real if not relative else 0.0
             ends = [complex(other_axis, y) for y in n]
         else:
             ends = list(map(complex, n[::2], n[1::2]))
         if relative:
-            ends = list(accumulate(ends, initial=self.here))[1:]
+            ends = list(accumulate(ends, initial=self.place))[1:]
         self._to(ends)
 
     def _to(self, ends: list[complex]) -> None:
         self.corners += ends
-        self.here = _bounded(ends[-1])
+        self.place = _bounded(ends[-1])
 
     def _curve(self, letter: str, words: list[str]) -> None:
         """C, S, Q, T. The first control point of a smooth curve (S, T) is the last one of the
@@ -278,20 +278,20 @@ class _Pen(Struct):
         degree = 3 if kind in "CS" else 2
         self._flush()
         last = self.segments[-1] if self.segments else None
-        before = self.here
+        before = self.place
         if isinstance(last, Bezier) and len(last.control) == degree:
             before = complex(*last.control[-2])
         controls: list[complex] = []
         for index in range(0, len(points), each):
             control = points[index : index + each]
             if relative:
-                control = [self.here + point for point in control]
+                control = [self.place + point for point in control]
             if kind in "ST":
-                control.insert(0, self.here + self.here - before)
+                control.insert(0, self.place + self.place - before)
             controls += control
-            before, self.here = control[-2:]
+            before, self.place = control[-2:]
         self.segments += map(Bezier, _pairs(controls).reshape(-1, degree, 2))
-        self.here = _bounded(self.here)
+        self.place = _bounded(self.place)
 
     def _flush(self) -> None:
         if self.corners:

@@ -101,7 +101,7 @@ def parse_numbers(text: str, name: str) -> list[float]:
     remainder = NUMBER.sub(" ", text).strip(BETWEEN)
     remainder = remainder.replace(",", " ").strip()
     if remainder:
-        raise DrawingError(f"{name} holds {short(remainder)}, which is no number")
+        raise DrawingError(f"{name} holds {shortened(remainder)}, which is no number")
     values = [float(number) for number in NUMBER.findall(text)]
     furthest = max(values, key=abs, default=0.0)
     in_bounds(furthest, name)
@@ -138,7 +138,7 @@ def view_box_map(box: SvgBox, onto: SvgBox, align: str) -> Affine:
     """
     match = _ALIGN.fullmatch(align or "xMidYMid")
     if match is None:
-        raise DrawingError(f"preserveAspectRatio {short(align)} is not known")
+        raise DrawingError(f"preserveAspectRatio {shortened(align)} is not known")
     sx, sy = onto.width / box.width, onto.height / box.height
     x, y = onto.x, onto.y
     if match[1] != "none":
@@ -148,7 +148,7 @@ def view_box_map(box: SvgBox, onto: SvgBox, align: str) -> Affine:
     return Affine(sx, 0.0, 0.0, sy, x - sx * box.x, y - sy * box.y).checked()
 
 
-def short(text: str) -> str:
+def shortened(text: str) -> str:
     """A quoted beginning of a text, for messages."""
     return repr(text if len(text) <= 24 else text[:21] + "...")
 
@@ -216,7 +216,7 @@ def _functions(text: str) -> list[tuple[str, str]]:
     while text[offset:].strip(BETWEEN):
         match = _FUNCTION.match(text, offset)
         if match is None:
-            raise DrawingError(f"transform {short(text[offset:])} is no transform")
+            raise DrawingError(f"transform {shortened(text[offset:])} is no transform")
         offset = match.end()
         parts.append((match[1], match[2]))
         if len(parts) > _MAX_FUNCTIONS:
@@ -279,7 +279,7 @@ def _with_unit(word: str, units: dict[str, float]) -> float:
     match = _MEASURE.fullmatch(word)
     unit = match[2].lower() if match else None
     if match is None or unit not in units:
-        raise DrawingError(f"transform has {short(word)}, which is no number that it can use")
+        raise DrawingError(f"transform has {shortened(word)}, which is no number that it can use")
     return in_bounds(float(match[1]) * units[str(unit)], "transform")
 
 

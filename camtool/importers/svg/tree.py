@@ -81,8 +81,8 @@ class Node(Struct, eq=False):
 
 
 def parse_tree(data: bytes) -> Node:
-    """The root of an SVG document made `ready`; DrawingError when it is no XML, no SVG, or not
-    safe."""
+    """The root of an SVG document made `as_safe_utf8`; DrawingError when it is no XML, no SVG, or
+    not safe."""
     from defusedxml.common import DefusedXmlException
 
     handler = _Builder()
@@ -275,7 +275,7 @@ _OLD_INKSCAPE = re.compile(rb"""inkscape:version=["']0\.([0-8]?[0-9]|9[01])(?![0
 _ILLUSTRATOR = re.compile(rb"Generator: Adobe Illustrator")
 
 
-def ready(data: bytes) -> bytes:
+def as_safe_utf8(data: bytes) -> bytes:
     """UTF-8 (or what expat reads itself) without outside references; DrawingError."""
     if data.startswith(GZIP):
         data = _unpack(data)

@@ -153,14 +153,14 @@ def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Findin
                     wanted=math.degrees(operation.entry.angle_rad),
                 )
             )
-        vertices = _turned(helix(hole.at_mm, radius, depth, turns), hole, operation)
+        vertices = _turned_vertices(helix(hole.at_mm, radius, depth, turns), hole, operation)
         feeds = setting.feeds
         along = feeds_along(vertices, feeds)
         runs.append(CutRun(vertices, along, feeds.plunge_mm_min, hole.name))
     return tuple(runs), steep_findings
 
 
-def _turned(vertices: Floats, hole: Hole, operation: Operation) -> Floats:
+def _turned_vertices(vertices: Floats, hole: Hole, operation: Operation) -> Floats:
     """The vertices of a ring, which runs CCW, in the direction of the operation."""
     if operation.direction == "conventional":  # mirrored
         vertices[:, 1] = 2.0 * hole.at_mm[1] - vertices[:, 1]
@@ -186,7 +186,7 @@ def _plunged(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Fin
     wide = 0.5 * _diameter(hole) - operation.away_mm
     depths = peck_depths(-setting.levels_mm[-1], _peck_mm(operation))
     way_down, down_feeds = pecks(hole.at_mm, depths, setting)
-    round_ = _turned(helix(hole.at_mm, wide, 0.0, 0), hole, operation)
+    round_ = _turned_vertices(helix(hole.at_mm, wide, 0.0, 0), hole, operation)
     round_[:, 2] = -depths[-1]
     along = [*down_feeds, *[feeds.cut_mm_min] * len(round_)]
     vertices = np.concatenate([way_down, round_])

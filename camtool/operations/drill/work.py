@@ -48,7 +48,7 @@ def drill(chosen: Chosen, setting: Setting) -> Work:
         *_too_large(large, limit),
         *_no_circles(other_names),
         *_other_sizes(holes, operation),
-        *_nothing(holes, operation),
+        *_empty_findings(holes, operation),
     ]
     if operation.peck_mm is not None:
         refuse_endless_pecks(-setting.levels_mm[-1], operation.peck_mm, holes, operation)
@@ -94,6 +94,6 @@ def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
         yield HOLE_SIZE(where=named(names), measured=drill_mm, limit=size, count=len(names))
 
 
-def _nothing(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
+def _empty_findings(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
     if not holes:
         yield NOTHING_DRAWN_TO_DRILL(where=operation_name(operation))

@@ -123,7 +123,7 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
             continue
         outline = each.region[0]
         items.append(Fixed(tuple(cleared.runs), setting, each.name, each.source, outline))
-        findings += [_changed(each, *change) for change in cleared.changed.items()]
+        findings += [_entry_finding(each, *change) for change in cleared.changed.items()]
         findings += [_slot(each, slot, setting.operation) for slot in slots]
         hair_mm = 2.0 * SLOT_TOLERANCE * setting.operation.tool.diameter_mm if slots else 0.0
         findings += unreached_findings(centre_region, setting, hair_mm=hair_mm)
@@ -169,12 +169,12 @@ def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
         connected, runs = ConnectedRegion(part), list[CutRun]()
         for path, region in clearing_paths(part, setting.operation):
             way_down = down_for(path, region, connected, setting)
-            runs += lowered(path, way_down, over_floor(connected), setting, each.name)
+            runs += lowered_runs(path, way_down, over_floor(connected), setting, each.name)
             changed_runs.setdefault(way_down.changed, runs[0])
         groups.append(runs)
     for path in slots:
         way_down = down_for(path, None, None, setting)
-        groups.append(lowered(path, way_down, back_along(path), setting, each.name))
+        groups.append(lowered_runs(path, way_down, back_along(path), setting, each.name))
         changed_runs.setdefault(way_down.changed, groups[-1][0])
     changed_runs.pop("", None)
     return Cleared(_nearest_next(groups), changed_runs)
@@ -318,7 +318,7 @@ def _no_rest(each: Pocket, operation: Operation) -> Finding:
     )
 
 
-def _changed(each: Pocket, change: str, run: CutRun) -> Finding:
+def _entry_finding(each: Pocket, change: str, run: CutRun) -> Finding:
     return ENTRY_CHANGED_IN_POCKET(
         where=at_place(each.name, run.vertices[0, :2].tolist()), change=change
     )
@@ -372,7 +372,9 @@ def down_for(
     return Down(changed=f"a plunge instead of a {entry.kind}")
 
 
-def lowered(path: Floats, way_down: Down, link: Link, setting: Setting, name: str) -> list[CutRun]:
+def lowered_runs(
+    path: Floats, way_down: Down, link: Link, setting: Setting, name: str
+) -> list[CutRun]:
     """The runs that follow a path (n, 3) at all levels: one, unless there is no link back."""
     runs: list[CutRun] = []
     parts: list[Floats] = []
@@ -383,8 +385,8 @@ def lowered(path: Floats, way_down: Down, link: Link, setting: Setting, name: st
             runs.append(_run(parts, setting, name))
             parts = []
         if link_back is not None:
-            parts.append(_at(link_back, above))
-        parts += [entry, _at(path, level)]
+            parts.append(_at_height(link_back, above))
+        parts += [entry, _at_height(path, level)]
     return [*runs, _run(parts, setting, name)]
 
 
@@ -402,7 +404,7 @@ def _entry(
         helix = _helix(way_down.centre, way_down.radius_mm, begin, drop / slope)
         across = link(helix[-1, :2], begin)
         if across is not None:
-            flat = _at(across, level)
+            flat = _at_height(across, level)
             return join_paths([np.insert(helix, 2, _sloping(helix, heights), axis=1), flat])
     if above == 0.0:
         return np.array([[*begin, level, 0.0]])
@@ -445,7 +447,7 @@ def _sloping(flat: Floats, heights: tuple[float, float]) -> Floats:
     return np.asarray(above + (level - above) * lengths / lengths[-1])
 
 
-def _at(flat: Floats, z: float) -> Floats:
+def _at_height(flat: Floats, z: float) -> Floats:
     """(k, 4) an open path (k, 3) at one height."""
     return np.insert(flat, 2, z, axis=1)
 

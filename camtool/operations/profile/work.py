@@ -58,12 +58,12 @@ SLOT_TOLERANCE_MM = 5e-4
 
 class _Line(Struct, frozen=True, eq=False):
     """A path of the tool centre; what is to stay lies to its left, or (False) to its right;
-    `of`: the chosen paths that it belongs to, the one it mostly follows first."""
+    `sources`: the chosen paths that it belongs to, the one it mostly follows first."""
 
     path: Polyline
-    left: bool
-    of: tuple[int, ...]
-    plain: Polyline | None = None
+    is_left: bool
+    sources: tuple[int, ...]
+    plain_path: Polyline | None = None
     """The line without its reliefs, when it has any."""
 
 
@@ -85,26 +85,28 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
     if not runs_beside(operation):
         opens = list(range(len(chosen.lines)))
     elif operation.side == "auto":
-        _together(chosen, closed, setting, lines)
+        _add_shapes(chosen, closed, setting, lines)
     else:
-        _each(chosen, closed, setting, lines)
+        _add_each(chosen, closed, setting, lines)
         lines.findings += (_no_side(chosen, k, operation.side) for k in opens)
     if not runs_beside(operation):
         lines.findings += run_together(chosen, setting)
     if operation.joins != "round":
-        lines.findings += shortened_list(list(_far(chosen, setting, lines.lines)), CORNER_FAR_MORE)
+        lines.findings += shortened_list(
+            list(_far_corners(chosen, setting, lines.lines)), CORNER_FAR_MORE
+        )
     if operation.corners != "none":
         lines.lines = [_relieved(line, chosen, setting, lines.findings) for line in lines.lines]
     names, sources = [chosen.names[k] for k in opens], chosen.source[opens].tolist()
     on_line = contours_along(chosen.lines.select(opens), setting, names, sources)
-    items = [*_beside(lines.lines, chosen, setting), *on_line]
+    items = [*_side_contours(lines.lines, chosen, setting), *on_line]
     return Work(sorted(items, key=lambda each: each.source), tuple(lines.findings))
 
 
-def _together(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
+def _add_shapes(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
     """Round the shapes of all closed paths, each shape at once."""
     for path_rows in _shapes(chosen, closed):
-        _shape(chosen, path_rows, setting, line_set)
+        _add_shape(chosen, path_rows, setting, line_set)
 
 
 def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
@@ -121,7 +123,7 @@ def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
     return [each.tolist() for each in (rows[~is_reversed], rows[is_reversed]) if len(each)]
 
 
-def _shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set: _Found) -> None:
+def _add_shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set: _Found) -> None:
     """Round a shape of these paths."""
     from camtool.geometry.offset import offset_shape
     from camtool.planning.reach import cut_away_findings, unreached_findings
@@ -132,7 +134,7 @@ def _shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set: _Fo
     before = len(line_set.lines)
     _round(chosen, path_rows, shape, setting, line_set)
     lines_made = line_set.lines[before:]
-    joined = [each for line in lines_made for each in _joined(chosen, line.of, setting)]
+    joined = [each for line in lines_made for each in _joined(chosen, line.sources, setting)]
     line_set.findings += shortened_list(joined, UNREACHED_BETWEEN_MORE)
     free_side = reverse_lines(shape)
     line_set.findings += cut_away_findings(shape, setting.operation)
@@ -143,7 +145,7 @@ def _shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set: _Fo
     line_set.findings += unreached_findings(free_side, setting, hair_mm=hair_mm)
 
 
-def _each(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
+def _add_each(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
     """Round or within each of the closed paths, whatever the others are."""
     from camtool.geometry.offset import offset_each
     from camtool.planning.reach import cut_away_findings
@@ -279,7 +281,7 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
     from camtool.planning.reliefs import add_reliefs
 
     tool, path = setting.operation.tool, line.path
-    for k in line.of:
+    for k in line.sources:
         is_other = (np.arange(len(chosen.lines)) != k) & chosen.lines.closed
         keep_out = chosen.lines.select(np.flatnonzero(is_other).tolist())
         kind, near_mm = setting.operation.corners, tool.radius_mm - setting.operation.beyond_mm
@@ -289,18 +291,18 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
             NOT_RELIEVED(where=at_place(chosen.names[k], corner), tool=tool_name(tool))
             for corner in relieved.left.tolist()
         )
-    return replace(line, path=path, plain=line.path)
+    return replace(line, path=path, plain_path=line.path)
 
 
-def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contour]:
+def _side_contours(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contour]:
     """The lines as the operation's direction has them: climbing, what is to stay is on the
     right."""
     direction = setting.operation.direction
     paths, left_flags = (
         Polylines.of(line.path for line in lines),
-        np.array([line.left for line in lines], dtype=np.bool_),
+        np.array([line.is_left for line in lines], dtype=np.bool_),
     )
-    first = [line.of[0] for line in lines]
+    first = [line.sources[0] for line in lines]
     if direction == "drawn":
         ccw = signed_areas(chosen.lines) > 0.0
         turn = (signed_areas(paths) > 0.0) != ccw[first]
@@ -311,9 +313,9 @@ def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contou
         Contour(
             path,
             setting,
-            chosen.names[line.of[0]],
-            int(chosen.source[line.of[0]]),
-            starts=_starts(path, line.plain),
+            chosen.names[line.sources[0]],
+            int(chosen.source[line.sources[0]]),
+            starts=_starts(path, line.plain_path),
             material_left=is_left,
         )
         for path, line, is_left in zip(paths, lines, (left_flags != turn).tolist(), strict=True)
@@ -338,19 +340,19 @@ def _no_side(chosen: Chosen, k: int, side: str) -> Finding:
     )
 
 
-def _far(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Finding]:
+def _far_corners(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Finding]:
     """Corners of the tool's path that lie far from the drawn corner that they go round.
 
     At a corner of the angle α the straight sides meet at away / sin(α/2) from it.
     """
     max_distance = FAR_CORNER * setting.operation.away_mm
     for line in lines:
-        drawn = Segments.of(chosen.lines.select(line.of))
+        drawn = Segments.of(chosen.lines.select(line.sources))
         corners = line.path.vertices[:, :2]
         distance = nearest(corners, drawn).distance
         for k in np.flatnonzero(distance > max_distance).tolist():
             yield CORNER_FAR(
-                where=at_place(chosen.names[line.of[0]], corners[k].tolist()),
+                where=at_place(chosen.names[line.sources[0]], corners[k].tolist()),
                 measured=distance[k],
                 limit=max_distance,
                 joins=setting.operation.joins,

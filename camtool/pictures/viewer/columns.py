@@ -69,7 +69,7 @@ def columns_of(content: Content, run: Playback | None) -> Columns:
         **_drawing(scene.drawing),
         **_moves(scene, run),
         **{name: points.astype(FLOAT) for name, points in places.items()},
-        **_wanted(scene.wanted if run is not None else None),
+        **_wanted_columns(scene.wanted if run is not None else None),
     }
 
 
@@ -272,7 +272,7 @@ def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
     return np.where(toolpath.is_motion, sorts, 0).astype(BYTE)
 
 
-def _wanted(wanted_path: Segments | None) -> Columns:
+def _wanted_columns(wanted_path: Segments | None) -> Columns:
     """The wanted path: where each line or arc ends, and where those begin that do not begin at the
     end of the one before."""
     if wanted_path is None or not len(wanted_path):
@@ -343,16 +343,16 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
     # A cut begins at the point before its first one.
     drawn = (cutting | np.append(cutting[1:], False))[kept_rows]
     points, bins, row = points[kept_rows], bins[kept_rows], run.trace_row[kept_rows]
-    offsets = _off(points, drawn, scene.wanted)
+    offsets = _offsets(points, drawn, scene.wanted)
     largest = float(np.abs(offsets).max(initial=0.0))
     count_mm = largest / MAX_COUNTS if scene.wanted is not None and largest > 0.0 else 0.0
     counts = np.rint(offsets / count_mm) if count_mm else np.zeros_like(offsets)
     all_points = np.ones(len(worst), dtype=np.bool_)
     columns = _columns(points, bins, row, counts, finest_mm(largest_mm))
-    return Traced(columns, count_mm, _off(worst, all_points, scene.wanted))
+    return Traced(columns, count_mm, _offsets(worst, all_points, scene.wanted))
 
 
-def _off(points: Floats, is_chosen: np.ndarray, wanted_path: Segments | None) -> Floats:
+def _offsets(points: Floats, is_chosen: np.ndarray, wanted_path: Segments | None) -> Floats:
     """(T, 2) mm: the vector from the nearest point of the wanted path to each chosen point, else
     0."""
     offsets = np.zeros_like(points)
