@@ -1,8 +1,7 @@
-"""Versions of installed packages, and entry points by which they add machines, operations and
-importers.
+"""Entry points of installed packages, by which they add machines, operations and importers.
 
-`importlib.metadata` finds both too, but to import it takes longer than to read them: it loads the
-package for electronic mail.
+`importlib.metadata` finds them too, but it loads the package for electronic mail
+(docs/decisions/0085-entry-points.md).
 """
 
 from __future__ import annotations
@@ -46,18 +45,6 @@ def entry_points(group: str) -> tuple[EntryPoint, ...]:
     `sys.path` has changed, as it does when a package is installed.
     """
     return _search(group, _path_state())
-
-
-def version_of(package: str) -> str:
-    """Return the version of an installed package; `importlib.metadata` raises where there is
-    none."""
-    folder = _packages(_path_state()).get(package)
-    for line in _lines(folder / "METADATA") if folder else ():
-        if line.startswith("Version:"):
-            return line.partition(":")[2].strip()
-    from importlib.metadata import version
-
-    return version(package)
 
 
 PathState = tuple[tuple[str, int], ...]

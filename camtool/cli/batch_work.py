@@ -15,6 +15,7 @@ from camtool.cli.files import seal
 from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags
 from camtool.findings import Finding, Severity
+from camtool.importers.read import file_bytes, read_bytes
 from camtool.plain import one_line
 from camtool.planning.job import job_of
 from camtool.records import replace
@@ -73,7 +74,6 @@ class PostWork:
 
     def warm(self) -> None:
         """Load the modules that every drawing needs."""
-        from camtool.importers.read import read_bytes
         from camtool.pipeline import post_drawing
 
         drawing = read_bytes(SMALL_JOB, "small.svg")
@@ -81,7 +81,6 @@ class PostWork:
 
     def make(self, task: DrawingTask, data: bytes | None) -> Outputs:
         """Make program, picture and report of a drawing; none of them if it has an error."""
-        from camtool.importers.read import file_bytes
         from camtool.pipeline import post_drawing
 
         data = file_bytes(task.path) if data is None else data

@@ -26,8 +26,11 @@ import click
 from camtool.cli.files import STDOUT
 from camtool.cli.life_signs import progress
 from camtool.errors import DrawingError, MachineError, OptionError
+from camtool.importers.formats import NoDrawingError, find_format
 from camtool.importers.options import Flag, ReadOptions, Selection, flags_of, options_of
+from camtool.importers.read import content, file_bytes, read_bytes
 from camtool.jobs.keys import FLAGS, flag_name
+from camtool.jobs.tools import Shop
 from camtool.keys import Given, Key
 from camtool.project import project_of
 from camtool.records import replace
@@ -431,7 +434,6 @@ class DrawingFlags:
         `data` is the file's content where it has been read already. OptionError for a layer or
         colour of the job that the drawing has not, unless flags restrict it.
         """
-        from camtool.importers.read import content, read_bytes
         from camtool.jobs.drawing import read_for_job
 
         job_options = {"text": job.text} if job is not None and job.text else {}
@@ -445,9 +447,6 @@ class DrawingFlags:
     def is_program(self, name: str, target: LoadedTarget) -> bool:
         """True if a file has the extension of the target's programs, or a content that is no
         drawing. `--format` says that it is one, and stdin is taken for one."""
-        from camtool.importers.formats import NoDrawingError, find_format
-        from camtool.importers.read import file_bytes
-
         suffix = Path(name).suffix
         if suffix.lower() == target.machine.target.extension:
             return True
@@ -568,8 +567,6 @@ class JobFlags:
 
     def _tools_and_defaults(self) -> Shop:
         """Return the tools that the job may name, and the defaults of the project and the user."""
-        from camtool.jobs.tools import Shop
-
         if self.project is None:
             return Shop()
         defaults = {key: self.project.value_of(key) for key in ("tool", "material")}

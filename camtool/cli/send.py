@@ -20,6 +20,7 @@ from camtool.cli.messages import say, say_findings, show_facts, show_text
 from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
+from camtool.sending.journal import read_journal
 
 if TYPE_CHECKING:
     from camtool.cli.wishes import AtStop
@@ -161,7 +162,6 @@ def send(
 
 def _find_unfinished(place: Path, data: bytes) -> JournalState | None:
     """Return the state in the journal of this program, None if there is none or it is finished."""
-    from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
 
     with suppress(InputError):
@@ -200,7 +200,6 @@ def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
     Raises InputError for the journal of another program or another machine file, and OptionError
     if the program was finished.
     """
-    from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
 
     state = read_journal(place)

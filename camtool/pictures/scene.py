@@ -21,6 +21,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.records import replace
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 
 if TYPE_CHECKING:
@@ -562,7 +563,6 @@ def _place_in(words: str) -> tuple[float, float] | None:
 def _faults(report: Report) -> tuple[tuple[float, float], ...]:
     """Return the places of the findings of the stock, remarks left out."""
     from camtool.stock.findings import StockCode
-    from camtool.toolpath.findings import ProgramCode
 
     codes = {each.name for each in StockCode}
     codes |= {ProgramCode.RAPID_IN_STOCK.name, ProgramCode.LOOSE_PIECE.name}

@@ -34,6 +34,7 @@ from camtool.geometry.measure import path_extents, signed_areas
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.patterns import matches
+from camtool.planning.holes import circle_of
 from camtool.planning.items import Chosen
 from camtool.planning.job import Job, Operation
 from camtool.planning.naming import range_words
@@ -273,8 +274,6 @@ class Traits:
 
 def circles(lines: Polylines, rows: Bools) -> Bools:
     """(M,) which of the rows (M,) of some paths are full circles."""
-    from camtool.planning.holes import circle_of
-
     is_circle = np.zeros(len(rows), dtype=np.bool_)
     for row in np.flatnonzero(rows & lines.closed).tolist():
         is_circle[row] = circle_of(lines[row]) is not None

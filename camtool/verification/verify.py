@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec import Struct
 
+from camtool import __version__
 from camtool.arrays import Floats, Indices
 from camtool.findings import Finding
-from camtool.plugins import version_of
 from camtool.progress import Progress
 from camtool.records import replace
 from camtool.simulation.controller import FusedRun
@@ -294,7 +294,7 @@ class ReportBuilder(Struct, frozen=True, eq=False):
             interpolator=case.target.model.interpolation(
                 case.decoded, case.machine, case.simulation
             ),
-            camtool_version=version_of("camtool"),
+            camtool_version=__version__,
             contour_errors=self._contours(),
             bidirectional=self._both_ways(),
             unreached=self._unreached(),

@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from camtool import __version__
 from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
 from camtool.machine.model import Machine
-from camtool.plugins import version_of
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from camtool.toolpath.touching import untouched_place
 from camtool.toolpath.wanted import TOOL_SHAPES, OperationNote, Operations, ToolNote
@@ -45,7 +45,7 @@ def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[
     ]
     origin = [toolpath.made_from, f"settings {machine.short_digest}"] if toolpath.made_from else []
     lines = [
-        f"{MAKER}{version_of('camtool')} for {machine.target.name}: {machine.target.title}",
+        f"{MAKER}{__version__} for {machine.target.name}: {machine.target.title}",
         *origin,
         *pack(toolpath.setup),
         f"{unit} and {unit}/min - part zero at X0 Y0 Z0",

@@ -89,6 +89,9 @@ HEAVY = {
 }
 
 
+MAX_LATE_IMPORTS = 315
+"""Imports of our own modules within functions; a fifth of them are those of the targets."""
+
 MACHINES = [path.parent for path in sorted(ROOT.glob("postprocessors/*/machine.toml"))]
 """The folder of each target."""
 
@@ -157,6 +160,19 @@ def broken_rules(source: str, room: str) -> list[str]:
         if target not in ALLOWED[room]:
             faults.append(f"line {line}: {room} imports {module}")
     return faults
+
+
+def test_few_of_our_own_modules_are_imported_late() -> None:
+    """What every run of a module needs is imported at its top."""
+    late = {
+        (path, line, module)
+        for path in files()
+        for function in ast.walk(ast.parse(source_of(path)))
+        if isinstance(function, ast.FunctionDef)
+        for line, module in imported(function, neighbours=True)
+        if room_of(module)
+    }
+    assert 100 < len(late) <= MAX_LATE_IMPORTS
 
 
 @pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
