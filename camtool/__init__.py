@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from camtool.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from camtool.api import (
         Calibration,
@@ -56,8 +58,6 @@ if TYPE_CHECKING:
         verify,
     )
     from camtool.errors import CamtoolError
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Calibration",

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
-from camtool import __version__
 from camtool.batches.pool import TICK_S, make_outputs
 from camtool.batches.run import BatchWork, DrawingTask, Outputs
 from camtool.errors import CamtoolError, OptionError
+from camtool.version import __version__
 
 if TYPE_CHECKING:
     from distributed import Client, Future

@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Protocol
 
-from camtool import __version__
 from camtool.batches.run import Outcome, OutcomeState
 from camtool.cli.messages import say
 from camtool.plain import one_line, to_json
+from camtool.version import __version__
 
 if TYPE_CHECKING:
     from rich.progress import Progress

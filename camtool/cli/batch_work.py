@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from camtool import __version__
 from camtool.batches.manifest import code_digest, content_digest, digest_of, packages_digest
 from camtool.batches.run import DrawingTask, Outputs
 from camtool.cli.files import seal
@@ -19,6 +18,7 @@ from camtool.importers.read import file_bytes, read_bytes
 from camtool.plain import one_line
 from camtool.planning.job import job_of
 from camtool.records import replace
+from camtool.version import __version__
 
 if TYPE_CHECKING:
     from camtool.inspection.tolerances import Asked

@@ -21,11 +21,11 @@ from typing import NoReturn, TextIO
 
 import click
 
-from camtool import __version__
 from camtool.cli import COMPLETE
 from camtool.cli.life_signs import LifeSigns, life_signs
 from camtool.cli.messages import say, say_error
 from camtool.errors import CamtoolError, InputError, OutputError
+from camtool.version import __version__
 
 EXIT_BAD_INPUT = 2
 EXIT_FAULT = 3

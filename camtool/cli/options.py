@@ -29,6 +29,7 @@ from camtool.errors import DrawingError, MachineError, OptionError
 from camtool.importers.formats import NoDrawingError, find_format
 from camtool.importers.options import Flag, ReadOptions, Selection, flags_of, options_of
 from camtool.importers.read import content, file_bytes, read_bytes
+from camtool.jobs.build import JobTables, build_job, read_job_file, tables_of_flags
 from camtool.jobs.keys import FLAGS, flag_name
 from camtool.jobs.tools import Shop
 from camtool.keys import Given, Key
@@ -528,8 +529,6 @@ class JobFlags:
 
         `--layer` restricts the drawing; a job of one operation takes just that of it.
         """
-        from camtool.jobs.build import JobTables, build_job, read_job_file, tables_of_flags
-
         file = JobTables()
         if self.file is not None:
             file = read_job_file(Path(self.file), self._piped_content)
@@ -546,7 +545,6 @@ class JobFlags:
 
         Of one operation `--layer` is a part of it. A usage error for `--operation`.
         """
-        from camtool.jobs.build import JobTables, read_job_file, tables_of_flags
         from camtool.jobs.changes import job_of_tables, merged_tables
 
         if self.operations or self.setup is not None:

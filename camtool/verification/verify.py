@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec import Struct
 
-from camtool import __version__
 from camtool.arrays import Floats, Indices
 from camtool.findings import Finding
 from camtool.progress import Progress
@@ -67,6 +66,7 @@ from camtool.verification.shape import (
     wanted_shape,
 )
 from camtool.verification.slides import Paths, SeenCircle, SlidePass, SlideTrace, trace_size
+from camtool.version import __version__
 
 if TYPE_CHECKING:
     from camtool.verification.conformance import Conformance

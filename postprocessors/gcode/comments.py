@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from camtool import __version__
 from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from camtool.toolpath.touching import untouched_place
 from camtool.toolpath.wanted import TOOL_SHAPES, OperationNote, Operations, ToolNote
+from camtool.version import __version__
 
 from .dialect import UNITS, GcodeDialect, Unit
 from .format import COMMENT_CHARS, NumberStyle, comment, format_column

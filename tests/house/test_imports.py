@@ -24,6 +24,7 @@ BASE = {
     "progress",
     "records",
     "tables",
+    "version",
 }
 SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
 TARGETS = SHARED | {"simulation", "target"}
@@ -45,6 +46,7 @@ ALLOWED = {
     "progress": set(),
     "records": set(),
     "tables": {"errors", "patterns"},
+    "version": set(),
     "project": {"errors", "patterns", "tables"},
     "geometry": BASE | {"kernels"},
     "kernels": BASE,
@@ -71,7 +73,7 @@ ALLOWED = {
     "cli": MADE | {"inspection", "calibration", "batches", "sending", "panel", "jobs", "project"},
     "__main__": {"cli"},
     "api": MADE | {"inspection", "calibration", "jobs"},
-    "__init__": {"api", "errors"},
+    "__init__": {"api", "errors", "version"},
 }
 HEAVY = {
     "build123d",
@@ -89,7 +91,7 @@ HEAVY = {
 }
 
 
-MAX_LATE_IMPORTS = 315
+MAX_LATE_IMPORTS = 325
 """Imports of our own modules within functions; a fifth of them are those of the targets."""
 
 MACHINES = [path.parent for path in sorted(ROOT.glob("postprocessors/*/machine.toml"))]
@@ -155,7 +157,7 @@ def broken_rules(source: str, room: str) -> list[str]:
     faults = []
     for line, module in imported(ast.parse(source), neighbours=room == "postprocessors"):
         target = room_of(module)
-        if target is None or target == room or module == "camtool.__version__":
+        if target is None or target == room:
             continue
         if target not in ALLOWED[room]:
             faults.append(f"line {line}: {room} imports {module}")
@@ -300,7 +302,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert not loaded_by("--help") & (HEAVY | {"numpy", "msgspec"})
 
 
-def test_importing_camtool_loads_nothing_of_it() -> None:
+def test_importing_camtool_loads_its_version_alone() -> None:
     code = "import sys, camtool; dir(camtool); print(*sys.modules)"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
@@ -309,7 +311,8 @@ def test_importing_camtool_loads_nothing_of_it() -> None:
     assert not {module.split(".")[0] for module in loaded} & (
         HEAVY | {"numpy", "msgspec", "click"}
     )
-    assert {module for module in loaded if module.startswith("camtool")} == {"camtool"}
+    ours = {module for module in loaded if module.startswith("camtool")}
+    assert ours == {"camtool", "camtool.version"}
 
 
 def test_an_svg_does_not_load_the_dxf_library() -> None:

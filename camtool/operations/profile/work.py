@@ -19,6 +19,7 @@ from camtool.arrays import Ints
 from camtool.findings import Finding
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, signed_areas
+from camtool.geometry.offset import offset_each, offset_shape
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Polyline,
@@ -125,7 +126,6 @@ def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
 
 def _add_shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set: _Found) -> None:
     """Round a shape of these paths."""
-    from camtool.geometry.offset import offset_shape
     from camtool.planning.reach import cut_away_findings, unreached_findings
 
     lines = chosen.lines.select(path_rows)
@@ -147,7 +147,6 @@ def _add_shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set:
 
 def _add_each(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
     """Round or within each of the closed paths, whatever the others are."""
-    from camtool.geometry.offset import offset_each
     from camtool.planning.reach import cut_away_findings
 
     lines = chosen.lines.select(closed)
@@ -205,8 +204,6 @@ def _missing(
 
 def _offset(shape: Polylines, away_mm: float, setting: Setting) -> Polylines:
     """The lines so far away from a shape, with the joins of the operation."""
-    from camtool.geometry.offset import offset_shape
-
     operation = setting.operation
     return offset_shape(shape, -away_mm, joins=operation.joins, mitre_limit=operation.mitre_limit)
 
