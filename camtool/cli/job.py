@@ -129,6 +129,13 @@ def new(
         parts = [part for each in parts if (part := _ask_kind(each)) is not None]
         if not parts:
             raise OptionError("nothing is left to cut", mend="let one operation cut something")
+    if has_text and not any(
+        is_text(read.sources[row])
+        for each in parts
+        if not each.part.is_left
+        for row in each.part.rows
+    ):
+        text = "skip"  # so that what is not cut is no edge either
     job_text = job_template(read, target, proposal, parts, text if has_text else "")
     write_all({output: job_text.encode()})
     say_findings(read.findings, quiet=quiet, verbose=verbose)

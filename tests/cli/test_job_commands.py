@@ -241,3 +241,20 @@ def test_questions_need_a_terminal(camtool: Run, tmp_path: Path, samples: Path) 
     assert done.returncode == 2
     assert b"--ask needs a terminal: leave it out" in done.stderr
     assert not (tmp_path / "job.toml").exists()
+
+
+def test_a_note_beside_a_part_is_neither_cut_nor_an_edge(camtool: Run, tmp_path: Path) -> None:
+    """Where no text is cut the job skips it: letters that are left would be edges to keep."""
+    (tmp_path / "a.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="60mm" viewBox="0 0 80 60">'
+        '<g fill="none" stroke="#000"><rect x="5" y="5" width="50" height="40"/></g>'
+        '<text x="30" y="47" font-size="5">oboe 2x</text></svg>'
+    )
+    stock = ("--tool-diameter", "3mm", "--thickness", "3mm")
+    done = camtool("job", "new", "a.svg", *stock, "-o", "a.toml")
+    assert b"text beside parts: not cut" in done.stderr
+    assert '\ntext = "skip"' in (tmp_path / "a.toml").read_text(encoding="utf-8")
+    done = camtool("post", "a.svg", "--job", "a.toml", "-t", "linuxcnc", "-o", "a.ngc")
+    assert done.returncode == 0, done.stderr
+    assert b"GOUGE" not in done.stderr
+    assert b"ENTITY_SKIPPED" in done.stderr
