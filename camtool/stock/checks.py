@@ -1,9 +1,10 @@
 """Checks of a program in its stock: depths, what is left, passes, tabs, shank, holder and clamps.
 
-All of them need the moves of the program, and know from the job alone what should be. Depths are
-exact at each point that is looked at: along the axis and the edges of every cut, since nothing is
-cut but by moves; on a lattice over the stock for what is left. The worst of them is then searched
-for around it by branch and bound.
+All of them need the moves of the program, and know from the job alone what should be. First it is
+tried to prove that nothing is too deep, or left (`camtool.stock.proofs`). Where that is not so,
+depths are exact at each point that is looked at: along the axis and the edges of every cut, since
+nothing is cut but by moves; on a lattice over the stock for what is left. The worst of them is
+then searched for around it by branch and bound.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from camtool.planning.naming import operation_name, tool_name
 from camtool.planning.sides import runs_beside
 from camtool.simulation.rows import block_of
 from camtool.stock.before import WHOLE, StockBefore, least_remaining
-from camtool.stock.cut import cut_box
+from camtool.stock.cut import CutStock, cut_box
 from camtool.stock.cutters import cutter_profile
 from camtool.stock.findings import (
     CUT_TOO_DEEP,
@@ -51,7 +52,7 @@ from camtool.stock.findings import (
 from camtool.stock.heights import greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
 from camtool.stock.pieces import BEFORE, LoosePiece, loose_pieces
-from camtool.stock.proofs import JudgedStock
+from camtool.stock.proofs import Gouges, JudgedStock, Leftovers, Trial
 from camtool.stock.wanted import WantedSolid, wanted_solid
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
@@ -71,7 +72,11 @@ EDGE_SHARE = 0.98
 walls, since passes need not lie exactly on each other."""
 
 LATTICE_POINTS = 20_000
-"""Points of the lattice on which material is looked for that is left."""
+"""Points of the lattice on which material is looked for that is left, where it is not proved that
+there is none."""
+
+TRIED_SQUARES = 40_000
+"""Squares of a layer within which a proof must be found."""
 
 SAME_PLACE_MM = 5.0
 """Places of one kind that are nearer to each other than this are one finding."""
@@ -250,8 +255,12 @@ class _Checks:
     def too_deep(self, severity: Severity) -> Iterator[Finding]:
         """Yield CUT_TOO_DEEP for places at which the stock is below the lowest that is allowed."""
 
+        trial = self._tried(Gouges)
+        if trial.holds:
+            return
         gouge_of, upper = self.stock.gouge
-        points = self.cuts.points[self._in_stock(self.cuts.points)]
+        points = np.concatenate([self.cuts.points, [trial.at_mm]])
+        points = points[self._in_stock(points)]
         for place, other_count in self._worst(points, gouge_of(points), gouge_of, upper):
             z, move_index = self.tree.heights(place[None])
             row = int(self.moves.row[move_index[0]])
@@ -275,12 +284,16 @@ class _Checks:
         boxes = [layer.curves.boxes for layer in self.solid.must if len(layer.lines)]
         if not boxes:
             return
+        trial = self._tried(Leftovers)
+        if trial.holds:
+            return
         every = np.concatenate(boxes)
         wide = max(layer.shift_mm for layer in self.solid.must)
         low, high = every[:, :2].min(axis=0) - wide, every[:, 2:].max(axis=0) + wide
         step = math.sqrt(float(np.prod(high - low)) / LATTICE_POINTS)
         x, y = (np.arange(low[k] + 0.5 * step, high[k], step) for k in (0, 1))
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        points = np.concatenate([points, [trial.at_mm]])
         points = points[self._in_stock(points)]
         for place, other_count in self._worst(points, leftover_of(points), leftover_of, upper):
             z, high_z = self.stock.tops(place[None]), self.solid.bands(place[None])[0, 1]
@@ -292,6 +305,16 @@ class _Checks:
                 high=float(high_z),
                 more=other_count,
             )
+
+    def _tried(self, judge: type[Gouges] | type[Leftovers]) -> Trial:
+        """Try whether nothing exceeds the tolerances: then no place needs to be looked at."""
+        distance_mm = min(self.solid.wall_mm, self.deep_mm)
+        if len(self.low) > MAX_CUTS or distance_mm <= 0.0:
+            return Trial(False)
+        box = None if self.request.stock is None else self.request.stock.box_mm
+        stock = CutStock(self.moves, self.tree, box or cut_box(self.moves))
+        judged = judge(stock, self.solid, self.before, TRIED_SQUARES)
+        return judged.tried(distance_mm)
 
     def _worst(
         self,

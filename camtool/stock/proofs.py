@@ -144,7 +144,7 @@ def proved_gouge(
 ) -> Bracket:
     """Bracket the greatest distance, mm, by which slides cut below a wanted solid; one that does
     not exceed the limit is told as that much at most."""
-    return _least_distance(lambda thin_mm: _Gouges(cut(thin_mm), solid, before), limit_mm)
+    return _least_distance(lambda thin_mm: Gouges(cut(thin_mm), solid, before), limit_mm)
 
 
 def proved_leftover(
@@ -152,10 +152,10 @@ def proved_leftover(
 ) -> Bracket:
     """Bracket the greatest distance, mm, by which material stands above what must be cut, as
     `proved_gouge` does."""
-    return _least_distance(lambda thin_mm: _Leftovers(cut(thin_mm), solid, before), limit_mm)
+    return _least_distance(lambda thin_mm: Leftovers(cut(thin_mm), solid, before), limit_mm)
 
 
-def _least_distance(judge: Callable[[float], _Gouges | _Leftovers], limit_mm: float) -> Bracket:
+def _least_distance(judge: Callable[[float], Gouges | Leftovers], limit_mm: float) -> Bracket:
     """Bracket the least distance, mm, of which a trial holds: few moves first, which are cheap."""
     for share in THIN_SHARES:
         judged = judge(max(share * limit_mm, MIN_THIN_MM))
@@ -234,11 +234,18 @@ class _Chords(Struct, frozen=True, eq=False):
         )
 
 
-class _Gouges:
+class Gouges:
     """The moves of a program, and what they may cut."""
 
-    def __init__(self, stock: CutStock, solid: WantedSolid, before: StockBefore) -> None:
+    def __init__(
+        self,
+        stock: CutStock,
+        solid: WantedSolid,
+        before: StockBefore,
+        max_squares: int = MAX_SQUARES,
+    ) -> None:
         self.stock, self.solid, self.before = stock, solid, before
+        self.max_squares = max_squares
         moves = stock.moves
         low = np.minimum(moves.start[:, 2], moves.end[:, 2]) < STOCK_TOP_MM - EPS_MM
         low &= moves.table[moves.tool, 0] > 0.0
@@ -341,7 +348,7 @@ class _Gouges:
             (*low.tolist(), *high.tolist()),
             EPS_MM,
             floor=distance_mm,
-            max_squares=MAX_SQUARES,
+            max_squares=self.max_squares,
             enough_value=distance_mm,
         )
         return _outcome(found, distance_mm)
@@ -396,11 +403,18 @@ def _allows(layer: WantedLayer, chords: _Chords, table: Floats, distance_mm: flo
     return fine
 
 
-class _Leftovers:
+class Leftovers:
     """The stock after a program, and what must be cut of it."""
 
-    def __init__(self, stock: CutStock, solid: WantedSolid, before: StockBefore) -> None:
+    def __init__(
+        self,
+        stock: CutStock,
+        solid: WantedSolid,
+        before: StockBefore,
+        max_squares: int = MAX_SQUARES,
+    ) -> None:
         self.stock, self.solid, self.before = stock, solid, before
+        self.max_squares = max_squares
         # The distances that are known to be enough for each layer.
         self.enough: list[float] = [math.inf] * len(solid.must)
 
@@ -492,7 +506,7 @@ class _Leftovers:
             box,
             EPS_MM,
             floor=distance_mm,
-            max_squares=MAX_SQUARES,
+            max_squares=self.max_squares,
             enough_value=distance_mm,
         )
         return _outcome(found, distance_mm)

@@ -89,7 +89,8 @@ def complaints(asked: Asked, moves: list[Move], findings: Collection[str]) -> li
         found += _gouges(asked, seen, walls, said)
         found += _left(asked, seen, walls, said)
     if asked.tabs is not None:
-        found += _tabs(asked, seen, "TAB_LEFT_OUT" in said)
+        # Where the pass before a finishing pass does not get, no tabs of its own stand.
+        found += _tabs(asked, seen, bool(said & {"TAB_LEFT_OUT", "FINISH_IN_PASSES"}))
     return found
 
 
@@ -341,6 +342,9 @@ def _raised(stay: list[Move], top: float) -> Iterator[Floats]:
             lower = min(points[i, 2], points[j, 2])
             if lower < top - 0.02:
                 yield piece
+    # A finishing pass may begin on a bridge, and end there.
+    if len(low) and low[0] and low[-1] < len(points) - 1:
+        yield np.concatenate([points[low[-1] + 1 :], points[: low[0]]])
 
 
 def _is_whole(asked: Asked, seen: Seen, piece: Floats) -> bool:

@@ -195,6 +195,23 @@ def test_what_is_left_is_found() -> None:
     assert finding.measured >= 0.29
 
 
+def test_what_is_left_between_the_points_of_a_lattice_is_found() -> None:
+    """Two rows of a zigzag leave a sliver of 0.02 mm between them."""
+    operation = Operation(
+        kind="pocket", tool=MILL, depth_mm=2.0, pattern="zigzag", step_over=0.975
+    )
+    plan = plan_of(operation)
+    rows = np.unique(np.round(plan.toolpath.end[:, 1], 3))
+    assert 10.0 in rows
+    assert 6.82 in rows
+    end = plan.toolpath.end.copy()
+    end[np.abs(end[:, 1] - 6.82) < 1e-3, 1] = 5.98
+    finding = one(judged(plan, replace(plan.toolpath, end=end)), StockCode.MATERIAL_LEFT)
+    assert finding.measured == pytest.approx(2.0)
+    assert place_of(finding)[1] == pytest.approx(7.99, abs=0.011)
+    assert judged(plan) == ()
+
+
 def test_a_missing_pass_is_found_with_its_chip() -> None:
     plan = plan_of(Operation(tool=MILL, depth_mm=3.0, step_down_mm=1.0, side="outside"))
     skipped = lowered(plan.toolpath, lambda z: np.where(z == -2.0, -1.0, z))
