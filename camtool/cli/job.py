@@ -261,6 +261,9 @@ def _summary(facts: dict[str, Any]) -> Iterator[str]:
                 f" {takes['points']} points"
             )
             yield from _sides(operation["contours"])
+    for setup in facts.get("setups", ()):
+        yield f"set-up     {setup['words']}"
+        yield f"           cuts {', '.join(setup['operations'])}"
     if "stock_mm" in facts:
         sizes = [f"{size:g}" for size in facts["stock_mm"]["size"] if size is not None]
         yield f"stock      {' by '.join(sizes)} mm{' thick' if len(sizes) == 1 else ''}"

@@ -13,6 +13,8 @@ from camtool.findings import Finding
 from camtool.geometry.facts import drawing_extents
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.planning.gouges import by_uncut
+from camtool.planning.naming import setup_words
+from camtool.planning.pins import with_pins
 from camtool.planning.place import place
 from camtool.planning.sides import Sides, choose, runs_beside
 
@@ -40,6 +42,15 @@ def described(
             "corner": None if stock.corner_mm is None else list(stock.corner_mm),
             "size": [*(stock.size_mm or (None, None)), stock.thickness_mm],
         }
+    if job.setups:
+        facts["setups"] = [
+            {
+                "name": setup.name,
+                "operations": list(setup.operations),
+                "words": setup_words(job.setup(setup.name)),
+            }
+            for setup in job.setups
+        ]
     findings: list[Finding] = []
     if drawing is None:
         return facts, findings
@@ -50,6 +61,7 @@ def described(
     sides = Sides.of(placed_drawing, job, unsaid)
     for operation, row in zip(job.operations, facts["operations"], strict=True):
         selection = choose(placed_drawing, operation, sides)
+        selection = with_pins(selection, placed_drawing, job, operation)
         closed = selection.lines.closed
         row["takes"] = {
             "closed": int(closed.sum()),

@@ -141,10 +141,9 @@ def flip_error_words(*setups: JobSetup) -> str:
 
 
 def pins_of(job: Job) -> tuple[tuple[float, float], ...]:
-    """Return the places of all alignment pins of a part in the frame of one of its set-ups."""
-    if job.setup_of is None:
-        return ()
-    places = dict.fromkeys(pin for setup in job.setup_of[0].setups for pin in setup.pins_mm)
+    """Return the places of all alignment pins of a part in the frame of one of its set-ups, or of
+    the face that is drawn."""
+    places = dict.fromkeys(pin for setup in job.whole.setups for pin in setup.pins_mm)
     return tuple(map(job.placement.turn.point, places))
 
 

@@ -62,6 +62,14 @@ def test_a_new_two_sided_job_is_cut_from_both_faces(
     assert "BACK POCKET 3mm" in job["setups"][1]["operations"]
     assert job["setups"][1]["operations"][-1] == "OUTLINE outer"
     assert job["setups"][0]["operations"][0] == "pins"
+    checked = camtool("job", "check", "hinge.toml", "--against", "hinge.dxf", "--json", "job.json")
+    assert checked.returncode == 0, checked.stderr
+    assert b"set-up     bottom; the other face is up; turned over about" in checked.stdout
+    described = json.loads((tmp_path / "job.json").read_text(encoding="utf-8"))
+    assert described["operations"][0]["takes"]["points"] == 2
+    assert [each["operations"] for each in described["setups"]] == [
+        each["operations"] for each in job["setups"]
+    ]
     flags = ("-t", "grbl", "--job", "hinge.toml", "--spindle", "10000")
     done = camtool("post", "hinge.dxf", *flags, "--json", "all.json")
     assert done.returncode == 0, done.stderr
