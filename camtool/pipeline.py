@@ -160,7 +160,7 @@ def post_drawing(
 
 
 def _post_drawing(drawing: Drawing, job: Job, target: LoadedTarget, posting: _Posting) -> Run:
-    """The program of a job, judged in the stock that is there before it."""
+    """Return the program of a job, judged in the stock as it is before that program runs."""
     from camtool.planning.plan import planned
 
     def plain() -> Run | None:

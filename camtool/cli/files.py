@@ -39,7 +39,7 @@ POLL_S = 0.05
 
 
 def write_all(files: dict[str, bytes]) -> None:
-    """Write each `name: data`; OutputError names the first that cannot be written."""
+    """Write these files, content by name, all or none; OutputError names the first that fails."""
     streams = {name: data for name, data in files.items() if _is_stream(name)}
     staged: list[tuple[Path, Path]] = []
     try:

@@ -55,7 +55,7 @@ class LifeSigns:
 
     @contextmanager
     def hidden(self) -> Iterator[None]:
-        """Show nothing within the block, in which the user is asked."""
+        """Hide the status line within the block, while the user is asked a question."""
         begin, self._begun = self._begun, None
         self.hide()
         try:

@@ -227,7 +227,7 @@ def gap_of(options: ReadOptions) -> float:
 
 
 def heal_contours(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions) -> Healed:
-    """The contours of the cleaned pieces."""
+    """Join the cleaned pieces to contours; arcs are recognised, and overlaps removed."""
     lasting = [pieces[index] for index in clean.piece.tolist()]
     places = [("" if options.across_layers else piece.layer, piece.colour) for piece in lasting]
     tolerance = min(SAME_LINE_MM, options.tolerance_mm)
@@ -344,7 +344,7 @@ class _Joined(Struct, frozen=True, eq=False):
         return segment_numbers(self.vertices, self.begin, self.end)
 
     def of(self, indices: Ints) -> Segments:
-        """These segments."""
+        """Return the segments with these indices (K,)."""
         begin = self.vertices[self.begin[indices]]
         return Segments.between(begin[:, :2], self.vertices[self.end[indices], :2], begin[:, 2])
 

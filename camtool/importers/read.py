@@ -127,7 +127,7 @@ def _standard_input() -> bytes:
 
 
 def file_bytes(path: Path) -> bytes:
-    """The file's content; DrawingError when there is none."""
+    """Return the content of the file; DrawingError where it cannot be read."""
     file = str(path)
     try:
         data = bytes_of(path, MAX_FILE_BYTES)

@@ -424,8 +424,8 @@ def _bands(
 
 
 def rounds_of(verification: Verification) -> tuple[Round, ...]:
-    """The full circles as polar plots show them, each with the number of the same circle in the
-    other direction."""
+    """Return the full circles as polar plots show them, each with the number of the same circle
+    cut in the other direction."""
     from camtool.verification.circles import CirclePairs
 
     circles = verification.circles

@@ -237,7 +237,7 @@ def _extreme(heights: np.ndarray, extreme: np.ufunc) -> np.ndarray:
 
 
 def _notes(solid: Solid, options: PictureOptions) -> tuple[str, ...]:
-    """The size of the stock, the deepest cut, and the greatest difference."""
+    """Return the lines below the title: stock size, deepest cut and greatest difference."""
     left, bottom, right, top = solid.pair.box_mm
     sizes = (right - left, top - bottom, solid.pair.thickness_mm)
     size_text = " × ".join(number(size, 2) for size in sizes)

@@ -277,9 +277,8 @@ def unreached_findings(
     """Return findings of what a tool within the region (on the left of its closed paths) cannot
     touch.
 
-    Feet of corners are not reported where the operation makes reliefs, nor for chamfers, whose
-    bevels are round there. Slots narrower than the
-    tool by `hair_mm` count as reached.
+    Corners are not reported where the operation makes reliefs, nor for chamfers, whose bevels are
+    round there. Slots narrower than the tool by `hair_mm` count as reached.
     """
     radius = setting.operation.wall_radius_mm
     pieces = unreached(region, radius - 0.5 * hair_mm)

@@ -474,7 +474,8 @@ def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
     reach, total = along.reach, along.total_mm
     bend = np.abs(along.turns)
 
-    def turning(min_turn: float) -> Floats:
+    def places_turning(min_turn: float) -> Floats:
+        """Return (K, 2) the lengths, twice, at which the path turns by more than this, rad."""
         lengths = reach[: len(bend)][bend > min_turn]
         if along.path.closed and len(lengths) and lengths[0] == 0.0:
             lengths = np.append(lengths, total)
@@ -487,7 +488,9 @@ def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
         tight = np.zeros(len(segments), dtype=np.bool_)
     arcs = np.column_stack([reach[:-1], reach[1:]])[tight]
     sharply = np.abs(segments.sweep[tight]) > GENTLE_RAD
-    return _Corners(turning(TAB_CORNER_RAD), turning(GENTLE_RAD), arcs, arcs[sharply])
+    return _Corners(
+        places_turning(TAB_CORNER_RAD), places_turning(GENTLE_RAD), arcs, arcs[sharply]
+    )
 
 
 def _half_length(along: MeasuredPath, centre: float, chord: float, room: float) -> float | None:

@@ -95,7 +95,8 @@ def rapid_findings(
     before: StockBefore | None = None,
 ) -> Iterator[Finding]:
     """Yield RAPID_IN_STOCK for the rapids of a program that get farther than a tolerance into what
-    is not cut before them; without the moves of its tools for all below the stock top that may."""
+    is not cut before them. Where the moves of its tools are not known, yield it for each rapid
+    below the stock top that may do so."""
     if moves is None:
         rapids = low_rapids(decoded)
     else:

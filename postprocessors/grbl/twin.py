@@ -1947,7 +1947,8 @@ def _trapezoid(
 
 
 def _slow_down(distance: float, v: float, a: float) -> list[Phase]:
-    """Return the phases of slowing down all along, to rest or over `distance` mm."""
+    """Return the phase in which the speed v falls at the rate a: to rest, or over `distance`
+    mm."""
     end = float(np.sqrt(max(v * v - 2.0 * a * distance, 0.0)))
     return [((v - end) / a, v, -a)] if v > 0.0 else []
 

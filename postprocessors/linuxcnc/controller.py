@@ -370,7 +370,7 @@ def _speeds(
     path_lengths = _in_turns(corners.length, np.maximum(own_length, 0.0, out=own_length))
     lasting = np.zeros(len(path_lengths), dtype=np.bool_)
     lasting[places] = path_lengths[places] > MIN_LENGTH_MM
-    along, fastest = _along_moves(moves, modes, corners)
+    along, fastest = _tangential_limits(moves, modes, corners)
     entry_speed = np.where(corners.length > 0.0, np.inf, corners.speed)
     entered = np.minimum(entry_speed, np.where(moves.last, np.sqrt(along * own_length), np.inf))
     return lasting, SpeedPlan(
@@ -404,12 +404,13 @@ def _in_turns(blends: Floats | float, moves: Floats) -> Floats:
     return values
 
 
-def _along_moves(
+def _tangential_limits(
     moves: PlannerMoves, modes: CornerModes, corners: PlannerCorners
 ) -> tuple[Floats, Floats]:
-    """(M,) mm/s² along the moves, less what bends at their ends and a last stop take; and (M,)
-    mm/s, how fast arcs may be with that. An arc before a wait was never finished for its next
-    move, and keeps half for turning."""
+    """Return the acceleration (M,) along each move, mm/s², without the shares that kinks at its
+    ends and a last stop take, and the highest speed (M,) of arcs with it, mm/s. Of an arc before a
+    wait half of the acceleration is kept for turning: the planner never finishes it for a next
+    move."""
     lost_share = np.maximum(corners.lost_share, np.append(corners.lost_share[1:], 0.0))
     last = moves.last
     overlapped = corners.overlap > 0.0

@@ -266,7 +266,7 @@ class _Reader:
         return feed
 
     def _event(self, code: str, letters: str, match: re.Match[str], index: int) -> None:
-        """All other codes. G90 is always in force here and gives no row."""
+        """Add the row of a block that is no move. G90 is always in force here and gives no row."""
         x, y, z = self.path.position
         zero_x, zero_y, zero_z = self._zero
         if code == "G90":

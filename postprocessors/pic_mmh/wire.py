@@ -243,8 +243,8 @@ class PicMmhConversation(PacketByPacket):
 
     @property
     def _silence_s(self) -> float:
-        """Return the silence, s, after which the packet counts as done. All reports of a jog have
-        come when its steps have; the steps of homing are not known."""
+        """Return how long nothing may come before the packet counts as done, s. A jog is done with
+        the report of its last step; how many steps homing takes is not known."""
         packet = self.packets[self.sent - 1]
         complete = packet.seconds > 0.0 and self._count >= packet.counts[1]
         return SILENCE_FACTOR * self.manner.late_s + (0.0 if complete else self._reverses_s)

@@ -230,7 +230,7 @@ class _Pieces:
         return angles[self._arc_rows]
 
     def _check_arcs(self, toolpath: Toolpath) -> None:
-        """ProgramError for arcs that it cannot count."""
+        """Raise ProgramError for arcs whose steps the controller cannot count."""
         rows = self._arc_rows
         centre, starts = toolpath.centre[rows], toolpath.starts_of(rows)
         reach = np.abs(centre) + np.abs(centre - starts[:, :2]).max(axis=1)[:, None]

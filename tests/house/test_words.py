@@ -23,6 +23,14 @@ CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILI
 MAX_QUESTIONS = 1
 MAX_SHARED_CLASS_NAMES = 0
 MAX_SUPERLATIVES = 0
+MAX_RIDDLES = 175
+
+RIDDLE = re.compile(
+    r"_*(?:found|made|way|most|asked|kept|held|said|apart|whole|mine|theirs|taken|known|about|on|left"
+    r"|told|wanted|given|here|there|those|many|much|least|beside|beyond)_*"
+)
+"""Prepositions, participles and pronouns that do not say what a value is; the side `left` of a box
+does."""
 
 
 @functools.cache
@@ -67,6 +75,20 @@ def superlatives(path: str, source: str) -> list[str]:
     return [f"{path}: {name}" for name in names if SUPERLATIVE.match(name)]
 
 
+def riddles(path: str, source: str) -> list[str]:
+    """Return the parameters and locals of functions, each once, that do not say what they are."""
+    if path.endswith(".pyx"):
+        return []
+    names = set()
+    for function in (node for node in nodes_of(source) if isinstance(node, FUNCTION)):
+        for node in ast.walk(function):
+            match node:
+                case ast.arg(arg=name) | ast.Name(id=name, ctx=ast.Store()):
+                    if RIDDLE.fullmatch(name):
+                        names.add(f"{path}: {function.name}: {name}")
+    return sorted(names)
+
+
 def shared_class_names(texts: dict[str, str]) -> list[str]:
     """Return the names that two public classes or more have."""
     counts = Counter(
@@ -94,6 +116,11 @@ def test_bounds_are_called_max_and_min() -> None:
     assert len(found) <= MAX_SUPERLATIVES, "\n".join(found)
 
 
+def test_names_of_values_are_nouns() -> None:
+    found = [line for each in sources().items() for line in riddles(*each)]
+    assert len(found) <= MAX_RIDDLES, "\n".join(found)
+
+
 def test_the_rules_can_be_broken() -> None:
     text = 'def f():\n    """Which one."""\n\n\ndef g():\n    """Return one."""\n'
     assert questions("a.py", text) == ["a.py: Which one."]
@@ -101,5 +128,7 @@ def test_the_rules_can_be_broken() -> None:
     text = "MOST_MM = 1\nMAX_MM = 1\n_LEAST: int = 2\nLEASTWISE = 3\n"
     assert superlatives("a.py", text) == ["a.py: MOST_MM", "a.py: _LEAST"]
     assert superlatives("a.pyx", "cdef double MOST_MM = 1\n") == ["a.pyx: MOST_MM"]
+    text = "def f(way, x):\n    left, y = x\n    return [found for found in y]\n"
+    assert riddles("a.py", text) == ["a.py: f: found", "a.py: f: left", "a.py: f: way"]
     same = "class A:\n    pass\n\n\nclass _B:\n    pass\n"
     assert shared_class_names({"a.py": same, "b.py": same}) == ["A"]

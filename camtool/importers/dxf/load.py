@@ -165,7 +165,7 @@ def _check_whole(tags: Tags, frame: DxfSections, file: str) -> list[str]:
         raise DrawingError("is no DXF: it has no section", file=file, mend=AGAIN)
     if frame.eof is not None:
         return []
-    if not frame.whole("ENTITIES"):
+    if not frame.is_complete("ENTITIES"):
         damaged = "" if tags.is_text else " or damaged"
         raise DrawingError(
             f"is cut off{damaged}: the end mark EOF is missing",

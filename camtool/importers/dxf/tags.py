@@ -206,15 +206,15 @@ class DxfSections(Struct, frozen=True):
     eof: int | None
     faults: tuple[str, ...]
 
-    def whole(self, name: str) -> bool:
+    def is_complete(self, name: str) -> bool:
         """True if there is a section of this name, and each of that name has its end."""
         ends = [part.end for part in self.sections if part.name == name]
         return bool(ends) and None not in ends
 
 
 def binary_tags(data: bytes, file: str) -> Tags:
-    """The tags of binary DXF up to its end mark, or to where they end to be tags; DrawingError
-    when a group code is none."""
+    """Return the tags of binary DXF up to its end mark, or to the first bytes that are no tag;
+    DrawingError for a value that is no group code."""
     from ezdxf.lldxf.tagger import binary_tags_loader
 
     codes: list[int] = []

@@ -134,6 +134,7 @@ def _parser(builder: _Builder, data: bytes) -> Any:
 
         def defused_entity_decl(self, name: str, is_parameter: bool, value: str | None,
                                 *outside: str | None) -> None:  # fmt: skip
+            """Accept a short internal entity of plain text; refuse every other one."""
             text = value or ""
             is_safe = len(text) <= MAX_ENTITY_SIGNS and not any(sign in text for sign in "&<%")
             if not (entities and is_safe) or is_parameter or value is None:
