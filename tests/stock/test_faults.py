@@ -16,7 +16,7 @@ from camtool.api import read_job
 from camtool.findings import Finding
 from camtool.importers.read import read_drawing
 from camtool.pictures.colours import GAP, channels
-from camtool.pictures.draw import draw, render
+from camtool.pictures.draw import draw, png
 from camtool.pictures.options import PictureOptions
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job
@@ -27,6 +27,7 @@ from tests.oracles.png import decode
 SAMPLES = Path(__file__).parents[2] / "samples"
 JOB = (SAMPLES / "plate.toml").read_text()
 WINDOW_MM = 12.0
+SIZE_PX = 240
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def found_in(run: Run, code: str) -> list[Finding]:
 def is_marked(run: Run, x: float, y: float, view: str) -> bool:
     """True if a picture of the place has a ring in its middle, in its SVG and in its pixels."""
     half = 0.5 * WINDOW_MM
-    options = PictureOptions(size_px=400, view=view, crop_mm=(x - half, y - half, 12.0, 12.0))
+    options = PictureOptions(size_px=SIZE_PX, view=view, crop_mm=(x - half, y - half, 12.0, 12.0))
     svg = draw(run.scene(), options)
     stock = re.search(r'<image id="stock"([^>]*)>', svg)
     assert stock is not None
@@ -150,7 +151,7 @@ def is_marked(run: Run, x: float, y: float, view: str) -> bool:
     middle = left + 0.5 * wide, top + 0.5 * high
     group = re.search(r'<g id="faults"[^>]*>(.*?)</g>', svg, re.DOTALL)
     rings = re.findall(r'cx="([\d.]+)" cy="([\d.]+)" r="([\d.]+)"', group[1] if group else "")
-    pixels = decode(render(run.scene(), "a.png", options))[..., :3].astype(int)
+    pixels = decode(png(svg, SIZE_PX))[..., :3].astype(int)
     page = float(re.findall(r'viewBox="0 0 ([\d.]+)', svg)[0])
     scale = pixels.shape[1] / page
     for cx, cy, r in rings:
