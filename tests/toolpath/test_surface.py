@@ -184,7 +184,7 @@ def test_a_program_follows_its_surface() -> None:
     surface = Surface(nodes, nodes, np.random.default_rng(1).normal(0.0, 0.1, (5, 5)))
     grbl = load_target("grbl")
     program = (
-        b"G21 G90\nM3 S1000\nG0 X1 Y1 Z3\nG1 Z-0.2 F100\nX9 Y2\nG2 X20 Y12 I4 J7\nG0 Z3\nM5\nM30\n"
+        b"G21 G90\nM3 S1000\nG0 X1 Y1 Z3\nG1 Z-0.2 F100\nX9 Y2\nG2 X19 Y12 I5 J5\nG0 Z3\nM5\nM30\n"
     )
     run = convert_program(program, grbl, grbl, file="part.nc", surface=surface)
     assert run.decoded is not None
