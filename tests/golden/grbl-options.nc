@@ -1,7 +1,8 @@
 N1 G17 G21 G90 G94
 N2 G54
 (stop: mount tool 1)
-(set its tip to Z 0 mm or zero Z again - then start)
+(zero Z on top of the stock at X0 Y0 - not cut yet)
+(or set its tip to Z 0 mm here - then start)
 N3 T1 M0
 N4 M3 S1200
 N5 G4 P2
