@@ -98,7 +98,8 @@ class _SentDrawings:
         return bool(self._queue or self._busy)
 
     def send(self, max_busy: int) -> Iterator[tuple[DrawingTask, Outputs]]:
-        """Send drawings until the cluster has `max_busy`; yield the errors of unreadable ones."""
+        """Send drawings until `max_busy` of them are sent and not answered, or none remains; yield
+        the tasks whose drawings cannot be read, with the error in their outputs."""
         from camtool.importers.read import file_bytes
 
         while self._queue and len(self._busy) < max_busy:

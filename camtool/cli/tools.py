@@ -159,7 +159,7 @@ def _derived(tool: Tool, preset: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _summary(name: str, described: Described) -> str:
-    """Return `tool 1, end mill 3.175 mm, 2 flutes; for plywood, mdf`."""
+    """Return one line about a tool, such as `tool 1, end mill 3.175 mm, 2 flutes; for plywood`."""
     from camtool.planning.naming import tool_words
 
     tool = _tool(name, described)

@@ -222,9 +222,10 @@ class Nodes(Struct, frozen=True, eq=False):
 
 
 def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
-    """Nodes of the curve, begun with at least `steps` steps; one node when the curve is a point.
+    """Return places of the curve with their tangents: at least `steps` of them, and so many more
+    that the curve between two of them is known within the tolerance; one for a point.
 
-    Raises GeometryError when the breaks do not rise or the curve is not finite.
+    Raises GeometryError when the curve's parameters do not rise or its points are not finite.
     """
     breaks = np.asarray(curve.breaks, dtype=np.float64)
     if len(breaks) < 2 or not np.isfinite(breaks).all() or not (np.diff(breaks) > 0.0).all():

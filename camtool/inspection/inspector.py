@@ -145,8 +145,8 @@ class Inspector:
         return sizes
 
     def _edges(self, variant: MachineVariant) -> dict[int, Floats]:
-        """Compute the position of the edge of each cut on a variant of the machine, by its
-        `id`."""
+        """Compute the machined edge (L, S) mm of each cut on a variant of the machine, as
+        `edge_at` does; the keys are the `id` of the cuts."""
         if not any(each.cuts for each in self.dimensions):
             return {}
         cached = self._edges_of

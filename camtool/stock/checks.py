@@ -499,7 +499,7 @@ class _Checks:
             yield FLOOR_LEFT(where=place, measured=max(-least.low, 0.0), other=other)
 
     def _is_part(self, piece: LoosePiece) -> bool:
-        """True if the innermost contour round most of a piece is the outline of a part."""
+        """True if more than half of a piece has the outline of a part as its innermost contour."""
         contours = self.request.contours
         if not len(contours):
             return False

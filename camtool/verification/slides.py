@@ -388,8 +388,8 @@ class TraceSize(Struct, frozen=True, eq=False):
 
 
 def trace_size(decoded: Toolpath, spacing_mm: float, max_points: int) -> TraceSize:
-    """Return a stride for samples about `spacing_mm` apart that keeps about half of `max_points`
-    points."""
+    """Return which samples of the slides' path are kept, when these are `spacing_mm` apart: each
+    n-th, so that about half of `max_points` are kept and twice as long a path has room."""
     if max_points == 0:
         return TraceSize(decoded.start[None, :2], 0, 1)
     lengths = row_lengths(decoded)

@@ -314,7 +314,7 @@ class GrblParser:
         return group
 
     def _probe_word(self, block: GrblBlock, hundredths: int, column: int) -> str:
-        """Set what G38.2 to G38.5 say; its group."""
+        """Store the probing motion of G38.2 to G38.5 in the block, and return the modal group."""
         raise LineFault("G38 probes, which cannot be simulated", column)
 
     def _plain_g_word(

@@ -100,7 +100,7 @@ class PulseTimes:
         return np.column_stack([both_s, longer_s - both_s])
 
     def _run_s(self, pulses: Ints) -> Floats:
-        """(N,) s for runs of pulses."""
+        """Return the times (N,), s, of runs of so many pulses (N,), each with its ramps."""
         if self._firmware.high_byte == "256":
             return self._burst_s(pulses)
         bursts = pulses // BURST_PULSES
@@ -108,6 +108,7 @@ class PulseTimes:
         return np.asarray(bursts * burst_s + self._burst_s(pulses - BURST_PULSES * bursts))
 
     def _burst_s(self, pulses: Ints) -> Floats:
-        """(N,) s with one ramp up and one down, from 90 pulses on."""
+        """Return the times (N,), s, of so many pulses (N,) with one ramp up and one down, which
+        there are from 90 pulses on."""
         ramped = 2.0 * self._ramp_s + (pulses - 2 * RAMP_PULSES) * self.periods_s[-1]
         return np.asarray(np.where(pulses < 2 * RAMP_PULSES, pulses * self.periods_s[0], ramped))

@@ -121,7 +121,8 @@ def _streams(jobs: Sequence[ReadJob], data: bytes, machine: MatlabRouterMachine)
 
 
 def _numbers(job: ReadJob, first: Ints, line: int) -> JobNumbers:
-    """A job from one of its lines (from 0) on, which begins at a point (2,)."""
+    """Return the numbers that are sent for the rest of a job: from `line` (counted from 0) on,
+    beginning at the point `first` (2,), in counts."""
     points = np.column_stack([first, first[:, None] + job.steps[:, line:].cumsum(axis=1)])
     x, y = first.tolist()
     lengths, speeds = job.length[:, line:].tolist(), job.speed[:, line:].tolist()

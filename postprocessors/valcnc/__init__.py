@@ -78,7 +78,7 @@ class Valcnc(Target):
         return ValcncTwin(machine, settings)
 
     def listing(self, data: bytes, machine: ValcncMachine) -> Listing:
-        """The lines that are blocks."""
+        """Return the texts of the lines that are blocks, for pages that show them."""
         from ..gcode.blocks import listing
 
         return listing(data)

@@ -48,7 +48,8 @@ _NO_SCRIPT = (".step", ".stp", ".brep", ".brp")
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
-    """The Drawing of a solid model; DrawingError when it cannot be read, or is not cut."""
+    """Read a solid model and return its section, or its outline, as a Drawing. DrawingError when
+    it cannot be read, or when the plane of the section does not meet it."""
     kind, unit = _kind(data, file, options)
     scale = unit.scale(options, file)
     height = None if options.section_z_mm is None else options.section_z_mm / scale
