@@ -95,7 +95,7 @@ def stages_picture() -> Scene:
             )
         ],
         "2-4. sliced, too near": pieces(elements, stages.slices[~stages.valid]),
-        "5. kept": pieces(elements, stages.kept),
+        "5. kept": pieces(elements, stages.final_slices),
     }
     layers = tuple(name for name, paths in groups.items() for _ in paths)
     drawing = Drawing(

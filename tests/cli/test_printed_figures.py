@@ -118,7 +118,7 @@ def toml_of(case: Case) -> str:
         lines += [f'side = "{asked.side}"']
     if asked.kind in ("profile", "pocket"):
         lines += [f"allowance = {asked.allowance}"]
-    if case.finish:
+    if case.finish and "finish_mm" not in own:
         lines += [f"finish = {case.finish}"]
     lines += [line for key, value in own.items() for line in _key(key, value)]
     return "\n".join(lines) + "\n"
