@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
 from camtool.findings import Finding
 from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.geometry.turn import Turn
 from camtool.inspection.depths import Z_WEIGHT, Floor, FloorDepths, Floors, depths_of
 from camtool.inspection.dimensions import DEPTHS, Dimension
-from camtool.inspection.features import BoundDimension, EdgeFeature, bind, features_of
+from camtool.inspection.features import BoundDimension, EdgeFeature, Feature, bind, features_of
 from camtool.inspection.findings import (
     DIMENSION_NOT_CUT,
     DIMENSION_NOT_CUT_ACROSS,
@@ -38,6 +40,7 @@ from camtool.inspection.sizes import (
     rows_of,
     size_of,
     sizes_of,
+    stations_of,
 )
 from camtool.inspection.uncertainty import (
     MachineVariant,
@@ -46,6 +49,7 @@ from camtool.inspection.uncertainty import (
     without_scatter,
 )
 from camtool.machine.model import Axis, Machine
+from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, JobSetup, Tool
 from camtool.planning.naming import flip_error_words
 from camtool.planning.place import SCALE_SHARE, placements
@@ -88,9 +92,96 @@ class Inspected(Struct, frozen=True, eq=False):
         return name if self.copy is None else f"{name}, copy {self.copy + 1}"
 
 
+class _FarCut(Struct, frozen=True, eq=False):
+    """A feature that another set-up cuts: the inspector of that set-up, the feature and its cut in
+    the frame there, and the map from there into the frame of the dimensions."""
+
+    inspector: Inspector
+    feature: Feature
+    cut: Cut
+    turn: Turn
+
+    def to_here(self, placed: Feature) -> Cut:
+        """Return the cut in the frame of the dimensions, where the feature is `placed`."""
+        mirrored = isinstance(placed, EdgeFeature) and self.turn.is_over
+        side = -self.cut.side if mirrored else self.cut.side
+        stations, seen = stations_of(placed, side), self.stations_here(self.cut.seen)
+        return replace(self.cut, side=side, stations=stations, seen=seen)
+
+    def stations_here(self, values: Floats | Bools) -> Any:
+        """Return values (L, S) of stations in the order of the stations in the frame of the
+        dimensions: those of an edge begin at the same end, those of a circle at its right."""
+        if isinstance(self.feature, EdgeFeature):
+            return values
+        spokes = (self.cut.side * self.cut.stations.normals) * np.array(self.turn.signs)
+        angle = np.mod(np.arctan2(spokes[:, 1], spokes[:, 0]), 2.0 * math.pi)
+        here = np.rint(angle / self.cut.stations.wide - 0.5).astype(np.int64) % len(angle)
+        moved = np.empty_like(values)
+        moved[:, here] = values
+        return moved
+
+    def edges(self, machine: Machine, wider_mm: float) -> Floats:
+        """Return the machined edge (L, S) mm in the frame of the dimensions; left of an edge is
+        its right in a frame that is turned over."""
+        slides = self.inspector.slides(machine).wider(0.5 * wider_mm)
+        edges = edge_at(self.feature, self.cut, rows_of(slides, self.cut, self.feature))
+        mirrored = isinstance(self.feature, EdgeFeature) and self.turn.is_over
+        return np.asarray(self.stations_here(-edges if mirrored else edges))
+
+
+class _OtherSetups:
+    """The other set-ups of a part, each posted when a dimension first needs it; `cuts` are the
+    cuts that were found there, by their `id` in the frame of the dimensions."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._inspectors: dict[str, Inspector | None] = {}
+        self.cuts: dict[int, _FarCut] = {}
+        self.setups: list[JobSetup] = []
+
+    def cut_of(self, drawn: Feature, placed: Feature, copy: int) -> Cut | None:
+        """Return the cut of a feature that another set-up cuts; None if none does."""
+        run, setup = self._run, _setup_that_cuts(self._run, drawn.path)
+        if setup is None:
+            return None
+        assert run.job is not None
+        assert run.job.setup_of is not None
+        assert run.drawing is not None
+        job = run.job.setup_of[0].setup(setup.name)
+        if setup.name not in self._inspectors:
+            other = post_drawing(run.drawing, job, run.target)
+            judged = other.verification is not None and other.decoded is not None
+            self._inspectors[setup.name] = Inspector(other, ()) if judged else None
+        inspector = self._inspectors[setup.name]
+        if inspector is None:
+            return None
+        feature = drawn.in_work_frame(placements(run.drawing, job)[copy])
+        cut = cut_of(feature, inspector.wanted_moves)
+        if cut is None:
+            return None
+        turn = job.placement.turn.back.then(run.job.placement.turn)
+        far_cut = _FarCut(inspector, feature, cut, turn)
+        here = far_cut.to_here(placed)
+        self.cuts[id(here)] = far_cut
+        if setup not in self.setups:
+            self.setups.append(setup)
+        return here
+
+    @property
+    def flip_errors_mm(self) -> list[float | None]:
+        """Greatest distances, mm, by which the set-ups that are turned over may lie beside the
+        first face: of all that cut a feature, this one too; None for one that is not known."""
+        assert self._run.job is not None
+        if not self.setups or self._run.job.setup_of is None:
+            return []
+        both = [*self.setups, self._run.job.setup_of[1]]
+        return [each.flip_error_mm for each in both if each.flip is not None]
+
+
 class Inspector:
     """Measure the dimensions of the part that the program of a run makes. `dimensions` can be
-    measured; `findings` say why the others cannot."""
+    measured; `findings` say why the others cannot. A feature that another set-up of the part cuts
+    is measured as that set-up cuts it."""
 
     def __init__(self, run: Run, dimensions: Iterable[Dimension]) -> None:
         """Take a run with a drawing, a job and a verification. Raises OptionError if its job
@@ -103,15 +194,17 @@ class Inspector:
         wanted_moves = run.verification.wanted
         self._follows = run.verification.follows.astype(np.int64)
         self._tool = ToolAt(wanted_moves.toolpath, run.job, tool_mm(run.job))
-        moves = swept_moves(wanted_moves, self._tool)
+        self.wanted_moves = swept_moves(wanted_moves, self._tool)
+        """The wanted moves, in the work frame."""
         self._points = _points(wanted_moves)
         self._last: tuple[Machine, SweptSegments] | None = None
         self._edges_of: tuple[Machine, float, dict[int, Floats]] | None = None
         self._job = run.job
         self._depths_by_z: dict[Axis, dict[int, FloorDepths | None]] = {}
         not_inspected: list[tuple[Dimension, Finding]] = []
+        self._others = _OtherSetups(run)
         self.dimensions: tuple[Inspected, ...] = tuple(
-            _inspected(run, dimensions, moves, not_inspected)
+            _inspected(run, dimensions, self.wanted_moves, self._others, not_inspected)
         )
         self._leave_out_narrow_floors(not_inspected)
         self.left_out = tuple(not_inspected)
@@ -151,9 +244,13 @@ class Inspector:
             return {}
         cached = self._edges_of
         if cached is None or cached[0] is not variant.machine or cached[1] != variant.wider_mm:
-            slides = self._slides(variant.machine).wider(0.5 * variant.wider_mm)
+            slides = self.slides(variant.machine).wider(0.5 * variant.wider_mm)
             edges = {
-                id(cut): edge_at(feature, cut, rows_of(slides, cut, feature))
+                id(cut): (
+                    self._others.cuts[id(cut)].edges(variant.machine, variant.wider_mm)
+                    if id(cut) in self._others.cuts
+                    else edge_at(feature, cut, rows_of(slides, cut, feature))
+                )
                 for feature, cut in {
                     id(cut): (feature, cut)
                     for each in self.dimensions
@@ -161,7 +258,16 @@ class Inspector:
                 }.values()
             }
             cached = self._edges_of = variant.machine, variant.wider_mm, edges
-        return cached[2]
+        if not self._others.cuts or not any(variant.beside_mm):
+            return cached[2]
+        by_mm = np.array(variant.beside_mm)
+        cuts = {id(cut): cut for each in self.dimensions for cut in each.cuts}
+        return {
+            key: edges + cuts[key].side * cuts[key].stations.normals @ by_mm
+            if key in self._others.cuts
+            else edges
+            for key, edges in cached[2].items()
+        }
 
     def values(self, variant: MachineVariant) -> Floats:
         """Compute best fit, least and largest local size (3 D,) mm of each of D dimensions."""
@@ -255,11 +361,18 @@ class Inspector:
         return any(each.floor is not None for each in self.dimensions)
 
     @property
+    def flip_errors_mm(self) -> list[float | None]:
+        """Greatest distances, mm, by which the set-ups of features may lie beside each other: one
+        for each that is turned over, where a dimension has features of two; None if not known."""
+        return self._others.flip_errors_mm
+
+    @property
     def tool_diameter_mm(self) -> float:
         """Diameter of the widest tool; 0 if none has a width."""
-        return 2.0 * float(self._tool.radius.max(initial=0.0))
+        far = [each.inspector.tool_diameter_mm for each in self._others.cuts.values()]
+        return max([2.0 * float(self._tool.radius.max(initial=0.0)), *far])
 
-    def _slides(self, machine: Machine) -> SweptSegments:
+    def slides(self, machine: Machine) -> SweptSegments:
         """Simulate the path of the slides of this machine for the program."""
         cached = self._last
         if cached is None or cached[0] is not machine:
@@ -300,6 +413,7 @@ def _inspected(
     run: Run,
     dimensions: Iterable[Dimension],
     moves: SweptSegments,
+    others: _OtherSetups,
     not_inspected: list[tuple[Dimension, Finding]],
 ) -> Iterable[Inspected]:
     assert run.drawing is not None
@@ -338,6 +452,14 @@ def _inspected(
                 if key not in cuts_by_feature:
                     cuts_by_feature[key] = cut_of(feature, moves)
                 cuts.append(cuts_by_feature[key])
+            if any(cuts):
+                # A dimension of other set-ups alone is inspected there.
+                cuts = [
+                    cut or others.cut_of(drawn, feature, copy)
+                    for cut, drawn, feature in zip(
+                        cuts, bound.features, placed_bound.features, strict=True
+                    )
+                ]
             candidate = Inspected(
                 placed_bound, tuple(filter(None, cuts)), copy if len(maps) > 1 else None
             )

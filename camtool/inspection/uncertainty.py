@@ -60,7 +60,7 @@ whose scale or squareness depend on the place.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
@@ -110,7 +110,8 @@ CERTAIN = 1e-12
 @dataclass(frozen=True)
 class MachineVariant:
     """A machine that differs from the one in the file, with a tool that is wider by `wider_mm`
-    than in the job, cuts deeper by `deeper_mm`, and has a stock that is thicker by `thicker_mm`.
+    than in the job, cuts deeper by `deeper_mm`, and has a stock that is thicker by `thicker_mm`;
+    features of other set-ups lie `beside_mm` (x, y) of their places.
     Variants of these alone share the machine object of the original, so that its motion is not
     simulated again."""
 
@@ -118,6 +119,7 @@ class MachineVariant:
     wider_mm: float = 0.0
     deeper_mm: float = 0.0
     thicker_mm: float = 0.0
+    beside_mm: tuple[float, float] = (0.0, 0.0)
 
 
 STEP_IN_BENDS = math.sqrt(3.0)
@@ -239,9 +241,16 @@ class Inputs(Struct, frozen=True, dict=True):
 # From a machine to its inputs.
 
 
-def inputs_of(machine: Machine, tool_diameter_mm: float, *, depths: bool = False) -> Inputs:
+def inputs_of(
+    machine: Machine,
+    tool_diameter_mm: float,
+    *,
+    depths: bool = False,
+    flip_errors_mm: Sequence[float | None] = (),
+) -> Inputs:
     """Collect the uncertain inputs of this machine with a tool of this diameter (0: no width);
-    with `depths` those of Z and of the stock too.
+    with `depths` those of Z and of the stock too. `flip_errors_mm`: how far set-ups may lie beside
+    each other, one for each that is turned over (None: not known).
 
     What nothing depends on is left out: the uncertainty of a compensation of 0, that of a tool
     without width, and scatter that is not modelled. Sizes are predicted without scatter.
@@ -268,6 +277,8 @@ def inputs_of(machine: Machine, tool_diameter_mm: float, *, depths: bool = False
         inputs.append(length("z_zero_mm", 0.0, stated.z_zero_mm, (lower, 1.0)))
         thickness = length("stock_thickness_mm", 0.0, stated.stock_thickness_mm, (thicker, 1.0))
         inputs.append(thickness)
+    if flip_errors_mm:
+        inputs += _flip_inputs(flip_errors_mm)
     for name, axis, standards, cells in axes:
         plays = [play for row in cells.play_mm for play in row] if cells else [axis.backlash_mm]
         scale = Direction(f"{name}.scale", _with_scale(name), distorts=True)
@@ -312,6 +323,21 @@ def _input(
 ) -> Input:
     missing = (name,) if standard is None else ()
     return Input(name, unit, value, standard, probe, along, edges, missing)
+
+
+def _flip_inputs(errors_mm: Sequence[float | None]) -> Iterator[Input]:
+    """Yield the inputs of a part that is turned over, in X and in Y. `flip_error` is a bound, so
+    all that lies within counts as equally likely: 1/√3 of it is the standard uncertainty (JCGM
+    100:2008, 4.3.7)."""
+    known = [each for each in errors_mm if each is not None]
+    standard = None
+    if len(known) == len(errors_mm):
+        standard = math.sqrt(sum(each * each for each in known) / 3.0)
+    missing = () if standard is not None else ("flip_error",)
+    for column, axis in enumerate("xy"):
+        direction = Direction(f"flip.{axis}", _with_flip(column))
+        name = f"flip_error.{axis}"
+        yield Input(name, "mm", 0.0, standard, PROBE_MM, ((direction, 1.0),), missing=missing)
 
 
 def _temperature(machine: Machine) -> Input:
@@ -407,6 +433,15 @@ def _with_tool(variant: MachineVariant, by_mm: float) -> MachineVariant:
 
 def _with_depth(variant: MachineVariant, by_mm: float) -> MachineVariant:
     return replace(variant, deeper_mm=variant.deeper_mm + by_mm)
+
+
+def _with_flip(column: int) -> Moved:
+    def shift_face(variant: MachineVariant, by_mm: float) -> MachineVariant:
+        x, y = variant.beside_mm
+        beside_mm = (x, y + by_mm) if column else (x + by_mm, y)
+        return replace(variant, beside_mm=beside_mm)
+
+    return shift_face
 
 
 def _with_stock(variant: MachineVariant, by_mm: float) -> MachineVariant:

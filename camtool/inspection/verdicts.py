@@ -137,7 +137,12 @@ def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Fi
     feature the slides leave, or may leave on a machine that differs by an uncertainty."""
     if not inspector.dimensions:
         return
-    inputs = inputs_of(run.target.machine, inspector.tool_diameter_mm, depths=inspector.has_depths)
+    inputs = inputs_of(
+        run.target.machine,
+        inspector.tool_diameter_mm,
+        depths=inspector.has_depths,
+        flip_errors_mm=inspector.flip_errors_mm,
+    )
     budget = propagate(
         inspector.machined, inputs, inspector.edges, measure=inspector.measured, extremes=True
     )

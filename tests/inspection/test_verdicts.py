@@ -407,7 +407,7 @@ def test_every_depth_counts(plate: Path) -> None:
         for cut in each.cuts:
             assert len(cut.levels_mm) == 4
     # Slide by slide, of the moves of each depth and below: the extremes are among them.
-    slides = inspector._slides(run.target.machine)
+    slides = inspector.slides(run.target.machine)
     for index, each in enumerate(inspector.dimensions):
         sizes = []
         for level in (math.inf, -2.0, -3.0, -4.0):
