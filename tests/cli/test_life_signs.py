@@ -93,14 +93,20 @@ def test_a_share_is_known_where_the_count_is() -> None:
 
 
 SLOWLY = """
-import sys
+import sys, time
 from camtool.cli import life_signs
+from camtool.progress import Progress
 life_signs.AFTER_S, life_signs.EVERY_S = 0.0, 0.001
+begin = Progress.begin
+def begin_slowly(self, *words):
+    begin(self, *words)
+    time.sleep(0.05)
+Progress.begin = begin_slowly
 from camtool.cli.main import main
 sys.argv[0] = "camtool"
 main()
 """
-"""camtool as if every second were a thousandth."""
+"""camtool as if every second were a thousandth; each stage lasts long enough to be seen."""
 
 
 def on_terminal(*arguments: str, folder: Path) -> bytes:
