@@ -217,9 +217,6 @@ class Inspector:
 
         `left_mm`: additional allowance on the walls of these paths of the drawing. The path of the
         tool and the edge that it cuts move outwards by it.
-
-        `left_mm`: if so much more is left on the walls of these paths of the drawing. The tool's
-        path lies so much farther from them then, and so does the edge that it cuts.
         """
         edges = self._edges(variant or MachineVariant(self._target.machine))
         allowances = left_mm or {}

@@ -55,7 +55,7 @@ class Message(Struct, frozen=True):
 
 
 class MachineState(Struct, frozen=True):
-    """What is known of the machine now.
+    """State of the machine, as far as it is known.
 
     `state`: "closed" without a line, otherwise the state of the conversation; `why`: what it waits
     for, or why it has ended; `says`: the state in the controller's word; `place_mm`: as it reports
@@ -77,9 +77,9 @@ class MachineState(Struct, frozen=True):
 
 
 class Session:
-    """One machine. `open_line` opens and locks its port for the length of a `with`; `watch`, which
-    may be set later, is called in the session's thread when the state has changed or a message has
-    come."""
+    """A machine at its port. `open_line` opens and locks the port for the length of a `with`;
+    `watch`, which may be set later, is called in the session's thread when the state has changed
+    or a message has come."""
 
     def __init__(
         self,

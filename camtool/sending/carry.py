@@ -40,8 +40,8 @@ class SendOptions(Struct, frozen=True):
 
 
 class SentProgram(Struct, frozen=True, eq=False):
-    """How sending a program has ended: its conversation, and the error that kept the journal or
-    the display from being written, if any."""
+    """Outcome of sending a program: its conversation, and the error that kept the journal or the
+    display from being written, if any."""
 
     one: Consignment
     conversation: Conversation
