@@ -180,17 +180,22 @@ class TestPage:
             "word => document.getElementById('state-word').textContent.startsWith(word)", arg=word
         )
 
+    @staticmethod
+    def place(page: Any, holds: str) -> None:
+        """Wait until the shown X, `at`, is as wanted."""
+        text = "document.getElementById('at-x').textContent"
+        page.wait_for_function(f"() => {{ const at = parseFloat({text}); return {holds}; }}")
+
     def test_it_jogs_zeroes_runs_and_stops(self, page: tuple[Any, Any, list[str]]) -> None:
         shown, twin, complaints = page
         shown.locator("#step-size").select_option("1")
         shown.locator("#pad .e").click()
-        self.state(shown, "moves")
+        self.place(shown, "at === 1")
         self.state(shown, "ready")
         assert twin.slides.commanded_mm[0] == pytest.approx(1.0, abs=0.01)
         shown.locator("#places button").first.click()
-        self.state(shown, "moves")
+        self.place(shown, "at === 0")
         self.state(shown, "ready")
-        shown.wait_for_function("document.getElementById('at-x').textContent === '0.000'")
         shown.locator("#start").click()
         self.state(shown, "runs")
         shown.locator("#pause").click()
@@ -208,8 +213,9 @@ class TestPage:
         shown.locator("#step-size").select_option("held")
         shown.locator("#machine").click()
         for end in ("up", "blur"):
+            before = twin.slides.commanded_mm[0]
             shown.keyboard.down("ArrowRight")
-            self.state(shown, "moves")
+            self.place(shown, f"at > {before + 0.01}")
             if end == "blur":
                 shown.evaluate("window.dispatchEvent(new Event('blur'))")
             else:

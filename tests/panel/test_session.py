@@ -31,20 +31,26 @@ class AtPanel:
     def __init__(self, name: str, twin: Any, port: str) -> None:
         self.twin = twin
         self.changed = threading.Condition()
+        self.history: list[str] = []
+        """All states, in order: a busy computer may see some of them only afterwards."""
+        self._seen = 0
         self.session = Session(
             load_target(name), Port(port), opened_line, speed=SPEED, watch=self._changed
         )
 
     def _changed(self) -> None:
         with self.changed:
+            self.history.append(self.session.state.state)
             self.changed.notify_all()
 
     def until(self, true: Callable[[], bool]) -> None:
         with self.changed:
             assert self.changed.wait_for(true, HANG_S), self.session.state
 
-    def until_state(self, *states: str) -> None:
-        self.until(lambda: self.session.state.state in states)
+    def until_state(self, state: str) -> None:
+        """Wait until the machine is, or has been, in a state since the last one waited for."""
+        self.until(lambda: state in self.history[self._seen :])
+        self._seen = self.history.index(state, self._seen) + 1
 
     @property
     def told(self) -> list[str]:
