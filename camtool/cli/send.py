@@ -285,11 +285,7 @@ class _Sending:
         from camtool.sending.live import LivePage
 
         one = self.one
-        remaining_s = 0.0
-        for packet in reversed(one.packets):
-            self._left.append(remaining_s)
-            remaining_s += packet.seconds
-        self._left = [remaining_s, *reversed(self._left)]
+        self._left = one.times_left_s()
         if self.live is not None:
             listing = one.run.listing if one.rest is None else None
             decoded = one.forecast.decoded

@@ -239,12 +239,7 @@ class Session:
 
     def _send(self, line: LineToController, one: Consignment, options: SendOptions) -> None:
         """Send a program to its end."""
-        left = 0.0
-        times = [0.0]
-        for packet in reversed(one.packets):
-            left += packet.seconds
-            times.append(left)
-        self._left_s, self._running = times[::-1], one
+        self._left_s, self._running = one.times_left_s(), one
         try:
             conversation = program_conversation(one, self.target, self.port, options)
             sent = carry_program(

@@ -10,6 +10,7 @@ import hashlib
 import math
 import re
 from collections.abc import Sequence
+from itertools import accumulate
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -100,6 +101,11 @@ class Consignment(Struct, frozen=True, eq=False):
     def seconds(self) -> float:
         """Duration of what is sent on the machine, s."""
         return float(sum(packet.seconds for packet in self.packets))
+
+    def times_left_s(self) -> list[float]:
+        """Return the times (P + 1), s, that remain when 0, 1, … P packets are acknowledged."""
+        seconds = [packet.seconds for packet in reversed(self.packets)]
+        return list(accumulate(seconds, initial=0.0))[::-1]
 
     def place_of(self, conversation: Conversation) -> Place | None:
         """Return the place that the machine reports, or else the end of the last block that is

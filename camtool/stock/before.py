@@ -58,8 +58,8 @@ class SetupCut(Struct, frozen=True, eq=False):
 
 
 class StockBefore(Struct, frozen=True, eq=False):
-    """What other set-ups have cut before a program, `above` from its own face and `below` from the
-    other one, of a stock that is so thick (inf where nothing is cut below)."""
+    """Stock that other set-ups have cut before a program, `above` from its own face and `below`
+    from the other one, of a stock that is so thick (inf where nothing is cut below)."""
 
     above: tuple[SetupCut, ...] = ()
     below: tuple[SetupCut, ...] = ()

@@ -961,7 +961,6 @@ HELD_PIECES: Final = 3
 
 OVERRIDE_BYTES: Final[dict[Override, tuple[int, Mapping[int, int]]]] = {
     "feed": (0x90, {10: 0x91, -10: 0x92, 1: 0x93, -1: 0x94}),
-    "rapid": (0x95, {}),
     "spindle": (0x99, {10: 0x9A, -10: 0x9B, 1: 0x9C, -1: 0x9D}),
 }
 """The byte that sets an override to 100 %, and those that change it by so much (config.h)."""

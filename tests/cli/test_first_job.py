@@ -129,7 +129,7 @@ def first_program(camtool: Run, folder: Path, name: str, *more: str) -> tuple[st
 
 
 def tool_of(program: str, line: int) -> str:
-    """What the comments before a line say of the tool."""
+    """Return the text of the comments before a line about the tool."""
     told = re.findall(
         r"^\(tool \d+ ([\w-]+):? .*\)$", "\n".join(program.splitlines()[:line]), re.M
     )
@@ -214,7 +214,7 @@ def test_the_part_is_what_was_drawn(camtool: Run, tmp_path: Path, name: str) -> 
 def test_the_recipe_is_the_golden_one(
     camtool: Run, tmp_path: Path, name: str, bless: bool
 ) -> None:
-    """What the job says, without its comments."""
+    """Return the lines of the job, without its comments."""
     first_program(camtool, tmp_path, name)
     lines = (tmp_path / "job.toml").read_text(encoding="utf-8").splitlines()
     said = [line.split("   #")[0].rstrip() for line in lines if not line.startswith("#")]
