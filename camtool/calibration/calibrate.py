@@ -7,6 +7,7 @@ machine's units ─▶ `to_text`, `to_data`
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -236,6 +237,16 @@ class Fitted(Struct, frozen=True):
     def outlier(self) -> bool:
         """True if the residual exceeds `OUTLIER_SIGMAS`."""
         return self.sigmas is not None and abs(self.sigmas) > OUTLIER_SIGMAS
+
+
+class Scatter(Struct, frozen=True):
+    """The scatter of `count` readings of one `nominal` length, such as the eight diameters of a
+    circle: their `mean_mm` and their standard deviation `sigma_mm` about it (n − 1)."""
+
+    nominal: str
+    count: int
+    mean_mm: float
+    sigma_mm: float
 
 
 @dataclass(frozen=True)
@@ -489,6 +500,15 @@ def to_data(calibration: Calibration, machine: Machine) -> dict[str, Any]:
             {"axis": axis, "mm": mm, "steps": steps}
             for axis, mm, steps in compensations(calibration, machine)
         ],
+        "scatter": [
+            {
+                "nominal": each.nominal,
+                "readings": each.count,
+                "mean_mm": each.mean_mm,
+                "sigma_um": _um(each.sigma_mm),
+            }
+            for each in scatters(calibration)
+        ],
         "readings": [
             {
                 "coupon": each.reading.coupon,
@@ -527,6 +547,19 @@ def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[
             yield axis, steps * axis_record.coded_step_mm, steps
 
 
+def scatters(calibration: Calibration) -> list[Scatter]:
+    """Return the scatter of each nominal length with several readings, as table 15 of the thesis
+    on pic-mmh has it (L2528-2630): before any model, so that errors of the machine are in it."""
+    readings: dict[str, list[float]] = {}
+    for each in calibration.fitted:
+        readings.setdefault(each.reading.measure.nominal, []).append(each.reading.measured_mm)
+    return [
+        Scatter(nominal, len(values), statistics.fmean(values), statistics.stdev(values))
+        for nominal, values in readings.items()
+        if len(values) > 1
+    ]
+
+
 def outliers(calibration: Calibration) -> list[str]:
     """Return one line for each outlier."""
     return [
@@ -557,6 +590,10 @@ def _text(calibration: Calibration, machine: Machine) -> Iterator[str]:
         ]
     )
     yield ""
+    if repeated := scatters(calibration):
+        head = ("repeated length", "readings", "mean", "σ", "3σ")
+        yield from _columns([head, *map(_scatter_row, repeated)])
+        yield ""
     yield _spread(calibration)
 
 
@@ -571,6 +608,12 @@ def _fit(each: Fitted) -> tuple[str, ...]:
     measured, predicted = f"{each.reading.measured_mm:.4f}", f"{each.predicted_mm:.4f}"
     residual = f"{each.residual_mm * UM_PER_MM:+.1f} µm"
     return each.reading.coupon, each.reading.name, measured, predicted, residual, mark
+
+
+def _scatter_row(each: Scatter) -> tuple[str, ...]:
+    sigma_um = each.sigma_mm * UM_PER_MM
+    mean, sigma, three = f"{each.mean_mm:.4f}", f"{sigma_um:.1f} µm", f"{3.0 * sigma_um:.1f} µm"
+    return each.nominal, str(each.count), mean, sigma, three
 
 
 def _spread(calibration: Calibration) -> str:

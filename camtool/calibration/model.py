@@ -132,6 +132,10 @@ class Measure(Protocol):
     def courses(self) -> tuple[CutAxis, ...]:
         """Axes on which the length depends."""
 
+    @property
+    def nominal(self) -> str:
+        """Nominal length as text, such as "Ø 6 mm" or "X 2.5 mm"; equal for repeated lengths."""
+
     def predict(self, trial: ParameterValues) -> Any:
         """Compute the length by the model, mm."""
 
@@ -150,6 +154,12 @@ class AxisDistance(Struct, frozen=True):
     def courses(self) -> tuple[CutAxis, ...]:
         return (self.course,)
 
+    @property
+    def nominal(self) -> str:
+        region = f" in {self.course.region}" if self.course.region else ""
+        play = ("", " and the play", " less the play")[self.turned]
+        return f"{self.course.axis.upper()} {self.nominal_mm:g} mm{play}{region}"
+
     def predict(self, trial: ParameterValues) -> Any:
         length = trial.scale(self.course) * self.nominal_mm + self.turned * trial.lost(self.course)
         return length + trial.tangent * self.aside_mm
@@ -164,6 +174,10 @@ class Diagonal(Struct, frozen=True):
     @property
     def courses(self) -> tuple[CutAxis, ...]:
         return self.x.course, self.y.course
+
+    @property
+    def nominal(self) -> str:
+        return f"diagonal of {abs(self.x.nominal_mm):g} × {self.y.nominal_mm:g} mm"
 
     def predict(self, trial: ParameterValues) -> Any:
         vertical = self.y.predict(trial)
@@ -183,6 +197,10 @@ class Diameter(Struct, frozen=True):
     @property
     def courses(self) -> tuple[CutAxis, ...]:
         return self.x, self.y
+
+    @property
+    def nominal(self) -> str:
+        return f"Ø {2.0 * self.radius_mm:g} mm"
 
     def predict(self, trial: ParameterValues) -> Any:
         cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)

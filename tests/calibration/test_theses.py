@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camtool.calibration.calibrate import Calibration, calibrate
+from camtool.calibration.calibrate import Calibration, calibrate, scatters, to_text
 from camtool.calibration.measurements import read_measurements
 from camtool.target.registry import load_target
 
@@ -132,3 +132,25 @@ def test_the_two_lines_of_the_parallel_port_machine() -> None:
     machine = load_target("flashcut").machine
     steps = {axis: count for axis, _, count in compensations(result, machine)}
     assert steps == {"x": 348, "y": 161}
+
+
+def test_the_scatter_of_circles_is_that_of_table_15() -> None:
+    """σ of 0.035, 0.022 and 0.020 mm, and 3σ of 105 µm for the largest circle (L2528-2594,
+    L2624-2630, where it is printed as nm)."""
+    result = calibrated("pic-mmh-circles.toml", "pic-mmh")
+    found = {each.nominal: each for each in scatters(result)}
+    assert list(found) == ["Ø 6 mm", "Ø 4 mm", "Ø 2 mm"]
+    for nominal, mean, sigma in (
+        ("Ø 6 mm", 5.958, 0.035),
+        ("Ø 4 mm", 3.982, 0.022),
+        ("Ø 2 mm", 1.991, 0.020),
+    ):
+        assert found[nominal].count == 8
+        assert found[nominal].mean_mm == pytest.approx(mean, abs=0.001)
+        assert found[nominal].sigma_mm == pytest.approx(sigma, abs=0.001)
+    machine = load_target("pic-mmh").machine
+    assert "Ø 6 mm                  8  5.9581  35.2 µm  105.7 µm" in to_text(result, machine)
+
+
+def test_lengths_that_were_measured_once_have_no_scatter() -> None:
+    assert scatters(calibrated("valcnc-steps.toml", "valcnc")) == []
