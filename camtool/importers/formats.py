@@ -62,6 +62,10 @@ _OTHERS = {
     ),
     rb"solid[ \t][^\n]*\n\s*facet\b": ("is a mesh (STL)", "export STEP, or a DXF of its outline"),
     rb"(?:IN|PU|PD|PA|SP\d)[\d,; ]*;": ("is a plotter file (HPGL)", _EXPORT),
+    rb"\*\*ABCDEFGHIJKLMNOPQRSTUVWXYZ|PS\x00\x00": (
+        "is a Parasolid file (.x_t, .x_b)",
+        "export STEP from the program that made it",
+    ),
     rb"[^\n]{72}S {0,6}\d{1,7}\s": ("is IGES", "export STEP from the program that made it"),
 }
 """First bytes of what people hand over by mistake, and what to do about it."""

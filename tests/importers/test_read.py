@@ -103,6 +103,8 @@ def test_the_content_decides_and_the_name_hints(content: bytes, suffix: str, wan
         (b"\x1f\x8b\x08\x00", "gunzip"),
         (b"PK\x03\x04", "unpack"),
         (b"%PDF-1.4", "export SVG or DXF"),
+        (b"**ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz****\n", "export STEP"),
+        (b"PS\x00\x00\x00\x3f: TRANSMIT FILE", "export STEP"),
         (b"AC1027", "save it as DXF"),
         (b"\x89PNG\r\n", "save it again"),
         (b"\xff\xd8\xff\xe0", "save it again"),
