@@ -47,7 +47,6 @@ from camtool.verification.report import Gates
 from camtool.verification.verify import Verification
 
 if TYPE_CHECKING:
-    from camtool.calibration.measurements import Measurements
     from camtool.inspection.meet import Meeting
     from camtool.machine.model import Machine
 

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
     from camtool.planning.items import Step
-    from camtool.planning.job import Job, Tool
+    from camtool.planning.job import Tool
     from camtool.planning.plan import Plan
     from camtool.simulation.motion import Effects
     from camtool.stock.before import StockBefore
@@ -74,19 +74,10 @@ if TYPE_CHECKING:
     from camtool.stock.cut import CutStock
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.moves import CompensatedToolpath, Toolpath
-    from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import ProtectedRegion
-    from camtool.verification.case import Case
     from camtool.verification.conformance import ProgramRequest
     from camtool.verification.registration import Registration
-    from camtool.verification.report import (
-        BaselineReport,
-        Gates,
-        Planned,
-        PlannedOperation,
-        PlannedStock,
-        PlannedTool,
-    )
+    from camtool.verification.report import Gates
     from camtool.verification.verify import Verification
 
 

@@ -15,14 +15,15 @@ import signal
 import sys
 import threading
 import traceback
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import NoReturn, TextIO
 
 import click
 
 from camtool.cli import COMPLETE
-from camtool.cli.life_signs import LifeSigns, life_signs
+from camtool.cli.life_signs import life_signs
 from camtool.cli.messages import say, say_error
 from camtool.errors import CamtoolError, InputError, OutputError
 from camtool.version import __version__
@@ -159,8 +160,15 @@ def main() -> NoReturn:
 def _exit_code(*, debug: bool) -> int:
     """Run the command line and return its exit code."""
     try:
-        with life_signs(sys.stderr, sys.argv[1:]) as signs:
-            return _run(signs)
+        with life_signs(sys.stderr, sys.argv[1:]) as signs, _system_errors():
+            code = cli.main(prog_name="camtool", standalone_mode=False, obj=signs)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        return code if isinstance(code, int) else 0
+    except SystemExit:
+        if COMPLETE in os.environ:  # the shell has its answer
+            raise
+        return EXIT_PIPE  # what click makes of EPIPE
     except click.ClickException as error:
         text = io.StringIO()
         error.show(text)
@@ -186,19 +194,11 @@ def _exit_code(*, debug: bool) -> int:
         return EXIT_FAULT
 
 
-def _run(signs: LifeSigns) -> int:
-    """Run the command, and flush stdout."""
+@contextmanager
+def _system_errors() -> Iterator[None]:
+    """Raise what the system refuses as errors of camtool that name the file."""
     try:
-        try:
-            code = cli.main(prog_name="camtool", standalone_mode=False, obj=signs)
-        except click.exceptions.Exit as stop:
-            code = stop.exit_code
-        except SystemExit:
-            if COMPLETE in os.environ:  # the shell has its answer
-                raise
-            return EXIT_PIPE  # what click makes of EPIPE
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        yield
     except OSError as error:
         if error.filename is None and error.errno in _FULL:
             raise OutputError(f"cannot be written ({error.strerror})", file="<stdout>") from error
@@ -207,7 +207,6 @@ def _run(signs: LifeSigns) -> int:
         # A name that the system refuses, in any place: too long, a loop of links.
         name = os.fsdecode(error.filename)
         raise InputError(f"cannot be used ({error.strerror})", file=name) from error
-    return code if isinstance(code, int) else 0
 
 
 def _trace(debug: bool) -> None:

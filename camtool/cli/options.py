@@ -40,7 +40,6 @@ from camtool.units import parse_feed, parse_length, parse_time
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
-    from camtool.jobs.tools import Shop
     from camtool.machine.model import Machine
     from camtool.planning.job import Job
     from camtool.project import Project

@@ -24,7 +24,6 @@ from camtool.records import replace
 from camtool.units import parse_length
 
 if TYPE_CHECKING:
-    from camtool.pictures.options import PictureOptions
     from camtool.pictures.scene import Scene
 
 

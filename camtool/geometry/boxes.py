@@ -22,7 +22,6 @@ from camtool.kernels.offsets import SegmentTree, curve_boxes, curve_rows, tree_o
 
 if TYPE_CHECKING:
     from camtool.kernels.near import Moves
-    from camtool.kernels.offsets import SegmentTree
 
 PAIRS_AT_A_TIME = 1 << 16
 """Pairs of boxes that are handled together: it bounds the memory."""

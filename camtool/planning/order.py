@@ -11,7 +11,6 @@ within it has been cut). The same input always gives the same order.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
@@ -31,10 +30,6 @@ from camtool.kernels.tours import (
 )
 from camtool.planning.items import Contour, Fixed, Items, contours_of
 from camtool.planning.paths import flat_path, joints
-
-if TYPE_CHECKING:
-    from camtool.kernels.tours import Tour
-
 
 Point = tuple[float, float]
 

@@ -36,7 +36,6 @@ from camtool.target.terminal import Terminal
 
 if TYPE_CHECKING:
     from camtool.arrays import Floats, Ints
-    from camtool.target.terminal import Terminal
     from camtool.toolpath.moves import Toolpath
 
 Place = tuple[float, float, float]

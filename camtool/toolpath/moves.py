@@ -230,9 +230,9 @@ class Toolpath:
     def by_parts(self, column: Callable[[Toolpath], Column]) -> Column:
         """Compute a column (N, …) for ROWS_AT_ONCE rows at a time; each value must follow from its
         row and the start of that row alone."""
-        plain_path = replace(self, drawn=None, operations=None)
         if len(self) <= ROWS_AT_ONCE:
-            return column(plain_path)
+            return column(self)
+        plain_path = replace(self, drawn=None, operations=None)
         result: Any = None
         for low in range(0, len(self), ROWS_AT_ONCE):
             part = column(plain_path.part(low, low + ROWS_AT_ONCE))
@@ -288,12 +288,9 @@ def are_arcs(kind: Codes | Ints) -> Bools:
 
 def are_below_top(toolpath: Toolpath) -> Bools:
     """Mask (N,) of rows that begin or end below the stock top."""
-
-    def low(part: Toolpath) -> Bools:
-        lowest = np.minimum(part.starts[:, 2], part.end[:, 2])
-        return np.asarray(lowest < STOCK_TOP_MM - LEVEL_MM)
-
-    return toolpath.by_parts(low)
+    heights = np.append(toolpath.start[2], toolpath.end[:, 2])
+    is_low = heights < STOCK_TOP_MM - LEVEL_MM
+    return np.asarray(is_low[:-1] | is_low[1:])
 
 
 def feeds_below_top(toolpath: Toolpath) -> Bools:

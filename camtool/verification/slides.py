@@ -55,7 +55,7 @@ from camtool.verification.matching import Match
 from camtool.verification.nearest import ANY_CONTOUR, run_peaks
 
 if TYPE_CHECKING:
-    from camtool.kernels.judging import Shapes, Sums, Task
+    from camtool.kernels.judging import Shapes
 
 
 BINS_KEPT = 64

@@ -178,6 +178,12 @@ def test_feeds_keep_to_the_machine() -> None:
     assert codes(path) == []
 
 
+@pytest.mark.parametrize(("part_above", "count"), [(1e-10, 0), (1e-7, 1)])
+def test_feeds_may_exceed_the_limit_by_rounding_alone(part_above: float, count: int) -> None:
+    path = ToolpathBuilder().line(10, 0, feed=100 * (1 + part_above))
+    assert codes(path, None, *LIMITS) == [ProgramCode.FEED_ABOVE_LIMIT] * count
+
+
 def test_slopes_keep_to_what_z_can() -> None:
     steep = ToolpathBuilder().line(3, 0, -0.4, feed=75)  # 4 : 30, along Z 9.9 mm/min
     assert codes(steep, None, *LIMITS) == []

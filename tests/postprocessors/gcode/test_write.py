@@ -237,6 +237,14 @@ def test_refused(name: str, path: ToolpathBuilder, message: str) -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
+def test_a_feed_may_exceed_the_limit_by_rounding_alone(name: str) -> None:
+    highest = load_target(name).machine.max_feed_mm_min
+    write(ToolpathBuilder().line(1, 1, feed=highest * (1 + 1e-10)).finish(), name)
+    with pytest.raises(PostError, match="the machine's highest"):
+        write(ToolpathBuilder().line(1, 1, feed=highest * (1 + 1e-7)).finish(), name)
+
+
+@pytest.mark.parametrize("name", TARGETS)
 def test_an_arc_that_sinks_is_a_helix(name: str) -> None:
     path = ToolpathBuilder().rapid(1, 0).arc(0, 1, -0.5, centre=(0.0, 0.0), ccw=True, feed=9)
     path.arc(0, 1, -1.0, centre=(0.0, 0.0), ccw=True, feed=9)
