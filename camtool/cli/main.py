@@ -69,6 +69,7 @@ COMMANDS = {
     "preview": "Picture of a drawing, toolpath or program.",
     "probe": "Measure the top of the blank.",
     "send": "Send a program to its machine.",
+    "servo": "Servo axes: their motors, and the gains of their loops.",
     "stale": "Programs that are out of date.",
     "targets": "The machines, and everything about one.",
     "tolerances": "Dimensions and their limits: begin a file, or see what one says.",

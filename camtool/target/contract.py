@@ -25,6 +25,7 @@ from camtool.machine.model import Axis, Link, Machine, SlideStart
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from camtool.machine.servo import SpeedLoop
     from camtool.simulation.controller import ControllerModel
     from camtool.target.twin import Twin
     from camtool.target.wire import NoWire, Wire
@@ -107,6 +108,14 @@ class Target(ABC):
     def model(self) -> ControllerModel[Any, Any]:
         """The model of its controllers; needed only where `controllers` names any."""
         raise NotImplementedError(f"{self.name} has no model of its controllers")
+
+    def speed_loop(self, machine: Machine[Any, Any]) -> SpeedLoop | None:
+        """Return the speed loops of its axes; None for a controller without any."""
+        return None
+
+    def loop_keys(self, loop: SpeedLoop) -> Mapping[str, Any]:
+        """Return the keys of `[controller]` that say this loop."""
+        raise NotImplementedError(f"{self.name} has no speed loop")
 
     def settings_from(self, text: str) -> Sequence[ControllerSetting] | None:
         """The values of a machine file that the controller's own settings say; None for a text

@@ -7,7 +7,7 @@ docs/controllers/matlab-router.md what the controller does with it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from camtool.target.contract import Target
 
@@ -21,6 +21,7 @@ from .dialect import (
 
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
+    from camtool.machine.servo import SpeedLoop
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -58,6 +59,19 @@ class MatlabRouter(Target):
         from .controller import MatlabRouterModel
 
         return MatlabRouterModel()
+
+    def speed_loop(self, machine: Machine[Any, Any]) -> SpeedLoop | None:
+        """Return the loops of the slaves; None for a machine with the exact path."""
+        from .controller import speed_loop
+
+        is_router = isinstance(machine.controller, MatlabRouterController)
+        return speed_loop(machine.controller) if is_router else None
+
+    def loop_keys(self, loop: SpeedLoop) -> dict[str, Any]:
+        """Return the keys of `[controller]` that say this loop."""
+        from .controller import loop_keys
+
+        return loop_keys(loop)
 
     def wire(self) -> MatlabRouterWire:
         """Numbers, and the time of a job."""

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from msgspec import Struct
@@ -26,6 +27,7 @@ from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import MachineError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
+from camtool.machine.servo import MotorModel, SpeedLoop
 from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
@@ -453,18 +455,53 @@ IDENTIFIED = 70.0
 """The drive at which gains were measured (L2704): its speed does not depend on the friction."""
 
 
+GAIN_UNIT = 0.001
+"""Gains are stored in thousandths (L5104-5106)."""
+
+
+def speed_loop(router: MatlabRouterController) -> SpeedLoop:
+    """Return the motors and the gains of the slaves."""
+    is_text = router.slaves == "text"
+    motors = (
+        MotorModel(gain * IDENTIFIED / (IDENTIFIED - friction), time_constant_s, friction)
+        for gain, time_constant_s, friction in zip(
+            router.plant_gain, router.time_constant_s, router.friction_percent, strict=True
+        )
+    )
+    return SpeedLoop(
+        tick_s=TICK_S,
+        motors=tuple(motors),
+        kid=router.kid or (TEXT_KID if is_text else (28.0,) * 3),
+        kpd=router.kpd or (TEXT_KPD if is_text else (159.0,) * 3),
+        gain_unit=GAIN_UNIT,
+        is_whole=not is_text,
+    )
+
+
+def loop_keys(loop: SpeedLoop) -> dict[str, Any]:
+    """Return the keys of `[controller]` that say this loop, its motors to 6 digits."""
+    motors = loop.motors
+    keys = {
+        "plant_gain": [motor.speed_at(IDENTIFIED) / IDENTIFIED for motor in motors],
+        "time_constant_s": [motor.time_constant_s for motor in motors],
+        "friction_percent": [motor.friction_percent for motor in motors],
+        "kid": loop.kid,
+        "kpd": loop.kpd,
+    }
+    return {key: [float(f"{value:.6g}") for value in values] for key, values in keys.items()}
+
+
 def program_of(orders: Indices, pauses_s: Floats, machine: _Machine) -> Program:
     """Return the program for the compiled loops; MachineError for gains that the listing's
     integers cannot hold."""
     router = machine.controller
     text = router.slaves == "text"
+    loop = speed_loop(router)
     axes = np.zeros((3, 8))
-    friction = np.array(router.friction_percent)
-    axes[:, 0] = np.array(router.plant_gain) * IDENTIFIED / (IDENTIFIED - friction)
-    axes[:, 1] = np.array(router.time_constant_s) * TICKS_PER_S
+    axes[:, 0] = [motor.gain for motor in loop.motors]
+    axes[:, 1] = [motor.time_constant_s * TICKS_PER_S for motor in loop.motors]
     axes[:, 2] = router.friction_percent
-    axes[:, 3] = router.kid or (TEXT_KID if text else (28.0,) * 3)
-    axes[:, 4] = router.kpd or (TEXT_KPD if text else (159.0,) * 3)
+    axes[:, 3], axes[:, 4] = loop.kid, loop.kpd
     axes[:, 5] = router.chunk_counts
     axes[:, 6] = 0 if text else router.home_phase_counts
     axes[:, 7] = router.home_counts
