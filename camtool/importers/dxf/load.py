@@ -1,7 +1,8 @@
 """The bytes of a DXF file to ezdxf's document, and what had to be repaired for that.
 
-    tags, each checked → sections → whole? → ezdxf's ordinary reader → the document
-                                       └── faulty order ──▶ ezdxf's recovery ──┘
+    tags, each checked → sections → whole? ─┬─ plain kinds alone ──▶ plain.py ───┬─▶ document
+                                            ├─ others ──▶ ezdxf's ordinary reader ┤
+                                            └─ faulty order ──▶ ezdxf's recovery ─┘
 
 Nothing is audited: an audit deletes what it does not like, and here every entity is either used
 or counted with a reason. A file whose entities are not all there is refused, whatever could be
@@ -25,6 +26,7 @@ from msgspec import Struct, field
 
 from camtool.errors import DrawingError
 from camtool.importers.dxf.bulk import Bulk, BulkLines
+from camtool.importers.dxf.plain import plain_document
 from camtool.importers.dxf.tags import (
     AGAIN,
     DxfSections,
@@ -61,8 +63,9 @@ class Loaded(Struct, frozen=True):
     lines: Mapping[str, BulkLines] = field(default_factory=dict)
 
 
-def load(data: bytes, file: str) -> Loaded:
-    """The document in `data`; DrawingError when it is no DXF, cut off or beyond repair."""
+def load(data: bytes, file: str, *, plain: bool = False) -> Loaded:
+    """The document in `data`; DrawingError when it is no DXF, cut off or beyond repair. `plain`: a
+    `PlainDocument` will do, where the file is no more."""
     _check_bytes(data, file)
     tags = binary_tags(data, file) if data.startswith(BINARY_DXF) else ascii_tags(data, file)
     if len(tags.codes) > MAX_TAGS:
@@ -77,7 +80,11 @@ def load(data: bytes, file: str) -> Loaded:
     notes = [*tags.notes, *cut, *frame.faults, *lost_entities(tags, frame)]
     with quiet() as warnings, without_collector():
         bulk = Bulk.of(tags, frame)
-        document = None if frame.faults else _load_plainly(tags, bulk, warnings)
+        document: Any = plain_document(tags, frame, bulk) if plain and not notes else None
+        if document is None and not frame.faults:
+            document = _load_with_ezdxf(tags, bulk, warnings)
+        if document is not None:
+            _add_vertices(document, bulk)
         notes.extend(warnings)
         if document is None or (warnings and tags.is_text):
             bulk = Bulk.none(tags)
@@ -176,7 +183,7 @@ def _check_whole(tags: Tags, frame: DxfSections, file: str) -> list[str]:
     return ["the end mark EOF is missing: what stood behind the entities is left out"]
 
 
-def _load_plainly(tags: Tags, bulk: Bulk, notes: list[str]) -> Any:
+def _load_with_ezdxf(tags: Tags, bulk: Bulk, notes: list[str]) -> Any:
     """The document of ezdxf's ordinary reader, without what is read in bulk; None when it fails
     or finds fault, as `notes`."""
     from ezdxf.document import Drawing
@@ -192,11 +199,15 @@ def _load_plainly(tags: Tags, bulk: Bulk, notes: list[str]) -> Any:
     except Exception as error:
         notes.append(_reason(error))
         return None
+    return document
+
+
+def _add_vertices(document: Any, bulk: Bulk) -> None:
+    """Give LWPOLYLINEs the vertices that were read in bulk."""
     if not all(handle in document.entitydb for handle in bulk.lines):
         raise RuntimeError("LINEs that are read in bulk follow none of the document")
     for handle, vertices in bulk.vertices.items():
         document.entitydb[handle].lwpoints.values = vertices
-    return document
 
 
 def _recover(tags: Tags, notes: list[str], file: str) -> Any:

@@ -34,7 +34,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     """The Drawing in model space or in `options.layout`; DrawingError naming layer and entity
     when it cannot be read."""
     with without_collector():
-        loaded = load(data, file)
+        loaded = load(data, file, plain=options.layout is None)
         units, findings = units_of(loaded.header, options)
         walk = DxfWalk(loaded, file, options)
         with quiet():

@@ -1,9 +1,8 @@
 """DXF entities to paths in mm: lines and circles exact, all other curves fitted.
 
 DXF keeps flat entities in a coordinate system of their own (OCS: the arbitrary axis algorithm of
-the DXF reference, here ezdxf's), and blocks are placed by any affine map. `Frame` is that map,
-from the world of an entity to mm; `Plane` is what it makes of the plane that the entity lies in,
-seen from above.
+the DXF reference), and blocks are placed by any affine map. `Frame` is that map, from the world of
+an entity to mm; `Plane` is what it makes of the plane that the entity lies in, seen from above.
 """
 
 from __future__ import annotations
@@ -33,6 +32,9 @@ ROUND_SHARE = 1e-9
 """Half axes that differ by less, or stand less askew, make a circle."""
 
 _UPWARDS = (0.0, 0.0, 1.0)
+_MAX_SHARE_OF_Y = 1.0 / 64.0
+"""The X axis of a plane is at a right angle to the world's Y axis where its unit normal has less
+than this along X and Y, otherwise to the world's Z axis."""
 
 
 class Plane(Struct, frozen=True, eq=False, dict=True):
@@ -122,17 +124,13 @@ class WorldMap(Struct, frozen=True, eq=False):
 
     def _plane(self, normal: tuple[float, ...]) -> Plane:
         """The plane of an OCS through the world's origin."""
-        from ezdxf.math import OCS
-
-        if not numbers(normal).any():
+        z = numbers(normal)
+        if not z.any():
             raise Unusable("has an extrusion of 0")
-        axes = np.eye(3)
-        if normal != _UPWARDS:
-            ocs = OCS(normal)
-            axes = np.array(
-                [tuple(ocs.to_wcs(axis)) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
-            )
-        u, v, rise = axes @ self.linear
+        z = z / math.hypot(*z)
+        x = np.cross(_UPWARDS if np.abs(z[:2]).max() >= _MAX_SHARE_OF_Y else (0.0, 1.0, 0.0), z)
+        x = x / math.hypot(*x)
+        u, v, rise = np.array([x, np.cross(z, x), z]) @ self.linear
         return Plane.of(u, v, self.offset, rise)
 
 

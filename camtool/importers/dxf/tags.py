@@ -48,6 +48,11 @@ _NUMBER = re.compile(
 _VERSION = re.compile(rb"\$ACADVER\s+1\s+(AC\d{4})")
 _CODEPAGE = re.compile(rb"\$DWGCODEPAGE\s+3\s+(\w+)")
 _UTF8_SINCE = b"AC1021"
+_NUMERIC_CODES = (
+    *((10, 80), (90, 100), (110, 150), (160, 180), (210, 240), (270, 300)),
+    *((370, 390), (400, 410), (420, 430), (440, 470), (1010, MAX_CODE + 1)),
+)
+"""Group codes from each first to before each second have numbers as values (DXF reference)."""
 _NOT_ASCII = 0x80
 _HEAD_BYTES = 65536  # the header's first variables name version and code page
 
@@ -362,14 +367,16 @@ def _plain_lines(data: bytes) -> tuple[bytes, str, tuple[str, ...]]:
 
 def _encoding(head: bytes) -> str:
     """Files since R2007 are UTF-8, older ones in the code page that they name."""
-    from ezdxf.tools.codepage import toencoding
-
     version, codepage = _VERSION.search(head), _CODEPAGE.search(head)
     if head.startswith(_UTF8_MARK):
         return "utf-8-sig"
     if version and version.group(1) >= _UTF8_SINCE:
         return "utf-8"
-    return str(toencoding(codepage.group(1).decode("ascii") if codepage else "ANSI_1252"))
+    if codepage is None or codepage.group(1) == b"ANSI_1252":
+        return "cp1252"
+    from ezdxf.tools.codepage import toencoding
+
+    return str(toencoding(codepage.group(1).decode("ascii")))
 
 
 def _check_codes(tags: Tags, file: str) -> None:
@@ -401,10 +408,8 @@ def check_numbers(tags: Tags, file: str, rows: Ints) -> None:
 
 
 def _is_number(code: int) -> bool:
-    """True if values of this group code are numbers (DXF reference, group code value types)."""
-    from ezdxf.lldxf.types import POINT_CODES, TYPE_TABLE
-
-    return code in POINT_CODES or TYPE_TABLE.get(code, str) in (int, float)
+    """True if values of this group code are numbers."""
+    return any(first <= code < end for first, end in _NUMERIC_CODES)
 
 
 def _without_escapes(values: list[str]) -> list[str]:

@@ -535,7 +535,9 @@ FOREGROUND = "#000000"
 CONTINUOUS = "Continuous"
 """The line type of layers that name none."""
 
-_BYBLOCK, _BYLAYER, _WHITE = 0, 256, 7
+_BYBLOCK, _BYLAYER = 0, 256
+_BASIC_COLOURS = ("", "#ff0000", "#ffff00", "#00ff00", "#00ffff", "#0000ff", "#ff00ff", FOREGROUND)
+"""Colours of the indices from 1 to 7."""
 
 
 class DxfLook(Struct, frozen=True):
@@ -610,8 +612,6 @@ def _layer(layer: Any) -> DxfLook:
 
 def _colour(index: Any, true: Any, by_layer: str, by_block: str) -> str:
     """ "#rrggbb" of a colour index or a true colour."""
-    from ezdxf.colors import aci2rgb
-
     if true is not None:
         return f"#{int(true) & 0xFFFFFF:06x}"
     number = _BYLAYER if index is None else abs(int(index))
@@ -619,4 +619,8 @@ def _colour(index: Any, true: Any, by_layer: str, by_block: str) -> str:
         return by_block
     if number >= _BYLAYER:
         return by_layer
-    return FOREGROUND if number == _WHITE else "#{:02x}{:02x}{:02x}".format(*aci2rgb(number))
+    if number < len(_BASIC_COLOURS):
+        return _BASIC_COLOURS[number]
+    from ezdxf.colors import aci2rgb
+
+    return "#{:02x}{:02x}{:02x}".format(*aci2rgb(number))
