@@ -105,7 +105,7 @@ EQUAL_MOTORS = [7.2, 30.5, 1.0]
 
 
 def test_the_frictions_that_make_the_motors_equal() -> None:
-    """Table 4.1 has three gains and one time constant. Load and viscous friction would change both;
+    """Table 4.1 has three gains and one time constant. Load and viscous friction change both;
     dry friction changes the gain alone. Z at least 1 %: the drive of 0 is 0.96 % of the bus."""
     settings = [f"controller.friction_percent={EQUAL_MOTORS}"]
     loaded = load_target("matlab-router", settings=settings)
