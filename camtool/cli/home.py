@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import click
 
 from camtool.cli.messages import say
 from camtool.cli.options import MachineFlags, machine_options, talk_options
-from camtool.errors import OptionError
+from camtool.errors import MachineError, OptionError
+from camtool.target.wire import Conversation, Place, WireState, place_words
 from camtool.units import parse_feed, parse_length
 
 PORT = click.option("--port", metavar="PORT", required=True, help="Such as /dev/ttyUSB0.")
@@ -18,10 +21,13 @@ BAUD = click.option("--baud", type=click.IntRange(min=1), help="Rate, where not 
 @machine_options
 @PORT
 @BAUD
+@click.option("--yes", is_flag=True, help="Do not ask for what must be done at the machine first.")
 @talk_options
-def home(machine: MachineFlags, port: str, baud: int | None, quiet: bool, verbose: bool) -> int:
+def home(
+    machine: MachineFlags, port: str, baud: int | None, yes: bool, quiet: bool, verbose: bool
+) -> int:
     """Send the machine to its switches."""
-    return act("home", machine, port, baud, {}, quiet=quiet)
+    return act("home", machine, port, baud, {}, quiet=quiet, yes=yes)
 
 
 def act(
@@ -33,31 +39,63 @@ def act(
     *,
     quiet: bool,
     unlock: bool = False,
+    yes: bool = False,
+    at_mm: Place | None = None,
 ) -> int:
     """Hold the conversation of one command; return the exit code. Ctrl-C, q and any exception stop
     the machine."""
     from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
-    from camtool.sending.drive import Driver, Request
+    from camtool.sending.drive import Driver, Order, Request
     from camtool.sending.line import opened_line
     from camtool.sending.prepare import manner_of, port_of, wire_of
-    from camtool.target.wire import WireState
 
     target = machine.load()
     wire = wire_of(target)
-    conversation = wire.command(action, target.machine, values, manner_of(target, unlock=unlock))
+    if at_mm is not None and not wire.jogs_from_place:
+        raise MachineError(
+            f"{target.machine.target.name} needs no place to jog from",
+            where="--at",
+            mend="leave it out",
+        )
+    manner = manner_of(target, unlock=unlock, at_mm=at_mm)
+    conversation = wire.command(action, target.machine, values, manner)
+    if not (yes or _is_agreed(conversation)):
+        return 1
     with opened_line(port_of(name, baud, wire, target)) as line, keys_of_terminal() as key:
         wishes = UserRequests(key, {"q": Request.STOP})
         tell = Messages(quiet=quiet)
-        driver = Driver(line, wish=wishes, tell=tell)
+
+        def wish() -> Request | Order | None:
+            if conversation.state is WireState.WAITING:
+                return Request.RESUME  # the user has agreed
+            return wishes()
+
+        driver = Driver(line, wish=wish, tell=tell)
         with wishes.catch_signals():
             driver.carry(conversation)
     tell.rest()
     if conversation.state is WireState.FINISHED:
-        say(f"camtool: {action}: done", quiet=quiet)
+        place = conversation.place_mm if wire.jogs_from_place else None
+        stands = f"; it stands at {place_words(place).replace(' ', ',')} (--at)" if place else ""
+        say(f"camtool: {action}: done{stands}", quiet=quiet)
         return 0
     reason = str(driver.trouble or conversation.why or conversation.state.value)
     say(f"camtool: error: {action}: {reason}", quiet=False)
     return 1
+
+
+def _is_agreed(conversation: Conversation) -> bool:
+    """Ask for what the user must do or allow before the first packet; True if there is nothing, or
+    the answer is yes."""
+    question = next((packet.ask for packet in conversation.packets[:1]), "")
+    if not question:
+        return True
+    if not sys.stdin.isatty():
+        raise click.UsageError(f"{question}: when that is so, give --yes")
+    if click.confirm(f"{question[0].upper()}{question[1:]}?", err=True, default=False):
+        return True
+    say("camtool: nothing was sent", quiet=False)
+    return False
 
 
 def axes_of(words: tuple[str, ...]) -> dict[str, float]:

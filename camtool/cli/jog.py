@@ -7,6 +7,7 @@ import click
 from camtool.cli.home import BAUD, PORT, UNLOCK, act, axes_of
 from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.errors import OptionError
+from camtool.target.wire import Place
 
 
 @click.command(
@@ -17,6 +18,12 @@ from camtool.errors import OptionError
 @PORT
 @BAUD
 @UNLOCK
+@click.option(
+    "--at",
+    metavar="X0,Y0,Z5",
+    help="Where the tool stands now, for a controller that does not know it and moves to absolute "
+    "places (valcnc).",
+)
 @talk_options
 def jog(
     axes: tuple[str, ...],
@@ -24,6 +31,7 @@ def jog(
     port: str,
     baud: int | None,
     unlock: bool,
+    at: str | None,
     quiet: bool,
     verbose: bool,
 ) -> int:
@@ -32,4 +40,16 @@ def jog(
     values["feed"] = values.pop("f", 0.0) or machine.load().machine.feed.default_mm_min
     if not values.keys() & set("xyz"):
         raise OptionError("no axis is to move", where="jog", mend="write X1.5")
-    return act("jog", machine, port, baud, values, quiet=quiet, unlock=unlock)
+    return act("jog", machine, port, baud, values, quiet=quiet, unlock=unlock, at_mm=_place_of(at))
+
+
+def _place_of(text: str | None) -> Place | None:
+    """Parse `X0,Y0,Z5`; OptionError for other text."""
+    if text is None:
+        return None
+    values = axes_of(tuple(text.replace(",", " ").split()))
+    if values.keys() != set("xyz"):
+        raise OptionError(
+            f"{text!r} is no place", where="--at", mend="write all axes, such as X0,Y0,Z5"
+        )
+    return values["x"], values["y"], values["z"]

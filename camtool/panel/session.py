@@ -103,6 +103,8 @@ class Session:
         self._left_s: list[float] = []
         self._running: Consignment | None = None
         self._count = 0
+        self._at_mm: Place | None = None
+        """Where the machine stands between conversations, as far as that is known."""
         self._thread: threading.Thread | None = None
 
     # Requests, from any thread.
@@ -220,7 +222,7 @@ class Session:
             if following is not None:
                 self._send(line, *following)
                 continue
-            manner = manner_of(self.target, late_s=LATE_S * self.speed)
+            manner = manner_of(self.target, late_s=LATE_S * self.speed, at_mm=self._at_mm)
             hand = self.wire.hand(self.target.machine, manner)
             driver = Driver(
                 line,
@@ -231,6 +233,7 @@ class Session:
                 tick_s=TICK_S,
             )
             driver.carry(hand)
+            self._at_mm = hand.place_mm if hand.is_still else None
             if hand.state is WireState.FAILED:
                 self.tell(hand.why, bad=True)
                 return
@@ -258,6 +261,8 @@ class Session:
             return
         finally:
             self._running = None
+        is_still = sent.conversation.is_still
+        self._at_mm = one.place_of(sent.conversation) if is_still else None
         if sent.is_finished:
             self.tell(f"finished: {len(one.packets)} packets")
         else:

@@ -32,6 +32,7 @@ from msgspec import Struct
 
 from camtool.errors import MachineError
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.target.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -206,8 +207,9 @@ class Manner(Struct, frozen=True):
     file; `paced`: each byte takes the time that the rate of the line gives it, so that a reply
     that comes sooner is none; `file`: where what is sent lies, for controllers that open it by
     themselves; `standing`: where the program was left that goes on, for controllers that say where
-    they are; `reach_mm`: the lowest and the highest place of what is sent, in the work frame, for
-    those that watch over their travel."""
+    they are; `at_mm`: where the tool stands now in the frame of the controller, as far as the user
+    or an earlier order says it; `reach_mm`: the lowest and the highest place of what is sent, in
+    the work frame, for those that watch over their travel."""
 
     single: bool = False
     home: bool = False
@@ -217,6 +219,7 @@ class Manner(Struct, frozen=True):
     paced: bool = False
     file: str = ""
     standing: ResumePoint | None = None
+    at_mm: Place | None = None
     reach_mm: tuple[Place, Place] | None = None
 
     @property
@@ -528,12 +531,13 @@ class CommandHand(Hand):
         self._order: Conversation | None = None
 
     def begin(self, now: float) -> None:
-        """Be ready: nothing is known of the machine before the first order."""
-        self.state = WireState.READY
+        """Be ready: nothing is known of the machine but what was known before."""
+        self.state, self.place_mm = WireState.READY, self.manner.at_mm
 
     def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
         """Hold the conversation of the command."""
-        self._begin(action, self._wire.command(action, self._machine, values, self.manner), now)
+        manner = replace(self.manner, at_mm=self.place_mm)
+        self._begin(action, self._wire.command(action, self._machine, values, manner), now)
 
     def hold(self, values: Mapping[str, float], now: float) -> None:
         """Hold the conversation of the command that moves until it is stopped."""
@@ -614,6 +618,8 @@ class CommandHand(Hand):
                 self.state = order.state if halted else WireState.SENDING
             return
         self._order, self.next_s = None, NEVER
+        if self._wire.place in ("kept", "steps"):
+            self.place_mm = order.place_mm if order.is_still else None
         if self.state is WireState.STOPPING:
             self._end(order.state, order.why)
             return
@@ -704,6 +710,9 @@ class Wire(ABC):
     """Orders by hand that `command`, or the controller's own `hand`, takes."""
     overrides: ClassVar[tuple[Override, ...]] = ()
     """Overrides that its conversations carry out."""
+    jogs_from_place: ClassVar[bool] = False
+    """True if a jog needs the place of the tool (`Manner.at_mm`), since the controller moves to
+    absolute places and does not say where it stands."""
 
     @abstractmethod
     def packets(

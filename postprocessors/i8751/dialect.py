@@ -93,10 +93,13 @@ class I8751Controller(SlideStart, frozen=True, tag_field="model", tag="i8751"):
 
 
 class I8751Link(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Option for what the thesis leaves open beside the replies of `[dialect]`: whether the end of
-    a packet, which is stored too (L4343-4352), is answered by an M before its F."""
+    """Options for what the thesis leaves open beside the replies of `[dialect]`. `packet_end`:
+    whether the end of a packet, which is stored too (L4343-4352), is answered by an M before its
+    F. `homing`: whether the controller's program seeks the optos of its origin at its "start", as
+    the thesis proposes and has not built (L5267-5338)."""
 
     packet_end: Literal["F", "M F"] = "F"
+    homing: Literal["none", "start"] = "none"
 
 
 I8751Machine = Machine[SlideStart, I8751Dialect]

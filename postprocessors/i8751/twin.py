@@ -7,9 +7,10 @@ controller says F, and takes the next packet or 54H, which it answers by A (L434
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import msgspec
 import numpy as np
@@ -37,6 +38,10 @@ DONE: Final = ord("A")
 SENSES: Final = (3, 4, STANDS)
 """Forward, backward, standing (L4106-4119)."""
 
+HOMING_HZ: Final = 8.0
+"""Rate of a motor that seeks its origin, which the thesis does not give: that at the begin of a
+ramp (L3150-3183)."""
+
 LINE_ENDS: Final = {"none": b"", "cr": b"\r", "lf": b"\n", "crlf": b"\r\n"}
 """Possible line ends behind LISTO and OTRO."""
 
@@ -47,7 +52,8 @@ class I8751TwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True,
     `key`: 13H opens the acquisition "once", or stands before "each-packet". `line_end`: behind
     LISTO and OTRO. `motor_reply`: to the number of a motor, printed as B and as 8. `dwell_reply`:
     to the two bytes of a wait, B being the reply to a motor. `packet_end`: to 45H. `opening` of
-    the line by somebody does "nothing", or a "reset".
+    the line by somebody does "nothing", or a "reset". `homing`: at the "start" of its program, to
+    optos that stand at `origin_mm` on each axis, from where the power came on; or "none".
     """
 
     key: Literal["once", "each-packet"] = "once"
@@ -56,6 +62,8 @@ class I8751TwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True,
     dwell_reply: Literal["B M", "M", "none"] = "B M"
     packet_end: Literal["F", "M F"] = "F"
     opening: Literal["nothing", "reset"] = "nothing"
+    homing: Literal["none", "start"] = "none"
+    origin_mm: Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)] = -2.0
 
 
 class I8751Twin(Twin):
@@ -84,6 +92,21 @@ class I8751Twin(Twin):
     def _reset(self) -> None:
         self._dialogue = self._program()
         next(self._dialogue)
+        self._is_homing = self._choices.homing == "start"
+        if self._is_homing:
+            self._executing = self._to_origin()
+            self._next_record()
+
+    def _to_origin(self) -> Iterator[tuple[Travel, int]]:
+        """Yield the motion of each motor to its opto, one motor after the other; one that covers
+        it already stands."""
+        for axis, step_mm in enumerate(self._step_mm):
+            place = self.slides.commanded_mm
+            count = max(math.ceil((place[axis] - self._choices.origin_mm) / step_mm - 1e-9), 0)
+            commanded = np.tile(place, (count, 1))
+            commanded[:, axis] -= step_mm * np.arange(1, count + 1)
+            seconds = np.arange(1, count + 1) / HOMING_HZ
+            yield Travel(commanded, seconds, np.zeros(count), count / HOMING_HZ), -1
 
     def _receive_byte(self, octet: int) -> None:
         if self._executing is None:
@@ -199,4 +222,6 @@ class I8751Twin(Twin):
             self.slides.begin(travel, self.now, block)
             return
         self._executing = None
-        self._out.append(EXECUTED)
+        if not self._is_homing:
+            self._out.append(EXECUTED)
+        self._is_homing = False

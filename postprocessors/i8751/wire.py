@@ -18,8 +18,9 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.errors import MachineError
+from camtool.records import replace
 from camtool.target.terminal import Terminal
-from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, Wire
+from camtool.target.wire import NEVER, Forecast, Manner, Packet, PacketByPacket, Wire
 
 from .dialect import I8751Dialect, I8751Link, I8751Machine
 from .pulses import PulseTimes
@@ -50,6 +51,14 @@ clocks that differ."""
 UNANSWERED_FACTOR: Final = 2.0
 """Wait behind a byte without a reply, in multiples of the lateness of the line."""
 
+SLOWEST_HZ: Final = 8.0
+"""Lowest rate of a motor (L3150-3183): the search of the origin has no ramp of its own."""
+
+MAX_HOMING_S: Final = 1200.0
+"""Longest search of the origin of an axis whose travel is not known, s."""
+
+HOMES: Final = "if it seeks its origin, it goes on until it has found it: its switch stops it"
+
 
 class I8751Wire(Wire):
     """The controller over RS-232."""
@@ -61,7 +70,7 @@ class I8751Wire(Wire):
         "the controller has just been reset: it waits for its key",
         "a wrong bit on the way to the machine is not seen: replies do not repeat what came",
     )
-    by_hand = frozenset({"jog", "line"})
+    by_hand = frozenset({"home", "jog", "line"})
     stopping = (
         "a packet that is being executed is executed to its end; one that is not complete yet is "
         "never begun, and the controller must then be reset"
@@ -83,7 +92,11 @@ class I8751Wire(Wire):
     ) -> I8751Conversation:
         """The conversation that sends these packets."""
         if manner.home:
-            raise MachineError("the controller has no switches to home to", where="--home")
+            raise MachineError(
+                "the controller homes at a reset alone",
+                where="--home",
+                mend="home it by camtool home: where it stands then is part zero to a program",
+            )
         return I8751Conversation(packets, machine, manner)
 
     def terminal(self, machine: I8751Machine) -> Terminal:
@@ -97,7 +110,10 @@ class I8751Wire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> I8751Conversation:
-        """A jog is a program of its steps; the machine has one speed."""
+        """A jog is a program of its steps; the machine has one speed. To home is a program of
+        nothing, behind a reset."""
+        if action == "home":
+            return self._homing(machine, manner)
         if action != "jog":
             return super().command(action, machine, values, manner)  # type: ignore[return-value]
         axes = zip("xyz", machine.axes, strict=True)
@@ -114,6 +130,27 @@ class I8751Wire(Wire):
         parts = list(_parts(stream, machine))
         packets = [Packet(part.data, seconds=seconds) for part in parts]
         return I8751Conversation(packets, machine, manner)
+
+    def _homing(self, machine: I8751Machine, manner: Manner) -> I8751Conversation:
+        """Return the conversation with a controller that seeks its optos at a reset (L5267-5338):
+        it takes the key when it has found them."""
+        assert isinstance(machine.link, I8751Link)
+        if machine.link.homing == "none":
+            raise MachineError(
+                "the controller's program has no search of its origin (link.homing is none)",
+                mend='set link.homing to "start" where it was given one, as the thesis proposes',
+            )
+        nothing = np.zeros((1, 3), dtype=np.int64)
+        stream = packet_bytes(nothing, nothing[:, :2], machine.dialect)
+        packets = [Packet(part.data) for part in _parts(stream, machine)]
+        packets[0] = replace(packets[0], ask="it homes when it is reset: has it just been reset")
+        homing_s = sum(
+            MAX_HOMING_S
+            if axis.travel_mm is None
+            else axis.travel_mm / axis.coded_step_mm / SLOWEST_HZ
+            for axis in machine.axes
+        )
+        return I8751Conversation(packets, machine, manner, homing_s=homing_s)
 
 
 class I8751Terminal(Terminal):
@@ -198,8 +235,18 @@ class I8751Conversation(PacketByPacket):
     stands = "stopped: it has executed what it was sent, and stands"
     goes_on = "it executes the packet to its end; its switch stops it"
 
-    def __init__(self, packets: Sequence[Packet], machine: I8751Machine, manner: Manner) -> None:
+    def __init__(
+        self,
+        packets: Sequence[Packet],
+        machine: I8751Machine,
+        manner: Manner,
+        *,
+        homing_s: float = 0.0,
+    ) -> None:
+        """`homing_s`: how long it may seek its origin before it takes the key, s."""
         super().__init__(packets, manner)
+        self._homing_s = homing_s
+        self._homed_by_s = NEVER
         stream = b"".join(packet.data for packet in packets)
         self._replies = [part.replies for part in _parts(stream, machine)]
         self._known = machine.dialect.motor_reply + "M"
@@ -208,8 +255,19 @@ class I8751Conversation(PacketByPacket):
         self._tries = 0
         self._written = 0.0
 
+    @property
+    def is_still(self) -> bool:
+        """True as for other packets, unless it may still seek its origin."""
+        return super().is_still and not (self._seeks_origin and self.done == 0)
+
+    @property
+    def _seeks_origin(self) -> bool:
+        """True while the key is not answered since the machine may home."""
+        return self._homing_s > 0.0 and self.sent <= 1 and self._at == 0
+
     def _send(self, packet: Packet, now: float) -> None:
         self._at, self._tries = 0, 1
+        self._homed_by_s = now + self._homing_s
         self._send_byte(now)
 
     def _send_byte(self, now: float) -> None:
@@ -250,7 +308,8 @@ class I8751Conversation(PacketByPacket):
             return
         self._said += text
         awaits_key = self._reply == READY and self._tries < KEY_TRIES
-        if self.manner.paced and now - self._written < ROUND_TRIP_S:
+        is_paced = self.manner.paced and not self._seeks_origin
+        if is_paced and now - self._written < ROUND_TRIP_S:
             self._fail(f"{self._said[:20]!r} comes too soon{self._in_reply}", now)
         elif self._is_answered:
             self._byte_done(now)
@@ -276,12 +335,16 @@ class I8751Conversation(PacketByPacket):
     def _mend(self) -> str:
         if self._executes:
             return "; it may be executing the packet: switch it off"
+        if self._seeks_origin:
+            return f"; {HOMES}"
         if not self.done and not self._at:
             return f"; {UNMOVED}; is it switched on, and is --baud its rate?"
         return f"; {UNMOVED}"
 
     @property
     def _unattended(self) -> str:
+        if self._busy and self._seeks_origin:
+            return HOMES
         return super()._unattended if self._busy and self._executes else ""
 
     def _byte_done(self, now: float) -> None:
@@ -298,6 +361,8 @@ class I8751Conversation(PacketByPacket):
             return
         if self._reply in (ANY, NONE):
             self._byte_done(now)
+        elif self._seeks_origin and now < self._homed_by_s:
+            self._send_byte(now)  # it hears nothing before it is at its origin
         else:
             self._fail(f"no reply, {self._reply} was awaited{self._in_reply}", now)
 
@@ -305,5 +370,8 @@ class I8751Conversation(PacketByPacket):
         """A packet that is not complete is never executed."""
         if self._executes and not unsent:
             return False
+        if self._seeks_origin:
+            self._stopped(f"nothing more was sent; {HOMES}")
+            return True
         self._stopped(f"stopped: {UNMOVED}")
         return True

@@ -8,6 +8,7 @@ homed.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -73,6 +74,8 @@ class LinuxcncTwin(Twin):
         self._halts: list[float] = []  # where it waits, s of the program
         self._segment_s = 0.0
         self._homing = False
+        self._jogs: dict[int, float] = {}  # axes that are being jogged, and their speeds, mm/s
+        self._target: Floats = np.zeros(3)  # of the jogs
         self.read_file: Callable[[str], bytes] = lambda name: Path(name).read_bytes()
         """Function that reads the file of a program."""
         self._hang_up()
@@ -240,13 +243,15 @@ class LinuxcncTwin(Twin):
         words = value.lower().split()
         if len(words) != 3 or words[0] not in ("x", "y", "z") or not self._homed:
             return False
-        if self._mode != "MANUAL" or not self._may_move():
+        if self._mode != "MANUAL" or not (self._may_move() or self._jogs):
             return False
         speed, distance = float(words[1]) / 60.0, float(words[2])
-        place = self.slides.commanded_mm
-        target = place.copy()
-        target["xyz".index(words[0])] += np.copysign(distance, speed)
-        self.slides.begin(_straight(place, target, abs(speed)), self.now, -1)
+        place, axis = self.slides.commanded_mm, "xyz".index(words[0])
+        if not self._jogs:
+            self._target = place.copy()
+        self._jogs[axis] = abs(speed)
+        self._target[axis] += np.copysign(distance, speed)
+        self.slides.begin(_jog_travel(place, self._target, self._jogs), self.now, -1)
         return True
 
     def _mdi(self, value: str) -> bool:
@@ -334,6 +339,7 @@ class LinuxcncTwin(Twin):
     def _abort(self) -> bool:
         self.slides.stop(self.now)
         self._travel, self._status, self._homing = None, "IDLE", False
+        self._jogs.clear()
         return True
 
     # Motion.
@@ -362,6 +368,7 @@ class LinuxcncTwin(Twin):
     def _wake(self) -> None:
         if self.slides.ends_s is not None:
             return
+        self._jogs.clear()
         if self._homing:
             self._homing, self._homed = False, True
         elif self._status == "RUNNING" and self._travel is not None:
@@ -385,6 +392,21 @@ def _on_off(value: bool) -> str:
 
 def _place(mm: Floats) -> str:
     return " ".join(f"{value:.6f}" for value in [*mm.tolist(), 0.0, 0.0, 0.0])
+
+
+def _jog_travel(start: Floats, target: Floats, speeds: dict[int, float]) -> Travel:
+    """Return the motion of axes that are jogged at once, each at its speed to its own end; those
+    that are there stand."""
+    lengths = np.abs(target - start)
+    total_s = max(float(lengths[axis]) / max(speed, 1e-9) for axis, speed in speeds.items())
+    count = max(math.ceil(float(lengths.max()) / 0.01), 1)
+    seconds = np.arange(1, count + 1) / count * total_s
+    places = np.tile(start, (count, 1))
+    for axis, speed in speeds.items():
+        places[:, axis] += np.sign(target[axis] - start[axis]) * np.minimum(
+            seconds * speed, lengths[axis]
+        )
+    return Travel(places, seconds, np.zeros(count), total_s)
 
 
 def _straight(start: Floats, target: Floats, speed: float = HOMING_MM_S) -> Travel:

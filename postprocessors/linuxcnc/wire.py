@@ -12,6 +12,7 @@ or yield how long to wait.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Final, cast
@@ -23,6 +24,7 @@ from camtool.records import replace
 from camtool.target.terminal import Terminal
 from camtool.target.wire import (
     HALTS,
+    LATE_S,
     Conversation,
     Forecast,
     Manner,
@@ -47,6 +49,10 @@ and encoders."""
 
 MAX_OVERRIDE: Final = 3.0
 """Largest override of feed and rapids."""
+
+HELD_AHEAD_S: Final = 0.3
+"""Time for which a held jog has increments ahead of it, s: what it moves on if camtool is killed,
+besides its braking."""
 
 STILL_REPORTS: Final = 2
 """Consecutive equal positions after which it stands."""
@@ -86,7 +92,7 @@ class LinuxcncWire(Wire):
         "machine",
     )
     stopping = "the program is aborted: the slides slow down and stand"
-    by_hand = frozenset({"home", "zero", "jog", "line"})
+    by_hand = frozenset({"home", "zero", "jog", "hold", "line"})
     overrides = ("feed", "spindle")
 
     def packets(
@@ -143,7 +149,8 @@ class LinuxcncWire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> LinuxcncConversation:
-        """`set home -1`; G10 L20 of the frame that is active; `set jog_incr`, axis by axis."""
+        """`set home -1`; G10 L20 of the frame that is active; `set jog_incr`, axis by axis, or
+        again and again while it is held."""
         return LinuxcncConversation((), _link(machine), manner, action, values)
 
 
@@ -170,6 +177,7 @@ class LinuxcncConversation(Conversation):
             "home": self._home,
             "zero": self._zero,
             "jog": self._jog,
+            "hold": self._hold,
         }
         self._script, self._fresh = self._session(acts[action]), True
         self._rest, self._asked, self._now = b"", "", 0.0
@@ -526,6 +534,27 @@ class LinuxcncConversation(Conversation):
             last = place
             yield self._poll_s
         self._end(WireState.FINISHED)
+
+    def _hold(self) -> Script:
+        """Jog by short increments until it is stopped. LinuxCNC adds each to where it is going, so
+        that it never has more to do than `HELD_AHEAD_S`, even if nobody speaks to it any more."""
+        yield from self._set("mode manual")
+        yield from self._set("teleop_enable on")
+        self._begun, self.state = True, WireState.SENDING
+        feed = self._values["feed"] / math.sqrt(len(self._axes))
+        ahead_s = HELD_AHEAD_S * self.manner.late_s / LATE_S
+        told_s = self._now - ahead_s
+        while True:
+            now = self._now
+            way_mm, told_s = feed / 60.0 * (now - told_s), now
+            for axis in self._axes:
+                sense = "-" if self._values[axis] < 0.0 else ""
+                yield from self._set(f"jog_incr {axis} {sense}{feed:.6f} {way_mm:.6f}")
+            yield from self._place()
+            yield from self._errors()
+            if self._said:
+                raise _Refused(self._said)
+            yield 0.25 * ahead_s
 
 
 def _whole_number(text: str) -> int:

@@ -9,14 +9,34 @@ characters and more a block is lost; that a block ends with a line feed is infer
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, cast
 
-from camtool.errors import MachineError
+import numpy as np
+
+from camtool.arrays import Floats
+from camtool.errors import MachineError, ProgramError
+from camtool.machine.model import Machine
+from camtool.simulation.motion import Options
 from camtool.target.terminal import Terminal
-from camtool.target.wire import LATE_S, Forecast, Manner, Packet, PacketByPacket, Wire
+from camtool.target.wire import (
+    LATE_S,
+    CommandHand,
+    Conversation,
+    Forecast,
+    HandAction,
+    Manner,
+    Packet,
+    PacketByPacket,
+    Place,
+    Wire,
+)
 
-from .dialect import ValcncLink, ValcncMachine
+from .controller import ValcncModel
+from .dialect import ValcncController, ValcncDialect, ValcncLink, ValcncMachine, scales_of
+from .read import read_block
+
+SimulatedMachine = Machine[ValcncController, ValcncDialect]
 
 OPENING: Final = b"C\n"
 
@@ -39,7 +59,8 @@ class ValcncWire(Wire):
         "controller answers nothing (link.answer)",
         "keep a hand at the switch: a stop takes effect behind the block that is being cut",
     )
-    by_hand = frozenset({"line"})
+    by_hand = frozenset({"zero", "jog", "line"})
+    jogs_from_place = True
     stopping = "nothing more is sent; the block that is being cut is cut to its end"
 
     def packets(self, data: bytes, machine: ValcncMachine, forecast: Forecast) -> Sequence[Packet]:
@@ -68,6 +89,113 @@ class ValcncWire(Wire):
         """Blocks."""
         return ValcncTerminal()
 
+    def command(
+        self,
+        action: str,
+        machine: ValcncMachine,
+        values: Mapping[str, float],
+        manner: Manner,
+    ) -> Conversation:
+        """A jog is a program of one block, or of two where Z moves too: up first, down last."""
+        if action == "zero":
+            raise MachineError(
+                f"{machine.target.name} has no command to zero over its line",
+                mend="bring the tool to part zero, and switch the controller off and on there",
+            )
+        if action != "jog":
+            return super().command(action, machine, values, manner)
+        if manner.at_mm is None:
+            raise MachineError(
+                "its blocks are absolute, and it does not say where it stands",
+                mend="say it: --at X0,Y0,Z0 (in the panel: zero) if it has just been switched on, "
+                "else where the last program or jog has ended",
+            )
+        at = np.array(manner.at_mm)
+        end = at + [values.get(letter, 0.0) for letter in "xyz"]
+        packets, block = [Packet(OPENING)], _block(at, machine)
+        place = manner.at_mm
+        for corner in _corners(at, end):
+            before, block = block, _block(corner, machine)
+            if block != before:
+                packets.append(_block_packet(block, machine, place))
+                place = packets[-1].end_mm or place
+        if len(packets) == 1:
+            raise MachineError("that is less than the last decimal of a block", mend="jog by more")
+        return self.conversation(packets, machine, manner)
+
+    def hand(self, machine: ValcncMachine, manner: Manner) -> ValcncHand:
+        """The conversation that jogs from place to place."""
+        return ValcncHand(self, machine, manner)
+
+
+def _corners(at: Floats, end: Floats) -> Iterator[Floats]:
+    """Yield the places (3,) of a jog: Z and the plane apart, and the tool up while it moves in
+    the plane."""
+    if end[2] > at[2]:
+        yield np.array([at[0], at[1], end[2]])
+    else:
+        yield np.array([end[0], end[1], at[2]])
+    yield end
+
+
+def _block(place_mm: Floats, machine: ValcncMachine) -> bytes:
+    """Return the block that moves to a place (3,) mm without cutting."""
+    units = place_mm * scales_of(machine, machine.dialect)
+    decimals = machine.dialect.decimals
+    words = [
+        f"{letter}{value:.{decimals}f}" for letter, value in zip("XYZ", units + 0.0, strict=True)
+    ]
+    return f"G00{''.join(words)}".encode("ascii")
+
+
+def _block_packet(text: bytes, machine: ValcncMachine, at_mm: Place) -> Packet:
+    """Return a block that begins at a place, with its simulated time and its end; ProgramError for
+    text that is no block."""
+    scales = scales_of(machine, machine.dialect)
+    x, y, z = np.round(np.array(at_mm) * scales, machine.dialect.decimals).tolist()
+    path, end = read_block(text, machine, (x, y, z))
+    chunks = ValcncModel().run(path, cast(SimulatedMachine, machine), Options())
+    seconds = float(np.concatenate([chunk.ledger.duration_s for chunk in chunks]).sum())
+    x, y, z = (np.array(end) / scales).tolist()
+    return Packet(text + b"\n", 0, seconds, end_mm=(x, y, z))
+
+
+class ValcncHand(CommandHand):
+    """A machine whose place is kept here: it is known once the user has said that the controller
+    stands at part zero, and after a program."""
+
+    def __init__(self, wire: ValcncWire, machine: ValcncMachine, manner: Manner) -> None:
+        super().__init__(wire, machine, manner)
+        self._of_valcnc = machine
+
+    def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
+        """Carry out an order; "zero" sends nothing, and says where the controller stands."""
+        if action != "zero":
+            super().order(action, values, now)
+            return
+        self.check_ready(action)
+        if not (values.keys() >= set("xyz") and not any(values.values())):
+            raise MachineError(
+                "the controller is at part zero on all axes when it is switched on, and takes no "
+                "other place",
+                mend="zero all axes at once",
+            )
+        self.place_mm = (0.0, 0.0, 0.0)
+        self._tell("taken to stand at part zero: right if it has just been switched on there")
+
+    def say(self, line: str, now: float) -> None:
+        """Send a typed block, and wait for its simulated time where its begin is known."""
+        text = "".join(line.split()).encode("ascii", "replace")
+        try:
+            if self.place_mm is None:
+                raise ProgramError("the begin of the block is not known")
+            packet = _block_packet(text, self._of_valcnc, self.place_mm)
+        except ProgramError:
+            super().say(line, now)
+            return
+        packets = [Packet(OPENING), packet]
+        self._begin("line", self._wire.conversation(packets, self._of_valcnc, self.manner), now)
+
 
 class ValcncTerminal(Terminal):
     """Blocks, one a line, of which none is known to be answered."""
@@ -94,10 +222,15 @@ class ValcncConversation(PacketByPacket):
         self._said = b""
         self._awaits = self._answered = False
         self._over = 0.0  # when the time of the block is over
+        self.place_mm = manner.at_mm
         if not self._answer:
             self.stands = (
                 "nothing more was sent; by the simulated time it stands, and says nothing"
             )
+
+    def _packet_done(self, now: float) -> None:
+        self.place_mm = self.packets[self.sent - 1].end_mm or self.place_mm
+        super()._packet_done(now)
 
     def _send(self, packet: Packet, now: float) -> None:
         self._write(packet.data)

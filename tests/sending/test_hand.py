@@ -23,8 +23,14 @@ READY = WireState.READY
 class AtHand:
     """A hand, the twin of its machine, and what it tells."""
 
-    def __init__(self, name: str, choices: tuple[str, ...] = (), faults: Faults | None = None):
-        self.target: LoadedTarget = load_target(name, settings=SETTINGS.get(name, ()))
+    def __init__(
+        self,
+        name: str,
+        choices: tuple[str, ...] = (),
+        faults: Faults | None = None,
+        target: LoadedTarget | None = None,
+    ):
+        self.target = target or load_target(name, settings=SETTINGS.get(name, ()))
         self.twin: Any = self.target.twin(list(choices))
         wire: Any = self.target.target.wire()
         self.hand: Hand = wire.hand(self.target.machine, Manner())
@@ -198,3 +204,71 @@ def test_a_stop_ends_what_is_held(name: str) -> None:
     at.after(20.0)
     assert at.hand.state is WireState.STOPPED
     assert not at.twin.is_moving
+
+
+def test_valcnc_jogs_from_the_place_that_the_user_has_said() -> None:
+    at = AtHand("valcnc", ("answer=ok",))
+    at.until_ready()
+    with pytest.raises(MachineError, match="does not say where it stands"):
+        at.hand.order("jog", {"x": 1.0}, at.now)
+    with pytest.raises(MachineError, match="zero all axes at once"):
+        at.hand.order("zero", {"x": 0.0}, at.now)
+    at.hand.order("zero", dict.fromkeys("xyz", 0.0), at.now)
+    for x in (2.0, -0.5):
+        at.hand.order("jog", {"x": x, "z": 0.25}, at.now)
+        at.until_ready()
+    at.hand.say("G00 X0.5 Y0.125 Z0.0624", at.now)
+    at.until_ready()
+    at.hand.order("jog", {"y": 1.0}, at.now)
+    at.until_ready()
+    step = max(axis.coded_step_mm for axis in at.target.machine.axes)
+    assert at.hand.place_mm == pytest.approx(tuple(at.place()), abs=0.51 * step)
+    assert at.place() == pytest.approx([4.0, 2.0, 0.5], abs=step)
+
+
+def test_a_place_that_has_become_unsure_is_forgotten() -> None:
+    """An answer was lost: nobody knows whether the block was drawn."""
+    at = AtHand("valcnc", ("answer=ok",))
+    at.until_ready()
+    at.hand.order("zero", dict.fromkeys("xyz", 0.0), at.now)
+    at.both.line.back.faults = Faults(drop=1.0)
+    at.hand.order("jog", {"x": 1.0}, at.now)
+    at.until_ready()
+    assert any("does not answer" in each for each in at.told)
+    with pytest.raises(MachineError, match="does not say where it stands"):
+        at.hand.order("jog", {"x": 1.0}, at.now)
+
+
+def test_i8751_homes_when_the_user_says_that_it_was_reset() -> None:
+    target = load_target("i8751", settings=(*SETTINGS["i8751"], "link.homing=start"))
+    at = AtHand("i8751", ("homing=start", "origin_mm=-0.5"), target=target)
+    at.until_ready()
+    at.hand.order("home", {}, at.now)
+    at.after(1.0)
+    assert at.hand.state is WireState.WAITING
+    assert "reset" in at.hand.why
+    at.hand.resume(at.now)
+    at.until_ready()
+    assert at.place() == pytest.approx([-0.5] * 3, abs=0.0125)
+
+
+@pytest.mark.parametrize(
+    ("held_s", "feed", "senses"), [(2.0, 300.0, "x"), (0.5, 60.0, "xy"), (4.0, 900.0, "xy")]
+)
+def test_a_held_jog_of_linuxcnc_ends_when_it_is_let_go(
+    held_s: float, feed: float, senses: str
+) -> None:
+    at = AtHand("linuxcnc")
+    at.until_ready()
+    at.hand.hold({**dict.fromkeys(senses, -1.0), "feed": feed}, at.now)
+    at.after(held_s)
+    let_go = at.place()
+    assert np.hypot(*let_go[:2]) == pytest.approx(feed / 60.0 * held_s, abs=feed / 60.0 * 0.2)
+    at.hand.release(at.now)
+    at.until_ready()
+    assert np.abs(at.place() - let_go).max() <= feed / 60.0 * 0.1 + 0.02
+    at.hand.hold({"y": 1.0, "feed": feed}, at.now)
+    at.after(1.0)
+    gone = at.place()
+    at.twin.advance(at.now + 60.0)  # camtool was killed
+    assert 0.0 < at.place()[1] - gone[1] <= feed / 60.0 * 0.4

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
+import numpy as np
 import pytest
 
 from camtool.errors import MachineError
@@ -12,7 +14,7 @@ from camtool.sending.prepare import Consignment, consignment
 from camtool.target.wire import Conversation, Manner, WireState
 from tests.feeding import same_motion
 from tests.postprocessors.i8751.machines import loaded
-from tests.sending.talking import talked
+from tests.sending.talking import Talking, talked
 
 RECORDS = bytes.fromhex(
     "01 03 00 64 02 04 00 05 00 01 03 04 00 2C 00 01 01 05 02 03 00 07 00 00 03 05 00 00"
@@ -142,11 +144,67 @@ def test_a_jog_is_a_program_of_its_steps() -> None:
     talked(talk, WiredTwin(twin, paced=True), latest_s=1000.0)
     assert talk.state is WireState.FINISHED, talk.why
     assert twin.slides.commanded_mm == pytest.approx([10.0, 0.0, -1.0])
-    for action in ("home", "zero"):
-        with pytest.raises(MachineError, match=f"no command to {action}"):
-            wire.command(action, target.machine, {}, Manner())  # type: ignore[union-attr]
-    with pytest.raises(MachineError, match="no switches"):
+    with pytest.raises(MachineError, match="no command to zero"):
+        wire.command("zero", target.machine, {}, Manner())  # type: ignore[union-attr]
+    with pytest.raises(MachineError, match="search of its origin"):
+        wire.command("home", target.machine, {}, Manner())  # type: ignore[union-attr]
+    with pytest.raises(MachineError, match="homes at a reset alone"):
         conversation(SHORT, manner=Manner(home=True))
+
+
+HOMES = loaded().with_settings(["link.homing=start"])
+
+
+def homing() -> Conversation:
+    wire: Any = HOMES.target.wire()
+    talk = wire.command("home", HOMES.machine, {}, Manner(paced=True))
+    assert isinstance(talk, Conversation)
+    return talk
+
+
+def agreed(talk: Conversation, now: float) -> None:
+    if talk.state is WireState.WAITING:
+        assert "has it just been reset" in talk.why
+        talk.resume(now)
+
+
+def test_homing_ends_at_the_optos_one_motor_after_the_other() -> None:
+    twin: Any = HOMES.twin(["homing=start", "origin_mm=-1.5"])
+    talk = homing()
+    talked(talk, WiredTwin(twin, paced=True), agreed, latest_s=1000.0)
+    assert talk.state is WireState.FINISHED, talk.why
+    assert twin.slides.commanded_mm == pytest.approx([-1.5] * 3, abs=0.0125)
+    assert twin.now > 3 * 1.5 / 0.0125 / 8.0
+    steps = np.diff(twin.slides.trace.commanded, axis=0, prepend=0.0)
+    assert ((steps != 0.0).sum(axis=1) == 1).all()
+    assert (np.diff(np.abs(steps).argmax(axis=1)) >= 0).all()
+    # A program that follows begins there, and finds the controller waiting for its key.
+    one = consigned(SHORT)
+    rest = one.wire.conversation(one.packets, HOMES.machine, Manner())
+    talked_on = Talking(rest, WiredTwin(twin), now=twin.now)
+    talked_on.until(twin.now + 3000.0)
+    assert rest.state is WireState.FINISHED, rest.why
+
+
+def test_homing_that_is_stopped_says_that_nothing_stops_it() -> None:
+    twin: Any = HOMES.twin(["homing=start"])
+    both = Talking(homing(), WiredTwin(twin, paced=True))
+    both.until(5.0, agreed)
+    both.talk.stop(both.now)
+    both.until(1000.0)
+    assert both.talk.state is WireState.STOPPED
+    assert "goes on until it has found it: its switch stops it" in both.talk.why
+    assert not both.talk.is_still
+    assert twin.is_moving
+
+
+def test_a_controller_that_never_answers_is_not_asked_for_ever() -> None:
+    talk = homing()
+    line = WiredTwin(HOMES.twin([]), Faults(drop=1.0), Faults(drop=1.0))
+    now = talked(talk, line, agreed, latest_s=5000.0)
+    assert talk.state is WireState.FAILED
+    assert "no reply" in talk.why
+    assert now > 1000.0
 
 
 def test_what_a_person_types_and_reads() -> None:

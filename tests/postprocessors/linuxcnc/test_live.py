@@ -13,13 +13,17 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from shapely import LineString, points
 
 from camtool.arrays import Floats
-from camtool.target.registry import load_target
+from camtool.sending.drive import Driver
+from camtool.sending.line import Port, opened_line
+from camtool.target.registry import LoadedTarget, load_target
+from camtool.target.wire import Hand, Manner, WireState
 from tests.feeding import motion
 from tests.oracles.linuxcnc_headless import COMMAND, alone, laid_out
 
@@ -146,6 +150,37 @@ def apart_mm(path: Floats, places: Floats) -> float:
     return found
 
 
+class Held:
+    """A hand that holds X for two seconds, lets go and closes; how far it went, mm, and how far
+    after it was let go."""
+
+    def __init__(self, loaded: LoadedTarget) -> None:
+        wire: Any = loaded.target.wire()
+        self.hand: Hand = wire.hand(loaded.machine, Manner())
+        self.went_mm = self.after_mm = 0.0
+        self._held_s = self._let_go_s = 0.0
+        self._begin_mm = self._let_go_mm = 0.0
+
+    def wish(self) -> Any:
+        hand, now = self.hand, time.monotonic()
+        if hand.state is WireState.READY and not self._held_s:
+            self._held_s = now
+            return lambda talk, at: talk.hold({"x": 1.0, "feed": 180.0}, at)
+        if hand.place_mm is None:
+            return None
+        if not self._let_go_s:
+            self._begin_mm = self._begin_mm or hand.place_mm[0]
+            if now - self._held_s < 2.0:
+                return None
+            self._let_go_s, self._let_go_mm = now, hand.place_mm[0]
+            return lambda talk, at: talk.release(at)
+        if hand.state is WireState.READY:
+            self.went_mm = hand.place_mm[0] - self._begin_mm
+            self.after_mm = hand.place_mm[0] - self._let_go_mm
+            return lambda talk, at: talk.close(at)
+        return None
+
+
 def test_a_program_is_driven_and_its_path_is_the_predicted_one(tmp_path: Path) -> None:
     loaded = load_target("linuxcnc")
     predicted = motion(PROGRAM, loaded).commanded
@@ -183,6 +218,13 @@ def test_a_program_is_driven_and_its_path_is_the_predicted_one(tmp_path: Path) -
         for action in (["jog", "X1.5", "Y-2", "F600"], ["zero", "X0"], ["home"]):
             by_hand = camtool(*action, "-t", "linuxcnc", *at)
             assert by_hand.returncode == 0, by_hand.stderr
+        # Held, as in the panel: increments that LinuxCNC adds to where it is going.
+        with opened_line(Port(at[1])) as line:
+            hand = Held(loaded)
+            Driver(line, wish=hand.wish).carry(hand.hand)
+        assert hand.hand.state is WireState.FINISHED, hand.hand.why
+        assert 4.0 < hand.went_mm < 6.0  # 2 s at 3 mm/s, and it speeds up and slows down
+        assert hand.after_mm < 0.6
         hands.do("set estop on")
         stopped = camtool(*words, *at)
         assert stopped.returncode == 1

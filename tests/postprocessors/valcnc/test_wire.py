@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
+import numpy as np
 import pytest
 from camtool_postprocessors.valcnc.wire import ValcncWire
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from camtool.errors import MachineError
 from camtool.sending.faults import Faults, WiredTwin
 from camtool.sending.prepare import Consignment, consignment
 from camtool.target.registry import load_target
-from camtool.target.wire import Conversation, Manner, WireState, Write
+from camtool.target.wire import Conversation, Manner, Place, WireState, Write
 from tests.feeding import logo, made, same_motion
+from tests.sending.talking import Talking
 from tests.sending.talking import talked as talked_with
 
 LOADED = load_target("valcnc")
@@ -146,3 +151,55 @@ def test_what_it_says_unasked_is_an_error_only_where_answers_are_awaited() -> No
 def test_what_a_person_types() -> None:
     terminal = LOADED.target.wire().terminal(LOADED.machine)  # type: ignore[union-attr]
     assert (terminal.hello, terminal.encode("G01 X1")) == (b"C\n", b"G01 X1\n")
+
+
+# By hand: blocks are absolute, so that the place must be known.
+
+
+def jogged(at_mm: Place | None, **values: float) -> tuple[Conversation, Any]:
+    twin: Any = LOADED.twin([])
+    if at_mm is not None and any(at_mm):
+        x, y, z = at_mm
+        jogged_to = ValcncWire().command(
+            "jog", LOADED.machine, {"x": x, "y": y, "z": z}, Manner(at_mm=(0.0, 0.0, 0.0))
+        )
+        talked_with(jogged_to, WiredTwin(twin), latest_s=1000.0)
+    talk = ValcncWire().command("jog", LOADED.machine, values, Manner(at_mm=at_mm))
+    both = Talking(talk, WiredTwin(twin), now=twin.now)
+    both.until(twin.now + 1000.0)
+    return talk, twin
+
+
+@given(
+    st.tuples(*[st.floats(-20.0, 20.0)] * 3),
+    st.tuples(*[st.floats(-9.0, 9.0)] * 3),
+)
+@settings(max_examples=25)
+def test_a_jog_moves_by_so_much_from_where_it_stands(at: Place, by: Place) -> None:
+    x, y, z = by
+    assume(max(map(abs, by)) > 0.01)
+    talk, twin = jogged(at, x=x, y=y, z=z)
+    assert talk.state is WireState.FINISHED, talk.why
+    step = max(axis.coded_step_mm for axis in LOADED.machine.axes)
+    wanted = np.array(at) + by
+    np.testing.assert_allclose(twin.slides.commanded_mm, wanted, atol=1.1 * step)
+    np.testing.assert_allclose(talk.place_mm, wanted, atol=step)
+
+
+def test_the_tool_is_up_while_a_jog_crosses() -> None:
+    for z in (3.0, -3.0):
+        _, twin = jogged((0.0, 0.0, 5.0), x=4.0, y=2.0, z=z)
+        places = twin.slides.trace.commanded
+        crosses = (np.diff(places[:, :2], axis=0) != 0.0).any(axis=1)
+        later = places[1:][crosses & (np.arange(1, len(places)) > np.argmax(places[:, 2] >= 5.0))]
+        assert (later[:, 2] >= max(5.0, 5.0 + z) - 0.01).all()
+
+
+def test_without_a_place_a_jog_is_refused_and_says_what_to_do() -> None:
+    with pytest.raises(MachineError, match="does not say where it stands") as refused:
+        jogged(None, x=1.0)
+    assert "--at" in str(refused.value)
+    with pytest.raises(MachineError, match="less than"):
+        jogged((0.0, 0.0, 0.0), x=1e-7)
+    with pytest.raises(MachineError, match="switch the controller off"):
+        ValcncWire().command("zero", LOADED.machine, {}, Manner())
