@@ -22,50 +22,51 @@ from camtool.arrays import Bools, Floats, Indices, Ints
 # the twin.
 
 
-cpdef near_pairs(Int[:, ::1] cells, double[:, ::1] points, double reach, Int most):
+cpdef near_pairs(Int[:, ::1] cells, double[:, ::1] points, double reach, Int max_pairs):
     """Rows (J,), (J,) of all points (E, 2) within `reach` of each other, each pair once.
 
     `cells` (E, 3): group, column and row of the grid cell of each point, `reach` wide, sorted.
-    No point gets more than `most` pairs with points after it: that bounds time and memory.
+    No point gets more than `max_pairs` pairs with points after it: that bounds time and memory.
     """
     cdef Int total
-    cdef Int[::1] one, other, none
+    cdef Int[::1] first, second, none
     none = np.empty(0, np.int64)
-    total = _pairs(cells, points, reach, most, none, none)
-    one, other = np.empty(total, np.int64), np.empty(total, np.int64)
-    _pairs(cells, points, reach, most, one, other)
-    return np.asarray(one), np.asarray(other)
+    total = _pairs(cells, points, reach, max_pairs, none, none)
+    first, second = np.empty(total, np.int64), np.empty(total, np.int64)
+    _pairs(cells, points, reach, max_pairs, first, second)
+    return np.asarray(first), np.asarray(second)
 
 
 cdef Int _pairs(
-    Int[:, ::1] cells, double[:, ::1] points, double reach, Int most, Int[::1] one, Int[::1] other
+    Int[:, ::1] cells, double[:, ::1] points, double reach, Int max_pairs, Int[::1] first,
+    Int[::1] second
 ) noexcept:
     """Counts the pairs, and writes them when there is room for them.
 
     Beside a point lie its own cell and the one above, which follow it in the sorted list, and
     three cells of the next column, whose beginning only moves forward.
     """
-    cdef Int i, count, low, number, found, after, group, column, row, j
+    cdef Int i, count, low, number, hits, offset, group, column, row, j
     count, low, number = 0, 0, len(points)
     for i in range(number):
         group, column, row = cells[i, 0], cells[i, 1], cells[i, 2]
-        found = 0
+        hits = 0
         while low < number and _is_before(cells, low, group, column + 1, row - 1):
             low += 1
-        for after in range(2):
-            j = i + 1 if after == 0 else max(low, i + 1)
+        for offset in range(2):
+            j = i + 1 if offset == 0 else max(low, i + 1)
             while (
                 j < number
-                and found < most
+                and hits < max_pairs
                 and cells[j, 0] == group
-                and cells[j, 1] == column + after
+                and cells[j, 1] == column + offset
                 and cells[j, 2] <= row + 1
             ):
                 if math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]) <= reach:
-                    if len(one) > 0:
-                        one[count], other[count] = i, j
+                    if len(first) > 0:
+                        first[count], second[count] = i, j
                     count += 1
-                    found += 1
+                    hits += 1
                 j += 1
     return count
 
@@ -86,13 +87,13 @@ cdef Int top(Int[::1] above, Int item) noexcept:
     return item
 
 
-cpdef clusters(Int count, Int[::1] one, Int[::1] other):
+cpdef clusters(Int count, Int[::1] first, Int[::1] second):
     """(count,) the least end of all ends that pairs connect with each end."""
     cdef Int k, i, a, b
     cdef Int[::1] above
     above = np.arange(count, dtype=np.int64)
-    for k in range(len(one)):
-        a, b = top(above, one[k]), top(above, other[k])
+    for k in range(len(first)):
+        a, b = top(above, first[k]), top(above, second[k])
         if a < b:
             above[b] = a
         elif b < a:
@@ -103,7 +104,8 @@ cpdef clusters(Int count, Int[::1] one, Int[::1] other):
 
 
 cpdef Int join(
-    Int[::1] one, Int[::1] other, Int[::1] mates, Int[::1] above, Int[::1] segments, Int[::1] arcs
+    Int[::1] first_ends, Int[::1] second_ends, Int[::1] mates, Int[::1] above, Int[::1] segments,
+    Int[::1] arcs
 ) noexcept:
     """Joins pairs of free ends in their order into `mates`; how many.
 
@@ -112,8 +114,8 @@ cpdef Int join(
     """
     cdef Int joined, k, a, b, s, t
     joined = 0
-    for k in range(len(one)):
-        a, b = one[k], other[k]
+    for k in range(len(first_ends)):
+        a, b = first_ends[k], second_ends[k]
         if mates[a] >= 0 or mates[b] >= 0:
             continue
         s, t = top(above, a // 2), top(above, b // 2)
@@ -134,7 +136,7 @@ cdef inline bint encloses(Int segments, Int arcs) noexcept:
     return segments > 2 or (segments == 2 and arcs > 0)
 
 
-cpdef walk(Int[::1] mates, uint8_t[::1] wanted):
+cpdef walk(Int[::1] mates, uint8_t[::1] is_chosen):
     """The chains of the wanted paths, each begun at its first path, which is not turned.
 
     Returns the ends by which the paths are entered, in the order of travel, where each chain
@@ -142,13 +144,13 @@ cpdef walk(Int[::1] mates, uint8_t[::1] wanted):
     """
     cdef Int count, index, size, chains, end, start
     cdef Int[::1] entries, begins
-    cdef uint8_t[::1] rings, seen
-    count = len(wanted)
+    cdef uint8_t[::1] rings, is_visited
+    count = len(is_chosen)
     entries, begins = np.empty(count, np.int64), np.empty(count + 1, np.int64)
-    rings, seen = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    rings, is_visited = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     size, chains = 0, 0
     for index in range(count):
-        if seen[index] or not wanted[index]:
+        if is_visited[index] or not is_chosen[index]:
             continue
         begins[chains] = size
         end = first_end(mates, 2 * index)
@@ -156,15 +158,15 @@ cpdef walk(Int[::1] mates, uint8_t[::1] wanted):
         start = end
         while end >= 0:
             entries[size] = end
-            seen[end // 2] = True
+            is_visited[end // 2] = True
             size += 1
             end = mates[end ^ 1]
             if end == start:
                 break
         chains += 1
     begins[chains] = size
-    found = np.asarray(rings[:chains]).view(np.bool_)
-    return np.asarray(entries[:size]), np.asarray(begins[: chains + 1]), found
+    are_rings = np.asarray(rings[:chains]).view(np.bool_)
+    return np.asarray(entries[:size]), np.asarray(begins[: chains + 1]), are_rings
 
 
 cdef Int first_end(Int[::1] mates, Int end) noexcept:
@@ -189,47 +191,48 @@ cpdef Int split_loops(
     before is a loop: it is closed there, and the rest goes on without it, as long as the ends
     that then meet lie within `reach`.
     """
-    cdef Int made, index, start, last, height, end, label, m, k, before, begin, close, segments
+    cdef Int loops, index, start, last, height, end, label, m, k, previous, begin, close, segments
     cdef Int arcs, less, fewer
     cdef Int[:, ::1] until
-    cdef Int[::1] where, stack
-    cdef bint done, near
-    where = np.full(len(mates), -1, np.int64)
+    cdef Int[::1] position, stack
+    cdef bint is_done, is_near
+    position = np.full(len(mates), -1, np.int64)
     stack = np.empty(len(mates) // 2 + 1, np.int64)
     until = np.zeros((len(stack) + 1, 2), np.int64)
-    made = 0
+    loops = 0
     for index in range(len(starts)):
         start = starts[index]
         segments, arcs = _ring_weight(start, mates, weights)
         last = mates[start]
-        height, end, done = 0, start, False
-        while not done:
+        height, end, is_done = 0, start, False
+        while not is_done:
             label = node[end]
-            if label >= 0 and where[label] >= 0:
-                k = where[label]
+            if label >= 0 and position[label] >= 0:
+                k = position[label]
                 less, fewer = until[height, 0] - until[k, 0], until[height, 1] - until[k, 1]
                 begin, close = stack[k], stack[height - 1] ^ 1
-                before = last if k == 0 else stack[k - 1] ^ 1
-                near = (
-                    _distance(points, begin, close) <= reach and _distance(points, before, end) <= reach
+                previous = last if k == 0 else stack[k - 1] ^ 1
+                is_near = (
+                    _distance(points, begin, close) <= reach
+                    and _distance(points, previous, end) <= reach
                 )
-                if near and encloses(less, fewer) and encloses(segments - less, arcs - fewer):
+                if is_near and encloses(less, fewer) and encloses(segments - less, arcs - fewer):
                     mates[begin], mates[close] = close, begin
-                    mates[before], mates[end] = end, before
+                    mates[previous], mates[end] = end, previous
                     segments, arcs = segments - less, arcs - fewer
-                    made += 1
-                    _forget(stack, k, height, node, where)
+                    loops += 1
+                    _forget(stack, k, height, node, position)
                     height = k
             stack[height] = end
             for m in range(2):
                 until[height + 1, m] = until[height, m] + weights[end // 2, m]
             if label >= 0:
-                where[label] = height
+                position[label] = height
             height += 1
-            done = end ^ 1 == last
+            is_done = end ^ 1 == last
             end = mates[end ^ 1]
-        _forget(stack, 0, height, node, where)
-    return made
+        _forget(stack, 0, height, node, position)
+    return loops
 
 
 cdef (Int, Int) _ring_weight(Int start, Int[::1] mates, Int[:, ::1] weights) noexcept:
@@ -244,17 +247,17 @@ cdef (Int, Int) _ring_weight(Int start, Int[::1] mates, Int[:, ::1] weights) noe
     return segments, arcs
 
 
-cdef void _forget(Int[::1] entries, Int low, Int high, Int[::1] node, Int[::1] where) noexcept:
-    """Takes the entries low … high − 1 out of `where` they stand."""
+cdef void _forget(Int[::1] entries, Int low, Int high, Int[::1] node, Int[::1] position) noexcept:
+    """Takes the entries low … high − 1 out of `position` they stand."""
     cdef Int m, label
     for m in range(low, high):
         label = node[entries[m]]
-        if label >= 0 and where[label] == m:
-            where[label] = -1
+        if label >= 0 and position[label] == m:
+            position[label] = -1
 
 
-cdef inline double _distance(double[:, ::1] points, Int one, Int other) noexcept:
-    return math.hypot(points[one, 0] - points[other, 0], points[one, 1] - points[other, 1])
+cdef inline double _distance(double[:, ::1] points, Int first, Int second) noexcept:
+    return math.hypot(points[first, 0] - points[second, 0], points[first, 1] - points[second, 1])
 
 
 # The nearest other point of each point, on a grid whose cells are looked at ring by ring.
@@ -264,9 +267,9 @@ cdef inline double _distance(double[:, ::1] points, Int one, Int other) noexcept
 
 
 cpdef nearest_others(
-    Int[:, ::1] cells, double[:, ::1] points, double size, double least, double reach
+    Int[:, ::1] cells, double[:, ::1] points, double size, double min_distance, double reach
 ):
-    """For each point (P, 2) the row of the nearest one farther than `least`, and its distance.
+    """For each point (P, 2) the row of the nearest one beyond `min_distance`, and its distance.
 
     `cells` (P, 2): column and row of the grid cell of each point, `size` wide, sorted. A point
     with none within `reach` gets −1. Equal distances go to the first row.
@@ -288,13 +291,13 @@ cpdef nearest_others(
                     stop = cells[i, 1] + ring if at_side else row
                     j = _first(cells, column, row)
                     while j < count and cells[j, 0] == column and cells[j, 1] <= stop:
-                        apart = math.hypot(
+                        gap = math.hypot(
                             points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
                         )
-                        if least < apart <= reach and (
-                            apart < distance[i] or (apart == distance[i] and j < nearest[i])
+                        if min_distance < gap <= reach and (
+                            gap < distance[i] or (gap == distance[i] and j < nearest[i])
                         ):
-                            nearest[i], distance[i] = j, apart
+                            nearest[i], distance[i] = j, gap
                         j += 1
                     row = stop + 1 if at_side else row + 2 * ring
             ring += 1
@@ -321,24 +324,28 @@ cdef Int _first(Int[:, ::1] cells, Int column, Int row) noexcept:
 # `camtool.geometry.boxes` chooses the axis on which fewer boxes are looked at.
 
 
-cpdef touching(double[:, ::1] boxes, Int[::1] same, Int[::1] differ, uint8_t[::1] asked, Int most):
+cpdef touching(
+    double[:, ::1] boxes, Int[::1] equal_keys, Int[::1] unequal_keys, uint8_t[::1] is_queried,
+    Int max_pairs
+):
     """Rows (J,), (J,) of boxes (K, 4) low, low, high, high that touch, each pair once.
 
-    `boxes` are sorted by their first column. Both of a pair have the same number in `same`,
-    different ones in `differ`, and at least one of them is `asked` for. No more than `most` pairs.
+    `boxes` are sorted by their first column. Both of a pair have the same number in `equal_keys`,
+    different ones in `unequal_keys`, of which at least one `is_queried`. At most `max_pairs`.
     """
     cdef Int count
-    cdef Int[::1] room, one, other
+    cdef Int[::1] room, first, second
     room = np.empty(0, np.int64)
-    count = _touching(boxes, same, differ, asked, most, room, room)
-    one, other = np.empty(count, np.int64), np.empty(count, np.int64)
-    _touching(boxes, same, differ, asked, most, one, other)
-    return np.asarray(one), np.asarray(other)
+    count = _touching(boxes, equal_keys, unequal_keys, is_queried, max_pairs, room, room)
+    first, second = np.empty(count, np.int64), np.empty(count, np.int64)
+    _touching(boxes, equal_keys, unequal_keys, is_queried, max_pairs, first, second)
+    return np.asarray(first), np.asarray(second)
 
 
 cdef Int _touching(
-    double[:, ::1] boxes, Int[::1] same, Int[::1] differ, uint8_t[::1] asked, Int most,
-    Int[::1] one, Int[::1] other
+    double[:, ::1] boxes, Int[::1] equal_keys, Int[::1] unequal_keys, uint8_t[::1] is_queried,
+    Int max_pairs,
+    Int[::1] first, Int[::1] second
 ) noexcept:
     """Counts the pairs, and writes them when there is room for them."""
     cdef Int count, i, j
@@ -349,14 +356,14 @@ cdef Int _touching(
             if (
                 boxes[j, 1] <= boxes[i, 3]
                 and boxes[i, 1] <= boxes[j, 3]
-                and same[i] == same[j]
-                and differ[i] != differ[j]
-                and (asked[i] or asked[j])
+                and equal_keys[i] == equal_keys[j]
+                and unequal_keys[i] != unequal_keys[j]
+                and (is_queried[i] or is_queried[j])
             ):
-                if count >= most:
+                if count >= max_pairs:
                     return count
-                if len(one) > 0:
-                    one[count], other[count] = i, j
+                if len(first) > 0:
+                    first[count], second[count] = i, j
                 count += 1
             j += 1
     return count
@@ -381,24 +388,25 @@ cpdef latest_near(double[:, ::1] places, Int[::1] begins, double reach):
     """(P,) the latest point before each of the points (P, 2) on its path within `reach`, −1 for
     none. Path k has the points begins[k]:begins[k + 1], `begins` (M + 1,)."""
     cdef Int slots
-    cdef int32_t[::1] heads, before, latest
+    cdef int32_t[::1] heads, previous, latest
     slots = 16
     while slots < len(places):
         slots *= 2
     heads = np.full(slots, -1, dtype=np.int32)
-    before = np.empty(len(places), dtype=np.int32)
+    previous = np.empty(len(places), dtype=np.int32)
     latest = np.full(len(places), -1, dtype=np.int32)
-    _latest_near(places, begins, reach, heads, before, latest)
+    _latest_near(places, begins, reach, heads, previous, latest)
     return np.asarray(latest)
 
 
 cdef void _latest_near(
-    double[:, ::1] places, Int[::1] begins, double reach, int32_t[::1] heads, int32_t[::1] before,
+    double[:, ::1] places, Int[::1] begins, double reach, int32_t[::1] heads,
+    int32_t[::1] previous,
     int32_t[::1] latest
 ) noexcept:
-    """Fills in `latest`; `heads` are the latest points of the chains, `before` the one before
+    """Fills in `latest`; `heads` are the latest points of the chains, `previous` the one before
     each point."""
-    cdef Int path, first, i, j, column, row, best, beside, above, own
+    cdef Int path, first, i, j, column, row, best, across, above, own
     cdef double x, y
     for path in range(len(begins) - 1):
         first = begins[path]
@@ -406,18 +414,18 @@ cdef void _latest_near(
             x, y = places[i, 0], places[i, 1]
             column, row = _cell(x, reach), _cell(y, reach)
             best = first - 1
-            for beside in range(3):
+            for across in range(3):
                 for above in range(3):
-                    j = heads[_slot(column + (beside + 1) % 3, row + (above + 1) % 3, len(heads))]
+                    j = heads[_slot(column + (across + 1) % 3, row + (above + 1) % 3, len(heads))]
                     while j > best:
                         if math.hypot(places[j, 0] - x, places[j, 1] - y) <= reach:
                             best = j
                         else:
-                            j = before[j]
+                            j = previous[j]
             if best >= first:
                 latest[i] = best
             own = _slot(column + 1, row + 1, len(heads))
-            before[i], heads[own] = heads[own], i
+            previous[i], heads[own] = heads[own], i
 
 
 cdef inline Int _cell(double place, double size) noexcept:

@@ -62,7 +62,7 @@ cpdef void largest_discs(
     the partner, looked at first. A disc that touches only its own arc, in whose centre it lies,
     has itself as partner.
     """
-    cdef (double, double, double, double, double, double) at
+    cdef (double, double, double, double, double, double) pose
     cdef Int k, own, corner, best
     cdef Int[:, ::1] links
     cdef double x, y, nx, ny, sx, sy, radius
@@ -81,8 +81,10 @@ cpdef void largest_discs(
             sx, sy = _from_corner(table[own, TX], table[own, TY], table, own, t[k])
         else:
             sx, sy = _from_corner(-table[own, UX], -table[own, UY], table, own, t[k] - 1.0)
-        at = (x, y, nx, ny, sx, sy)
-        radius, best = _largest(table, links, boxes, own, guess[k, 0], guess[k, 1], at, t[k] < 0.5)
+        pose = (x, y, nx, ny, sx, sy)
+        radius, best = (
+            _largest(table, links, boxes, own, guess[k, 0], guess[k, 1], pose, t[k] < 0.5)
+        )
         cx, cy = x + radius * nx, y + radius * ny
         result[k, 0], result[k, 1], result[k, 2] = cx, cy, radius
         result[k, 3] = _place(table, best, cx, cy)
@@ -133,21 +135,21 @@ cdef Int _at_convex_corner(Int[:, ::1] links, Int own, double t) noexcept:
 
 cdef (double, Int) _largest(
     double[:, ::1] table, Int[:, ::1] links, double[:, ::1] boxes, Int own, Int guess,
-    Int other_guess, (double, double, double, double, double, double) at, bint at_start
+    Int other_guess, (double, double, double, double, double, double) pose, bint at_start
 ) noexcept:
     """Radius and partner of the largest disc at a point with its normal."""
-    cdef Int other, home, turn, block, best
-    cdef double x, y, radius, found, dx, dy
-    x, y = at[0], at[1]
+    cdef Int neighbour, home, turn, block, best
+    cdef double x, y, radius, limit, dx, dy
+    x, y = pose[0], pose[1]
     radius, best = math.INFINITY, own
     if table[own, LENGTH] > 0.0 and table[own, SWEEP] > 0.0:
         radius = table[own, LENGTH] / table[own, SWEEP]
     for turn in range(2):
-        other = guess if turn == 0 else other_guess
-        if other != own:
-            found = _limit(table, links, own, other, at, radius, at_start)
-            if found < radius:
-                radius, best = found, other
+        neighbour = guess if turn == 0 else other_guess
+        if neighbour != own:
+            limit = _limit(table, links, own, neighbour, pose, radius, at_start)
+            if limit < radius:
+                radius, best = limit, neighbour
     home = own // BLOCK
     for turn in range(len(boxes)):
         block = (home + turn) % len(boxes)
@@ -155,126 +157,135 @@ cdef (double, Int) _largest(
         dy = max(boxes[block, 1] - y, 0.0, y - boxes[block, 3])
         if math.hypot(dx, dy) > 2.0 * radius:
             continue
-        for other in range(block * BLOCK, min((block + 1) * BLOCK, len(table))):
-            if other == own:
+        for neighbour in range(block * BLOCK, min((block + 1) * BLOCK, len(table))):
+            if neighbour == own:
                 continue
-            found = _limit(table, links, own, other, at, radius, at_start)
-            if found < radius:
-                radius, best = found, other
+            limit = _limit(table, links, own, neighbour, pose, radius, at_start)
+            if limit < radius:
+                radius, best = limit, neighbour
     return radius, best
 
 
 cdef double _limit(
-    double[:, ::1] table, Int[:, ::1] links, Int own, Int other,
-    (double, double, double, double, double, double) at, double radius, bint at_start
+    double[:, ::1] table, Int[:, ::1] links, Int own, Int neighbour,
+    (double, double, double, double, double, double) pose, double radius, bint at_start
 ) noexcept:
     """The radius to which another element limits the disc; inf where it does not, or not below
     `radius`."""
     cdef (double, double) turns
     cdef (double, double, double, double) sight
-    cdef bint before, behind, corner, as_point
-    cdef double found
-    wx, wy = at[0] - table[other, AX], at[1] - table[other, AY]
-    before, behind = links[own, 0] == other, links[own, 1] == other
-    found = math.INFINITY
+    cdef bint precedes, follows, corner, as_point
+    cdef double limit
+    wx, wy = pose[0] - table[neighbour, AX], pose[1] - table[neighbour, AY]
+    precedes, follows = links[own, 0] == neighbour, links[own, 1] == neighbour
+    limit = math.INFINITY
     # Its corner, or the smooth joint at its start, as a point; not one of our own ends.
-    corner = table[other, LENGTH] == 0.0
-    ahead = -(at[2] * wx + at[3] * wy)
+    corner = table[neighbour, LENGTH] == 0.0
+    ahead = -(pose[2] * wx + pose[3] * wy)
     if (
-        (corner or links[other, 2] == SMOOTH)
-        and not (behind or (before and corner))
+        (corner or links[neighbour, 2] == SMOOTH)
+        and not (follows or (precedes and corner))
         and ahead > 0.0
     ):
-        found = 0.5 * (wx * wx + wy * wy) / ahead
+        limit = 0.5 * (wx * wx + wy * wy) / ahead
     if corner:
-        return found
-    if (before and links[own, 2] == SMOOTH) or (behind and links[other, 2] == SMOOTH):
+        return limit
+    if (precedes and links[own, 2] == SMOOTH) or (follows and links[neighbour, 2] == SMOOTH):
         return math.INFINITY
-    if table[own, LENGTH] == 0.0 and (before or behind):
+    if table[own, LENGTH] == 0.0 and (precedes or follows):
         return math.INFINITY
-    tx, ty = table[other, TX], table[other, TY]
+    tx, ty = table[neighbour, TX], table[neighbour, TY]
     tilt = _turn(table, links, own if at_start else links[own, 1])
-    turns = tilt + _turn(table, links, other), tilt + _turn(table, links, links[other, 1])
+    turns = tilt + _turn(table, links, neighbour), tilt + _turn(table, links, links[neighbour, 1])
     # A neighbour behind a convex corner is seen from that corner.
-    if before and at_start and links[own, 2] == CONVEX:
-        sight = (table[other, UX], table[other, UY], at[4], at[5])
-        return min(found, _touching(table, other, sight, at, min(radius, found), -1.0, turns))
-    if behind and not at_start and links[other, 2] == CONVEX:
-        sight = (tx, ty, at[4], at[5])
-        return min(found, _touching(table, other, sight, at, min(radius, found), -1.0, turns))
-    least = _least(table, links, own, other)
+    if precedes and at_start and links[own, 2] == CONVEX:
+        sight = (table[neighbour, UX], table[neighbour, UY], pose[4], pose[5])
+        return (
+            min(limit, _touching(table, neighbour, sight, pose, min(radius, limit), -1.0, turns))
+        )
+    if follows and not at_start and links[neighbour, 2] == CONVEX:
+        sight = (tx, ty, pose[4], pose[5])
+        return (
+            min(limit, _touching(table, neighbour, sight, pose, min(radius, limit), -1.0, turns))
+        )
+    min_distance = _min_distance(table, links, own, neighbour)
     return min(
-        found, _touching(table, other, (tx, ty, wx, wy), at, min(radius, found), least, turns)
+        limit,
+        _touching(
+            table, neighbour, (tx, ty, wx, wy), pose, min(radius, limit), min_distance, turns
+        ),
     )
 
 
 cdef double _turn(double[:, ::1] table, Int[:, ::1] links, Int own) noexcept:
     """By how many radians a smooth joint to the element before turns after all; 0 at others."""
-    cdef Int before
+    cdef Int previous
     if links[own, 2] != SMOOTH:
         return 0.0
-    before = links[own, 0]
-    ux, uy = table[before, UX], table[before, UY]
+    previous = links[own, 0]
+    ux, uy = table[previous, UX], table[previous, UY]
     return float(abs(ux * table[own, TY] - uy * table[own, TX]))
 
 
-cdef double _least(double[:, ::1] table, Int[:, ::1] links, Int own, Int other) noexcept:
-    """Return the least distance (mm) of a point on the inner side of `other`: above 0 behind a
+cdef double _min_distance(
+    double[:, ::1] table, Int[:, ::1] links, Int own, Int neighbour
+) noexcept:
+    """Return the least distance (mm) of a point on the inner side of `neighbour`: above 0 behind a
     reflex corner."""
-    cdef Int before, behind
-    cdef bint over
-    before, behind = links[own, 0], links[own, 1]
-    over = (table[before, LENGTH] == 0.0 and links[before, 0] == other) or (
-        table[behind, LENGTH] == 0.0 and links[behind, 1] == other
+    cdef Int previous, following
+    cdef bint is_over
+    previous, following = links[own, 0], links[own, 1]
+    is_over = (table[previous, LENGTH] == 0.0 and links[previous, 0] == neighbour) or (
+        table[following, LENGTH] == 0.0 and links[following, 1] == neighbour
     )
-    return TOUCH_MM if over else 0.0
+    return TOUCH_MM if is_over else 0.0
 
 
 cdef double _touching(
     double[:, ::1] table, Int own, (double, double, double, double) sight,
-    (double, double, double, double, double, double) at, double radius, double least,
+    (double, double, double, double, double, double) pose, double radius, double min_distance,
     (double, double) turns
 ) noexcept:
     """The radius at which the disc touches the line or arc `own` within it; inf if it is not
     below `radius` or touches beyond the ends.
 
     `sight`: the tangent at a point of the element, and how the disc's place is seen from there.
-    With `least` below 0 that is a shared corner, and rounding may not hide the element. Nor may it
-    hide one that is touched at its end: beside an arc the disc at the joint touches what follows
+    With `min_distance` below 0 that is a shared corner, and rounding may not hide the element. Nor
+    may it hide one that is touched at its end: beside an arc the disc at the joint touches what follows
     the arc just there, and without it would seem to have room far beyond the arc's own radius.
     """
-    cdef bint begins, ends
-    cdef double g, found
+    cdef bint is_past_start, is_before_end
+    cdef double g, reach
     tx, ty, wx, wy = sight
     kappa = table[own, SWEEP] / table[own, LENGTH]
     g = wy * tx - wx * ty - 0.5 * kappa * (wx * wx + wy * wy)
-    if least < 0.0:
+    if min_distance < 0.0:
         g = max(g, 0.0)
-    elif g <= least:
+    elif g <= min_distance:
         return math.INFINITY
     mx, my = -ty - kappa * wx, tx - kappa * wy
     # 1 − n·m without cancellation: |n − m|²/2 + (1 − |m|²)/2, and |m|² = 1 − 2κg.
-    ex, ey = at[2] - mx, at[3] - my
+    ex, ey = pose[2] - mx, pose[3] - my
     below = 0.5 * (ex * ex + ey * ey) + kappa * g
     if below <= 0.0 or g >= radius * below:
         return math.INFINITY
-    found = g / below
-    cx, cy = at[0] + found * at[2], at[1] + found * at[3]
-    after = (cx - table[own, AX]) * table[own, TX] + (cy - table[own, AY]) * table[own, TY]
-    still = (cx - table[own, BX]) * table[own, UX] + (cy - table[own, BY]) * table[own, UY]
-    begins = after >= -TOUCH_MM - turns[0] * found
-    ends = still <= TOUCH_MM + turns[1] * found
-    return found if begins and ends else math.INFINITY
+    reach = g / below
+    cx, cy = pose[0] + reach * pose[2], pose[1] + reach * pose[3]
+    past_start = (cx - table[own, AX]) * table[own, TX] + (cy - table[own, AY]) * table[own, TY]
+    past_end = (cx - table[own, BX]) * table[own, UX] + (cy - table[own, BY]) * table[own, UY]
+    is_past_start = past_start >= -TOUCH_MM - turns[0] * reach
+    is_before_end = past_end <= TOUCH_MM + turns[1] * reach
+    return reach if is_past_start and is_before_end else math.INFINITY
 
 
-cdef double _place(double[:, ::1] table, Int other, double cx, double cy) noexcept:
+cdef double _place(double[:, ::1] table, Int element, double cx, double cy) noexcept:
     """At which part of an element a disc with this middle touches it."""
-    wx, wy = cx - table[other, AX], cy - table[other, AY]
+    wx, wy = cx - table[element, AX], cy - table[element, AY]
     tx, ty, length, sweep = (
-        table[other, TX],
-        table[other, TY],
-        table[other, LENGTH],
-        table[other, SWEEP],
+        table[element, TX],
+        table[element, TY],
+        table[element, LENGTH],
+        table[element, SWEEP],
     )
     if length > 0.0 and sweep == 0.0:
         part = (wx * tx + wy * ty) / length

@@ -137,18 +137,18 @@ cpdef samples_between(double[:, :, ::1] pieces, double[:] t):
     """((n − 1) · `MEASURE_STEPS` + 1, 2) positions: so many from each of the parameters t (n,) in
     0..m on to the next one, and that at the last."""
     cdef Int i, j, row, k
-    cdef double here
-    cdef double[:, ::1] out
-    out = np.empty(((len(t) - 1) * MEASURE_STEPS + 1, 2))
-    for i in range(len(out)):
+    cdef double parameter
+    cdef double[:, ::1] samples
+    samples = np.empty(((len(t) - 1) * MEASURE_STEPS + 1, 2))
+    for i in range(len(samples)):
         row, j = i // MEASURE_STEPS, i % MEASURE_STEPS
-        here = t[row]
+        parameter = t[row]
         if j > 0:
-            here += float(j) / float(MEASURE_STEPS) * (t[row + 1] - t[row])
-        k = min(int(here), len(pieces) - 1)
-        x, y, _, _ = evaluate(pieces, k, here - float(k))
-        out[i, 0], out[i, 1] = x, y
-    return np.asarray(out)
+            parameter += float(j) / float(MEASURE_STEPS) * (t[row + 1] - t[row])
+        k = min(int(parameter), len(pieces) - 1)
+        x, y, _, _ = evaluate(pieces, k, parameter - float(k))
+        samples[i, 0], samples[i, 1] = x, y
+    return np.asarray(samples)
 
 
 cpdef double speed(double[:, :, ::1] pieces, Int k, double u) noexcept:
@@ -158,18 +158,18 @@ cpdef double speed(double[:, :, ::1] pieces, Int k, double u) noexcept:
 
 
 cdef (double, double) aside(
-    double[:, :, ::1] pieces, Int k, double u, double side, double least
+    double[:, :, ::1] pieces, Int k, double u, double side, double min_length
 ) noexcept:
     """Unit tangent a little before (side −1) or after (+1) u, where the piece is faster than
-    `least`."""
+    `min_length`."""
     cdef Int exponent
     if u <= 0.0 or u >= 1.0:
         side = 1.0 if u <= 0.0 else -1.0  # at the ends of a piece look inside
     for exponent in range(ASIDE_FROM, ASIDE_TO):
-        beside = min(max(u + side * math.pow(10.0, float(exponent)), 0.0), 1.0)
-        _, _, dx, dy = evaluate(pieces, k, beside)
+        near_u = min(max(u + side * math.pow(10.0, float(exponent)), 0.0), 1.0)
+        _, _, dx, dy = evaluate(pieces, k, near_u)
         length = math.sqrt(dx * dx + dy * dy)
-        if length > least:
+        if length > min_length:
             return dx / length, dy / length
     return 1.0, 0.0  # the curve stands still here: such nodes are merged
 
@@ -177,62 +177,68 @@ cdef (double, double) aside(
 cdef double slowest(double[:, :, ::1] pieces, Int k, double low, double high) noexcept:
     """The u between low and high where the piece moves slowest: golden section."""
     cdef Int _
-    one, two = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    at_one, at_two = speed(pieces, k, one), speed(pieces, k, two)
+    lower, upper = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    lower_speed, upper_speed = speed(pieces, k, lower), speed(pieces, k, upper)
     for _ in range(GOLDEN_ROUNDS):
-        if at_one < at_two:
-            high, two, at_two = two, one, at_one
-            one = high - GOLDEN * (high - low)
-            at_one = speed(pieces, k, one)
+        if lower_speed < upper_speed:
+            high, upper, upper_speed = upper, lower, lower_speed
+            lower = high - GOLDEN * (high - low)
+            lower_speed = speed(pieces, k, lower)
         else:
-            low, one, at_one = one, two, at_two
-            two = low + GOLDEN * (high - low)
-            at_two = speed(pieces, k, two)
+            low, lower, lower_speed = lower, upper, upper_speed
+            upper = low + GOLDEN * (high - low)
+            upper_speed = speed(pieces, k, upper)
     return 0.5 * (low + high)
 
 
 cdef first_steps(double[:, :, ::1] pieces, Int k, Int each):
     """The u (≥ each + 1,) that piece k is cut at first, tips and cusps among them; its speed."""
-    cdef Int i, count, before, after, side
-    cdef double here, u, tip, fastest
-    cdef double[::1] speeds, out
+    cdef Int i, count, previous, following, side
+    cdef double grid_u, u, tip, fastest
+    cdef double[::1] speeds, steps
     speeds = np.empty(each + 1)
     fastest = 0.0
     for i in range(each + 1):
         speeds[i] = speed(pieces, k, float(i) / float(each))
         fastest = max(fastest, speeds[i])
-    out = np.empty(2 * each + 2)
+    steps = np.empty(2 * each + 2)
     count = 0
     for i in range(each + 1):
-        here = float(i) / float(each)
-        tip = here
-        before, after = max(i - 1, 0), min(i + 1, each)
-        if speeds[i] <= min(speeds[before], speeds[after]) and speeds[i] < SLOW_SHARE * fastest:
-            tip = slowest(pieces, k, float(before) / float(each), float(after) / float(each))
+        grid_u = float(i) / float(each)
+        tip = grid_u
+        previous, following = max(i - 1, 0), min(i + 1, each)
+        if (
+            speeds[i] <= min(speeds[previous], speeds[following])
+            and speeds[i] < SLOW_SHARE * fastest
+        ):
+            tip = slowest(pieces, k, float(previous) / float(each), float(following) / float(each))
         for side in range(2):
-            u = min(tip, here) if side == 0 else max(tip, here)
-            if count == 0 or out[count - 1] < u <= 1.0:
-                out[count] = u
+            u = min(tip, grid_u) if side == 0 else max(tip, grid_u)
+            if count == 0 or steps[count - 1] < u <= 1.0:
+                steps[count] = u
                 count += 1
-    out[0] = 0.0
-    return np.asarray(out[:count]), fastest
+    steps[0] = 0.0
+    return np.asarray(steps[:count]), fastest
 
 
 cdef bint too_coarse(
-    double[:, :, ::1] pieces, Int k, double[:, ::1] before, Int i, double[:, ::1] behind, Int j,
+    double[:, :, ::1] pieces, Int k, double[:, ::1] rows_before, Int i,
+    double[:, ::1] rows_behind, Int j,
     double tolerance
 ) noexcept:
     """True if the step between two rows (u, x, y, arrive x, y, leave x, y), row i of those before
     and row j of those behind, must be halved."""
     cdef Int turn
     cdef bint bends
-    cdef double reach, off
-    low, high = before[i, 0], behind[j, 0]
+    cdef double reach, distance
+    low, high = rows_before[i, 0], rows_behind[j, 0]
     middle = 0.5 * (low + high)
     if not low < middle < high:
         return False
-    ax, ay, bx, by = before[i, 1], before[i, 2], behind[j, 1], behind[j, 2]
-    leave_x, leave_y, arrive_x, arrive_y = before[i, 5], before[i, 6], behind[j, 3], behind[j, 4]
+    ax, ay, bx, by = rows_before[i, 1], rows_before[i, 2], rows_behind[j, 1], rows_behind[j, 2]
+    leave_x, leave_y, arrive_x, arrive_y = (
+        rows_before[i, 5], rows_before[i, 6], rows_behind[j, 3], rows_behind[j, 4]
+    )
     pair = biarc(ax, ay, leave_x, leave_y, bx, by, arrive_x, arrive_y)
     bends = leave_x * arrive_x + leave_y * arrive_y < math.cos(_STEP_TURN_RAD)
     reach = 0.0
@@ -242,64 +248,64 @@ cdef bint too_coarse(
         x, y, _, _ = evaluate(pieces, k, low + share * (high - low))
         reach = max(reach, abs(x - ax), abs(y - ay), abs(x - bx), abs(y - by))
         if not bends:
-            off = distance_to_biarc(x, y, ax, ay, bx, by, pair)
-            bends = off > _STEP_ERROR_SHARE * tolerance
+            distance = distance_to_biarc(x, y, ax, ay, bx, by, pair)
+            bends = distance > _STEP_ERROR_SHARE * tolerance
         if bends and reach > POSITION_EPS_MM:
             return True
     return False
 
 
-cdef piece_rows(double[:, :, ::1] pieces, Int k, Int each, double tolerance, Int most):
+cdef piece_rows(double[:, :, ::1] pieces, Int k, Int each, double tolerance, Int max_rows):
     """Nodes (n, 7) of piece k: u, x, y, tangents before and after; begun with `each` steps.
 
     Steps are halved from left to right; the stack holds the right ends of those still to do.
     """
     cdef Int count, i, depth, column, last, top
     cdef bint fine
-    cdef double fastest, least
-    cdef double[:, ::1] stack, out
+    cdef double fastest, min_length
+    cdef double[:, ::1] stack, kept_rows
     cdef double[::1] grid
     grid, fastest = first_steps(pieces, k, each)
-    least = _VANISHING_TANGENT * fastest
+    min_length = _VANISHING_TANGENT * fastest
     stack = np.empty((64, 7))
-    out = np.empty((512, 7))
-    fill_row(pieces, k, 0.0, least, out, 0)
+    kept_rows = np.empty((512, 7))
+    fill_row(pieces, k, 0.0, min_length, kept_rows, 0)
     count = 1
     for i in range(1, len(grid)):
-        fill_row(pieces, k, grid[i], least, stack, 0)
+        fill_row(pieces, k, grid[i], min_length, stack, 0)
         depth = 1
         while depth > 0:
             last, top = count - 1, depth - 1
-            fine = depth < len(stack) and count < most
-            if fine and too_coarse(pieces, k, out, last, stack, top, tolerance):
-                middle = 0.5 * (out[last, 0] + stack[top, 0])
-                fill_row(pieces, k, middle, least, stack, depth)
+            fine = depth < len(stack) and count < max_rows
+            if fine and too_coarse(pieces, k, kept_rows, last, stack, top, tolerance):
+                middle = 0.5 * (kept_rows[last, 0] + stack[top, 0])
+                fill_row(pieces, k, middle, min_length, stack, depth)
                 depth += 1
                 continue
-            if count == len(out):
-                out = np.concatenate([out, out])
+            if count == len(kept_rows):
+                kept_rows = np.concatenate([kept_rows, kept_rows])
             for column in range(7):
-                out[count, column] = stack[top, column]
+                kept_rows[count, column] = stack[top, column]
             count += 1
             depth -= 1
-    return np.asarray(out[:count])
+    return np.asarray(kept_rows[:count])
 
 
 cdef void fill_row(
-    double[:, :, ::1] pieces, Int k, double u, double least, double[:, ::1] rows, Int i
+    double[:, :, ::1] pieces, Int k, double u, double min_length, double[:, ::1] rows, Int i
 ) noexcept:
     """Write u, x, y, tangent before and tangent after into row i of `rows` (n, 7)."""
     cdef double dx, dy
     x, y, dx, dy = evaluate(pieces, k, u)
     length = math.sqrt(dx * dx + dy * dy)
     rows[i, 0], rows[i, 1], rows[i, 2] = u, x, y
-    if length > least:
+    if length > min_length:
         rows[i, 3], rows[i, 4] = dx / length, dy / length
         rows[i, 5], rows[i, 6] = rows[i, 3], rows[i, 4]
     else:
-        dx, dy = aside(pieces, k, u, -1.0, least)
+        dx, dy = aside(pieces, k, u, -1.0, min_length)
         rows[i, 3], rows[i, 4] = dx, dy
-        dx, dy = aside(pieces, k, u, 1.0, least)
+        dx, dy = aside(pieces, k, u, 1.0, min_length)
         rows[i, 5], rows[i, 6] = dx, dy
 
 
@@ -310,39 +316,39 @@ cpdef curve_rows(double[:, :, ::1] pieces, Int steps, double tolerance):
     as the last of them.
     """
     cdef Int each, count, k, i, column, last
-    cdef double apart, x, y
-    cdef double[:, ::1] out, rows, grown
+    cdef double gap, x, y
+    cdef double[:, ::1] all_rows, rows, grown
     cdef uint8_t[::1] corner
     each = max(4, (steps + len(pieces) - 1) // len(pieces))
-    out = np.empty((256, 7))
+    all_rows = np.empty((256, 7))
     count = 0
     for k in range(len(pieces)):
         rows = piece_rows(pieces, k, each, tolerance, max(MAX_NODES - count, 2))
-        if count + len(rows) > len(out):
+        if count + len(rows) > len(all_rows):
             grown = np.empty((2 * (count + len(rows)), 7))
-            grown[:count] = out[:count]
-            out = grown
+            grown[:count] = all_rows[:count]
+            all_rows = grown
         for i in range(len(rows)):
             last = max(count - 1, 0)
-            apart = math.hypot(rows[i, 1] - out[last, 1], rows[i, 2] - out[last, 2])
-            if count == 0 or apart > POSITION_EPS_MM:
-                out[count, 0] = rows[i, 0] + float(k)
+            gap = math.hypot(rows[i, 1] - all_rows[last, 1], rows[i, 2] - all_rows[last, 2])
+            if count == 0 or gap > POSITION_EPS_MM:
+                all_rows[count, 0] = rows[i, 0] + float(k)
                 for column in range(1, 7):
-                    out[count, column] = rows[i, column]
+                    all_rows[count, column] = rows[i, column]
                 count += 1
             else:
-                out[last, 5], out[last, 6] = rows[i, 5], rows[i, 6]
+                all_rows[last, 5], all_rows[last, 6] = rows[i, 5], rows[i, 6]
     x, y, _, _ = evaluate(pieces, len(pieces) - 1, 1.0)
-    out[count - 1, 1], out[count - 1, 2] = x, y
+    all_rows[count - 1, 1], all_rows[count - 1, 2] = x, y
     if count > 1:
-        out[count - 1, 0] = float(len(pieces))
+        all_rows[count - 1, 0] = float(len(pieces))
     corner = np.zeros(count, dtype=np.bool_)
     for i in range(count):
-        cross = out[i, 3] * out[i, 6] - out[i, 4] * out[i, 5]
-        dot = out[i, 3] * out[i, 5] + out[i, 4] * out[i, 6]
+        cross = all_rows[i, 3] * all_rows[i, 6] - all_rows[i, 4] * all_rows[i, 5]
+        dot = all_rows[i, 3] * all_rows[i, 5] + all_rows[i, 4] * all_rows[i, 6]
         corner[i] = abs(math.atan2(cross, dot)) > _CORNER_ANGLE_RAD
     corner[0] = corner[count - 1] = True
-    return np.asarray(out[:count]), np.asarray(corner).view(np.bool_)
+    return np.asarray(all_rows[:count]), np.asarray(corner).view(np.bool_)
 
 
 # Biarcs, distances to arcs, and how far arcs and biarcs stray from nodes on a curve.
@@ -367,9 +373,9 @@ cpdef inline double distance_to_arc(
     ux, uy = bx - ax, by - ay
     rest = 1.0 - bulge * bulge
     forward = wx * (rest * ux + 2.0 * bulge * uy) + wy * (rest * uy - 2.0 * bulge * ux)
-    behind = vx * (rest * ux - 2.0 * bulge * uy) + vy * (rest * uy + 2.0 * bulge * ux)
+    past_end = vx * (rest * ux - 2.0 * bulge * uy) + vy * (rest * uy + 2.0 * bulge * ux)
     square = ux * ux + uy * uy
-    if square == 0.0 or forward < 0.0 or behind > 0.0:
+    if square == 0.0 or forward < 0.0 or past_end > 0.0:
         return math.sqrt(min(wx * wx + wy * wy, vx * vx + vy * vy))
     power = bulge * (wx * vx + wy * vy) - 0.5 * rest * (wy * ux - wx * uy)
     qx = bulge * (wx - 0.5 * ux) + 0.25 * rest * uy
@@ -430,9 +436,9 @@ cdef inline double distance_to_biarc(
     jx, jy, first, second = pair
     if math.isnan(jx):
         return math.INFINITY
-    one = distance_to_arc(px, py, start_x, start_y, jx, jy, first)
-    two = distance_to_arc(px, py, jx, jy, end_x, end_y, second)
-    return min(one, two)
+    first_distance = distance_to_arc(px, py, start_x, start_y, jx, jy, first)
+    second_distance = distance_to_arc(px, py, jx, jy, end_x, end_y, second)
+    return min(first_distance, second_distance)
 
 
 cdef inline (double, double, double, double) biarc_between(
@@ -458,17 +464,17 @@ cpdef step_errors(
     """For each step from node rows[i] (k,) to the next: the largest distance of its probes
     (j, k, 2) from the biarc over the step, infinite when there is none."""
     cdef Int i, j, a, b
-    cdef double[::1] out
-    out = np.empty(len(rows))
+    cdef double[::1] errors
+    errors = np.empty(len(rows))
     for i in range(len(rows)):
         a, b = rows[i], rows[i] + 1
         pair = biarc_between(point, leave, arrive, a, b)
         ax, ay, bx, by = point[a, 0], point[a, 1], point[b, 0], point[b, 1]
-        out[i] = 0.0
+        errors[i] = 0.0
         for j in range(len(probes)):
-            off = distance_to_biarc(probes[j, i, 0], probes[j, i, 1], ax, ay, bx, by, pair)
-            out[i] = max(out[i], off)
-    return np.asarray(out)
+            distance = distance_to_biarc(probes[j, i, 0], probes[j, i, 1], ax, ay, bx, by, pair)
+            errors[i] = max(errors[i], distance)
+    return np.asarray(errors)
 
 
 cpdef double span_error(
@@ -476,13 +482,13 @@ cpdef double span_error(
 ) noexcept:
     """The largest distance of the nodes between from the biarc over nodes low..high."""
     cdef Int i
-    cdef double off
+    cdef double distance
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
     pair = biarc_between(point, leave, arrive, low, high)
     largest = math.INFINITY if math.isnan(pair[0]) else 0.0
     for i in range(low + 1, high):
-        off = distance_to_biarc(point[i, 0], point[i, 1], ax, ay, bx, by, pair)
-        largest = max(largest, off)
+        distance = distance_to_biarc(point[i, 0], point[i, 1], ax, ay, bx, by, pair)
+        largest = max(largest, distance)
     return largest
 
 
@@ -508,8 +514,8 @@ cdef double arc_error(double[:, ::1] point, Int low, Int high, double bulge) noe
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
     largest = 0.0
     for i in range(low + 1, high):
-        off = distance_to_arc(point[i, 0], point[i, 1], ax, ay, bx, by, bulge)
-        largest = max(largest, off)
+        distance = distance_to_arc(point[i, 0], point[i, 1], ax, ay, bx, by, bulge)
+        largest = max(largest, distance)
     return largest
 
 
@@ -528,10 +534,10 @@ cpdef Int longest_span(
     error ∝ length³   ⇒   the length that fits is about length · (target / error)^(1/3).
     That rule leads for a few tries, bisection then; at least one step is taken.
     """
-    cdef Int best, beyond, high, tries, reach, ahead
-    best, beyond, high, tries = low + 1, furthest + 1, guess, 0
-    while beyond - best > 1:
-        high = min(max(high, best + 1), beyond - 1)
+    cdef Int best, too_far, high, tries, reach, ahead
+    best, too_far, high, tries = low + 1, furthest + 1, guess, 0
+    while too_far - best > 1:
+        high = min(max(high, best + 1), too_far - 1)
         error = span_error(point, leave, arrive, low, high)
         ratio = 4.0 if error == 0.0 else min(4.0, (target / error) ** (1.0 / 3.0))
         ahead = int(0.98 * ratio * float(high - low))
@@ -539,9 +545,9 @@ cpdef Int longest_span(
         if error <= target:
             best = high
         else:
-            beyond = high
+            too_far = high
         tries += 1
-        high = reach if tries <= 4 and ratio > 0.0 else (best + beyond) // 2
+        high = reach if tries <= 4 and ratio > 0.0 else (best + too_far) // 2
     return best
 
 
@@ -575,26 +581,26 @@ cdef double single_bulge(
 
 
 cdef (Int, double) longest_single(
-    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int least,
-    Int most, Int guess, double target
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int shortest,
+    Int farthest, Int guess, double target
 ) noexcept:
-    """End node and bulge of the longest single arc or line from `low` that ends after `least`
-    and not after `most`; NaN when there is none.
+    """End node and bulge of the longest single arc or line from `low` that ends after `shortest`
+    and not after `farthest`; NaN when there is none.
 
     Tangents may suit far off and not before (about an axis of symmetry), so all nodes are tried,
     from the far end of a window of 2 · `guess` nodes that grows as long as its end is reached.
     """
-    cdef Int beyond, best, high
-    beyond, best, bulge = least, least, math.NAN
-    while best == beyond and beyond < most:
-        least = beyond
-        beyond = min(max(low + 2 * guess, 2 * beyond - low), most)
-        for high in range(beyond, least, -1):
-            found = single_bulge(point, leave, arrive, low, high, target)
-            if not math.isnan(found):
-                best, bulge = high, found
+    cdef Int too_far, best, high
+    too_far, best, bulge = shortest, shortest, math.NAN
+    while best == too_far and too_far < farthest:
+        shortest = too_far
+        too_far = min(max(low + 2 * guess, 2 * too_far - low), farthest)
+        for high in range(too_far, shortest, -1):
+            candidate = single_bulge(point, leave, arrive, low, high, target)
+            if not math.isnan(candidate):
+                best, bulge = high, candidate
                 break
-        if beyond == least:
+        if too_far == shortest:
             break
     return best, bulge
 
@@ -603,7 +609,7 @@ cdef furthest_nodes(double[:, ::1] leave, double[:, ::1] arrive, uint8_t[::1] co
     """(n,) the last node that a span from each node may reach: the next corner, or where the curve
     has turned by `SPAN_TURN_RAD`, to either side."""
     cdef Int count, i, last
-    cdef Int[::1] out
+    cdef Int[::1] furthest
     cdef double[::1] turned
     count = len(leave)
     turned = np.zeros(count)
@@ -611,37 +617,37 @@ cdef furthest_nodes(double[:, ::1] leave, double[:, ::1] arrive, uint8_t[::1] co
         cross = leave[i - 1, 0] * arrive[i, 1] - leave[i - 1, 1] * arrive[i, 0]
         dot = leave[i - 1, 0] * arrive[i, 0] + leave[i - 1, 1] * arrive[i, 1]
         turned[i] = turned[i - 1] + abs(math.atan2(cross, dot))
-    out = np.zeros(count, dtype=np.int64)
+    furthest = np.zeros(count, dtype=np.int64)
     last = 0
     for i in range(count - 1):
         last = max(last, i + 1)
         while not corner[last] and turned[last + 1] - turned[i] <= _SPAN_TURN_RAD:
             last += 1
-        out[i] = last
-    return np.asarray(out)
+        furthest[i] = last
+    return np.asarray(furthest)
 
 
 cdef (Int, Int, double) furthest_state(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int[::1] limit,
-    Int[::1] states, Int now, Int guess, double target
+    Int[::1] states, Int state, Int guess, double target
 ) noexcept:
-    """The furthest node at the price that begins at row `now` of `states` (node −1: none), the row
-    whence it is reached, and the bulge of the single arc or line that does it (NaN: a biarc)."""
+    """The furthest node at the price that begins at row `state` of `states` (node −1: none), the
+    row whence it is reached, and the bulge of the single arc or line that does it (NaN: a biarc)."""
     cdef Int row, best, whence, low, begin, high
     cdef bint first
-    best, whence, bulge = states[now - CANDIDATES], now - CANDIDATES, math.NAN
-    for row in range(max(now - 2 * CANDIDATES, 0), now):
+    best, whence, bulge = states[state - CANDIDATES], state - CANDIDATES, math.NAN
+    for row in range(max(state - 2 * CANDIDATES, 0), state):
         low = states[row]
         if low < 0 or limit[low] <= best:
             continue
-        if row >= now - CANDIDATES:
-            high, found = longest_single(
+        if row >= state - CANDIDATES:
+            high, candidate = longest_single(
                 point, leave, arrive, low, best, limit[low], guess, target
             )
             if high > best:
-                best, whence, bulge = high, row, found
+                best, whence, bulge = high, row, candidate
             continue
-        first = row == now - 2 * CANDIDATES
+        first = row == state - 2 * CANDIDATES
         if first or span_holds(point, leave, arrive, low, best + 1, target):
             begin = low + guess if first else best + 2
             high = longest_span(point, leave, arrive, low, limit[low], begin, target)
@@ -664,7 +670,7 @@ cdef longest_spans(
     the price before, or a biarc from two prices before. A few nodes short of it are kept as well:
     a span that takes a sharp tip in its middle may have to begin there.
     """
-    cdef Int count, row, now, guess, m, spans, best, before, low, place, high
+    cdef Int count, row, state, guess, m, spans, best, previous, low, place, high
     cdef Int[::1] limit, states, whence, ends
     cdef double first, jx, jy, second, bulge
     cdef double[:, ::1] pairs
@@ -676,15 +682,17 @@ cdef longest_spans(
     bulges = np.zeros(len(states))
     for row in range(1, len(states)):
         states[row] = -1
-    now, guess = 0, count
-    while states[now] < count - 1:
-        now += CANDIDATES
-        best, row, bulge = furthest_state(point, leave, arrive, limit, states, now, guess, target)
-        before, low, guess = states[now - CANDIDATES], states[row], best - states[row]
+    state, guess = 0, count
+    while states[state] < count - 1:
+        state += CANDIDATES
+        best, row, bulge = (
+            furthest_state(point, leave, arrive, limit, states, state, guess, target)
+        )
+        previous, low, guess = states[state - CANDIDATES], states[row], best - states[row]
         for m in range(CANDIDATES):
-            place = best - m * (best - before) // CANDIDATES
+            place = best - m * (best - previous) // CANDIDATES
             if m > 0:
-                if place <= before or place == states[now + m - 1]:
+                if place <= previous or place == states[state + m - 1]:
                     continue
                 if not math.isnan(bulge):
                     bulge = single_bulge(point, leave, arrive, low, place, target)
@@ -692,14 +700,14 @@ cdef longest_spans(
                         break
                 elif not span_holds(point, leave, arrive, low, place, target):
                     continue
-            states[now + m], whence[now + m], bulges[now + m] = place, row, bulge
-    spans, row = 0, now
+            states[state + m], whence[state + m], bulges[state + m] = place, row, bulge
+    spans, row = 0, state
     while row > 0:
         spans += 1 if states[row] > states[whence[row]] else 0
         row = whence[row]
     ends = np.zeros(spans + 1, dtype=np.int64)
     pairs = np.empty((spans, 4))
-    row = now
+    row = state
     while row > 0:
         low, high, bulge = states[whence[row]], states[row], bulges[row]
         row = whence[row]
@@ -720,7 +728,9 @@ cdef longest_spans(
 # Vertices are rows x, y, bulge; the last row is the end of the chain.
 
 
-cdef Int lines_for(double ax, double ay, double bx, double by, double bulge, double off) noexcept:
+cdef Int lines_for(
+    double ax, double ay, double bx, double by, double bulge, double max_error
+) noexcept:
     """Return the number of lines that replace an arc too flat to be written; 0 if it stays an arc.
 
     sagitta = |bulge| · chord / 2, radius = chord (1 + b²) / (4 |b|) and each of n lines leaves the
@@ -732,7 +742,7 @@ cdef Int lines_for(double ax, double ay, double bx, double by, double bulge, dou
         return 1
     if chord * (1.0 + bulge * bulge) <= 4.0 * abs(bulge) * _MAX_RADIUS_MM:
         return 0
-    return int(min(math.ceil(math.sqrt(sagitta / off)), float(MAX_LINES)))
+    return int(min(math.ceil(math.sqrt(sagitta / max_error)), float(MAX_LINES)))
 
 
 cdef chain(double[:, ::1] point, Int[::1] ends, double[:, ::1] pairs, double tolerance):
@@ -740,7 +750,7 @@ cdef chain(double[:, ::1] point, Int[::1] ends, double[:, ::1] pairs, double tol
 
     Arcs that leave their chord by `STRAIGHT_SAGITTA_MM` or less, and flat ones, are lines.
     """
-    cdef Int spans, count, s, k, total, i, made, j
+    cdef Int spans, count, s, k, total, i, row_count, j
     cdef Int[::1] owner, parts, first
     cdef double[:, ::1] arcs, rows
     spans = len(pairs)
@@ -767,32 +777,34 @@ cdef chain(double[:, ::1] point, Int[::1] ends, double[:, ::1] pairs, double tol
         total += max(parts[i], 1)
     rows = np.empty((total + 1, 3))
     first = np.zeros(spans + 1, dtype=np.int64)
-    made = 0
+    row_count = 0
     for i in range(count):
         ax, ay, bulge = arcs[i, 0], arcs[i, 1], arcs[i, 2]
         if i == 0 or owner[i] != owner[i - 1]:
-            first[owner[i]] = made
+            first[owner[i]] = row_count
         ux, uy = arcs[i + 1, 0] - ax, arcs[i + 1, 1] - ay
         for j in range(max(parts[i], 1)):
             # On a flat arc the point at the share h of the chord lies beside it by 2b·h(1 − h)·u.
             h = float(j) / float(max(parts[i], 1))
-            off = 2.0 * bulge * h * (1.0 - h)
-            rows[made, 0], rows[made, 1] = ax + h * ux + off * uy, ay + h * uy - off * ux
-            rows[made, 2] = bulge if parts[i] == 0 else 0.0
-            made += 1
-    rows[made, 0], rows[made, 1], rows[made, 2] = point[k, 0], point[k, 1], 0.0
-    first[spans] = made
+            offset = 2.0 * bulge * h * (1.0 - h)
+            rows[row_count, 0], rows[row_count, 1] = (
+                ax + h * ux + offset * uy, ay + h * uy - offset * ux
+            )
+            rows[row_count, 2] = bulge if parts[i] == 0 else 0.0
+            row_count += 1
+    rows[row_count, 0], rows[row_count, 1], rows[row_count, 2] = point[k, 0], point[k, 1], 0.0
+    first[spans] = row_count
     return np.asarray(rows), np.asarray(first)
 
 
-cdef double common_bulge(double[:, ::1] rows, Int one, double end_x, double end_y) noexcept:
-    """The bulge of the one arc or line that both segments lie on which begin at `one` and at the
+cdef double common_bulge(double[:, ::1] rows, Int first, double end_x, double end_y) noexcept:
+    """The bulge of the one arc or line that both segments lie on which begin at `first` and at the
     row after it and end there, or NaN."""
-    cdef Int two
+    cdef Int second
     cdef double bulge, sweep
-    two = one + 1
-    ax, ay, a = rows[one, 0], rows[one, 1], rows[one, 2]
-    bx, by, b = rows[two, 0], rows[two, 1], rows[two, 2]
+    second = first + 1
+    ax, ay, a = rows[first, 0], rows[first, 1], rows[first, 2]
+    bx, by, b = rows[second, 0], rows[second, 1], rows[second, 2]
     if a * b < 0.0 or (a == 0.0) != (b == 0.0):
         return math.NAN
     sweep = 4.0 * (math.atan(a) + math.atan(b))
@@ -819,28 +831,33 @@ cdef joined(double[:, ::1] rows, double size):
     cdef Int count, i, last
     cdef Int[::1] places
     cdef double end_x, end_y, bulge
-    cdef double[:, ::1] out
-    out = np.empty((len(rows), 3))
+    cdef double[:, ::1] merged
+    merged = np.empty((len(rows), 3))
     places = np.zeros(len(rows) - 1, dtype=np.int64)
-    out[0, 0], out[0, 1], out[0, 2] = rows[0, 0], rows[0, 1], 0.0
+    merged[0, 0], merged[0, 1], merged[0, 2] = rows[0, 0], rows[0, 1], 0.0
     count = 1
     for i in range(len(rows) - 1):
         end_x, end_y = rows[i + 1, 0], rows[i + 1, 1]
-        if math.hypot(end_x - out[count - 1, 0], end_y - out[count - 1, 1]) <= size:
+        if math.hypot(end_x - merged[count - 1, 0], end_y - merged[count - 1, 1]) <= size:
             places[i] = max(count - 2, 0)
             continue
-        out[count - 1, 2] = rows[i, 2]
-        if count > 1 and math.hypot(end_x - out[count - 2, 0], end_y - out[count - 2, 1]) > size:
-            bulge = common_bulge(out, count - 2, end_x, end_y)
+        merged[count - 1, 2] = rows[i, 2]
+        if (
+            count > 1
+            and math.hypot(end_x - merged[count - 2, 0], end_y - merged[count - 2, 1]) > size
+        ):
+            bulge = common_bulge(merged, count - 2, end_x, end_y)
             if not math.isnan(bulge):
                 count -= 1
-                out[count - 1, 2] = bulge
+                merged[count - 1, 2] = bulge
         places[i] = count - 1
-        out[count, 0], out[count, 1], out[count, 2] = end_x, end_y, 0.0
+        merged[count, 0], merged[count, 1], merged[count, 2] = end_x, end_y, 0.0
         count += 1
     last = len(rows) - 1
-    out[count - 1, 0], out[count - 1, 1], out[count - 1, 2] = rows[last, 0], rows[last, 1], 0.0
-    return np.asarray(out[:count]), np.asarray(places)
+    merged[count - 1, 0], merged[count - 1, 1], merged[count - 1, 2] = (
+        rows[last, 0], rows[last, 1], 0.0
+    )
+    return np.asarray(merged[:count]), np.asarray(places)
 
 
 cdef deviations(
@@ -854,9 +871,9 @@ cdef deviations(
     """
     cdef Int each, s, last, i, low, high, row
     cdef double bulge, nearest, x, y, ax, ay, bx, by
-    cdef double[::1] out
+    cdef double[::1] distances
     each = (len(samples) - 1) // ends[len(ends) - 1]
-    out = np.empty(len(samples))
+    distances = np.empty(len(samples))
     for s in range(len(ends) - 1):
         low, high = places[first[s]], places[first[s + 1] - 1]
         last = ends[s + 1] * each + (1 if s == len(ends) - 2 else 0)
@@ -867,11 +884,11 @@ cdef deviations(
                 ax, ay, bulge = vertices[row, 0], vertices[row, 1], vertices[row, 2]
                 bx, by = vertices[row + 1, 0], vertices[row + 1, 1]
                 nearest = min(nearest, distance_to_arc(x, y, ax, ay, bx, by, bulge))
-            out[i] = nearest
-    return np.asarray(out)
+            distances[i] = nearest
+    return np.asarray(distances)
 
 
-cdef (double, double, double) summary(double[:, ::1] samples, double[::1] off) noexcept:
+cdef (double, double, double) summary(double[:, ::1] samples, double[::1] errors) noexcept:
     """Largest deviation and rms, weighted by length, and length of the curve, mm.
 
     Between samples i and i + 1 the deviation peaks at or below the meeting of the lines through
@@ -880,17 +897,17 @@ cdef (double, double, double) summary(double[:, ::1] samples, double[::1] off) n
     """
     cdef Int i
     squares, length = 0.0, 0.0
-    largest = off[len(off) - 1]
-    for i in range(len(off) - 1):
+    largest = errors[len(errors) - 1]
+    for i in range(len(errors) - 1):
         step = math.hypot(samples[i + 1, 0] - samples[i, 0], samples[i + 1, 1] - samples[i, 1])
-        squares += step * 0.5 * (off[i] * off[i] + off[i + 1] * off[i + 1])
+        squares += step * 0.5 * (errors[i] * errors[i] + errors[i + 1] * errors[i + 1])
         length += step
-        largest = max(largest, off[i])
-        if 0 < i < len(off) - 2:
-            rise, fall = off[i] - off[i - 1], off[i + 1] - off[i + 2]
+        largest = max(largest, errors[i])
+        if 0 < i < len(errors) - 2:
+            rise, fall = errors[i] - errors[i - 1], errors[i + 1] - errors[i + 2]
             if rise > 0.0 and fall > 0.0:
-                share = min(max((off[i + 1] + fall - off[i]) / (rise + fall), 0.0), 1.0)
-                largest = max(largest, min(off[i] + rise * share, off[i + 1] + fall))
+                share = min(max((errors[i + 1] + fall - errors[i]) / (rise + fall), 0.0), 1.0)
+                largest = max(largest, min(errors[i] + rise * share, errors[i + 1] + fall))
     return largest, math.sqrt(squares / length) if length > 0.0 else 0.0, length
 
 
@@ -902,7 +919,7 @@ cpdef fit_nodes(nodes, double[:, ::1] samples, double target, double tolerance):
     and its largest and rms deviation from the samples, and their length, mm."""
     cdef Int[::1] ends, first, places
     cdef double[:, ::1] point, arrive, leave, pairs, rows, vertices
-    cdef double[::1] off
+    cdef double[::1] errors
     cdef uint8_t[::1] corner
     point, arrive, leave, corner = nodes
     ends, pairs = longest_spans(point, leave, arrive, corner, target)
@@ -910,8 +927,8 @@ cpdef fit_nodes(nodes, double[:, ::1] samples, double target, double tolerance):
     vertices, places = joined(rows, POSITION_EPS_MM)
     if len(vertices) == 1:
         return np.asarray(vertices), (0.0, 0.0, 0.0)
-    off = deviations(samples, ends, first, vertices, places)
-    return np.asarray(vertices), summary(samples, off)
+    errors = deviations(samples, ends, first, vertices, places)
+    return np.asarray(vertices), summary(samples, errors)
 
 
 # Runs of chords that lie on one circle, along a chain of points.
@@ -956,13 +973,13 @@ cpdef enum:
 cdef bint lengths_agree(double[:, ::1] points, Int low, Int high) noexcept:
     """True if the chords low..high − 1 have similar lengths; the first and last may be shorter."""
     cdef Int k
-    least, most = math.INFINITY, 0.0
+    shortest, longest = math.INFINITY, 0.0
     for k in range(low, high):
         length = math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1])
-        most = max(most, length)
+        longest = max(longest, length)
         if low < k < high - 1:
-            least = min(least, length)
-    return most <= MAX_LENGTH_RATIO * least
+            shortest = min(shortest, length)
+    return longest <= MAX_LENGTH_RATIO * shortest
 
 
 cdef bint is_straight(double[:, ::1] points, Int low, Int high, double noise) noexcept:
@@ -998,10 +1015,10 @@ cpdef (double, double, double) circle_of(double[:, ::1] points, Int low, Int hig
 
 
 cdef (Int, double, double, double, double) judge(
-    double[:, ::1] points, Int low, Int high, double noise, double tolerance, double[::1] off
+    double[:, ::1] points, Int low, Int high, double noise, double tolerance, double[::1] errors
 ) noexcept:
     """FAIL, STRAIGHT or ARC for the points low..high; of an arc centre, radius, signed sweep.
-    There is room in `off` (n,) for a number of each point."""
+    There is room in `errors` (n,) for a number of each point."""
     cdef Int k
     cdef double rough, fourth, sweep, largest
     if not lengths_agree(points, low, high):
@@ -1012,8 +1029,8 @@ cdef (Int, double, double, double, double) judge(
     sweep, rough, largest = 0.0, 0.0, 0.0
     for k in range(low, high + 1):
         x, y = points[k, 0] - cx, points[k, 1] - cy
-        off[k - low] = math.hypot(x, y) - radius
-        largest = max(largest, abs(off[k - low]))
+        errors[k - low] = math.hypot(x, y) - radius
+        largest = max(largest, abs(errors[k - low]))
         if k < high:
             nx, ny = points[k + 1, 0] - cx, points[k + 1, 1] - cy
             turn = math.atan2(x * ny - y * nx, x * nx + y * ny)
@@ -1023,7 +1040,10 @@ cdef (Int, double, double, double, double) judge(
     if high - low + 1 >= ROUGH_POINTS:
         # Not at the ends: a point that no longer belongs to the arc would speak for itself.
         for k in range(3, high - low - 2):
-            fourth = off[k - 2] - 4.0 * off[k - 1] + 6.0 * off[k] - 4.0 * off[k + 1] + off[k + 2]
+            fourth = (
+                errors[k - 2] - 4.0 * errors[k - 1] + 6.0 * errors[k] - 4.0 * errors[k + 1]
+                + errors[k + 2]
+            )
             rough += abs(fourth) / float(high - low - 5)
     if abs(sweep) > 2.0 * math.M_PI + _MAX_TURN_RAD:
         return FAIL, 0.0, 0.0, 0.0, 0.0
@@ -1036,33 +1056,33 @@ cdef (Int, double, double, double, double) judge(
 
 
 cdef (Int, Int, double, double, double, double) longest_run(
-    double[:, ::1] points, Int low, double noise, double tolerance, double[::1] off
+    double[:, ::1] points, Int low, double noise, double tolerance, double[::1] errors
 ) noexcept:
     """The last point of the longest run from `low`, and what it is; `low` for none."""
-    cdef Int best, beyond, size, rest, doubled, high, is_
+    cdef Int best, too_far, size, rest, doubled, high, is_
     cdef double cx, cy, radius, sweep
-    best, beyond, size = low, len(points), MIN_POINTS - 1
+    best, too_far, size = low, len(points), MIN_POINTS - 1
     is_, cx, cy, radius, sweep = FAIL, 0.0, 0.0, 0.0, 0.0
     while best < len(points) - 1 and low + size < len(points):
-        found = judge(points, low, low + size, noise, tolerance, off)
-        if found[0] != FAIL:
+        verdict = judge(points, low, low + size, noise, tolerance, errors)
+        if verdict[0] != FAIL:
             best = low + size
-            is_, cx, cy, radius, sweep = found
+            is_, cx, cy, radius, sweep = verdict
         elif size >= 2 * ROUGH_POINTS - 1:
-            beyond = low + size
+            too_far = low + size
             break
         # A few points may fail by noise that more of them show to be noise.
         rest = len(points) - 1 - low
         doubled = 2 * size if size >= ROUGH_POINTS - 1 else max(2 * size, ROUGH_POINTS - 1)
         size = min(doubled, rest) if size < rest else size + 1
-    while best > low and beyond - best > 1:
-        high = (best + beyond) // 2
-        found = judge(points, low, high, noise, tolerance, off)
-        if found[0] == FAIL:
-            beyond = high
+    while best > low and too_far - best > 1:
+        high = (best + too_far) // 2
+        verdict = judge(points, low, high, noise, tolerance, errors)
+        if verdict[0] == FAIL:
+            too_far = high
         else:
             best = high
-            is_, cx, cy, radius, sweep = found
+            is_, cx, cy, radius, sweep = verdict
     return best, is_, cx, cy, radius, sweep
 
 
@@ -1072,42 +1092,42 @@ cpdef find_runs(double[:, ::1] points, double noise, double tolerance):
     A run that is straight so far is passed; the arc behind it begins within its last chords, and
     is extended backwards as far as it goes.
     """
-    cdef Int count, low, done, high, is_
+    cdef Int count, low, run_end, high, is_
     cdef double cx, cy, radius, sweep
-    cdef double[:, ::1] out
-    cdef double[::1] off
-    out, off = np.empty((len(points) // (MIN_POINTS - 1) + 1, 6)), np.empty(len(points))
-    count, low, done = 0, 0, 0
+    cdef double[:, ::1] runs
+    cdef double[::1] errors
+    runs, errors = np.empty((len(points) // (MIN_POINTS - 1) + 1, 6)), np.empty(len(points))
+    count, low, run_end = 0, 0, 0
     while low + MIN_POINTS <= len(points):
-        high, is_, cx, cy, radius, sweep = longest_run(points, low, noise, tolerance, off)
+        high, is_, cx, cy, radius, sweep = longest_run(points, low, noise, tolerance, errors)
         if is_ != ARC:
             low = max(low + 1, high - MIN_POINTS + 1)
             continue
-        while low > done:
-            longer = judge(points, low - 1, high, noise, tolerance, off)
+        while low > run_end:
+            longer = judge(points, low - 1, high, noise, tolerance, errors)
             if longer[0] != ARC:
                 break
             low -= 1
             is_, cx, cy, radius, sweep = longer
-        out[count, 0], out[count, 1] = low, high
-        out[count, 2], out[count, 3], out[count, 4], out[count, 5] = cx, cy, radius, sweep
+        runs[count, 0], runs[count, 1] = low, high
+        runs[count, 2], runs[count, 3], runs[count, 4], runs[count, 5] = cx, cy, radius, sweep
         count += 1
-        low = done = high
-    return np.asarray(out[:count])
+        low = run_end = high
+    return np.asarray(runs[:count])
 
 
 cpdef double furthest_off(double[:, ::1] points, double[:, ::1] arcs) noexcept:
     """The largest distance of points (n, 2) from a chain of arcs (m, 3)."""
     cdef Int i, row
-    cdef double bulge, nearest, largest, off
+    cdef double bulge, nearest, largest, distance
     largest = 0.0
     for i in range(len(points)):
         nearest = math.INFINITY
         for row in range(len(arcs) - 1):
             ax, ay, bulge = arcs[row, 0], arcs[row, 1], arcs[row, 2]
             bx, by = arcs[row + 1, 0], arcs[row + 1, 1]
-            off = distance_to_arc(points[i, 0], points[i, 1], ax, ay, bx, by, bulge)
-            nearest = min(nearest, off)
+            distance = distance_to_arc(points[i, 0], points[i, 1], ax, ay, bx, by, bulge)
+            nearest = min(nearest, distance)
         largest = max(largest, nearest)
     return largest
 
@@ -1129,7 +1149,7 @@ cpdef (double, Int, Int) closest(
     `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4) and the ascending `path` (K,) of the
     segments. Rows are −1 when there is one path only.
     """
-    cdef Int count, row, best_row, best_other, first, last, other
+    cdef Int count, row, best_row, best_other, first, last, candidate
     cdef Int[::1] stack
     cdef double[:, ::1] tree
     tree = tree_of(boxes)
@@ -1142,11 +1162,11 @@ cpdef (double, Int, Int) closest(
             first, last = row, row
             while last + 1 < count and path[last + 1] == path[row]:
                 last += 1
-        apart, other = _from_point(
+        distance, candidate = _from_point(
             start[row, 0], start[row, 1], start, end, bulge, tree, first, last, best, stack
         )
-        if other >= 0:
-            best, best_row, best_other = apart, row, other
+        if candidate >= 0:
+            best, best_row, best_other = distance, row, candidate
     return best, best_row, best_other
 
 
@@ -1157,21 +1177,21 @@ cpdef nearest_rows(
     """(P,) rows of the segments nearest to points (P, 2); quick when neighbours in the list are
     near. `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4), K ≥ 1; where two are as near, the
     last one keeps its place."""
-    cdef Int other, row, index
-    cdef Int[::1] found, stack
+    cdef Int candidate, row, index
+    cdef Int[::1] nearest, stack
     cdef double _, x, y, ax, ay, bx, by
     cdef double[:, ::1] tree
     tree = tree_of(boxes)
-    found, stack = np.zeros(len(points), np.int64), np.empty(DEPTH, np.int64)
+    nearest, stack = np.zeros(len(points), np.int64), np.empty(DEPTH, np.int64)
     row = 0
     for index in range(len(points)):
         x, y = points[index, 0], points[index, 1]
         ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
-        apart = distance_to_arc(x, y, ax, ay, bx, by, bulge[row])
-        _, other = _from_point(x, y, start, end, bulge, tree, 0, -1, apart, stack)
-        row = other if other >= 0 else row
-        found[index] = row
-    return np.asarray(found)
+        distance = distance_to_arc(x, y, ax, ay, bx, by, bulge[row])
+        _, candidate = _from_point(x, y, start, end, bulge, tree, 0, -1, distance, stack)
+        row = candidate if candidate >= 0 else row
+        nearest[index] = row
+    return np.asarray(nearest)
 
 
 cdef (double, Int) _from_point(
@@ -1180,10 +1200,10 @@ cdef (double, Int) _from_point(
 ) noexcept:
     """The distance to the nearest segment outside first … last that is nearer than the best one
     so far, and its row; −1 when there is none. `stack` (`DEPTH`,) is room."""
-    cdef Int leaves, found, height, node, row, low, high
+    cdef Int leaves, best_row, height, node, row, low, high
     cdef bint own
     leaves = len(tree) // 2
-    found = -1
+    best_row = -1
     height, stack[0] = 1, 1
     while height > 0:
         height -= 1
@@ -1199,7 +1219,7 @@ cdef (double, Int) _from_point(
             if first <= row <= last:
                 continue
             ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
-            apart = distance_to_arc(x, y, ax, ay, bx, by, bulge[row])
-            if apart < best:
-                best, found = apart, row
-    return best, found
+            distance = distance_to_arc(x, y, ax, ay, bx, by, bulge[row])
+            if distance < best:
+                best, best_row = distance, row
+    return best, best_row

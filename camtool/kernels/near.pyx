@@ -61,8 +61,8 @@ class Moves(NamedTuple):
 
 
 cdef class Near:
-    """Input and buffers of a search: K moves, P `points` (P, 3) mm with their heights, the limit in XY and
-    the window of heights (on a slope, more by the slope), and room for what waits. Of each point:
+    """Input and buffers of a search: K moves, P `points` (P, 3) mm with their heights, the limit in XY
+    and the window of heights (on a slope, more by the slope), and room for what waits. Of each point:
     how many moves are within both (`count` (P,)), how far the nearest of these is (`distance`
     (P,) mm) and its row (`move` (P,))."""
 
@@ -70,7 +70,7 @@ cdef class Near:
     cdef const int[:] arc
     cdef double[:, ::1] arcs, points
     cdef double limit, window
-    cdef double[::1] distance, apart, box
+    cdef double[::1] distance, distances, box
     cdef Int[::1] move, count, order, waiting
     cdef int[::1] candidates
 
@@ -79,15 +79,15 @@ cdef class Near:
         moves: Moves,
         points: Floats,
         limits_mm: tuple[float, float],
-        found: tuple[Floats, Ints, Ints],
+        nearest_so_far: tuple[Floats, Ints, Ints],
     ) -> None:
         self.start, self.end, self.heights, self.arc, self.arcs = moves
         self.points = points
         self.limit, self.window = limits_mm
-        self.distance, self.move, self.count = found
+        self.distance, self.move, self.count = nearest_so_far
         self.order = np.arange(len(points))
         self.candidates = np.empty(2 * len(moves.arc) + 2, dtype=np.int32)
-        self.apart = np.empty(FEW_MOVES)
+        self.distances = np.empty(FEW_MOVES)
         self.waiting = np.empty(4 * DEPTH, dtype=np.int64)
         self.box = np.empty(6)
 
@@ -99,13 +99,13 @@ def nearest(
     for none, and the row of that, −1 for none; arguments as in `Near`. `runs` (R, 4): begin and
     end of some points, begin and end of the moves with which they are compared."""
     count = np.zeros(len(points), dtype=np.int64)
-    found = np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64), count
-    near = Near(moves, points, limits_mm, found)
+    result = np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64), count
+    search = Near(moves, points, limits_mm, result)
     nothing, nowhere = np.empty(0, dtype=np.int64), np.empty(0)
     for run in runs:
         low, high, first, last = run.tolist()
-        divide(low, high, first, last, near, nothing, nowhere)
-    return found[:2]
+        divide(low, high, first, last, search, nothing, nowhere)
+    return result[:2]
 
 
 def pairs(
@@ -115,25 +115,25 @@ def pairs(
     in `Near`."""
     count = np.zeros(len(points), dtype=np.int64)
     place = np.empty(len(points), dtype=np.int64)
-    near = Near(moves, points, limits_mm, (np.empty(len(points)), place, count))
-    divide(0, len(points), 0, len(moves.arc), near, np.empty(0, dtype=np.int64), np.empty(0))
+    search = Near(moves, points, limits_mm, (np.empty(len(points)), place, count))
+    divide(0, len(points), 0, len(moves.arc), search, np.empty(0, dtype=np.int64), np.empty(0))
     move, distance = np.empty(int(count.sum()), dtype=np.int64), np.empty(int(count.sum()))
     place[:] = np.cumsum(count) - count
-    divide(0, len(points) if len(move) else 0, 0, len(moves.arc), near, move, distance)
+    divide(0, len(points) if len(move) else 0, 0, len(moves.arc), search, move, distance)
     return np.repeat(np.arange(len(points)), count), move, distance
 
 
 cpdef divide(
-    Int low, Int high, Int first, Int last, Near near, Int[::1] found, double[::1] distance
+    Int low, Int high, Int first, Int last, Near search, Int[::1] moves, double[::1] distance
 ):
-    """Compare the points low:high with the moves first:last; with room in `found` and `distance`
+    """Compare the points low:high with the moves first:last; with room in `moves` and `distance`
     all moves within the limits go there, those of a point from its place in `near.move` on."""
     cdef Int k, height, axis, end, split, part
     cdef double middle
     cdef bint larger
     cdef int[::1] candidates
     cdef Int[::1] waiting
-    candidates, waiting = near.candidates, near.waiting
+    candidates, waiting = search.candidates, search.waiting
     if low >= high or first >= last:
         return
     for k in range(first, last):
@@ -144,21 +144,21 @@ cpdef divide(
         height -= 1
         low, high = waiting[4 * height], waiting[4 * height + 1]
         first, last = waiting[4 * height + 2], waiting[4 * height + 3]
-        axis, middle = _set_box(low, high, near)
-        end = _keep_near(first, last, near)
+        axis, middle = _set_box(low, high, search)
+        end = _keep_near(first, last, search)
         if end == last:
             continue
         if axis < 0 or high - low <= FEW_POINTS or end - last <= FEW_MOVES:
-            if len(found) > 0:
-                _list(low, high, last, end, near, found, distance)
+            if len(moves) > 0:
+                _list(low, high, last, end, search, moves, distance)
             else:
-                if end - last > len(near.apart):
-                    near.apart = np.empty(2 * (end - last))
-                _compare(low, high, last, end, near)
+                if end - last > len(search.distances):
+                    search.distances = np.empty(2 * (end - last))
+                _compare(low, high, last, end, search)
             continue
         if 2 * (end - last) <= last - first:
             first, last = last, end
-        split = _divided(low, high, axis, middle, near)
+        split = _divided(low, high, axis, middle, search)
         for part in range(2):
             # The larger part waits below the smaller one.
             larger = (split - low > high - split) == (part == 0)
@@ -168,31 +168,31 @@ cpdef divide(
             height += 1
 
 
-cdef (Int, double) _set_box(Int low, Int high, Near near) noexcept:
+cdef (Int, double) _set_box(Int low, Int high, Near search) noexcept:
     """Set the box of the points low:high; returns its longest side (−1: it is a point) and the
     middle of that."""
     cdef Int side, axis, n
-    cdef double longest, middle, least, most, value
+    cdef double longest, middle, smallest, largest, value
     cdef double[:, ::1] points
     cdef Int[::1] order
     cdef double[::1] box
-    points, order, box = near.points, near.order, near.box
+    points, order, box = search.points, search.order, search.box
     side, longest, middle = -1, 0.0, 0.0
     for axis in range(3):
-        least = most = points[order[low], axis]
+        smallest = largest = points[order[low], axis]
         for n in range(low + 1, high):
             value = points[order[n], axis]
-            least = value if value < least else least
-            most = value if value > most else most
-        box[axis], box[axis + 3] = least, most
-        if most - least > longest:
-            side, longest = axis, most - least
-            middle = least + 0.5 * longest
-            middle = least if middle >= most else middle
+            smallest = value if value < smallest else smallest
+            largest = value if value > largest else largest
+        box[axis], box[axis + 3] = smallest, largest
+        if largest - smallest > longest:
+            side, longest = axis, largest - smallest
+            middle = smallest + 0.5 * longest
+            middle = smallest if middle >= largest else middle
     return side, middle
 
 
-cdef Int _keep_near(Int first, Int last, Near near) noexcept:
+cdef Int _keep_near(Int first, Int last, Near search) noexcept:
     """Write the candidates first:last that come within the limits of the box behind `last`;
     returns the end of these."""
     cdef Int n, k, arc, end
@@ -202,15 +202,15 @@ cdef Int _keep_near(Int first, Int last, Near near) noexcept:
     cdef const double[:, :] start, ends, heights
     cdef double[:, ::1] arcs
     cdef double[::1] box
-    candidates, box, arcs, heights = near.candidates, near.box, near.arcs, near.heights
-    start, ends = near.start, near.end
-    room, window, end = near.limit + SLACK_MM, near.window + SLACK_MM, last
+    candidates, box, arcs, heights = search.candidates, search.box, search.arcs, search.heights
+    start, ends = search.start, search.end
+    room, window, end = search.limit + SLACK_MM, search.window + SLACK_MM, last
     low_x, low_y, high_x, high_y = box[0] - room, box[1] - room, box[3] + room, box[4] + room
     x, y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
     wide, tall = high_x - x, high_y - y
     for n in range(first, last):
         k = candidates[n]
-        arc = near.arc[k]
+        arc = search.arc[k]
         ax, ay, bx, by = start[k, 0], start[k, 1], ends[k, 0], ends[k, 1]
         if arc < 0:
             if min(ax, bx) > high_x or max(ax, bx) < low_x:
@@ -223,7 +223,7 @@ cdef Int _keep_near(Int first, Int last, Near near) noexcept:
             if arcs[arc, LOW_Y] > high_y or arcs[arc, HIGH_Y] < low_y:
                 continue
         z, to_z = heights[k, 0], heights[k, 1]
-        around = window * (1.0 + _slope(near, k))
+        around = window * (1.0 + _slope(search, k))
         if min(z, to_z) > box[5] + around or max(z, to_z) < box[2] - around:
             continue
         if arc < 0:
@@ -245,28 +245,28 @@ cdef Int _keep_near(Int first, Int last, Near near) noexcept:
     return end
 
 
-cdef inline double _slope(Near near, Int k) noexcept:
+cdef inline double _slope(Near search, Int k) noexcept:
     """Return the change of height of a move, as a share of its length."""
     cdef double rise, length, dx, dy
     cdef Int arc
-    rise, arc = abs(near.heights[k, 1] - near.heights[k, 0]), near.arc[k]
+    rise, arc = abs(search.heights[k, 1] - search.heights[k, 0]), search.arc[k]
     if rise == 0.0:
         return 0.0
     if arc >= 0:
-        length = near.arcs[arc, RADIUS] * near.arcs[arc, SWEEP]
+        length = search.arcs[arc, RADIUS] * search.arcs[arc, SWEEP]
     else:
-        dx, dy = near.end[k, 0] - near.start[k, 0], near.end[k, 1] - near.start[k, 1]
+        dx, dy = search.end[k, 0] - search.start[k, 0], search.end[k, 1] - search.start[k, 1]
         length = math.sqrt(dx * dx + dy * dy)
     return float(rise / (length if length > 0.0 else 1.0))
 
 
-cdef Int _divided(Int low, Int high, Int axis, double middle, Near near) noexcept:
+cdef Int _divided(Int low, Int high, Int axis, double middle, Near search) noexcept:
     """Put those of the points low:high that are not above the middle before the others; returns
     where these begin."""
     cdef Int split, n, point
     cdef double[:, ::1] points
     cdef Int[::1] order
-    points, order = near.points, near.order
+    points, order = search.points, search.order
     split = low
     for n in range(low, high):
         point = order[n]
@@ -276,17 +276,17 @@ cdef Int _divided(Int low, Int high, Int axis, double middle, Near near) noexcep
     return split
 
 
-cdef inline double _distance(Near near, Int k, double x, double y, double z) noexcept:
+cdef inline double _distance(Near search, Int k, double x, double y, double z) noexcept:
     """The distance of a point from a move; inf beyond the limits."""
     cdef Int arc
-    cdef double from_z, rise, window, ax, ay, bx, by, share, dx, dy, px, py, square, apart, sine
+    cdef double from_z, rise, window, ax, ay, bx, by, share, dx, dy, px, py, square, distance, sine
     cdef double to_a, to_b
     cdef double[:, ::1] arcs
-    arc, from_z = near.arc[k], near.heights[k, 0]
-    rise, window = near.heights[k, 1] - from_z, near.window * (1.0 + _slope(near, k))
+    arc, from_z = search.arc[k], search.heights[k, 0]
+    rise, window = search.heights[k, 1] - from_z, search.window * (1.0 + _slope(search, k))
     if rise == 0.0 and abs(from_z - z) > window:
         return math.INFINITY
-    ax, ay, bx, by = near.start[k, 0], near.start[k, 1], near.end[k, 0], near.end[k, 1]
+    ax, ay, bx, by = search.start[k, 0], search.start[k, 1], search.end[k, 0], search.end[k, 1]
     share = 0.0
     if arc < 0:
         dx, dy = bx - ax, by - ay
@@ -295,23 +295,23 @@ cdef inline double _distance(Near near, Int k, double x, double y, double z) noe
         share = (px * dx + py * dy) * (1.0 / (square if square > 0.0 else 1.0))
         share = min(max(share, 0.0), 1.0)
         px, py = px - share * dx, py - share * dy
-        apart = math.sqrt(px * px + py * py)
+        distance = math.sqrt(px * px + py * py)
     else:
-        arcs = near.arcs
+        arcs = search.arcs
         px, py = x - arcs[arc, CX], y - arcs[arc, CY]
         sine = arcs[arc, UX] * py - arcs[arc, UY] * px
         if sine < 0.0 or px * arcs[arc, VY] - py * arcs[arc, VX] < 0.0:
             to_a, to_b = (x - ax) ** 2 + (y - ay) ** 2, (x - bx) ** 2 + (y - by) ** 2
-            apart = math.sqrt(min(to_a, to_b))
+            distance = math.sqrt(min(to_a, to_b))
         else:
-            apart = abs(math.sqrt(px * px + py * py) - arcs[arc, RADIUS])
-        if rise != 0.0 and apart <= near.limit:
+            distance = abs(math.sqrt(px * px + py * py) - arcs[arc, RADIUS])
+        if rise != 0.0 and distance <= search.limit:
             share = _share_of_arc(arcs, arc, ax, ay, px, py, sine)
-    if apart > near.limit:
+    if distance > search.limit:
         return math.INFINITY
     if rise != 0.0 and abs(from_z + share * rise - z) > window:
         return math.INFINITY
-    return apart
+    return distance
 
 
 cdef double _share_of_arc(
@@ -326,48 +326,50 @@ cdef double _share_of_arc(
     return 0.0 if angle > math.M_PI + 0.5 * sweep else min(angle / sweep, 1.0)
 
 
-cdef void _compare(Int low, Int high, Int first, Int last, Near near) noexcept:
+cdef void _compare(Int low, Int high, Int first, Int last, Near search) noexcept:
     """Of each of the points low:high the nearest of the candidates first:last."""
     cdef Int i, point, n, count
-    cdef double best, away, x, y, z
+    cdef double best, distance, x, y, z
     cdef double[:, ::1] points
     cdef Int[::1] order
     cdef int[::1] candidates
-    cdef double[::1] apart
-    points, order, candidates, apart = near.points, near.order, near.candidates, near.apart
+    cdef double[::1] distances
+    points, order, candidates, distances = (
+        search.points, search.order, search.candidates, search.distances
+    )
     for i in range(low, high):
         point, best, count = order[i], math.INFINITY, 0
         x, y, z = points[point, 0], points[point, 1], points[point, 2]
         for n in range(first, last):
-            away = _distance(near, candidates[n], x, y, z)
-            apart[n - first] = away
-            best = away if away < best else best
-            count += 1 if away < math.INFINITY else 0
+            distance = _distance(search, candidates[n], x, y, z)
+            distances[n - first] = distance
+            best = distance if distance < best else best
+            count += 1 if distance < math.INFINITY else 0
         if count == 0:
             continue
         n = last - 1
-        while apart[n - first] > best + EQUAL_MM:
+        while distances[n - first] > best + EQUAL_MM:
             n -= 1
-        near.distance[point], near.move[point] = best, candidates[n]
-        near.count[point] = count
+        search.distance[point], search.move[point] = best, candidates[n]
+        search.count[point] = count
 
 
 cdef void _list(
-    Int low, Int high, Int first, Int last, Near near, Int[::1] found, double[::1] distance
+    Int low, Int high, Int first, Int last, Near search, Int[::1] moves, double[::1] distance
 ) noexcept:
     """All of the candidates first:last that are within the limits of each of the points."""
-    cdef Int i, point, n, at
-    cdef double away, x, y, z
+    cdef Int i, point, n, index
+    cdef double gap, x, y, z
     cdef double[:, ::1] points
     cdef Int[::1] order
     cdef int[::1] candidates
-    points, order, candidates = near.points, near.order, near.candidates
+    points, order, candidates = search.points, search.order, search.candidates
     for i in range(low, high):
         point = order[i]
-        at = near.move[point]
+        index = search.move[point]
         x, y, z = points[point, 0], points[point, 1], points[point, 2]
         for n in range(first, last):
-            away = _distance(near, candidates[n], x, y, z)
-            if away < math.INFINITY:
-                found[at], distance[at] = candidates[n], away
-                at += 1
+            gap = _distance(search, candidates[n], x, y, z)
+            if gap < math.INFINITY:
+                moves[index], distance[index] = candidates[n], gap
+                index += 1

@@ -84,13 +84,13 @@ cdef Int wait_for_children(
     return height + 2
 
 
-cdef inline bint touch(double[:, ::1] one, Int i, double[:, ::1] other, Int j) noexcept:
+cdef inline bint touch(double[:, ::1] boxes, Int i, double[:, ::1] other_boxes, Int j) noexcept:
     """True if box i of one list and box j of another have a point in common."""
     return bool(
-        one[i, 0] <= other[j, 2]
-        and other[j, 0] <= one[i, 2]
-        and one[i, 1] <= other[j, 3]
-        and other[j, 1] <= one[i, 3]
+        boxes[i, 0] <= other_boxes[j, 2]
+        and other_boxes[j, 0] <= boxes[i, 2]
+        and boxes[i, 1] <= other_boxes[j, 3]
+        and other_boxes[j, 1] <= boxes[i, 3]
     )
 
 
@@ -190,20 +190,20 @@ cpdef double arc_length_at(double[:, ::1] curves, Int i, double x, double y) noe
     The chord to the point makes half the swept angle with the tangent; points before the start
     show as half angles beyond the middle of what remains of the circle.
     """
-    cdef bint before
+    cdef bint is_before
     cdef double half, chord
     qx, qy = x - curves[i, AX], y - curves[i, AY]
     ahead = curves[i, TX] * qx + curves[i, TY] * qy
     if curves[i, BEND] == 0.0:
         return float(ahead)
     chord = math.sqrt(qx * qx + qy * qy)
-    beside = curves[i, TX] * qy - curves[i, TY] * qx
-    half = math.atan2(math.copysign(1.0, curves[i, BEND]) * beside, ahead)
-    before = half > 0.5 * math.M_PI + 0.25 * abs(curves[i, SWEEP]) or half < -0.5 * math.M_PI
-    half = math.M_PI - abs(half) if before else abs(half)
+    across = curves[i, TX] * qy - curves[i, TY] * qx
+    half = math.atan2(math.copysign(1.0, curves[i, BEND]) * across, ahead)
+    is_before = half > 0.5 * math.M_PI + 0.25 * abs(curves[i, SWEEP]) or half < -0.5 * math.M_PI
+    half = math.M_PI - abs(half) if is_before else abs(half)
     if half != 0.0:
         chord *= half / math.sin(half)
-    return float(-chord if before else chord)
+    return float(-chord if is_before else chord)
 
 
 cpdef inline (double, double) point_on(double[:, ::1] curves, Int i, double t) noexcept:
@@ -263,9 +263,9 @@ cdef inline double depth_in(double[:, ::1] kites, Int i, double x, double y) noe
     """Return the depth (mm) of a point in kite i; below 0 outside it."""
     qx, qy = x - kites[i, CX], y - kites[i, CY]
     n1x, n1y, n2x, n2y = kites[i, N1X], kites[i, N1Y], kites[i, N2X], kites[i, N2Y]
-    out = min(kites[i, DEEP] - n1x * qx - n1y * qy, kites[i, DEEP] - n2x * qx - n2y * qy)
-    out = min(out, kites[i, FAR] - kites[i, MX] * qx - kites[i, MY] * qy)
-    return float(min(out, n1y * qx - n1x * qy, n2x * qy - n2y * qx))
+    depth = min(kites[i, DEEP] - n1x * qx - n1y * qy, kites[i, DEEP] - n2x * qx - n2y * qy)
+    depth = min(depth, kites[i, FAR] - kites[i, MX] * qx - kites[i, MY] * qy)
+    return float(min(depth, n1y * qx - n1x * qy, n2x * qy - n2y * qx))
 
 
 cpdef double deepest(
@@ -324,27 +324,29 @@ PLACES = (0.5, 0.03, 0.97, 0.2, 0.8, 0.35, 0.65)
 
 cdef double least_below(
     double[:, ::1] curves, double[:, ::1] tree, double x, double y, double best, double enough,
-    Int[::1] stack, double[::1] apart
+    Int[::1] stack, double[::1] squares
 ) noexcept:
     """Distance of a point from the nearest curve, or `best` when none is nearer than that.
 
-    Any distance below `enough` will do. `stack` and `apart` (`DEPTH`,) are scratch buffers.
+    Any distance below `enough` will do. `stack` and `squares` (`DEPTH`,) are scratch buffers.
     """
-    cdef Int leaves, height, node, low, row, near, far
+    cdef Int leaves, height, node, low, row, near_node, far_node
     leaves = len(tree) // 2
-    height, stack[0], apart[0] = 1, 1, apart_square(tree, 1, x, y)
+    height, stack[0], squares[0] = 1, 1, apart_square(tree, 1, x, y)
     while height > 0:
         height -= 1
         node = stack[height]
-        if apart[height] >= best * best:
+        if squares[height] >= best * best:
             continue
         if node < leaves:
-            near, far = 2 * node, 2 * node + 1
-            to_near, to_far = apart_square(tree, near, x, y), apart_square(tree, far, x, y)
+            near_node, far_node = 2 * node, 2 * node + 1
+            to_near, to_far = (
+                apart_square(tree, near_node, x, y), apart_square(tree, far_node, x, y)
+            )
             if to_far < to_near:
-                near, far, to_near, to_far = far, near, to_far, to_near
-            stack[height], apart[height] = far, to_far
-            stack[height + 1], apart[height + 1] = near, to_near
+                near_node, far_node, to_near, to_far = far_node, near_node, to_far, to_near
+            stack[height], squares[height] = far_node, to_far
+            stack[height + 1], squares[height + 1] = near_node, to_near
             height += 2
             continue
         low = (node - leaves) * LEAF
@@ -357,15 +359,15 @@ cdef double least_below(
 
 cpdef nearest_distances(double[:, ::1] points, double[:, ::1] curves, double[:, ::1] tree):
     """(P,) distance of each point (P, 2) from the nearest curve."""
-    cdef double[::1] found, apart
+    cdef double[::1] distances, squares
     cdef Int i
     cdef Int[::1] stack
-    found = np.empty(len(points))
-    stack, apart = np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    distances = np.empty(len(points))
+    stack, squares = np.empty(DEPTH, np.int64), np.empty(DEPTH)
     for i in range(len(points)):
         x, y = points[i, 0], points[i, 1]
-        found[i] = least_below(curves, tree, x, y, math.INFINITY, 0.0, stack, apart)
-    return np.asarray(found)
+        distances[i] = least_below(curves, tree, x, y, math.INFINITY, 0.0, stack, squares)
+    return np.asarray(distances)
 
 
 # Linear bounds of the distance from the nearest curve, along chords and over discs.
@@ -396,20 +398,20 @@ cdef inline double power_of(double[:, ::1] curves, Int i, double x, double y) no
 cdef (double, double, double) away_from(double[:, ::1] curves, Int i, double x, double y) noexcept:
     """Distance of a point from row i, and the direction from the nearest place to the point; 0
     where it lies there."""
-    cdef double px, py, apart, bend = curves[i, BEND], qx, qy, rx, ry
+    cdef double px, py, distance, bend = curves[i, BEND], qx, qy, rx, ry
     qx, qy = x - curves[i, AX], y - curves[i, AY]
     rx, ry = x - curves[i, BX], y - curves[i, BY]
     if not faces(curves, i, x, y):
         if rx * rx + ry * ry < qx * qx + qy * qy:
             qx, qy = rx, ry
-        apart = math.sqrt(qx * qx + qy * qy)
-        return (apart, qx / apart, qy / apart) if apart > 0.0 else (0.0, 0.0, 0.0)
+        distance = math.sqrt(qx * qx + qy * qy)
+        return (distance, qx / distance, qy / distance) if distance > 0.0 else (0.0, 0.0, 0.0)
     # n − k q is k times the way from the point to the centre, and n on the line itself.
     px, py = -curves[i, TY] - bend * qx, curves[i, TX] - bend * qy
     rx, ry = -curves[i, TY], curves[i, TX]
-    apart = math.sqrt(px * px + py * py)
-    if apart > 0.0:
-        rx, ry = px / apart, py / apart
+    distance = math.sqrt(px * px + py * py)
+    if distance > 0.0:
+        rx, ry = px / distance, py / distance
     if power_of(curves, i, x, y) > 0.0:
         rx, ry = -rx, -ry
     return gap_to(curves, i, x, y), rx, ry
@@ -420,22 +422,22 @@ cdef (double, double) least_along(
 ) noexcept:
     """Values at the ends of a chord, with the middle (x, y) and half of it (dx, dy), of a linear
     function that is nowhere on it more than the distance from row i."""
-    cdef double apart, nx, ny, low, high, ox, oy, radius, bend = curves[i, BEND], out
-    apart, nx, ny = away_from(curves, i, x, y)
-    out = apart - math.sqrt(dx * dx + dy * dy)
+    cdef double distance, nx, ny, low, high, ox, oy, radius, bend = curves[i, BEND], bound
+    distance, nx, ny = away_from(curves, i, x, y)
+    bound = distance - math.sqrt(dx * dx + dy * dy)
     if bend == 0.0:
         low = nx * dx + ny * dy
-        return apart - low, apart + low
+        return distance - low, distance + low
     radius = 1.0 / abs(bend)
     ox, oy = x - curves[i, AX] + curves[i, TY] / bend, y - curves[i, AY] - curves[i, TX] / bend
-    apart = math.sqrt(ox * ox + oy * oy)
-    if apart < radius:
+    distance = math.sqrt(ox * ox + oy * oy)
+    if distance < radius:
         low = radius - math.sqrt((ox - dx) * (ox - dx) + (oy - dy) * (oy - dy))
         high = radius - math.sqrt((ox + dx) * (ox + dx) + (oy + dy) * (oy + dy))
     else:
-        low = (ox * dx + oy * dy) / apart
-        low, high = apart - radius - low, apart - radius + low
-    return (low, high) if min(low, high) > out else (out, out)
+        low = (ox * dx + oy * dy) / distance
+        low, high = distance - radius - low, distance - radius + low
+    return (low, high) if min(low, high) > bound else (bound, bound)
 
 
 cdef (double, double) most_along(
@@ -443,46 +445,46 @@ cdef (double, double) most_along(
 ) noexcept:
     """Values at the ends of a chord, as in `least_along`, of a linear function that is nowhere on
     it less than the distance from row i."""
-    cdef double ox, oy, low, high, slope, apart, radius, bend = curves[i, BEND]
+    cdef double ox, oy, low, high, slope, distance, radius, bend = curves[i, BEND]
     if bend == 0.0:
         return distance_to(curves, i, x - dx, y - dy), distance_to(curves, i, x + dx, y + dy)
     if not (faces(curves, i, x - dx, y - dy) and faces(curves, i, x + dx, y + dy)):
-        apart = distance_to(curves, i, x, y) + math.sqrt(dx * dx + dy * dy)
-        return apart, apart
+        distance = distance_to(curves, i, x, y) + math.sqrt(dx * dx + dy * dy)
+        return distance, distance
     radius = 1.0 / abs(bend)
     ox, oy = x - curves[i, AX] + curves[i, TY] / bend, y - curves[i, AY] - curves[i, TX] / bend
-    apart = math.sqrt(ox * ox + oy * oy)
-    slope = (ox * dx + oy * dy) / apart if apart > 0.0 else 0.0
+    distance = math.sqrt(ox * ox + oy * oy)
+    slope = (ox * dx + oy * dy) / distance if distance > 0.0 else 0.0
     low = math.sqrt((ox - dx) * (ox - dx) + (oy - dy) * (oy - dy)) - radius
     high = math.sqrt((ox + dx) * (ox + dx) + (oy + dy) * (oy + dy)) - radius
-    return max(low, radius - apart + slope), max(high, radius - apart - slope)
+    return max(low, radius - distance + slope), max(high, radius - distance - slope)
 
 
 cdef void nearest_two(
     double[:, ::1] curves, double[:, ::1] tree, double x, double y, Int[::1] stack, Int[::1] row,
-    double[::1] apart
+    double[::1] distances
 ) noexcept:
     """Store the two curves nearest to a point and their distances; −1 and inf where there is none."""
     cdef Int leaves = len(tree) // 2, height = 1, node, low, i
-    cdef double away
-    row[0], row[1], apart[0], apart[1] = -1, -1, math.INFINITY, math.INFINITY
+    cdef double distance
+    row[0], row[1], distances[0], distances[1] = -1, -1, math.INFINITY, math.INFINITY
     stack[0] = 1
     while height > 0:
         height -= 1
         node = stack[height]
-        if apart_square(tree, node, x, y) >= apart[1] * apart[1]:
+        if apart_square(tree, node, x, y) >= distances[1] * distances[1]:
             continue
         if node < leaves:
             height = wait_for_children(tree, node, x, y, stack, height)
             continue
         low = (node - leaves) * LEAF
         for i in range(low, min(low + LEAF, len(curves))):
-            away = distance_to(curves, i, x, y)
-            if away < apart[0]:
-                row[1], apart[1] = row[0], apart[0]
-                row[0], apart[0] = i, away
-            elif away < apart[1]:
-                row[1], apart[1] = i, away
+            distance = distance_to(curves, i, x, y)
+            if distance < distances[0]:
+                row[1], distances[1] = row[0], distances[0]
+                row[0], distances[0] = i, distance
+            elif distance < distances[1]:
+                row[1], distances[1] = i, distance
 
 
 cpdef chord_distances(
@@ -492,22 +494,22 @@ cpdef chord_distances(
     ways from start to end are (K, 2): at both ends the least, at both ends the most. Between the
     ends the distance lies between the lines through these. Along a chord that may meet a curve the
     least is what the distance may be on either side of it, counted below 0 on the other one."""
-    cdef double[:, ::1] found = np.empty((len(middles), 4))
+    cdef double[:, ::1] bounds = np.empty((len(middles), 4))
     cdef Int[::1] stack = np.empty(DEPTH, np.int64), row = np.empty(2, np.int64)
-    cdef double[::1] apart = np.empty(2)
+    cdef double[::1] distances = np.empty(2)
     cdef Int k, i, leaves = len(tree) // 2, height, node, low
-    cdef double x, y, dx, dy, long_, limit, one, other
+    cdef double x, y, dx, dy, long_, limit, first_bound, second_bound
     for k in range(len(middles)):
         x, y, dx, dy = middles[k, 0], middles[k, 1], halves[k, 0], halves[k, 1]
-        nearest_two(curves, tree, x, y, stack, row, apart)
-        found[k, 2], found[k, 3] = most_along(curves, row[0], x, y, dx, dy)
+        nearest_two(curves, tree, x, y, stack, row, distances)
+        bounds[k, 2], bounds[k, 3] = most_along(curves, row[0], x, y, dx, dy)
         long_ = math.sqrt(dx * dx + dy * dy)
-        if apart[0] <= long_:
-            found[k, 0] = found[k, 1] = apart[0] - long_
+        if distances[0] <= long_:
+            bounds[k, 0] = bounds[k, 1] = distances[0] - long_
             continue
-        limit = apart[0] + 2.0 * long_
-        found[k, 0], found[k, 1] = least_along(curves, row[0], x, y, dx, dy)
-        if apart[1] > limit:
+        limit = distances[0] + 2.0 * long_
+        bounds[k, 0], bounds[k, 1] = least_along(curves, row[0], x, y, dx, dy)
+        if distances[1] > limit:
             continue
         height, stack[0] = 1, 1
         while height > 0:
@@ -522,9 +524,11 @@ cpdef chord_distances(
             low = (node - leaves) * LEAF
             for i in range(low, min(low + LEAF, len(curves))):
                 if i != row[0] and distance_to(curves, i, x, y) <= limit:
-                    one, other = least_along(curves, i, x, y, dx, dy)
-                    found[k, 0], found[k, 1] = min(found[k, 0], one), min(found[k, 1], other)
-    return np.asarray(found)
+                    first_bound, second_bound = least_along(curves, i, x, y, dx, dy)
+                    bounds[k, 0], bounds[k, 1] = (
+                        min(bounds[k, 0], first_bound), min(bounds[k, 1], second_bound)
+                    )
+    return np.asarray(bounds)
 
 
 cpdef enum:
@@ -538,53 +542,53 @@ cpdef disc_tangents(
 ):
     """(P, 2, 5) upper bounds of the distance from the two curves nearest to each point (P, 2), within
     `reach` (P,) of it; the distance of a second one that does not exist is inf."""
-    cdef double[:, :, ::1] found = np.zeros((len(points), 2, TANGENT_COLUMNS))
+    cdef double[:, :, ::1] tangents = np.zeros((len(points), 2, TANGENT_COLUMNS))
     cdef Int[::1] stack = np.empty(DEPTH, np.int64), row = np.empty(2, np.int64)
-    cdef double[::1] apart = np.empty(2)
-    cdef double x, y, r, bend, away, radius, margin
+    cdef double[::1] distances = np.empty(2)
+    cdef double x, y, r, bend, gap, radius, margin
     cdef bint is_within
     cdef Int k, j, i
     for k in range(len(points)):
         x, y, r = points[k, 0], points[k, 1], reach[k]
-        nearest_two(curves, tree, x, y, stack, row, apart)
+        nearest_two(curves, tree, x, y, stack, row, distances)
         for j in range(2):
             i = row[j]
-            found[k, j, APART] = apart[j]
+            tangents[k, j, APART] = distances[j]
             if i < 0:
                 continue
-            away, found[k, j, SLOPE_X], found[k, j, SLOPE_Y] = away_from(curves, i, x, y)
-            found[k, j, MORE], found[k, j, MORE_BEYOND] = bulge_of(away, r), math.INFINITY
+            gap, tangents[k, j, SLOPE_X], tangents[k, j, SLOPE_Y] = away_from(curves, i, x, y)
+            tangents[k, j, MORE], tangents[k, j, MORE_BEYOND] = bulge_of(gap, r), math.INFINITY
             bend = curves[i, BEND]
             if not faces(curves, i, x, y):
                 continue
-            away = arc_length_at(
-                curves, i, x - away * found[k, j, SLOPE_X], y - away * found[k, j, SLOPE_Y]
+            gap = arc_length_at(
+                curves, i, x - gap * tangents[k, j, SLOPE_X], y - gap * tangents[k, j, SLOPE_Y]
             )
-            margin = min(away, curves[i, LENGTH] - away)
+            margin = min(gap, curves[i, LENGTH] - gap)
             if bend == 0.0:
                 if margin >= r:
-                    found[k, j, MORE] = found[k, j, MORE_BEYOND] = 0.0
+                    tangents[k, j, MORE] = tangents[k, j, MORE_BEYOND] = 0.0
                 continue
             radius = 1.0 / abs(bend)
             is_within = (power_of(curves, i, x, y) < 0.0) == (bend > 0.0)
-            away = radius - apart[j] if is_within else radius + apart[j]
-            if margin * away < 0.5 * math.M_PI * r * radius:
+            gap = radius - distances[j] if is_within else radius + distances[j]
+            if margin * gap < 0.5 * math.M_PI * r * radius:
                 continue
-            found[k, j, MORE] = 0.0 if is_within else bulge_of(away, r)
-            found[k, j, MORE_BEYOND] = bulge_of(away, r) if is_within else 0.0
-    return np.asarray(found)
+            tangents[k, j, MORE] = 0.0 if is_within else bulge_of(gap, r)
+            tangents[k, j, MORE_BEYOND] = bulge_of(gap, r) if is_within else 0.0
+    return np.asarray(tangents)
 
 
-cdef double bulge_of(double apart, double reach) noexcept:
+cdef double bulge_of(double distance, double reach) noexcept:
     """By how much the distance from a point, so far away, is more than linear within a disc."""
-    return reach * reach / (2.0 * apart) if reach <= 2.0 * apart else 2.0 * reach
+    return reach * reach / (2.0 * distance) if reach <= 2.0 * distance else 2.0 * reach
 
 
-cdef twice_the_room(Int[:, ::1] found):
+cdef twice_the_room(Int[:, ::1] pairs):
     """The same pairs (J, 2), and room for as many more."""
     cdef Int[:, ::1] more
-    more = np.empty((2 * len(found), 2), np.int64)
-    more[: len(found)] = found
+    more = np.empty((2 * len(pairs), 2), np.int64)
+    more[: len(pairs)] = pairs
     return more
 
 
@@ -593,10 +597,10 @@ cpdef curves_within(
 ):
     """(J, 2) pairs of a point (P, 2) and a curve that is no farther from it than `reach` (P,), in
     the order of the points."""
-    cdef Int[:, ::1] found
+    cdef Int[:, ::1] pairs
     cdef Int[::1] stack
     cdef Int i, leaves, count, height, node, low, row
-    found = np.empty((len(points) + LEAF, 2), np.int64)
+    pairs = np.empty((len(points) + LEAF, 2), np.int64)
     stack = np.empty(DEPTH, np.int64)
     leaves, count = len(tree) // 2, 0
     for i in range(len(points)):
@@ -611,14 +615,14 @@ cpdef curves_within(
                 stack[height], stack[height + 1] = 2 * node + 1, 2 * node
                 height += 2
                 continue
-            if count + LEAF > len(found):
-                found = twice_the_room(found)
+            if count + LEAF > len(pairs):
+                pairs = twice_the_room(pairs)
             low = (node - leaves) * LEAF
             for row in range(low, min(low + LEAF, len(curves))):
                 if distance_to(curves, row, x, y) <= limit:
-                    found[count, 0], found[count, 1] = i, row
+                    pairs[count, 0], pairs[count, 1] = i, row
                     count += 1
-    return np.asarray(found[:count])
+    return np.asarray(pairs[:count])
 
 
 # Which segments lie beside points, of so many that their rows are not stored.
@@ -662,7 +666,7 @@ cdef class SegmentTree:
 
 cdef (Int, Int) _rows_of(SegmentTree tree, Int leaf) noexcept:
     """Return the begin and end of the rows of a leaf; compute them if they are not cached."""
-    cdef Int slot, first, last, k, at, begin, end
+    cdef Int slot, first, last, k, segment, begin, end
     cdef double ax, ay, bx, by
     slot = leaf % LEAVES_KEPT
     first = slot * tree.leaf
@@ -671,8 +675,8 @@ cdef (Int, Int) _rows_of(SegmentTree tree, Int leaf) noexcept:
         return first, last
     tree.kept[slot] = leaf
     for k in range(first, last):
-        at = tree.order[leaf * tree.leaf + k - first]
-        begin, end = tree.begin[at], tree.end[at]
+        segment = tree.order[leaf * tree.leaf + k - first]
+        begin, end = tree.begin[segment], tree.end[segment]
         ax, ay = tree.vertices[begin, 0], tree.vertices[begin, 1]
         bx, by = tree.vertices[end, 0], tree.vertices[end, 1]
         set_curve_row(tree.rows, k, ax, ay, bx, by, tree.vertices[begin, 2])
@@ -681,47 +685,49 @@ cdef (Int, Int) _rows_of(SegmentTree tree, Int leaf) noexcept:
 
 cpdef distances_from(double[:, ::1] points, SegmentTree tree):
     """(P,) distance of each point (P, 2) from the nearest segment; inf where there is none."""
-    cdef double[::1] found, apart
+    cdef double[::1] distances, squares
     cdef Int[::1] stack
     cdef double[:, ::1] nodes, rows
-    cdef Int leaves, i, height, node, low, high, k, near, far
+    cdef Int leaves, i, height, node, low, high, k, near_node, far_node
     cdef double x, y, best, to_near, to_far
-    found = np.empty(len(points))
-    stack, apart = np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    distances = np.empty(len(points))
+    stack, squares = np.empty(DEPTH, np.int64), np.empty(DEPTH)
     nodes, rows, leaves = tree.nodes, tree.rows, len(tree.nodes) // 2
     for i in range(len(points)):
         x, y, best = points[i, 0], points[i, 1], math.INFINITY
-        height, stack[0], apart[0] = 1, 1, apart_square(nodes, 1, x, y)
+        height, stack[0], squares[0] = 1, 1, apart_square(nodes, 1, x, y)
         while height > 0:
             height -= 1
             node = stack[height]
-            if apart[height] >= best * best:
+            if squares[height] >= best * best:
                 continue
             if node >= leaves:
                 low, high = _rows_of(tree, node - leaves)
                 for k in range(low, high):
                     best = min(best, distance_to(rows, k, x, y))
                 continue
-            near, far = 2 * node, 2 * node + 1
-            to_near, to_far = apart_square(nodes, near, x, y), apart_square(nodes, far, x, y)
+            near_node, far_node = 2 * node, 2 * node + 1
+            to_near, to_far = (
+                apart_square(nodes, near_node, x, y), apart_square(nodes, far_node, x, y)
+            )
             if to_far < to_near:
-                near, far, to_near, to_far = far, near, to_far, to_near
-            stack[height], apart[height] = far, to_far
-            stack[height + 1], apart[height + 1] = near, to_near
+                near_node, far_node, to_near, to_far = far_node, near_node, to_far, to_near
+            stack[height], squares[height] = far_node, to_far
+            stack[height + 1], squares[height + 1] = near_node, to_near
             height += 2
-        found[i] = best
-    return np.asarray(found)
+        distances[i] = best
+    return np.asarray(distances)
 
 
 cpdef segments_within(double[:, ::1] points, double[::1] reach, SegmentTree tree):
     """(J, 2) pairs of a point (P, 2) and a segment that is no farther from it than `reach` (P,),
     in the order of the points."""
-    cdef Int[:, ::1] found
+    cdef Int[:, ::1] pairs
     cdef Int[::1] stack
     cdef double[:, ::1] nodes, rows
     cdef Int leaves, count, i, height, node, low, high, k
     cdef double x, y, limit
-    found = np.empty((len(points) + tree.leaf, 2), np.int64)
+    pairs = np.empty((len(points) + tree.leaf, 2), np.int64)
     stack = np.empty(DEPTH, np.int64)
     nodes, rows, leaves, count = tree.nodes, tree.rows, len(tree.nodes) // 2, 0
     for i in range(len(points)):
@@ -736,15 +742,15 @@ cpdef segments_within(double[:, ::1] points, double[::1] reach, SegmentTree tree
                 stack[height], stack[height + 1] = 2 * node + 1, 2 * node
                 height += 2
                 continue
-            if count + tree.leaf > len(found):
-                found = twice_the_room(found)
+            if count + tree.leaf > len(pairs):
+                pairs = twice_the_room(pairs)
             low, high = _rows_of(tree, node - leaves)
             for k in range(low, high):
                 if distance_to(rows, k, x, y) <= limit:
-                    found[count, 0] = i
-                    found[count, 1] = tree.order[(node - leaves) * tree.leaf + k - low]
+                    pairs[count, 0] = i
+                    pairs[count, 1] = tree.order[(node - leaves) * tree.leaf + k - low]
                     count += 1
-    return np.asarray(found[:count])
+    return np.asarray(pairs[:count])
 
 
 cpdef Int gathered(
@@ -780,28 +786,31 @@ cpdef Int gathered(
 cdef double _violation(
     double[:, ::1] curves, double[:, ::1] tree, double[:, ::1] kites, double[:, ::1] kite_tree,
     Int[::1] rows, Int count, double x, double y, double distance, double spare, double enough,
-    Int[::1] stack, double[::1] apart
+    Int[::1] stack, double[::1] squares
 ) noexcept:
     """Return how far, mm, a point violates the offset distance beyond the slack `spare`.
 
     0 if it does not; the search stops at any number above `enough`. It is too near to the source, or
     too deep in a kite. `rows` are those of the curves that can be nearer than the distance, `count`
-    their number, −1 for all. `stack`, `apart` (`DEPTH`,): scratch buffers.
+    their number, −1 for all. `stack`, `squares` (`DEPTH`,): scratch buffers.
     """
     cdef Int k
-    least = distance - spare
+    min_distance = distance - spare
     if count < 0:
-        short = least - least_below(curves, tree, x, y, least, least - enough, stack, apart)
+        short = (
+            min_distance
+            - least_below(curves, tree, x, y, min_distance, min_distance - enough, stack, squares)
+        )
     else:
         short = 0.0
         for k in range(count):
-            short = max(short, least - distance_to(curves, rows[k], x, y))
+            short = max(short, min_distance - distance_to(curves, rows[k], x, y))
     if short > enough or len(kites) == 0:
         return short
     return deepest(kites, kite_tree, x, y, short + spare, enough + spare, stack) - spare
 
 
-cpdef trimmed_ends(double[:, ::1] elements, near, (double, double) limits):
+cpdef trimmed_ends(double[:, ::1] elements, surroundings, (double, double) limits):
     """(K, 2) fractions between which each element may be far enough from the source.
 
     The distance from the source, and the depth in a kite, change by no more than the way along an
@@ -810,20 +819,20 @@ cpdef trimmed_ends(double[:, ::1] elements, near, (double, double) limits):
     nothing is left.
     """
     cdef double[:, ::1] ends, curves, tree, kites, kite_tree
-    cdef Int i, count, way, _
+    cdef Int i, count, side, _
     cdef Int[::1] rows, stack
-    cdef double[::1] apart
-    curves, tree, kites, kite_tree = near
+    cdef double[::1] squares
+    curves, tree, kites, kite_tree = surroundings
     distance, spare = limits
     ends = np.empty((len(elements), 2))
-    rows, stack, apart = np.empty(GATHERED, np.int64), np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    rows, stack, squares = np.empty(GATHERED, np.int64), np.empty(DEPTH, np.int64), np.empty(DEPTH)
     for i in range(len(elements)):
         low, high, length = 0.0, 1.0, elements[i, LENGTH]
         x, y = point_on(elements, i, 0.5)
         count = gathered(curves, tree, x, y, distance + 0.5 * length, rows, stack)
-        for way in range(2):
+        for side in range(2):
             for _ in range(TRIM_ROUNDS):
-                x, y = point_on(elements, i, low if way == 0 else high)
+                x, y = point_on(elements, i, low if side == 0 else high)
                 enough = (high - low) * length
                 step = (
                     _violation(
@@ -839,13 +848,13 @@ cpdef trimmed_ends(double[:, ::1] elements, near, (double, double) limits):
                         spare,
                         enough,
                         stack,
-                        apart,
+                        squares,
                     )
                     / length
                 )
                 if step <= TRIM_STEP_SHARE * (high - low):
                     break
-                if way == 0:
+                if side == 0:
                     low += step
                 else:
                     high -= step
@@ -858,24 +867,25 @@ cpdef trimmed_ends(double[:, ::1] elements, near, (double, double) limits):
 
 
 cpdef far_enough(
-    double[:, ::1] elements, Int[::1] element, double[:, ::1] span, near, (double, double) limits
+    double[:, ::1] elements, Int[::1] element, double[:, ::1] span, surroundings,
+    (double, double) limits
 ):
     """(S,) true for the slices of which no measured point is too near to the source.
 
     Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]. `limits` are the
     distance, and by how much a point may be too near.
     """
-    cdef double[::1] places, apart
+    cdef double[::1] places, squares
     cdef uint8_t[::1] valid
-    cdef Int i, last, whole, count, k, row
+    cdef Int i, last, gathered_count, count, k, row
     cdef double[:, ::1] curves, tree, kites, kite_tree
     cdef Int[::1] rows, stack
-    curves, tree, kites, kite_tree = near
+    curves, tree, kites, kite_tree = surroundings
     distance, spare = limits
     places = np.array(PLACES)
     valid = np.ones(len(element), np.bool_)
-    rows, stack, apart = np.empty(GATHERED, np.int64), np.empty(DEPTH, np.int64), np.empty(DEPTH)
-    last, whole = -1, -1
+    rows, stack, squares = np.empty(GATHERED, np.int64), np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    last, gathered_count = -1, -1
     for i in range(len(element)):
         row, t0, part = element[i], span[i, 0], span[i, 1] - span[i, 0]
         length = elements[row, LENGTH]
@@ -883,8 +893,8 @@ cpdef far_enough(
             # No other curve is too near to any point of the element.
             x, y = point_on(elements, row, 0.5)
             last = row
-            whole = gathered(curves, tree, x, y, distance + 0.5 * length, rows, stack)
-        count = whole
+            gathered_count = gathered(curves, tree, x, y, distance + 0.5 * length, rows, stack)
+        count = gathered_count
         for k in range(len(places)):
             x, y = point_on(elements, row, t0 + places[k] * part)
             short = _violation(
@@ -900,12 +910,12 @@ cpdef far_enough(
                 spare,
                 0.0,
                 stack,
-                apart,
+                squares,
             )
             if short > 0.0:
                 valid[i] = False
                 break
-            if k == 0 and whole < 0:
+            if k == 0 and gathered_count < 0:
                 reach = distance + 0.5 * part * length
                 count = gathered(curves, tree, x, y, reach, rows, stack)
     return np.asarray(valid).view(np.bool_)
@@ -928,16 +938,17 @@ cpdef enum:
 
 
 cpdef pairs_of(
-    double[:, ::1] boxes, double[:, ::1] tree, double[:, ::1] others, double[:, ::1] other_tree,
+    double[:, ::1] boxes, double[:, ::1] tree, double[:, ::1] other_boxes,
+    double[:, ::1] other_tree,
     bint own
 ):
-    """(J, 2) rows of `boxes` and of `others` that touch; a tree stands over each.
+    """(J, 2) rows of `boxes` and of `other_boxes` that touch; a tree stands over each.
 
     `own` says that both are the same: then each pair comes once, the lesser row first. Nodes of
     both trees are looked at in pairs, so that what two large boxes tell is told once.
     """
     cdef Int first, last, other_first, other_last, leaves, other_leaves, count, height, i, a, b
-    cdef Int child, low, far_low, j, far
+    cdef Int child, low, far_low, j, other_child
     cdef Int[:, ::1] pairs
     cdef Int[::1] left, right
     pairs = np.empty((4 * len(boxes) + 16, 2), np.int64)
@@ -954,15 +965,15 @@ cpdef pairs_of(
             first, last = (2 * a, 2 * a + 2) if a < leaves else (a, a + 1)
             other_first, other_last = (2 * b, 2 * b + 2) if b < other_leaves else (b, b + 1)
             for child in range(first, last):
-                for far in range(other_first, other_last):
-                    if not own or child <= far:
-                        left[height], right[height] = child, far
+                for other_child in range(other_first, other_last):
+                    if not own or child <= other_child:
+                        left[height], right[height] = child, other_child
                         height += 1
             continue
         low, far_low = (a - leaves) * LEAF, (b - other_leaves) * LEAF
         for i in range(low, min(low + LEAF, len(boxes))):
-            for j in range(far_low, min(far_low + LEAF, len(others))):
-                if (not own or i < j) and touch(boxes, i, others, j):
+            for j in range(far_low, min(far_low + LEAF, len(other_boxes))):
+                if (not own or i < j) and touch(boxes, i, other_boxes, j):
                     if count == len(pairs):
                         pairs = np.concatenate([pairs, pairs])
                     pairs[count, 0], pairs[count, 1] = i, j
@@ -974,25 +985,25 @@ cpdef meetings_of(double[:, ::1] a, double[:, ::1] b, Int[:, ::1] pairs, double 
     """The rows (J, 2) of a and b, and the meetings (J, 4), of the pairs (P, 2) of rows."""
     cdef Int room, count, k, more, m, i, j
     cdef Int[:, ::1] rows
-    cdef double[:, ::1] found
+    cdef double[:, ::1] points
     room = len(pairs) + MAX_MEETINGS + 16
-    rows, found = np.empty((room, 2), np.int64), np.empty((room, 4))
+    rows, points = np.empty((room, 2), np.int64), np.empty((room, 4))
     count = 0
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         if count + MAX_MEETINGS > len(rows):
-            rows, found = np.concatenate([rows, rows]), np.concatenate([found, found])
-        more = _meet(a, b, i, j, eps, found, count)
+            rows, points = np.concatenate([rows, rows]), np.concatenate([points, points])
+        more = _meet(a, b, i, j, eps, points, count)
         for m in range(count, count + more):
             rows[m, 0], rows[m, 1] = i, j
         count += more
-    return np.asarray(rows[:count]), np.asarray(found[:count])
+    return np.asarray(rows[:count]), np.asarray(points[:count])
 
 
 cdef Int _meet(
-    double[:, ::1] a, double[:, ::1] b, Int i, Int j, double eps, double[:, ::1] found, Int at
+    double[:, ::1] a, double[:, ::1] b, Int i, Int j, double eps, double[:, ::1] points, Int offset
 ) noexcept:
-    """Write the intersections of row i of a and row j of b into `found` from row `at` on, and
+    """Write the intersections of row i of a and row j of b into `points` from row `offset` on, and
     return their number."""
     cdef Int count, k
     count = 0
@@ -1001,7 +1012,7 @@ cdef Int _meet(
             x, y = (a[i, AX], a[i, AY]) if k == 0 else (a[i, BX], a[i, BY])
         else:
             x, y = (b[j, AX], b[j, AY]) if k == 2 else (b[j, BX], b[j, BY])
-        count += _store_intersection_if_new(a, b, i, j, x, y, eps, found, at, count)
+        count += _store_intersection_if_new(a, b, i, j, x, y, eps, points, offset, count)
     # Row j of b is to be the rounder one.
     if abs(b[j, BEND]) < abs(a[i, BEND]):
         x, y, other_x, other_y = _common_points(b, a, j, i)
@@ -1009,18 +1020,21 @@ cdef Int _meet(
         x, y, other_x, other_y = _common_points(a, b, i, j)
     for _ in range(2):
         # No NaN passes: curves that miss each other by far have no common points.
-        if gap_to(a, i, x, y) <= eps and not _is_stored(a, b, i, j, x, y, eps, found, at, count):
-            count += _store_intersection_if_new(a, b, i, j, x, y, eps, found, at, count)
+        if (
+            gap_to(a, i, x, y) <= eps
+            and not _is_stored(a, b, i, j, x, y, eps, points, offset, count)
+        ):
+            count += _store_intersection_if_new(a, b, i, j, x, y, eps, points, offset, count)
         x, y = other_x, other_y
     return count
 
 
 cdef bint _is_stored(
     double[:, ::1] a, double[:, ::1] b, Int i, Int j, double x, double y, double eps,
-    double[:, ::1] found, Int at, Int count
+    double[:, ::1] points, Int offset, Int count
 ) noexcept:
     """True if the curves stay within eps of each other from a common point to all of the shorter
-    one, or to a meeting found before: one of `count` in the rows of `found` from `at` on.
+    one, or to a meeting found before: one of `count` in the rows of `points` from `offset` on.
 
     At the angle θ and with curvatures that differ by k they are θ s + k s²/2 apart after s, at
     most. There rounding alone would place a crossing: where they are tangent at an end, anywhere
@@ -1029,13 +1043,13 @@ cdef bint _is_stored(
     cdef Int k
     ax, ay = _tangent_after(a, i, arc_length_at(a, i, x, y))
     bx, by = _tangent_after(b, j, arc_length_at(b, j, x, y))
-    way = -1.0 if ax * bx + ay * by < 0.0 else 1.0
-    angle, bend = abs(ax * by - ay * bx), abs(a[i, BEND] - way * b[j, BEND])
+    direction = -1.0 if ax * bx + ay * by < 0.0 else 1.0
+    angle, bend = abs(ax * by - ay * bx), abs(a[i, BEND] - direction * b[j, BEND])
     s = min(a[i, LENGTH], b[j, LENGTH])
     if angle * s + 0.5 * bend * s * s <= eps:
         return True
-    for k in range(at, at + count):
-        s = math.hypot(found[k, X] - x, found[k, Y] - y)
+    for k in range(offset, offset + count):
+        s = math.hypot(points[k, X] - x, points[k, Y] - y)
         if angle * s + 0.5 * bend * s * s <= eps:
             return True
     return False
@@ -1043,31 +1057,31 @@ cdef bint _is_stored(
 
 cdef Int _store_intersection_if_new(
     double[:, ::1] a, double[:, ::1] b, Int i, Int j, double x, double y, double eps,
-    double[:, ::1] found, Int at, Int count
+    double[:, ::1] points, Int offset, Int count
 ) noexcept:
     """Store the point and return 1 if both curves pass within eps of it and it is not stored yet,
-    else return 0; `count` intersections are in the rows of `found` from `at` on."""
+    else return 0; `count` intersections are in the rows of `points` from `offset` on."""
     cdef Int row, k
     if not (gap_to(a, i, x, y) <= eps and gap_to(b, j, x, y) <= eps):
         return 0
     on_a, on_b = arc_length_at(a, i, x, y), arc_length_at(b, j, x, y)
     if not (-eps <= on_a <= a[i, LENGTH] + eps and -eps <= on_b <= b[j, LENGTH] + eps):
         return 0
-    for k in range(at, at + count):
-        if math.hypot(found[k, X] - x, found[k, Y] - y) <= 2.0 * eps:
+    for k in range(offset, offset + count):
+        if math.hypot(points[k, X] - x, points[k, Y] - y) <= 2.0 * eps:
             return 0
-    row = at + count
-    found[row, X], found[row, Y] = x, y
-    found[row, TA] = _fraction(on_a, a[i, LENGTH], eps)
-    found[row, TB] = _fraction(on_b, b[j, LENGTH], eps)
+    row = offset + count
+    points[row, X], points[row, Y] = x, y
+    points[row, TA] = _fraction(on_a, a[i, LENGTH], eps)
+    points[row, TB] = _fraction(on_b, b[j, LENGTH], eps)
     return 1
 
 
-cdef inline double _fraction(double length, double whole, double eps) noexcept:
+cdef inline double _fraction(double length, double full_length, double eps) noexcept:
     """Fraction of the whole length, exactly 0 or 1 within eps of an end."""
-    if length >= whole - eps:
+    if length >= full_length - eps:
         return 1.0
-    return 0.0 if length <= eps else length / whole
+    return 0.0 if length <= eps else length / full_length
 
 
 cdef inline (double, double) _tangent_after(double[:, ::1] curves, Int i, double length) noexcept:
@@ -1100,10 +1114,13 @@ cdef (double, double, double, double) _common_points(
     gamma = k_round * (fx * fx + fy * fy) - 2.0 * (nx * fx + ny * fy)
     root = beta * beta - k_round * gamma
     stable = beta + math.copysign(math.sqrt(max(root, 0.0)), beta)
-    two = gamma / stable if root > 0.0 or k_round == 0.0 else stable / k_round
-    one = two if k_round == 0.0 else stable / k_round
+    second_shift = gamma / stable if root > 0.0 or k_round == 0.0 else stable / k_round
+    first_shift = second_shift if k_round == 0.0 else stable / k_round
     ox, oy = b[j, AX] + fx, b[j, AY] + fy
-    return ox - one * uy, oy + one * ux, ox - two * uy, oy + two * ux
+    return (
+        ox - first_shift * uy, oy + first_shift * ux, ox - second_shift * uy,
+        oy + second_shift * ux
+    )
 
 
 # Raw elements cut at their meetings: nodes, slices between them, and slices that lead nowhere.
@@ -1125,20 +1142,22 @@ cpdef merged(double[:, :] points, double[::1] skew, Int[::1] order, double eps):
     points by `skew` (P,), which differs between two points by no more than their distance.
     """
     cdef Int[::1] group, first, node
-    cdef Int i, count, j, root, one, hits, other, low, high
+    cdef Int i, count, j, root, base, hits, candidate, low, high
     group = np.empty(len(points), np.int64)
     for i in range(len(points)):
         group[i] = i
     for i in range(len(order)):
-        one, hits = order[i], 0
+        base, hits = order[i], 0
         for j in range(i + 1, len(order)):
-            other = order[j]
-            if skew[other] - skew[one] > eps or hits == MAX_MERGED:
+            candidate = order[j]
+            if skew[candidate] - skew[base] > eps or hits == MAX_MERGED:
                 break
-            apart_x, apart_y = points[one, 0] - points[other, 0], points[one, 1] - points[other, 1]
+            apart_x, apart_y = (
+                points[base, 0] - points[candidate, 0], points[base, 1] - points[candidate, 1]
+            )
             if apart_x * apart_x + apart_y * apart_y <= eps * eps:
                 hits += 1
-                low, high = _root(group, one), _root(group, other)
+                low, high = _root(group, base), _root(group, candidate)
                 group[max(low, high)] = min(low, high)
     first, node = np.empty(len(points), np.int64), np.empty(len(points), np.int64)
     count = 0
@@ -1200,8 +1219,8 @@ cpdef in_order(Int[::1] keys, double[::1] t, Int count):
     return np.asarray(rows)
 
 
-cdef bint _is_after(double[::1] t, Int one, Int other) noexcept:
-    return bool(t[one] > t[other] or (t[one] == t[other] and one > other))
+cdef bint _is_after(double[::1] t, Int first, Int second) noexcept:
+    return bool(t[first] > t[second] or (t[first] == t[second] and first > second))
 
 
 cpdef doubles_left(
@@ -1213,29 +1232,32 @@ cpdef doubles_left(
     Slices between the same nodes are the same when their middles are within `eps`.
     """
     cdef uint8_t[::1] keep
-    cdef Int[::1] near, from_node, to_node, rows, begins
-    cdef Int row, node, count, k, far, m, other
+    cdef Int[::1] low_node, from_node, to_node, rows, begins
+    cdef Int row, node, count, k, high_node, m, other_row
     from_node, to_node, count = ends
     keep = np.ones(len(element), np.bool_)
-    near = np.empty(len(element), np.int64)
+    low_node = np.empty(len(element), np.int64)
     for row in range(len(element)):
-        near[row] = min(from_node[row], to_node[row])
-    rows, begins = grouped(near, count)
+        low_node[row] = min(from_node[row], to_node[row])
+    rows, begins = grouped(low_node, count)
     for node in range(count):
         for k in range(begins[node], begins[node + 1]):
             row = rows[k]
-            far = max(from_node[row], to_node[row])
+            high_node = max(from_node[row], to_node[row])
             for m in range(k + 1, begins[node + 1]):
-                other = rows[m]
+                other_row = rows[m]
                 if not keep[row]:
                     break
-                if not keep[other] or max(from_node[other], to_node[other]) != far:
+                if (
+                    not keep[other_row]
+                    or max(from_node[other_row], to_node[other_row]) != high_node
+                ):
                     continue
                 ax, ay = point_on(elements, element[row], middle_t[row])
-                bx, by = point_on(elements, element[other], middle_t[other])
+                bx, by = point_on(elements, element[other_row], middle_t[other_row])
                 if math.hypot(ax - bx, ay - by) <= eps:
-                    keep[other] = False
-                    keep[row] = from_node[row] == from_node[other]
+                    keep[other_row] = False
+                    keep[row] = from_node[row] == from_node[other_row]
     return np.asarray(keep).view(np.bool_)
 
 
@@ -1295,14 +1317,14 @@ cpdef traced(double[:, ::1] elements, Int[::1] element, double[:, ::1] span, end
     node twice. Where several slices leave a node, the leftmost one is taken.
     """
     cdef uint8_t[::1] unused
-    cdef Int[::1] seen, from_node, to_node, leaving, first, path, rows, begins, ways
-    cdef Int node, loops, start, count, length, last, chosen, low, k
+    cdef Int[::1] order_seen, from_node, to_node, leaving, first, path, rows, begins, ways
+    cdef Int node, loops, start, count, length, last, next_row, low, k
     from_node, to_node, count = ends
     leaving, first = grouped(from_node, count)
     unused = np.ones(len(element), np.bool_)
-    seen = np.empty(count, np.int64)
+    order_seen = np.empty(count, np.int64)
     for node in range(count):
-        seen[node] = -1
+        order_seen[node] = -1
     path, length = np.empty(len(element), np.int64), 0
     rows, begins = np.empty(len(element), np.int64), np.zeros(len(element) + 1, np.int64)
     loops = 0
@@ -1311,30 +1333,30 @@ cpdef traced(double[:, ::1] elements, Int[::1] element, double[:, ::1] span, end
             continue
         unused[start] = False
         path[0], length = start, 1
-        seen[from_node[start]] = 0
+        order_seen[from_node[start]] = 0
         while length > 0:
             last = path[length - 1]
             node = to_node[last]
-            if seen[node] >= 0:
-                low = seen[node]
+            if order_seen[node] >= 0:
+                low = order_seen[node]
                 begins[loops + 1] = begins[loops] + length - low
                 for k in range(low, length):
                     rows[begins[loops] + k - low] = path[k]
                     # This node too: what is left of the path may leave it once more.
-                    seen[from_node[path[k]]] = -1
+                    order_seen[from_node[path[k]]] = -1
                 loops += 1
                 length = low
                 continue
             ways = leaving[first[node] : first[node + 1]]
-            chosen = _leftmost(elements, element, span, last, unused, ways)
-            if chosen < 0:
-                seen[from_node[last]] = -1
+            next_row = _leftmost(elements, element, span, last, unused, ways)
+            if next_row < 0:
+                order_seen[from_node[last]] = -1
                 length -= 1
                 continue
-            seen[node] = length
-            path[length] = chosen
+            order_seen[node] = length
+            path[length] = next_row
             length += 1
-            unused[chosen] = False
+            unused[next_row] = False
     return np.asarray(rows[: begins[loops]]), np.asarray(begins[: loops + 1])
 
 
@@ -1344,25 +1366,25 @@ cdef Int _leftmost(
 ) noexcept:
     """The unused one of the slices `ways` that turns left the most when `last` led there; turning
     right back is left back. −1 when there is none."""
-    cdef Int k, best, others, way
-    best, most, others = -1, -math.INFINITY, 0
+    cdef Int k, best, count, row
+    best, max_turn, count = -1, -math.INFINITY, 0
     for k in range(len(ways)):
-        way = ways[k]
-        if unused[way]:
-            best = way if others == 0 else best
-            others += 1
-    if others < 2:
+        row = ways[k]
+        if unused[row]:
+            best = row if count == 0 else best
+            count += 1
+    if count < 2:
         return best
     ax, ay = _tangent(elements, element[last], span[last, 1])
     for k in range(len(ways)):
-        way = ways[k]
-        if unused[way]:
-            bx, by = _tangent(elements, element[way], span[way, 0])
+        row = ways[k]
+        if unused[row]:
+            bx, by = _tangent(elements, element[row], span[row, 0])
             turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
             if turn <= U_TURN_EPS_RAD - math.M_PI:
                 turn = math.M_PI
-            if turn > most:
-                best, most = way, turn
+            if turn > max_turn:
+                best, max_turn = row, turn
     return best
 
 
@@ -1434,52 +1456,56 @@ cdef Int _cleaned(double[:, ::1] vertices, bint closed, double eps):
 
     Each shrinks to its middle; the ends of an open path stay. 0 when nothing is left.
     """
-    cdef Int count, left, row, place, height, following, earlier, k
-    cdef uint8_t[::1] there
-    cdef Int[::1] after, before, stack
-    count = left = len(vertices)
-    after, before = np.empty(count, np.int64), np.empty(count, np.int64)
+    cdef Int count, remaining, row, place, height, following, earlier, k
+    cdef uint8_t[::1] is_kept
+    cdef Int[::1] next_rows, previous_rows, stack
+    count = remaining = len(vertices)
+    next_rows, previous_rows = np.empty(count, np.int64), np.empty(count, np.int64)
     stack, height = np.empty(3 * count, np.int64), count
     for row in range(count):
-        after[row], before[row], stack[row] = row + 1, row - 1, count - 1 - row
-    after[count - 1] = 0 if closed else -1
-    before[0] = count - 1 if closed else -1
-    there = np.ones(count, np.bool_)
+        next_rows[row], previous_rows[row], stack[row] = row + 1, row - 1, count - 1 - row
+    next_rows[count - 1] = 0 if closed else -1
+    previous_rows[0] = count - 1 if closed else -1
+    is_kept = np.ones(count, np.bool_)
     while height > 0:
         height -= 1
         row = stack[height]
-        following, earlier = after[row], before[row]
-        if not there[row] or following < 0 or _length(vertices, row, following) > eps:
+        following, earlier = next_rows[row], previous_rows[row]
+        if not is_kept[row] or following < 0 or _length(vertices, row, following) > eps:
             continue
-        if left <= 2:
+        if remaining <= 2:
             return 0
         # The first and the last vertex of an open path have none before and none after them.
-        if after[following] >= 0:
+        if next_rows[following] >= 0:
             part = 0.5 if earlier >= 0 else 0.0
             for k in range(2):
                 vertices[following, k] += (1.0 - part) * (
                     vertices[row, k] - vertices[following, k]
                 )
-        there[row] = False
-        left -= 1
-        before[following] = earlier
+        is_kept[row] = False
+        remaining -= 1
+        previous_rows[following] = earlier
         stack[height] = following
         height += 1
         if earlier >= 0:
-            after[earlier] = following
+            next_rows[earlier] = following
             stack[height] = earlier
             height += 1
     place = 0
     for row in range(count):
-        if there[row]:
+        if is_kept[row]:
             for k in range(3):
                 vertices[place, k] = vertices[row, k]
             place += 1
-    return left
+    return remaining
 
 
-cdef double _length(double[:, ::1] vertices, Int one, Int other) noexcept:
-    return math.hypot(vertices[one, 0] - vertices[other, 0], vertices[one, 1] - vertices[other, 1])
+cdef double _length(double[:, ::1] vertices, Int first, Int second) noexcept:
+    return (
+        math.hypot(
+            vertices[first, 0] - vertices[second, 0], vertices[first, 1] - vertices[second, 1]
+        )
+    )
 
 
 # Which points a closed path of lines and arcs holds, by a ray to the right over a tree of boxes.
@@ -1503,12 +1529,12 @@ cpdef insides(
     `curves` (K, 11) and `tree` as in offset_curves and box_tree, `bulge` (K,).
     """
     cdef Int i
-    cdef uint8_t[::1] found
+    cdef uint8_t[::1] inside
     cdef Int[::1] stack
-    found, stack = np.empty(len(points), np.bool_), np.empty(DEPTH, np.int64)
+    inside, stack = np.empty(len(points), np.bool_), np.empty(DEPTH, np.int64)
     for i in range(len(points)):
-        found[i] = is_inside(curves, bulge, tree, points[i, 0], points[i, 1], stack)
-    return np.asarray(found).view(np.bool_)
+        inside[i] = is_inside(curves, bulge, tree, points[i, 0], points[i, 1], stack)
+    return np.asarray(inside).view(np.bool_)
 
 
 cdef bint is_inside(
@@ -1560,21 +1586,21 @@ cpdef holds(double[:, ::1] points, Int[::1] begins, ring, Int[::1] paths, double
     `ring` holds curves, bulge and tree of a closed path; what is within `eps` of its line is
     neither outside nor inside.
     """
-    cdef Int[::1] said, stack
+    cdef Int[::1] positions, stack
     cdef Int n, k
     cdef double[:, ::1] curves, tree
-    cdef double[::1] bulge, apart
+    cdef double[::1] bulge, squares
     curves, bulge, tree = ring
-    said = np.empty(len(paths), np.int64)
-    stack, apart = np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    positions = np.empty(len(paths), np.int64)
+    stack, squares = np.empty(DEPTH, np.int64), np.empty(DEPTH)
     for n in range(len(paths)):
-        said[n] = ON_LINE
+        positions[n] = ON_LINE
         for k in range(begins[paths[n]], begins[paths[n] + 1]):
             x, y = points[k, 0], points[k, 1]
-            if least_below(curves, tree, x, y, 2.0 * eps, eps, stack, apart) <= eps:
+            if least_below(curves, tree, x, y, 2.0 * eps, eps, stack, squares) <= eps:
                 continue
             if not is_inside(curves, bulge, tree, x, y, stack):
-                said[n] = OUT
+                positions[n] = OUT
                 break
-            said[n] = HELD
-    return np.asarray(said)
+            positions[n] = HELD
+    return np.asarray(positions)

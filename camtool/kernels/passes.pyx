@@ -44,25 +44,25 @@ cpdef reaches(double[::1] lengths, Int[::1] first):
     segments first[i] to first[i + 1]."""
     cdef Int path, k
     cdef double total
-    cdef double[::1] found
-    found = np.empty(len(lengths) + len(first) - 1)
+    cdef double[::1] totals
+    totals = np.empty(len(lengths) + len(first) - 1)
     for path in range(len(first) - 1):
         total = 0.0
         for k in range(first[path], first[path + 1]):
-            found[k + path] = total
+            totals[k + path] = total
             total += lengths[k]
-        found[first[path + 1] + path] = total
-    return np.asarray(found)
+        totals[first[path + 1] + path] = total
+    return np.asarray(totals)
 
 
 cdef inline double begin_of(Tracks tracks, Int path, Int u) noexcept:
     """The length at which segment u of a path begins, counted on through the laps."""
-    cdef Int count, at
+    cdef Int count, offset
     cdef double lap
     count = tracks.first[path + 1] - tracks.first[path]
-    at = tracks.first[path] + path
+    offset = tracks.first[path] + path
     lap = math.floor(float(u) / float(count))
-    return float(lap * tracks.reach[at + count] + tracks.reach[at + u - <Int>lap * count])
+    return float(lap * tracks.reach[offset + count] + tracks.reach[offset + u - <Int>lap * count])
 
 
 cdef inline Int row_of(Tracks tracks, Int path, Int u) noexcept:
@@ -74,9 +74,9 @@ cdef inline Int row_of(Tracks tracks, Int path, Int u) noexcept:
 
 cdef inline double size_of(Tracks tracks, Int path, Int u) noexcept:
     """The length of segment u of a path, counted on through the laps."""
-    cdef Int at
-    at = row_of(tracks, path, u) + path
-    return float(tracks.reach[at + 1] - tracks.reach[at])
+    cdef Int offset
+    offset = row_of(tracks, path, u) + path
+    return float(tracks.reach[offset + 1] - tracks.reach[offset])
 
 
 cdef Int last_before(Tracks tracks, Int path, double length) noexcept:
@@ -84,12 +84,12 @@ cdef Int last_before(Tracks tracks, Int path, double length) noexcept:
 
     `length` lies on the path itself, not further round.
     """
-    cdef Int at, low, high, middle
-    at = tracks.first[path] + path
+    cdef Int offset, low, high, middle
+    offset = tracks.first[path] + path
     low, high = 0, tracks.first[path + 1] - tracks.first[path]
     while high - low > 1:
         middle = (low + high) // 2
-        if tracks.reach[at + middle] <= length:
+        if tracks.reach[offset + middle] <= length:
             low = middle
         else:
             high = middle
@@ -113,22 +113,23 @@ cdef (double, double) point(Tracks tracks, Int row, double t) noexcept:
 
 cdef (double, double) place(Tracks tracks, Int path, double length) noexcept:
     """The point of a path at a length; ends of open paths reach no further."""
-    cdef Int at, u
+    cdef Int offset, u
     cdef double total, part
-    at = tracks.first[path] + path
-    total = tracks.reach[at + tracks.first[path + 1] - tracks.first[path]]
+    offset = tracks.first[path] + path
+    total = tracks.reach[offset + tracks.first[path + 1] - tracks.first[path]]
     if tracks.closed[path]:
         length = math.fmod(length, total)
         if length < 0.0:
             length += total
     u = last_before(tracks, path, length)
-    part = (length - tracks.reach[at + u]) / (tracks.reach[at + u + 1] - tracks.reach[at + u])
+    low = tracks.reach[offset + u]
+    part = (length - low) / (tracks.reach[offset + u + 1] - low)
     return point(tracks, tracks.first[path] + u, min(max(part, 0.0), 1.0))
 
 
 cdef (Int, Int) span(Tracks tracks, Int path, double begin, double end) noexcept:
     """The first and the last of the segments of a path between two lengths, begin < end."""
-    cdef Int count, limit, here, first, last
+    cdef Int count, limit, piece_at, first, last
     cdef double total, low_lap, high_lap
     count = tracks.first[path + 1] - tracks.first[path]
     total = tracks.reach[tracks.first[path] + path + count]
@@ -136,14 +137,14 @@ cdef (Int, Int) span(Tracks tracks, Int path, double begin, double end) noexcept
     if tracks.closed[path]:
         low_lap, high_lap = math.floor(begin / total), math.floor(end / total)
     limit = (int(high_lap) + 1) * count
-    here = int(low_lap) * count + last_before(tracks, path, begin - low_lap * total)
-    first = max(here - 1, int(low_lap) * count)
+    piece_at = int(low_lap) * count + last_before(tracks, path, begin - low_lap * total)
+    first = max(piece_at - 1, int(low_lap) * count)
     while first < limit and begin_of(tracks, path, first) + size_of(tracks, path, first) <= (
         begin + NEAR_MM
     ):
         first += 1
     if first == limit or begin_of(tracks, path, first) >= end - NEAR_MM:
-        return here, here  # shorter than NEAR_MM: a piece of the one there
+        return piece_at, piece_at  # shorter than NEAR_MM: a piece of the one there
     last = first
     while last + 1 < limit and begin_of(tracks, path, last + 1) < end - NEAR_MM:
         last += 1
@@ -170,68 +171,72 @@ cdef (double, double) start_of(
     return point(tracks, row_of(tracks, path, u), stops if end < begin else begins)
 
 
-cdef double[:, ::1] grown(double[:, ::1] vertices, Int count, Int wanted):
+cdef double[:, ::1] grown(double[:, ::1] vertices, Int count, Int needed):
     """Room for so many vertices, the first `count` of them kept."""
     cdef double[:, ::1] more
-    if wanted <= len(vertices):
+    if needed <= len(vertices):
         return vertices
-    more = np.empty((max(2 * len(vertices), wanted), 4))
+    more = np.empty((max(2 * len(vertices), needed), 4))
     more[:count] = vertices[:count]
     return np.asarray(more)
 
 
 cdef Int write_piece(
-    Tracks tracks, Int path, double begin, double end, Int first, Int last, double[:, ::1] out,
-    Int at
+    Tracks tracks, Int path, double begin, double end, Int first, Int last,
+    double[:, ::1] vertices,
+    Int index
 ) noexcept:
-    """Write the vertices of a piece of a path behind row `at` of `out`, its start, which takes the
-    first bulge; return the row of its last vertex. The z is the length of the piece so
+    """Write the vertices of a piece of a path behind row `index` of `vertices`, its start, which
+    takes the first bulge; return the row of its last vertex. The z is the length of the piece so
     far. `first` and `last`: the piece's `span` from the lower length to the higher one."""
-    cdef bint back
-    cdef double low, high, done, begins, stops, after, _, whole, part, bulge, x, y, from_x, from_y
+    cdef bint is_reversed
+    cdef double low, high, travelled, begins, stops, end_part, _, full_bulge, part, bulge, x
+    cdef double y, from_x, from_y
     cdef double length
     cdef Int k, u, row
-    back = end < begin
+    is_reversed = end < begin
     low, high = min(begin, end), max(begin, end)
-    done = 0.0
+    travelled = 0.0
     from_x, from_y = start_of(tracks, path, begin, end, first, last)
     for k in range(last - first + 1):
-        u = last - k if back else first + k
+        u = last - k if is_reversed else first + k
         row = row_of(tracks, path, u)
         begins, stops = part_of(tracks, path, u, low, high)
-        whole = tracks.bulge[row]
+        full_bulge = tracks.bulge[row]
         part = stops - begins
-        bulge = whole if part == 1.0 else math.tan(part * math.atan(whole))
-        if back:
+        bulge = full_bulge if part == 1.0 else math.tan(part * math.atan(full_bulge))
+        if is_reversed:
             bulge = 0.0 - bulge
             x, y = point(tracks, row, begins)
         elif k < last - first:
-            after, _ = part_of(tracks, path, u + 1, low, high)
-            x, y = point(tracks, row_of(tracks, path, u + 1), after)
+            end_part, _ = part_of(tracks, path, u + 1, low, high)
+            x, y = point(tracks, row_of(tracks, path, u + 1), end_part)
         else:
             x, y = point(tracks, row, stops)
         length = math.hypot(x - from_x, y - from_y)
         if bulge != 0.0:
             length *= (1.0 + bulge * bulge) * math.atan(bulge) / bulge
-        done += length
-        out[at, 3] = bulge
-        at += 1
-        out[at, 0], out[at, 1], out[at, 2], out[at, 3] = x, y, done, 0.0
+        travelled += length
+        vertices[index, 3] = bulge
+        index += 1
+        vertices[index, 0], vertices[index, 1], vertices[index, 2], vertices[index, 3] = (
+            x, y, travelled, 0.0
+        )
         from_x, from_y = x, y
-    return at
+    return index
 
 
 cpdef piece(Tracks tracks, Int path, double begin, double end):
     """(k, 4) x, y, length so far and bulge of a path from one length to another, backwards when
     `end` is the lower one. The last bulge is 0."""
     cdef Int first, last
-    cdef double[:, ::1] out
+    cdef double[:, ::1] vertices
     first, last = span(tracks, path, min(begin, end), max(begin, end))
-    out = np.empty((last - first + 2, 4))
-    out[0, 0], out[0, 1] = start_of(tracks, path, begin, end, first, last)
-    out[0, 2] = 0.0
-    write_piece(tracks, path, begin, end, first, last, out, 0)
-    return np.asarray(out)
+    vertices = np.empty((last - first + 2, 4))
+    vertices[0, 0], vertices[0, 1] = start_of(tracks, path, begin, end, first, last)
+    vertices[0, 2] = 0.0
+    write_piece(tracks, path, begin, end, first, last, vertices, 0)
+    return np.asarray(vertices)
 
 
 cpdef lifted(Tracks tracks, Int[::1] path, Int[::1] first, double[::1] length, double[::1] z):
@@ -242,35 +247,37 @@ cpdef lifted(Tracks tracks, Int[::1] path, Int[::1] first, double[::1] length, d
     the rows first[i] to first[i + 1]: straight up or down where the length stays, else with z in
     proportion to the length. Its last bulge is 0.
     """
-    cdef Int run, of, k, j, at, was, low, high
-    cdef double begin, end, below, above, here, total
+    cdef Int run, of, k, j, index, was, low, high
+    cdef double begin, end, below, above, position, total
     cdef Int[::1] runs
-    cdef double[:, ::1] out
-    out = np.empty((2 * len(length) + len(tracks.bulge), 4))
-    runs, at = np.empty(len(path) + 1, np.int64), -1
+    cdef double[:, ::1] vertices
+    vertices = np.empty((2 * len(length) + len(tracks.bulge), 4))
+    runs, index = np.empty(len(path) + 1, np.int64), -1
     for run in range(len(path)):
         of = path[run]
-        runs[run] = at + 1
-        out = grown(out, at + 1, at + 2)
-        at += 1
-        out[at, 0], out[at, 1] = place(tracks, of, length[first[run]])
-        out[at, 2], out[at, 3] = z[first[run]], 0.0
+        runs[run] = index + 1
+        vertices = grown(vertices, index + 1, index + 2)
+        index += 1
+        vertices[index, 0], vertices[index, 1] = place(tracks, of, length[first[run]])
+        vertices[index, 2], vertices[index, 3] = z[first[run]], 0.0
         for k in range(first[run], first[run + 1] - 1):
             begin, end, below, above = length[k], length[k + 1], z[k], z[k + 1]
             if abs(end - begin) <= NEAR_MM:
                 if abs(above - below) > NEAR_MM:
-                    out = grown(out, at + 1, at + 2)
-                    at += 1
-                    out[at, 0], out[at, 1] = out[at - 1, 0], out[at - 1, 1]
-                    out[at, 2], out[at, 3] = above, 0.0
+                    vertices = grown(vertices, index + 1, index + 2)
+                    index += 1
+                    vertices[index, 0], vertices[index, 1] = (
+                        vertices[index - 1, 0], vertices[index - 1, 1]
+                    )
+                    vertices[index, 2], vertices[index, 3] = above, 0.0
                 continue
             low, high = span(tracks, of, min(begin, end), max(begin, end))
-            out = grown(out, at + 1, at + 3 + high - low)
-            was, here = at, out[at, 2]
-            at = write_piece(tracks, of, begin, end, low, high, out, at)
-            total = out[at, 2]
-            for j in range(was + 1, at + 1):
-                out[j, 2] = below + (above - below) * out[j, 2] / total
-            out[was, 2] = here
-    runs[len(path)] = at + 1
-    return np.asarray(out[: at + 1]), np.asarray(runs)
+            vertices = grown(vertices, index + 1, index + 3 + high - low)
+            was, position = index, vertices[index, 2]
+            index = write_piece(tracks, of, begin, end, low, high, vertices, index)
+            total = vertices[index, 2]
+            for j in range(was + 1, index + 1):
+                vertices[j, 2] = below + (above - below) * vertices[j, 2] / total
+            vertices[was, 2] = position
+    runs[len(path)] = index + 1
+    return np.asarray(vertices[: index + 1]), np.asarray(runs)

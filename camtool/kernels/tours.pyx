@@ -78,32 +78,34 @@ cdef class Route:
 cdef class Step:
     """A change of the tour that shortens it by `gain`.
 
-    other < 0: the positions low … high are reversed. Otherwise they change places with those
-    behind them up to `other`; `flip` says which of the two is reversed as well (1: the first,
+    second_high < 0: the positions low … high are reversed. Otherwise they change places with those
+    behind them up to `second_high`; `flip` says which of the two is reversed as well (1: the first,
     2: the second, 0: none). `new_row` ≥ 0: the row that item `who` takes then.
     """
 
     cdef double gain
-    cdef Int low, high, other, flip, who, new_row
+    cdef Int low, high, second_high, flip, who, new_row
 
     def __init__(self) -> None:
         self.gain = 0.0
-        self.low, self.high, self.other, self.flip, self.who, self.new_row = 0, -1, -1, 0, -1, -1
+        self.low, self.high, self.second_high, self.flip, self.who, self.new_row = (
+            0, -1, -1, 0, -1, -1
+        )
 
     cdef void set(
-        self, double gain, Int low, Int high, Int other, Int flip, Int who, Int new_row
+        self, double gain, Int low, Int high, Int second_high, Int flip, Int who, Int new_row
     ) noexcept:
         """Make it another one."""
-        self.gain, self.low, self.high, self.other = gain, low, high, other
+        self.gain, self.low, self.high, self.second_high = gain, low, high, second_high
         self.flip, self.who, self.new_row = flip, who, new_row
 
 
-cdef inline double gap(Route tour, Int one, Int other) noexcept:
+cdef inline double gap(Route tour, Int from_row, Int to_row) noexcept:
     """From the exit of a row to the entry of another one."""
-    if other == tour.free:
+    if to_row == tour.free:
         return 0.0
-    x = tour.ends[other, 0] - tour.ends[one, 2]
-    y = tour.ends[other, 1] - tour.ends[one, 3]
+    x = tour.ends[to_row, 0] - tour.ends[from_row, 2]
+    y = tour.ends[to_row, 1] - tour.ends[from_row, 3]
     return math.sqrt(x * x + y * y)
 
 
@@ -114,21 +116,21 @@ cdef inline Int row_at(Route tour, Int position) noexcept:
 
 cpdef void reverse(Route tour, Int low, Int high) noexcept:
     """Reverse the positions low … high, and turn what lies there."""
-    cdef Int one, other
+    cdef Int first_item, last_item
     while low <= high:
-        one, other = tour.item[low], tour.item[high]
-        tour.item[low], tour.item[high] = other, one
-        tour.place[one], tour.place[other] = high, low
-        tour.row[one] = tour.turned[tour.row[one]]
-        if one != other:
-            tour.row[other] = tour.turned[tour.row[other]]
+        first_item, last_item = tour.item[low], tour.item[high]
+        tour.item[low], tour.item[high] = last_item, first_item
+        tour.place[first_item], tour.place[last_item] = high, low
+        tour.row[first_item] = tour.turned[tour.row[first_item]]
+        if first_item != last_item:
+            tour.row[last_item] = tour.turned[tour.row[last_item]]
         low += 1
         high -= 1
 
 
 cpdef double turning(Route tour, Int low, Int high) noexcept:
     """Return the extra length (mm) inside low … high if it is reversed; inf if it must not be."""
-    cdef Int position, item, k, one, other
+    cdef Int position, item, k, earlier_row, later_row
     cdef double longer
     if len(tour.after) > 0:
         for position in range(low, high):
@@ -139,24 +141,27 @@ cpdef double turning(Route tour, Int low, Int high) noexcept:
     longer = 0.0
     if tour.one_way:
         for position in range(low, high):
-            one, other = row_at(tour, position), row_at(tour, position + 1)
-            longer += gap(tour, tour.turned[other], tour.turned[one]) - gap(tour, one, other)
+            earlier_row, later_row = row_at(tour, position), row_at(tour, position + 1)
+            longer += (
+                gap(tour, tour.turned[later_row], tour.turned[earlier_row])
+                - gap(tour, earlier_row, later_row)
+            )
     return longer
 
 
-cpdef bint may_swap(Route tour, Int low, Int high, Int other) noexcept:
+cpdef bint may_swap(Route tour, Int low, Int high, Int second_high) noexcept:
     """True if nothing in low … high must come before anything in high + 1 … other."""
     cdef Int position, item, k
     if len(tour.after) == 0:
         return True
-    if high - low < other - high:
+    if high - low < second_high - high:
         for position in range(low, high + 1):
             item = tour.item[position]
             for k in range(tour.after_first[item], tour.after_first[item + 1]):
-                if high < tour.place[tour.after[k]] <= other:
+                if high < tour.place[tour.after[k]] <= second_high:
                     return False
         return True
-    for position in range(high + 1, other + 1):
+    for position in range(high + 1, second_high + 1):
         item = tour.item[position]
         for k in range(tour.earlier_first[item], tour.earlier_first[item + 1]):
             if low <= tour.place[tour.earlier[k]] <= high:
@@ -166,43 +171,49 @@ cpdef bint may_swap(Route tour, Int low, Int high, Int other) noexcept:
 
 cpdef double gain_of_reversal(Route tour, Int low, Int high) noexcept:
     """Return the length (mm) saved at both sides of a reversed part."""
-    cdef Int left, right, one, other
+    cdef Int left, right, first_row, last_row
     left, right = row_at(tour, low - 1), row_at(tour, high + 1)
-    one, other = row_at(tour, low), row_at(tour, high)
+    first_row, last_row = row_at(tour, low), row_at(tour, high)
     return (
-        gap(tour, left, one)
-        + gap(tour, other, right)
-        - gap(tour, left, tour.turned[other])
-        - gap(tour, tour.turned[one], right)
+        gap(tour, left, first_row)
+        + gap(tour, last_row, right)
+        - gap(tour, left, tour.turned[last_row])
+        - gap(tour, tour.turned[first_row], right)
     )
 
 
-cpdef double gain_of_swap(Route tour, Int low, Int high, Int other, Int flip) noexcept:
+cpdef double gain_of_swap(Route tour, Int low, Int high, Int second_high, Int flip) noexcept:
     """Return the length (mm) saved at the sides of two parts that change places."""
-    cdef Int left, right, one, end_one, two, end_two
-    cdef double before
-    left, right = row_at(tour, low - 1), row_at(tour, other + 1)
-    one, end_one = row_at(tour, low), row_at(tour, high)
-    two, end_two = row_at(tour, high + 1), row_at(tour, other)
-    before = gap(tour, left, one) + gap(tour, end_one, two) + gap(tour, end_two, right)
+    cdef Int left, right, first_start, first_end, second_start, second_end
+    cdef double old_gaps
+    left, right = row_at(tour, low - 1), row_at(tour, second_high + 1)
+    first_start, first_end = row_at(tour, low), row_at(tour, high)
+    second_start, second_end = row_at(tour, high + 1), row_at(tour, second_high)
+    old_gaps = (
+        gap(tour, left, first_start) + gap(tour, first_end, second_start)
+        + gap(tour, second_end, right)
+    )
     if flip == 1:
-        one, end_one = tour.turned[end_one], tour.turned[one]
+        first_start, first_end = tour.turned[first_end], tour.turned[first_start]
     elif flip == 2:
-        two, end_two = tour.turned[end_two], tour.turned[two]
-    return before - gap(tour, left, two) - gap(tour, end_two, one) - gap(tour, end_one, right)
+        second_start, second_end = tour.turned[second_end], tour.turned[second_start]
+    return (
+        old_gaps - gap(tour, left, second_start) - gap(tour, second_end, first_start)
+        - gap(tour, first_end, right)
+    )
 
 
 cdef Int take(Route tour, Step step, Int[:, ::1] log, Int logged) noexcept:
     """Change the tour, write down how to undo it, and return how much is written."""
-    cdef Int low, high, other, middle
-    low, high, other = step.low, step.high, step.other
-    if other >= 0:
-        middle = low + other - high
-        logged = _reversed(tour, low, other, log, logged)
+    cdef Int low, high, second_high, middle
+    low, high, second_high = step.low, step.high, step.second_high
+    if second_high >= 0:
+        middle = low + second_high - high
+        logged = _reversed(tour, low, second_high, log, logged)
         if step.flip != 2:
             logged = _reversed(tour, low, middle - 1, log, logged)
         if step.flip != 1:
-            logged = _reversed(tour, middle, other, log, logged)
+            logged = _reversed(tour, middle, second_high, log, logged)
     elif high >= low:
         logged = _reversed(tour, low, high, log, logged)
     if step.new_row >= 0:
@@ -371,20 +382,21 @@ cdef Int _halves_wait(
 ) noexcept:
     """Let the halves of a node wait, the nearer one on top; how many wait then."""
     cdef bint left_first
-    left_first = _box_distance_square(tree, 2 * node + 1, x, y) <= _box_distance_square(tree, 2 * node + 2, x, y)
+    left = _box_distance_square(tree, 2 * node + 1, x, y)
+    left_first = left <= _box_distance_square(tree, 2 * node + 2, x, y)
     waiting[top] = 2 * node + (2 if left_first else 1)
     waiting[top + 1] = 2 * node + (1 if left_first else 2)
     return top + 2
 
 
-cpdef Int nearest_row(Branches tree, Int[::1] on, double x, double y) noexcept:
-    """The nearest point that is switched on, `on` (N,) 1 or 0; −1 when none is."""
-    cdef Int top, leaves, node, k, row, found
+cpdef Int nearest_row(Branches tree, Int[::1] is_open, double x, double y) noexcept:
+    """The nearest point that is switched on, `is_open` (N,) 1 or 0; −1 when none is."""
+    cdef Int top, leaves, node, k, row, nearest
     cdef Int[::1] waiting
-    cdef double best, apart, dx, dy
+    cdef double best, square, dx, dy
     waiting, top, leaves = tree.waiting, 1, len(tree.size) // 2
     waiting[0] = 0
-    found, best = -1, math.INFINITY
+    nearest, best = -1, math.INFINITY
     while top > 0:
         top -= 1
         node = waiting[top]
@@ -395,37 +407,37 @@ cpdef Int nearest_row(Branches tree, Int[::1] on, double x, double y) noexcept:
             continue
         for k in range(tree.begin[node], tree.begin[node] + tree.size[node]):
             row = tree.rows[k]
-            if on[row]:
+            if is_open[row]:
                 dx, dy = tree.points[row, 0] - x, tree.points[row, 1] - y
-                apart = dx * dx + dy * dy
-                if apart < best or (apart == best and row < found):
-                    found, best = row, apart
-    return found
+                square = dx * dx + dy * dy
+                if square < best or (square == best and row < nearest):
+                    nearest, best = row, square
+    return nearest
 
 
 cpdef Int nearest_owners(
-    Branches tree, Int[::1] owner, Int row, Int most, Int quarter, Int[::1] found,
-    double[::1] apart
+    Branches tree, Int[::1] owner, Int row, Int max_count, Int quarter, Int[::1] nearest,
+    double[::1] squares
 ) noexcept:
-    """The owners nearest to a point, but its own: up to `most`, each once, nearest first; they are
-    written into `found`, their squared distances into `apart`. Returns how many.
+    """The owners nearest to a point, but its own: up to `max_count`, each once, nearest first; they
+    are written into `nearest`, their squared distances into `squares`. Returns how many.
 
     `quarter` 0 … 3: only those above and to the right of the point, and so on CCW.
     """
-    cdef Int top, leaves, node, k, other, count
+    cdef Int top, leaves, node, k, point, count
     cdef Int[::1] waiting
     cdef double x, y, left, right, below, above, dx, dy
     x, y = tree.points[row, 0], tree.points[row, 1]
     waiting, top, leaves = tree.waiting, 1, len(tree.size) // 2
     waiting[0] = 0
-    for k in range(most):
-        found[k], apart[k] = -1, math.INFINITY
+    for k in range(max_count):
+        nearest[k], squares[k] = -1, math.INFINITY
     while top > 0:
         top -= 1
         node = waiting[top]
         left, right = tree.box[node, 0] - x, tree.box[node, 2] - x
         below, above = tree.box[node, 1] - y, tree.box[node, 3] - y
-        if _box_distance_square(tree, node, x, y) > apart[most - 1] or not (
+        if _box_distance_square(tree, node, x, y) > squares[max_count - 1] or not (
             _looks_to(quarter, right, above)
             or _looks_to(quarter, left, above)
             or _looks_to(quarter, left, below)
@@ -436,12 +448,12 @@ cpdef Int nearest_owners(
             top = _halves_wait(tree, node, x, y, waiting, top)
             continue
         for k in range(tree.begin[node], tree.begin[node] + tree.size[node]):
-            other = tree.rows[k]
-            dx, dy = tree.points[other, 0] - x, tree.points[other, 1] - y
-            if owner[other] != owner[row] and _looks_to(quarter, dx, dy):
-                _enter(found, apart, most, owner[other], dx * dx + dy * dy)
+            point = tree.rows[k]
+            dx, dy = tree.points[point, 0] - x, tree.points[point, 1] - y
+            if owner[point] != owner[row] and _looks_to(quarter, dx, dy):
+                _enter(nearest, squares, max_count, owner[point], dx * dx + dy * dy)
     count = 0
-    while count < most and found[count] >= 0:
+    while count < max_count and nearest[count] >= 0:
         count += 1
     return count
 
@@ -459,32 +471,34 @@ cdef inline bint _looks_to(Int quarter, double dx, double dy) noexcept:
     return True
 
 
-cdef void _enter(Int[::1] found, double[::1] apart, Int most, Int owner, double distance) noexcept:
-    """Put an owner into the sorted list of `most`, or move it up when it is there already."""
-    cdef Int at, k
-    at = most - 1
-    if not _is_before(distance, owner, found, apart, at):
+cdef void _enter(
+    Int[::1] nearest, double[::1] squares, Int max_count, Int owner, double distance
+) noexcept:
+    """Put an owner into the sorted list of `max_count`, or move it up when it is there already."""
+    cdef Int index, k
+    index = max_count - 1
+    if not _is_before(distance, owner, nearest, squares, index):
         return
-    for k in range(most):
-        if found[k] == owner:
-            if apart[k] <= distance:
+    for k in range(max_count):
+        if nearest[k] == owner:
+            if squares[k] <= distance:
                 return
-            at = k
+            index = k
             break
-    while at > 0 and _is_before(distance, owner, found, apart, at - 1):
-        found[at], apart[at] = found[at - 1], apart[at - 1]
-        at -= 1
-    found[at], apart[at] = owner, distance
+    while index > 0 and _is_before(distance, owner, nearest, squares, index - 1):
+        nearest[index], squares[index] = nearest[index - 1], squares[index - 1]
+        index -= 1
+    nearest[index], squares[index] = owner, distance
 
 
 cdef inline bint _is_before(
-    double distance, Int owner, Int[::1] found, double[::1] apart, Int at
+    double distance, Int owner, Int[::1] nearest, double[::1] squares, Int index
 ) noexcept:
     """True if an owner comes before the one at an index: nearer, or as near and with the smaller
     number."""
-    if distance != apart[at]:
-        return bool(distance < apart[at])
-    return bool(found[at] < 0 or owner < found[at])
+    if distance != squares[index]:
+        return bool(distance < squares[index])
+    return bool(nearest[index] < 0 or owner < nearest[index])
 
 
 # The first tour, by nearest neighbours, and which items are near to which.
@@ -515,35 +529,35 @@ cpdef nearest_first(
     Shorter than M when items wait for each other.
     """
     cdef Branches branches
-    cdef Int i, rank, count, row, chosen, item, k, later
-    cdef Int[::1] rows, owner, on, waiting
+    cdef Int i, rank, count, row, next_row, item, k, later
+    cdef Int[::1] rows, owner, is_open, waiting
     cdef double x, y
     count, x, y = len(first) - 1, start[0], start[1]
     branches = Branches(tree)
     rows, owner = np.empty(count, np.int64), np.empty(first[count], np.int64)
-    on, waiting = np.ones(first[count], np.int64), np.array(waits)
+    is_open, waiting = np.ones(first[count], np.int64), np.array(waits)
     for i in range(count):
         for row in range(first[i], first[i + 1]):
             owner[row] = i
             if waiting[i] > 0:
-                on[row] = 0
+                is_open[row] = 0
                 switch(branches, row, -1)
     for rank in range(count):
-        chosen = nearest_row(branches, on, x, y)
-        if chosen < 0:
+        next_row = nearest_row(branches, is_open, x, y)
+        if next_row < 0:
             return np.asarray(rows[:rank])
-        rows[rank] = chosen
-        item = owner[chosen]
-        x, y = ends[chosen, 2], ends[chosen, 3]
+        rows[rank] = next_row
+        item = owner[next_row]
+        x, y = ends[next_row, 2], ends[next_row, 3]
         for row in range(first[item], first[item + 1]):
-            on[row] = 0
+            is_open[row] = 0
             switch(branches, row, -1)
         for k in range(after_first[item], after_first[item + 1]):
             later = after[k]
             waiting[later] -= 1
             if waiting[later] == 0:
                 for row in range(first[later], first[later + 1]):
-                    on[row] = 1
+                    is_open[row] = 1
                     switch(branches, row, 1)
     return np.asarray(rows)
 
@@ -555,9 +569,10 @@ cpdef neighbours(tree, Int[::1] owner, Int count):
     too; what several bring comes once.
     """
     cdef Branches branches
-    cdef Int total, i, places, most, place, k, quarter, wanted, hits, m, item, most_of_item
-    cdef Int[::1] place_first, near_first, near, seen, found
-    cdef double[::1] apart
+    cdef Int total, i, places, max_nearest, place, k, quarter, wanted_count, hits, m, item
+    cdef Int most_of_item
+    cdef Int[::1] place_first, near_first, neighbour, last_seen, nearest
+    cdef double[::1] squares
     place_first = np.zeros(count + 1, np.int64)
     for place in range(len(owner)):
         place_first[owner[place] + 1] += 1
@@ -565,25 +580,25 @@ cpdef neighbours(tree, Int[::1] owner, Int count):
         place_first[item + 1] += place_first[item]
     near_first = np.zeros(count + 1, np.int64)
     most_of_item = NEAR + NEAR_EACH + 4 * NEAR_QUARTER
-    near = np.empty(len(owner) * NEAR_EACH + count * most_of_item, np.int64)
-    seen, total, branches = np.full(count, -1, dtype=np.int64), 0, Branches(tree)
-    found, apart = np.empty(NEAR + NEAR_EACH, np.int64), np.empty(NEAR + NEAR_EACH)
+    neighbour = np.empty(len(owner) * NEAR_EACH + count * most_of_item, np.int64)
+    last_seen, total, branches = np.full(count, -1, dtype=np.int64), 0, Branches(tree)
+    nearest, squares = np.empty(NEAR + NEAR_EACH, np.int64), np.empty(NEAR + NEAR_EACH)
     for i in range(count):
         places = place_first[i + 1] - place_first[i]
-        most = max(NEAR_EACH, (NEAR + places - 1) // max(places, 1))
+        max_nearest = max(NEAR_EACH, (NEAR + places - 1) // max(places, 1))
         # Each place, then the quarters about the first one.
         for k in range(places + (4 if places > 0 else 0)):
             place = place_first[i] + (k if k < places else 0)
             quarter = ANYWHERE if k < places else k - places
-            wanted = most if k < places else NEAR_QUARTER
-            hits = nearest_owners(branches, owner, place, wanted, quarter, found, apart)
+            wanted_count = max_nearest if k < places else NEAR_QUARTER
+            hits = nearest_owners(branches, owner, place, wanted_count, quarter, nearest, squares)
             for m in range(hits):
-                if seen[found[m]] != i:
-                    seen[found[m]] = i
-                    near[total] = found[m]
+                if last_seen[nearest[m]] != i:
+                    last_seen[nearest[m]] = i
+                    neighbour[total] = nearest[m]
                     total += 1
         near_first[i + 1] = total
-    return np.array(near[:total]), np.asarray(near_first)
+    return np.array(neighbour[:total]), np.asarray(near_first)
 
 
 # The best rows for a given order, exactly: the shortest way through layers.
@@ -601,7 +616,7 @@ cpdef best_rows(
 
     `ends` (S, 4): entry x, y and exit x, y; item i owns the rows from first[i] to first[i + 1].
     """
-    cdef Int count, rows_in_all, row, rank, low, high, r, chosen, last
+    cdef Int count, rows_in_all, row, rank, low, high, r, best_row, last
     cdef Int[::1] came_from, rows
     cdef double best, x, y, length, home
     cdef double[::1] cost
@@ -622,17 +637,17 @@ cpdef best_rows(
                     best = length
                     came_from[row] = r
             cost[row] = best
-    chosen, best = -1, math.INFINITY
+    best_row, best = -1, math.INFINITY
     last = order[count - 1]
     for row in range(first[last], first[last + 1]):
         home = math.hypot(ends[row, 2] - goal[0], ends[row, 3] - goal[1])
         length = cost[row] + (0.0 if math.isnan(goal[0]) else home)
         if length < best:
-            chosen, best = row, length
+            best_row, best = row, length
     rows = np.empty(count, np.int64)
     for rank in range(count - 1, -1, -1):
-        rows[rank] = chosen
-        chosen = came_from[chosen]
+        rows[rank] = best_row
+        best_row = came_from[best_row]
     return np.asarray(rows)
 
 
@@ -706,10 +721,10 @@ cdef Int _touched_wait(
     Route tour, Step step, Int[::1] queue, Int[::1] waits, Int head, Int count
 ) noexcept:
     """Let the items wait that lie beside a gap which a step has changed; how many wait then."""
-    cdef Int last, middle, at, k
-    last = step.high if step.other < 0 else step.other
-    middle = step.low if step.other < 0 else step.low + step.other - step.high
-    at = step.low if step.who < 0 else tour.place[step.who]
+    cdef Int last, middle, position, k
+    last = step.high if step.second_high < 0 else step.second_high
+    middle = step.low if step.second_high < 0 else step.low + step.second_high - step.high
+    position = step.low if step.who < 0 else tour.place[step.who]
     for k in range(2):
         count = _wait(tour, queue, waits, head, count, step.low - 1 + k)
     for k in range(2):
@@ -717,56 +732,56 @@ cdef Int _touched_wait(
     for k in range(2):
         count = _wait(tour, queue, waits, head, count, last + k)
     for k in range(2):
-        count = _wait(tour, queue, waits, head, count, at + k)
+        count = _wait(tour, queue, waits, head, count, position + k)
     return count
 
 
 cdef void best_step(Route tour, Int item, Step best) noexcept:
     """Make `best` the step that gains most of those that concern this item; without one its gain
     is the least that counts."""
-    cdef Int turned, k, at, last, row, left, right, near, spot, other
+    cdef Int turned, k, position, last, row, left, right, neighbour, spot, neighbour_row
     cdef bint alone
     cdef double reach, lifted
-    at, last = tour.place[item], len(tour.item) - 2
-    row, left, right = tour.row[item], row_at(tour, at - 1), row_at(tour, at + 1)
-    into, out = gap(tour, left, row), gap(tour, row, right)
+    position, last = tour.place[item], len(tour.item) - 2
+    row, left, right = tour.row[item], row_at(tour, position - 1), row_at(tour, position + 1)
+    gap_before, gap_after = gap(tour, left, row), gap(tour, row, right)
     turned = tour.turned[row]
     best.set(MIN_GAIN_MM, 0, -1, -1, 0, -1, -1)
     _other_row(tour, item, best)
-    _reversal(tour, 1, at, best)
-    _reversal(tour, at, last, best)
-    lifted = into + out - gap(tour, left, right)
+    _reversal(tour, 1, position, best)
+    _reversal(tour, position, last, best)
+    lifted = gap_before + gap_after - gap(tour, left, right)
     # A place gains nowhere more than by being lifted out, and little beside a far neighbour.
     alone = tour.first[item + 1] - tour.first[item] == 1 and not tour.one_way
-    reach = max(into, out) if alone else math.INFINITY
+    reach = max(gap_before, gap_after) if alone else math.INFINITY
     for k in range(tour.near_first[item], tour.near_first[item + 1]):
-        near = tour.near[k]
-        spot, other = tour.place[near], tour.row[near]
-        if gap(tour, other, row) < into:
-            _part(tour, at, 1, spot, False, best)
-        if gap(tour, turned, other) < into:
-            _part(tour, at, 1, spot - 1, True, best)
-            _reversal(tour, min(at, spot), max(at, spot) - 1, best)
-        if gap(tour, row, other) < out:
-            _part(tour, at, -1, spot - 1, False, best)
-        if gap(tour, other, turned) < out:
-            _part(tour, at, -1, spot, True, best)
-            _reversal(tour, min(at, spot) + 1, max(at, spot), best)
-        if gap(tour, row, other) < reach and (lifted > best.gain or not alone):
+        neighbour = tour.near[k]
+        spot, neighbour_row = tour.place[neighbour], tour.row[neighbour]
+        if gap(tour, neighbour_row, row) < gap_before:
+            _part(tour, position, 1, spot, False, best)
+        if gap(tour, turned, neighbour_row) < gap_before:
+            _part(tour, position, 1, spot - 1, True, best)
+            _reversal(tour, min(position, spot), max(position, spot) - 1, best)
+        if gap(tour, row, neighbour_row) < gap_after:
+            _part(tour, position, -1, spot - 1, False, best)
+        if gap(tour, neighbour_row, turned) < gap_after:
+            _part(tour, position, -1, spot, True, best)
+            _reversal(tour, min(position, spot) + 1, max(position, spot), best)
+        if gap(tour, row, neighbour_row) < reach and (lifted > best.gain or not alone):
             _single(tour, item, spot - 1, lifted, best)
             _single(tour, item, spot, lifted, best)
 
 
 cdef void _other_row(Route tour, Int item, Step best) noexcept:
     """The best row of an item where it is."""
-    cdef Int other, at, row, left, right
-    at, row = tour.place[item], tour.row[item]
-    left, right = row_at(tour, at - 1), row_at(tour, at + 1)
-    now = gap(tour, left, row) + gap(tour, row, right)
-    for other in range(tour.first[item], tour.first[item + 1]):
-        gain = now - gap(tour, left, other) - gap(tour, other, right)
+    cdef Int candidate, position, row, left, right
+    position, row = tour.place[item], tour.row[item]
+    left, right = row_at(tour, position - 1), row_at(tour, position + 1)
+    old_gaps = gap(tour, left, row) + gap(tour, row, right)
+    for candidate in range(tour.first[item], tour.first[item + 1]):
+        gain = old_gaps - gap(tour, left, candidate) - gap(tour, candidate, right)
         if gain > best.gain:
-            best.set(gain, at, at - 1, -1, 0, item, other)
+            best.set(gain, position, position - 1, -1, 0, item, candidate)
 
 
 cdef void _reversal(Route tour, Int low, Int high, Step best) noexcept:
@@ -780,12 +795,12 @@ cdef void _reversal(Route tour, Int low, Int high, Step best) noexcept:
             best.set(gain, low, high, -1, 0, -1, -1)
 
 
-cdef void _part(Route tour, Int at, Int way, Int spot, bint turn, Step best) noexcept:
+cdef void _part(Route tour, Int position, Int direction, Int spot, bint turn, Step best) noexcept:
     """Parts of two and more items that begin (way 1) or end (way −1) at a position, moved between
     the positions `spot` and `spot` + 1."""
     cdef Int length, low, high
     for length in range(2, MAX_MOVED + 1):
-        low = at if way > 0 else at - length + 1
+        low = position if direction > 0 else position - length + 1
         high = low + length - 1
         if low < 1 or high > len(tour.item) - 2 or low - 1 <= spot <= high:
             break
@@ -795,38 +810,40 @@ cdef void _part(Route tour, Int at, Int way, Int spot, bint turn, Step best) noe
             _swap(tour, spot + 1, low - 1, high, 2 if turn else 0, best)
 
 
-cdef void _swap(Route tour, Int low, Int high, Int other, Int flip, Step best) noexcept:
+cdef void _swap(Route tour, Int low, Int high, Int second_high, Int flip, Step best) noexcept:
     cdef double gain
-    gain = gain_of_swap(tour, low, high, other, flip)
-    if gain > best.gain and may_swap(tour, low, high, other):
+    gain = gain_of_swap(tour, low, high, second_high, flip)
+    if gain > best.gain and may_swap(tour, low, high, second_high):
         if flip == 1:
             gain -= turning(tour, low, high)
         elif flip == 2:
-            gain -= turning(tour, high + 1, other)
+            gain -= turning(tour, high + 1, second_high)
         if gain > best.gain:
-            best.set(gain, low, high, other, flip, -1, -1)
+            best.set(gain, low, high, second_high, flip, -1, -1)
 
 
 cdef void _single(Route tour, Int item, Int spot, double lifted, Step best) noexcept:
     """Search for the item that is best moved between the positions `spot` and `spot` + 1, and for
     its best row there."""
-    cdef Int at, k, left, right, row, first, count, other, low, high, end
-    cdef double gain, found, there
-    at = tour.place[item]
-    if at - 1 <= spot <= at:
+    cdef Int position, k, left, right, row, first, count, candidate, low, high, end
+    cdef double gain, candidate_gain, opened_gap
+    position = tour.place[item]
+    if position - 1 <= spot <= position:
         return
     left, right = row_at(tour, spot), row_at(tour, spot + 1)
-    there = lifted + gap(tour, left, right)
+    opened_gap = lifted + gap(tour, left, right)
     row, gain = -1, best.gain
     first, count = tour.first[item], tour.first[item + 1] - tour.first[item]
     for k in range(min(count, ROWS_TRIED)):
-        other = first + (k if count <= ROWS_TRIED else k * count // ROWS_TRIED)
-        found = there - gap(tour, left, other) - gap(tour, other, right)
-        if found > gain:
-            row, gain = other, found
+        candidate = first + (k if count <= ROWS_TRIED else k * count // ROWS_TRIED)
+        candidate_gain = opened_gap - gap(tour, left, candidate) - gap(tour, candidate, right)
+        if candidate_gain > gain:
+            row, gain = candidate, candidate_gain
     if row < 0:
         return
-    low, high, end = (at, at, spot) if spot > at else (spot + 1, at - 1, at)
+    low, high, end = (
+        (position, position, spot) if spot > position else (spot + 1, position - 1, position)
+    )
     if may_swap(tour, low, high, end):
         best.set(gain, low, high, end, 0, item, row)
 
@@ -839,7 +856,7 @@ def settled(tour: Tour) -> float:
 cpdef double kicked(tour, Int kicks, Int seed):
     """Shorten the tour until no step gains any more, then by so many kicks; return the length (mm)
     saved."""
-    cdef Int items, waiting, may_undo, kick, logged, low, high, other
+    cdef Int items, waiting, may_undo, kick, logged, low, high, second_high
     cdef Int[:, ::1] log
     cdef Int[::1] queue, waits
     cdef Route route
@@ -867,11 +884,11 @@ cpdef double kicked(tour, Int kicks, Int seed):
             seed = seed * 48271 % 2147483647
             high = min(low + seed % KICK_REACH, items - 1)
             seed = seed * 48271 % 2147483647
-            other = min(high + 1 + seed % KICK_REACH, items)
-            if not may_swap(route, low, high, other):
+            second_high = min(high + 1 + seed % KICK_REACH, items)
+            if not may_swap(route, low, high, second_high):
                 continue
-            gain = gain_of_swap(route, low, high, other, 0)
-            step.set(gain, low, high, other, 0, -1, -1)
+            gain = gain_of_swap(route, low, high, second_high, 0)
+            step.set(gain, low, high, second_high, 0, -1, -1)
             may_undo = take(route, step, log, 0)
             waiting = _touched_wait(route, step, queue, waits, 0, waiting)
     return gained
