@@ -32,11 +32,19 @@ from camtool.progress import Progress
 from camtool.records import replace
 from camtool.run import Run
 from camtool.simulation.motion import ALL
+from camtool.simulation.rows import block_of
 from camtool.stock.findings import STOCK_NOT_JUDGED_TOOLS
-from camtool.toolpath.lower import at_feed, carried_over, within_feeds, without_coolant
+from camtool.toolpath.findings import SURFACE_FOLLOWED_NOT, SURFACE_FOLLOWED_WITHIN
+from camtool.toolpath.lower import (
+    at_feed,
+    carried_over,
+    turned,
+    within_feeds,
+    without_coolant,
+)
 from camtool.toolpath.moves import Kind, feeds_below_top, mounted_before, toolpath_extents
 from camtool.toolpath.program import Program
-from camtool.toolpath.surface import Surface, follow
+from camtool.toolpath.surface import Surface, follow, surface_error
 from camtool.toolpath.touching import untouched_place
 from camtool.verification.case import (
     TRACE_POINTS,
@@ -472,6 +480,7 @@ def convert_program(
     *,
     file: str,
     feed_mm_min: float | None = None,
+    turn_deg: float = 0.0,
     surface: Surface | None = None,
     check: bool = True,
     progress: Progress | None = None,
@@ -480,8 +489,9 @@ def convert_program(
 
     The second program shall make the moves that the first controller decodes. Setting part zero
     is left out, since a program begins there. Feeds that are too fast for the second machine
-    become its highest feed; `feed_mm_min` replaces all feeds. With a `surface` the cuts follow it,
-    within the machine's tolerance for curves. ProgramError names file, block and column.
+    become its highest feed; `feed_mm_min` replaces all feeds. The moves are turned by `turn_deg`
+    counter-clockwise about part zero. With a `surface` the cuts follow it, within the machine's
+    tolerance for curves, and are compared with it. ProgramError names file, block and column.
     """
     progress = progress or Progress()
     progress.begin(f"reading {PurePath(file).name}")
@@ -494,6 +504,9 @@ def convert_program(
         wanted_path = at_feed(wanted_path, feed_mm_min)
     else:
         wanted_path = within_feeds(wanted_path, target.machine)
+    if turn_deg:
+        wanted_path = turned(wanted_path, turn_deg)
+    flat_path = wanted_path
     if surface is not None:
         wanted_path = follow(wanted_path, surface, target.machine.defaults.fit_tolerance_mm)
     run = Run(source=file, target=target, wanted=wanted_path)
@@ -504,6 +517,8 @@ def convert_program(
     findings = _merge_findings(
         wanted_path.findings, program.findings, reread.findings, left_out=repeated
     )
+    if surface is not None:
+        findings = (*findings, _surface_finding(flat_path, reread, surface, target))
     if not check:
         return replace(run, program=program, decoded=reread, findings=findings)
     case = Case(
@@ -523,6 +538,19 @@ def convert_program(
         verification=verification.with_findings(findings),
         findings=findings,
     )
+
+
+def _surface_finding(
+    flat: Toolpath, written: Toolpath, surface: Surface, target: LoadedTarget
+) -> Finding:
+    """Return how far the cuts of a program are from the surface that they follow."""
+    machine = target.machine
+    limit = machine.defaults.fit_tolerance_mm + target.target.unit_mm(machine, machine.axes.z)
+    error_mm, row = surface_error(flat, written, surface)
+    if error_mm <= limit:
+        return SURFACE_FOLLOWED_WITHIN(measured=error_mm, limit=limit)
+    place = block_of(written, row)
+    return SURFACE_FOLLOWED_NOT(where=place, measured=error_mm, limit=limit)
 
 
 def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:

@@ -18,9 +18,13 @@ from camtool.cli.picture_options import (
 )
 from camtool.cli.post import RequestedOutputs, finish
 from camtool.cli.report import ReportOutputs, report_option
+from camtool.errors import OptionError
 
 if TYPE_CHECKING:
     from camtool.toolpath.surface import Surface
+
+MAX_TURN_DEG = 360.0
+"""Largest angle by which a program is turned."""
 
 
 @click.command(cls=SectionedCommand, short_help="A program of one machine as that of another.")
@@ -36,6 +40,13 @@ if TYPE_CHECKING:
 @click.option("--from-set", multiple=True, metavar="KEY=VALUE", help="Change its values.")
 @click.option(
     "--feed", "feed_mm_min", callback=feed, metavar="FEED", help="For all cuts, in mm/min."
+)
+@click.option(
+    "--turn",
+    "turn_deg",
+    default=0.0,
+    metavar="DEGREES",
+    help="Turn it counter-clockwise about part zero.",
 )
 @click.option("--surface", metavar="FILE", help="Let the cuts follow this probed surface.")
 @click.option(
@@ -59,6 +70,7 @@ def convert(
     from_machine: str | None,
     from_set: tuple[str, ...],
     feed_mm_min: float | None,
+    turn_deg: float,
     surface: str | None,
     preview: str | None,
     report: str | None,
@@ -75,6 +87,8 @@ def convert(
     --surface (camtool probe writes it) the cuts follow the measured top of the blank; --from and
     --to may be the same machine.
     """
+    if not -MAX_TURN_DEG <= turn_deg <= MAX_TURN_DEG:
+        raise OptionError(f"{turn_deg:g} is no angle from -360 to 360", where="--turn")
     outputs = ReportOutputs(preview, report, page)
     picture.check(outputs.pictures, UNVERIFIED if no_verify else RESULT)
     before = MachineFlags(source, from_machine, from_set).load()
@@ -92,6 +106,7 @@ def convert(
         after,
         file=display_name(program),
         feed_mm_min=feed_mm_min,
+        turn_deg=turn_deg,
         surface=None if surface is None else _surface(surface),
         check=not no_verify,
         progress=progress(),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,6 +13,9 @@ from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.errors import MachineError, OptionError
 from camtool.target.wire import Conversation, Place, WireState, place_words
 from camtool.units import parse_feed, parse_length
+
+if TYPE_CHECKING:
+    from camtool.target.registry import LoadedTarget
 
 PORT = click.option("--port", metavar="PORT", required=True, help="Such as /dev/ttyUSB0.")
 UNLOCK = click.option("--unlock", is_flag=True, help="Unlock a controller that is locked first.")
@@ -42,12 +47,8 @@ def act(
     yes: bool = False,
     at_mm: Place | None = None,
 ) -> int:
-    """Hold the conversation of one command; return the exit code. Ctrl-C, q and any exception stop
-    the machine."""
-    from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
-    from camtool.sending.drive import Driver, Order, Request
-    from camtool.sending.line import opened_line
-    from camtool.sending.prepare import manner_of, port_of, wire_of
+    """Hold the conversation of one command; return the exit code."""
+    from camtool.sending.prepare import manner_of, wire_of
 
     target = machine.load()
     wire = wire_of(target)
@@ -61,27 +62,50 @@ def act(
     conversation = wire.command(action, target.machine, values, manner)
     if not (yes or _is_agreed(conversation)):
         return 1
-    with opened_line(port_of(name, baud, wire, target)) as line, keys_of_terminal() as key:
-        wishes = UserRequests(key, {"q": Request.STOP})
-        tell = Messages(quiet=quiet)
-
-        def wish() -> Request | Order | None:
-            if conversation.state is WireState.WAITING:
-                return Request.RESUME  # the user has agreed
-            return wishes()
-
-        driver = Driver(line, wish=wish, tell=tell)
-        with wishes.catch_signals():
-            driver.carry(conversation)
-    tell.rest()
-    if conversation.state is WireState.FINISHED:
+    reason = carried(conversation, target, name, baud, quiet=quiet, is_agreed=True)
+    if not reason:
         place = conversation.place_mm if wire.jogs_from_place else None
         stands = f"; it stands at {place_words(place).replace(' ', ',')} (--at)" if place else ""
         say(f"camtool: {action}: done{stands}", quiet=quiet)
         return 0
-    reason = str(driver.trouble or conversation.why or conversation.state.value)
     say(f"camtool: error: {action}: {reason}", quiet=False)
     return 1
+
+
+def carried(
+    conversation: Conversation,
+    target: LoadedTarget,
+    port: str,
+    baud: int | None,
+    *,
+    quiet: bool,
+    is_agreed: bool = False,
+    watch: Callable[[Conversation], None] = lambda _: None,
+) -> str:
+    """Hold a conversation to its end; return why it has failed, "" if it has not. Ctrl-C, q and
+    any exception stop the machine. `is_agreed`: it goes on where it waits for the user."""
+    from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
+    from camtool.sending.drive import Driver, Order, Request
+    from camtool.sending.line import opened_line
+    from camtool.sending.prepare import port_of, wire_of
+
+    opened = opened_line(port_of(port, baud, wire_of(target), target))
+    with opened as line, keys_of_terminal() as key:
+        wishes = UserRequests(key, {"q": Request.STOP})
+        tell = Messages(quiet=quiet)
+
+        def wish() -> Request | Order | None:
+            if is_agreed and conversation.state is WireState.WAITING:
+                return Request.RESUME
+            return wishes()
+
+        driver = Driver(line, wish=wish, watch=watch, tell=tell)
+        with wishes.catch_signals():
+            driver.carry(conversation)
+    tell.rest()
+    if conversation.state is WireState.FINISHED and driver.trouble is None:
+        return ""
+    return str(driver.trouble or conversation.why or conversation.state.value)
 
 
 def _is_agreed(conversation: Conversation) -> bool:

@@ -74,6 +74,7 @@ COMMANDS = {
     "targets": "The machines, and everything about one.",
     "tolerances": "Dimensions and their limits: begin a file, or see what one says.",
     "tools": "The tools that jobs may name.",
+    "touch": "Touch off an edge, a corner, a bore or a plate.",
     "twin": "A virtual machine at a port.",
     "unlock": "Unlock a controller.",
     "verify": "Simulate and judge a program.",

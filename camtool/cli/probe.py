@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from camtool.cli.files import display_name, read_bytes, refuse_same, write_all
-from camtool.cli.home import BAUD, PORT, UNLOCK
+from camtool.cli.home import BAUD, PORT, UNLOCK, carried
 from camtool.cli.life_signs import progress, signs_of_command
-from camtool.cli.messages import say
+from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, feed, length, machine_options, talk_options
-from camtool.errors import OptionError
+from camtool.errors import OptionError, OutputError
 
 if TYPE_CHECKING:
     from camtool.geometry.polylines import Segments
+    from camtool.toolpath.probing import Box, ProbeAnswer, ProbeCycle, ProbeStep
+
+JOURNAL = click.option(
+    "--journal", metavar="FILE", help="Add each touch and the result to this file."
+)
 
 
 @click.command(short_help="Measure the top of the blank.")
@@ -36,13 +46,16 @@ if TYPE_CHECKING:
 )
 @click.option("--feed", default="50", callback=feed, metavar="FEED", help="Of the probe.")
 @click.option("--holes", metavar="DRAWING", help="Leave out points in its closed contours.")
+@click.option("--job", metavar="FILE", help="Leave out points in its clamps ([[keep_out]]).")
 @click.option(
     "--margin",
     default="1mm",
     callback=length,
     metavar="LENGTH",
-    help="Distance of points from the holes.",
+    help="Distance of points from holes and clamps.",
 )
+@JOURNAL
+@click.option("--json", "as_json", is_flag=True, help="What was measured as JSON, on stdout.")
 @click.option("--yes", is_flag=True, help="Begin without asking.")
 @talk_options
 def probe(
@@ -57,7 +70,10 @@ def probe(
     lowest: float,
     feed: float,
     holes: str | None,
+    job: str | None,
     margin: float,
+    journal: str | None,
+    as_json: bool,
     yes: bool,
     quiet: bool,
     verbose: bool,
@@ -66,62 +82,116 @@ def probe(
 
     The tool stands above part zero, which was touched off; heights are measured from there.
     `camtool convert PROGRAM --from NAME --to NAME --surface FILE` lets the cuts follow them.
-    Ctrl-C stops the machine. Exit code 1, and no file, when a point was not touched.
+    Points in the holes of a drawing and in the clamps of a job are left out. Ctrl-C stops the
+    machine. Exit code 1, and no file, when a point was not touched.
     """
-    from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
     from camtool.pipeline import read_program
-    from camtool.sending.drive import Driver, Request
-    from camtool.sending.line import opened_line
-    from camtool.sending.prepare import manner_of, port_of, wire_of
-    from camtool.target.wire import ProbePlan, WireState
-    from camtool.toolpath.probing import grid_over, in_rows, surface_from, without_holes
+    from camtool.sending.prepare import manner_of, wire_of
+    from camtool.toolpath.probing import (
+        grid_over,
+        height_map,
+        in_rows,
+        probed_nodes,
+        refuse_boxes_on_the_way,
+        surface_from,
+    )
     from camtool.toolpath.surface import text_of_surface
 
     target = machine.load()
     wire = wire_of(target)
     out = output or str(Path(program).with_suffix(".surface.csv"))
-    refuse_same([program, *machine.files()], [out])
+    reads = [program, *machine.files(), *(each for each in (holes, job) if each is not None)]
+    refuse_same(reads, [out, *([] if journal is None else [journal])])
     decoded = read_program(read_bytes(program), target, source=display_name(program)).decoded
     assert decoded is not None
     x, y = grid_over(decoded, step)
-    probed = without_holes(x, y, [] if holes is None else _contours(holes), margin)
+    boxes = [] if job is None else _boxes(job)
+    probed = probed_nodes(x, y, [] if holes is None else _contours(holes), boxes, margin)
     points = in_rows(x, y, probed)
-    plan = ProbePlan(tuple(points), clear, lowest, feed)
-    conversation, heights = wire.probing(plan, target.machine, manner_of(target, unlock=unlock))
-    if not yes:
-        with signs_of_command().hidden():
-            words = (
-                f"Probe {len(points)} points from X{x[0]:g} Y{y[0]:g} to X{x[-1]:g} Y{y[-1]:g}?"
-            )
-            if not click.confirm(words, err=True, default=False):
-                say("camtool: nothing was sent", quiet=False)
-                return 1
-    signs = progress()
-    signs.begin("probing", len(points))
+    refuse_boxes_on_the_way(points, boxes, clear, margin)
+    heights: list[float] = []
+    cycle = height_map(points, clear, lowest, feed, heights)
+    with journaled(journal, "surface", cycle) as (noted, close):
+        conversation = wire.probing(noted, target.machine, manner_of(target, unlock=unlock))
+        words = f"Probe {len(points)} points from X{x[0]:g} Y{y[0]:g} to X{x[-1]:g} Y{y[-1]:g}?"
+        if not yes and not asked_to_begin(words):
+            return 1
+        signs = progress()
+        signs.begin("probing", len(points))
 
-    def watch(_: object) -> None:
-        signs.done = len(heights)
+        def watch(_: object) -> None:
+            signs.done = len(heights)
 
-    with opened_line(port_of(port, baud, wire, target)) as line, keys_of_terminal() as key:
-        wishes = UserRequests(key, {"q": Request.STOP})
-        tell = Messages(quiet=quiet)
-        driver = Driver(line, wish=wishes, watch=watch, tell=tell)
-        with wishes.catch_signals():
-            driver.carry(conversation)
-    tell.rest()
-    if conversation.state is not WireState.FINISHED or len(heights) != len(points):
-        why = str(driver.trouble or conversation.why or "a point was not touched")
-        say(f"camtool: error: probe: {why}; {len(heights)} points were touched", quiet=False)
+        reason = carried(conversation, target, port, baud, quiet=quiet, watch=watch)
+        close(reason, {"points": len(heights)})
+    if reason:
+        say(f"camtool: error: probe: {reason}; {len(heights)} points were touched", quiet=False)
         return 1
     surface = surface_from(x, y, probed, heights)
     write_all({out: text_of_surface(surface).encode()})
     low, high = surface.range_mm
+    if as_json:
+        result = {"file": out, "points": len(points), "low_mm": low, "high_mm": high}
+        show_text(json.dumps(result, indent=2, ensure_ascii=False))
     say(
         f"camtool: {out}: {len(points)} points, {low:.3f} to {high:.3f} mm; camtool convert "
         f"{display_name(program)} --from … --to … --surface {out} follows it",
         quiet=quiet,
     )
     return 0
+
+
+def asked_to_begin(words: str) -> bool:
+    """Ask the user; False, and say so, if the machine is not to move."""
+    with signs_of_command().hidden():
+        if click.confirm(words, err=True, default=False):
+            return True
+    say("camtool: nothing was sent", quiet=False)
+    return False
+
+
+Close = Callable[[str, Mapping[str, Any]], None]
+"""Function that adds the end of a cycle to its journal: why it failed, and what was measured."""
+
+
+@contextmanager
+def journaled(
+    name: str | None, what: str, cycle: ProbeCycle
+) -> Iterator[tuple[ProbeCycle, Close]]:
+    """Give the cycle that adds each touch to the journal as a JSON line, and what ends it; without
+    a file, the cycle as it is. OutputError for a file that cannot be written."""
+    from camtool.toolpath.probing import noted
+
+    if name is None:
+        yield cycle, lambda reason, measured: None
+        return
+
+    def refused(error: OSError) -> OutputError:
+        return OutputError(f"the journal cannot be written ({error.strerror})", file=name)
+
+    try:
+        handle = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    except OSError as error:
+        raise refused(error) from error
+
+    def add(line: Mapping[str, Any]) -> None:
+        try:
+            os.write(handle, json.dumps(line, ensure_ascii=False).encode() + b"\n")
+            os.fsync(handle)
+        except OSError as error:
+            raise refused(error) from error
+
+    def note(step: ProbeStep, answer: ProbeAnswer) -> None:
+        add({step.action: step.axes, "at": answer.place, "touched": answer.has_touched})
+
+    def close(reason: str, measured: Mapping[str, Any]) -> None:
+        add({"end": "failed" if reason else "finished", "why": reason, **measured})
+
+    try:
+        add({"probe": what, "at": time.strftime("%Y-%m-%dT%H:%M:%S%z")})
+        yield noted(cycle, note), close
+    finally:
+        os.close(handle)
 
 
 def _contours(name: str) -> list[Segments]:
@@ -133,3 +203,14 @@ def _contours(name: str) -> list[Segments]:
     if not rings:
         raise OptionError("has no closed contours", where=f"--holes {name}")
     return rings
+
+
+def _boxes(name: str) -> list[Box]:
+    """Return the boxes of a job file, in the work frame."""
+    from camtool.jobs.build import job_of_file
+    from camtool.toolpath.probing import Box
+
+    boxes = job_of_file(Path(name)).keep_out
+    if not boxes:
+        raise OptionError("has no [[keep_out]]", where=f"--job {name}")
+    return [Box(each.name, each.x_mm, each.y_mm, each.z_mm[1]) for each in boxes]

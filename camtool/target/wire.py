@@ -38,6 +38,7 @@ from camtool.target.terminal import Terminal
 if TYPE_CHECKING:
     from camtool.arrays import Floats, Ints
     from camtool.toolpath.moves import Toolpath
+    from camtool.toolpath.probing import ProbeCycle
 
 Place = tuple[float, float, float]
 
@@ -512,16 +513,6 @@ class Hand(Conversation):
             )
 
 
-class ProbePlan(Struct, frozen=True):
-    """Places to probe: `points` (x, y) mm in the work frame, in this order; between them the probe
-    is lifted to `clear_mm`, and it goes down to `lowest_mm` at most, by `feed` mm/min."""
-
-    points: tuple[tuple[float, float], ...]
-    clear_mm: float
-    lowest_mm: float
-    feed: float
-
-
 class CommandHand(Hand):
     """A machine moved by the commands of its wire: each order is a conversation of its own."""
 
@@ -748,14 +739,13 @@ class Wire(ABC):
         return CommandHand(self, machine, manner)
 
     def probing(
-        self, plan: ProbePlan, machine: Machine[Any, Any], manner: Manner
-    ) -> tuple[Conversation, list[float]]:
-        """Return the conversation that probes, and the list to which it adds the height in the
-        work frame of each point that was touched. MachineError where the controller has no
-        probe."""
+        self, cycle: ProbeCycle, machine: Machine[Any, Any], manner: Manner
+    ) -> Conversation:
+        """Return the conversation that carries out a cycle of touches. MachineError where the
+        controller has no probe."""
         raise MachineError(
             f"{machine.target.name} has no command to probe over its line",
-            mend="measure the heights by hand, and write them into a file of a surface",
+            mend="measure by hand; heights can be written into a file of a surface",
         )
 
     def terminal(self, machine: Machine[Any, Any]) -> Terminal:

@@ -180,6 +180,14 @@ class ProgramCode(Code):
         "mount each with its tip where that of the last one was, or set Z zero again; or write a "
         "program for each tool with `--split tool`",
     )
+    SURFACE_FOLLOWED = (
+        325,
+        (INFO, ERROR),
+        "the cuts of a converted program were compared with the probed surface that they follow; "
+        "the greatest distance in Z is given; an error where it is beyond what curves may be off "
+        "and the last decimal of a height",
+        "a surface with a smaller step; or report it with the program and the surface",
+    )
     ARC_MISSES_END = (
         401,
         (ERROR, WARNING),
@@ -208,4 +216,16 @@ FEED_ABOVE_LIMIT_LOWERED = Sentence(
     "highest feed of {machine}",
     "mm_min",
     WARNING,
+)
+SURFACE_FOLLOWED_WITHIN = Sentence(
+    ProgramCode.SURFACE_FOLLOWED,
+    "the cuts are {measured:.4f} mm or less from the probed surface (limit {limit:g})",
+    "mm",
+    INFO,
+)
+SURFACE_FOLLOWED_NOT = Sentence(
+    ProgramCode.SURFACE_FOLLOWED,
+    "a cut is {measured:.4f} mm from the probed surface, and {limit:g} are allowed",
+    "mm",
+    ERROR,
 )

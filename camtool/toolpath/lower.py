@@ -232,6 +232,26 @@ def without_coolant(toolpath: Toolpath) -> Toolpath:
     return replace(remainder, findings=(*toolpath.findings, finding))
 
 
+def turned(toolpath: Toolpath, angle_deg: float) -> Toolpath:
+    """Return the toolpath turned counter-clockwise about part zero. PostError where it homes,
+    since machine zero does not turn."""
+    homes = np.flatnonzero((toolpath.kind == Kind.HOME_XY) | (toolpath.kind == Kind.HOME_Z))
+    if len(homes):
+        raise PostError(
+            "goes to machine zero, which cannot be turned",
+            where=toolpath.place(int(homes[0])),
+            mend="take that block out",
+        )
+    angle = math.radians(angle_deg)
+    matrix = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    columns = {}
+    for name in ("end", "start", "centre"):
+        places = getattr(toolpath, name).copy()
+        places[..., :2] = places[..., :2] @ matrix
+        columns[name] = read_only(places)
+    return replace(toolpath, **columns)
+
+
 def at_feed(toolpath: Toolpath, feed_mm_min: float) -> Toolpath:
     """Return the toolpath with all cuts at one feed."""
     return replace(toolpath, feed=np.where(toolpath.is_feed, feed_mm_min, toolpath.feed))

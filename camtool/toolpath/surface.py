@@ -16,7 +16,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import InputError, OptionError, PostError
 from camtool.toolpath.lower import MAX_PARTS
-from camtool.toolpath.moves import Toolpath, read_only
+from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, read_only
 
 FORMAT = "camtool surface 1"
 """First line of a file of a surface."""
@@ -287,10 +287,10 @@ def _are_divided(toolpath: Toolpath, surface: Surface, tolerance_mm: float) -> B
 
 
 def _bends(
-    surface: Surface, points: Floats, way: Floats, sweep: Floats | float, radius: Floats | float
+    surface: Surface, points: Floats, step: Floats, sweep: Floats | float, radius: Floats | float
 ) -> Floats:
     """Return upper bounds (K,) mm of the second derivative of the height by the share of a move,
-    for moves that lie in the cells of these points (K, 2) each: lines by `way` (K, 2), or arcs of
+    for moves that lie in the cells of these points (K, 2) each: lines by `step` (K, 2), or arcs of
     a `radius` with a `sweep` that is not 0.
 
     In a cell the height is a + b·x + c·y + d·x·y. Along a line its second derivative is constant,
@@ -309,6 +309,92 @@ def _bends(
         np.maximum(np.abs(high - low), np.abs(high_up - low_up)) / width,
         np.maximum(np.abs(low_up - low), np.abs(high_up - high)) / height,
     )
-    along = 2.0 * twist * np.abs(way[:, 0] * way[:, 1])
+    along = 2.0 * twist * np.abs(step[:, 0] * step[:, 1])
     around = np.square(sweep) * (radius * slope + 3.0 * np.square(radius) * twist)
     return np.asarray(np.where(np.asarray(sweep) != 0.0, around, along))
+
+
+# A toolpath against the surface that it follows; shares no code with `follow`.
+
+CHECKED_SHARES = 16
+"""Places of each cut that are compared with the surface."""
+
+VERTICAL_MM = 1e-6
+"""A cut shorter than this in the plane goes up or down."""
+
+
+class _Cuts:
+    """The cuts of a toolpath, and how far each has come in its run, which is the cutting between
+    two rapids: `begin`, `end` (C,) from run + 0 to run + 1, by the length in the plane."""
+
+    def __init__(self, toolpath: Toolpath) -> None:
+        toolpath = toolpath.first(toolpath.executed_rows)
+        self.toolpath, self.rows = toolpath, np.flatnonzero(toolpath.is_feed)
+        arcs = PolarArcs(toolpath, toolpath.is_arc & toolpath.is_feed)
+        self._arcs, self._arc_of = arcs, np.full(len(toolpath), -1)
+        self._arc_of[arcs.row] = np.arange(len(arcs.row))
+        starts = toolpath.starts_of(self.rows)
+        lengths = np.hypot(*(toolpath.end[self.rows] - starts)[:, :2].T)
+        turning = self._arc_of[self.rows]
+        radius = 0.5 * (arcs.radius + arcs.end_radius)
+        lengths[turning >= 0] = (radius * np.abs(arcs.sweep))[turning[turning >= 0]]
+        # A rapid that moves nothing separates no runs: writers leave it out.
+        moved = (toolpath.starts != toolpath.end).any(axis=1)
+        breaks = np.cumsum((toolpath.kind == Kind.RAPID) & moved)[self.rows]
+        _, self.run = np.unique(breaks, return_inverse=True)
+        self.is_flat = lengths > VERTICAL_MM
+        self.runs = int(self.run.max(initial=-1)) + 1
+        totals = np.bincount(self.run, np.where(self.is_flat, lengths, 0.0), self.runs)
+        shares = np.where(self.is_flat, lengths, 0.0) / np.maximum(totals, VERTICAL_MM)[self.run]
+        ends = np.cumsum(shares)
+        before = np.concatenate([[0.0], ends])[np.searchsorted(self.run, np.arange(self.runs))]
+        self.end = self.run + np.clip(ends - before[self.run], 0.0, 1.0)
+        self.begin = self.end - shares
+
+    def points(self, cuts: Ints, share: Floats) -> Floats:
+        """Compute the points (K, 3) mm of these cuts at `share` (K,) of their length."""
+        rows = self.rows[cuts]
+        starts = self.toolpath.starts_of(rows)
+        points = starts + share[:, None] * (self.toolpath.end[rows] - starts)
+        turning = self._arc_of[rows]
+        is_arc = turning >= 0
+        points[is_arc] = self._arcs.points(turning[is_arc], share[is_arc])
+        return np.asarray(points)
+
+
+def surface_error(flat: Toolpath, written: Toolpath, surface: Surface) -> tuple[float, int]:
+    """Return the largest distance in Z, mm, of the cuts of `written` from those of `flat` on the
+    surface, at many places of each cut, and the row of `written` where it is. Places that belong
+    together have come equally far in their runs. PostError where the runs are not the same."""
+    plain, warped = _Cuts(flat), _Cuts(written)
+    if plain.runs != warped.runs:
+        raise PostError(
+            f"the cuts of the program are {warped.runs} runs, and those that shall follow the "
+            f"surface {plain.runs}"
+        )
+    worst, place = 0.0, 0
+    cuts = np.flatnonzero(warped.is_flat)
+    between = np.flatnonzero(plain.is_flat)
+    for share in (np.arange(CHECKED_SHARES) + 0.5) / CHECKED_SHARES:
+        at = warped.begin[cuts] + share * (warped.end - warped.begin)[cuts]
+        index = np.minimum(np.searchsorted(plain.end[between], at), len(between) - 1)
+        source = between[index]
+        part = (at - plain.begin[source]) / (plain.end - plain.begin)[source]
+        wanted_z = plain.points(source, np.clip(part, 0.0, 1.0))[:, 2]
+        points = warped.points(cuts, np.full(len(cuts), share))
+        errors = np.abs(points[:, 2] - wanted_z - surface.heights(points[:, :2]))
+        if len(errors) and float(errors.max()) > worst:
+            worst, place = float(errors.max()), int(warped.rows[cuts[int(errors.argmax())]])
+    # Drilled holes: the lowest place of each run, which its way in the plane says nothing of.
+    lowest = [np.full(plain.runs, np.inf), np.full(warped.runs, np.inf)]
+    for cuts_of, low in zip((plain, warped), lowest, strict=True):
+        ends = cuts_of.toolpath.end[cuts_of.rows]
+        raised = surface.heights(ends[:, :2]) if cuts_of is warped else 0.0
+        np.minimum.at(low, cuts_of.run, ends[:, 2] - raised)
+    errors = np.abs(lowest[0] - lowest[1])
+    holes = ~np.isin(np.arange(plain.runs), warped.run[warped.is_flat])
+    if holes.any() and float(errors[holes].max()) > worst:
+        run = int(np.flatnonzero(holes)[int(errors[holes].argmax())])
+        worst = float(errors[run])
+        place = int(warped.rows[int(np.flatnonzero(warped.run == run)[0])])
+    return worst, place

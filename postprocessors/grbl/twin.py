@@ -18,7 +18,6 @@ import re
 from collections.abc import Generator, Mapping, Sequence
 from typing import Any, Final, Literal
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 
@@ -27,6 +26,7 @@ from camtool.machine.model import Machine
 from camtool.records import replace
 from camtool.simulation.legs import coded_steps_mm
 from camtool.simulation.speed_plan import FROM_REST, axis_limits, max_along
+from camtool.target.probed import ProbedPart
 from camtool.target.twin import Slides, Travel, Twin
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -162,22 +162,14 @@ DEFAULTS: Final = {
 }
 """Default settings that are not 0 (DEFAULTS_GENERIC, defaults.h)."""
 
-NEVER_CLOSED: Final = -1e6
-"""No slide comes down to this height, mm."""
 
-
-class GrblTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class GrblTwinSettings(ProbedPart, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Set-up of a virtual grbl. `homing`: "on" has switches at both ends of the travel, and locks
     it until `$H` or `$X` ($22). `opening`: whether DTR resets the board when its port is opened,
-    as that of an Uno, which then forgets its place. `probe_mm`: at or below this height on the
-    machine, as it is when the power comes on, the probe is closed; `probe_slope_x` and
-    `probe_slope_y`: how much higher that is for each mm of X and Y (a blank that lies aslant)."""
+    as that of an Uno, which then forgets its place. The others say what its probe touches."""
 
     homing: Literal["off", "on"] = "off"
     opening: Literal["reset", "nothing"] = "reset"
-    probe_mm: float = NEVER_CLOSED
-    probe_slope_x: float = 0.0
-    probe_slope_y: float = 0.0
 
 
 class _Planned(Struct, eq=False):
@@ -1350,12 +1342,8 @@ class GrblTwin(Twin):
 
     def _closes_probe(self, mm: Floats) -> Bools:
         """Mask (…) of the places (…, 3) at which the probe is on the blank, or in it."""
-        choices = self._choices
-        slope = np.array([choices.probe_slope_x, choices.probe_slope_y])
-        height = (
-            choices.probe_mm + self._machine.controller.machine_zero_mm[2] + mm[..., :2] @ slope
-        )
-        return np.asarray(mm[..., 2] <= height + 0.5 * self._slide_step_mm[2])
+        machine_zero = np.array(self._machine.controller.machine_zero_mm)
+        return self._choices.closes(mm - machine_zero, 0.5 * float(self._slide_step_mm[2]))
 
     def _has_touched(self) -> bool:
         """True once the probing move under way has ended at the probe."""

@@ -33,10 +33,10 @@ from camtool.target.wire import (
     Override,
     Packet,
     Place,
-    ProbePlan,
     Wire,
     WireState,
 )
+from camtool.toolpath.probing import AXES, CycleRun, ProbeCycle, ProbeStep
 
 from .dialect import GrblController, GrblMachine
 from .settings import BAUD, beyond_travel, differences
@@ -104,7 +104,7 @@ _STATUS = re.compile(
 )
 _PLACE = re.compile(r"-?\d+\.\d+(?:,-?\d+\.\d+){2,}")
 _OVERRIDES = re.compile(r"\d{1,3},\d{1,3},\d{1,3}")
-_PROBED = re.compile(r"\[PRB:[-\d.]+,[-\d.]+,(-?\d+\.\d+)(?:,[-\d.]+)*:1\]")
+_PROBED = re.compile(r"\[PRB:((?:-?\d+\.\d+,){2,}-?\d+\.\d+):([01])\]")
 _FEED = re.compile(r"\d{1,9}(?:\.\d*)?")
 _SETTING = re.compile(r"\$\d{1,3}=[^\s=]+")
 _PUSHED = re.compile(r"\[[A-Za-z0-9]{1,6}:.*\]")
@@ -159,7 +159,7 @@ ALARMS: Final = {
     1: "a limit switch was hit; its position is lost",
     2: "the target is outside of the travel; its position is kept",
     3: "it was reset while it moved; its position is lost",
-    4: "the probe is not in its first state",
+    4: "the probe touches already, before it was to move",
     5: "the probe did not touch",
     6: "homing: it was reset",
     7: "homing: the door was opened",
@@ -233,12 +233,9 @@ class GrblWire(Wire):
             return GrblConversation((), machine, replace(manner, unlock=True))
         return GrblConversation((), machine, manner, (hand_line(action, values).rstrip(b"\n"),))
 
-    def probing(
-        self, plan: ProbePlan, machine: GrblMachine, manner: Manner
-    ) -> tuple[Conversation, list[float]]:
-        """G38.2 at each point."""
-        probing = GrblProbing(plan, machine, manner)
-        return probing, probing.heights
+    def probing(self, cycle: ProbeCycle, machine: GrblMachine, manner: Manner) -> GrblProbing:
+        """G38.3 to each place, and G10 L20 where a zero is set."""
+        return GrblProbing(cycle, machine, manner)
 
     def hand(self, machine: GrblMachine, manner: Manner) -> GrblHand:
         """Return one conversation for all orders: `command` would reset grbl before each."""
@@ -993,24 +990,89 @@ def override_aim(name: Override, percent: int) -> int:
 
 
 class GrblProbing(GrblConversation):
-    """The lines that probe, and the heights that grbl reports of them (`[PRB:x,y,z:1]`, in the
-    frame of the machine)."""
+    """A cycle of touches: one line after the other, each when the one before has been answered.
 
-    def __init__(self, plan: ProbePlan, machine: GrblMachine, manner: Manner) -> None:
-        self.heights: list[float] = []
-        clear = f"G90G21G0Z{plan.clear_mm:.3f}\n".encode()
-        lines = [clear]
-        for x, y in plan.points:
-            lines.append(f"G0X{x:.3f}Y{y:.3f}\n".encode())
-            lines.append(f"G38.2Z{plan.lowest_mm:.3f}F{plan.feed:.1f}\n".encode())
-            lines.append(clear)
-        super().__init__([Packet(line) for line in lines], machine, manner)
+    Touches are G38.3, which ends without an alarm where nothing was touched, so that the tool can
+    go back. `ok` to it comes behind `[PRB:x,y,z:1]`, in the frame of the machine.
+    """
+
+    def __init__(self, cycle: ProbeCycle, machine: GrblMachine, manner: Manner) -> None:
+        super().__init__((), machine, manner)
+        self._run = CycleRun(cycle)
+        self._report: tuple[Place, bool] | None = None  # of the line under way
+
+    def _ready(self, now: float) -> None:
+        if self._offset is None or self._machine_mm is None:
+            return  # the next report says both
+        if "P" in self._closed:
+            self._end(WireState.FAILED, f"the probe touches already: {TOUCHES_MEND}")
+            return
+        super()._ready(now)
+
+    def _go_on(self, now: float, *, anew: bool = False) -> None:
+        super()._go_on(now, anew=anew)
+        is_free = self._phase == "commands" and not self._commands and not self._out_lines
+        if not is_free or self.state is not WireState.SENDING:
+            return
+        if not self._run.has_begun:
+            assert self._machine_mm is not None
+            assert self._offset is not None
+            self._frame = self._offset
+            self._run.begin(_difference(self._machine_mm, self._frame))
+        if self._run.step is not None:
+            self._report = None
+            self._put(_Line(_probe_line(self._run.step)))
+
+    def _answer(self, line: str, now: float) -> None:
+        step, frame = self._run.step, self._frame
+        if line == "ok" and step is not None and frame is not None and self._out_lines:
+            touched = None
+            if step.action in ("touch", "guard"):
+                if self._report is None:
+                    self._fail("it does not say where the probe stands: its report is lost", now)
+                    return
+                place, has_touched = self._report
+                touched = _difference(place, frame) if has_touched else None
+                if touched is not None and (reason := self._run.refusal(touched)):
+                    self._fail(reason, now)
+                    return
+            elif step.action == "zero":
+                at = {**dict(zip(AXES, self._run.place, strict=True)), **step.axes}
+                change = _difference(self._run.place, (at["x"], at["y"], at["z"]))
+                self._frame = _difference(frame, _difference((0.0, 0.0, 0.0), change))
+            self._run.answer(touched)
+        super()._answer(line, now)
 
     def _line(self, line: str, now: float) -> None:
-        found = _PROBED.fullmatch(line)
-        if found is not None and self._phase == "commands" and self._frame is not None:
-            self.heights.append(float(found[1]) - self._frame[2])
+        report = _PROBED.fullmatch(line)
+        if report is not None:
+            x, y, z = (float(each) for each in report[1].split(",")[:3])
+            self._report = (x, y, z), report[2] == "1"
         super()._line(line, now)
+
+    def _at_rest(self, now: float) -> None:
+        if self._out_lines and self._idle >= MIN_IDLE_REPORTS:
+            self._fail("an answer is missing: a line may be lost", now)
+        elif self._run.failure and not self._out_lines:
+            self._end(WireState.FAILED, self._run.failure)
+        else:
+            super()._at_rest(now)
+
+
+MIN_IDLE_REPORTS: Final = 4
+"""Idle reports in a row after which the answer to a line that probes is lost."""
+
+TOUCHES_MEND: Final = "lift it, look at its cable, or set $6 if it is not closed"
+
+
+def _probe_line(step: ProbeStep) -> bytes:
+    """Return the line of grbl that makes a step of a cycle."""
+    axes = "".join(f"{axis.upper()}{value:.4f}" for axis, value in step.axes.items())
+    if step.action == "zero":
+        return f"G21G10L20P0{axes}\n".encode()
+    if step.action == "go":
+        return f"G90G21G0{axes}\n".encode()
+    return f"G90G21G38.3{axes}F{step.feed:.1f}\n".encode()
 
 
 class GrblHand(GrblConversation, Hand):

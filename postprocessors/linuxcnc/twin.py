@@ -14,13 +14,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final, Literal
 
-import msgspec
 import numpy as np
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import CamtoolError
 from camtool.machine.model import Machine
 from camtool.records import replace
+from camtool.target.probed import ProbedPart
 from camtool.target.twin import COMMANDED, Slides, Travel, Twin, travel_of
 from camtool.toolpath.moves import Toolpath
 
@@ -36,13 +36,20 @@ JOINTS: Final = 6
 
 FRAME: Final = re.compile(r"G10 ?L20 ?P0((?: ?[XYZ]-?\d*\.?\d+)+)", re.IGNORECASE)
 WORD: Final = re.compile(r"([XYZ])(-?\d*\.?\d+)", re.IGNORECASE)
+PROBES: Final = re.compile(
+    r"(?:G21 |G90 |G94 )*G38\.([23])((?: ?[XYZ]-?\d*\.?\d+)+) F(\d*\.?\d+)", re.IGNORECASE
+)
+DEBUG: Final = re.compile(r"\(DEBUG, ?(.*)\)", re.IGNORECASE)
+PARAMETER: Final = re.compile(r"#(\d+)")
+PROBE_PART_MM: Final = 0.002
+"""Parts in which it looks at its probe."""
 PAUSES: Final = re.compile(rb"^[^(;]*M0*[01](?![\d.])", re.IGNORECASE)
 BLOCK: Final = re.compile(rb"[A-Za-z#]")
 
 
-class LinuxcncTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class LinuxcncTwinSettings(ProbedPart, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """State in which it is found. `power`: "ready" (switched on and homed), "on" (not homed), or
-    "estop"."""
+    "estop". The others say what its probe touches."""
 
     power: Literal["ready", "on", "estop"] = "ready"
 
@@ -76,6 +83,10 @@ class LinuxcncTwin(Twin):
         self._homing = False
         self._jogs: dict[int, float] = {}  # axes that are being jogged, and their speeds, mm/s
         self._target: Floats = np.zeros(3)  # of the jogs
+        self._choices = choices
+        self._queue: list[str] = []  # lines of MDI that wait for the one that moves
+        self._display = ""
+        self._parameters = dict.fromkeys(range(5061, 5071), 0.0)
         self.read_file: Callable[[str], bytes] = lambda name: Path(name).read_bytes()
         """Function that reads the file of a program."""
         self._hang_up()
@@ -150,7 +161,9 @@ class LinuxcncTwin(Twin):
             "pos_offset": lambda: _place(self._zero),
             "error": self._popped,
             "operator_text": lambda: "OK",
-            "operator_display": lambda: "OK",
+            "operator_display": self._shown,
+            "probe_value": lambda: str(int(self._is_touching())),
+            "probe_tripped": lambda: "YES" if self._parameters[5070] else "NO",
             "linear_unit_conversion": lambda: "MM",
             "feed_override": lambda: "100",
             "echo": lambda: _on_off(self._echo),
@@ -162,6 +175,14 @@ class LinuxcncTwin(Twin):
     def _popped(self) -> str:
         error, self._error = self._error, ""
         return error or "OK"
+
+    def _shown(self) -> str:
+        text, self._display = self._display, ""
+        return text or "OK"
+
+    def _is_touching(self) -> bool:
+        home = np.array(self._machine.controller.machine_zero_mm)
+        return bool(self._choices.closes(self.slides.commanded_mm - home, PROBE_PART_MM))
 
     def _line(self) -> int:
         """The line that it is at, from 1; behind the end the last that moved."""
@@ -255,20 +276,61 @@ class LinuxcncTwin(Twin):
         return True
 
     def _mdi(self, value: str) -> bool:
-        """G10 L20 P0, or a line in absolute coordinates."""
+        """G10 L20 P0, G38.2 and G38.3, a message, or a line in absolute coordinates."""
+        if self._mode == "MDI" and self._on and self.slides.ends_s is not None:
+            self._queue.append(value)
+            return True
         if self._mode != "MDI" or not self._may_move() or not self._homed:
             return True  # it is acknowledged, and an operator's error is shown
+        value = value.removeprefix("G21 ") if FRAME.search(value) else value
+        if match := DEBUG.fullmatch(value):
+            self._display = PARAMETER.sub(
+                lambda number: f"{self._parameters[int(number[1])]:.6f}", match[1]
+            )
+            return True
+        if match := PROBES.fullmatch(value):
+            self._probe(match)
+            return True
         match = FRAME.fullmatch(value)
         if match:
             for axis, text in WORD.findall(match[1]):
                 axis_index = "XYZ".index(axis.upper())
                 self._zero[axis_index] = self.slides.commanded_mm[axis_index] - float(text)
             return True
-        path = self._decoded(value.encode() + b"\nM2\n", here=True)
+        # Axes that the line does not name stay where they are.
+        x, y, z = (self.slides.commanded_mm - self._zero).tolist()
+        stands = f"G21 G90 G0 X{x:.9f} Y{y:.9f} Z{z:.9f}\n"
+        path = self._decoded(f"{stands}{value}\nM2\n".encode(), here=True)
         if path is not None:
             motion = LinuxcncModel().run(path, self._machine, COMMANDED)
             self.slides.begin(travel_of(motion).shifted(self._zero), self.now, -1)
         return True
+
+    def _probe(self, match: re.Match[str]) -> None:
+        """Move until the probe touches; the place goes into #5061 to #5063, in the work frame."""
+        if self._is_touching():
+            self._error = "Probe is already tripped when starting G38.2 or G38.3 move"
+            self._queue.clear()
+            return
+        place = self.slides.commanded_mm
+        target = place - self._zero
+        for axis, text in WORD.findall(match[2]):
+            target["XYZ".index(axis.upper())] = float(text)
+        travel = _straight(place, target + self._zero, float(match[3]) / 60.0, PROBE_PART_MM)
+        home = np.array(self._machine.controller.machine_zero_mm)
+        closed = np.flatnonzero(self._choices.closes(travel.commanded - home, 0.0))
+        if len(closed):
+            count = int(closed[0]) + 1
+            end_s = float(travel.seconds[count - 1])
+            parts = travel.commanded[:count], travel.seconds[:count], travel.added_s[:count]
+            travel = Travel(*parts, end_s)
+        elif match[1] == "2":
+            self._error = "G38.2 move finished without making contact."
+            self._queue.clear()
+        end = travel.commanded[-1] - self._zero
+        self._parameters.update(zip(range(5061, 5064), end.tolist(), strict=True))
+        self._parameters[5070] = float(bool(len(closed)))
+        self.slides.begin(travel, self.now, -1)
 
     def _open(self, name: str) -> bool:
         try:
@@ -340,6 +402,7 @@ class LinuxcncTwin(Twin):
         self.slides.stop(self.now)
         self._travel, self._status, self._homing = None, "IDLE", False
         self._jogs.clear()
+        self._queue.clear()
         return True
 
     # Motion.
@@ -379,6 +442,8 @@ class LinuxcncTwin(Twin):
             else:
                 self._halts = [halt for halt in self._halts if halt != self._since]
                 self._status = "PAUSED"
+        while self._queue and self.slides.ends_s is None:
+            self._mdi(self._queue.pop(0))
 
 
 def _has_words(line: bytes) -> bool:
@@ -409,10 +474,12 @@ def _jog_travel(start: Floats, target: Floats, speeds: dict[int, float]) -> Trav
     return Travel(places, seconds, np.zeros(count), total_s)
 
 
-def _straight(start: Floats, target: Floats, speed: float = HOMING_MM_S) -> Travel:
-    """A line, in parts of 0.01 mm."""
+def _straight(
+    start: Floats, target: Floats, speed: float = HOMING_MM_S, part_mm: float = 0.01
+) -> Travel:
+    """A line, in parts of `part_mm` at most."""
     length = float(np.linalg.norm(target - start))
-    count = max(int(np.ceil(length / 0.01)), 1)
+    count = max(int(np.ceil(length / part_mm)), 1)
     share = np.arange(1, count + 1)[:, None] / count
     seconds = share[:, 0] * length / max(speed, 1e-9)
     return Travel(start + share * (target - start), seconds, np.zeros(count), float(seconds[-1]))

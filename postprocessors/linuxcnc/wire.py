@@ -34,6 +34,7 @@ from camtool.target.wire import (
     Wire,
     WireState,
 )
+from camtool.toolpath.probing import CycleRun, ProbeCycle, ProbeStep
 
 from ..gcode.blocks import has_words
 from .dialect import LinuxcncLink, LinuxcncMachine
@@ -153,6 +154,12 @@ class LinuxcncWire(Wire):
         again and again while it is held."""
         return LinuxcncConversation((), _link(machine), manner, action, values)
 
+    def probing(
+        self, cycle: ProbeCycle, machine: LinuxcncMachine, manner: Manner
+    ) -> LinuxcncConversation:
+        """MDI: G38.3 to each place, and G10 L20 where a zero is set."""
+        return LinuxcncConversation((), _link(machine), manner, "probe", cycle=cycle)
+
 
 def _link(machine: LinuxcncMachine) -> LinuxcncLink:
     assert isinstance(machine.link, LinuxcncLink)
@@ -169,15 +176,17 @@ class LinuxcncConversation(Conversation):
         manner: Manner,
         action: str,
         values: Mapping[str, float] | None = None,
+        cycle: ProbeCycle | None = None,
     ) -> None:
         super().__init__(packets, manner)
-        self._link, self._values = link, values or {}
+        self._link, self._values, self._cycle = link, values or {}, cycle
         acts: dict[str, Callable[[], Script]] = {
             "run": self._run,
             "home": self._home,
             "zero": self._zero,
             "jog": self._jog,
             "hold": self._hold,
+            "probe": self._probe,
         }
         self._script, self._fresh = self._session(acts[action]), True
         self._rest, self._asked, self._now = b"", "", 0.0
@@ -318,12 +327,17 @@ class LinuxcncConversation(Conversation):
         self.place_mm = x, y, z
         return x, y, z
 
-    def _errors(self) -> Script:
+    def _errors(self) -> Generator[str | float, str, str]:
+        """Show what it reports; return its message of a probe."""
+        report = ""
         for name in ("error", "operator_text", "operator_display"):
             text = yield from self._get(name)
-            if text != "OK":
+            if text.startswith(PROBED):
+                report = text
+            elif text != "OK":
                 self._tell(f"it says: {text}")
                 self._said = text if name == "error" else self._said
+        return report
 
     # What is held.
 
@@ -529,10 +543,7 @@ class LinuxcncConversation(Conversation):
                 if self._said or self._now > end:
                     raise _Refused(self._said or f"{axis.upper()} does not arrive")
                 yield self._poll_s
-        last = None
-        while (place := (yield from self._place())) != last:
-            last = place
-            yield self._poll_s
+        yield from self._still()
         self._end(WireState.FINISHED)
 
     def _hold(self) -> Script:
@@ -555,6 +566,78 @@ class LinuxcncConversation(Conversation):
             if self._said:
                 raise _Refused(self._said)
             yield 0.25 * ahead_s
+
+    def _still(self) -> Script:
+        """Wait until two reports give the same place."""
+        last = None
+        while (place := (yield from self._place())) != last:
+            last = place
+            yield self._poll_s
+
+    def _probe(self) -> Script:
+        """Do one step of the cycle after the other, by MDI; a step that probes is over when the
+        message behind it comes, with the place in the work frame (#5061 to #5063, #5070)."""
+        assert self._cycle is not None
+        run = CycleRun(self._cycle)
+        if _whole_number((yield from self._get("probe_value"))):
+            raise _Refused("the probe touches already: lift it, or look at its cable")
+        yield from self._set("mode mdi")
+        run.begin((yield from self._place()))
+        self._begun, self.state = True, WireState.SENDING
+        number = 0
+        while (step := run.step) is not None:
+            yield from self._set(f"mdi {_probe_line(step)}")
+            touched = None
+            if step.action in ("touch", "guard"):
+                number += 1
+                marker = f"{PROBED} {number} #5070 #5061 #5062 #5063"
+                yield from self._set(f"mdi (DEBUG,{marker})")
+                touched = yield from self._touched(number, run, step)
+            run.answer(touched)
+        yield from self._still()
+        yield from self._errors()
+        if self._said:
+            raise _Refused(self._said)
+        yield from self._set("mode manual")
+        self._end(WireState.FAILED if run.failure else WireState.FINISHED, run.failure)
+
+    def _touched(
+        self, number: int, run: CycleRun, step: ProbeStep
+    ) -> Generator[str | float, str, Place | None]:
+        """Wait for the message of a step that probes; return the place of the touch, None where
+        nothing was touched."""
+        steps = [run.place["xyz".index(axis)] - value for axis, value in step.axes.items()]
+        length = sum(value * value for value in steps) ** 0.5
+        end = self._now + 2.0 * 60.0 * length / step.feed + 2.0 * self.manner.patience_s
+        while not (report := (yield from self._errors())):
+            if self._said or self._now > end:
+                raise _Refused(self._said or "it does not say where the probe stands")
+            yield self._poll_s
+        try:
+            index, has_touched, x, y, z = (float(each) for each in report.split()[1:6])
+        except ValueError:
+            raise _Refused(f"a report of the probe that is none: {report[:60]!r}") from None
+        if index != number:
+            raise _Refused(f"a report of another touch: {report[:60]!r}")
+        if not has_touched:
+            return None
+        if reason := run.refusal((x, y, z)):
+            raise _Refused(reason)
+        return x, y, z
+
+
+PROBED: Final = "CAMTOOL-PROBE"
+"""First word of the messages in which it says where the probe has touched."""
+
+
+def _probe_line(step: ProbeStep) -> str:
+    """Return the line of MDI that makes a step of a cycle."""
+    axes = "".join(f" {axis.upper()}{value:.4f}" for axis, value in step.axes.items())
+    if step.action == "zero":
+        return f"G21 G10 L20 P0{axes}"
+    if step.action == "go":
+        return f"G21 G90 G0{axes}"
+    return f"G21 G90 G94 G38.3{axes} F{step.feed:.1f}"
 
 
 def _whole_number(text: str) -> int:

@@ -94,6 +94,27 @@ def test_holes_are_not_probed(program: Path, tmp_path: Path) -> None:
     assert surface.z == pytest.approx(np.full(surface.z.shape, -0.5), abs=0.006)
 
 
+def test_clamps_are_not_probed_nor_run_into(program: Path, tmp_path: Path) -> None:
+    job = tmp_path / "job.toml"
+    table = '[[keep_out]]\nname = "clamp"\nx = "9..12mm"\ny = "0..3mm"\nz = "..{top}mm"\n'
+    with blank() as port:
+        words = ["probe", str(program), "-t", "grbl", "--port", port, "--yes", "--step", "5"]
+        words += ["--job", str(job), "--json"]
+        job.write_text(table.format(top=4))
+        code, said = run(*words)
+        assert code == 2, said
+        assert "leads through 'clamp', whose top is at Z4" in said
+        assert not program.with_suffix(".surface.csv").exists()
+        job.write_text(table.format(top=1.5))
+        code, said = run(*words)
+    assert code == 0, said
+    surface = surface_of_text(program.with_suffix(".surface.csv").read_text(), "")
+    left_out = [(x, y) for x in surface.x for y in surface.y if 8 <= x <= 13 and -1 <= y <= 4]
+    assert len(left_out) == 1
+    count = int(said.split(" points")[0].split()[-1])
+    assert count == surface.z.size - len(left_out)
+
+
 def test_a_blank_that_is_not_reached_is_said(program: Path) -> None:
     with blank() as port:
         words = ["probe", str(program), "-t", "grbl", "--port", port, "--yes"]

@@ -11,14 +11,18 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Floats
 from camtool.errors import InputError, PostError
+from camtool.findings import Severity
 from camtool.pipeline import convert_program
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.findings import ProgramCode
+from camtool.toolpath.moves import Kind, Toolpath, read_only
 from camtool.toolpath.surface import (
     Surface,
     filled,
     follow,
+    surface_error,
     surface_of_text,
     text_of_surface,
 )
@@ -105,6 +109,39 @@ def test_cuts_keep_their_depth_below_the_surface(seed: int, nodes: int) -> None:
     assert {move.centre for move in warped if move.centre is not None} == arcs
     assert length_of(warped) == pytest.approx(length_of(path), abs=1e-6)
     assert (warped.end[warped.kind == Kind.RAPID, 2] >= 5.0 + surface.range_mm[1] - 1e-12).all()
+    assert surface_error(path, warped, surface)[0] <= 1.01 * TOLERANCE_MM
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 2**32), nodes=st.integers(2, 9))
+def test_a_cut_that_does_not_follow_is_found(seed: int, nodes: int) -> None:
+    surface, path = random_surface(seed, nodes), random_path(seed)
+    warped = follow(path, surface, TOLERANCE_MM)
+    rows = np.flatnonzero(warped.is_feed)
+    row = int(rows[seed % (len(rows) - 1) + 1])
+    end = warped.end.copy()
+    end[row, 2] += 0.5
+    error_mm, place = surface_error(path, replace(warped, end=read_only(end)), surface)
+    assert 0.25 < error_mm <= 0.5 + TOLERANCE_MM  # some place lies within half of a move
+    assert place in (row, row + 1)
+    with pytest.raises(PostError, match="runs"):
+        surface_error(path, warped.first(1), surface)
+
+
+def test_a_hole_that_does_not_follow_is_found() -> None:
+    nodes = np.array([0.0, 10.0])
+    surface = Surface(nodes, nodes, np.array([[0.0, 0.0], [0.4, 0.4]]))
+    holes = ToolpathBuilder()
+    for y in (0.0, 5.0, 10.0):
+        holes.rapid(3.0, y, 2.0).line(z=-1.0, feed=50.0).rapid(z=2.0)
+    path = holes.finish()
+    warped = follow(path, surface, TOLERANCE_MM)
+    assert surface_error(path, warped, surface)[0] < 1e-9
+    end = warped.end.copy()
+    end[4, 2] -= 0.1
+    error_mm, place = surface_error(path, replace(warped, end=read_only(end)), surface)
+    assert place == 4
+    assert error_mm == pytest.approx(0.1)
 
 
 def length_of(path: Toolpath) -> float:
@@ -192,4 +229,41 @@ def test_a_program_follows_its_surface() -> None:
     places: Floats = np.array(sampled(run.decoded)[41:])
     wanted = [-0.2 + height_at(surface, x, y) for x, y, _ in places.tolist()]
     tolerance = grbl.machine.defaults.fit_tolerance_mm + 0.001
+    [finding] = [each for each in run.findings if each.code == ProgramCode.SURFACE_FOLLOWED]
+    assert finding.severity == Severity.INFO
+    assert finding.measured is not None
+    assert 0.0 < finding.measured <= tolerance == finding.limit
     assert np.abs(places[:, 2] - wanted).max() <= tolerance
+
+
+def test_a_program_that_does_not_follow_is_not_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    nodes = np.array([0.0, 40.0])
+    surface = Surface(nodes, nodes, np.array([[0.0, 0.1], [0.2, 0.5]]))
+    grbl = load_target("grbl")
+    program = b"G21 G90\nM3 S1000\nG0 X1 Y1 Z3\nG1 Z-0.2 F100\nX9 Y2\nG0 Z3\nM5\nM30\n"
+    monkeypatch.setattr("camtool.pipeline.follow", lambda path, *_: path)
+    run = convert_program(program, grbl, grbl, file="part.nc", surface=surface)
+    assert run.failed
+    [finding] = [each for each in run.findings if each.code == ProgramCode.SURFACE_FOLLOWED]
+    assert finding.severity == Severity.ERROR
+    assert "block" in str(finding.where)
+
+
+def test_a_program_is_turned_about_part_zero() -> None:
+    grbl = load_target("grbl")
+    program = (
+        b"G21 G90\nM3 S1000\nG0 X10 Y0 Z3\nG1 Z-0.2 F100\nG3 X0 Y10 I-10 J0\nG0 Z3\nM5\nM30\n"
+    )
+    run = convert_program(program, grbl, grbl, file="part.nc", turn_deg=30.0)
+    assert run.decoded is not None
+    assert not run.failed, run.findings
+    path = run.decoded
+    [arc] = np.flatnonzero(path.is_arc)
+    angle = math.radians(30.0)
+    assert path.end[arc, :2] == pytest.approx(
+        [-10.0 * math.sin(angle), 10.0 * math.cos(angle)], abs=0.002
+    )
+    assert path.centre[arc] == pytest.approx([0.0, 0.0], abs=0.002)
+    pic = load_target("pic-mmh")
+    with pytest.raises(PostError, match="machine zero"):
+        convert_program(b"G28X0Y0;M30;", pic, pic, file="part.pic", turn_deg=30.0)

@@ -3,6 +3,7 @@ joints go where `verify` says."""
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -24,6 +25,7 @@ from camtool.sending.drive import Driver
 from camtool.sending.line import Port, opened_line
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.wire import Hand, Manner, WireState
+from camtool.toolpath.surface import surface_of_text
 from tests.feeding import motion
 from tests.oracles.linuxcnc_headless import COMMAND, alone, laid_out
 
@@ -77,11 +79,30 @@ class Hands:
         return said
 
 
+BLANK = """loadrt sum2
+loadrt comp
+addf sum2.0 servo-thread
+addf comp.0 servo-thread
+setp sum2.0.gain0 0.01
+setp sum2.0.gain1 -0.02
+setp sum2.0.offset -2
+net p0 => sum2.0.in0
+net p1 => sum2.0.in1
+net surface sum2.0.out => comp.0.in1
+net p2 => comp.0.in0
+net probe comp.0.out => motion.probe-input
+"""
+"""A probe that touches below -2 mm + 0.01 X - 0.02 Y."""
+
+
 @contextmanager
-def live(folder: Path) -> Iterator[tuple[int, Hands]]:
-    """LinuxCNC, switched on; the port of linuxcncrsh."""
+def live(folder: Path, hal: str = "") -> Iterator[tuple[int, Hands]]:
+    """LinuxCNC, switched on, with these lines at the end of its HAL file; the port of
+    linuxcncrsh."""
     port = free_port()
     environment = laid_out(folder, DISPLAY, folder.parents[:2]) | {"RSH_PORT": str(port)}
+    with (folder / "machine.hal").open("a", encoding="ascii") as file:
+        file.write(hal)
     with alone(), (folder / "linuxcnc.log").open("w") as log:
         running = subprocess.Popen(
             COMMAND,
@@ -229,3 +250,31 @@ def test_a_program_is_driven_and_its_path_is_the_predicted_one(tmp_path: Path) -
         stopped = camtool(*words, *at)
         assert stopped.returncode == 1
         assert "emergency stop" in stopped.stderr
+
+
+def test_its_probe_finds_a_blank_that_lies_aslant(tmp_path: Path) -> None:
+    program = tmp_path / "part.ngc"
+    program.write_bytes(b"G21 G90 G17\nG0 Z3\nG0 X2 Y1\nG1 Z-1 F300\nG1 X22\nG1 Y11\nG0 Z3\nM2\n")
+    with live(tmp_path, BLANK) as (port, _):
+        at = ["-t", "linuxcnc", "--port", f"socket://127.0.0.1:{port}", "--yes"]
+        assert camtool("home", *at[:-1]).returncode == 0
+        probed = camtool("probe", str(program), *at, "--lowest", "-4mm", "--feed", "120")
+        assert probed.returncode == 0, probed.stderr
+        surface = surface_of_text(program.with_suffix(".surface.csv").read_text(), "")
+        wanted = -2.0 + 0.01 * surface.x[None, :] - 0.02 * surface.y[:, None]
+        assert surface.z == pytest.approx(wanted, abs=0.005)
+        x, y = float(surface.x[0]), float(surface.y[0])
+        # The tool stands above the last point; the plate is touched there.
+        touched = camtool("touch", "plate", "--thickness", "1.5mm", *at, "--json")
+        assert touched.returncode == 0, touched.stderr
+        found = json.loads(touched.stdout)
+        assert -2.5 < found["top_z_mm"] < -1.5
+        again = camtool("touch", "plate", "--thickness", "1.5mm", *at, "--json")
+        assert json.loads(again.stdout)["top_z_mm"] == pytest.approx(1.5, abs=0.005), (x, y)
+        missed = camtool("touch", "edge", "--towards", "x+", "--tool-diameter", "1", *at)
+        assert missed.returncode == 1
+        assert "nothing was touched" in missed.stderr
+        camtool("jog", "Z-9", "F600", *at[:-1])
+        touching = camtool("touch", "plate", "--thickness", "1.5mm", *at)
+        assert touching.returncode == 1
+        assert "touches already" in touching.stderr
