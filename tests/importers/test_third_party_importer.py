@@ -1,31 +1,15 @@
 """docs/formats.md: the importer that stands there is found by its entry point, and reads."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.waiting import HANG_S
+from tests.third_party import camtool
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")
 PLOT = b"IN;SP1;PU0,0;PD400,0;PD400,200;PD0,200;PD0,0;PU0,0;"
-
-
-def camtool(place: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """A run of `camtool ARGUMENTS` in a folder, with the packages of `place`."""
-    code = "import sys; from camtool.cli.main import main; sys.argv[0] = 'camtool'; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        cwd=folder,
-        env={"PYTHONPATH": str(place), "PATH": "/usr/bin:/bin", "HOME": str(folder)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=HANG_S,
-    )
 
 
 def install(place: Path, text: str) -> Path:

@@ -2,14 +2,13 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import ezdxf
 import pytest
 
-from tests.waiting import HANG_S
+from tests.third_party import camtool
+from tests.third_party import install as pip_install
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "write-an-operation.md").read_text(encoding="utf-8")
@@ -32,10 +31,7 @@ def install(source: Path, place: Path, texts: dict[str, str]) -> None:
     for name, text in texts.items():
         folder = source if name.endswith(".toml") else package
         (folder / name).write_text(text, encoding="utf-8")
-    offline = ("--no-deps", "--no-build-isolation", "--no-index", "--quiet")
-    command = [sys.executable, "-m", "pip", "install", *offline, "--target", place, source]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG_S)
-    assert done.returncode == 0, done.stderr
+    pip_install(source, place)
 
 
 TEXTS = {name: listing(f"The {part}") for part, name in PARTS.items()}
@@ -65,20 +61,6 @@ def broken(tmp_path_factory: pytest.TempPathFactory) -> Path:
     record = TEXTS["__init__.py"].replace('cuts="at"', 'cuts="up"')
     install(tmp_path_factory.mktemp("source"), place, {**TEXTS, "__init__.py": record})
     return place
-
-
-def camtool(place: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """A run of `camtool ARGUMENTS` in a folder, with the packages of `place`."""
-    code = "import sys; from camtool.cli.main import main; sys.argv[0] = 'camtool'; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        cwd=folder,
-        env={"PYTHONPATH": str(place), "PATH": "/usr/bin:/bin", "HOME": str(folder)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=HANG_S,
-    )
 
 
 @pytest.fixture

@@ -2,13 +2,12 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.waiting import HANG_S
+from tests.third_party import camtool
+from tests.third_party import install as pip_install
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "write-a-post.md").read_text(encoding="utf-8")
@@ -34,24 +33,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (package / "__init__.py").write_text(listing("target"))
     (package / "controller.py").write_text(listing("controller"))
     (package / "findings.py").write_text(listing("findings"))
-    offline = ("--no-deps", "--no-build-isolation", "--no-index", "--quiet")
-    command = [sys.executable, "-m", "pip", "install", *offline, "--target", place, source]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG_S)
-    assert done.returncode == 0, done.stderr
+    pip_install(source, place)
     return place
-
-
-def camtool(installed: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    code = "import sys; from camtool.cli.main import main; sys.argv[0] = 'camtool'; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        cwd=folder,
-        env={"PYTHONPATH": str(installed), "PATH": "/usr/bin:/bin", "HOME": str(folder)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=HANG_S,
-    )
 
 
 @pytest.mark.parametrize("part", MOST_LINES)

@@ -176,12 +176,15 @@ def test_what_spoils_no_part_is_a_warning(name: str, kind: str) -> None:
 
 def _new_findings(name: str, data: bytes) -> list[tuple[Code, Severity]]:
     """Code and severity of what `verify --against` says of a program, and not of the sound one."""
-    said = []
+    return list((_findings(name, data) - _findings(name, sound(name)[0].data)).elements())
+
+
+@cache
+def _findings(name: str, data: bytes) -> Counter[tuple[Code, Severity]]:
+    """Count what `verify --against` says of a program, by code and severity."""
     whole, drawing, job = sound(name)
-    for each in (whole.data, data):
-        run = verify_program(each, whole.target, source="damaged", drawing=drawing, job=job)
-        said.append(Counter((finding.code, finding.severity) for finding in run.findings))
-    return list((said[1] - said[0]).elements())
+    run = verify_program(data, whole.target, source="damaged", drawing=drawing, job=job)
+    return Counter((finding.code, finding.severity) for finding in run.findings)
 
 
 LEAST = {
