@@ -6,6 +6,7 @@ import asyncio
 import threading
 import webbrowser
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -66,7 +67,7 @@ def panel(
     else:
         line = port_of(port, baud, wire, target)
     session = Session(target, line, opened_line)
-    server = PanelServer(session, loaded)
+    server = PanelServer(session, loaded, Path(program).parent if program else Path())
     session.watch = server.changed
     wishes = UserRequests(one_s=0.0)
 

@@ -5,16 +5,82 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from msgspec import Struct
 
 from camtool.errors import InputError, OptionError
 from camtool.pictures.viewer.page import viewer_page
 from camtool.sending.carry import SendOptions
 from camtool.sending.journal import JournalState, read_journal
-from camtool.sending.prepare import Consignment, consignment, lines_of
+from camtool.sending.prepare import Consignment, consignment, lines_of, tool_at_of
+from camtool.target.wire import Conversation, Place, ToolAt
+from camtool.toolpath.moves import Kind
 
 if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
+
+
+class BlockFacts(Struct, frozen=True):
+    """A block of a program that runs: its `number` (from 1), where it ends, its feed (None for a
+    rapid or no motion) and the speed of the spindle, 0 while that stands."""
+
+    number: int = 0
+    end_mm: Place | None = None
+    feed_mm_min: float | None = None
+    rpm: float = 0.0
+
+
+class Course:
+    """The course of what is sent: its blocks, and the time that remains."""
+
+    def __init__(self, one: Consignment) -> None:
+        self.one = one
+        self._left_s = one.times_left_s()
+        path = one.forecast.decoded
+        self._path = path.first(path.executed_rows)
+        self._last_row = np.maximum.accumulate(self._path.block)
+        starts = np.isin(self._path.kind, (Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.SPINDLE_OFF))
+        self._spindle_rows = np.flatnonzero(starts)
+
+    def left_s(self, acknowledged: int) -> float:
+        """Return the time, s, that remains when so many packets are acknowledged."""
+        return self._left_s[acknowledged]
+
+    def acknowledged_block(self, talk: Conversation) -> int:
+        """Return the block that was acknowledged last, from 1; 0 for none."""
+        if not talk.acknowledged:
+            return 0
+        return self.one.block_of(self.one.packets[talk.acknowledged - 1].block) + 1
+
+    def following_block(self, talk: Conversation) -> int:
+        """Return the block behind the one that stops the program, from 1."""
+        stop = self.one.packets[min(talk.acknowledged, len(self.one.packets) - 1)].block
+        return self.one.block_of(stop) + 2
+
+    def waiting_bytes(self, talk: Conversation) -> int:
+        """Return the bytes that were sent and are not acknowledged."""
+        return sum(len(each.data) for each in self.one.packets[talk.acknowledged : talk.sent])
+
+    def facts(self, talk: Conversation) -> BlockFacts:
+        """Return the facts of the block after the one that was acknowledged last, if it was sent,
+        else of that one."""
+        if not talk.sent:
+            return BlockFacts()
+        block = self.one.packets[min(talk.acknowledged, talk.sent - 1)].block
+        row = int(np.searchsorted(self._last_row, block, side="right")) - 1
+        if row < 0:
+            return BlockFacts()
+        path, rows = self._path, self._spindle_rows
+        x, y, z = path.end[row].tolist()
+        turn = int(np.searchsorted(rows, row, side="right")) - 1
+        speed = float(path.value[rows[turn]]) if turn >= 0 else 0.0
+        turns = turn >= 0 and path.kind[rows[turn]] != Kind.SPINDLE_OFF and speed == speed
+        return BlockFacts(
+            self.one.block_of(block) + 1,
+            (x, y, z),
+            float(path.feed[row]) if path.is_feed[row] else None,
+            speed if turns else 0.0,
+        )
 
 
 class LoadedProgram(Struct, frozen=True, eq=False):
@@ -52,6 +118,7 @@ class LoadedProgram(Struct, frozen=True, eq=False):
             "packets": len(one.packets),
             "seconds": one.seconds,
             "failed": one.run.failed,
+            "sha256": one.sha256[:16],
             "lines": [] if one.run.failed else lines_of(one, self.target),
             "findings": [
                 {"severity": each.severity.name.lower(), "text": str(each)}
@@ -74,10 +141,19 @@ class LoadedProgram(Struct, frozen=True, eq=False):
         return state if state.sha256 == self.one.sha256 else None
 
     def prepared(
-        self, *, single: bool, first: int, resumes: bool, despite_errors: bool, speed: float
+        self,
+        *,
+        single: bool,
+        first: int,
+        resumes: bool,
+        despite_errors: bool,
+        speed: float,
+        tool_at: ToolAt = "",
+        more: bool = False,
     ) -> tuple[Consignment, SendOptions]:
-        """Return what is sent, and how; OptionError for a program with errors, unless they are
-        allowed, and for one that cannot be resumed."""
+        """Return what is sent, and how; `more`: the journal goes on. OptionError for a program
+        with errors, unless they are allowed, for one that cannot be resumed, and where the place
+        of the tool must be said."""
         if self.one.run.failed and not despite_errors:
             raise OptionError(
                 "the program has errors that would spoil the part",
@@ -89,6 +165,14 @@ class LoadedProgram(Struct, frozen=True, eq=False):
             raise OptionError("no journal says where it was left", where=self.file)
         begin = state.block if state is not None else first
         one = self.one
+        if state is not None:
+            name = self.target.machine.target.name
+            known, question = tool_at_of(one.wire, state, tool_at, name)
+            if question and not tool_at:
+                raise OptionError(
+                    f"{question}?", where=self.file, mend="say where the tool stands, and go on"
+                )
+            tool_at = known
         if begin or state is not None or one.run.failed:
             one = consignment(
                 self.data,
@@ -96,13 +180,14 @@ class LoadedProgram(Struct, frozen=True, eq=False):
                 source=self.file,
                 first=begin,
                 state=state,
+                tool_at=tool_at,
                 despite_errors=despite_errors,
             )
         options = SendOptions(
             self.journal,
             single=single,
             speed=speed,
-            more=resumes,
+            more=resumes or more,
             file=str(Path(self.file).resolve()) if one.wire.opens_file else "",
         )
         return one, options

@@ -11,20 +11,22 @@ from __future__ import annotations
 import asyncio
 import hmac
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
+from contextlib import suppress
 from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import msgspec
 from aiohttp import WSMsgType, web
 from msgspec import Struct
 
-from camtool.errors import CamtoolError
+from camtool.errors import CamtoolError, OptionError
 from camtool.machine.model import Machine
 from camtool.panel.program import LoadedProgram
-from camtool.panel.session import Session
+from camtool.panel.session import AXES, Session
 from camtool.sending.drive import Request
-from camtool.target.wire import HandAction, Override, WireState
+from camtool.target.wire import HandAction, Override, ToolAt, Wire, WireState
 
 if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
@@ -38,6 +40,9 @@ ASKS_S: Final = 5.0
 """Interval of pings; a page that does not answer is gone, s."""
 
 MAX_MESSAGE_BYTES: Final = 4096
+
+SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
+"""Ends of files that hold programs, besides the machine's own."""
 
 PAGE_FILES: Final = ("panel.html", "panel.css", "panel.js")
 
@@ -60,6 +65,27 @@ class JogRequest(Struct, frozen=True, tag="jog", tag_field="do", forbid_unknown_
 
 class KeepRequest(Struct, frozen=True, tag="keep", tag_field="do", forbid_unknown_fields=True):
     """The key of a held jog is still down."""
+
+
+class GoRequest(Struct, frozen=True, tag="go", tag_field="do", forbid_unknown_fields=True):
+    """Go to a place, mm, at a feed in mm/min; axes that are None stay. `machine`: to
+    machine zero instead."""
+
+    feed: float
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
+    machine: bool = False
+
+
+class LeaveRequest(Struct, frozen=True, tag="leave", tag_field="do", forbid_unknown_fields=True):
+    """End the program at its stop, to touch off another tool."""
+
+
+class LoadRequest(Struct, frozen=True, tag="load", tag_field="do", forbid_unknown_fields=True):
+    """Read and judge a program of the panel's folder."""
+
+    name: str
 
 
 class ReleaseRequest(
@@ -97,10 +123,12 @@ class ChangeRequest(
 
 class StartRequest(Struct, frozen=True, tag="start", tag_field="do", forbid_unknown_fields=True):
     """Send the program: `single`: block by block; `first`: from this block on (from 1); `resumes`:
-    where the journal says that it was left; `despite_errors`: although it has findings that spoil
-    the part."""
+    where the journal says that it was left, with the tool as `tool_at` says; `more`: behind a
+    stop; `despite_errors`: although it has findings that spoil the part."""
 
     single: bool = False
+    tool_at: ToolAt = ""
+    more: bool = False
     first: int = 1
     resumes: bool = False
     despite_errors: bool = False
@@ -132,6 +160,9 @@ class TakeRequest(Struct, frozen=True, tag="take", tag_field="do", forbid_unknow
 
 Wanted = (
     JogRequest
+    | GoRequest
+    | LeaveRequest
+    | LoadRequest
     | KeepRequest
     | ReleaseRequest
     | ZeroRequest
@@ -149,24 +180,29 @@ _DECODER: Final = msgspec.json.Decoder(Wanted)
 
 
 class Client:
-    """A page that is open; `shown` is the number of the last message that it has."""
+    """A page that is open; `shown` is the number of the last message that it has, `edition` that
+    of the program."""
 
     def __init__(self, socket: web.WebSocketResponse) -> None:
-        self.socket, self.shown = socket, 0
+        self.socket, self.shown, self.edition = socket, 0, -1
         self.changed = asyncio.Event()
 
 
 class PanelServer:
-    """The pages of one session; `program` is what `StartRequest` sends, None without one."""
+    """The pages of one session; `program` is what `StartRequest` sends, None without one, and
+    `folder` holds others that can be loaded."""
 
-    def __init__(self, session: Session, program: LoadedProgram | None = None) -> None:
-        self.session, self.program = session, program
+    def __init__(
+        self, session: Session, program: LoadedProgram | None = None, folder: Path | None = None
+    ) -> None:
+        self.session, self.program, self.folder = session, program, folder
+        self._edition = 0
         self.key = secrets.token_urlsafe(24)
         self.port = 0
         self._clients: list[Client] = []
         self._commander: Client | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._starting: asyncio.Task[None] | None = None
+        self._work: asyncio.Task[None] | None = None
         self._end: Callable[[], object] = lambda: None
 
     @property
@@ -278,21 +314,27 @@ class PanelServer:
 
     async def _push(self, client: Client) -> None:
         """Send the state to a page whenever it has changed."""
-        await client.socket.send_str(self._first())
         while not client.socket.closed:
             await client.changed.wait()
             client.changed.clear()
+            if client.edition != self._edition:
+                client.edition = self._edition
+                await client.socket.send_str(await asyncio.to_thread(self._first))
             await client.socket.send_str(self._state(client))
             await asyncio.sleep(PUSH_S)
 
     def _first(self) -> str:
-        """Return the first message to a page: the machine and the program, which do not change."""
+        """Return the first message to a page: the machine and the program, which seldom change."""
         session = self.session
         return _json(
             {
                 "machine": _machine(session.target),
                 "port": session.port.name,
                 "can": sorted(session.wire.by_hand),
+                "zeroes_each": session.wire.zeroes_each,
+                "reported": session.wire.place == "told",
+                "tool_at": _tool_at_choices(session.wire),
+                "programs": [each.name for each in self._programs()],
                 "overrides": list(session.wire.overrides),
                 "ready": list(session.wire.ready),
                 "stopping": session.wire.stopping,
@@ -347,8 +389,20 @@ class PanelServer:
                 session.release()
             case JogRequest():
                 self._jog(wanted)
+            case GoRequest():
+                axes = {axis: getattr(wanted, axis) for axis in AXES}
+                places = {axis: place for axis, place in axes.items() if place is not None}
+                feed = self._feed(wanted.feed, AXES if wanted.machine else places)
+                if wanted.machine:
+                    session.go_home(feed)
+                else:
+                    session.go(places, feed)
+            case LeaveRequest():
+                session.leave_stop()
+            case LoadRequest():
+                self._work = asyncio.create_task(asyncio.to_thread(self._load, wanted.name))
             case ZeroRequest():
-                session.order("zero", {axis: 0.0 for axis in "xyz" if axis in wanted.axes})
+                session.order("zero", {axis: 0.0 for axis in AXES if axis in wanted.axes})
             case OrderRequest():
                 action: HandAction = wanted.action
                 session.order(action, {})
@@ -364,20 +418,57 @@ class PanelServer:
                 session.reopen()
             case StartRequest():
                 # It may have to be judged again, and the page goes on meanwhile.
-                self._starting = asyncio.create_task(asyncio.to_thread(self._start, wanted))
+                self._work = asyncio.create_task(asyncio.to_thread(self._start, wanted))
+
+    def _programs(self) -> list[Path]:
+        """List the programs of the folder."""
+        if self.folder is None:
+            return []
+        suffixes = {self.session.target.machine.target.extension, *SUFFIXES}
+        with suppress(OSError):
+            return sorted(
+                each
+                for each in self.folder.iterdir()
+                if each.suffix in suffixes and each.is_file()
+            )
+        return []
+
+    def _load(self, name: str) -> None:
+        """Read and judge a program."""
+        session = self.session
+        if session.state.runs:
+            session.tell("a program is running: stop it first", bad=True)
+            return
+        file = next((each for each in self._programs() if each.name == name), None)
+        if file is None:
+            session.tell(f"there is no program {name!r} in the folder", bad=True)
+            return
+        try:
+            session.tell(f"{name} is judged")
+            self.program = LoadedProgram.read(str(file), session.target)
+        except CamtoolError as error:
+            session.tell(str(error), bad=True)
+            return
+        self._edition += 1
+        session.tell(f"{name} is loaded")
+
+    def _feed(self, feed: float, axes: Iterable[str]) -> float:
+        """Return a feed, mm/min, no higher than the axes can do."""
+        machine = self.session.target.machine
+        rates = [getattr(machine.axes, axis).max_rate_mm_min for axis in axes]
+        feed = min([feed, *(rate for rate in rates if rate is not None)])
+        if not feed > 0.0:
+            raise OptionError("a jog needs a feed above 0", mend="give one")
+        return feed
 
     def _jog(self, wanted: JogRequest) -> None:
         """Jog, at no more than the axes can do."""
-        machine = self.session.target.machine
-        values = {axis: getattr(wanted, axis) for axis in "xyz" if getattr(wanted, axis)}
-        rates = [getattr(machine.axes, axis).max_rate_mm_min for axis in values]
-        feed = min([wanted.feed, *(rate for rate in rates if rate is not None)])
-        if not feed > 0.0:
-            self.session.tell("a jog needs a feed above 0", bad=True)
-        elif wanted.held:
-            self.session.hold({**values, "feed": feed})
+        values = {axis: getattr(wanted, axis) for axis in AXES if getattr(wanted, axis)}
+        values["feed"] = self._feed(wanted.feed, values)
+        if wanted.held:
+            self.session.hold(values)
         else:
-            self.session.order("jog", {**values, "feed": feed})
+            self.session.order("jog", values)
 
     def _start(self, wanted: StartRequest) -> None:
         """Send the program."""
@@ -392,12 +483,26 @@ class PanelServer:
                 single=wanted.single,
                 first=wanted.first - 1,
                 resumes=wanted.resumes,
+                tool_at=wanted.tool_at,
+                more=wanted.more,
                 despite_errors=wanted.despite_errors,
                 speed=self.session.speed,
             )
             self.session.run_program(one, options)
+            self._edition += 1  # where its journal says that it was left is another place now
         except CamtoolError as error:
             self.session.tell(str(error), bad=True)
+
+
+def _tool_at_choices(wire: Wire) -> list[ToolAt]:
+    """Return what can be said of the place of the tool when a program goes on."""
+    choices: dict[str, list[ToolAt]] = {
+        "told": ["", "journal", "zero", "known"],
+        "kept": ["zero"],
+        "steps": ["journal", "zero"],
+        "homed": [""],
+    }
+    return choices[wire.place]
 
 
 def _machine(target: LoadedTarget) -> dict[str, Any]:
@@ -409,7 +514,7 @@ def _machine(target: LoadedTarget) -> dict[str, Any]:
             "travel_mm": axis.travel_mm,
             "max_rate_mm_min": axis.max_rate_mm_min,
         }
-        for name, axis in zip("xyz", machine.axes, strict=True)
+        for name, axis in zip(AXES, machine.axes, strict=True)
     }
     return {
         "name": machine.target.name,

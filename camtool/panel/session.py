@@ -7,6 +7,7 @@ come from other threads, and are carried out at the next turn of the driver, wit
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
@@ -18,18 +19,21 @@ from typing import TYPE_CHECKING, Any, Final
 from msgspec import Struct
 
 from camtool.errors import CamtoolError, MachineError
+from camtool.panel.program import BlockFacts, Course
 from camtool.sending.carry import SendOptions, carry_program, program_conversation
 from camtool.sending.drive import Driver, LineToController, Order, Request
 from camtool.sending.line import Port
 from camtool.sending.prepare import Consignment, manner_of, wire_of
 from camtool.target.wire import (
     LATE_S,
+    NEAR_MM,
     Conversation,
     Hand,
     HandAction,
     Override,
     Place,
     WireState,
+    place_words,
 )
 
 if TYPE_CHECKING:
@@ -46,6 +50,12 @@ MAX_MESSAGES: Final = 200
 """Messages that are kept for pages that come later."""
 
 
+RATE_S: Final = 0.5
+"""Time over which the rate of counted steps is measured, s."""
+
+AXES: Final = "xyz"
+
+
 class Message(Struct, frozen=True):
     """A sentence for the user with its number, counted from 1; `bad` if something went wrong."""
 
@@ -59,8 +69,15 @@ class MachineState(Struct, frozen=True):
 
     `state`: "closed" without a line, otherwise the state of the conversation; `why`: what it waits
     for, or why it has ended; `says`: the state in the controller's word; `place_mm`: as it reports
-    it, in the work frame; `overrides` in %. Of a program: `sent`, `acknowledged`, `done` packets,
-    the `block` that was acknowledged last (from 1; 0 for none), and the time `left_s`.
+    it or as it is counted, in the work frame, `machine_mm`: from machine zero; `is_homed`: that is
+    known, and the travel is watched, whose ends in the work frame are `travel_mm`; the feed, the
+    step rate of the fastest axis and the speed of the spindle; `overrides` in %.
+
+    Of a program: `sent`, `acknowledged`, `done` packets, the bytes `buffered` that are not
+    acknowledged, the `block` that was acknowledged last (from 1; 0 for none), where the one that
+    is cut ends, `programmed_mm`, and the time `left_s`. `stops`: it waits at a stop for the user,
+    as for another tool; `change_first`: it was left there to touch off, and goes on with this
+    block (0: no).
     """
 
     state: str = "closed"
@@ -68,12 +85,42 @@ class MachineState(Struct, frozen=True):
     says: str = ""
     runs: bool = False
     place_mm: Place | None = None
+    machine_mm: Place | None = None
+    is_homed: bool = False
+    travel_mm: tuple[Place, Place] | None = None
+    programmed_mm: Place | None = None
+    feed_mm_min: float | None = None
+    step_hz: float | None = None
+    rpm: float | None = None
     overrides: Mapping[Override, int] = {}
     sent: int = 0
     acknowledged: int = 0
     done: int = 0
+    buffered: int = 0
     block: int = 0
     left_s: float = 0.0
+    stops: bool = False
+    change_first: int = 0
+
+
+class StepRate:
+    """The rate of counted steps, by the places of the last `RATE_S`."""
+
+    def __init__(self, step_mm: tuple[float, ...], speed: float) -> None:
+        self._step_mm, self._speed = step_mm, speed
+        self._places: deque[tuple[float, Place]] = deque()
+
+    def add(self, place_mm: Place, now: float) -> tuple[float, float]:
+        """Note a place; return the feed, mm/min, and the step rate of the fastest axis, Hz."""
+        self._places.append((now, place_mm))
+        while now - self._places[0][0] > RATE_S and len(self._places) > 1:
+            self._places.popleft()
+        (before, start), seconds = self._places[0], (now - self._places[0][0]) * self._speed
+        if seconds <= 0.0 or before == now:
+            return 0.0, 0.0
+        ways = [abs(to - at) for to, at in zip(place_mm, start, strict=True)]
+        hz = max(way / step for way, step in zip(ways, self._step_mm, strict=True)) / seconds
+        return math.hypot(*ways) / seconds * 60.0, hz
 
 
 class Session:
@@ -100,11 +147,19 @@ class Session:
         self._held_until: float | None = None
         self._closing = threading.Event()
         self._opens = threading.Event()
-        self._left_s: list[float] = []
-        self._running: Consignment | None = None
+        self._course: Course | None = None
+        self._legs: deque[tuple[Mapping[str, float], float]] = deque()
+        self._leg: Mapping[str, float] = {}
+        self._change_first = 0
+        self._leaves_stop = False
+        is_told = self.wire.place == "told" or self.wire.jogs_from_place
+        self._place_mm: Place | None = None if is_told else (0.0, 0.0, 0.0)
+        self._machine_mm: Place | None = None
+        self._is_homed = False
+        self._home_mm: Place | None = None  # where homing has left it, from machine zero
+        steps = tuple(axis.coded_step_mm for axis in target.machine.axes)
+        self._step_mm, self._rate = steps, StepRate(steps, speed)
         self._count = 0
-        self._at_mm: Place | None = None
-        """Where the machine stands between conversations, as far as that is known."""
         self._thread: threading.Thread | None = None
 
     # Requests, from any thread.
@@ -132,6 +187,7 @@ class Session:
             while True:
                 self._requests.get_nowait()
         self._held_until = self._next = None
+        self._legs.clear()
         self._requests.put(Request.STOP)
 
     def request(self, request: Request) -> None:
@@ -139,8 +195,46 @@ class Session:
         self._requests.put(request)
 
     def order(self, action: HandAction, values: Mapping[str, float]) -> None:
-        """Home, zero, jog or unlock."""
-        self._by_hand(lambda hand, now: hand.order(action, values, now))
+        """Home, zero, jog or unlock. A jog that would leave the travel is refused."""
+
+        def begin(hand: Hand, now: float) -> None:
+            if action == "jog":
+                self._check_travel(values)
+            hand.order(action, values, now)
+
+        self._by_hand(begin)
+
+    def go(self, places: Mapping[str, float], feed: float) -> None:
+        """Go to a place of the work frame: up first, then across, then down. MachineError where
+        the place of the tool is not known."""
+        at = self.state.place_mm
+        if at is None:
+            raise MachineError("nobody knows where the tool stands", mend="home it or zero it")
+        goal = {axis: places[axis] for axis in AXES if axis in places}
+        self._check_travel({axis: goal[axis] - at[AXES.index(axis)] for axis in goal})
+        across = {axis: goal[axis] for axis in "xy" if axis in goal}
+        legs = [across] if across else []
+        if "z" in goal:
+            legs.insert(0 if goal["z"] > at[2] else len(legs), {"z": goal["z"]})
+        self._leg = {}
+        self._legs = deque((leg, feed) for leg in legs)
+
+    def go_home(self, feed: float) -> None:
+        """Go to machine zero, where homing has left it. MachineError where it was not homed."""
+        at, machine_at, home = self.state.place_mm, self.state.machine_mm, self._home_mm
+        if at is None or machine_at is None or home is None or not self.state.is_homed:
+            raise MachineError("it was not homed from here", mend="home it")
+        columns = zip(AXES, at, machine_at, home, strict=True)
+        self.go({axis: end + one - other for axis, one, other, end in columns}, feed)
+
+    def leave_stop(self) -> None:
+        """End a program that waits at a stop, so that the machine can be moved by hand, as to
+        touch off another tool; it goes on behind the stop."""
+        if not self.state.stops:
+            self.tell("the program does not wait at a stop", bad=True)
+            return
+        self._leaves_stop = True
+        self._requests.put(Request.STOP)
 
     def say(self, line: str) -> None:
         """Type a line to the controller."""
@@ -148,14 +242,60 @@ class Session:
         self._by_hand(lambda hand, now: hand.say(line, now))
 
     def hold(self, values: Mapping[str, float]) -> None:
-        """Move until `release`, or until `keep` has not been called for `HELD_S`."""
+        """Move until `release`, until `keep` has not been called for `HELD_S`, or to the end of
+        the travel where that is known."""
         self._held_until = time.monotonic() + HELD_S
 
         def begin(hand: Hand, now: float) -> None:
             if self._held_until is not None:  # else it has been let go already
-                hand.hold(values, now)
+                hand.hold({**values, **self._room(values)}, now)
 
         self._by_hand(begin)
+
+    @property
+    def ends_mm(self) -> tuple[Place, Place] | None:
+        """The ends of the travel in the work frame; None while they are not known."""
+        at, machine_at = self._place_mm, self._machine_mm
+        if not self._is_homed or at is None or machine_at is None:
+            return None
+        low, high = self.wire.travel_mm(self.target.machine)
+        (x, y, z), (u, v, w) = (
+            [end + at[k] - machine_at[k] for k, end in enumerate(ends)] for ends in (low, high)
+        )
+        return (x, y, z), (u, v, w)
+
+    def _check_travel(self, values: Mapping[str, float]) -> None:
+        """Raise MachineError for a way, mm by axis, that leaves the travel."""
+        ends, at = self.ends_mm, self._place_mm
+        if ends is None or at is None:
+            return
+        for k, axis in enumerate(AXES):
+            way = values.get(axis, 0.0)
+            excess = max(at[k] + way - ends[1][k], ends[0][k] - at[k] - way)
+            if way and excess > NEAR_MM and (at[k] + way > ends[1][k]) == (way > 0.0):
+                room = abs(way) - excess
+                raise MachineError(
+                    f"{axis.upper()}{way:+.3f} mm leaves the travel by {excess:.3f} mm: it ends "
+                    f"at {axis.upper()}{ends[way > 0.0][k]:.3f}",
+                    mend=f"go by {max(room, 0.0):.3f} mm at most",
+                )
+
+    def _room(self, values: Mapping[str, float]) -> Mapping[str, float]:
+        """Return how far a held jog may go, mm; MachineError at the end of the travel."""
+        ends, at = self.ends_mm, self._place_mm
+        senses = [values.get(axis, 0.0) for axis in AXES]
+        norm = math.hypot(*senses)
+        if ends is None or at is None:
+            return {}
+        rooms = [
+            (ends[sense > 0.0][k] - at[k]) * norm / sense
+            for k, sense in enumerate(senses)
+            if sense
+        ]
+        room = min(rooms, default=math.inf)
+        if room <= NEAR_MM:
+            raise MachineError("it stands at the end of its travel", mend="jog the other way")
+        return {"room": room} if math.isfinite(room) else {}
 
     def keep(self) -> None:
         """Confirm that the key is still held."""
@@ -178,7 +318,18 @@ class Session:
                 f"the machine is not ready ({self.state.state})",
                 mend="wait until it stands, or connect it",
             )
-        self._next = one, options
+        at = self.state.place_mm
+        if self.wire.place == "kept" and at is not None:
+            start = one.place_of(
+                one.wire.conversation((), self.target.machine, manner_of(self.target))
+            )
+            if start is not None and math.dist(at, start) > NEAR_MM:
+                raise MachineError(
+                    f"the tool stands at {place_words(at)}, and the program begins at "
+                    f"{place_words(start)}",
+                    mend="go there, or zero all axes here",
+                )
+        self._next, self._change_first = (one, options), 0
         self._by_hand(lambda hand, now: hand.close(now))
 
     def tell(self, text: str, *, bad: bool = False) -> None:
@@ -213,7 +364,12 @@ class Session:
                     self._converse(line)
             except CamtoolError as error:
                 self.tell(str(error), bad=True)
-            self._set(MachineState(why=self.state.why))
+            self._forget_place()
+            self._set(MachineState(why=self.state.why, change_first=self._change_first))
+
+    def _forget_place(self) -> None:
+        """The machine position is not known any more: it may have been switched off."""
+        self._is_homed, self._machine_mm = False, None
 
     def _converse(self, line: LineToController) -> None:
         """Hold conversations until the line is to be closed or nobody can speak to the machine."""
@@ -222,8 +378,9 @@ class Session:
             if following is not None:
                 self._send(line, *following)
                 continue
-            manner = manner_of(self.target, late_s=LATE_S * self.speed, at_mm=self._at_mm)
+            manner = manner_of(self.target, late_s=LATE_S * self.speed, at_mm=self._place_mm)
             hand = self.wire.hand(self.target.machine, manner)
+            hand.machine_mm, hand.is_homed = self._machine_mm, self._is_homed
             driver = Driver(
                 line,
                 wish=self._wish,
@@ -233,7 +390,6 @@ class Session:
                 tick_s=TICK_S,
             )
             driver.carry(hand)
-            self._at_mm = hand.place_mm if hand.is_still else None
             if hand.state is WireState.FAILED:
                 self.tell(hand.why, bad=True)
                 return
@@ -242,7 +398,7 @@ class Session:
 
     def _send(self, line: LineToController, one: Consignment, options: SendOptions) -> None:
         """Send a program to its end."""
-        self._left_s, self._running = one.times_left_s(), one
+        self._course, self._leaves_stop = Course(one), False
         try:
             conversation = program_conversation(one, self.target, self.port, options)
             sent = carry_program(
@@ -260,11 +416,16 @@ class Session:
             self.tell(str(error), bad=True)
             return
         finally:
-            self._running = None
-        is_still = sent.conversation.is_still
-        self._at_mm = one.place_of(sent.conversation) if is_still else None
+            self._course = None
+        if conversation.state is WireState.FAILED:
+            self._forget_place()
+        knows = conversation.is_still or conversation.counts_steps
+        if self.wire.place != "told" and not knows:
+            self._place_mm = None
         if sent.is_finished:
             self.tell(f"finished: {len(one.packets)} packets")
+        elif self._leaves_stop and conversation.state is WireState.STOPPED:
+            self.tell(f"change the tool and touch off; it goes on with block {self._change_first}")
         else:
             self.tell(f"{sent.words}; it can be resumed", bad=True)
 
@@ -277,29 +438,104 @@ class Session:
             self.tell("let go: the page has not confirmed the key")
         with suppress(queue.Empty):
             return self._requests.get_nowait()
+        if self._legs and self.state.state == WireState.READY.value:
+            return self._next_leg()
         return None
 
+    def _next_leg(self) -> Order | None:
+        """Return the order of the next leg of the way to a place."""
+        at = self.state.place_mm
+        (goal, feed), before = self._legs.popleft(), self._leg
+        arrived = at is not None and all(
+            abs(at[AXES.index(axis)] - place) < NEAR_MM for axis, place in before.items()
+        )
+        if at is None or not arrived:
+            self._legs.clear()
+            self.tell("it has not arrived where it was to go, and stays there", bad=True)
+            return None
+        self._leg = goal
+        ways = {axis: place - at[AXES.index(axis)] for axis, place in goal.items()}
+        ways = {
+            axis: way
+            for axis, way in ways.items()
+            if abs(way) >= 0.5 * self._step_mm[AXES.index(axis)]
+        }
+        if not ways:
+            return None
+
+        def begin(talk: Conversation, now: float) -> None:
+            if isinstance(talk, Hand):
+                try:
+                    talk.order("jog", {**ways, "feed": feed}, now)
+                except CamtoolError as error:
+                    self._legs.clear()
+                    self.tell(str(error), bad=True)
+
+        return begin
+
     def _show(self, talk: Conversation) -> None:
-        one, block, left = self._running, 0, 0.0
-        if one is not None:
-            left = self._left_s[talk.acknowledged]
-            if talk.acknowledged:
-                block = one.block_of(one.packets[talk.acknowledged - 1].block) + 1
+        course = self._course
+        facts = BlockFacts() if course is None else course.facts(talk)
+        before, at = self._place_mm, talk.place_mm
+        if course is not None and not talk.counts_steps:
+            at = course.one.place_of(talk)
+        if self.wire.place == "told":
+            self._machine_mm = talk.machine_mm or self._machine_mm
+        elif isinstance(talk, Hand):
+            self._machine_mm = talk.machine_mm
+        elif self._machine_mm is not None and None not in (at, before):
+            columns = zip(self._machine_mm, at or (), before or (), strict=True)
+            x, y, z = (machine + to - start for machine, to, start in columns)
+            self._machine_mm = x, y, z
+        self._place_mm = at
+        if isinstance(talk, Hand):
+            if talk.is_homed and not self._is_homed:
+                self._home_mm = self._machine_mm
+            self._is_homed = talk.is_homed
+        stops = course is not None and talk.state is WireState.WAITING
+        stops = stops and (talk.is_program_stop or bool(talk.packets[talk.done].ask))
+        if course is not None and stops:
+            self._change_first = course.following_block(talk)
+        elif course is not None and not self._leaves_stop:
+            self._change_first = 0
+        feed, hz = self._speeds(talk, facts)
         self._set(
             MachineState(
                 state=talk.state.value,
                 why=talk.why,
                 says=getattr(talk, "says", ""),
-                runs=one is not None,
-                place_mm=talk.place_mm if one is None else one.place_of(talk),
+                runs=course is not None,
+                place_mm=at,
+                machine_mm=self._machine_mm,
+                is_homed=self._is_homed,
+                travel_mm=self.ends_mm,
+                programmed_mm=facts.end_mm,
+                feed_mm_min=feed,
+                step_hz=hz,
+                rpm=talk.rpm if course is None or talk.rpm is not None else facts.rpm,
                 overrides=dict(talk.overrides),
                 sent=talk.sent,
                 acknowledged=talk.acknowledged,
                 done=talk.done,
-                block=block,
-                left_s=left,
+                buffered=0 if course is None else course.waiting_bytes(talk),
+                block=0 if course is None else course.acknowledged_block(talk),
+                left_s=0.0 if course is None else course.left_s(talk.acknowledged),
+                stops=stops,
+                change_first=0 if stops else self._change_first,
             )
         )
+
+    def _speeds(self, talk: Conversation, facts: BlockFacts) -> tuple[float | None, float | None]:
+        """Return the feed, mm/min, and the step rate, Hz: as counted, or else by the feed that is
+        reported or programmed; None for what is not known, as that of a rapid."""
+        if talk.counts_steps and talk.place_mm is not None:
+            return self._rate.add(talk.place_mm, time.monotonic())
+        moves = talk.state in (WireState.SENDING, WireState.PAUSING, WireState.STOPPING)
+        feed = talk.feed_mm_min
+        if feed is None and (self._course is None or not moves):
+            return (None if moves else 0.0), (None if moves else 0.0)
+        feed = facts.feed_mm_min if feed is None else feed
+        return feed, None if feed is None else feed / 60.0 / self._step_mm[0]
 
     def _set(self, state: MachineState) -> None:
         if state != self.state:

@@ -77,6 +77,7 @@ def program_conversation(
         paced=not port.is_virtual,
         file=options.file,
         standing=one.standing if one.wire.place == "told" else None,
+        at_mm=one.begin_mm,
         reach_mm=one.reach_mm,
     )
     packets = [replace(packet, ask="") for packet in one.packets[:1]] + [*one.packets[1:]]

@@ -107,6 +107,12 @@ class Consignment(Struct, frozen=True, eq=False):
         seconds = [packet.seconds for packet in reversed(self.packets)]
         return list(accumulate(seconds, initial=0.0))[::-1]
 
+    @property
+    def begin_mm(self) -> Place:
+        """Place at which the tool stands when it begins, in the work frame."""
+        x, y, z = self.forecast.decoded.start.tolist()
+        return x, y, z
+
     def place_of(self, conversation: Conversation) -> Place | None:
         """Return the place that the machine reports, or else the end of the last block that is
         done, in the work frame in which the program begins."""

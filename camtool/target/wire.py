@@ -241,6 +241,13 @@ class Conversation(ABC):
         self.why = ""
         self.sent = self.acknowledged = self.done = 0
         self.place_mm: Place | None = None
+        self.machine_mm: Place | None = None
+        """Position from machine zero, mm, None where it is not known."""
+        self.counts_steps = False
+        """True if its place is counted by the steps that the controller reports."""
+        self.feed_mm_min: float | None = None
+        self.rpm: float | None = None
+        """Feed and spindle speed that the controller reports, None where it does not."""
         self.is_program_stop = False
         """True where it was last WAITING because the program stops for an operator (M0)."""
         self.overrides: dict[Override, int] = {}
@@ -471,6 +478,8 @@ class PacketByPacket(Conversation):
 class Hand(Conversation):
     """A machine moved by hand: a conversation that stays open between orders.
 
+    `is_homed`: its machine position is known since it was homed.
+
     It is READY between orders, SENDING while one is carried out, and READY again when the machine
     stands; an order that the controller refuses is told, and changes nothing. `stop` stops the
     machine and ends the conversation, as everywhere; `close` ends it while the machine stands.
@@ -478,6 +487,7 @@ class Hand(Conversation):
     """
 
     says = ""
+    is_homed = False
 
     @abstractmethod
     def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
@@ -486,8 +496,9 @@ class Hand(Conversation):
 
     @abstractmethod
     def hold(self, values: Mapping[str, float], now: float) -> None:
-        """Move in a direction until `release`: `values` are the senses of the axes (−1, 1) and the
-        "feed" (mm/min). MachineError as of `order`."""
+        """Move in a direction until `release`: `values` are the senses of the axes (−1, 1), the
+        "feed" (mm/min), and the "room" (mm) after which it ends at the latest, where that is
+        known. MachineError as of `order`."""
 
     @abstractmethod
     def release(self, now: float) -> None:
@@ -514,12 +525,18 @@ class Hand(Conversation):
 
 
 class CommandHand(Hand):
-    """A machine moved by the commands of its wire: each order is a conversation of its own."""
+    """A machine moved by the commands of its wire: each order is a conversation of its own.
+
+    Where the controller reports no place, the place is where the session has begun, plus what was
+    counted, or what orders that were carried out have moved.
+    """
 
     def __init__(self, wire: Wire, machine: Machine[Any, Any], manner: Manner) -> None:
         super().__init__((), manner)
         self._wire, self._machine = wire, machine
         self._order: Conversation | None = None
+        self._action = ""
+        self._values: Mapping[str, float] = {}
 
     def begin(self, now: float) -> None:
         """Be ready: nothing is known of the machine but what was known before."""
@@ -528,7 +545,7 @@ class CommandHand(Hand):
     def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
         """Hold the conversation of the command."""
         manner = replace(self.manner, at_mm=self.place_mm)
-        self._begin(action, self._wire.command(action, self._machine, values, manner), now)
+        self._begin(action, self._wire.command(action, self._machine, values, manner), now, values)
 
     def hold(self, values: Mapping[str, float], now: float) -> None:
         """Hold the conversation of the command that moves until it is stopped."""
@@ -544,9 +561,16 @@ class CommandHand(Hand):
         """Type the line to the terminal of the controller."""
         self._begin("line", TypedLine(self._wire.terminal(self._machine), line, self.manner), now)
 
-    def _begin(self, action: str, conversation: Conversation, now: float) -> None:
+    def _begin(
+        self,
+        action: str,
+        conversation: Conversation,
+        now: float,
+        values: Mapping[str, float] | None = None,
+    ) -> None:
         self.check_ready(action)
         self._order, self.state, self.why = conversation, WireState.SENDING, ""
+        self._action, self._values = action, values or {}
         conversation.begin(now)
         self._follow()
 
@@ -602,21 +626,66 @@ class CommandHand(Hand):
             return
         self._out += order.actions()
         self.next_s, self.why = order.next_s, order.why
-        self.place_mm = order.place_mm or self.place_mm
+        self.counts_steps = order.counts_steps
+        if self._wire.place == "told":
+            self.place_mm = order.place_mm or self.place_mm
+            self.machine_mm = order.machine_mm or self.machine_mm
+        elif order.place_mm is not None and self._action != "zero":
+            self._move_to(order.place_mm)
         if not order.is_over:
             if self.state is not WireState.STOPPING:
                 halted = order.state in HALTS
                 self.state = order.state if halted else WireState.SENDING
             return
+        self._settle(order)
         self._order, self.next_s = None, NEVER
-        if self._wire.place in ("kept", "steps"):
-            self.place_mm = order.place_mm if order.is_still else None
         if self.state is WireState.STOPPING:
             self._end(order.state, order.why)
             return
         self.state, self.why = WireState.READY, ""
         if order.state is not WireState.FINISHED:
             self._tell(order.why)
+
+    def _move_to(self, place_mm: Place) -> None:
+        """Note that the tool stands at a place of the work frame."""
+        if self.place_mm is not None and self.machine_mm is not None:
+            columns = zip(self.machine_mm, place_mm, self.place_mm, strict=True)
+            x, y, z = (machine + place - before for machine, place, before in columns)
+            self.machine_mm = x, y, z
+        self.place_mm = place_mm
+
+    def _settle(self, order: Conversation) -> None:
+        """Note where an order that is over has left the tool."""
+        is_done = order.state is WireState.FINISHED
+        if self._wire.place == "told":
+            self.is_homed |= self._action == "home" and is_done
+        elif self._action == "home":
+            at = None if self.machine_mm is None else _moved(self.place_mm, self.machine_mm, -1.0)
+            self.place_mm = order.place_mm or (at or (0.0, 0.0, 0.0) if is_done else None)
+            self.machine_mm, self.is_homed = ((0.0, 0.0, 0.0) if is_done else None), is_done
+        elif self._action == "zero":
+            if is_done:
+                at = self.place_mm or (0.0, 0.0, 0.0)
+                x, y, z = (self._values.get(axis, at[k]) for k, axis in enumerate("xyz"))
+                self.place_mm = x, y, z
+        elif order.counts_steps and order.state is not WireState.FAILED:
+            return
+        elif order.place_mm is None and self._action == "jog" and is_done:
+            x, y, z = (self._values.get(axis, 0.0) for axis in "xyz")
+            moved = _moved(self.place_mm, (x, y, z))
+            if moved is not None:
+                self._move_to(moved)
+        elif order.place_mm is None or not order.is_still:
+            self.place_mm = self.machine_mm = None
+            self.is_homed = False
+
+
+def _moved(place_mm: Place | None, by_mm: Place, sense: float = 1.0) -> Place | None:
+    """Return a place moved by so much; None for none."""
+    if place_mm is None:
+        return None
+    x, y, z = (at + sense * by for at, by in zip(place_mm, by_mm, strict=True))
+    return x, y, z
 
 
 QUIET_S = 0.3
@@ -699,11 +768,20 @@ class Wire(ABC):
     """Effect of a stop, such as "the machine stops at once"."""
     by_hand: ClassVar[frozenset[HandAction]] = frozenset()
     """Orders by hand that `command`, or the controller's own `hand`, takes."""
+    zeroes_each: ClassVar[bool] = True
+    """True if it zeroes axes one by one."""
     overrides: ClassVar[tuple[Override, ...]] = ()
     """Overrides that its conversations carry out."""
     jogs_from_place: ClassVar[bool] = False
     """True if a jog needs the place of the tool (`Manner.at_mm`), since the controller moves to
     absolute places and does not say where it stands."""
+
+    def travel_mm(self, machine: Machine[Any, Any]) -> tuple[Place, Place]:
+        """Return the lowest and the highest place of the travel from machine zero, mm; infinite
+        where it is not known."""
+        x, y, z = (math.inf if (each := axis.travel_mm) is None else each for axis in machine.axes)
+        u, v, w = (0.0 if math.isfinite(each) else -math.inf for each in (x, y, z))
+        return (u, v, w), (x, y, z)
 
     @abstractmethod
     def packets(

@@ -15,6 +15,7 @@ stepper.c, protocol.c).
 
 from __future__ import annotations
 
+import math
 import re
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -237,6 +238,12 @@ class GrblWire(Wire):
         """G38.3 to each place, and G10 L20 where a zero is set."""
         return GrblProbing(cycle, machine, manner)
 
+    def travel_mm(self, machine: GrblMachine) -> tuple[Place, Place]:
+        """From −travel to 0 (limits.c, system_check_travel_limits)."""
+        _, (u, v, w) = super().travel_mm(machine)
+        x, y, z = (0.0 if math.isfinite(each) else each for each in (u, v, w))
+        return (-u, -v, -w), (x, y, z)
+
     def hand(self, machine: GrblMachine, manner: Manner) -> GrblHand:
         """Return one conversation for all orders: `command` would reset grbl before each."""
         return GrblHand(machine, manner)
@@ -302,7 +309,6 @@ class GrblConversation(Conversation):
         self._probed = 0  # packets before the last query that was sent
         self._phase = "greeting"
         self._offset: Place | None = None  # its work zero, once it has said so
-        self._machine_mm: Place | None = None
         self._frame: Place | None = None  # the work zero with which the program begins
         self._standing = None if manner.home else manner.standing
         self._restarted = False  # whether it has begun anew with the port
@@ -338,9 +344,9 @@ class GrblConversation(Conversation):
     @property
     def at_mm(self) -> Place | None:
         """By its machine position, so that frames that the program sets do not matter."""
-        if self._frame is None or self._machine_mm is None:
+        if self._frame is None or self.machine_mm is None:
             return None
-        return _difference(self._machine_mm, self._frame)
+        return _difference(self.machine_mm, self._frame)
 
     @property
     def is_still(self) -> bool:
@@ -627,6 +633,9 @@ class GrblConversation(Conversation):
             if stale:
                 return
             if self._stops():
+                stop = self.packets[self.acknowledged : self.sent][:1]
+                if stop and stop[0].waits:  # it has waited for all that is before it
+                    self.done = max(self.done, self.acknowledged)
                 self.state, self.why = WireState.WAITING, self._stop_note()
                 self.is_program_stop = True
             elif self._holds >= MIN_HOLD_REPORTS:
@@ -660,6 +669,8 @@ class GrblConversation(Conversation):
         values = dict(field.split(":", 1) for field in fields.split("|") if field)
         feed, before = values.get("FS", values.get("F", "")).partition(",")[0], self._feed
         self._feed = float(feed) if _FEED.fullmatch(feed) else 0.0
+        speed = values.get("FS", "").partition(",")[2]
+        self.feed_mm_min, self.rpm = self._feed, float(speed) if _FEED.fullmatch(speed) else None
         self._slows = self._feed < before
         reports_overrides = bool(_OVERRIDES.fullmatch(values.get("Ov", "")))
         if reports_overrides:
@@ -686,10 +697,10 @@ class GrblConversation(Conversation):
                 self._offset = (x, y, z)
             elif name == "WPos":
                 self.place_mm = (x, y, z)
-                self._machine_mm = _difference(self.place_mm, _difference((0.0, 0.0, 0.0), offset))
+                self.machine_mm = _difference(self.place_mm, _difference((0.0, 0.0, 0.0), offset))
             else:
-                self._machine_mm = (x, y, z)
-                self.place_mm = _difference(self._machine_mm, offset)
+                self.machine_mm = (x, y, z)
+                self.place_mm = _difference(self.machine_mm, offset)
 
     def _check_first_report(self, state: str, now: float) -> None:
         """Handle its first report: begin only with a controller at rest, and reset it, so that
@@ -734,7 +745,7 @@ class GrblConversation(Conversation):
     def _ready(self, now: float) -> None:
         """Begin, unless the program is to go on where the controller does not take it to stand."""
         if self._standing is not None:
-            place_said, stated_place = self._machine_mm, self._standing.said_mm
+            place_said, stated_place = self.machine_mm, self._standing.said_mm
             place = _difference(place_said, self._offset) if place_said and self._offset else None
             reason = self._standing.refusal(place, restarted=self._restarted)
             if place_said is None or reason:
@@ -1086,6 +1097,8 @@ class GrblHand(GrblConversation, Hand):
     def __init__(self, machine: GrblMachine, manner: Manner) -> None:
         super().__init__((), machine, manner)
         self._held: Mapping[str, float] = {}
+        self._room_mm = math.inf  # of a held jog, until it would leave the travel
+        self._homes_now = False
         self._released = False
         self._queued_s = 0.0  # the time up to which the pieces of a held jog last
         self._typed = False  # whether answers are those to a typed line
@@ -1115,6 +1128,7 @@ class GrblHand(GrblConversation, Hand):
             )
         self.state, self.why, self._idle = WireState.SENDING, "", 0
         self._jogs, self._typed, self._acted = line.startswith(b"$J="), False, True
+        self._homes_now = line == HOMING
         self._put(_Line(line))
         self._poll(now)
 
@@ -1124,6 +1138,7 @@ class GrblHand(GrblConversation, Hand):
         if self.says == "Alarm":
             raise MachineError("it is locked", mend="home it, or unlock it if its place is known")
         self._held, self._released = dict(values), False
+        self._room_mm = values.get("room", math.inf)
         self.state, self.why, self._idle = WireState.SENDING, "", 0
         self._jogs, self._acted, self._queued_s = True, True, now
         self._lengthen(now)
@@ -1154,7 +1169,12 @@ class GrblHand(GrblConversation, Hand):
         self.next_s = min(max(self.next_s, now), now + piece_s)
         if self._out_lines or self._queued_s - now > stops_s + HELD_PIECES * piece_s:
             return
-        axes = {axis: sense / norm * speed * piece_s for axis, sense in senses.items()}
+        length = min(speed * piece_s, self._room_mm)
+        self._room_mm -= length
+        if length <= 0.0:
+            self._held = {}
+            return
+        axes = {axis: sense / norm * length for axis, sense in senses.items()}
         self._put(_Line(hand_line("jog", {**axes, "feed": self._held["feed"]})))
         self._queued_s = max(self._queued_s, now) + piece_s
 
@@ -1185,7 +1205,7 @@ class GrblHand(GrblConversation, Hand):
         self._out_lines.popleft()
         self._idle = 0
         if line != "ok":
-            self._held = {}
+            self._held, self._homes_now = {}, False
             if not self._typed:
                 meaning = ERRORS.get(int(line[6:]), "it says no more")
                 self._tell(f"it refuses ({line}): {meaning}")
@@ -1203,6 +1223,7 @@ class GrblHand(GrblConversation, Hand):
             super()._status(state, fields, now)
             return
         self._where(fields, now)
+        self.is_homed = False
         if self._phase == "greeting":
             self._phase = "commands"
         if not self._out_lines:
@@ -1212,7 +1233,8 @@ class GrblHand(GrblConversation, Hand):
         """Behind an order it is ready for the next one."""
         if state is WireState.FINISHED and self.state is WireState.SENDING:
             self.state, self.why, self._released = WireState.READY, "", False
-            self._typed = False
+            self.is_homed |= self._homes_now
+            self._typed = self._homes_now = False
             return
         super()._end(state, why)
 

@@ -143,6 +143,11 @@ class LinuxcncWire(Wire):
         """The words of linuxcncrsh."""
         return LinuxcncTerminal(_link(machine))
 
+    def travel_mm(self, machine: LinuxcncMachine) -> tuple[Place, Place]:
+        """Unknown: LinuxCNC itself keeps to the limits of its INI file."""
+        x = math.inf
+        return (-x, -x, -x), (x, x, x)
+
     def command(
         self,
         action: str,
@@ -190,6 +195,7 @@ class LinuxcncConversation(Conversation):
         }
         self._script, self._fresh = self._session(acts[action]), True
         self._rest, self._asked, self._now = b"", "", 0.0
+        self._zero_mm: Place | None = None  # part zero of its frame, from machine zero
         self._skips = ""
         """Answers that begin otherwise are passed over."""
         self._begun = self._aborting = self._pausing = self._going_on = False
@@ -319,12 +325,21 @@ class LinuxcncConversation(Conversation):
             raise _Refused(f"it refuses 'set {_without_password(words)}': {answer[:60]}")
 
     def _place(self) -> Generator[str | float, str, Place]:
-        text = yield from self._get("rel_act_pos")
+        x, y, z = yield from self._coordinates("rel_act_pos")
+        if self._zero_mm is None:
+            a, b, c = yield from self._coordinates("abs_act_pos")
+            self._zero_mm = a - x, b - y, c - z
+        self.place_mm = x, y, z
+        a, b, c = self._zero_mm
+        self.machine_mm = x + a, y + b, z + c
+        return x, y, z
+
+    def _coordinates(self, name: str) -> Generator[str | float, str, Place]:
+        text = yield from self._get(name)
         try:
             x, y, z = (float(each) for each in text.split()[:JOINTS])
         except ValueError:
             raise _Refused(f"a place that is none: {text[:60]!r}") from None
-        self.place_mm = x, y, z
         return x, y, z
 
     def _errors(self) -> Generator[str | float, str, str]:

@@ -9,6 +9,7 @@ come as the simulation makes outputs, and its time is over. The controller says 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -21,6 +22,7 @@ from camtool.target.wire import (
     Manner,
     Packet,
     PacketByPacket,
+    Place,
     Wire,
     WireState,
 )
@@ -28,6 +30,8 @@ from camtool.target.wire import (
 from .dialect import PicMmhLink, PicMmhMachine
 
 ALTO: Final = b"A;"
+_ZEROES: Final = (b"Q;", b"G54;")
+"""Strings that make the place of the tool part zero."""
 
 _STEPS = re.compile(rb"P[XYZ][+-](\d{4});")
 
@@ -69,6 +73,7 @@ class PicMmhWire(Wire):
     )
     stopping = "A; stops it at once; its motors keep their place"
     by_hand = frozenset({"home", "zero", "jog", "hold", "line"})
+    zeroes_each = False
 
     def packets(self, data: bytes, machine: PicMmhMachine, forecast: Forecast) -> Sequence[Packet]:
         """The compensations, then the blocks."""
@@ -124,6 +129,7 @@ class PicMmhWire(Wire):
                 for text, count in _steps(letter, values[letter], axis.coded_step_mm)
             ]
         elif action == "hold":
+            room, feed = values.get("room", math.inf), values["feed"]
             senses = {letter: values[letter] for letter in "xyz" if values.get(letter)}
             if len(senses) != 1:
                 raise MachineError(
@@ -131,6 +137,10 @@ class PicMmhWire(Wire):
                     mend="hold one key at a time",
                 )
             [(letter, sense)] = senses.items()
+            if math.isfinite(room):  # strings that end there by themselves
+                return self.command(
+                    "jog", machine, {letter: math.copysign(room, sense), "feed": feed}, manner
+                )
             text = f"J{letter.upper()}{'-' if sense < 0.0 else '+'};"
             steps = round(ENDLESS_S * _by_hand_hz(machine))
             packets = [Packet(text.encode(), seconds=ENDLESS_S, counts=(UNTIL_SILENT, steps))]
@@ -212,11 +222,56 @@ class PicMmhConversation(PacketByPacket):
         self._count = 0
         self._over = 0.0  # when the time of the block is over
         self._halting = False
+        self._step_mm = [axis.coded_step_mm for axis in machine.axes]
+        self._play_steps = [
+            round(axis.compensation_mm / axis.coded_step_mm)
+            if link.compensation == "reported"
+            else 0
+            for axis in machine.axes
+        ]
+        self._senses = [0, 0, 0]  # of the last step of each axis
+        self._silent_steps = [0, 0, 0]  # reports of compensation that are still to come
+        self._halt_byte = b""  # a byte that may be the first of A;, or a step
         self._ends = 0  # how many ; are to come back until A; has
         self._told = 0.0  # when A; was written last
 
+    def begin_at(self, place_mm: Place | None) -> None:
+        """Count from this place on, where steps are reported."""
+        self.place_mm = None if self._link.step_byte == "none" else place_mm
+        self.counts_steps = self.place_mm is not None
+
+    def _count_steps(self, octets: bytes) -> None:
+        """Move the place by reported steps; those of a compensation move nothing."""
+        if self.place_mm is None or not octets:
+            return
+        moved = [0, 0, 0]
+        for octet in octets:
+            for axis in range(3):
+                sense = self._sense(octet, axis)
+                if sense and sense != self._senses[axis]:
+                    if self._senses[axis]:
+                        self._silent_steps[axis] = self._play_steps[axis]
+                    self._senses[axis] = sense
+                if sense and self._silent_steps[axis]:
+                    self._silent_steps[axis] -= 1
+                else:
+                    moved[axis] += sense
+        columns = zip(self.place_mm, moved, self._step_mm, strict=True)
+        x, y, z = (at + count * step for at, count, step in columns)
+        self.place_mm = x, y, z
+
+    def _sense(self, octet: int, axis: int) -> int:
+        """Return 1, −1 or 0: the step of an axis that a byte reports."""
+        if self._link.step_byte == "letters":
+            return {"XYZ"[axis]: 1, "xyz"[axis]: -1}.get(chr(octet), 0)
+        if not 0x40 < octet < 0x80:
+            return 0
+        return (0, 1, 0, -1)[octet >> 2 * axis & 3]
+
     def _send(self, packet: Packet, now: float) -> None:
         self._write(packet.data)
+        if packet.data in _ZEROES:
+            self.place_mm = None if self.place_mm is None else (0.0, 0.0, 0.0)
         self._echo = packet.data if self._link.echo == "echo" else b""
         self._count = 0
         self.next_s = now + self.manner.patience_s
@@ -285,6 +340,13 @@ class PicMmhConversation(PacketByPacket):
         if self.is_over or not data:
             return
         if self._halting:
+            # A step of X in the positive sense is the letter A: only the ; behind it tells.
+            echoed = data.startswith(self._echo[: len(data)])
+            count = min(len(self._echo), len(data)) if echoed else 0
+            self._echo = self._echo[count:]
+            text = (self._halt_byte + data[count:]).replace(ALTO, b"")
+            self._halt_byte = text[-1:] if text[-1:] == ALTO[:1] else b""
+            self._count_steps(text.removesuffix(self._halt_byte))
             self._ends -= data.count(b";")
             if self._ends > 0 and now >= self._told + RESTOP_FACTOR * self.manner.late_s:
                 self._told = now
@@ -304,6 +366,7 @@ class PicMmhConversation(PacketByPacket):
         begins = bool(self._echo) and count == len(self._echo)
         self._echo, steps = self._echo[count:], data[count:]
         self._count += len(steps)
+        self._count_steps(steps)
         if any(not self._is_report(octet) for octet in steps):
             self._fail(f"it says {steps[:20]!r}, which is no step", now)
         elif begins:

@@ -275,14 +275,19 @@ function begin() {
   document.body.dataset.ready = "yes";
 }
 
-/** Within the panel: its page says how far the program has come, by block, and where the tool is. */
+/** Within the panel: its page says how far the program has come, by block, and where the tool and
+ * the travel are; it is told that Escape was pressed here. */
 function listenToFrame(columns, stage, player) {
   let shown = null;
+  window.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") window.parent.postMessage({ camtool: "stop" }, location.origin);
+  });
   window.addEventListener("message", (event) => {
     const said = event.origin === location.origin && event.data ? event.data.camtool : null;
     if (!said || !player || JSON.stringify(said) === shown) return;
     shown = JSON.stringify(said);
     stage.run.place = said.place;
+    stage.run.travel = said.travel;
     if (said.block !== null) {
       const rows = columns.move_block;
       let low = 0, high = rows.length;

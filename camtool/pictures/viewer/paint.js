@@ -265,11 +265,11 @@ function paintGrid(ctx, view, colours) {
 }
 
 /** The table's travel from part zero. */
-function paintTravel(ctx, view, [width, height], colours) {
+function paintTravel(ctx, view, [left, low, right, high], colours) {
   ctx.strokeStyle = colours.travel;
   ctx.lineWidth = 2;
   ctx.setLineDash([]);
-  ctx.strokeRect(view.px(0), view.py(height), width * view.scale, height * view.scale);
+  ctx.strokeRect(view.px(left), view.py(high), (right - left) * view.scale, (high - low) * view.scale);
 }
 
 /** Single points of the drawing. */

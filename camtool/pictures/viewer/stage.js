@@ -399,7 +399,7 @@ class Stage {
     this.clear("done");
     this.clear("ground");
     const { on, head } = this.layers;
-    if (on.get("travel")) paintTravel(this.contexts.ground, this.view, head.travel_mm, colours);
+    if (on.get("travel")) paintTravel(this.contexts.ground, this.view, [0, 0, ...head.travel_mm], colours);
   }
 
   paintPlan(colours) {
@@ -455,6 +455,7 @@ class Stage {
       paintTrack(ctx, view, track, { from: row, to: row + 1 }, { [row]: 0 }, [picked]);
     }
     if (this.mark) paintDots(ctx, view, this.mark, 14, { line: colours.pick, width: 3 });
+    if (run.travel) paintTravel(ctx, view, run.travel, colours);
     if (moves.count) paintTool(ctx, view, moves, run, this.layers.widthAt(run), colours);
   }
 
