@@ -51,7 +51,7 @@ MAX_MESSAGES: Final = 200
 
 
 RATE_S: Final = 0.5
-"""Time over which the rate of counted steps is measured, s."""
+"""Time of the machine over which the rate of counted steps is measured, s."""
 
 AXES: Final = "xyz"
 
@@ -113,10 +113,11 @@ class StepRate:
     def add(self, place_mm: Place, now: float) -> tuple[float, float]:
         """Note a place; return the feed, mm/min, and the step rate of the fastest axis, Hz."""
         self._places.append((now, place_mm))
-        while now - self._places[0][0] > RATE_S and len(self._places) > 1:
+        while len(self._places) > 2 and now - self._places[1][0] > RATE_S / self._speed:
             self._places.popleft()
-        (before, start), seconds = self._places[0], (now - self._places[0][0]) * self._speed
-        if seconds <= 0.0 or before == now:
+        before, start = self._places[0]
+        seconds = (now - before) * self._speed
+        if seconds <= 0.0:
             return 0.0, 0.0
         ways = [abs(to - at) for to, at in zip(place_mm, start, strict=True)]
         hz = max(way / step for way, step in zip(ways, self._step_mm, strict=True)) / seconds

@@ -229,6 +229,8 @@ class PicMmhConversation(PacketByPacket):
             else 0
             for axis in machine.axes
         ]
+        self._base_mm: Place | None = None  # where the counts began
+        self._counts = [0, 0, 0]
         self._senses = [0, 0, 0]  # of the last step of each axis
         self._silent_steps = [0, 0, 0]  # reports of compensation that are still to come
         self._halt_byte = b""  # a byte that may be the first of A;, or a step
@@ -237,14 +239,14 @@ class PicMmhConversation(PacketByPacket):
 
     def begin_at(self, place_mm: Place | None) -> None:
         """Count from this place on, where steps are reported."""
-        self.place_mm = None if self._link.step_byte == "none" else place_mm
+        self.place_mm = self._base_mm = None if self._link.step_byte == "none" else place_mm
+        self._counts = [0, 0, 0]
         self.counts_steps = self.place_mm is not None
 
     def _count_steps(self, octets: bytes) -> None:
         """Move the place by reported steps; those of a compensation move nothing."""
-        if self.place_mm is None or not octets:
+        if self._base_mm is None or not octets:
             return
-        moved = [0, 0, 0]
         for octet in octets:
             for axis in range(3):
                 sense = self._sense(octet, axis)
@@ -255,8 +257,8 @@ class PicMmhConversation(PacketByPacket):
                 if sense and self._silent_steps[axis]:
                     self._silent_steps[axis] -= 1
                 else:
-                    moved[axis] += sense
-        columns = zip(self.place_mm, moved, self._step_mm, strict=True)
+                    self._counts[axis] += sense
+        columns = zip(self._base_mm, self._counts, self._step_mm, strict=True)
         x, y, z = (at + count * step for at, count, step in columns)
         self.place_mm = x, y, z
 
@@ -271,7 +273,7 @@ class PicMmhConversation(PacketByPacket):
     def _send(self, packet: Packet, now: float) -> None:
         self._write(packet.data)
         if packet.data in _ZEROES:
-            self.place_mm = None if self.place_mm is None else (0.0, 0.0, 0.0)
+            self.begin_at(None if self.place_mm is None else (0.0, 0.0, 0.0))
         self._echo = packet.data if self._link.echo == "echo" else b""
         self._count = 0
         self.next_s = now + self.manner.patience_s
@@ -344,10 +346,11 @@ class PicMmhConversation(PacketByPacket):
             echoed = data.startswith(self._echo[: len(data)])
             count = min(len(self._echo), len(data)) if echoed else 0
             self._echo = self._echo[count:]
-            text = (self._halt_byte + data[count:]).replace(ALTO, b"")
-            self._halt_byte = text[-1:] if text[-1:] == ALTO[:1] else b""
-            self._count_steps(text.removesuffix(self._halt_byte))
             self._ends -= data.count(b";")
+            text = (self._halt_byte + data[count:]).replace(ALTO, b"")
+            is_open = self._ends > 0 and text.endswith(ALTO[:1])
+            self._halt_byte = ALTO[:1] if is_open else b""
+            self._count_steps(text[:-1] if is_open else text)
             if self._ends > 0 and now >= self._told + RESTOP_FACTOR * self.manner.late_s:
                 self._told = now
                 self._write(ALTO)
