@@ -167,12 +167,12 @@ class LoadedProgram(Struct, frozen=True, eq=False):
         one = self.one
         if state is not None:
             name = self.target.machine.target.name
-            known, question = tool_at_of(one.wire, state, tool_at, name)
+            stated, question = tool_at_of(one.wire, state, tool_at, name)
             if question and not tool_at:
                 raise OptionError(
                     f"{question}?", where=self.file, mend="say where the tool stands, and go on"
                 )
-            tool_at = known
+            tool_at = stated
         if begin or state is not None or one.run.failed:
             one = consignment(
                 self.data,

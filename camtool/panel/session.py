@@ -119,9 +119,12 @@ class StepRate:
         seconds = (now - before) * self._speed
         if seconds <= 0.0:
             return 0.0, 0.0
-        ways = [abs(to - at) for to, at in zip(place_mm, start, strict=True)]
-        hz = max(way / step for way, step in zip(ways, self._step_mm, strict=True)) / seconds
-        return math.hypot(*ways) / seconds * 60.0, hz
+        distances = [abs(to - at) for to, at in zip(place_mm, start, strict=True)]
+        hz = (
+            max(distance / step for distance, step in zip(distances, self._step_mm, strict=True))
+            / seconds
+        )
+        return math.hypot(*distances) / seconds * 60.0, hz
 
 
 class Session:
@@ -266,18 +269,22 @@ class Session:
         return (x, y, z), (u, v, w)
 
     def _check_travel(self, values: Mapping[str, float]) -> None:
-        """Raise MachineError for a way, mm by axis, that leaves the travel."""
+        """Raise MachineError for a distance, mm by axis, that leaves the travel."""
         ends, at = self.ends_mm, self._place_mm
         if ends is None or at is None:
             return
         for k, axis in enumerate(AXES):
-            way = values.get(axis, 0.0)
-            excess = max(at[k] + way - ends[1][k], ends[0][k] - at[k] - way)
-            if way and excess > NEAR_MM and (at[k] + way > ends[1][k]) == (way > 0.0):
-                room = abs(way) - excess
+            distance = values.get(axis, 0.0)
+            excess = max(at[k] + distance - ends[1][k], ends[0][k] - at[k] - distance)
+            if (
+                distance
+                and excess > NEAR_MM
+                and (at[k] + distance > ends[1][k]) == (distance > 0.0)
+            ):
+                room = abs(distance) - excess
                 raise MachineError(
-                    f"{axis.upper()}{way:+.3f} mm leaves the travel by {excess:.3f} mm: it ends "
-                    f"at {axis.upper()}{ends[way > 0.0][k]:.3f}",
+                    f"{axis.upper()}{distance:+.3f} mm leaves the travel by {excess:.3f} mm: it "
+                    f"ends at {axis.upper()}{ends[distance > 0.0][k]:.3f}",
                     mend=f"go by {max(room, 0.0):.3f} mm at most",
                 )
 
@@ -321,10 +328,8 @@ class Session:
             )
         at = self.state.place_mm
         if self.wire.place == "kept" and at is not None:
-            start = one.place_of(
-                one.wire.conversation((), self.target.machine, manner_of(self.target))
-            )
-            if start is not None and math.dist(at, start) > NEAR_MM:
+            start = one.begin_mm
+            if math.dist(at, start) > NEAR_MM:
                 raise MachineError(
                     f"the tool stands at {place_words(at)}, and the program begins at "
                     f"{place_words(start)}",
@@ -455,19 +460,19 @@ class Session:
             self.tell("it has not arrived where it was to go, and stays there", bad=True)
             return None
         self._leg = goal
-        ways = {axis: place - at[AXES.index(axis)] for axis, place in goal.items()}
-        ways = {
-            axis: way
-            for axis, way in ways.items()
-            if abs(way) >= 0.5 * self._step_mm[AXES.index(axis)]
+        distances = {axis: place - at[AXES.index(axis)] for axis, place in goal.items()}
+        distances = {
+            axis: distance
+            for axis, distance in distances.items()
+            if abs(distance) >= 0.5 * self._step_mm[AXES.index(axis)]
         }
-        if not ways:
+        if not distances:
             return None
 
         def begin(talk: Conversation, now: float) -> None:
             if isinstance(talk, Hand):
                 try:
-                    talk.order("jog", {**ways, "feed": feed}, now)
+                    talk.order("jog", {**distances, "feed": feed}, now)
                 except CamtoolError as error:
                     self._legs.clear()
                     self.tell(str(error), bad=True)

@@ -67,6 +67,13 @@ class Forecast(Struct, frozen=True, eq=False):
     def __len__(self) -> int:
         return len(self.seconds)
 
+    def end_of(self, block: int) -> Place | None:
+        """Where a block ends; None behind the last one that does anything."""
+        if block >= len(self.end_mm):
+            return None
+        x, y, z = self.end_mm[block].tolist()
+        return x, y, z
+
     def seconds_of(self, block: int) -> float:
         """The time of a block, s; blocks behind the last one that does anything take none."""
         return float(self.seconds[block]) if block < len(self.seconds) else 0.0

@@ -1013,7 +1013,7 @@ class GrblProbing(GrblConversation):
         self._report: tuple[Place, bool] | None = None  # of the line under way
 
     def _ready(self, now: float) -> None:
-        if self._offset is None or self._machine_mm is None:
+        if self._offset is None or self.machine_mm is None:
             return  # the next report says both
         if "P" in self._closed:
             self._end(WireState.FAILED, f"the probe touches already: {TOUCHES_MEND}")
@@ -1026,10 +1026,10 @@ class GrblProbing(GrblConversation):
         if not is_free or self.state is not WireState.SENDING:
             return
         if not self._run.has_begun:
-            assert self._machine_mm is not None
+            assert self.machine_mm is not None
             assert self._offset is not None
             self._frame = self._offset
-            self._run.begin(_difference(self._machine_mm, self._frame))
+            self._run.begin(_difference(self.machine_mm, self._frame))
         if self._run.step is not None:
             self._report = None
             self._put(_Line(_probe_line(self._run.step)))

@@ -236,8 +236,9 @@ class PicMmhConversation(PacketByPacket):
         self._halt_byte = b""  # a byte that may be the first of A;, or a step
         self._ends = 0  # how many ; are to come back until A; has
         self._told = 0.0  # when A; was written last
+        self._count_from(manner.at_mm)
 
-    def begin_at(self, place_mm: Place | None) -> None:
+    def _count_from(self, place_mm: Place | None) -> None:
         """Count from this place on, where steps are reported."""
         self.place_mm = self._base_mm = None if self._link.step_byte == "none" else place_mm
         self._counts = [0, 0, 0]
@@ -273,7 +274,7 @@ class PicMmhConversation(PacketByPacket):
     def _send(self, packet: Packet, now: float) -> None:
         self._write(packet.data)
         if packet.data in _ZEROES:
-            self.begin_at(None if self.place_mm is None else (0.0, 0.0, 0.0))
+            self._count_from(None if self.place_mm is None else (0.0, 0.0, 0.0))
         self._echo = packet.data if self._link.echo == "echo" else b""
         self._count = 0
         self.next_s = now + self.manner.patience_s

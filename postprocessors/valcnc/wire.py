@@ -73,7 +73,8 @@ class ValcncWire(Wire):
                     f"has {len(line)} characters, and the controller takes {BUFFER_CHARS}",
                     where=f"block {block + 1}",
                 )
-            packets.append(Packet(line + b"\n", block, forecast.seconds_of(block)))
+            seconds, end_mm = forecast.seconds_of(block), forecast.end_of(block)
+            packets.append(Packet(line + b"\n", block, seconds, end_mm=end_mm))
         return packets
 
     def conversation(
