@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         Placement,
         Reading,
         Run,
+        Signals,
         Stock,
         Tool,
         Toolpath,
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
         preview,
         read_drawing,
         read_job,
+        signals,
         targets,
         verify,
     )
@@ -77,6 +79,7 @@ __all__ = [
     "Placement",
     "Reading",
     "Run",
+    "Signals",
     "Stock",
     "Tool",
     "Toolpath",
@@ -96,6 +99,7 @@ __all__ = [
     "preview",
     "read_drawing",
     "read_job",
+    "signals",
     "targets",
     "verify",
 ]

@@ -45,6 +45,7 @@ from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 from camtool.verification.report import Gates
 from camtool.verification.verify import Verification
+from camtool.waveforms.signals import Signals
 
 if TYPE_CHECKING:
     from camtool.inspection.meet import Meeting
@@ -69,6 +70,7 @@ __all__ = [
     "Placement",
     "Reading",
     "Run",
+    "Signals",
     "Stock",
     "Tool",
     "Toolpath",
@@ -88,6 +90,7 @@ __all__ = [
     "preview",
     "read_drawing",
     "read_job",
+    "signals",
     "targets",
     "verify",
 ]
@@ -441,6 +444,18 @@ def verify(
     return verify_program(
         data, loaded_target, source=source, drawing=read, job=job_used, judging=judging
     )
+
+
+def signals(program: bytes | Program | str | Path, target: str | LoadedTarget) -> Signals:
+    """The lines of the target's controller over time while it runs a program: step and direction
+    lines, or the coils of its motors.
+
+    `count()` gives the steps of each motor and the time in s, `levels()` the bytes of all ports in
+    chunks, `save("a.vcd")` a dump, a table (.csv) or a picture (.svg, .png). Raises MachineError
+    for a target without steps, ProgramError with block and column. Source: docs/signals.md.
+    """
+    data, source = as_bytes(program)
+    return Signals.of(data, as_target(target), Path(source).name)
 
 
 def compare(

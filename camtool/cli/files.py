@@ -18,9 +18,10 @@ import sys
 import tempfile
 import time
 import unicodedata
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path, PurePath
+from typing import TypeAlias
 
 from camtool.bounds import program_bytes
 from camtool.errors import OutputError, ProgramError
@@ -38,7 +39,11 @@ POLL_S = 0.05
 """A pipe is looked at so often until then."""
 
 
-def write_all(files: dict[str, bytes]) -> None:
+Content: TypeAlias = bytes | Iterable[bytes]
+"""The content of a file, whole or piece by piece as it is made."""
+
+
+def write_all(files: Mapping[str, Content]) -> None:
     """Write these files, content by name, all or none; OutputError names the first that fails."""
     streams = {name: data for name, data in files.items() if _is_stream(name)}
     staged: list[tuple[Path, Path]] = []
@@ -179,7 +184,7 @@ def _is_stream(name: str) -> bool:
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
-def _write_stream(name: str, data: bytes) -> None:
+def _write_stream(name: str, data: Content) -> None:
     """Write all data to stdout or to a named pipe or device, and flush it.
 
     Raises BrokenPipeError if the program that reads stdout has ended, else OutputError.
@@ -189,11 +194,11 @@ def _write_stream(name: str, data: bytes) -> None:
     try:
         if name == STDOUT:
             sys.stdout.flush()
-            sys.stdout.buffer.write(data)
+            sys.stdout.buffer.writelines(_pieces(data))
             sys.stdout.buffer.flush()
             return
         with _open_stream(name) as stream:
-            stream.write(data)
+            stream.writelines(_pieces(data))
     except BrokenPipeError:
         if name == STDOUT:
             raise
@@ -270,7 +275,7 @@ def _second_name(temporary: Path, place: Path) -> Path | None:
     return old
 
 
-def _stage(place: Path, data: bytes) -> tuple[Path, Path]:
+def _stage(place: Path, data: Content) -> tuple[Path, Path]:
     """Write a temporary file with the data in the folder of its place; return both paths. Links
     are followed."""
     named, place = str(place), Path(os.path.realpath(place))
@@ -279,7 +284,7 @@ def _stage(place: Path, data: bytes) -> tuple[Path, Path]:
         handle, name = tempfile.mkstemp(prefix=f".{place.name[:KEPT]}.", dir=place.parent)
         temporary = Path(name)
         with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
+            stream.writelines(_pieces(data))
             stream.flush()
             os.fsync(stream.fileno())
         temporary.chmod(_mode_for(place))
@@ -290,6 +295,10 @@ def _stage(place: Path, data: bytes) -> tuple[Path, Path]:
             raise _write_error(named, error) from error
         raise
     return temporary, place
+
+
+def _pieces(data: Content) -> Iterable[bytes]:
+    return [data] if isinstance(data, bytes) else data
 
 
 def _mode_for(place: Path) -> int:

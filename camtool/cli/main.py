@@ -70,6 +70,7 @@ COMMANDS = {
     "probe": "Measure the top of the blank.",
     "send": "Send a program to its machine.",
     "servo": "Servo axes: their motors, and the gains of their loops.",
+    "signals": "Step lines, coils and port bytes over time.",
     "stale": "Programs that are out of date.",
     "targets": "The machines, and everything about one.",
     "tolerances": "Dimensions and their limits: begin a file, or see what one says.",
@@ -120,6 +121,7 @@ def cli() -> None:
     camtool batch   drawings/ -t pic-mmh -o build/   many, those that have changed
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
+    camtool signals logo.pic -t pic-mmh -o logo.vcd   its coils over time, for GTKWave
     camtool send    logo.pic -t pic-mmh --port /dev/ttyUSB0
     camtool panel   logo.pic -t pic-mmh --port /dev/ttyUSB0   the same, from a page
     camtool ports                               where machines may be

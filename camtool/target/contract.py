@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from camtool.machine.servo import SpeedLoop
     from camtool.simulation.controller import ControllerModel
+    from camtool.target.signals import NoSignals, SignalModel
     from camtool.target.twin import Twin
     from camtool.target.wire import NoWire, Wire
     from camtool.toolpath.moves import Toolpath
@@ -128,6 +129,13 @@ class Target(ABC):
         raise MachineError(
             f"{self.name} has no settings that can be read from a port", where="--port"
         )
+
+    def signals(self) -> SignalModel | NoSignals:
+        """Return the model of the signals of its motors; by default a `NoSignals`, which says why
+        there is none."""
+        from camtool.target.signals import NoSignals
+
+        return NoSignals()
 
     def wire(self) -> Wire | NoWire:
         """Return the protocol that sends its programs; by default a `NoWire`, which says why there

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import FlashcutModel
+    from .signals import FlashcutSignals
 
 
 class Flashcut(Target):
@@ -57,6 +58,12 @@ class Flashcut(Target):
     def unit_mm(self, machine: FlashcutMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return float(10.0**-machine.dialect.decimals)
+
+    def signals(self) -> FlashcutSignals:
+        """The signals of its motors; docs/signals.md."""
+        from .signals import FlashcutSignals
+
+        return FlashcutSignals()
 
     def wire(self) -> NoWire:
         """None: its port is no line, and the PC is its clock (L1044-1050)."""

@@ -111,7 +111,8 @@ class FlashcutRun:
         path = place_events(toolpath.first(toolpath.executed_rows), machine)
         check_rows(path, len(path))
         self._rows = len(path)
-        self._still_s = waits_s(path, len(path))
+        self.waits_s = waits_s(path, len(path))
+        """(R,) s of rows without motion."""
         self._table = MoveTable.of(path, machine)
         self._mechanics = Mechanics(machine, path.start, options.effects)
         self._parts = controller.half_periods_per_step
@@ -124,11 +125,15 @@ class FlashcutRun:
             from_reached=controller.goes_on_from == "reached",
             late_longer=controller.clock == "late-longer",
         )
-        self._counters = Counters(np.zeros(3, np.int64), path.start.copy(), np.zeros(8, np.int64))
+        self._counters = Counters(np.zeros(3, np.int64), path.start.copy(), np.zeros(10, np.int64))
         self._samples = options.chunk_steps
 
     def run(self) -> Iterator[Chunk]:
         """The chunks of all rows up to the end of the program."""
+        return map(self._chunk, self.batches())
+
+    def batches(self) -> Iterator[TimerBatch]:
+        """Yield the samples of all rows up to the end of the program."""
         low = 0
         while low < self._rows:
             move_counts = np.cumsum(self._table.moves_of(low, low + MOVES_AT_ONCE))
@@ -136,25 +141,30 @@ class FlashcutRun:
             yield from self._window(low, high)
             low = high
 
-    def _window(self, low: int, high: int) -> Iterator[Chunk]:
-        """The chunks of the rows low:high."""
+    def _window(self, low: int, high: int) -> Iterator[TimerBatch]:
+        """The samples of the rows low:high."""
         moves = self._table.moves(low, high)
         move = done_rows = 0  # rows from `low` on whose ledger is complete
         while done_rows < high - low:
+            row_of, move_of, since_ms = np.empty((3, self._samples), np.int64)
             issued = Issued(
                 np.empty((self._samples, 3)),
-                np.empty(self._samples, np.int64),
+                row_of,
+                move_of,
+                since_ms,
                 np.zeros(high - low, np.int64),
                 np.zeros((high - low, 3), np.int64),
             )
             move, filled = timers_fill(moves, move, self._rules, self._counters, issued)
             under_way = int(moves.row[move]) if move < len(moves.row) else high - low
             rows = np.arange(done_rows, min(under_way + 1, high - low))
-            yield self._chunk(low, rows, issued, filled)
+            going = self._counters.under_way.copy()
+            yield TimerBatch(low, rows, moves, issued, filled, move, going)
             done_rows = under_way
 
-    def _chunk(self, low: int, rows: Ints, issued: Issued, filled: int) -> Chunk:
-        """The first samples of `issued`, and what the rows low + rows did in them."""
+    def _chunk(self, batch: TimerBatch) -> Chunk:
+        """The samples of a batch, and what its rows did in them."""
+        low, rows, issued, filled = batch.low, batch.rows, batch.issued, batch.filled
         row, commanded = issued.row[:filled] + low, issued.commanded[:filled]
         reversals = np.zeros((len(rows), 3), dtype=np.int64)
         samples = np.zeros(len(rows), dtype=np.int64)
@@ -168,7 +178,7 @@ class FlashcutRun:
         moving_s = self._parts * issued.duration_ms[rows] / 1000.0
         ledger = Ledger(
             row=low + rows,
-            duration_s=moving_s + compensation_s + self._still_s[low + rows],
+            duration_s=moving_s + compensation_s + self.waits_s[low + rows],
             compensation_s=compensation_s,
             iterations=samples,
             steps=issued.steps[rows],
@@ -185,6 +195,20 @@ class FlashcutRun:
             half_xy = half_z = np.full(len(rows), self._compensation_ms)
         milliseconds = (steps[:, 0] + steps[:, 1]) * (half_xy + 1) + steps[:, 2] * (half_z + 1)
         return np.asarray(self._parts * milliseconds / 1000.0)
+
+
+class TimerBatch(Struct, frozen=True, eq=False):
+    """The first `filled` samples of `issued`, which are of `moves`; `rows` (R,), from `low` on:
+    those that move in them, or do not move. `move`: the one to go on with, and `under_way` of
+    `Counters`, after the last sample."""
+
+    low: int
+    rows: Ints
+    moves: Moves
+    issued: Issued
+    filled: int
+    move: int
+    under_way: Ints
 
 
 # Rows of a toolpath as the displacements that the parallel-port machine's program makes of them.

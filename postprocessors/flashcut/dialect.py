@@ -58,7 +58,8 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
     sees its half period go by: "whole-ms": every axis fires at the first whole millisecond above
     it; "late-longer": the longer axis a millisecond late at each step, the shorter one exactly;
     both give Tabla 3.8 (L1210-1214). `half_periods_per_step`: 2 fits the times of Tabla 4.1
-    (L1583-1587). `rounding` of each displacement to steps (L1208). `goes_on_from`: a displacement
+    (L1583-1587). `coil_states_per_step` of the signals (`signals`); 2 for each half period where
+    left out. `rounding` of each displacement to steps (L1208). `goes_on_from`: a displacement
     (L1101) is counted from where the program was ("programmed") or from where the steps have led
     ("reached"). `chords_per_turn`: arcs become "una serie de puntos" (L1089), number not said.
     """
@@ -68,6 +69,7 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
     compensation_half_period_ms: Annotated[int, Meta(ge=1, le=60_000)] | None = None
     clock: Literal["whole-ms", "late-longer"] = "whole-ms"
     half_periods_per_step: Annotated[int, Meta(ge=1, le=2)] = 2
+    coil_states_per_step: Annotated[int, Meta(ge=1, le=8)] | None = None
     rounding: Literal["nearest", "truncate"] = "nearest"
     goes_on_from: Literal["programmed", "reached"] = "programmed"
     chords_per_turn: Annotated[int, Meta(ge=4, le=10_000)] = 72

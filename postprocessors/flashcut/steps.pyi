@@ -29,6 +29,8 @@ class Counters(NamedTuple):
 class Issued(NamedTuple):
     commanded: Floats
     row: Ints
+    move: Ints
+    since_ms: Ints
     duration_ms: Ints
     steps: Ints
 

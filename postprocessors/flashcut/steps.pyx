@@ -13,7 +13,7 @@ late at each step and the shorter one never: it fires every P·n/m ms and makes 
 steps. Steps of both axes at the same time are one sample; so is the one that ends the move.
 
 Exact, because times are integers (in the second reading those of a move are taken m times), and
-only the difference of the next two firings is carried along: below 2⁶² for all half periods and
+only the time of the next firing and its difference to the other one are carried along: below 2⁶² for all half periods and
 displacements below 2³¹. Lengths become steps as everywhere, by floor(length / step + a half and
 a guard); no position is summed up. Compiled, because a displacement may depend on what the one
 before it reached, and a part has millions of steps.
@@ -58,9 +58,10 @@ class Rules(NamedTuple):
 
 class Counters(NamedTuple):
     """State of the controller, changed in place: steps issued so far (3,), where the program is
-    (3,) mm, and of the move that is under way (8,): steps of its longer axis to come, by how much
+    (3,) mm, and of the move that is under way (10,): steps of its longer axis to come, by how much
     its shorter axis fires later than that, their columns (the shorter −1: none), their senses,
-    and the times between their steps."""
+    the times between their steps, the next step of the longer axis from the start of the move on,
+    ms, and how many units of the other times are a millisecond."""
 
     steps: Ints
     programmed: Floats
@@ -68,11 +69,14 @@ class Counters(NamedTuple):
 
 
 class Issued(NamedTuple):
-    """Samples: positions (K, 3) mm and their rows (K,); of each row (R,) the half periods of the
-    longer axis with their lateness, ms, and (R, 3) steps: added to what is there."""
+    """Samples: positions (K, 3) mm, their rows (K,), their moves (K,) and half periods (K,) ms
+    since the start of these; of each row (R,) the half periods of the longer axis with their
+    lateness, ms, and (R, 3) steps: added to what is there."""
 
     commanded: Floats
     row: Ints
+    move: Ints
+    since_ms: Ints
     duration_ms: Ints
     steps: Ints
 
@@ -80,7 +84,7 @@ class Issued(NamedTuple):
 cdef class Timers:
     """All of these as the loops read them, and where the axes are."""
 
-    cdef Int[::1] what, half_period, move_row, steps, under_way, row, duration_ms
+    cdef Int[::1] what, half_period, move_row, steps, under_way, row, move, since_ms, duration_ms
     cdef Int[:, ::1] steps_of_rows
     cdef double[:, ::1] target, commanded
     cdef const double[::1] origin
@@ -92,7 +96,8 @@ cdef class Timers:
         self.what, self.target, self.half_period, self.move_row = moves
         self.origin, self.step_mm, self.added, self.from_reached, self.late_longer = rules
         self.steps, self.programmed, self.under_way = counters
-        self.commanded, self.row, self.duration_ms, self.steps_of_rows = issued
+        self.commanded, self.row, self.move, self.since_ms = issued[:4]
+        self.duration_ms, self.steps_of_rows = issued[4:]
         self.here = np.empty(3)
 
 
@@ -112,7 +117,7 @@ cdef Int _displacement(Int axis, double target, bint sensed, Timers timers) noex
 cdef void _begin(Int move, Timers timers) noexcept:
     """Set the timers of a move."""
     cdef Int what, half_period, longer, shorter, short_way, along_x, along_y, long_way, n, m
-    cdef Int every, short_every
+    cdef Int every, short_every, unit
     cdef Int[::1] under_way
     what, half_period, under_way = timers.what[move], timers.half_period[move], timers.under_way
     longer, shorter, short_way = 2, -1, 0
@@ -126,11 +131,11 @@ cdef void _begin(Int move, Timers timers) noexcept:
         longer = 0 if what == HOME_X else 1 if what == HOME_Y else 2
         long_way = _displacement(longer, timers.target[move, longer], what != Z, timers)
     n, m = abs(long_way), abs(short_way)
-    every, short_every = half_period + 1, 0
+    every, short_every, unit = half_period + 1, 0, 1
     if m == 0:
         shorter = -1
     elif timers.late_longer:
-        every, short_every = every * m, half_period * n
+        every, short_every, unit = every * m, half_period * n, m
     else:
         short_every = half_period * n // m + 1
     under_way[0], under_way[1] = n, short_every - every
@@ -138,26 +143,29 @@ cdef void _begin(Int move, Timers timers) noexcept:
     under_way[4] = 1 if long_way >= 0 else -1
     under_way[5] = 1 if short_way >= 0 else -1
     under_way[6], under_way[7] = every, short_every
+    under_way[8], under_way[9] = half_period + 1, unit
 
 
-cdef Int _run(Timers timers, Int row, Int first) noexcept:
+cdef Int _run(Timers timers, Int row, Int move, Int first) noexcept:
     """Let the timers run until the move ends or the samples are full; the samples then filled."""
     cdef Int axis, left, gap, longer, shorter, sense, short_sense, every, short_every, count
-    cdef Int short_count, k
-    cdef Int[::1] steps, under_way, rows
+    cdef Int short_count, k, next_ms, unit
+    cdef Int[::1] steps, under_way, rows, moves, since
     cdef bint fires
     cdef double[:, ::1] commanded
     cdef double[::1] step_mm, here
     under_way, step_mm = timers.under_way, timers.step_mm
     steps, here, commanded, rows = timers.steps, timers.here, timers.commanded, timers.row
+    moves, since = timers.move, timers.since_ms
     left, gap, longer, shorter = under_way[0], under_way[1], under_way[2], under_way[3]
     sense, short_sense = under_way[4], under_way[5]
-    every, short_every = under_way[6], under_way[7]
+    every, short_every, next_ms, unit = under_way[6], under_way[7], under_way[8], under_way[9]
     for axis in range(3):
         here[axis] = timers.origin[axis] + float(steps[axis]) * step_mm[axis]
     count, short_count, k = steps[longer], steps[max(shorter, 0)], first
     while left > 0 and k < len(rows):
         fires = shorter < 0 or gap >= 0
+        since[k] = next_ms if fires else next_ms - (unit - 1 - gap) // unit
         if shorter >= 0 and gap <= 0:
             short_count += short_sense
             here[shorter] = timers.origin[shorter] + float(short_count) * step_mm[shorter]
@@ -166,17 +174,18 @@ cdef Int _run(Timers timers, Int row, Int first) noexcept:
             count += sense
             here[longer] = timers.origin[longer] + float(count) * step_mm[longer]
             gap -= every
+            next_ms += every // unit
             left -= 1
         for axis in range(3):
             commanded[k, axis] = here[axis]
-        rows[k] = row
+        rows[k], moves[k] = row, move
         k += 1
     timers.steps_of_rows[row, longer] += abs(count - steps[longer])
     steps[longer] = count
     if shorter >= 0:
         timers.steps_of_rows[row, shorter] += abs(short_count - steps[shorter])
         steps[shorter] = short_count
-    under_way[0], under_way[1] = left, gap
+    under_way[0], under_way[1], under_way[8] = left, gap, next_ms
     return k
 
 
@@ -193,7 +202,7 @@ cpdef (Int, Int) timers_fill(moves, Int first, rules, counters, issued):
         if timers.under_way[0] == 0:
             _begin(move, timers)
         row, before = timers.move_row[move], timers.under_way[0]
-        k = _run(timers, row, k)
+        k = _run(timers, row, move, k)
         done = before - timers.under_way[0]
         timers.duration_ms[row] += done * (timers.half_period[move] + 1)
         if timers.under_way[0] > 0:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import I8751Model
+    from .signals import I8751Signals
     from .twin import I8751Twin, I8751TwinSettings
     from .wire import I8751Wire
 
@@ -56,6 +57,12 @@ class I8751(Target):
         """Return the sum of both tolerances, mm: of the ends of records from their lines, and of
         lines from their arcs."""
         return machine.dialect.tolerance_mm + machine.dialect.arc_tolerance_mm
+
+    def signals(self) -> I8751Signals:
+        """The signals of its motors; docs/signals.md."""
+        from .signals import I8751Signals
+
+        return I8751Signals()
 
     def wire(self) -> I8751Wire:
         """A byte and its reply, a packet and its F."""

@@ -99,6 +99,32 @@ class PulseTimes:
         both_s = longer_s * shorter / np.maximum(longer, 1)
         return np.column_stack([both_s, longer_s - both_s])
 
+    def around(self, steps: Ints, number: Ints) -> tuple[Floats, Floats]:
+        """Return s (K,) of the pulses without a step right before the steps `number` (K,), counted
+        from 0, of records of `steps` (K, 3) ≥ 0; and s (K,) of the delay behind each."""
+        x, y, z = steps.T
+        both, longer = np.minimum(x, y), np.maximum(x, y)
+        flows = self._firmware.elbow == "flows"
+        is_z, is_alone = number >= longer, (number >= both) & (number < longer)
+        starts_anew = is_alone & (not flows)
+        pulse = number - np.where(is_z, longer, np.where(starts_anew, both, 0))
+        steps_of_run = np.where(flows, longer, both)
+        steps_of_run = np.where(is_z, z, np.where(starts_anew, longer - both, steps_of_run))
+        lost = np.where(starts_anew & (both > 0), 0, self._firmware.lost_pulses)
+        total = steps_of_run + lost
+        first_s = self._delays_s(np.zeros_like(total), total)
+        before_s = np.where((pulse == 0) & (lost > 0), first_s, 0.0)
+        return before_s, self._delays_s(pulse + lost, total)
+
+    def _delays_s(self, pulse: Ints, total: Ints) -> Floats:
+        """Return the delays (K,), s, behind pulses, counted from 0, of runs of `total` (K,)."""
+        if self._firmware.high_byte == "255":
+            in_bursts = total // BURST_PULSES * BURST_PULSES
+            total = np.where(pulse < in_bursts, BURST_PULSES, total - in_bursts)
+            pulse = np.where(pulse < in_bursts, pulse % BURST_PULSES, pulse - in_bursts)
+        ramp = np.minimum(np.minimum(pulse, total - 1 - pulse), RAMP_PULSES)
+        return self.periods_s[np.where(total < 2 * RAMP_PULSES, 0, ramp)]
+
     def _run_s(self, pulses: Ints) -> Floats:
         """Return the times (N,), s, of runs of so many pulses (N,), each with its ramps."""
         if self._firmware.high_byte == "256":

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from camtool.machine.model import Axis, Machine
+    from camtool.target.signals import NoSignals
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -66,6 +67,16 @@ class Linuxcnc(Target):
         from .controller import LinuxcncModel
 
         return LinuxcncModel()
+
+    def signals(self) -> NoSignals:
+        """None; docs/signals.md."""
+        from camtool.target.signals import NoSignals
+
+        return NoSignals(
+            "its program has no steps: the step generator or the servos of the machine's HAL "
+            "follow the trajectory",
+            "halscope shows its pins; camtool preview --simulate FILE.html plays the trajectory",
+        )
 
     def wire(self) -> LinuxcncWire:
         """A file that it opens, told and watched through linuxcncrsh."""

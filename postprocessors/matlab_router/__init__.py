@@ -22,6 +22,7 @@ from .dialect import (
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.machine.servo import SpeedLoop
+    from camtool.target.signals import NoSignals
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -72,6 +73,15 @@ class MatlabRouter(Target):
         from .controller import loop_keys
 
         return loop_keys(loop)
+
+    def signals(self) -> NoSignals:
+        """None; docs/signals.md."""
+        from camtool.target.signals import NoSignals
+
+        return NoSignals(
+            "its slaves turn DC motors by speed loops, with a voltage each 5 ms and no steps",
+            "camtool preview --simulate FILE.html plays the places of its encoders",
+        )
 
     def wire(self) -> MatlabRouterWire:
         """Numbers, and the time of a job."""

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import PicMmhModel
+    from .signals import PicMmhSignals
     from .twin import PicMmhTwin, PicMmhTwinSettings
     from .wire import PicMmhWire
 
@@ -55,6 +56,12 @@ class PicMmh(Target):
 
         steps = (each.coded_step_mm for each in machine.axes)
         return max(1.0 / UNITS_PER_MM[machine.dialect.form], *steps)
+
+    def signals(self) -> PicMmhSignals:
+        """The signals of its motors; docs/signals.md."""
+        from .signals import PicMmhSignals
+
+        return PicMmhSignals()
 
     def wire(self) -> PicMmhWire:
         """A block, its echo, its steps."""

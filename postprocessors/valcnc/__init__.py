@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import ValcncModel
+    from .signals import ValcncSignals
     from .twin import ValcncTwin, ValcncTwinSettings
     from .wire import ValcncWire
 
@@ -56,6 +57,12 @@ class Valcnc(Target):
         """The last decimal of a coordinate, on the axis where it is the most."""
         dialect = machine.dialect
         return float(10.0**-dialect.decimals / scales_of(machine, dialect).min())
+
+    def signals(self) -> ValcncSignals:
+        """The signals of its motors; docs/signals.md."""
+        from .signals import ValcncSignals
+
+        return ValcncSignals()
 
     def wire(self) -> ValcncWire:
         """A block and its time."""

@@ -54,6 +54,7 @@ def set_up(folder: Path) -> None:
     (folder / DRAWING).write_bytes(SVG)
     (folder / "holes.svg").write_bytes(DIMPLES)
     (folder / "a.nc").write_bytes(PROGRAM)
+    (folder / "a.ngc").write_bytes(b"G00 X1.0 Y0.0 Z0.0\nG01 X1.25 Y0.5 Z0.0\n")
     (folder / "tool.tbl").write_bytes(TABLE)
     (folder / "job.toml").write_bytes(JOB)
     (folder / "tolerances.toml").write_bytes(TOLERANCES)
@@ -81,6 +82,7 @@ BASES: Mapping[str, tuple[str, ...]] = {
     "stale": ("-t", "linuxcnc"),
     "verify": ("-t", "grbl"),
     "convert": ("--from", "grbl", "--to", "linuxcnc", "-o", "out.ngc"),
+    "signals": ("-t", "valcnc", "-o", "out.svg"),
     "check": (),
     "job new": (),
     "job check": (),
@@ -105,6 +107,7 @@ ARGUMENTS: Mapping[str, str] = {
     "stale": DRAWING,
     "verify": "a.nc",
     "convert": "a.nc",
+    "signals": "a.ngc",
     "check": DRAWING,
     "job new": DRAWING,
     "job check": "job.toml",

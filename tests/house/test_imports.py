@@ -60,6 +60,7 @@ ALLOWED = {
     "postprocessors": TARGETS,
     "verification": JUDGE | {"stock"},
     "pictures": JUDGE | {"stock", "verification"},
+    "waveforms": TARGETS | {"pictures"},
     "calibration": TARGETS,
     "jobs": TARGETS | {"importers", "planning"},
     "operations": SHARED | {"planning", "jobs"},
@@ -70,9 +71,10 @@ ALLOWED = {
     "batches": MADE,
     "sending": MADE,
     "panel": MADE | {"sending"},
-    "cli": MADE | {"inspection", "calibration", "batches", "sending", "panel", "jobs", "project"},
+    "cli": MADE
+    | {"inspection", "calibration", "batches", "sending", "panel", "jobs", "project", "waveforms"},
     "__main__": {"cli"},
-    "api": MADE | {"inspection", "calibration", "jobs"},
+    "api": MADE | {"inspection", "calibration", "jobs", "waveforms"},
     "__init__": {"api", "errors", "version"},
 }
 HEAVY = {

@@ -33,7 +33,9 @@ class Ran:
         rules, counters = fresh(late)
         move, parts = 0, [np.empty((0, 3))]
         while move < count:
-            issued = Issued(np.empty((room, 3)), np.empty(room, np.int64), self.ms, self.steps)
+            issued = Issued(
+                np.empty((room, 3)), *np.empty((3, room), np.int64), self.ms, self.steps
+            )
             move, filled = timers_fill(moves, move, rules, counters, issued)
             parts.append(issued.commanded[:filled])
         self.commanded = np.concatenate(parts)
@@ -47,7 +49,7 @@ class Ran:
 
 def fresh(late: bool) -> tuple[Rules, Counters]:
     rules = Rules(np.zeros(3), np.full(3, STEP), 0.5, False, late)
-    return rules, Counters(np.zeros(3, np.int64), np.zeros(3), np.zeros(8, np.int64))
+    return rules, Counters(np.zeros(3, np.int64), np.zeros(3), np.zeros(10, np.int64))
 
 
 def literally(ways: list[tuple[int, int]], p: int, late: bool) -> Pc:
@@ -143,11 +145,15 @@ def test_the_longest_displacements_do_not_overflow() -> None:
         target = np.array([[most * STEP, m * STEP, 0.0]])
         moves = Moves(zeros + XY, target, zeros + most, zeros)
         rules = Rules(np.zeros(3), np.full(3, STEP), 0.5, False, late)
-        counters = Counters(np.zeros(3, np.int64), np.zeros(3), np.zeros(8, np.int64))
+        counters = Counters(np.zeros(3, np.int64), np.zeros(3), np.zeros(10, np.int64))
         issued = Issued(
-            np.empty((50, 3)), np.empty(50, np.int64), zeros.copy(), np.zeros((1, 3), np.int64)
+            np.empty((50, 3)),
+            *np.empty((3, 50), np.int64),
+            zeros.copy(),
+            np.zeros((1, 3), np.int64),
         )
         assert timers_fill(moves, 0, rules, counters, issued) == (0, 50)
         times = sorted({k * every for k in range(1, 60)} | {k * short for k in range(1, 60)})[:50]
         wanted = [(time // every, time // short) for time in times]
         assert np.rint(issued.commanded[:, :2] / STEP).tolist() == [list(pair) for pair in wanted]
+        assert issued.since_ms.tolist() == [time // (m if late else 1) for time in times]
