@@ -21,13 +21,13 @@ from msgspec import Struct
 from camtool.errors import MachineError
 from camtool.findings import TargetCode
 from camtool.machine.model import Axis, Link, Machine, SlideStart
+from camtool.target.signals import NoSignals, SignalModel
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from camtool.machine.servo import SpeedLoop
     from camtool.simulation.controller import ControllerModel
-    from camtool.target.signals import NoSignals, SignalModel
     from camtool.target.twin import Twin
     from camtool.target.wire import NoWire, Wire
     from camtool.toolpath.moves import Toolpath
@@ -133,8 +133,6 @@ class Target(ABC):
     def signals(self) -> SignalModel | NoSignals:
         """Return the model of the signals of its motors; by default a `NoSignals`, which says why
         there is none."""
-        from camtool.target.signals import NoSignals
-
         return NoSignals()
 
     def wire(self) -> Wire | NoWire:

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from msgspec import Struct
 
-from camtool.machine.model import Machine
-from camtool.simulation.pulses import Pulses
-from camtool.toolpath.moves import Toolpath
+if TYPE_CHECKING:
+    from camtool.machine.model import Machine
+    from camtool.simulation.pulses import Pulses
+    from camtool.toolpath.moves import Toolpath
 
 
 class Coils(Struct, frozen=True):

@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from camtool.target.contract import ControllerSetting, Target
+from camtool.target.signals import NoSignals
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
 from .dialect import LinuxcncController, LinuxcncDialect, LinuxcncLink, LinuxcncMachine
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from camtool.machine.model import Axis, Machine
-    from camtool.target.signals import NoSignals
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -70,8 +70,6 @@ class Linuxcnc(Target):
 
     def signals(self) -> NoSignals:
         """None; docs/signals.md."""
-        from camtool.target.signals import NoSignals
-
         return NoSignals(
             "its program has no steps: the step generator or the servos of the machine's HAL "
             "follow the trajectory",

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from camtool.target.contract import Target
+from camtool.target.signals import NoSignals
 
 from .dialect import (
     MatlabRouterController,
@@ -22,7 +23,6 @@ from .dialect import (
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.machine.servo import SpeedLoop
-    from camtool.target.signals import NoSignals
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -76,8 +76,6 @@ class MatlabRouter(Target):
 
     def signals(self) -> NoSignals:
         """None; docs/signals.md."""
-        from camtool.target.signals import NoSignals
-
         return NoSignals(
             "its slaves turn DC motors by speed loops, with a voltage each 5 ms and no steps",
             "camtool preview --simulate FILE.html plays the places of its encoders",
