@@ -166,7 +166,7 @@ def _lane(lane: _Lane, stretch: Stretch, sides: tuple[float, float], scale: floa
 
 
 def _pulse_times(lane: _Lane, tick_s: float) -> str:
-    """How long the line is high and low between two changes, such as "4 / 4 ms"."""
+    """Return the times for which the line is high and low, such as "4 / 4 ms"."""
     durations = np.diff(lane.tick[1:]) * tick_s
     parts = [durations[lane.level[1:-1] == level] for level in (1, 0) if len(durations)]
     if not all(map(len, parts)) or not parts:
