@@ -66,6 +66,14 @@ def override_orders() -> dict[str, Request | Order]:
     return {**{key: changed(*change) for key, change in OVERRIDE_KEYS.items()}, "=": reset}
 
 
+GUARDED = (
+    'exec 3<&0 </dev/null; (read _ <&3; kill -s TERM 0) & exec 3<&-; sh -c "$0"; code=$?; '
+    "kill -s KILL $! 2>/dev/null; exit $code"
+)
+"""Script of the shell that runs a command, `$0`, and ends it with all that it has begun when the
+pipe at its input is closed: by camtool, or because camtool was killed."""
+
+
 class AtStop:
     """The answer to a program that waits for an operator (M0, a tool change) where none is asked:
     "fail" stops the machine, any other text is a command of the shell. The program goes on when
@@ -88,8 +96,16 @@ class AtStop:
             self._stops, self.trouble = True, "it waits, and --at-stop is fail"
             return
         values = {**os.environ, "CAMTOOL_WHY": one_line(why)}
-        self._running = subprocess.Popen(  # the user's own command
-            self._command, shell=True, env=values, stdin=subprocess.DEVNULL
+        if sys.platform == "win32":
+            self._running = subprocess.Popen(  # the user's own command
+                self._command, shell=True, env=values, stdin=subprocess.DEVNULL
+            )
+            return
+        self._running = subprocess.Popen(
+            ["/bin/sh", "-c", GUARDED, self._command],
+            env=values,
+            stdin=subprocess.PIPE,
+            start_new_session=True,
         )
 
     def __call__(self) -> Request | None:
@@ -108,9 +124,14 @@ class AtStop:
 
     def end(self) -> None:
         """End a command that still runs: nobody needs its answer any more."""
-        if self._running is not None:
-            self._running.terminate()
-            self._running = None
+        running, self._running = self._running, None
+        if running is None:
+            return
+        if running.stdin is None:
+            running.terminate()
+        else:
+            running.stdin.close()
+            running.wait()
 
 
 class UserRequests:

@@ -334,6 +334,8 @@ class GrblConversation(Conversation):
         self._failing = self._alarm = ""
         self._halted = 0.0
         self._reset_sent = self._slows = False
+        self._reported = self._stands_at = ""  # places as the last reports have them
+        self._asked_again = 0
         self._acted = False  # whether anything but questions was sent
         self._feed = 0.0
         self._aims: dict[Override, int] = {}  # overrides that are wanted, %
@@ -444,7 +446,7 @@ class GrblConversation(Conversation):
         if self.state is WireState.STOPPING:
             elapsed = now - self._halted
             if self._reset_sent and elapsed >= patience:
-                reason = self._failing or "it was told to stop"
+                reason, self._stood = self._failing or "it was told to stop", False
                 self._end(
                     WireState.FAILED, f"{reason}; it did not confirm the stop: switch it off"
                 )
@@ -656,7 +658,15 @@ class GrblConversation(Conversation):
             return
         self._moves = self._moves + 1 if state in ("Run", "Jog") else 0
         if state in STANDING or state == "Home" or self._idle >= 2:
-            self._stood = state not in ("Home", "Alarm")
+            stands = state not in ("Home", "Alarm")
+            # A report may be damaged: the place counts when the next one says it too.
+            if stands and self.place_mm is not None and self._stands_at != self._reported:
+                self._stands_at, self._asked_again = self._reported, self._asked_again + 1
+                if self._asked_again < MAX_ASKED_AGAIN:
+                    self._poll(now)
+                    return
+                stands = False
+            self._stood = stands and self._reported != ""
             self._reset(now)
         elif state == "Hold:1" or self._slows:
             self._halted = now
@@ -684,6 +694,7 @@ class GrblConversation(Conversation):
         if closed and closed != self._closed and self._phase != "greeting":
             self._tell(f"it reports closed switches: {_switches(closed)}")
         self._closed = closed
+        self._reported = values.get("MPos", values.get("WPos", ""))
         for name in ("WCO", "MPos", "WPos"):
             text = values.get(name)
             if text is None:
@@ -711,6 +722,12 @@ class GrblConversation(Conversation):
                 self._write(RESET)
             elif self._fresh and (self._offset or self._standing is None):
                 self._ready(now)
+        elif state == "Hold:0" and self.manner.standing is not None:
+            # The sender of this program is gone, such as one that was killed at a stop (M0): what
+            # it has left in the buffer is dropped, and the place is kept.
+            if self._resets == 0:
+                self._resets, self._begun = 1, now
+                self._write(RESET)
         elif state == "Alarm" and self._unlocks:
             self._ready(now)
         elif state == "Alarm":
@@ -722,7 +739,8 @@ class GrblConversation(Conversation):
                 self._tell("it still moves: waiting until it stands")
         else:
             meaning = STATES.get(state, "")
-            self._end(WireState.FAILED, f"it is not ready: {state}, {meaning}")
+            drops = ", and ^X in camtool console drops what it has" if state == "Hold:0" else ""
+            self._end(WireState.FAILED, f"it is not ready: {state}, {meaning}{drops}")
 
     def _banner(self, now: float) -> None:
         if self.state is WireState.STOPPING and self._reset_sent:
@@ -959,6 +977,10 @@ class GrblConversation(Conversation):
 
 SINGLE: Final = "single block"
 
+
+MAX_ASKED_AGAIN: Final = 5
+"""Reports of a machine that stands, but says another place each time; then its place counts as
+unknown."""
 
 MIN_HELD_S: Final = 0.03
 """Shortest time of a piece of a jog that lasts as long as a key is held: a line and its answer

@@ -47,6 +47,25 @@ def test_the_steps_of_pic_mmh_are_counted() -> None:
     assert said.splitlines() == ["PX+0100;", "100 × X+", "BX204;", "PX+0003;", "3 × X+"]
 
 
+@pytest.mark.parametrize("speed", [20.0, 2000.0])
+def test_motion_without_an_end_is_ended_by_the_next_line_of_a_pipe(speed: float) -> None:
+    """However many steps are reported meanwhile."""
+    twin: Any = load_target("pic-mmh").twin([])
+    with hosted(twin, speed) as port:
+        done = subprocess.run(
+            [sys.executable, "-m", "camtool", "console", "pic-mmh", port, "--baud", "9600"],
+            input="JX+;\nA;\n",
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=HANG_S,
+        )
+        assert not twin.is_moving
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "A;"
+    assert any("X+" in line for line in done.stdout.splitlines())
+
+
 def test_linuxcnc_is_greeted_first() -> None:
     said = typed("linuxcnc", "get program_status\nset mode auto\nset nonsense\n")
     assert "HELLO ACK" in said
