@@ -8,20 +8,18 @@ as compiled loops take them, with the tree of boxes that those loops go down the
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import Segments
+from camtool.kernels import near
 from camtool.kernels.chaining import touching
-from camtool.kernels.move_tree import LEAF, hilbert_order, move_tree
-from camtool.kernels.offsets import SegmentTree, curve_boxes, curve_rows, tree_of
-
-if TYPE_CHECKING:
-    from camtool.kernels.near import Moves
+from camtool.kernels.move_tree import hilbert_order
+from camtool.kernels.near import Moves
+from camtool.kernels.offsets import curve_boxes, curve_rows, tree_of
 
 PAIRS_AT_A_TIME = 1 << 16
 """Pairs of boxes that are handled together: it bounds the memory."""
@@ -34,6 +32,10 @@ BLOCKS_AT_A_TIME = PAIRS_AT_A_TIME // FAN
 
 IN_ORDER = 2048
 """An index of no more boxes than this keeps their order: sorting takes longer than it saves."""
+
+MIN_LIMIT_MM, LIMIT_GROWTH = 1e-6, 4.0
+"""A search for the nearest move begins within a small limit, at least the first, and grows it by
+the second while none is found."""
 
 NOWHERE = (np.inf, np.inf, -np.inf, -np.inf)
 """A box that touches none."""
@@ -178,30 +180,15 @@ class IndexedCurves(Struct, frozen=True, eq=False):
         return cls(rows, boxes, tree_of(boxes))
 
 
-def segment_tree(vertices: Floats, begin: Indices, end: Indices) -> SegmentTree:
-    """The segments between the rows `begin` and `end` (K,) of vertices (N, 3), to be asked which
-    of them lie beside points; along Hilbert's curve, since what is near in the plane need not be
-    near in a file."""
-
-    def boxes(indices: Ints | Indices) -> Floats:
-        starts, ends = vertices.take(begin[indices], axis=0), vertices.take(end[indices], axis=0)
-        segments = Segments.between(starts[:, :2], ends[:, :2], starts[:, 2])
-        return curve_boxes(curve_rows_of(segments), 0.0)
-
-    return SegmentTree(vertices, (begin, end), *move_tree(len(begin), boxes), LEAF)
-
-
 def curve_rows_of(segments: Segments) -> Floats:
     """Return the segments as rows (K, 11) of camtool.kernels.offsets."""
     columns = (segments.start, segments.end, segments.bulge)
     return curve_rows(*(np.ascontiguousarray(column) for column in columns))
 
 
-def moves_of(segments: Segments, heights: Floats) -> Moves:
-    """Return the segments with the heights of their starts and ends (K, 2) mm, as
-    `camtool.kernels.near` takes them."""
-    from camtool.kernels import near as columns
-
+def moves_of(segments: Segments, heights: Floats | None = None) -> Moves:
+    """Return the segments with the heights of their starts and ends (K, 2) mm, 0 where they are
+    not given, as `camtool.kernels.near` takes them."""
     rows = np.flatnonzero(segments.bulge)
     arc = np.broadcast_to(np.int32(-1), len(segments))
     if len(rows):
@@ -209,11 +196,51 @@ def moves_of(segments: Segments, heights: Floats) -> Moves:
         arc[rows] = np.arange(len(rows))
     bent = segments[rows]
     turn = np.where(bent.bulge < 0.0, -1.0, 1.0)[:, None]
-    arcs = np.empty((len(rows), columns.COLUMNS))
-    arcs[:, [columns.CX, columns.CY]], arcs[:, columns.RADIUS] = bent.centre, bent.radius
+    arcs = np.empty((len(rows), near.COLUMNS))
+    arcs[:, [near.CX, near.CY]], arcs[:, near.RADIUS] = bent.centre, bent.radius
     # Normals that point into the wedge from its two edges.
-    arcs[:, [columns.UX, columns.UY]] = turn * (bent.start - bent.centre)
-    arcs[:, [columns.VX, columns.VY]] = turn * (bent.end - bent.centre)
-    arcs[:, columns.SWEEP] = np.abs(bent.sweep)
-    arcs[:, [columns.LOW_X, columns.LOW_Y, columns.HIGH_X, columns.HIGH_Y]] = segment_boxes(bent)
-    return columns.Moves(segments.start, segments.end, heights, arc, arcs)
+    arcs[:, [near.UX, near.UY]] = turn * (bent.start - bent.centre)
+    arcs[:, [near.VX, near.VY]] = turn * (bent.end - bent.centre)
+    arcs[:, near.SWEEP] = np.abs(bent.sweep)
+    arcs[:, [near.LOW_X, near.LOW_Y, near.HIGH_X, near.HIGH_Y]] = segment_boxes(bent)
+    if heights is None:
+        heights = np.broadcast_to(0.0, (len(segments), 2))
+    return Moves(segments.start, segments.end, heights, arc, arcs)
+
+
+def distances_from(points: Floats, moves: Moves) -> Floats:
+    """Return (P,) mm: how far each of the points (P, 2) is from the nearest of the moves, seen
+    from above."""
+    places = np.column_stack([points, np.zeros(len(points))])
+    distance = np.full(len(points), np.inf)
+    if not len(moves.start):
+        return distance
+    # The search compares a point with all moves within its limit: so it begins with a small one.
+    span = np.ptp(moves.start, axis=0).max() + np.ptp(moves.end, axis=0).max()
+    limit_mm = max(span / len(moves.start), MIN_LIMIT_MM)
+    while len(rows := np.flatnonzero(np.isinf(distance))):
+        every = np.array([[0, len(rows), 0, len(moves.start)]])
+        distance[rows], _ = near.nearest(moves, places[rows], every, (limit_mm, np.inf))
+        limit_mm *= LIMIT_GROWTH
+    return distance
+
+
+def nearest_pairs(
+    points: Floats, moves: Moves, times: float, slack_mm: float
+) -> tuple[Floats, Ints, Ints]:
+    """Return (P,) mm, how far each of the points (P, 2) is from the nearest of the moves, and the
+    rows (J,), (J,) of all pairs of a point and a move that is no farther from it than so many
+    `times` that and `slack_mm` more."""
+    distance = distances_from(points, moves)
+    reach = times * distance + slack_mm
+    places = np.column_stack([points, np.zeros(len(points))])
+    pairs = [np.empty((2, 0), dtype=np.int64)]
+    # One search has one reach: points of about the same one are searched for together.
+    octave = np.frexp(reach)[1]
+    for each in np.unique(octave):
+        rows = np.flatnonzero(octave == each)
+        point, move, apart = near.pairs(moves, places[rows], (float(reach[rows].max()), np.inf))
+        is_near = apart <= reach[rows[point]]
+        pairs.append(np.stack([rows[point[is_near]], move[is_near]]))
+    point, move = np.concatenate(pairs, axis=1)
+    return distance, point, move

@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import DrawingError, GeometryError
-from camtool.geometry.boxes import segment_tree
+from camtool.geometry.boxes import moves_of, nearest_pairs
 from camtool.geometry.chain import Chained, Kinds, chain, numbered
 from camtool.geometry.drawing import Gap, Healing, Skipped
 from camtool.geometry.intersect import self_crossings_of
@@ -38,7 +38,6 @@ from camtool.geometry.polylines import (
 from camtool.geometry.simplify import recognise_arcs, without_tiny
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import MAX_COORDINATE_MM, MAX_POINTS, Piece, too_many_points
-from camtool.kernels.offsets import distances_from, segments_within
 
 IS_DRAWN_TWICE = "is drawn twice"
 """The reason for leaving out a piece that repeats another one."""
@@ -402,13 +401,12 @@ def _near_segments(
     and one of the others that is no farther from it than so many times that."""
     if not len(indices):
         return
-    tree = segment_tree(other_segments.vertices, other_segments.begin, other_segments.end)
+    moves = moves_of(other_segments.of(np.arange(len(other_segments))))
     for first in range(0, len(indices), SEGMENTS_AT_ONCE):
         batch = indices[first : first + SEGMENTS_AT_ONCE]
         row = np.repeat(np.arange(len(batch)), len(PLACES))
         points = point_at(segments.of(batch), row, np.tile(PLACES, len(batch)))
-        distances = distances_from(points, tree)
-        pairs = segments_within(points, times * distances + POSITION_EPS_MM, tree)
+        distances, point, other = nearest_pairs(points, moves, times, POSITION_EPS_MM)
         # Two positions nearer than that are one.
         distances = np.where(distances > POSITION_EPS_MM, distances, 0.0)
-        yield batch[row], distances, pairs[:, 0], pairs[:, 1]
+        yield batch[row], distances, point, other

@@ -1,4 +1,4 @@
-from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.arrays import Bools, Floats, Ints
 
 APART: int
 HELD: int
@@ -23,19 +23,6 @@ def nearest_distances(points: Floats, curves: Floats, tree: Floats) -> Floats: .
 def chord_distances(middles: Floats, halves: Floats, curves: Floats, tree: Floats) -> Floats: ...
 def disc_tangents(points: Floats, reach: Floats, curves: Floats, tree: Floats) -> Floats: ...
 def curves_within(points: Floats, reach: Floats, curves: Floats, tree: Floats) -> Ints: ...
-
-class SegmentTree:
-    def __init__(
-        self,
-        vertices: Floats,
-        ends: tuple[Indices, Indices],
-        nodes: Floats,
-        order: Indices,
-        leaf: int,
-    ) -> None: ...
-
-def distances_from(points: Floats, tree: SegmentTree) -> Floats: ...
-def segments_within(points: Floats, reach: Floats, tree: SegmentTree) -> Ints: ...
 def trimmed_ends(elements: Floats, surroundings: Near, limits: tuple[float, float]) -> Floats: ...
 def far_enough(
     elements: Floats, element: Ints, span: Floats, surroundings: Near, limits: tuple[float, float]

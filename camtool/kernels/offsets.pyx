@@ -11,7 +11,7 @@ from camtool.kernels.types cimport Int
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.arrays import Bools, Floats, Ints
 
 # A binary tree of boxes over rows in their order: what is far away is left out at once.
 #
@@ -621,134 +621,6 @@ cpdef curves_within(
             for row in range(low, min(low + LEAF, len(curves))):
                 if distance_to(curves, row, x, y) <= limit:
                     pairs[count, 0], pairs[count, 1] = i, row
-                    count += 1
-    return np.asarray(pairs[:count])
-
-
-# Which segments lie beside points, of so many that their rows are not stored.
-#
-# Rows take 88 bytes a segment. Here those of a leaf are made from ends and bulges when a point
-# comes near its box, and stay until another leaf takes their place, so that a segment has no more
-# than its part of the tree (`camtool.kernels.move_tree`) and its place in it. Points that follow
-# each other along a path come near the same few leaves.
-
-
-cpdef enum:
-    # The rows of so many leaves are kept: 180 kB.
-    LEAVES_KEPT = 256
-
-
-cdef class SegmentTree:
-    """K segments between the rows `begin` and `end` (K,) of `vertices` (N, 3) of x, y and the
-    bulge of the segment that leaves; `nodes` (2L, 6) over the `order` (K,) of them, `leaf` of
-    which a leaf holds."""
-
-    cdef const double[:, :] vertices
-    cdef double[:, ::1] nodes, rows
-    cdef const int[:] begin, end, order
-    cdef Int[::1] kept
-    cdef Int leaf
-
-    def __init__(
-        self,
-        vertices: Floats,
-        ends: tuple[Indices, Indices],
-        nodes: Floats,
-        order: Indices,
-        leaf: int,
-    ) -> None:
-        self.vertices, self.nodes, self.order = vertices, nodes, order
-        self.begin, self.end = ends
-        self.leaf = leaf
-        self.rows = np.empty((LEAVES_KEPT * leaf, 11))
-        self.kept = np.full(LEAVES_KEPT, -1)
-
-
-cdef (Int, Int) _rows_of(SegmentTree tree, Int leaf) noexcept:
-    """Return the begin and end of the rows of a leaf; compute them if they are not cached."""
-    cdef Int slot, first, last, k, segment, begin, end
-    cdef double ax, ay, bx, by
-    slot = leaf % LEAVES_KEPT
-    first = slot * tree.leaf
-    last = first + min(tree.leaf, len(tree.order) - leaf * tree.leaf)
-    if tree.kept[slot] == leaf:
-        return first, last
-    tree.kept[slot] = leaf
-    for k in range(first, last):
-        segment = tree.order[leaf * tree.leaf + k - first]
-        begin, end = tree.begin[segment], tree.end[segment]
-        ax, ay = tree.vertices[begin, 0], tree.vertices[begin, 1]
-        bx, by = tree.vertices[end, 0], tree.vertices[end, 1]
-        set_curve_row(tree.rows, k, ax, ay, bx, by, tree.vertices[begin, 2])
-    return first, last
-
-
-cpdef distances_from(double[:, ::1] points, SegmentTree tree):
-    """(P,) distance of each point (P, 2) from the nearest segment; inf where there is none."""
-    cdef double[::1] distances, squares
-    cdef Int[::1] stack
-    cdef double[:, ::1] nodes, rows
-    cdef Int leaves, i, height, node, low, high, k, near_node, far_node
-    cdef double x, y, best, to_near, to_far
-    distances = np.empty(len(points))
-    stack, squares = np.empty(DEPTH, np.int64), np.empty(DEPTH)
-    nodes, rows, leaves = tree.nodes, tree.rows, len(tree.nodes) // 2
-    for i in range(len(points)):
-        x, y, best = points[i, 0], points[i, 1], math.INFINITY
-        height, stack[0], squares[0] = 1, 1, apart_square(nodes, 1, x, y)
-        while height > 0:
-            height -= 1
-            node = stack[height]
-            if squares[height] >= best * best:
-                continue
-            if node >= leaves:
-                low, high = _rows_of(tree, node - leaves)
-                for k in range(low, high):
-                    best = min(best, distance_to(rows, k, x, y))
-                continue
-            near_node, far_node = 2 * node, 2 * node + 1
-            to_near, to_far = (
-                apart_square(nodes, near_node, x, y), apart_square(nodes, far_node, x, y)
-            )
-            if to_far < to_near:
-                near_node, far_node, to_near, to_far = far_node, near_node, to_far, to_near
-            stack[height], squares[height] = far_node, to_far
-            stack[height + 1], squares[height + 1] = near_node, to_near
-            height += 2
-        distances[i] = best
-    return np.asarray(distances)
-
-
-cpdef segments_within(double[:, ::1] points, double[::1] reach, SegmentTree tree):
-    """(J, 2) pairs of a point (P, 2) and a segment that is no farther from it than `reach` (P,),
-    in the order of the points."""
-    cdef Int[:, ::1] pairs
-    cdef Int[::1] stack
-    cdef double[:, ::1] nodes, rows
-    cdef Int leaves, count, i, height, node, low, high, k
-    cdef double x, y, limit
-    pairs = np.empty((len(points) + tree.leaf, 2), np.int64)
-    stack = np.empty(DEPTH, np.int64)
-    nodes, rows, leaves, count = tree.nodes, tree.rows, len(tree.nodes) // 2, 0
-    for i in range(len(points)):
-        x, y, limit = points[i, 0], points[i, 1], reach[i]
-        height, stack[0] = 1, 1
-        while height > 0:
-            height -= 1
-            node = stack[height]
-            if apart_square(nodes, node, x, y) > limit * limit:
-                continue
-            if node < leaves:
-                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
-                height += 2
-                continue
-            if count + tree.leaf > len(pairs):
-                pairs = twice_the_room(pairs)
-            low, high = _rows_of(tree, node - leaves)
-            for k in range(low, high):
-                if distance_to(rows, k, x, y) <= limit:
-                    pairs[count, 0] = i
-                    pairs[count, 1] = tree.order[(node - leaves) * tree.leaf + k - low]
                     count += 1
     return np.asarray(pairs[:count])
 

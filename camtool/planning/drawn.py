@@ -28,10 +28,9 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.geometry.boxes import segment_tree
+from camtool.geometry.boxes import moves_of, nearest_pairs
 from camtool.geometry.measure import extents, path_extents
-from camtool.geometry.polylines import Polylines, Segments, next_vertices, reverse, segment_rows
-from camtool.kernels.offsets import distances_from, segments_within
+from camtool.geometry.polylines import Polylines, Segments, reverse, segment_rows
 from camtool.planning.items import Contour, Runs, Setting, Step, contours_of
 from camtool.planning.job import Operation, Tool
 from camtool.planning.sides import regions_of, runs_beside
@@ -110,15 +109,14 @@ def _path_offsets(
             yield rows, np.full((len(rows), 2), path_error)
         return
 
-    begin = segment_rows(lines).astype(np.int32)
-    end = next_vertices(lines.offsets)[begin].astype(np.int32)
-    tree = segment_tree(lines.vertices, begin, end)
+    begin = segment_rows(lines)
+    moves = moves_of(Segments.of(lines))
     for first in range(0, len(rows), ROWS_AT_ONCE):
         batch = slice(first, first + ROWS_AT_ONCE)
-        points = np.ascontiguousarray(_points(toolpath, rows[batch]))
-        pairs = segments_within(points, distances_from(points, tree) + AS_NEAR_MM, tree)
+        points = _points(toolpath, rows[batch])
+        _, point, segment = nearest_pairs(points, moves, 1.0, AS_NEAR_MM)
         max_off = np.zeros((len(points) // len(PLACES), 2))
-        np.maximum.at(max_off, pairs[:, 0] // len(PLACES), drawn_off[begin[pairs[:, 1]]])
+        np.maximum.at(max_off, point // len(PLACES), drawn_off[begin[segment]])
         yield rows[batch], max_off + path_error
 
 

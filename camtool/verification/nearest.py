@@ -21,17 +21,13 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Floats, Indices, Ints
-from camtool.geometry.boxes import moves_of
+from camtool.geometry.boxes import LIMIT_GROWTH, moves_of
 from camtool.kernels import near as at
 from camtool.kernels.near import nearest, pairs
 from camtool.verification.cuts import CutMoves
 
 if TYPE_CHECKING:
     from camtool.kernels.near import Moves
-
-LIMIT_GROWTH = 4.0
-"""A search without a limit begins within a small one, which grows by this factor while no move is
-found."""
 
 ANY_CONTOUR = -1
 """The contour of points that are compared with the moves of every contour."""

@@ -26,6 +26,7 @@ from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.findings import Code, Finding, TargetCode
+from camtool.geometry.boxes import distances_from, moves_of
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.machine.model import Machine
@@ -220,36 +221,24 @@ def _area_outside(
     import shapely
 
     rest = shapely.difference(one, other)
+    nowhere = (0.0, 0.0)
     if rest.is_empty:
-        return 0.0, 0.0, (0.0, 0.0)
+        return 0.0, 0.0, nowhere
+    rings = [*map(shapely.get_coordinates, shapely.get_rings(shapely.get_parts(other)))]
+    if not rings:
+        return float(rest.area), math.inf, nowhere
     # A strip may be deeper between its corners than at them.
     dense = shapely.segmentize(rest, max(rest.length / MAX_DEPTH_POINTS, DEPTH_SPACING_MM))
     places = shapely.get_coordinates(dense)
-    nowhere = (0.0, 0.0)
-    if len(shapely.get_coordinates(shapely.boundary(other))) == 0:
-        return float(rest.area), math.inf, nowhere
-    tree = shapely.STRtree(_boundary_edges(other))
-    shapely.prepare(other)  # newer versions of shapely do this themselves
-    places = places[~shapely.intersects_xy(other, *places.T)]
-    points = shapely.points(places)
-    (row, _), distance = tree.query_nearest(points, return_distance=True, all_matches=False)
-    depth = float(distance.max(initial=0.0))
+    starts = np.concatenate([ring[:-1] for ring in rings])
+    ends = np.concatenate([ring[1:] for ring in rings])
+    edges = Segments.between(starts, ends, np.zeros(len(starts)))
+    distance = distances_from(places, moves_of(edges))
+    depth = float(distance.max())
     if depth <= 2.0 * tolerance:
         return 0.0, 0.0, nowhere
-    x, y = places[row[int(distance.argmax())]].tolist()
+    x, y = places[int(distance.argmax())].tolist()
     return float(rest.area), depth, (x, y)
-
-
-def _boundary_edges(region: Any) -> Any:
-    """Return the edges of the boundary of a region."""
-    import shapely
-
-    rings = shapely.get_rings(shapely.get_parts(region))
-    found = []
-    for ring in rings:
-        points = shapely.get_coordinates(ring)
-        found.append(shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)))
-    return np.concatenate(found)
 
 
 class _Lines(Struct, frozen=True, eq=False):
