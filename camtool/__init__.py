@@ -18,48 +18,7 @@ from typing import TYPE_CHECKING, Any
 from camtool.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from camtool.api import (
-        Calibration,
-        Comparison,
-        CutStock,
-        Drawing,
-        Effects,
-        Gates,
-        Job,
-        Judging,
-        ListedTarget,
-        LoadedTarget,
-        Looks,
-        Operation,
-        Picture,
-        Placement,
-        Reading,
-        Run,
-        Signals,
-        Stock,
-        Tool,
-        Toolpath,
-        Verification,
-        calibrate,
-        compare,
-        convert,
-        cut_stock,
-        inspect,
-        job_of,
-        load_target,
-        meet,
-        plan,
-        post,
-        post_by_setup,
-        post_by_tool,
-        preview,
-        read_drawing,
-        read_job,
-        signals,
-        targets,
-        verify,
-    )
-    from camtool.errors import CamtoolError
+    from camtool.api import *
 
 __all__ = [
     "Calibration",

@@ -70,7 +70,7 @@ from camtool.verification.report import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from camtool.arrays import Bools, Indices
+    from camtool.arrays import Bools, Floats, Indices
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
     from camtool.planning.items import Step
@@ -716,6 +716,13 @@ def _cut_mm(wanted_path: Toolpath) -> tuple[float, float, float, float] | None:
             taper_reach = note.depth_mm * math.tan(0.5 * note.tool.tip_angle_rad)
             reach = min(taper_reach, reach or math.inf)
         boxes.append(toolpath_extents(part, rows=cuts)[:2] + np.array([-reach, reach]))
+    return _around(boxes)
+
+
+def _around(boxes: Sequence[Floats]) -> tuple[float, float, float, float] | None:
+    """Return left, lower, right and upper end of boxes (2, 2), None without any."""
+    import numpy as np
+
     if not boxes:
         return None
     every = np.array(boxes)
@@ -742,11 +749,7 @@ def _swept_mm(
             reach = max([tool.radius_mm, *(radius for _, radius, *_ in tool.bodies)])
             box = toolpath_extents(part, rows=part.is_motion)[:2]
             boxes.append(box + np.array([-reach, reach]))
-    if not boxes:
-        return None
-    every = np.array(boxes)
-    (left_x, lowest), (right, top) = every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)
-    return float(left_x), float(lowest), float(right), float(top)
+    return _around(boxes)
 
 
 def _touch_mm(wanted_path: Toolpath) -> tuple[tuple[float, float] | None, ...]:

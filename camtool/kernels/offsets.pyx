@@ -71,6 +71,24 @@ cdef inline double apart_square(double[:, ::1] tree, Int node, double x, double 
     return float(dx * dx + dy * dy)
 
 
+cdef inline (Int, Int) next_leaf(
+    double[:, ::1] tree, double x, double y, double square, Int[::1] stack, Int height
+) noexcept:
+    """Return the next leaf of those that wait on a stack of `height` nodes whose box is no farther
+    from a point than the root of `square`, and the new height; leaf −1 if there is none."""
+    cdef Int node, leaves = len(tree) // 2
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        if apart_square(tree, node, x, y) > square:
+            continue
+        if node >= leaves:
+            return node - leaves, height
+        stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+        height += 2
+    return -1, 0
+
+
 cdef Int wait_for_children(
     double[:, ::1] tree, Int node, double x, double y, Int[::1] stack, Int height
 ) noexcept:
@@ -276,25 +294,17 @@ cpdef double deepest(
 
     Any depth above `enough` will do. `stack` (`DEPTH`,) is a scratch buffer.
     """
-    cdef Int leaves, height, node, low, row
+    cdef Int leaf, height, row
     if len(kites) == 0:
         return best
-    leaves = len(tree) // 2
-    height, stack[0] = 1, 1
-    while height > 0:
-        height -= 1
-        node = stack[height]
-        if apart_square(tree, node, x, y) > 0.0:
-            continue
-        if node < leaves:
-            stack[height], stack[height + 1] = 2 * node + 1, 2 * node
-            height += 2
-            continue
-        low = (node - leaves) * LEAF
-        for row in range(low, min(low + LEAF, len(kites))):
+    stack[0] = 1
+    leaf, height = next_leaf(tree, x, y, 0.0, stack, 1)
+    while leaf >= 0:
+        for row in range(leaf * LEAF, min((leaf + 1) * LEAF, len(kites))):
             best = max(best, depth_in(kites, row, x, y))
         if best > enough:
             return best
+        leaf, height = next_leaf(tree, x, y, 0.0, stack, height)
     return best
 
 
@@ -497,7 +507,7 @@ cpdef chord_distances(
     cdef double[:, ::1] bounds = np.empty((len(middles), 4))
     cdef Int[::1] stack = np.empty(DEPTH, np.int64), row = np.empty(2, np.int64)
     cdef double[::1] distances = np.empty(2)
-    cdef Int k, i, leaves = len(tree) // 2, height, node, low
+    cdef Int k, i, leaf, height
     cdef double x, y, dx, dy, long_, limit, first_bound, second_bound
     for k in range(len(middles)):
         x, y, dx, dy = middles[k, 0], middles[k, 1], halves[k, 0], halves[k, 1]
@@ -511,23 +521,16 @@ cpdef chord_distances(
         bounds[k, 0], bounds[k, 1] = least_along(curves, row[0], x, y, dx, dy)
         if distances[1] > limit:
             continue
-        height, stack[0] = 1, 1
-        while height > 0:
-            height -= 1
-            node = stack[height]
-            if apart_square(tree, node, x, y) > limit * limit:
-                continue
-            if node < leaves:
-                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
-                height += 2
-                continue
-            low = (node - leaves) * LEAF
-            for i in range(low, min(low + LEAF, len(curves))):
+        stack[0] = 1
+        leaf, height = next_leaf(tree, x, y, limit * limit, stack, 1)
+        while leaf >= 0:
+            for i in range(leaf * LEAF, min((leaf + 1) * LEAF, len(curves))):
                 if i != row[0] and distance_to(curves, i, x, y) <= limit:
                     first_bound, second_bound = least_along(curves, i, x, y, dx, dy)
                     bounds[k, 0], bounds[k, 1] = (
                         min(bounds[k, 0], first_bound), min(bounds[k, 1], second_bound)
                     )
+            leaf, height = next_leaf(tree, x, y, limit * limit, stack, height)
     return np.asarray(bounds)
 
 
@@ -599,29 +602,22 @@ cpdef curves_within(
     the order of the points."""
     cdef Int[:, ::1] pairs
     cdef Int[::1] stack
-    cdef Int i, leaves, count, height, node, low, row
+    cdef Int i, count, leaf, height, row
     pairs = np.empty((len(points) + LEAF, 2), np.int64)
     stack = np.empty(DEPTH, np.int64)
-    leaves, count = len(tree) // 2, 0
+    count = 0
     for i in range(len(points)):
         x, y, limit = points[i, 0], points[i, 1], reach[i]
-        height, stack[0] = 1, 1
-        while height > 0:
-            height -= 1
-            node = stack[height]
-            if apart_square(tree, node, x, y) > limit * limit:
-                continue
-            if node < leaves:
-                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
-                height += 2
-                continue
+        stack[0] = 1
+        leaf, height = next_leaf(tree, x, y, limit * limit, stack, 1)
+        while leaf >= 0:
             if count + LEAF > len(pairs):
                 pairs = twice_the_room(pairs)
-            low = (node - leaves) * LEAF
-            for row in range(low, min(low + LEAF, len(curves))):
+            for row in range(leaf * LEAF, min((leaf + 1) * LEAF, len(curves))):
                 if distance_to(curves, row, x, y) <= limit:
                     pairs[count, 0], pairs[count, 1] = i, row
                     count += 1
+            leaf, height = next_leaf(tree, x, y, limit * limit, stack, height)
     return np.asarray(pairs[:count])
 
 
@@ -633,25 +629,17 @@ cpdef Int gathered(
 
     −1 if `rows` is too short for them. `stack` (`DEPTH`,) is a scratch buffer.
     """
-    cdef Int leaves, count, height, node, low, row
-    leaves, count = len(tree) // 2, 0
-    height, stack[0] = 1, 1
-    while height > 0:
-        height -= 1
-        node = stack[height]
-        if apart_square(tree, node, x, y) >= reach * reach:
-            continue
-        if node < leaves:
-            stack[height], stack[height + 1] = 2 * node + 1, 2 * node
-            height += 2
-            continue
-        low = (node - leaves) * LEAF
-        for row in range(low, min(low + LEAF, len(curves))):
+    cdef Int count, leaf, height, row
+    count, stack[0] = 0, 1
+    leaf, height = next_leaf(tree, x, y, reach * reach, stack, 1)
+    while leaf >= 0:
+        for row in range(leaf * LEAF, min((leaf + 1) * LEAF, len(curves))):
             if distance_to(curves, row, x, y) < reach:
                 if count == len(rows):
                     return -1
                 rows[count] = row
                 count += 1
+        leaf, height = next_leaf(tree, x, y, reach * reach, stack, height)
     return count
 
 
