@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import GrblModel
+    from .signals import GrblSignals
     from .twin import GrblTwin, GrblTwinSettings
     from .wire import GrblWire
 
@@ -73,6 +74,12 @@ class Grbl(Target):
         from .settings import ask_listing
 
         return ask_listing(port)
+
+    def signals(self) -> GrblSignals:
+        """The signals of its motors; docs/signals.md."""
+        from .signals import GrblSignals
+
+        return GrblSignals()
 
     def wire(self) -> GrblWire:
         """Lines, as many as its buffer takes."""

@@ -99,11 +99,31 @@ def _rows_to_end(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
     return sample_rows(path.first(path.executed_rows), machine, controller)
 
 
-def sample_rows(
+def plan_to_end(path: Toolpath, machine: _Machine) -> Iterator[PlannedBlocks]:
+    """Return the planned blocks of all rows up to the end of the program; raises as
+    `GrblModel.run`."""
+    controller = _controller(machine)
+    check_rows(path, path.executed_rows)
+    return plan_rows(path.first(path.executed_rows), machine, controller)
+
+
+class PlannedBlocks(Struct, frozen=True, eq=False):
+    """The `blocks` (B,) of the rows low:high, as they are planned: `plan` and `squares` of these
+    and of those behind them, and the mask (B,) of those behind which the machine stands."""
+
+    low: int
+    high: int
+    blocks: Blocks
+    plan: SpeedPlan
+    squares: Floats
+    rests: Bools
+
+
+def plan_rows(
     path: Toolpath, machine: _Machine, controller: GrblController
-) -> Iterator[SampledRows]:
-    """Yield the motion of all rows, some thousand at a time. Planned with each window are the
-    block before it, for the corner between them, and as many blocks behind it as the ring
+) -> Iterator[PlannedBlocks]:
+    """Yield the planned blocks of all rows, some thousand at a time. Planned with each window are
+    the block before it, for the corner between them, and as many blocks behind it as the ring
     holds."""
     window = controller.buffer_blocks - 1
     parts, stops = blocks_of(path, machine, controller), stops_of(path, controller)
@@ -122,17 +142,38 @@ def sample_rows(
         )
         plan = speeds_of(known_blocks, path, machine, before, len(last), stops)
         squares = plan.squares(window)
-        seconds = np.zeros(high - low)
-        np.add.at(seconds, block_group.row - low, plan.seconds(squares)[:count])
-        if controller.idle_delay_ms != ALWAYS_ON:
-            stop_rows = np.append(stops.before(known_blocks), True)[len(last) + 1 :][:count]
-            np.add.at(seconds, block_group.row[stop_rows] - low, controller.idle_delay_ms / 1000.0)
-        dwells = low + np.flatnonzero(path.kind[low:high] == Kind.DWELL)
-        seconds[dwells - low] = [dwell_s(value) for value in path.value[dwells].tolist()]
-        samples = GrblSamples(block_group, np.arange(low, high + 1), machine)
-        yield SampledRows(low, high, low, samples, seconds, iterates=True)
+        rests = np.append(stops.before(known_blocks), True)[len(last) + 1 :][:count]
+        yield PlannedBlocks(low, high, block_group, plan, squares, rests)
         before, low = plan.entry_after(count, squares), high
         last = block_group.part(count - 1, count) if count else last
+
+
+def sample_rows(
+    path: Toolpath, machine: _Machine, controller: GrblController
+) -> Iterator[SampledRows]:
+    """Yield the motion of all rows, some thousand at a time."""
+    for planned in plan_rows(path, machine, controller):
+        low, high, blocks = planned.low, planned.high, planned.blocks
+        seconds, count = dwells_of(path, low, high), len(blocks)
+        own_s = planned.plan.seconds(planned.squares)[:count]
+        own_s += idle_delay_s(controller) * planned.rests
+        np.add.at(seconds, blocks.row - low, own_s)
+        samples = GrblSamples(blocks, np.arange(low, high + 1), machine)
+        yield SampledRows(low, high, low, samples, seconds, iterates=True)
+
+
+def dwells_of(path: Toolpath, low: int, high: int) -> Floats:
+    """Return (high − low,) s that the rows low:high dwell."""
+    seconds = np.zeros(high - low)
+    dwells = low + np.flatnonzero(path.kind[low:high] == Kind.DWELL)
+    seconds[dwells - low] = [dwell_s(value) for value in path.value[dwells].tolist()]
+    return seconds
+
+
+def idle_delay_s(controller: GrblController) -> float:
+    """Return the time, s, that it waits at each stop ($1)."""
+    is_on = controller.idle_delay_ms == ALWAYS_ON
+    return 0.0 if is_on else controller.idle_delay_ms / 1000.0
 
 
 class GrblSamples:

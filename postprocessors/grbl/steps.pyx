@@ -13,6 +13,7 @@ a block goes on from. Whole numbers throughout.
 
 from __future__ import annotations
 
+from libc cimport math
 from camtool.kernels.types cimport Int
 
 import numpy as np
@@ -59,3 +60,168 @@ cpdef void step_lines_fill(
         k += count
         block += 1
         event = 0
+
+
+# The segments of grbl's stepper: how long each tick of its timer is (`st_prep_buffer`, stepper.c).
+#
+# A block is cut into segments of about 10 ms, of whole steps of its longest axis and one tick each.
+# Below 8, 4 and 2 kHz a step takes 2, 4 and 8 ticks (AMASS), in any of which the other axes may
+# step. The arithmetic is that of the firmware, in 32-bit floats and in its order, mm and minutes;
+# its timer counts one cycle more than it is told.
+
+
+cpdef enum:
+    # Eighths of a step of the longest axis: the finest tick.
+    EIGHTHS = 8
+    # Cycles of the longest tick.
+    MAX_CYCLES = 65535
+
+cdef enum:
+    ACCELERATES, CRUISES, BRAKES
+
+# Cycles of a minute, and those of a step from which on it takes 2, 4 and 8 ticks.
+cdef float CYCLES_PER_MINUTE = 960000000.0
+cdef Int TWO_TICKS = 2000, FOUR_TICKS = 4000, EIGHT_TICKS = 8000
+
+# Minutes of a segment, and the least way of one in steps.
+cdef float SEGMENT_MIN = 1.0 / 6000.0
+cdef float MIN_STEPS = 1.25
+
+cdef float HALF = 0.5, TWO = 2.0, ZERO = 0.0
+
+
+cdef class Segments:
+    """The segments of B blocks, from the first on. Columns (B,), 32-bit: length mm, acceleration
+    mm/min², squares of the speeds at start and end (mm/min)², highest speed mm/min; and the steps
+    of the longest axis."""
+
+    cdef float[::1] length, acceleration, entry, exit, nominal
+    cdef int[::1] events
+    cdef Int block
+    cdef bint is_loaded
+    cdef int ramp
+    cdef float mm, steps_remaining, step_per_mm, least_mm, dt_remainder, speed, maximum, exit_speed
+    cdef float accelerate_until, decelerate_after
+
+    def __init__(self, length, acceleration, entry, exit, nominal, events) -> None:
+        self.length, self.acceleration, self.entry = length, acceleration, entry
+        self.exit, self.nominal, self.events = exit, nominal, events
+        self.block, self.is_loaded = 0, False
+
+    def fill(self, Int[::1] block, Int[::1] eighths, Int[::1] tick, Int[::1] cycles) -> int:
+        """Fill the next segments: their blocks, lengths in eighths of a step, eighths of a tick,
+        and cycles of a tick, all (S,). Return how many there are; fewer than S only at the end."""
+        cdef Int k, steps, level, count
+        cdef float dt, inv_rate, distance, remaining, last
+        k = 0
+        while k < len(block) and self.block < len(self.length):
+            if not self.is_loaded:
+                self._load()
+            dt = self._advance()
+            distance = self.step_per_mm * self.mm
+            remaining = <float>math.ceil(distance)
+            last = <float>math.ceil(self.steps_remaining)
+            steps = <Int>(last - remaining)
+            dt += self.dt_remainder
+            inv_rate = dt / (last - distance)
+            count = <Int>math.ceil(CYCLES_PER_MINUTE * inv_rate)
+            level = 0
+            if count >= EIGHT_TICKS:
+                level = 3
+            elif count >= FOUR_TICKS:
+                level = 2
+            elif count >= TWO_TICKS:
+                level = 1
+            block[k], eighths[k] = self.block, steps * EIGHTHS
+            tick[k] = EIGHTHS >> level
+            cycles[k] = min(count >> level, <Int>MAX_CYCLES) + 1
+            self.steps_remaining = remaining
+            self.dt_remainder = (remaining - distance) * inv_rate
+            if self.mm == ZERO:
+                self.block += 1
+                self.is_loaded = False
+            k += 1
+        return k
+
+    cdef void _load(self) noexcept:
+        """Load the next block, and find its ramps."""
+        cdef float inv_2_accel, entry, exit, nominal, meeting
+        cdef Int b
+        b = self.block
+        self.mm = self.length[b]
+        self.steps_remaining = <float>self.events[b]
+        self.step_per_mm = self.steps_remaining / self.mm
+        self.least_mm = MIN_STEPS / self.step_per_mm
+        self.dt_remainder = ZERO
+        entry, exit = self.entry[b], self.exit[b]
+        self.speed, self.exit_speed = <float>math.sqrt(entry), <float>math.sqrt(exit)
+        inv_2_accel = HALF / self.acceleration[b]
+        self.ramp, self.accelerate_until = ACCELERATES, self.mm
+        self.decelerate_after = ZERO
+        nominal = self.nominal[b] * self.nominal[b]
+        meeting = HALF * (self.mm + inv_2_accel * (entry - exit))
+        self.is_loaded = True
+        if meeting <= ZERO:
+            self.accelerate_until, self.maximum = ZERO, self.exit_speed
+        elif meeting >= self.mm:
+            self.ramp = BRAKES
+        else:
+            self.decelerate_after = inv_2_accel * (nominal - exit)
+            if self.decelerate_after < meeting:
+                self.maximum = self.nominal[b]
+                if entry >= nominal:
+                    self.ramp = CRUISES
+                else:
+                    self.accelerate_until -= inv_2_accel * (nominal - entry)
+            else:
+                self.accelerate_until = self.decelerate_after = meeting
+                self.maximum = <float>math.sqrt(TWO * self.acceleration[b] * meeting + exit)
+
+    cdef float _advance(self) noexcept:
+        """Go on by a segment; return its minutes."""
+        cdef float longest, dt, time, ahead, change, least, mm, acceleration
+        acceleration = self.acceleration[self.block]
+        longest, dt, time, mm = SEGMENT_MIN, ZERO, SEGMENT_MIN, self.mm
+        least = mm - self.least_mm
+        if least < ZERO:
+            least = ZERO
+        while True:
+            change = acceleration * time
+            if self.ramp == ACCELERATES:
+                mm -= time * (self.speed + HALF * change)
+                if mm < self.accelerate_until:
+                    mm = self.accelerate_until
+                    time = TWO * (self.mm - mm) / (self.speed + self.maximum)
+                    self.ramp = BRAKES if mm == self.decelerate_after else CRUISES
+                    self.speed = self.maximum
+                else:
+                    self.speed += change
+            elif self.ramp == CRUISES:
+                ahead = mm - self.maximum * time
+                if ahead < self.decelerate_after:
+                    time = (mm - self.decelerate_after) / self.maximum
+                    mm = self.decelerate_after
+                    self.ramp = BRAKES
+                else:
+                    mm = ahead
+            else:
+                ahead = mm - time * (self.speed - HALF * change)
+                if self.speed > change and ahead > ZERO:
+                    mm = ahead
+                    self.speed -= change
+                else:
+                    time = TWO * mm / (self.speed + self.exit_speed)
+                    mm = ZERO
+                    self.speed = self.exit_speed
+            dt += time
+            if dt < longest:
+                time = longest - dt
+            elif mm > least:
+                longest += SEGMENT_MIN
+                time = longest - dt
+            else:
+                break
+            if mm <= ZERO:
+                break
+        self.mm = mm
+        return dt

@@ -43,6 +43,7 @@ BENCHES = {
         Bench("valcnc", (), 0.04, 14400.0, dwells=False),
         Bench("i8751", (*STEP_I8751, "feed.default_mm_min=20"), 0.005, 20.0, arcs=False),
         Bench("flashcut", (), 0.0019, 3.0),
+        Bench("grbl", (), 0.004, 300.0),
     )
 }
 

@@ -112,7 +112,7 @@ def test_a_dump_says_the_same_as_the_table(name: str, data: st.DataObject) -> No
     found = signals(data.draw(paths(bench, reach=60)), bench.target())
     scale, changes = dump_of(found)
     board = found.board
-    assert scale == {1e-3: "1 ms", 1e-6: "1 us", 1e-7: "100 ns"}[board.tick_s]
+    assert scale == {1e-3: "1 ms", 1e-6: "1 us", 1e-7: "100 ns", 1e-10: "100 ps"}[board.tick_s]
     per_unit = round({"ms": 1e-3, "us": 1e-6}[board.unit] / board.tick_s)
     last: dict[str, int] = {}
     wanted: Changes = defaultdict(list)
@@ -133,10 +133,13 @@ def test_a_dump_says_the_same_as_the_table(name: str, data: st.DataObject) -> No
     assert changes == wanted
 
 
+@pytest.mark.parametrize("name", ["valcnc", "grbl"])
 @examples(25, 1000, deadline=None)
 @given(data=st.data())
-def test_step_lines_rise_once_a_step_with_the_direction_set(data: st.DataObject) -> None:
-    bench = BENCHES["valcnc"]
+def test_step_lines_rise_once_a_step_with_the_direction_set(
+    name: str, data: st.DataObject
+) -> None:
+    bench = BENCHES[name]
     found = signals(data.draw(paths(bench, reach=60)), bench.target())
     _, changes = dump_of(found)
     counts = found.count()

@@ -13,6 +13,7 @@ import random
 import re
 import shutil
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,9 +25,10 @@ from camtool.errors import ProgramError
 from camtool.simulation.motion import IDEAL, Options
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
-from tests.oracles.grbl_firmware import Ran, built, run, source
+from tests.oracles.grbl_firmware import Ran, Sent, built, factory, played, run, source
 from tests.oracles.motion_rows import rows_of
 from tests.targets import simulate
+from tests.waveforms.programs import of_text
 
 pytestmark = [
     pytest.mark.slow,
@@ -151,6 +153,11 @@ def model(text: str, *settings: str) -> tuple[np.ndarray, float]:
     return np.concatenate([np.zeros((0, 3)), *places]), sum(row.duration_s for row in rows)
 
 
+@pytest.fixture(scope="module")
+def signal_board(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built(tmp_path_factory.mktemp("board"))
+
+
 @pytest.mark.parametrize("seed", range(MOVING))
 def test_steps_and_times(firmware: Callable[..., Ran], seed: int) -> None:
     """Positions of both step for step, and how long they take, with and without laser mode."""
@@ -178,6 +185,43 @@ def test_steps_and_times(firmware: Callable[..., Ran], seed: int) -> None:
     found = np.rint(places / [1 / steps, 0.004, 0.004]).astype(np.int64)
     np.testing.assert_array_equal(found, plain.steps)
     assert abs(seconds - smooth.seconds) <= max(TIME_S, TIME_PART * smooth.seconds), text
+
+
+PIECE_BYTES, PIECE_S = 60, 0.02
+"""Programs go to grbl in pieces that its buffer holds; its planner takes 15 blocks."""
+
+TICK_PART, TICK_S = 1e-4, 60e-6
+"""Times of steps differ by so much: planned speeds are 64-bit floats here, and 32-bit there."""
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_ticks_of_signals(tmp_path: Path, signal_board: Path, seed: int) -> None:
+    """Each pulse of the step pins, with the direction pins as they then are, and its time."""
+    draw = random.Random(seed)
+    text = "G21 G90 F100\nG1 X-1.5 Y0.3\n"
+    for _ in range(draw.randint(2, 10)):
+        where = f"X{number(draw, -2, 2)} Y{number(draw, -2, 2)}"
+        which = draw.random()
+        if which < 0.2:
+            text += f"G0 {where} Z{number(draw, -1, 1)}\n"
+        else:
+            text += f"G1 {where} F{draw.randint(20, 500)}\n"
+    data = f"{text}G4 P0.05\nG0 X1\n".encode()
+    pieces = [data[k : k + PIECE_BYTES] for k in range(0, len(data), PIECE_BYTES)]
+    sent = [Sent(pieces[0]), *(Sent(piece, PIECE_S) for piece in pieces[1:])]
+    session = played(signal_board, factory(signal_board, tmp_path), sent, tmp_path)
+    ways = np.diff(session.slides, axis=0, prepend=np.zeros((1, 3), np.int64))
+    pulsing = ways.any(axis=1)
+    at_s, ways = session.at_s[pulsing], ways[pulsing]
+
+    parts = list(of_text("grbl", data.decode()).pulses())
+    ticks = np.rint(np.concatenate([part.at_s for part in parts]) * 16e6).astype(np.int64)
+    moments, index = np.unique(ticks, return_inverse=True)
+    found = np.zeros((len(moments), 3), dtype=np.int64)
+    np.add.at(found, index, np.concatenate([part.moves for part in parts]))
+    np.testing.assert_array_equal(found, ways)
+    times = (moments - moments[0]) / 16e6
+    np.testing.assert_allclose(times, at_s - at_s[0], rtol=TICK_PART, atol=TICK_S)
 
 
 def test_words(firmware: Callable[..., Ran]) -> None:
