@@ -15,6 +15,7 @@ import click
 from camtool.cli.files import STDOUT, check_new, check_places, display_name, read_bytes, write_all
 from camtool.cli.messages import say
 from camtool.cli.options import decorate, talk_options
+from camtool.cli.settings import asked_settings
 from camtool.errors import MachineError, OptionError
 from camtool.project import FILE, MACHINES, NAME, names_machine, text_naming_machine, user_folder
 from camtool.tables import parse_table
@@ -278,12 +279,13 @@ def _controller_settings(
 ) -> tuple[str, Sequence[ControllerSetting]]:
     """Return the name of the target, and the settings of the machine that its controller
     reports."""
-    from camtool.target.registry import each_target, find_target, target_names
+    from camtool.target.registry import each_target, find_target, load_target, target_names
 
     if port is not None:
         if target is None:
             raise click.UsageError("--port needs --target: which controller is there?")
-        settings, text = f"--port {port}", find_target(target)[0].ask_settings(port)
+        lines = asked_settings(load_target(target), port, None, quiet=True)
+        settings, text = f"--port {port}", "\n".join(lines)
     elif settings is not None:
         text = settings_text(settings)
     else:

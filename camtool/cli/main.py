@@ -70,6 +70,7 @@ COMMANDS = {
     "probe": "Measure the top of the blank.",
     "send": "Send a program to its machine.",
     "servo": "Servo axes: their motors, and the gains of their loops.",
+    "settings": "A controller's own settings: read, compare, restore.",
     "signals": "Step lines, coils and port bytes over time.",
     "stale": "Programs that are out of date.",
     "targets": "The machines, and everything about one.",
@@ -125,6 +126,8 @@ def cli() -> None:
     camtool send    logo.pic -t pic-mmh --port /dev/ttyUSB0
     camtool panel   logo.pic -t pic-mmh --port /dev/ttyUSB0   the same, from a page
     camtool ports                               where machines may be
+    camtool touch   corner -t grbl …            part zero, by a probe
+    camtool settings read -t grbl …             what a controller keeps
     camtool probe   logo.nc -t grbl --port /dev/ttyUSB0   the top of the blank, for --surface
     camtool home, jog, zero, unlock             a machine moved by hand
     camtool console grbl /dev/ttyUSB0           type to a controller

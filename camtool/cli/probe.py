@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -18,10 +18,25 @@ from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, feed, length, machine_options, talk_options
 from camtool.errors import OptionError, OutputError
-
-if TYPE_CHECKING:
-    from camtool.geometry.polylines import Segments
-    from camtool.toolpath.probing import Box, ProbeAnswer, ProbeCycle, ProbeStep
+from camtool.geometry.polylines import Segments
+from camtool.importers.read import read_drawing
+from camtool.jobs.build import job_of_file
+from camtool.pipeline import read_program
+from camtool.sending.prepare import manner_of, wire_of
+from camtool.toolpath.probing import (
+    Box,
+    ProbeAnswer,
+    ProbeCycle,
+    ProbeStep,
+    grid_over,
+    height_map,
+    in_rows,
+    noted,
+    probed_nodes,
+    refuse_boxes_on_the_way,
+    surface_from,
+)
+from camtool.toolpath.surface import text_of_surface
 
 JOURNAL = click.option(
     "--journal", metavar="FILE", help="Add each touch and the result to this file."
@@ -85,17 +100,6 @@ def probe(
     Points in the holes of a drawing and in the clamps of a job are left out. Ctrl-C stops the
     machine. Exit code 1, and no file, when a point was not touched.
     """
-    from camtool.pipeline import read_program
-    from camtool.sending.prepare import manner_of, wire_of
-    from camtool.toolpath.probing import (
-        grid_over,
-        height_map,
-        in_rows,
-        probed_nodes,
-        refuse_boxes_on_the_way,
-        surface_from,
-    )
-    from camtool.toolpath.surface import text_of_surface
 
     target = machine.load()
     wire = wire_of(target)
@@ -160,7 +164,6 @@ def journaled(
 ) -> Iterator[tuple[ProbeCycle, Close]]:
     """Give the cycle that adds each touch to the journal as a JSON line, and what ends it; without
     a file, the cycle as it is. OutputError for a file that cannot be written."""
-    from camtool.toolpath.probing import noted
 
     if name is None:
         yield cycle, lambda reason, measured: None
@@ -196,8 +199,6 @@ def journaled(
 
 def _contours(name: str) -> list[Segments]:
     """Return the closed contours of a drawing."""
-    from camtool.geometry.polylines import Segments
-    from camtool.importers.read import read_drawing
 
     rings = [Segments.of(path) for path in read_drawing(Path(name)).paths if path.closed]
     if not rings:
@@ -207,8 +208,6 @@ def _contours(name: str) -> list[Segments]:
 
 def _boxes(name: str) -> list[Box]:
     """Return the boxes of a job file, in the work frame."""
-    from camtool.jobs.build import job_of_file
-    from camtool.toolpath.probing import Box
 
     boxes = job_of_file(Path(name)).keep_out
     if not boxes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import click
 
@@ -13,9 +13,9 @@ from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, feed, length, machine_options, talk_options
 from camtool.cli.probe import JOURNAL, asked_to_begin, journaled
 from camtool.errors import OptionError
-
-if TYPE_CHECKING:
-    from camtool.toolpath.probing import Axis, Measured, Place, ProbeScript, Touch
+from camtool.sending.prepare import manner_of, wire_of
+from camtool.toolpath import probing
+from camtool.toolpath.probing import Axis, Measured, Place, ProbeScript, Touch
 
 AXES_OF = {
     "plate": "z",
@@ -114,8 +114,6 @@ def touch(
     Each place is touched twice, fast and slowly. Between places the tool stops where it touches.
     Ctrl-C stops the machine. Exit code 1, and no zero, when something is not as it should be.
     """
-    from camtool.sending.prepare import manner_of, wire_of
-    from camtool.toolpath import probing
 
     values = axes_of(axes)
     wrong = values.keys() - set(AXES_OF[what])

@@ -11,6 +11,7 @@ and its model within the methods that need them.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -40,6 +41,10 @@ class NoDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 class NoTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The settings of a virtual controller whose wire is known completely."""
+
+
+NEAR_RATIO = 1e-6
+"""Settings whose ratio is nearer to 1 than this are equal."""
 
 
 class ControllerSetting(Struct, frozen=True):
@@ -123,12 +128,29 @@ class Target(ABC):
         that is none of these settings. MachineError for what is missing or cannot be used."""
         return None
 
-    def ask_settings(self, port: str) -> str:
-        """The text for `settings_from`, asked of the controller at a serial port; MachineError
-        where none answers."""
-        raise MachineError(
-            f"{self.name} has no settings that can be read from a port", where="--port"
-        )
+    def compare_settings(
+        self, text: str, machine: Machine[Any, Any]
+    ) -> tuple[list[str], list[str]]:
+        """Compare the controller's own settings with the machine file. Return the differences that
+        spoil a part or may damage the machine, and other remarks. MachineError as
+        `settings_from`."""
+        settings = self.settings_from(text)
+        if settings is None:
+            raise MachineError("says nothing of a machine")
+        errors = []
+        for setting in settings:
+            value: Any = machine
+            for name in setting.key.split("."):
+                value = getattr(value, name, None)
+            is_near = value == setting.value
+            if isinstance(value, float | int) and isinstance(setting.value, float | int):
+                is_near = math.isclose(value, setting.value, rel_tol=NEAR_RATIO)
+            if value is not None and not is_near:
+                errors.append(
+                    f"{setting.said} means {setting.value}, but {setting.key} of the machine file "
+                    f"is {value}: change one of the two"
+                )
+        return errors, []
 
     def signals(self) -> SignalModel | NoSignals:
         """Return the model of the signals of its motors; by default a `NoSignals`, which says why

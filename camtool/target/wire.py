@@ -531,6 +531,15 @@ class Hand(Conversation):
             )
 
 
+class SettingsConversation(Conversation):
+    """A controller that is asked for its settings, and takes changes of them. `before`, `after`:
+    its listings; `written`: the changes that it has taken."""
+
+    before: Sequence[str] = ()
+    after: Sequence[str] = ()
+    written: Sequence[str] = ()
+
+
 class CommandHand(Hand):
     """A machine moved by the commands of its wire: each order is a conversation of its own.
 
@@ -773,6 +782,9 @@ class Wire(ABC):
     """True if the controller locks itself and has a command to end that (`Manner.unlock`)."""
     stopping: ClassVar[str] = ""
     """Effect of a stop, such as "the machine stops at once"."""
+    question: ClassVar[bytes] = b""
+    """Bytes that the controller answers, and that move nothing on any machine; b"" where none are
+    known to be so."""
     by_hand: ClassVar[frozenset[HandAction]] = frozenset()
     """Orders by hand that `command`, or the controller's own `hand`, takes."""
     zeroes_each: ClassVar[bool] = True
@@ -832,6 +844,22 @@ class Wire(ABC):
             f"{machine.target.name} has no command to probe over its line",
             mend="measure by hand; heights can be written into a file of a surface",
         )
+
+    def settings(
+        self, machine: Machine[Any, Any], manner: Manner, changes: Sequence[str] = ()
+    ) -> SettingsConversation:
+        """Return the conversation that asks for the settings, makes these changes ("$110=800") and
+        asks again. MachineError where the controller has none that its line reaches."""
+        raise MachineError(
+            f"{machine.target.name} has no settings that can be read over its line",
+            mend="camtool settings compare FILE reads those that stand in a file, such as "
+            "LinuxCNC's INI",
+        )
+
+    def recognised(self, heard: str) -> str:
+        """Return the controller and its state as an answer to `question` says them; "" where it is
+        another."""
+        return ""
 
     def terminal(self, machine: Machine[Any, Any]) -> Terminal:
         """Return the terminal that translates typed lines into bytes and explains answers."""

@@ -69,11 +69,11 @@ class Grbl(Target):
 
         return settings_of(text)
 
-    def ask_settings(self, port: str) -> str:
-        """Its answer to `$$`; MachineError where none comes."""
-        from .settings import ask_listing
+    def compare_settings(self, text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
+        """Compare its answer to `$$` with the machine file."""
+        from .settings import differences
 
-        return ask_listing(port)
+        return differences(text, machine)
 
     def signals(self) -> GrblSignals:
         """The signals of its motors; docs/signals.md."""

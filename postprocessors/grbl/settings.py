@@ -8,13 +8,11 @@ status reports) are passed over.
 from __future__ import annotations
 
 import re
-import time
-from typing import Any
 
 from camtool.errors import MachineError
 from camtool.records import replace
 from camtool.target.contract import ControllerSetting
-from camtool.target.wire import Place, port_fault
+from camtool.target.wire import Place
 
 from .dialect import GrblController, GrblMachine
 
@@ -208,55 +206,3 @@ def _difference(
 
 BAUD = 115200
 """grbl 1.1's rate (BAUD_RATE in its config.h)."""
-
-BANNER_S = 3.0
-"""Longest wait for the greeting of a board that resets when its port is opened."""
-
-ANSWER_S = 3.0
-"""Longest silence before a controller counts as not answering."""
-
-MAX_LINES = 1000
-
-
-def ask_listing(port: str) -> str:
-    """Return the answer to `$$` at a serial port; MachineError if none comes, or if it is no
-    listing."""
-    import serial  # seldom needed
-
-    try:
-        with serial.Serial(port, BAUD, timeout=0.1, write_timeout=ANSWER_S) as line:
-            _lines(line, BANNER_S, "Grbl")
-            line.reset_input_buffer()
-            line.write(b"$$\n")
-            rows = _lines(line, ANSWER_S, "ok", "error")
-    except (OSError, ValueError) as error:  # serial.SerialException is an OSError
-        reason, mend = port_fault(error)
-        raise MachineError(
-            f"the port cannot be used ({reason})",
-            where=f"--port {port}",
-            mend=f"{mend}; or give the listing as a file",
-        ) from error
-    if not rows or rows[-1] != "ok":
-        raise MachineError(
-            f"the answer to $$ is {rows[-1]!r}" if rows else "nothing answers $$",
-            where=f"--port {port}",
-            mend="$$ works while the machine is idle or locked; is it a grbl at this port?",
-        )
-    return "\n".join(rows)
-
-
-def _lines(port: Any, patience_s: float, *ends: str) -> list[str]:
-    """The lines that come, up to one that begins with one of `ends`, or until nothing comes for
-    so long."""
-    rows, part, last = list[str](), b"", time.monotonic()
-    while time.monotonic() - last < patience_s and len(rows) < MAX_LINES:
-        chunk = port.read(256)
-        if not chunk:
-            continue
-        last = time.monotonic()
-        *complete, part = (part + chunk).split(b"\n")
-        for each in complete:
-            rows.append(each.decode("ascii", "replace").strip())
-            if rows[-1].startswith(ends):
-                return rows
-    return rows

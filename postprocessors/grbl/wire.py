@@ -34,13 +34,14 @@ from camtool.target.wire import (
     Override,
     Packet,
     Place,
+    SettingsConversation,
     Wire,
     WireState,
 )
 from camtool.toolpath.probing import AXES, CycleRun, ProbeCycle, ProbeStep
 
 from .dialect import GrblController, GrblMachine
-from .settings import BAUD, beyond_travel, differences
+from .settings import BAUD, LISTED_TOLERANCE, beyond_travel, differences
 
 BUFFER_BYTES: Final = 127
 """128 bytes (RX_BUFFER_SIZE, serial.h), of which the ring leaves one empty."""
@@ -110,6 +111,7 @@ _FEED = re.compile(r"\d{1,9}(?:\.\d*)?")
 _SETTING = re.compile(r"\$\d{1,3}=[^\s=]+")
 _PUSHED = re.compile(r"\[[A-Za-z0-9]{1,6}:.*\]")
 _STARTUP = re.compile(r">(.*):(ok|error:(\d+))")
+_VERSION = re.compile(r"Grbl \d+\.\d+\w*")
 _BANNER = re.compile(r"Grbl (?:1\.[1-9]|[2-9])")
 _WORD = re.compile(r"G0*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _AXIS = re.compile(r"[XYZ]", re.IGNORECASE)
@@ -190,6 +192,7 @@ class GrblWire(Wire):
     baud = BAUD
     place = "told"
     unlocks = True
+    question = STATUS
     by_hand = frozenset({"home", "zero", "jog", "hold", "unlock", "line"})
     overrides = ("feed", "rapid", "spindle")
     ready = (
@@ -243,6 +246,21 @@ class GrblWire(Wire):
         _, (u, v, w) = super().travel_mm(machine)
         x, y, z = (0.0 if math.isfinite(each) else each for each in (u, v, w))
         return (-u, -v, -w), (x, y, z)
+
+    def settings(
+        self, machine: GrblMachine, manner: Manner, changes: Sequence[str] = ()
+    ) -> GrblSettings:
+        """`$$`, a line for each change, and `$$`."""
+        return GrblSettings(machine, manner, changes)
+
+    def recognised(self, heard: str) -> str:
+        """Its version, which it says when the port resets it, and how it stands."""
+        version = _VERSION.search(heard)
+        status = _STATUS.search(heard)
+        words = [version[0]] if version else ["grbl"]
+        if status:
+            words.append(STATES[status[1]])
+        return ": ".join(words) if version or status else ""
 
     def hand(self, machine: GrblMachine, manner: Manner) -> GrblHand:
         """Return one conversation for all orders: `command` would reset grbl before each."""
@@ -1106,6 +1124,88 @@ def _probe_line(step: ProbeStep) -> bytes:
     if step.action == "go":
         return f"G90G21G0{axes}\n".encode()
     return f"G90G21G38.3{axes}F{step.feed:.1f}\n".encode()
+
+
+class GrblSettings(GrblConversation, SettingsConversation):
+    """A grbl that is asked for its settings, before and after it has taken changes of them. It
+    answers while it is locked too."""
+
+    def __init__(self, machine: GrblMachine, manner: Manner, changes: Sequence[str]) -> None:
+        self._changes = sorted(changes, key=_setting_order)
+        lines = [each.encode("ascii") for each in self._changes]
+        super().__init__((), machine, manner, (b"$$", *lines, b"$$"))
+        self.written: list[str] = []
+        self._awaited: _Line | None = None  # the line whose answer is due, and since when
+        self._awaited_since = 0.0
+        self._is_listed = False
+
+    @property
+    def _unlocks(self) -> bool:
+        return True  # it stays locked, which changes nothing
+
+    def tick(self, now: float) -> None:
+        """Notice a line whose answer does not come, though reports do."""
+        head = self._out_lines[0] if self._out_lines else None
+        if head is not self._awaited:
+            self._awaited, self._awaited_since = head, now
+        elif head is not None and now - self._awaited_since >= self.manner.patience_s:
+            text = head.data.decode("ascii").strip()
+            self._end(WireState.FAILED, f"no answer to {text}, which it may have taken")
+            return
+        super().tick(now)
+
+    def _answer(self, line: str, now: float) -> None:
+        head = self._out_lines[0].data.decode("ascii").strip() if self._out_lines else ""
+        if head in self._changes and line != "ok" and self.state is WireState.SENDING:
+            meaning = ERRORS.get(int(line[6:]), "it says no more")
+            self._end(WireState.FAILED, f"{line} to {head}: {meaning}")
+            return
+        if head in self._changes and line == "ok":
+            self.written.append(head)
+        super()._answer(line, now)
+
+    def _compare(self, now: float) -> None:
+        listing, self._listing = self._listing, []
+        if not self._is_listed:
+            self.before, self._is_listed = listing, True
+            return
+        self.after = listing
+        expected = listed_settings(self.before) | listed_settings(self._changes)
+        read_back = listed_settings(self.after)
+        different = [
+            f"${number} is {read_back.get(number, 'missing')} instead of {value}"
+            for number, value in expected.items()
+            if not _are_equal(read_back.get(number, ""), value)
+        ]
+        if different:
+            self._end(WireState.FAILED, f"read back otherwise: {'; '.join(different)}")
+        else:
+            self._end(WireState.FINISHED)
+
+
+def listed_settings(lines: Sequence[str]) -> dict[int, str]:
+    """Return the values of a listing by their numbers; ValueError for a line that is none."""
+    pairs = (line.removeprefix("$").partition("=")[::2] for line in lines)
+    return {int(number): value for number, value in pairs}
+
+
+def _are_equal(value: str, other: str) -> bool:
+    try:
+        return abs(float(value) - float(other)) <= LISTED_TOLERANCE
+    except ValueError:
+        return value == other
+
+
+def _setting_order(line: str) -> tuple[int, int]:
+    """Return the key that sorts changes: homing is switched on before and off behind the soft
+    limits, which need it."""
+    number = int(line[1:].partition("=")[0])
+    if number == HOMING_SETTING:
+        return (-1 if float(line.partition("=")[2]) else 1), number
+    return 0, number
+
+
+HOMING_SETTING: Final = 22
 
 
 class GrblHand(GrblConversation, Hand):

@@ -95,6 +95,7 @@ class LinuxcncWire(Wire):
     stopping = "the program is aborted: the slides slow down and stand"
     by_hand = frozenset({"home", "zero", "jog", "hold", "line"})
     overrides = ("feed", "spindle")
+    question = b"hello EMC camtool 1.0\r\n"
 
     def packets(
         self, data: bytes, machine: LinuxcncMachine, forecast: Forecast
@@ -158,6 +159,10 @@ class LinuxcncWire(Wire):
         """`set home -1`; G10 L20 of the frame that is active; `set jog_incr`, axis by axis, or
         again and again while it is held."""
         return LinuxcncConversation((), _link(machine), manner, action, values)
+
+    def recognised(self, heard: str) -> str:
+        """Its answer to the greeting, which enables nothing."""
+        return "LinuxCNC (linuxcncrsh)" if heard.upper().startswith("HELLO ") else ""
 
     def probing(
         self, cycle: ProbeCycle, machine: LinuxcncMachine, manner: Manner

@@ -1,19 +1,17 @@
 """`camtool init`: a machine of one's own, found by its name, and what is refused."""
 
 import json
-import os
-import pty
 import re
-import threading
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import ezdxf
 import pytest
 
 from camtool.cli.init import AXES
+from camtool.target.registry import load_target
 from tests.cli.conftest import Run
+from tests.sending.test_ends import hosted
 
 LISTING = """Grbl 1.1h ['$' for help]
 >>> $$
@@ -157,7 +155,7 @@ def test_each_number_may_be_one_or_three(camtool: Run, config: Path, flag: str) 
         (("mine", "-t", "grbl", "--travel", "1e9"), "--travel 1e9: "),
         (("mine", "-t", "grbl", "--settings", "missing.txt"), "cannot be read"),
         (("mine", "--port", "/nonexistent"), "--port needs --target"),
-        (("mine", "-t", "grbl", "--port", "/nonexistent"), "the port cannot be used"),
+        (("mine", "-t", "grbl", "--port", "/dev/no-port"), "the port cannot be opened"),
         (("mine", "-t", "valcnc", "--port", "/nonexistent"), "no settings that can be read"),
         (("mine", "-t", "grbl", "--port", "a", "--settings", "b"), "contradict"),
         (("mine", "-t", "grbl", "--project", "-o", "b"), "contradict"),
@@ -279,32 +277,10 @@ def test_a_listing_may_be_pasted(camtool: Run, config: Path) -> None:
     assert (values["travel_mm"], values["backlash_mm"]) == (300, 0.02)
 
 
-@pytest.fixture
-def board() -> Iterator[str]:
-    """A serial port at which something answers as grbl does."""
-    master, slave = pty.openpty()
-
-    def answer() -> None:
-        os.write(master, b"\r\nGrbl 1.1h ['$' for help]\r\n")
-        asked = b""
-        try:
-            while b"$$\n" not in asked:
-                asked += os.read(master, 100)
-            rows = [row for row in LISTING.splitlines() if row.startswith("$")]
-            os.write(master, "".join(f"{row}\r\n" for row in rows).encode() + b"ok\r\n")
-        except OSError:
-            pass
-
-    thread = threading.Thread(target=answer, daemon=True)
-    thread.start()
-    yield os.ttyname(slave)
-    os.close(slave)
-    os.close(master)
-    thread.join(5.0)
-
-
-def test_a_controller_is_asked_at_its_port(camtool: Run, config: Path, board: str) -> None:
-    done = camtool("init", "mine", "-t", "grbl", "--port", board)
+def test_a_controller_is_asked_at_its_port(camtool: Run, config: Path) -> None:
+    board = load_target("grbl").with_settings(["axes.x.travel_mm=300"]).twin()
+    with hosted(board, 20.0) as port:
+        done = camtool("init", "mine", "-t", "grbl", "--port", port)
     assert done.returncode == 0, done.stderr
     assert said(config / "machines" / "mine.toml")["travel_mm"] == 300
 
