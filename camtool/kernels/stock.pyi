@@ -1,5 +1,7 @@
 from camtool.arrays import Floats, Ints
 
+QUARTERS: Floats
+
 class StockTree:
     top: float
     def __init__(
@@ -24,7 +26,7 @@ class StockTree:
         before: Ints | None = None,
         enough: float = ...,
     ) -> Floats: ...
-    def means(self, squares: Floats, bottom: float = ...) -> tuple[Floats, Floats]: ...
+    def quarter_means(self, squares: Floats, bottom: float = ...) -> tuple[Floats, Floats]: ...
 
 def heights_of_moves(moves: Floats, tools: Floats, points: Floats, grow: Floats) -> Floats: ...
 def thinned(points: Floats, row: Ints, start: Floats, beside: float) -> Ints: ...

@@ -52,6 +52,7 @@ cdef enum:
 cdef int HALVINGS = 54
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+QUARTERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 
 cdef double BEND_MM = 1e-9  # a place of a cone nearer than this to its tip or flat lies on its bend
 
@@ -296,74 +297,51 @@ cdef class StockTree:
                 )
         return np.asarray(found)
 
-    def means(self, squares: Floats, double bottom=-math.INFINITY):
-        """(K,), (K,) bounds of the mean height over each square: middle and half a side (K, 3); the
-        stock ends at a bottom."""
+    def quarter_means(self, squares: Floats, double bottom=-math.INFINITY):
+        """(4 K,), (4 K,) bounds of the mean height over the quarters of each square, in the order
+        of `QUARTERS`: middle and half a side (K, 3); the stock ends at a bottom."""
         cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
-        cdef Py_ssize_t k, count = at.shape[0]
-        cdef double[::1] low = np.empty(count)
-        cdef double[::1] high = np.empty(count)
-        cdef Int last = -1
+        cdef double[:, ::1] signs = QUARTERS
+        cdef Py_ssize_t k, q, count = at.shape[0]
+        cdef double[::1] low = np.empty(4 * count)
+        cdef double[::1] high = np.empty(4 * count)
+        cdef Int[::1] near = np.empty(self.moves.shape[0], dtype=np.int64)
+        cdef double[::1] heights = np.empty(self.moves.shape[0])
+        cdef Int last = -1, found
+        cdef double[3] quarter
         with nogil:
             for k in range(count):
-                low[k], high[k] = self.top, self.top
-                self.mean_of(&at[k, 0], bottom, &last, &low[k], &high[k])
+                found = self.gather(&at[k, 0], near, &last)
+                quarter[2] = 0.5 * at[k, 2]
+                for q in range(4):
+                    quarter[0] = at[k, 0] + signs[q, 0] * quarter[2]
+                    quarter[1] = at[k, 1] + signs[q, 1] * quarter[2]
+                    self.mean_of(
+                        quarter, bottom, near, found, heights, &low[4 * k + q], &high[4 * k + q]
+                    )
         return np.asarray(low), np.asarray(high)
 
-    cdef void mean_of(
-        self, const double* square, double bottom, Int* guess, double* low, double* high
-    ) noexcept nogil:
-        """Bounds of the mean height over a square. From below: the least of the tangent planes of
-        all moves that may be lowest there is concave, so its mean is at least that of the four
-        corners. From above: the mean of the corners of the best move."""
+    cdef Int gather(self, const double* square, Int[::1] near, Int* guess) noexcept nogil:
+        """Store the moves that may be lowest somewhere over a square; return their number."""
         cdef Int stack[FAN * DEPTH]
         cdef int levels[FAN * DEPTH]
-        cdef double x = square[0], y = square[1], half = square[2]
-        cdef double room = half * math.sqrt(2.0), best, floor, z, average
-        cdef double[2] slope
+        cdef double x = square[0], y = square[1], room = square[2] * math.sqrt(2.0)
+        cdef double best = self.top
         cdef double[MAX_CORNERS] now
         cdef double[3][MAX_CORNERS] whole
-        cdef double[4] least
-        cdef int count, depth, k
-        cdef Int node, child, end, row = -1
-        cdef double[2] way
-        cdef double cover = -math.INFINITY, part
-        way[0], way[1] = 0.0, 0.0
-        for k in range(4):
-            whole[0][k] = x + (half if k & 1 else -half)
-            whole[1][k] = y + (half if k & 2 else -half)
-            whole[2][k] = 0.0
-        low[0], high[0] = self.top, self.top
+        cdef int count = 1, depth
+        cdef Int node, child, end, row = -1, cover = -1, found = 0
         if self.height == 0:
-            return
+            return 0
+        corners_of(square, whole)
         self.lowest(x, y, 0.0, self.top, -1, &row, guess[0])
-        best = self.top
         if row >= 0:
             guess[0] = row
-            z = self.corners(row, 4, whole, 0.0, now)
-            if z <= best:
-                best, average = z, 0.0
-                for k in range(4):
-                    average += 0.25 * max(now[k], bottom)
-                high[0] = average
-        if best == self.top:
-            # No single move is known to cover the square: a wall may stand in it.
-            if row < 0:
-                self.lowest(x, y, room, self.top, -1, &row, guess[0])
-            if row < 0:
-                return
-            guess[0] = row
-            part = self.beyond(row, x, y, way)
-            if part == math.INFINITY:
-                cover = part
-            else:
-                average = self.covered(row, square, way, part, bottom)
-                high[0] = min(high[0], average)
-        # Moves that are nowhere lower than `best` are not looked at; they leave no less than it.
-        floor = best
-        for k in range(4):
-            least[k] = best
-        stack[0], levels[0], count = 0, self.height - 1, 1
+            best = min(best, self.corners(row, 4, whole, 0.0, now))
+        if best < self.top:  # one move covers all of it
+            cover = near[0] = row
+            found = 1
+        stack[0], levels[0] = 0, self.height - 1
         while count:
             count -= 1
             node, depth = stack[count], levels[count]
@@ -371,44 +349,95 @@ cdef class StockTree:
             if not self.nearer(&self.nodes[row, 0], x, y, room, 0.0) < best:
                 continue
             end = min(FAN * (node + 1), self.members(depth))
-            if depth:
-                for child in range(FAN * node, end):
+            for child in range(FAN * node, end):
+                if depth:
                     stack[count], levels[count] = child, depth - 1
                     count += 1
-                continue
-            for child in range(FAN * node, end):
-                if self.moves[child, AZ] + min(
+                elif child != cover and self.moves[child, AZ] + min(
                     self.moves[child, SLOPE] * self.moves[child, LONG], 0.0
-                ) >= best:
-                    continue
-                z = height_of(
+                ) < best and height_of(
                     &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, room
-                )
-                if z >= best:
-                    continue
-                floor = min(floor, z)
-                if best == self.top:
-                    cover = max(cover, self.support(child, x, y, way, room))
-                average = tangent_of(
-                    &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, slope
-                )
-                if average == math.INFINITY:
-                    slope[0], slope[1] = 0.0, 0.0
-                else:
-                    z = average
-                for k in range(4):
-                    least[k] = min(
-                        least[k],
-                        z
-                        + (half if k & 1 else -half) * slope[0]
-                        + (half if k & 2 else -half) * slope[1],
+                ) < best:
+                    near[found] = child
+                    found += 1
+        return found
+
+    cdef void mean_of(
+        self, const double* square, double bottom, Int[::1] near, Int count, double[::1] heights,
+        double* low, double* high
+    ) noexcept nogil:
+        """Bounds of the mean height over a square that so many moves may cut; `heights`: scratch
+        buffer. From below: the least of the tangent planes of all moves that may be lowest there
+        is concave, so its mean is at least that of the four corners. From above: the mean of the
+        corners of the best move."""
+        cdef double x = square[0], y = square[1], half = square[2]
+        cdef double room = half * math.sqrt(2.0), best = self.top, z, average, lowest = self.top
+        cdef double[2] slope
+        cdef double[MAX_CORNERS] now
+        cdef double[3][MAX_CORNERS] whole
+        cdef double[4] least
+        cdef int k
+        cdef Int i, row = -1
+        cdef double[2] way
+        cdef double cover = -math.INFINITY, part, floor
+        way[0], way[1] = 0.0, 0.0
+        corners_of(square, whole)
+        low[0], high[0] = self.top, self.top
+        for i in range(count):
+            heights[i] = height_of(
+                &self.moves[near[i], 0], &self.tools[self.tool[near[i]], 0], x, y, 0.0
+            )
+            if heights[i] < lowest:
+                lowest, row = heights[i], near[i]
+        if row >= 0:
+            z = self.corners(row, 4, whole, 0.0, now)
+            if z <= best:
+                best, high[0] = z, mean_above(now, bottom)
+        if best == self.top:
+            # No single move is known to cover the square: a wall may stand in it.
+            if row < 0:
+                for i in range(count):
+                    z = height_of(
+                        &self.moves[near[i], 0], &self.tools[self.tool[near[i]], 0], x, y, room
                     )
-                if self.corners(child, 4, whole, 0.0, now) == math.INFINITY:
-                    continue
-                average = 0.0
-                for k in range(4):
-                    average += 0.25 * max(now[k], bottom)
-                high[0] = min(high[0], average)
+                    if z < lowest:
+                        lowest, row = z, near[i]
+            if row < 0:
+                return
+            part = self.beyond(row, x, y, way)
+            if part == math.INFINITY:
+                cover = part
+            else:
+                high[0] = min(high[0], self.covered(row, square, way, part, bottom))
+        # Moves that are nowhere lower than `best` are not looked at; they leave no less than it.
+        floor = best
+        for k in range(4):
+            least[k] = best
+        for i in range(count):
+            row = near[i]
+            z = height_of(&self.moves[row, 0], &self.tools[self.tool[row], 0], x, y, room)
+            if z >= best:
+                continue
+            floor = min(floor, z)
+            if best == self.top:
+                cover = max(cover, self.support(row, x, y, way, room))
+            average = tangent_of(
+                &self.moves[row, 0], &self.tools[self.tool[row], 0], x, y, slope
+            )
+            if average == math.INFINITY:
+                slope[0], slope[1] = 0.0, 0.0
+            else:
+                z = average
+            for k in range(4):
+                least[k] = min(
+                    least[k],
+                    z
+                    + (half if k & 1 else -half) * slope[0]
+                    + (half if k & 2 else -half) * slope[1],
+                )
+            # The mean of a convex function is no less than its value in the middle.
+            if heights[i] < high[0] and self.corners(row, 4, whole, 0.0, now) < math.INFINITY:
+                high[0] = min(high[0], mean_above(now, bottom))
         low[0] = max(0.25 * (least[0] + least[1] + least[2] + least[3]), floor, bottom)
         if best == self.top and cover < room:
             low[0] = max(low[0], half_plane_mean(half, way, cover, least, self.top))
@@ -634,6 +663,24 @@ cdef class StockTree:
             if most == math.INFINITY:
                 break
         return most
+
+
+cdef inline void corners_of(const double* square, double[3][MAX_CORNERS] at) noexcept nogil:
+    """Store the corners of a square, with the value 0."""
+    cdef int k
+    for k in range(4):
+        at[0][k] = square[0] + (square[2] if k & 1 else -square[2])
+        at[1][k] = square[1] + (square[2] if k & 2 else -square[2])
+        at[2][k] = 0.0
+
+
+cdef inline double mean_above(const double* corner, double bottom) noexcept nogil:
+    """Mean of four heights, none of them below a bottom."""
+    cdef double found = 0.0
+    cdef int k
+    for k in range(4):
+        found += 0.25 * max(corner[k], bottom)
+    return found
 
 
 cdef int clipped(

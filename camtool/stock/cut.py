@@ -109,15 +109,15 @@ class CutStock(Struct, frozen=True, eq=False):
         between two bounds."""
         top, bottom = self.tree.top, -math.inf if self.bottom_mm is None else self.bottom_mm
 
-        def means(squares: Floats) -> tuple[Floats, Floats]:
-            low, high = self.tree.means(squares, bottom)
+        def quarter_means(squares: Floats) -> tuple[Floats, Floats]:
+            low, high = self.tree.quarter_means(squares, bottom)
             return top - high, top - low
 
         def extremes(squares: Floats) -> tuple[Floats, Floats]:
             low, high = self.tree.least(squares), self.tree.greatest(squares)
             return top - np.maximum(high, bottom), top - np.maximum(low, bottom)
 
-        return integral(means, extremes, self.box_mm, share)
+        return integral(quarter_means, extremes, self.box_mm, share)
 
 
 def _across(axis: str, at_mm: float, place: Floats) -> Floats:
@@ -254,4 +254,4 @@ def _volume_between(one: StockTree, other: StockTree, box: Box, slack_mm3: float
         lower = np.maximum(one.least(squares) - other.greatest(squares), 0.0)
         return lower, np.maximum(one.greatest(squares) - other.least(squares), 0.0)
 
-    return integral(extremes, extremes, box, slack=slack_mm3)
+    return integral(None, extremes, box, slack=slack_mm3)

@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.kernels.move_tree import hilbert_order
-from camtool.kernels.stock import StockTree
+from camtool.kernels.stock import QUARTERS, StockTree
 from camtool.stock.moves import StockMoves
 
 TOP_MM = 0.0
@@ -40,6 +40,9 @@ VOLUME_SHARE = 0.01
 
 MIN_VOLUME_MM3 = 1e-6
 """Volumes are not told more exactly than to this."""
+
+LEFT_SHARE = 0.3
+"""Quarters leave open about this part of what their square has left open."""
 
 MAX_VOLUME_SQUARES = 100_000
 """Squares that a volume is divided into, at most: its bounds are then wider."""
@@ -158,13 +161,13 @@ def greatest_value(
     return Bracket(best, max(proved, best), place, examined)
 
 
-MeanBounds = Callable[[Floats], tuple[Floats, Floats]]
-"""Lower and upper bounds (K,), (K,) of a function over squares (K, 3)."""
+Bounds = Callable[[Floats], tuple[Floats, Floats]]
+"""Lower and upper bounds of a function over squares (K, 3)."""
 
 
 def integral(
-    means: MeanBounds,
-    extremes: MeanBounds,
+    quarter_means: Bounds | None,
+    extremes: Bounds,
     box: tuple[float, float, float, float],
     share: float = VOLUME_SHARE,
     slack: float = MIN_VOLUME_MM3,
@@ -173,12 +176,11 @@ def integral(
     """Return the integral of a function over a box between two bounds, to a share of it or to
     `slack`, whichever is more.
 
-    `means` bounds the mean of the function over squares, `extremes` its values, for squares that
-    lie partly outside of the box. The squares where the bounds are farthest apart are divided
-    again and again. The place is that of the square with the most.
+    `quarter_means` bounds the means of the function over the quarters of squares, `extremes` its
+    values, for squares that lie partly outside of the box. The squares where the bounds are
+    farthest apart are divided again and again. The place is that of the square with the most.
     """
-    squares = _first_squares(box)
-    low, high = _parts(squares, means, extremes, box)
+    squares, low, high = _quarters(_first_squares(box), quarter_means, extremes, box)
     while True:
         total = float(low.sum()), float(high.sum())
         wanted_gap = max(share * total[1], slack)
@@ -186,37 +188,44 @@ def integral(
         if total[1] - total[0] <= wanted_gap or len(squares) >= max_squares:
             break
         order = np.argsort(gaps)
-        # The squares with the smallest gaps stay, as long as these make half of what may stay.
-        is_small = np.cumsum(gaps[order]) <= 0.5 * wanted_gap
+        # The squares with the smallest gaps stay: as many as make half of what may stay, or more
+        # where the others then suffice.
+        total_gap = total[1] - total[0]
+        may_stay = max(0.5 * wanted_gap, (wanted_gap - LEFT_SHARE * total_gap) / (1 - LEFT_SHARE))
+        is_small = np.cumsum(gaps[order]) <= may_stay
         room = max(1, (max_squares - len(squares)) // 3)
-        divided_rows = order[~is_small][-room:]
-        is_kept = np.ones(len(squares), dtype=np.bool_)
-        is_kept[divided_rows] = False
-        quarters = divided(squares[divided_rows])
-        lows, highs = _parts(quarters, means, extremes, box)
-        squares = np.concatenate([squares[is_kept], quarters])
-        low, high = np.append(low[is_kept], lows), np.append(high[is_kept], highs)
+        # In their order, so that each is near the one before.
+        rows = np.sort(order[~is_small][-room:])
+        parts = _quarters(squares[rows], quarter_means, extremes, box)
+        squares, low, high = (
+            np.concatenate([np.delete(kept, rows, axis=0), part])
+            for kept, part in zip((squares, low, high), parts, strict=True)
+        )
     x, y = squares[int(np.argmax(high)), :2].tolist()
     return Bracket(total[0], total[1], (x, y), len(squares))
 
 
-def _parts(
+def _quarters(
     squares: Floats,
-    means: MeanBounds,
-    extremes: MeanBounds,
+    quarter_means: Bounds | None,
+    extremes: Bounds,
     box: tuple[float, float, float, float],
-) -> tuple[Floats, Floats]:
-    """Return bounds (K,), (K,) of the integral over the part of each square in a box."""
-    low = np.maximum(squares[:, :2] - squares[:, 2:], box[:2])
-    high = np.minimum(squares[:, :2] + squares[:, 2:], box[2:])
+) -> tuple[Floats, Floats, Floats]:
+    """Return the quarters of squares, and bounds of the integral over the part of each in a box."""
+    quarters = divided(squares)
+    low = np.maximum(quarters[:, :2] - quarters[:, 2:], box[:2])
+    high = np.minimum(quarters[:, :2] + quarters[:, 2:], box[2:])
     sides = np.maximum(high - low, 0.0)
     size = sides[:, 0] * sides[:, 1]
-    is_full = size >= 4.0 * squares[:, 2] ** 2 * (1.0 - 1e-9)
-    bounds = np.zeros((2, len(squares)))
-    bounds[:, is_full] = means(squares[is_full])
-    part = ~is_full & (size > 0.0)
-    bounds[:, part] = extremes(squares[part])
-    return size * bounds[0], size * bounds[1]
+    is_full = size >= 4.0 * quarters[:, 2] ** 2 * (1.0 - 1e-9)
+    is_full &= quarter_means is not None
+    is_whole = is_full.reshape(-1, 4).all(axis=1)
+    whole, part = np.repeat(is_whole, 4), np.repeat(~is_whole, 4) & (size > 0.0)
+    bounds = np.zeros((2, len(quarters)))
+    if quarter_means is not None:
+        bounds[:, whole] = quarter_means(squares[is_whole])
+    bounds[:, part] = extremes(quarters[part])
+    return quarters, size * bounds[0], size * bounds[1]
 
 
 def _first_squares(box: tuple[float, float, float, float]) -> Floats:
@@ -233,6 +242,5 @@ def _first_squares(box: tuple[float, float, float, float]) -> Floats:
 def divided(squares: Floats) -> Floats:
     """Return the four quarters of each square: (4 K, 3) of (K, 3)."""
     half = 0.5 * squares[:, 2]
-    signs = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
-    middles = squares[:, None, :2] + signs * half[:, None, None]
+    middles = squares[:, None, :2] + QUARTERS * half[:, None, None]
     return np.column_stack([middles.reshape(-1, 2), np.repeat(half, 4)])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camtool.arrays import Floats
 from camtool.stock.cut import CutStock
 from camtool.stock.cutters import CutterProfile
-from camtool.stock.heights import greatest_value, stock_tree
+from camtool.stock.heights import divided, greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
 from tests.oracles import stock_heights as slow
 from tests.stock.cuts import BALL, BULL, CUTTERS, FLAT, V_BIT, moves_of
@@ -104,7 +104,8 @@ def test_means_lie_between_their_bounds(seed: int, count: int, size: float) -> N
     rng = np.random.default_rng(seed)
     squares = np.column_stack([rng.uniform(0.0, 10.0, (30, 2)), np.full(30, size)])
     bottom = float(rng.choice([-1.0, -math.inf]))
-    low, high = tree.means(squares, bottom)
+    low, high = tree.quarter_means(squares, bottom)
+    squares, size = divided(squares), 0.5 * size
     places = (np.arange(40) + 0.5) / 20.0 - 1.0
     grid = np.stack(np.meshgrid(places, places), axis=-1).reshape(-1, 2)
     for square, least, most in zip(squares, low.tolist(), high.tolist(), strict=True):
@@ -133,7 +134,8 @@ def test_means_agree_with_those_of_small_squares(seed: int, count: int, size: fl
     )
     squares = np.column_stack([places, np.full(len(places), size)])
     bottom = float(rng.choice([-1.0, -6.0, -math.inf]))
-    low, high = tree.means(squares, bottom)
+    low, high = tree.quarter_means(squares, bottom)
+    squares, size = divided(squares), 0.5 * size
     off = (np.arange(32) + 0.5) / 16.0 - 1.0
     grid = np.stack(np.meshgrid(off, off), axis=-1).reshape(-1, 2) * size
     for square, least, most in zip(squares, low.tolist(), high.tolist(), strict=True):
