@@ -13,12 +13,12 @@ is that from the segment: along a row of cells it is √(c² + (p + q i)²) in e
       flat      u = √(R² − a²): the rim
       cone      u = a |m| / √(rise² − m²), no less than √(flat² − a²), no more than the rim
       ball      u = √((r² − a²) m² / (1 + m²))
-      bull      by Newton's steps in a bracket, to NEAR_SHARE of the corner: the height errs by
-                the square of that; where moves are not very gentle, from a table for each move
+      bull      by Newton's steps in a bracket, the last one below NEAR_SHARE of the corner: u errs
+                by about the square of that, the height by the square of the error; where moves are not very gentle, from a table for each move
                 by √(R² − a²), with u linear between its rows: the height errs by below 1e-6 mm
 
 A move that begins where the one before ended, with the same tool, cuts nothing new behind its
-start: these cells are left out. Loops hold no state but the heights, so equal moves give equal
+start: these cells are left out. The move before leaves out what lies beyond its end, but for these. Loops hold no state but the heights, so equal moves give equal
 bytes on every processor.
 """
 
@@ -37,7 +37,7 @@ cdef enum:
 
 cdef double LEVEL_MM = 1e-7  # a smaller change of height is none
 cdef double SHORT_MM = 1e-9  # a shorter move is a plunge
-cdef double NEAR_SHARE = 1e-5
+cdef double NEAR_SHARE = 3e-4
 cdef double GENTLE_SHARE = 0.01  # where slope · flat is less of the corner, no table is exact enough
 
 
@@ -45,6 +45,13 @@ cdef struct Cutter:
     double radius, flat, corner, rise
     double reach  # distance up to which the move in hand can cut below the top
     double* table  # of a bull nose on it: the u by √(R² − a²); NULL without
+
+
+cdef struct Move:
+    # Start, direction and length in the plane, slope; cells whose foot lies before `skip` are cut
+    # by the move before, as `joined` ones are.
+    double ax, ay, az, ux, uy, run, slope, skip
+    bint joined
 
 
 cdef struct Row:
@@ -66,55 +73,73 @@ cpdef void cut_heights(
     `camtool.stock.cutters.CutterProfile.columns`. `owner` (NY, NX), or (0, 0), gets `first` plus
     the number of the move that cut a cell deepest, the earliest of several.
     """
-    cdef double x0, y0, cell, ax, ay, az, bx, by, bz, run, slope, ux, uy, skip
+    cdef double x0, y0, cell, low_y, high_y
     cdef Int k, ny, nx
-    cdef bint joined, wanted
+    cdef bint wanted, cuts, following_cuts
     cdef double[ROWS + 2] table
-    cdef Cutter cutter
+    cdef Cutter cutter, following_cutter
+    cdef Move move, following
     cdef Row row
     x0, y0, cell = origin
     ny, nx = heights.shape[0], heights.shape[1]
     wanted = owner.shape[0] > 0
     row.owner = NULL
     row.x0, row.cell = x0, cell
+    cuts = _take(&move, &cutter, starts, ends, tool, cutters, 0)
     for k in range(tool.shape[0]):
-        ax, ay, az = starts[k, 0], starts[k, 1], starts[k, 2]
-        bx, by, bz = ends[k, 0], ends[k, 1], ends[k, 2]
-        if not _reaches(&cutter, cutters, tool[k], min(az, bz)):
-            continue
-        joined = k > 0 and tool[k] == tool[k - 1] and (
-            ends[k - 1, 0] == ax and ends[k - 1, 1] == ay and ends[k - 1, 2] == az
-        )
-        run = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
-        if run < SHORT_MM:
-            run = slope = 0.0
-            ux, uy = 1.0, 0.0
-            bx, by = ax, ay
-            joined = joined and az <= bz
-            az = bz = min(az, bz)
-        else:
-            slope = (bz - az) / run
-            ux, uy = (bx - ax) / run, (by - ay) / run
-            if abs(bz - az) <= LEVEL_MM:
-                slope = 0.0
-                joined = joined and az <= bz
-                az = bz = min(az, bz)
-        row.move = <int> (first + k)
-        cutter.table = NULL
-        if cutter.flat > 0.0 and abs(slope) * cutter.flat > GENTLE_SHARE * cutter.corner > 0.0:
-            cutter.table = table
-            _tabulate(&cutter, abs(slope))
-        low = _index(math.ceil((min(ay, by) - cutter.reach - y0) / cell), ny)
-        high = _index(math.floor((max(ay, by) + cutter.reach - y0) / cell) + 1.0, ny)
-        for j in range(low, high):
-            row.height = &heights[j, 0]
-            if wanted:
-                row.owner = &owner[j, 0]
-            if slope == 0.0:
-                _cut_level(&row, nx, &cutter, ax, ay, az, run, ux, uy, y0 + j * cell, joined)
-            else:
-                skip = _behind(&cutter, slope) if joined else -math.INFINITY
-                _cut_slope(&row, nx, &cutter, ax, ay, az, run, ux, uy, slope, y0 + j * cell, skip)
+        following.joined = False
+        following_cuts = _take(&following, &following_cutter, starts, ends, tool, cutters, k + 1)
+        if cuts:
+            row.move = <int> (first + k)
+            cutter.table = NULL
+            if (
+                cutter.flat > 0.0
+                and abs(move.slope) * cutter.flat > GENTLE_SHARE * cutter.corner > 0.0
+            ):
+                cutter.table = table
+                _tabulate(&cutter, abs(move.slope))
+            low_y, high_y = move.ay, move.ay + move.run * move.uy
+            low_y, high_y = min(low_y, high_y), max(low_y, high_y)
+            low = _index(math.ceil((low_y - cutter.reach - y0) / cell), ny)
+            high = _index(math.floor((high_y + cutter.reach - y0) / cell) + 1.0, ny)
+            for j in range(low, high):
+                row.height = &heights[j, 0]
+                if wanted:
+                    row.owner = &owner[j, 0]
+                if move.slope == 0.0:
+                    _cut_level(&row, nx, &cutter, &move, &following, y0 + j * cell)
+                else:
+                    _cut_slope(&row, nx, &cutter, &move, &following, y0 + j * cell)
+        move, cutter, cuts = following, following_cutter, following_cuts
+
+
+cdef bint _take(
+    Move* move, Cutter* cutter, double[:, ::1] starts, double[:, ::1] ends, Int[::1] tool,
+    double[:, ::1] cutters, Int k
+) noexcept:
+    """Store a move and its cutter; False where there is none or it cuts nothing."""
+    cdef double dx, dy, dz
+    if k >= tool.shape[0] or not _reaches(
+        cutter, cutters, tool[k], min(starts[k, 2], ends[k, 2])
+    ):
+        return False
+    move.ax, move.ay, move.az = starts[k, 0], starts[k, 1], starts[k, 2]
+    dx, dy, dz = ends[k, 0] - move.ax, ends[k, 1] - move.ay, ends[k, 2] - move.az
+    move.joined = k > 0 and tool[k] == tool[k - 1] and (
+        ends[k - 1, 0] == move.ax and ends[k - 1, 1] == move.ay and ends[k - 1, 2] == move.az
+    )
+    move.run, move.ux, move.uy, move.slope = math.sqrt(dx * dx + dy * dy), 1.0, 0.0, 0.0
+    if move.run >= SHORT_MM:
+        move.ux, move.uy = dx / move.run, dy / move.run
+    else:
+        move.run = 0.0
+    if move.run > 0.0 and abs(dz) > LEVEL_MM:
+        move.slope = dz / move.run
+    else:
+        move.joined = move.joined and dz >= 0.0
+        move.az = min(move.az, ends[k, 2])
+    move.skip = _behind(cutter, move.slope) if move.joined else -math.INFINITY
+    return True
 
 
 cdef bint _reaches(Cutter* cutter, double[:, ::1] cutters, Int tool, double z) noexcept:
@@ -188,11 +213,13 @@ cdef (double, double) _span(
 
 
 cdef void _cut_level(
-    Row* row, Int nx, Cutter* cutter, double ax, double ay, double z, double run,
-    double ux, double uy, double y, bint joined
+    Row* row, Int nx, Cutter* cutter, Move* move, Move* following, double y
 ) noexcept:
     """Cut a row with a level move; a joined one only before its start."""
     cdef double left, right, half, off, x, bx, by, other
+    cdef double ax = move.ax, ay = move.ay, z = move.az, run = move.run
+    cdef double ux = move.ux, uy = move.uy
+    cdef bint joined = move.joined
     cdef Int low, high, begin, end
     left, right = _span(ax, ay, run, ux, uy, y, cutter.reach)
     low, high = _from(row, nx, left), _from(row, nx, right)
@@ -218,19 +245,41 @@ cdef void _cut_level(
         if ux < 0.0:
             if not joined:
                 _lower(row, end, high, cutter, z, y - ay, row.x0 - ax, row.cell)
-            _lower(row, low, begin, cutter, z, y - by, row.x0 - bx, row.cell)
+            _lower_end(row, low, begin, cutter, z, bx, by, following, y)
         else:
             if not joined:
                 _lower(row, low, begin, cutter, z, y - ay, row.x0 - ax, row.cell)
-            _lower(row, end, high, cutter, z, y - by, row.x0 - bx, row.cell)
+            _lower_end(row, end, high, cutter, z, bx, by, following, y)
     elif (y - ay) * uy < 0.0:
         if not joined:
             _lower(row, low, high, cutter, z, y - ay, row.x0 - ax, row.cell)
         return
     elif (y - ay) * uy > run:
-        _lower(row, low, high, cutter, z, y - by, row.x0 - bx, row.cell)
+        _lower_end(row, low, high, cutter, z, bx, by, following, y)
         return
     _lower(row, begin, end, cutter, z, 0.0, (y - ay) * ux - (row.x0 - ax) * uy, -row.cell * uy)
+
+
+cdef void _lower_end(
+    Row* row, Int low, Int high, Cutter* cutter, double z, double bx, double by, Move* following,
+    double y
+) noexcept:
+    """Lower the cells low:high beyond the end (bx, by) of a move, but for those, to within a cell,
+    that the one that follows from there cuts as deep."""
+    cdef double off = (y - following.ay) * following.uy, x
+    # A flat tool on a level move leaves out all that lies round its start.
+    cdef bint is_left = following.joined and (
+        following.slope != 0.0 or cutter.corner > 0.0 or cutter.rise > 0.0
+    )
+    if is_left and abs(following.ux) > SHORT_MM:
+        x = following.ax + (following.skip - off) / following.ux
+        if following.ux > 0.0:
+            high = min(high, _from(row, high, x) + 1)
+        else:
+            low = max(low, _from(row, high, x) - 1)
+    elif is_left and off >= following.skip:
+        return
+    _lower(row, low, high, cutter, z, y - by, row.x0 - bx, row.cell)
 
 
 cdef void _lower_flat(Row* row, Int low, Int high, double z) noexcept:
@@ -249,7 +298,7 @@ cdef void _lower_flat(Row* row, Int low, Int high, double z) noexcept:
             height[i] = cut if cut < height[i] else height[i]
 
 
-cdef void _lower(
+cdef wide _lower(
     Row* row, Int low, Int high, Cutter* cutter, double z, double c, double p, double q
 ) noexcept:
     """Lower the cells low:high to z and the profile at the distance √(c² + (p + q i)²)."""
@@ -289,30 +338,44 @@ cdef void _lower(
             height[i] = cut if cut < height[i] else height[i]
 
 
-cdef void _cut_slope(
-    Row* row, Int nx, Cutter* cutter, double ax, double ay, double z, double run,
-    double ux, double uy, double slope, double y, double skip
+cdef wide _cut_slope(
+    Row* row, Int nx, Cutter* cutter, Move* move, Move* following, double y
 ) noexcept:
-    """Cut a row with a sloping move; cells whose foot lies before `skip` are left out."""
-    cdef double left, right, first, along, aside, square, rim, u, s, near = -1.0
+    """Cut a row with a sloping move."""
+    cdef double left, right, ahead, along, aside, square, rim, u, s, near = -1.0
+    cdef double ux = move.ux, uy = move.uy, run = move.run, z = move.az, slope = move.slope
     cdef double radius = cutter.radius, flat = cutter.flat, corner = cutter.corner
     cdef double rise = cutter.rise, steep = abs(slope), ratio = math.INFINITY
     cdef double sign = 1.0 if slope > 0.0 else -1.0
     cdef float* height = row.height
     cdef int* owner = row.owner
-    cdef double x0 = row.x0 - ax, cell = row.cell, off = y - ay, best
+    cdef double x0 = row.x0 - move.ax, cell = row.cell, off = y - move.ay, best
+    cdef double end_x = move.ax + run * ux, end_y = move.ay + run * uy
     cdef float cut
-    cdef int i, low, high, move = row.move
-    left, right = _span(ax, ay, run, ux, uy, y, cutter.reach)
-    if skip > -math.INFINITY:
-        if abs(ux) > SHORT_MM:
-            first = ax + (skip - off * uy) / ux
-            left, right = (max(left, first), right) if ux > 0.0 else (left, min(right, first))
-        elif off * uy < skip:
-            return
+    cdef int i, low, high, number = row.move
+    left, right = _span(move.ax, move.ay, run, ux, uy, y, cutter.reach)
     if not left <= right:
         return
     low, high = <int> _from(row, nx, left), <int> _from(row, nx, right)
+    # Cells whose foot lies beyond this place are cut deepest at the end.
+    ahead = run - _behind(cutter, -slope)
+    if abs(ux) > SHORT_MM:
+        left, right = move.ax + (move.skip - off * uy) / ux, move.ax + (ahead - off * uy) / ux
+        if ux > 0.0:
+            low, i = max(low, <int> _from(row, high, left)), <int> _from(row, high, right)
+            i = max(low, i)
+            _lower_end(row, i, high, cutter, z + slope * run, end_x, end_y, following, y)
+            high = i
+        else:
+            high, i = min(high, <int> _from(row, high, left) + 1), <int> _from(row, high, right)
+            i = min(max(low, i), high)
+            _lower_end(row, low, i, cutter, z + slope * run, end_x, end_y, following, y)
+            low = i
+    elif off * uy < move.skip:
+        return
+    elif off * uy > ahead:
+        _lower_end(row, low, high, cutter, z + slope * run, end_x, end_y, following, y)
+        return
     if corner > 0.0:
         ratio = steep / math.sqrt(1.0 + steep * steep)
     elif steep < rise:
@@ -332,7 +395,7 @@ cdef void _cut_slope(
             square = square if square > 0.0 and corner > 0.0 else 0.0
             cut = <float> (z + slope * s + corner - math.sqrt(square))
             if owner != NULL:
-                owner[i] = move if cut < height[i] else owner[i]
+                owner[i] = number if cut < height[i] else owner[i]
             height[i] = cut if cut < height[i] else height[i]
         return
     if cutter.table != NULL:
@@ -359,7 +422,7 @@ cdef void _cut_slope(
         if cut < height[i]:
             height[i] = cut
             if owner != NULL:
-                owner[i] = move
+                owner[i] = number
 
 
 cdef wide _lower_bull(
@@ -397,12 +460,14 @@ cdef wide _lower_bull(
 
 cdef void _tabulate(Cutter* cutter, double steep) noexcept:
     """Fill the table (ROWS + 2,) of a bull nose: its u where √(R² − a²) is k R / ROWS."""
-    cdef double rim, radius = cutter.radius, near = 0.0
+    cdef double rim, radius = cutter.radius, near = 0.0, before = 0.0
     cdef int k
     for k in range(ROWS + 1):
         rim = radius * k / ROWS
-        near = _bull(cutter.corner, cutter.flat, steep, radius * radius - rim * rim, rim, near)
-        cutter.table[k] = near
+        cutter.table[k] = _bull(
+            cutter.corner, cutter.flat, steep, radius * radius - rim * rim, rim, 2.0 * near - before
+        )
+        before, near = near, cutter.table[k]
     cutter.table[ROWS + 1] = near
 
 
