@@ -211,7 +211,7 @@ def _quarters(
     extremes: Bounds,
     box: tuple[float, float, float, float],
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the quarters of squares, and bounds of the integral over the part of each in a box."""
+    """Return the quarters of squares, and bounds of the integral over what of each is in a box."""
     quarters = divided(squares)
     low = np.maximum(quarters[:, :2] - quarters[:, 2:], box[:2])
     high = np.minimum(quarters[:, :2] + quarters[:, 2:], box[2:])

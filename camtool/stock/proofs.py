@@ -32,6 +32,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.geometry.polylines import Polyline, Polylines
 from camtool.kernels.offsets import APART, MORE, MORE_BEYOND, SLOPE_X, SLOPE_Y
 from camtool.kernels.stock import StockTree
 from camtool.records import replace
@@ -75,7 +76,7 @@ RING_POINTS = 16
 """Directions in which the edge of a tool is looked at where it is doubtful."""
 
 MAX_DOUBTFUL = 2_000
-"""Doubtful places of a round that are looked at."""
+"""Doubtful places of a round that are looked at, and of a groove that are searched."""
 
 
 class Trial(Struct, frozen=True):
@@ -454,7 +455,8 @@ class Leftovers:
 
     def _groove(self, layer: WantedLayer, distance_mm: float) -> Trial | None:
         """Try whether some move of the groove's own tool passes within the distance of each place
-        of its line, deep enough; None where that does not show it."""
+        of its line, deep enough, and search the grooves of the places of which that does not
+        hold; None where neither shows it."""
         cutter = layer.cutter
         assert cutter is not None
         sagitta = SAGITTA_SHARE * distance_mm
@@ -471,6 +473,7 @@ class Leftovers:
         asked = np.minimum(layer.base_mm + layer.rise * (layer.shift_mm - x), layer.depth_mm)
         level = distance_mm - float((asked + cutter.heights(x - EPS_MM)).max())
         begin, end = layer.chords(sagitta)
+        rest = [np.empty((0, 2, 2))]
         while len(begin):
             corners = np.stack([begin, end], axis=1)
             high = tree.greatest_over(corners, np.zeros(corners.shape[:2]), enough=level)
@@ -480,11 +483,18 @@ class Leftovers:
             missed = tree.heights(middle)[0] > level + EPS_MM
             if missed.any():
                 found = self._beside(layer, middle[missed][:MAX_DOUBTFUL], distance_mm)
-                return found if found.excess_mm > distance_mm else None
-            if (np.hypot(*(end - begin).T) <= SHORT_SHARE * distance_mm).any():
-                return None
+                if found.excess_mm > distance_mm:
+                    return found
+            short = np.hypot(*(end - begin).T) <= SHORT_SHARE * distance_mm
+            rest.append(corners[rows][short])
+            begin, middle, end = begin[~short], middle[~short], end[~short]
             begin, end = np.concatenate([begin, middle]), np.concatenate([middle, end])
-        return Trial(True)
+        if sum(map(len, rest)) > MAX_DOUBTFUL:
+            return None
+        chords = [Polyline(np.insert(each, 2, 0.0, axis=1)) for each in np.concatenate(rest)]
+        some = replace(layer, lines=Polylines.of(chords))
+        trial = self._region(some, near, self._box_of(some))
+        return trial if trial.holds else None
 
     def _beside(self, layer: WantedLayer, middle: Floats, distance_mm: float) -> Trial:
         """Return the greatest excess across a groove at places (P, 2) of its line."""
@@ -516,8 +526,9 @@ class Leftovers:
         bound = np.full(len(squares), -np.inf)
         for row, corners, values in _pieces(layer, squares, distance_mm):
             high = self.stock.tree.greatest_over(corners, values, enough=distance_mm)
-            left = np.flatnonzero(high > distance_mm)
-            if layer.rise and len(left):
+            # Where the linear depth is more than the layer's, the latter counts.
+            left = np.flatnonzero((high > distance_mm) & (values.max(axis=1) > layer.depth_mm))
+            if len(left):
                 full = np.full_like(values[left], layer.depth_mm)
                 most = self.stock.tree.greatest_over(corners[left], full, enough=distance_mm)
                 high[left] = np.minimum(high[left], most)
