@@ -83,6 +83,12 @@ MAX_BEYOND_SHARE = 0.25
 """An allowance that takes a tool farther beyond a line than this part of its radius looks like a
 mistake: corrections of wear and play are hundredths of millimetres."""
 
+CORNER_GAP = math.sqrt(2.0)
+"""Rings of a pocket are by this factor farther apart at a square corner than along its sides."""
+
+MIN_STEP_OVER = 0.1
+"""No finer step-over is proposed than this."""
+
 OFF_STOCK_MM = 0.01
 """A drawing may lie beyond the edge of the stock by this much: nobody measures it finer."""
 
@@ -537,11 +543,20 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
     if cuts_beside and max(below, 0.0) < tool.nose_mm - POSITION_EPS_MM:
         yield CUT_DOUBTFUL_NOSE.words(nose=tool.nose_mm)
     makes_floor = contract.clears or contract.cuts == "over"
-    ridge = ridge_mm(tool, operation.step_over) if makes_floor else 0.0
+    ridge = peak_mm(tool, operation.step_over) if makes_floor else 0.0
     if ridge > POSITION_EPS_MM and below <= 0.0:
-        yield CUT_DOUBTFUL_RIDGES.words(ridge=ridge)
+        flat = 1.0 - 2.0 * tool.nose_mm / tool.diameter_mm
+        finer = max(math.floor(100.0 * flat / CORNER_GAP) / 100.0, MIN_STEP_OVER)
+        finer = min(finer, 0.5 * operation.step_over)
+        yield CUT_DOUBTFUL_RIDGES.words(ridge=ridge, finer=finer, less=peak_mm(tool, finer))
     if tool.materials and not operation.material:
         yield CUT_DOUBTFUL_PRESET.words(materials=", ".join(tool.materials))
+
+
+def peak_mm(tool: Tool, step_over: float) -> float:
+    """Height of the highest peaks on a floor, mm: at square corners of rings, which are farther
+    apart there."""
+    return ridge_mm(tool, min(CORNER_GAP * step_over, 1.0))
 
 
 def ridge_mm(tool: Tool, step_over: float) -> float:

@@ -61,9 +61,9 @@ class PlanningCode(Code):
     TAB_LEFT_OUT = (
         209,
         WARNING,
-        "a tab does not fit where it should stand, or a hole is drilled through it; or "
-        "(counted, in one) holes, open paths and contours that are too short get no tabs "
-        "although other parts have them",
+        "a tab does not fit where it should stand, or a hole is drilled through it, or the tool "
+        "that roughs, which makes the tabs, does not get there; or (counted, in one) holes, open "
+        "paths and contours that are too short get no tabs although other parts have them",
         "use fewer or narrower tabs, or another operation for what needs its own",
     )
     LEAD_LEFT_OUT = (
@@ -455,6 +455,12 @@ TAB_LEFT_OUT = Sentence(
 TAB_LEFT_OUT_DRILLED = Sentence(
     PlanningCode.TAB_LEFT_OUT, "a hole is drilled through this tab of {contour}: it may not hold"
 )
+TAB_LEFT_OUT_ROUGH = Sentence(
+    PlanningCode.TAB_LEFT_OUT,
+    "{measured:# tab holds|# tabs hold} this part instead of {limit:.0f}: the roughing makes them, "
+    "and its tool does not get all round the part (leave out finish, or take a smaller tool)",
+    "tabs",
+)
 TAB_LEFT_OUT_OF_ALL = Sentence(
     PlanningCode.TAB_LEFT_OUT,
     "{measured:# contour gets|# contours get} no tabs: {kinds}; cut them in an operation "
@@ -669,7 +675,8 @@ CUT_DOUBTFUL_NOSE = Sentence(
 )
 CUT_DOUBTFUL_RIDGES = Sentence(
     PlanningCode.CUT_DOUBTFUL,
-    "the round nose of the tool leaves ridges of {ridge:.3g} mm on floors (--step-over)",
+    "the round nose of the tool leaves ridges of up to {ridge:.2g} mm on floors "
+    "(--step-over {finer:.2g} leaves {less:.2g} mm)",
 )
 CUT_DOUBTFUL_LOOSE = Sentence(
     PlanningCode.CUT_DOUBTFUL, "parts are cut out of the stock, and nothing holds them (--tabs 4)"

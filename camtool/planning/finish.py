@@ -13,7 +13,7 @@ e is more than a part of its diameter anywhere, the wall is finished in passes, 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -28,11 +28,17 @@ from camtool.geometry.polylines import (
     Segments,
     reverse_lines,
 )
-from camtool.planning.findings import FINISH_IN_PASSES, FINISH_IN_PASSES_WHOLE, PlanningCode
+from camtool.planning.findings import (
+    FINISH_IN_PASSES,
+    FINISH_IN_PASSES_WHOLE,
+    TAB_LEFT_OUT_ROUGH,
+    PlanningCode,
+)
 from camtool.planning.items import Contour, Setting, Step
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of
 from camtool.planning.settings import levels
+from camtool.planning.tabs import is_hole
 from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
 
@@ -51,6 +57,7 @@ OF_WALLS = (
     PlanningCode.NOT_RELIEVED,
     PlanningCode.CORNER_FAR,
     PlanningCode.FINISH_IN_PASSES,
+    PlanningCode.TAB_LEFT_OUT,
 )
 """What is said of the wall: by the stage that cuts it. All else is said by the first one."""
 
@@ -99,8 +106,30 @@ def in_passes(
     stepped = replace(setting, levels_mm=passes)
     contours = [replace(contour, setting=stepped) for contour in contours]
     if math.isinf(max_engaged):
-        return contours, [FINISH_IN_PASSES_WHOLE(where=place, passes=len(passes))]
-    return contours, [FINISH_IN_PASSES(where=place, measured=max_engaged, passes=len(passes))]
+        finding = FINISH_IN_PASSES_WHOLE(where=place, passes=len(passes))
+    else:
+        finding = FINISH_IN_PASSES(where=place, measured=max_engaged, passes=len(passes))
+    return contours, [finding, *_tabs_lost(contours, rough)]
+
+
+def _tabs_lost(contours: Sequence[Contour], rough: Step) -> Iterator[Finding]:
+    """Yield a finding for each part that fewer tabs hold than are asked for: the tool that roughs
+    makes them, and does not get all round it."""
+    tabs = rough.operation.tabs
+    if tabs is None or tabs.at_mm is not None:
+        return
+    centres = np.array([bridge.centre for bridge in rough.bridges]).reshape(-1, 2)
+    spans = np.array([bridge.half_span_mm for bridge in rough.bridges])
+    for contour in contours:
+        if contour.path.closed and not is_hole(contour):
+            apart = nearest(centres, Segments.of(Polylines.of([contour.path]))).distance
+            own = int((apart <= spans + rough.operation.allowance_mm + POSITION_EPS_MM).sum())
+            if own < (tabs.count or 1):
+                yield TAB_LEFT_OUT_ROUGH(
+                    where=at_place(contour.name, contour.path.start.tolist()),
+                    measured=own,
+                    limit=tabs.count or 1,
+                )
 
 
 def _engaged(contours: list[Contour], operation: Operation, rough: Step) -> tuple[float, str]:

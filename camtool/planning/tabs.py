@@ -132,13 +132,13 @@ def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
         return contours, []
     if contours[0].setting.operation.tabs.at_mm is not None:
         return _with_tabs_by_hand(contours), []
-    parts = [k for k, each in enumerate(contours) if each.path.closed and not _is_hole(each)]
+    parts = [k for k, each in enumerate(contours) if each.path.closed and not is_hole(each)]
     tabbed = {k for k in parts or range(len(contours)) if _is_long_enough(contours[k])}
     tabless = [each for k, each in enumerate(contours) if tabbed and k not in tabbed]
     if not tabless:
         return contours, []
     opens = sum(not each.path.closed for each in tabless)
-    holes = sum(each.path.closed and _is_hole(each) for each in tabless)
+    holes = sum(each.path.closed and is_hole(each) for each in tabless)
     kinds = (
         (holes, "holes"),
         (opens, "open"),
@@ -201,7 +201,7 @@ def middle_of_longest_gap(
     return x, y
 
 
-def _is_hole(contour: Contour) -> bool:
+def is_hole(contour: Contour) -> bool:
     """True if the material that stays lies around a closed contour, and not within it."""
     if contour.material_left is None:
         return False

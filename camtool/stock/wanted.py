@@ -60,7 +60,7 @@ from camtool.geometry.polylines import (
 )
 from camtool.kernels.move_tree import hilbert_order
 from camtool.kernels.offsets import chord_distances, disc_tangents, insides, nearest_distances
-from camtool.planning.checks import ridge_mm
+from camtool.planning.checks import peak_mm
 from camtool.planning.findings import PlanningCode
 from camtool.planning.holes import HOLE_SIZE_MM, circle_of, drilled_holes
 from camtool.planning.items import Chosen, Step
@@ -79,8 +79,7 @@ DEFAULT_WALL_MM = 0.01
 """Width of the band beside a wall in which nothing is judged, if it is not given."""
 
 DIAGONAL = math.sqrt(2.0)
-"""Of a square over its side, and of a quarter arc over its radius; and by how much farther apart
-rings of a pocket are at a corner than along its sides."""
+"""Of a square over its side, and of a quarter arc over its radius."""
 
 NOSE_SHARE = 0.5
 """Of the groove of a round nose, the share of its corner beside the flat that must be cut."""
@@ -365,8 +364,7 @@ class _Layers:
     @property
     def _floor_mm(self) -> float:
         """The depth at least of a floor, with the ridges of a round nose at a square corner."""
-        tool, step_over = self.operation.tool, self.operation.step_over
-        return self.depth_mm - ridge_mm(tool, min(DIAGONAL * step_over, 1.0))
+        return self.depth_mm - peak_mm(self.operation.tool, self.operation.step_over)
 
     @property
     def _leads_mm(self) -> float:

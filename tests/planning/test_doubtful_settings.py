@@ -148,6 +148,27 @@ def test_ridges_are_as_high_as_the_nose_between_two_paths(tool: Tool, step_over:
 
 
 @pytest.mark.parametrize(
+    ("tool", "words"),
+    [
+        # At square corners rings of 1.2 mm are 1.7 mm apart; the flat is 1 mm wide.
+        (("bull", 1.0), "ridges of up to 0.063 mm on floors (--step-over 0.2 leaves 0 mm)"),
+        (("bull", 0.1), ""),
+        (("ball", 1.5), "(--step-over 0.1 leaves 0.015 mm)"),
+    ],
+)
+def test_peaks_at_corners_count_and_a_finer_step_over_is_named(
+    tool: tuple[str, float], words: str
+) -> None:
+    kind, corner_mm = tool
+    said: dict[str, object] = {"tool_kind": kind, "tool_diameter_mm": 3.0}
+    if kind == "bull":
+        said["tool_corner_radius_mm"] = corner_mm
+    found = _said("grbl", job_of(**TOOL_SAID, **said, kind="pocket", depth_mm=3.0))
+    assert words in found
+    assert ("ridges" in found) == bool(words)
+
+
+@pytest.mark.parametrize(
     ("said", "words"),
     [
         ({"depth_mm": 3.0}, "parts are cut out of the stock, and nothing holds them"),

@@ -154,6 +154,21 @@ def test_where_roughing_does_not_get_the_wall_is_cut_in_passes(machine: Machine)
     assert not [each for each in plain.findings if each.code == PlanningCode.FINISH_IN_PASSES]
 
 
+def test_a_part_that_lost_tabs_in_the_roughing_is_told(machine: Machine) -> None:
+    """Two parts so near that the tool runs between them only when it finishes: it roughs round
+    both in one contour, whose two tabs stand on one or the other."""
+    tabs = Tabs(count=2, width_mm=0.3, height_mm=0.2)
+    settings = {"finish_mm": 0.05, "depth_mm": 0.5, "step_down_mm": 0.1, "tabs": tabs}
+    near = [box(0, 0, 3, 3), box(3.32, 0, 6, 3)]
+    rough, done = stages(machine, near, **settings)
+    lost = [each for each in done.findings if each.code == PlanningCode.TAB_LEFT_OUT]
+    assert len(rough.bridges) == 2
+    assert lost
+    assert all("instead of 2: the roughing makes them" in each.message for each in lost)
+    apart = [box(0, 0, 3, 3), box(4, 0, 7, 3)]
+    assert not stages(machine, apart, **settings)[1].findings
+
+
 def test_tabs_of_the_first_stage_stay(machine: Machine) -> None:
     rough, done = stages(
         machine,
