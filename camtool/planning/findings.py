@@ -457,7 +457,7 @@ TAB_LEFT_OUT_DRILLED = Sentence(
 )
 TAB_LEFT_OUT_ROUGH = Sentence(
     PlanningCode.TAB_LEFT_OUT,
-    "{measured:# tab holds|# tabs hold} this part instead of {limit:.0f}: the roughing makes them, "
+    "{measured:# tab holds|# tabs hold} this part instead of {limit:.0f}: roughing makes them, "
     "and its tool does not get all round the part (leave out finish, or take a smaller tool)",
     "tabs",
 )

@@ -164,7 +164,7 @@ def test_a_part_that_lost_tabs_in_the_roughing_is_told(machine: Machine) -> None
     lost = [each for each in done.findings if each.code == PlanningCode.TAB_LEFT_OUT]
     assert len(rough.bridges) == 2
     assert lost
-    assert all("instead of 2: the roughing makes them" in each.message for each in lost)
+    assert all("instead of 2: roughing makes them" in each.message for each in lost)
     apart = [box(0, 0, 3, 3), box(4, 0, 7, 3)]
     assert not stages(machine, apart, **settings)[1].findings
 
