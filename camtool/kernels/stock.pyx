@@ -57,9 +57,9 @@ QUARTERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 cdef double BEND_MM = 1e-9  # a place of a cone nearer than this to its tip or flat lies on its bend
 
 
-cdef inline double profile(const double* tool, double apart, double grow) noexcept nogil:
+cdef inline double profile(const double* tool, double distance, double grow) noexcept nogil:
     """Height of a tool's surface over its tip at a distance from its axis."""
-    cdef double out = apart - tool[FLAT] - grow
+    cdef double out = distance - tool[FLAT] - grow
     if out <= 0.0:
         return 0.0
     if tool[CORNER] > 0.0:
@@ -75,7 +75,7 @@ cdef inline double downhill(
     """Distance downhill, from the place on a sloping line that is nearest to a point `aside` of it
     to the one where the tool is lowest over the point; `most` at most."""
     cdef double flat = tool[FLAT] + grow, corner = tool[CORNER]
-    cdef double low, high, middle, apart, out
+    cdef double low, high, middle, distance, out
     cdef int k
     low = math.sqrt(flat * flat - aside * aside) if aside < flat else 0.0
     if corner <= 0.0:
@@ -89,12 +89,12 @@ cdef inline double downhill(
     high = most
     for k in range(HALVINGS):
         middle = 0.5 * (low + high)
-        apart = math.sqrt(aside * aside + middle * middle)
-        out = apart - flat
+        distance = math.sqrt(aside * aside + middle * middle)
+        out = distance - flat
         # The slope of the profile there against that of the line, without a division by zero.
         if out > 0.0 and (
             out >= corner
-            or out * middle > steep * apart * math.sqrt(corner * corner - out * out)
+            or out * middle > steep * distance * math.sqrt(corner * corner - out * out)
         ):
             high = middle
         else:
@@ -109,20 +109,20 @@ cdef inline double height_of(
     where the tool does not get."""
     cdef double wide = tool[RADIUS] + grow
     cdef double px = x - move[AX], py = y - move[AY]
-    cdef double along, aside, s, apart, reach, low, high
+    cdef double along, aside, s, distance, reach, low, high
     if wide <= 0.0:
         return math.INFINITY
     if move[LONG] == 0.0:
-        apart = math.sqrt(px * px + py * py)
-        return move[AZ] + profile(tool, apart, grow) if apart <= wide else math.INFINITY
+        distance = math.sqrt(px * px + py * py)
+        return move[AZ] + profile(tool, distance, grow) if distance <= wide else math.INFINITY
     aside = math.fabs(px * move[UY] - py * move[UX])
     if aside > wide:
         return math.INFINITY
     along = px * move[UX] + py * move[UY]
     if move[SLOPE] == 0.0:
         s = min(max(along, 0.0), move[LONG]) - along
-        apart = math.sqrt(aside * aside + s * s)
-        return move[AZ] + profile(tool, apart, grow) if apart <= wide else math.INFINITY
+        distance = math.sqrt(aside * aside + s * s)
+        return move[AZ] + profile(tool, distance, grow) if distance <= wide else math.INFINITY
     reach = math.sqrt(wide * wide - aside * aside)
     low, high = max(0.0, along - reach), min(move[LONG], along + reach)
     if low > high:
@@ -130,8 +130,8 @@ cdef inline double height_of(
     s = downhill(tool, aside, math.fabs(move[SLOPE]), reach, grow)
     s = along - s if move[SLOPE] > 0.0 else along + s
     s = min(max(s, low), high)
-    apart = math.sqrt(aside * aside + (s - along) * (s - along))
-    return move[AZ] + move[SLOPE] * s + profile(tool, min(apart, wide), grow)
+    distance = math.sqrt(aside * aside + (s - along) * (s - along))
+    return move[AZ] + move[SLOPE] * s + profile(tool, min(distance, wide), grow)
 
 
 cdef inline double tangent_of(
@@ -141,7 +141,7 @@ cdef inline double tangent_of(
     which the height of the move nowhere lies; inf where there is none or it is not known: beyond
     the tool, and where the edge of the tool cuts deepest."""
     cdef double px = x - move[AX], py = y - move[AY], wide = tool[RADIUS]
-    cdef double along, aside, s, apart, reach, dx, dy, out, steep
+    cdef double along, aside, s, distance, reach, dx, dy, out, steep
     slope[0], slope[1] = 0.0, 0.0
     along = px * move[UX] + py * move[UY]
     s = min(max(along, 0.0), move[LONG])
@@ -156,20 +156,20 @@ cdef inline double tangent_of(
         s = along - s if move[SLOPE] > 0.0 else along + s
         s = min(max(s, 0.0), move[LONG])
     dx, dy = px - s * move[UX], py - s * move[UY]
-    apart = math.sqrt(dx * dx + dy * dy)
-    if apart >= wide:
+    distance = math.sqrt(dx * dx + dy * dy)
+    if distance >= wide:
         return math.INFINITY
-    out = apart - tool[FLAT]
+    out = distance - tool[FLAT]
     if out <= BEND_MM and tool[CORNER] <= 0.0:
         # At a bend of a cone: along the move the height rises as the move does, unless an end of
         # it is deepest.
         if (s <= 0.0 and move[SLOPE] > 0.0) or (s >= move[LONG] and move[SLOPE] < 0.0):
             return move[AZ] + move[SLOPE] * s
         slope[0], slope[1] = move[SLOPE] * move[UX], move[SLOPE] * move[UY]
-        along = (dx * move[UX] + dy * move[UY]) / apart if apart > BEND_MM else 1.0
-        if apart > BEND_MM and along != 0.0:
+        along = (dx * move[UX] + dy * move[UY]) / distance if distance > BEND_MM else 1.0
+        if distance > BEND_MM and along != 0.0:
             slope[0], slope[1] = (
-                move[SLOPE] / along * dx / apart, move[SLOPE] / along * dy / apart
+                move[SLOPE] / along * dx / distance, move[SLOPE] / along * dy / distance
             )
         return move[AZ] + move[SLOPE] * s
     if out > 0.0:
@@ -179,8 +179,8 @@ cdef inline double tangent_of(
             steep = out / math.sqrt(tool[CORNER] * tool[CORNER] - out * out)
         else:
             steep = tool[RISE]
-        slope[0], slope[1] = steep * dx / apart, steep * dy / apart
-    return move[AZ] + move[SLOPE] * s + profile(tool, apart, 0.0)
+        slope[0], slope[1] = steep * dx / distance, steep * dy / distance
+    return move[AZ] + move[SLOPE] * s + profile(tool, distance, 0.0)
 
 
 cdef class StockTree:
@@ -328,16 +328,16 @@ cdef class StockTree:
         cdef double x = square[0], y = square[1], room = square[2] * math.sqrt(2.0)
         cdef double best = self.top
         cdef double[MAX_CORNERS] now
-        cdef double[3][MAX_CORNERS] whole
+        cdef double[3][MAX_CORNERS] polygon
         cdef int count = 1, depth
         cdef Int node, child, end, row = -1, cover = -1, found = 0
         if self.height == 0:
             return 0
-        corners_of(square, whole)
+        corners_of(square, polygon)
         self.lowest(x, y, 0.0, self.top, -1, &row, guess[0])
         if row >= 0:
             guess[0] = row
-            best = min(best, self.corners(row, 4, whole, 0.0, now))
+            best = min(best, self.corners(row, 4, polygon, 0.0, now))
         if best < self.top:  # one move covers all of it
             cover = near[0] = row
             found = 1
@@ -378,9 +378,9 @@ cdef class StockTree:
         cdef double[4] least
         cdef int k
         cdef Int i, row = -1
-        cdef double[2] way
+        cdef double[2] direction
         cdef double cover = -math.INFINITY, part, floor
-        way[0], way[1] = 0.0, 0.0
+        direction[0], direction[1] = 0.0, 0.0
         corners_of(square, whole)
         low[0], high[0] = self.top, self.top
         for i in range(count):
@@ -404,11 +404,11 @@ cdef class StockTree:
                         lowest, row = z, near[i]
             if row < 0:
                 return
-            part = self.beyond(row, x, y, way)
+            part = self.beyond(row, x, y, direction)
             if part == math.INFINITY:
                 cover = part
             else:
-                high[0] = min(high[0], self.covered(row, square, way, part, bottom))
+                high[0] = min(high[0], self.covered(row, square, direction, part, bottom))
         # Moves that are nowhere lower than `best` are not looked at; they leave no less than it.
         floor = best
         for k in range(4):
@@ -420,7 +420,7 @@ cdef class StockTree:
                 continue
             floor = min(floor, z)
             if best == self.top:
-                cover = max(cover, self.support(row, x, y, way, room))
+                cover = max(cover, self.support(row, x, y, direction, room))
             average = tangent_of(
                 &self.moves[row, 0], &self.tools[self.tool[row], 0], x, y, slope
             )
@@ -440,25 +440,25 @@ cdef class StockTree:
                 high[0] = min(high[0], mean_above(now, bottom))
         low[0] = max(0.25 * (least[0] + least[1] + least[2] + least[3]), floor, bottom)
         if best == self.top and cover < room:
-            low[0] = max(low[0], half_plane_mean(half, way, cover, least, self.top))
+            low[0] = max(low[0], half_plane_mean(half, direction, cover, least, self.top))
         high[0] = max(high[0], low[0])
 
-    cdef double beyond(self, Int move, double x, double y, double* way) noexcept nogil:
-        """Return how far the tool of a move gets beyond a point, along the direction `way` from
+    cdef double beyond(self, Int move, double x, double y, double* direction) noexcept nogil:
+        """Return how far the tool of a move gets beyond a point, along `direction` from
         the nearest place of its axis to the point, below 0 where it ends before it; inf where the
         point lies on the axis."""
         cdef double* columns = &self.moves[move, 0]
-        cdef double px = x - columns[AX], py = y - columns[AY], s, apart
+        cdef double px = x - columns[AX], py = y - columns[AY], s, distance
         s = min(max(px * columns[UX] + py * columns[UY], 0.0), columns[LONG])
         px, py = px - s * columns[UX], py - s * columns[UY]
-        apart = math.sqrt(px * px + py * py)
-        if apart <= 0.0:
+        distance = math.sqrt(px * px + py * py)
+        if distance <= 0.0:
             return math.INFINITY
-        way[0], way[1] = px / apart, py / apart
-        return self.tools[self.tool[move], RADIUS] - apart
+        direction[0], direction[1] = px / distance, py / distance
+        return self.tools[self.tool[move], RADIUS] - distance
 
     cdef double support(
-        self, Int move, double x, double y, const double* way, double room
+        self, Int move, double x, double y, const double* direction, double room
     ) noexcept nogil:
         """Upper bound of how far the tool of a move gets along a direction from a point, within a
         disc of radius `room` round it. The tool lies on one side of its tangent."""
@@ -468,7 +468,7 @@ cdef class StockTree:
             return room
         if far <= -room:
             return -room
-        cosine = own[0] * way[0] + own[1] * way[1]
+        cosine = own[0] * direction[0] + own[1] * direction[1]
         if cosine * room <= far:
             return room
         return far * cosine + math.sqrt(
@@ -476,7 +476,7 @@ cdef class StockTree:
         )
 
     cdef double covered(
-        self, Int move, const double* square, const double* way, double far, double bottom
+        self, Int move, const double* square, const double* direction, double far, double bottom
     ) noexcept nogil:
         """Upper bound of the mean height over a square, of which a move covers a part: all that
         lies before the chord of its edge."""
@@ -491,7 +491,7 @@ cdef class StockTree:
         far -= radius - math.sqrt(radius * radius - room) + 1e-12 * radius
         for k in range(4):
             none[k] = 0.0
-        count = clipped(half, way, far, none, at)
+        count = clipped(half, direction, far, none, at)
         for k in range(count):
             at[2][k] = height_of(columns, tool, square[0] + at[0][k], square[1] + at[1][k], 0.0)
             if at[2][k] == math.INFINITY:
@@ -684,7 +684,8 @@ cdef inline double mean_above(const double* corner, double bottom) noexcept nogi
 
 
 cdef int clipped(
-    double half, const double* way, double far, const double* value, double[3][MAX_CORNERS] at
+    double half, const double* direction, double far, const double* value,
+    double[3][MAX_CORNERS] at
 ) noexcept nogil:
     """Store the corners of the part of a square about 0 that lies no farther than `far` along a
     direction: x, y and the value, which is given at the corners of the square and linear along its
@@ -695,7 +696,8 @@ cdef int clipped(
     cdef int[4] order
     order[0], order[1], order[2], order[3] = 0, 1, 3, 2
     for k in range(4):
-        off[k] = (half if k & 1 else -half) * way[0] + (half if k & 2 else -half) * way[1] - far
+        off[k] = (half if k & 1 else -half) * direction[0] - far
+        off[k] += (half if k & 2 else -half) * direction[1]
     for k in range(4):
         here, there = order[k], order[(k + 1) & 3]
         if off[here] <= 0.0:
@@ -730,7 +732,7 @@ cdef double fan_integral(int count, double[3][MAX_CORNERS] at) noexcept nogil:
 
 
 cdef double half_plane_mean(
-    double half, const double* way, double far, const double* value, double top
+    double half, const double* direction, double far, const double* value, double top
 ) noexcept nogil:
     """Mean over a square of a concave function with these values at the corners, at least, where
     it is `top` beyond a line across a direction."""
@@ -739,7 +741,7 @@ cdef double half_plane_mean(
     cdef int count, k
     for k in range(4):
         below[k] = value[k] - top
-    count = clipped(half, way, far, below, at)
+    count = clipped(half, direction, far, below, at)
     return top + fan_integral(count, at) / (4.0 * half * half)
 
 
@@ -824,24 +826,24 @@ cdef inline bint lies_beside(
     double[:, ::1] at, Py_ssize_t begin, Py_ssize_t end, double beside
 ) noexcept nogil:
     """True if all points between two lie within a distance of the line from one to the other."""
-    cdef double[3] way
+    cdef double[3] direction
     cdef double[3] off
-    cdef double square = 0.0, share, apart
+    cdef double square = 0.0, share, distance
     cdef Py_ssize_t k
     cdef int c
     for c in range(3):
-        way[c] = at[end, c] - at[begin, c]
-        square += way[c] * way[c]
+        direction[c] = at[end, c] - at[begin, c]
+        square += direction[c] * direction[c]
     for k in range(begin + 1, end):
         share = 0.0
         for c in range(3):
             off[c] = at[k, c] - at[begin, c]
-            share += off[c] * way[c]
+            share += off[c] * direction[c]
         share = min(max(share / square, 0.0), 1.0) if square > 0.0 else 0.0
-        apart = 0.0
+        distance = 0.0
         for c in range(3):
-            apart += (off[c] - share * way[c]) * (off[c] - share * way[c])
-        if apart > beside * beside:
+            distance += (off[c] - share * direction[c]) * (off[c] - share * direction[c])
+        if distance > beside * beside:
             return False
     return True
 
