@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from msgspec import Struct
 
-from camtool.errors import InputError, OptionError
+from camtool.errors import InputError, OptionError, OutputError
 from camtool.pictures.viewer.page import viewer_page
 from camtool.sending.carry import SendOptions
 from camtool.sending.journal import JournalState, read_journal
@@ -188,6 +188,19 @@ class LoadedProgram(Struct, frozen=True, eq=False):
             single=single,
             speed=speed,
             more=resumes or more,
-            file=str(Path(self.file).resolve()) if one.wire.opens_file else "",
+            file=self._sent_file(one),
         )
         return one, options
+
+    def _sent_file(self, one: Consignment) -> str:
+        """Write what is sent beside the program, for a controller that opens it as a file; return
+        its path, "" for others."""
+        if not one.wire.opens_file:
+            return ""
+        file = Path(self.file)
+        copy = file.with_name(f"{file.stem}.sent{file.suffix}").resolve()
+        try:
+            copy.write_bytes(one.data)
+        except OSError as error:
+            raise OutputError(f"cannot be written ({error.strerror})", file=str(copy)) from error
+        return str(copy)

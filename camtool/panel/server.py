@@ -196,7 +196,7 @@ class PanelServer:
         self, session: Session, program: LoadedProgram | None = None, folder: Path | None = None
     ) -> None:
         self.session, self.program, self.folder = session, program, folder
-        self._edition = 0
+        self._edition, self._has_run = 0, False
         self.key = secrets.token_urlsafe(24)
         self.port = 0
         self._clients: list[Client] = []
@@ -247,6 +247,10 @@ class PanelServer:
             loop.call_soon_threadsafe(self._wake)
 
     def _wake(self) -> None:
+        runs = self.session.state.runs
+        if self._has_run and not runs:
+            self._edition += 1  # its journal says where it was left
+        self._has_run = runs
         for client in self._clients:
             client.changed.set()
 
@@ -489,7 +493,6 @@ class PanelServer:
                 speed=self.session.speed,
             )
             self.session.run_program(one, options)
-            self._edition += 1  # where its journal says that it was left is another place now
         except CamtoolError as error:
             self.session.tell(str(error), bad=True)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -29,12 +29,21 @@ SPEED = 1.0
 
 
 @contextmanager
-def served(name: str, program: LoadedProgram | None = None) -> Iterator[tuple[PanelServer, Any]]:
+def served(
+    name: str,
+    program: LoadedProgram | None = None,
+    *,
+    choices: Sequence[str] = (),
+    settings: Sequence[str] = (),
+    speed: float = SPEED,
+    folder: Path | None = None,
+) -> Iterator[tuple[PanelServer, Any]]:
     """A panel of a virtual machine, served in a thread."""
-    twin = load_target(name).twin([])
-    with hosted(twin, SPEED) as port:
-        session = Session(load_target(name), Port(port), opened_line, speed=SPEED)
-        server = PanelServer(session, program)
+    target = load_target(name, settings=settings)
+    twin = target.twin(list(choices))
+    with hosted(twin, speed) as port:
+        session = Session(target, Port(port), opened_line, speed=speed)
+        server = PanelServer(session, program, folder)
         session.watch = server.changed
         ready = threading.Event()
 
