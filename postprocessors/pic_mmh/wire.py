@@ -153,14 +153,14 @@ def _by_hand_hz(machine: PicMmhMachine) -> float:
     return min(BY_HAND_HZ, machine.limits.max_step_rate_hz or BY_HAND_HZ)
 
 
-def _reverses_s(machine: PicMmhMachine) -> float:
-    """Return the longest time without reports, s, while the controller makes up for the play of an
-    axis by hand."""
+def _reverses_s(machine: PicMmhMachine) -> list[float]:
+    """Return the time without reports, s, while the controller makes up for the play of each axis
+    by hand."""
     assert isinstance(machine.link, PicMmhLink)
     if machine.link.compensation == "reported" and machine.link.step_byte != "none":
-        return 0.0
+        return [0.0, 0.0, 0.0]
     steps = [axis.compensation_mm / axis.coded_step_mm for axis in machine.axes]
-    return max(steps) / _by_hand_hz(machine)
+    return [count / _by_hand_hz(machine) for count in steps]
 
 
 def _compensations(machine: PicMmhMachine) -> list[bytes]:
@@ -217,7 +217,9 @@ class PicMmhConversation(PacketByPacket):
             self.stands = (
                 "nothing more was sent; by the simulated time it stands, and says nothing"
             )
-        self._reverses_s = _reverses_s(machine)
+        self._play_s = _reverses_s(machine)
+        self._reverses_s = max(self._play_s)
+        self._unsure_s = 0.0  # how long the packet may make up for the play of earlier motion
         self._echo = b""
         self._count = 0
         self._over = 0.0  # when the time of the block is over
@@ -246,8 +248,6 @@ class PicMmhConversation(PacketByPacket):
 
     def _count_steps(self, octets: bytes) -> None:
         """Move the place by reported steps; those of a compensation move nothing."""
-        if self._base_mm is None or not octets:
-            return
         for octet in octets:
             for axis in range(3):
                 sense = self._sense(octet, axis)
@@ -259,6 +259,8 @@ class PicMmhConversation(PacketByPacket):
                     self._silent_steps[axis] -= 1
                 else:
                     self._counts[axis] += sense
+        if self._base_mm is None:
+            return
         columns = zip(self._base_mm, self._counts, self._step_mm, strict=True)
         x, y, z = (at + count * step for at, count, step in columns)
         self.place_mm = x, y, z
@@ -284,6 +286,9 @@ class PicMmhConversation(PacketByPacket):
     def _moves(self, now: float) -> None:
         """Note that the block has been accepted: from now on it is executed."""
         packet = self.packets[self.sent - 1]
+        # In which sense an axis moved before the program, nobody knows.
+        unmoved = zip(self._play_s, self._senses, strict=True)
+        self._unsure_s = sum(seconds for seconds, sense in unmoved if not sense)
         self._over = now + packet.seconds
         if self._is_counted_later:
             seconds = packet.seconds + self._reverses_s
@@ -330,9 +335,8 @@ class PicMmhConversation(PacketByPacket):
             self._fail(f"it has reported {-missing} steps too many", now)
         elif missing:
             packet = self.packets[self.sent - 1]
-            self.next_s = (
-                self._over + (TIME_FACTOR - 1.0) * packet.seconds + self.manner.patience_s
-            )
+            late_s = (TIME_FACTOR - 1.0) * packet.seconds + TIME_FACTOR * self._unsure_s
+            self.next_s = self._over + late_s + self.manner.patience_s
         elif now >= self._over:
             self._packet_done(now)
         else:
@@ -449,7 +453,7 @@ class PicMmhTerminal(Terminal):
         link = machine.link
         assert isinstance(link, PicMmhLink)
         self._link, self.answers = link, link.echo == "echo"
-        self._reverses_s, self._hz = _reverses_s(machine), _by_hand_hz(machine)
+        self._reverses_s, self._hz = max(_reverses_s(machine)), _by_hand_hz(machine)
         self._left = 0  # steps of PX that are still to be reported
         self._ends = 0  # how many ; are to come back until A; has
         self._steps: list[tuple[str, int]] = []  # kinds of outputs and how many of each

@@ -293,6 +293,9 @@ def test_a_hand_at_each_machine(at: At) -> None:
         at.press("Go")
         at.until_still()
     page.locator("#resume-left").click()
+    if name == "i8751":  # it still waits for the rest of the data
+        at.until_told("must be reset")
+        return
     at.until_told("finished")
     assert read_journal(Path(at.server.program.journal)).finished
 

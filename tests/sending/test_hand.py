@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import MachineError
 from camtool.sending.faults import Faults, WiredTwin
+from camtool.sending.prepare import consignment
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.wire import Hand, Manner, Tell, WireState
 from tests.sending.talking import Talking
@@ -272,3 +273,20 @@ def test_a_held_jog_of_linuxcnc_ends_when_it_is_let_go(
     gone = at.place()
     at.twin.advance(at.now + 60.0)  # camtool was killed
     assert 0.0 < at.place()[1] - gone[1] <= feed / 60.0 * 0.4
+
+
+def test_a_program_waits_for_the_play_that_a_jog_has_left() -> None:
+    """The PIC makes up for it in silence, 9 s of X and 8 s of Y, before the first step."""
+    text = b"G54;G90;G00X00003.00Y00002.00;G00X00000.00Y00000.00;M30;"
+    at = AtHand("pic-mmh")
+    at.until_ready()
+    for sense in (1.0, -1.0):
+        at.hand.order("jog", {"x": 0.014 * sense, "y": 0.014 * sense, "feed": 1.0}, at.now)
+        at.until_ready()
+    one = consignment(text, at.target, source="part.pic")
+    wire: Any = at.target.target.wire()
+    conversation = wire.conversation(one.packets, at.target.machine, Manner())
+    both = Talking(conversation, WiredTwin(at.twin))
+    both.now = at.now
+    both.until(at.now + 120.0)
+    assert conversation.state is WireState.FINISHED, conversation.why
