@@ -26,8 +26,10 @@ from camtool.waveforms.levels import Line, LineLevels, lines_of
 LANE, GAP, MOTOR_GAP = 26.0, 12.0, 16.0
 """Height of a lane, the gap below it, and the further gap between two motors."""
 
-NAMES, TIMES = 116.0, 150.0
-"""Room for the names of the lines, and for the times of their pulses."""
+NAMES, TIMES_GAP = 116.0, 12.0
+"""Room for the names of the lines, and gap before the times of their pulses."""
+
+HEADER = "high / low"
 
 NUMBER_SPACING = 90.0
 """Least distance of two numbers of the time axis."""
@@ -79,13 +81,15 @@ def scope_svg(
     note = f"{_text(span)} {unit} from {_text(start_s)} s on"
     head, head_end = title_and_notes(name, [note], width)
     lanes = _lanes(stretch, motors, head_end + 18.0)
-    x_low, x_high = MARGIN + NAMES, width - MARGIN - TIMES
+    words = [HEADER, *(_pulse_times(lane, tick_s) for lane in lanes)]
+    room = max(text.width(each, TICK_CAP) for each in words) + TIMES_GAP
+    x_low, x_high = MARGIN + NAMES, width - MARGIN - room
     bottom = lanes[-1].top + LANE + GAP
     scale = (x_high - x_low) / (stretch.to_tick - stretch.from_tick)
     frame: Look = {"x": x_low, "y": head_end + 8.0, "width": x_high - x_low}
     height = bottom - head_end - 8.0
     small = TextStyle(TICK_CAP, QUIET)
-    header = text.label("high / low", (x_high + 12.0, head_end), small)
+    header = text.label(HEADER, (x_high + TIMES_GAP, head_end), small)
     grid, axis = _axis(stretch, (x_low, x_high), (head_end + 8.0, bottom), scale)
     parts = [element("rect", {**frame, "height": height, "fill": PLOT}), grid]
     for lane in lanes:
@@ -158,11 +162,14 @@ def _lane(lane: _Lane, stretch: Stretch, sides: tuple[float, float], scale: floa
     name = lane.line.name.replace("_", " ")
     words = _pulse_times(lane, stretch.board.tick_s)
     middle = lane.top + (LANE + TICK_CAP) / 2.0
-    return [
+    parts = [
         element("path", pen, title(f"{name}: {words}" if words else name)),
         text.label(name, (x_low - 12.0, middle), TextStyle(15.0, INK, "end")),
-        text.label(words, (x_high + 12.0, middle), TextStyle(TICK_CAP, QUIET)) if words else "",
     ]
+    if words:
+        place = x_high + TIMES_GAP, middle
+        parts.append(text.label(words, place, TextStyle(TICK_CAP, QUIET)))
+    return parts
 
 
 def _pulse_times(lane: _Lane, tick_s: float) -> str:

@@ -34,6 +34,7 @@ PAGES = (
     "docs/verifying.md",
     "docs/pictures.md",
     "docs/gallery.md",
+    "docs/validation.md",
 )
 FIRST = "logo.png"
 DISTANCE_MM = 1.6

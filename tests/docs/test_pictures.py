@@ -39,8 +39,9 @@ def compare(name: str, made: bytes, shown: bytes) -> None:
 
 
 QUICK = {"layers.png", "outline.png", "polar.png", "sign-iso.png", make_images.FIRST}
-"""A drawing, a job, a prediction, a stock and the README's: the default run looks at these, the
-nightly one at all."""
+QUICK |= {"signals-flashcut.png"}
+"""A drawing, a job, a prediction, a stock, signals and the README's: the default run looks at
+these, the nightly one at all."""
 
 
 @pytest.mark.parametrize(
@@ -73,5 +74,5 @@ def test_the_comparison_can_fail() -> None:
 def test_every_picture_is_shown_and_has_its_command() -> None:
     pages = [ROOT / "README.md", *(ROOT / page for page in make_images.PAGES)]
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
-    shown = set(re.findall(r"\]\((?:docs/)?images/(\S+?)\)", text))
+    shown = set(re.findall(r"\]\((?:docs/)?images/(\S+?\.png)\)", text))
     assert shown == {*COMMANDS, DRAWN} == {path.name for path in IMAGES.glob("*.png")}
