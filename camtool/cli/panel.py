@@ -13,7 +13,7 @@ import click
 
 from camtool.cli.home import BAUD
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import MachineFlags, machine_options, talk_options
+from camtool.cli.options import MachineFlags, length, machine_options, talk_options
 
 if TYPE_CHECKING:
     from camtool.sending.twin import PseudoTerminal
@@ -32,6 +32,12 @@ if TYPE_CHECKING:
     metavar="N",
     help="Port of the page on this computer  [any that is free]",
 )
+@click.option(
+    "--tool-diameter",
+    callback=length,
+    metavar="LENGTH",
+    help="Of the end mill in the machine: the picture shows the stock that it cuts.",
+)
 @click.option("--open", "opens", is_flag=True, help="Open the page in a browser.")
 @talk_options
 def panel(
@@ -40,6 +46,7 @@ def panel(
     port: str | None,
     baud: int | None,
     http_port: int,
+    tool_diameter: float | None,
     opens: bool,
     quiet: bool,
     verbose: bool,
@@ -59,7 +66,7 @@ def panel(
 
     target = machine.load()
     wire = wire_of(target)
-    loaded = None if program is None else LoadedProgram.read(program, target)
+    loaded = None if program is None else LoadedProgram.read(program, target, tool_diameter)
     twin = None
     if port is None:
         twin, line = _virtual(machine), None
@@ -67,7 +74,8 @@ def panel(
     else:
         line = port_of(port, baud, wire, target)
     session = Session(target, line, opened_line)
-    server = PanelServer(session, loaded, Path(program).parent if program else Path())
+    folder = Path(program).parent if program else Path()
+    server = PanelServer(session, loaded, folder, tool_diameter)
     session.watch = server.changed
     wishes = UserRequests(one_s=0.0)
 

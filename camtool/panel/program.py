@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +10,14 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.errors import InputError, OptionError, OutputError
+from camtool.pictures.scene import stock_pair
 from camtool.pictures.viewer.page import viewer_page
+from camtool.records import replace
 from camtool.sending.carry import SendOptions
 from camtool.sending.journal import JournalState, read_journal
 from camtool.sending.prepare import Consignment, consignment, lines_of, tool_at_of
+from camtool.stock.cutters import CutterProfile
+from camtool.stock.moves import stock_moves_of_toolpath
 from camtool.target.wire import Conversation, Place, ToolAt
 from camtool.toolpath.moves import Kind
 
@@ -84,21 +89,23 @@ class Course:
 
 
 class LoadedProgram(Struct, frozen=True, eq=False):
-    """A program that was read and judged; `file` names it."""
+    """A program that was read and judged; `file` names it. `tool_mm`: diameter of its end mill,
+    with which the picture shows the stock; None: not known."""
 
     file: str
     data: bytes
     target: LoadedTarget
     one: Consignment
+    tool_mm: float | None = None
 
     @classmethod
-    def read(cls, file: str, target: LoadedTarget) -> LoadedProgram:
+    def read(cls, file: str, target: LoadedTarget, tool_mm: float | None = None) -> LoadedProgram:
         """Read and judge a program; InputError if it cannot be read."""
         try:
             data = Path(file).read_bytes()
         except OSError as error:
             raise InputError(f"cannot be read ({error.strerror})", file=file) from error
-        return cls(file, data, target, consignment(data, target, source=file))
+        return cls(file, data, target, consignment(data, target, source=file), tool_mm)
 
     @property
     def journal(self) -> Path:
@@ -107,7 +114,14 @@ class LoadedProgram(Struct, frozen=True, eq=False):
 
     def page(self) -> bytes:
         """The page of the viewer."""
-        return viewer_page(self.one.run.scene())
+        scene = self.one.run.scene()
+        path = scene.toolpath
+        if path is None or self.tool_mm is None:
+            return viewer_page(scene)
+        mills = (CutterProfile(0.5 * self.tool_mm, 0.5 * self.tool_mm),)
+        moves = stock_moves_of_toolpath(path, np.zeros(len(path), dtype=np.int64), mills)
+        cut = partial(stock_pair, moves, scene.stock_mm, scene.thickness_mm)
+        return viewer_page(replace(scene, cut=cut, tool_mm=self.tool_mm))
 
     def facts(self) -> dict[str, Any]:
         """Return the values of the program that the page shows, and its findings."""

@@ -190,12 +190,17 @@ class Client:
 
 class PanelServer:
     """The pages of one session; `program` is what `StartRequest` sends, None without one, and
-    `folder` holds others that can be loaded."""
+    `folder` holds others that can be loaded; `tool_mm`: the diameter of their end mill."""
 
     def __init__(
-        self, session: Session, program: LoadedProgram | None = None, folder: Path | None = None
+        self,
+        session: Session,
+        program: LoadedProgram | None = None,
+        folder: Path | None = None,
+        tool_mm: float | None = None,
     ) -> None:
         self.session, self.program, self.folder = session, program, folder
+        self.tool_mm = tool_mm
         self._edition, self._has_run = 0, False
         self.key = secrets.token_urlsafe(24)
         self.port = 0
@@ -449,7 +454,7 @@ class PanelServer:
             return
         try:
             session.tell(f"{name} is judged")
-            self.program = LoadedProgram.read(str(file), session.target)
+            self.program = LoadedProgram.read(str(file), session.target, self.tool_mm)
         except CamtoolError as error:
             session.tell(str(error), bad=True)
             return

@@ -517,12 +517,14 @@ def test_nothing_is_wider_than_the_screen(
 def test_the_picture_shows_travel_and_tool(browser: Any, tmp_path: Path) -> None:
     machine = Machine("grbl", CHANGE, ".nc", choices=("homing=on",))
     with opened(machine, browser, tmp_path) as at:
+        at.server.tool_mm = 3.0
         load(at)
         frame = at.page.frame_locator("#view")
         frame.locator("body[data-painted]").wait_for()
         at.press("Home")
         at.until(lambda: at.session.state.is_homed)
         assert "X -200.0 to 0.0" in at.page.locator("#now-travel").inner_text()
+        assert '"cutters":[[' in at.server.program.page().decode()
         frame.locator("#stage").click()
         at.page.keyboard.press("Escape")
         at.until_told("stopped")
