@@ -824,6 +824,10 @@ def _beside_mm(case: Case) -> float:
     return WALL_COVERAGES * case.coverage_mm + off_mm
 
 
+NETS_THIN_MM = 2e-3
+"""The slides' path is thinned by no more than this where nets of copper are proved."""
+
+
 def _stock_findings(
     case: Case,
     request: StockRequest | None,
@@ -854,8 +858,11 @@ def _stock_findings(
         return tuple(findings_found)
     if not any(cutter.radius_mm for cutter in tools.cutters):
         return tuple(findings_found)
-    from camtool.stock.checks import stock_findings
+    from camtool.stock.checks import net_findings, stock_findings
 
+    if request.copper:
+        slides = slide_moves(decoded, case.target, tools, case.simulation, thin_mm=NETS_THIN_MM)
+        findings_found += net_findings(slides, request)
     if case.compensated is not None:
         moves = slide_moves(decoded, case.target, tools, case.simulation)
     return (*findings_found, *stock_findings(decoded, moves, request, case.depth_mm, planning))

@@ -277,8 +277,8 @@ def _fit(
     high = [np.inf, np.inf, np.inf, MAX_DRIVE_PERCENT][: len(start)]
     scale = np.maximum(np.abs(start), [1e-6, 1e-6, tick_s, 1.0][: len(start)])
     low = [1e-9, 1e-6, 0.0, 0.0][: len(start)]
-    found = least_squares(residuals, start, bounds=(low, high), x_scale=scale, jac="3-point")
-    return found.x, found.jac, found.fun
+    fitted = least_squares(residuals, start, bounds=(low, high), x_scale=scale, jac="3-point")
+    return fitted.x, fitted.jac, fitted.fun
 
 
 def _residual(motor: MotorModel, response: MeasuredResponse, tick_s: float) -> Floats:
@@ -425,8 +425,8 @@ def _held_drives(
     drives: Floats, tick: int, late_s: float, tick_s: float
 ) -> Iterator[tuple[float, float, float]]:
     """Yield (begin, end, drive) s within a tick of drives that act `late_s` late."""
-    whole, part_s = divmod(late_s, tick_s)
-    first = tick - int(whole)
+    late_ticks, part_s = divmod(late_s, tick_s)
+    first = tick - int(late_ticks)
     if part_s > 0.0:
         yield 0.0, part_s, float(drives[first - 1]) if first > 0 else 0.0
     yield part_s, tick_s, float(drives[first]) if first >= 0 else 0.0

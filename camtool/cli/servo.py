@@ -84,25 +84,25 @@ def identify(
         read_response(read_bytes(name).decode("utf-8", "replace"), name, drive)
         for name in responses
     ]
-    found = identified(tables, loop.tick_s)
+    result = identified(tables, loop.tick_s)
     index = AXES.index(axis)
     motors = [*loop.motors]
-    motors[index] = found.motor
+    motors[index] = result.motor
     changed = replace(loop, motors=tuple(motors))
     files: dict[str, bytes] = {}
     if output is not None:
         files[output] = _machine_file(machine, loaded, changed, "identified from measured steps")
     if report is not None:
-        files[report] = to_json(_motor_data(axis, found)).encode()
+        files[report] = to_json(_motor_data(axis, result)).encode()
     write_all(files)
     if STDOUT not in files and not quiet:
-        for line in _motor_lines(axis, found, loop.motors[index]):
+        for line in _motor_lines(axis, result, loop.motors[index]):
             show_text(one_line(line))
-    for note in found.notes:
+    for note in result.notes:
         say(f"camtool: note: {note}", quiet=quiet)
     if output is not None:
-        if found.motor.dead_time_s > 0.1 * loop.tick_s:
-            late_ms = found.motor.dead_time_s * 1e3
+        if result.motor.dead_time_s > 0.1 * loop.tick_s:
+            late_ms = result.motor.dead_time_s * 1e3
             say(f"camtool: note: the dead time of {late_ms:.1f} ms is in no key", quiet=quiet)
         say(f"written: {'stdout' if output == STDOUT else output}", quiet=quiet)
 
@@ -217,8 +217,8 @@ def _motor_lines(axis: str, found: Identification, before: MotorModel) -> Iterat
     yield f"axis {axis}          before  identified  ± standard uncertainty"
     for name, old, new, unit, key in rows:
         sigma = found.uncertainty[key]
-        known = "not determined" if sigma is None else f"± {sigma:.2g} {unit}"
-        yield f"{name:<14}{old:>9.4g}{new:>12.5g}  {known}"
+        sigma_words = "not determined" if sigma is None else f"± {sigma:.2g} {unit}"
+        yield f"{name:<14}{old:>9.4g}{new:>12.5g}  {sigma_words}"
     yield f"{found.samples} samples, residuals {found.residual:.3g} rms"
 
 

@@ -5,6 +5,7 @@
     SVG          XML whose first element is `svg`, plain or packed by gzip
     solid        STEP (ISO-10303-21), BREP of OpenCASCADE; a script by its extension .py
     bitmap       PNG, JPEG
+    board        Gerber (%FS, %MO, %TF), Excellon (M48), or a ZIP archive of such files
     points       NumPy's .npy and .npz, JSON (`[` or `{`), the router's arrays (`xy = `), or a
                  first line of two numbers
 
@@ -14,7 +15,9 @@ and other archives) is refused with what to do about it.
 
 from __future__ import annotations
 
+import io
 import re
+import zipfile
 import zlib
 
 from camtool.errors import DrawingError
@@ -24,6 +27,9 @@ BINARY_DXF = b"AutoCAD Binary DXF\r\n\x1a\x00"
 
 HEAD_BYTES = 4096
 """Number of bytes of a file that decide its format."""
+
+MAX_ENTRIES = 100
+"""A ZIP archive is a board's if one of its first entries is."""
 
 XML_HEAD_BYTES = 1 << 20
 """The first element of an XML file is searched for in this many bytes, after comments and a
@@ -35,6 +41,7 @@ _EXTENSIONS = {
     "points": ".csv .tsv .txt .dat .xy .json .npy .npz .m",
     "solid": ".step .stp .brep .brp .py",
     "bitmap": ".png .jpg .jpeg",
+    "board": ".gbr .ger .gtl .gbl .gko .gm1 .drl .xln .exc",
 }
 _FORMAT_BY_SUFFIX = {
     suffix: name for name, suffixes in _EXTENSIONS.items() for suffix in suffixes.split()
@@ -80,6 +87,8 @@ _ZIPPED = {
 _DXF_START = re.compile(r"\s*(?:0|999)[ \t]*(?:\r\n|\n|\r)")
 _STEP_START = re.compile(r"\s*(?:/\*(?:(?!\*/).)*\*/\s*)*ISO-10303-21\s*;", re.DOTALL)
 _BREP_START = re.compile(r"\s*(?:DBRep_DrawableShape|CASCADE Topology V\d|Open CASCADE Topology)")
+_GERBER_START = re.compile(r"^\s*%(?:FS[LTD]?[AI]?X\d|MO(?:MM|IN)\*|TF\.)", re.MULTILINE)
+_EXCELLON_START = re.compile(r"(?:\s+|;[^\n]*\n|%\s*\n)*M48\b")
 _ROUTER = re.compile(
     r"^[ \t]*(?:l?xy|velxy|[xy]_points|l[xy]|vel[xy]|size_of_array|first_point[xy])[ \t]*=",
     re.MULTILINE,
@@ -125,6 +134,8 @@ def _by_bytes(data: bytes, file: str) -> str | None:
             return "svg"
         raise DrawingError("is compressed with gzip", file=file, mend="unpack it first (gunzip)")
     if data.startswith(_ZIP):
+        if _is_board_archive(data):
+            return "board"
         complaint, mend = next(
             (answer for sign, answer in _ZIPPED.items() if sign in data[:HEAD_BYTES]),
             ("is a ZIP archive", "unpack it first"),
@@ -141,6 +152,8 @@ def _by_text(data: bytes, suffix: str, file: str) -> str | None:
     head = text_head(data)
     if _DXF_START.match(head):
         return "dxf"
+    if is_gerber(head) or is_excellon(head):
+        return "board"
     if is_step(head) or is_brep(head):
         return "solid"
     start = head.lstrip()[:1]
@@ -159,6 +172,30 @@ def _by_text(data: bytes, suffix: str, file: str) -> str | None:
 def is_step(head: str) -> bool:
     """True if the text begins with the header of STEP."""
     return _STEP_START.match(head) is not None
+
+
+def is_gerber(head: str) -> bool:
+    """True if the text begins as Gerber does: with its number format or its unit."""
+    return _GERBER_START.search(head) is not None
+
+
+def is_excellon(head: str) -> bool:
+    """True if the text begins with the head of Excellon."""
+    return _EXCELLON_START.match(head) is not None
+
+
+def _is_board_archive(data: bytes) -> bool:
+    """True if a ZIP archive holds a Gerber or Excellon file."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            for entry in archive.infolist()[:MAX_ENTRIES]:
+                with archive.open(entry) as file:
+                    head = text_head(file.read(HEAD_BYTES))
+                if is_gerber(head) or is_excellon(head):
+                    return True
+    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, OSError, ValueError):
+        return False  # what it is instead, the caller says
+    return False
 
 
 def is_brep(head: str) -> bool:

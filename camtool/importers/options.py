@@ -20,7 +20,7 @@ from camtool.units import MM_PER_UNIT, parse_length
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
 
-FORMATS = ("dxf", "svg", "points", "solid", "bitmap")
+FORMATS = ("dxf", "svg", "points", "solid", "bitmap", "board")
 """Names of the formats, each with a package of that name beside this file."""
 
 SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")

@@ -61,7 +61,8 @@ def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation
             *shortened_list(cleared, GOUGE_BY_POCKET_MORE),
             *shortened_list(pocket_findings, GOUGE_MORE),
         ]
-    if not runs_beside(operation):
+    # Nets are proved on the cut itself, and all else on a board lies below its copper.
+    if not runs_beside(operation) or operation.contract.frees_nets:
         return []
     gouges = list(_gouges(work, chosen, sides, operation))
     findings = shortened_list(gouges, GOUGE_MORE)

@@ -80,7 +80,8 @@ class OperationKind:
     `path_error_mm`: its centre paths may be off the drawing's by this much.
 
     The tool: `descent` is how it goes down: in "passes" of one depth each, in one "helix", in
-    "pecks", or along "slopes". `needs_v_bit`: it cuts with a V bit alone.
+    "pecks", or along "slopes". `needs_v_bit`: it cuts with a V bit alone. `frees_nets`: what it
+    takes are nets of copper, which are to be whole afterwards, and apart.
 
     Words: `cut_name` is what is cut of the stock ("" for parts and holes), `reason` why its
     contours lie on no side, as `camtool job` says it.
@@ -101,6 +102,7 @@ class OperationKind:
     path_error_mm: float = 0.0
     descent: str = "passes"
     needs_v_bit: bool = False
+    frees_nets: bool = False
     cut_name: str = ""
     reason: str = ""
 

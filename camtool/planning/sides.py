@@ -395,7 +395,11 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
 
 
 def _rim(operation: Operation, sides: Sides, index: list[int]) -> Bools:
-    """(M,) which of the chosen paths are rims of parts, for a profile that asks for it."""
+    """(M,) which of the chosen paths are rims of parts, for a profile that asks for it; of nets,
+    which are rims of copper: an area of its own, whatever outline lies around it."""
+    if operation.contract.frees_nets:
+        levels = sides.nesting.among(np.array(index, dtype=np.int64)).levels
+        return np.asarray(levels.depth % 2 == 0)
     if operation.side == "auto" and runs_beside(operation):
         return sides.seen_by(operation).rim[index]
     return np.full(len(index), operation.side == "outside")

@@ -39,6 +39,9 @@ from camtool.stock.findings import (
     LOOSE_PIECE_BEFORE,
     LOOSE_PIECE_CUT,
     MATERIAL_LEFT,
+    NET_CUT,
+    NETS_APART,
+    NETS_JOINED,
     PASS_TOO_DEEP,
     STOCK_NOT_JUDGED_BEFORE,
     STOCK_NOT_JUDGED_NARROW,
@@ -53,7 +56,7 @@ from camtool.stock.heights import greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
 from camtool.stock.pieces import BEFORE, LoosePiece, loose_pieces
 from camtool.stock.proofs import Gouges, JudgedStock, Leftovers, Trial
-from camtool.stock.wanted import WantedSolid, wanted_solid
+from camtool.stock.wanted import CopperNets, WantedSolid, wanted_solid
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
 
@@ -106,9 +109,9 @@ MIN_CHORDS = 48
 class StockRequest(Struct, frozen=True, eq=False):
     """The solid that a job asks for, its closed contours, and which of them (C,) are the outlines
     of parts without tabs; its operations that cut, in their order, each with its depth, mm, and
-    the bridges of its tabs; the boxes that are to be kept free, the stock, and what set-ups before
-    have cut of it. `is_whole`: nothing else has cut before: passes, and what is left, can be
-    judged."""
+    the bridges of its tabs; the boxes that are to be kept free, the stock, what set-ups before
+    have cut of it, and the nets of `copper` that are to be freed. `is_whole`: nothing else has cut
+    before: passes, and what is left, can be judged."""
 
     solid: WantedSolid
     contours: Polylines
@@ -121,6 +124,7 @@ class StockRequest(Struct, frozen=True, eq=False):
     stock: Stock | None
     before: StockBefore = WHOLE
     is_whole: bool = True
+    copper: tuple[CopperNets, ...] = ()
 
 
 def stock_request(
@@ -154,7 +158,14 @@ def stock_request(
         job.stock,
         before or WHOLE,
         is_whole,
+        tuple(_copper_of(step) for step in cutting if step.operation.contract.frees_nets),
     )
+
+
+def _copper_of(step: Step) -> CopperNets:
+    lines = step.chosen.lines
+    closed = lines.select(np.flatnonzero(lines.closed).tolist())
+    return CopperNets(operation_name(step.operation), closed, step.operation.own_value("copper"))
 
 
 def stock_findings(
@@ -181,6 +192,35 @@ def stock_findings(
     else:
         stock_faults.append(STOCK_NOT_JUDGED_BEFORE())
     return tuple(stock_faults)
+
+
+def net_findings(slides: StockMoves, request: StockRequest) -> Iterator[Finding]:
+    """Yield NETS_JOINED and NET_CUT for nets of copper that are not apart, or not whole, after the
+    moves of the slides, and NETS_APART for a board without such a net."""
+    from camtool.stock.nets import judge_nets
+
+    stock = request.stock
+    for copper in request.copper:
+        report = judge_nets(slides, copper, None if stock is None else stock.box_mm)
+        for sentence, faults in ((NETS_JOINED, report.shorts), (NET_CUT, report.opens)):
+            for number, fault in enumerate(faults[:FINDINGS_LISTED], start=1):
+                others = len(faults) - FINDINGS_LISTED if number == FINDINGS_LISTED else 0
+                yield sentence(
+                    where=place_words(fault.at_mm),
+                    measured=fault.pieces,
+                    operation=copper.name,
+                    more=others,
+                )
+        if not (report.shorts or report.opens):
+            yield NETS_APART(
+                where=place_words(report.gap.at_mm) if report.gap else "",
+                measured=report.nets,
+                operation=copper.name,
+                groove=f"{report.gap.width_mm:.3f} mm" if report.gap else "not closed",
+                copper=f"{report.copper.width_mm:.3f} mm, {place_words(report.copper.at_mm)}"
+                if report.copper
+                else "not known",
+            )
 
 
 class _Points(Struct, frozen=True, eq=False):

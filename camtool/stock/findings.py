@@ -97,6 +97,26 @@ class StockCode(Code):
         "neither goes through it",
         "nothing, if it is thick enough",
     )
+    NETS_JOINED = (
+        612,
+        ERROR,
+        "two nets of a board stay joined after the predicted cut, by their own copper or by "
+        "copper between them that is not cut off; the place is where they are nearest",
+        "a finer tool, less depth of a V bit, or more distance in the drawing",
+    )
+    NET_CUT = (
+        613,
+        ERROR,
+        "a net of a board is cut into several pieces, or away, by the predicted cut",
+        "a finer tool, less depth of a V bit, or wider tracks; less backlash of the machine",
+    )
+    NETS_APART = (
+        614,
+        INFO,
+        "it is proved that all nets of a board are apart and whole after the predicted cut; the "
+        "narrowest groove beside a net and the narrowest copper of a net are given",
+        "nothing",
+    )
 
 
 CUT_TOO_DEEP = Sentence(
@@ -164,6 +184,20 @@ LOOSE_PIECE_BEFORE = Sentence(
     "what is cut here, {width:.3g} by {height:.3g} mm, has come loose in a set-up before: cut its "
     "outline in the last set-up, or give it tabs",
     "mm2",
+)
+NETS_JOINED = Sentence(
+    StockCode.NETS_JOINED, "{operation}: two nets are joined near here" + and_more("pairs")
+)
+NET_CUT = Sentence(
+    StockCode.NET_CUT,
+    "{operation}: a net is in {measured:.0f} pieces after the cut" + and_more("nets"),
+    "pieces",
+)
+NETS_APART = Sentence(
+    StockCode.NETS_APART,
+    "{operation}: all nets, {measured:.0f}, are apart and whole; the narrowest groove beside one "
+    "is {groove}, and the narrowest copper {copper}",
+    "nets",
 )
 STOCK_NOT_JUDGED_TOOLS = Sentence(
     StockCode.STOCK_NOT_JUDGED,

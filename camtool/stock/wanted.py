@@ -231,6 +231,15 @@ class WantedSolid(Struct, frozen=True, eq=False):
         return (self.may, low, self.wall_mm), (self.must, high, -self.wall_mm)
 
 
+class CopperNets(Struct, frozen=True, eq=False):
+    """The nets that the operation `name` frees: the closed `contours` of their copper (an odd
+    number of them around it), mm, and how thick it is."""
+
+    name: str
+    contours: Polylines
+    thickness_mm: float
+
+
 def wanted_solid(steps: Sequence[Step], wall_mm: float = DEFAULT_WALL_MM) -> WantedSolid:
     """Return the solid that the operations of a plan leave, from what each took of the drawing and
     its setting; what cuts no width leaves all."""
@@ -411,6 +420,8 @@ class _Layers:
             if operation.contract.breaks_edges:
                 width, rise = operation.chamfer_mm or 0.0, cutter_profile(tool).rise
                 reach = 2.0 * (operation.wall_radius_mm + width) + self._leads_mm
+                if operation.contract.frees_nets:  # rings farther out
+                    reach += operation.own_value("isolation") or 0.0
                 yield WantedLayer(self.name, lines, side, width, 0.0, rise, self.depth_mm, reach)
                 continue
             shift, reach_mm = -operation.allowance_mm, reach + self._leads_mm

@@ -54,6 +54,11 @@ def test_the_script_writes_these_files_and_no_others(made: Path):
     assert sorted(path.name for path in made.iterdir()) == sorted(NAMES)
 
 
+def test_the_board_is_what_its_script_writes(tmp_path: Path):
+    subprocess.run([sys.executable, "-B", str(SAMPLES / "make_led.py"), str(tmp_path)], check=True)
+    assert (SAMPLES / "led.zip").read_bytes() == (tmp_path / "led.zip").read_bytes()
+
+
 @pytest.mark.parametrize("name", ["logo.dxf", "coupon.dxf", "plate.dxf", "mount.dxf", "board.dxf"])
 def test_ezdxf_finds_nothing_to_repair(name: str):
     import ezdxf

@@ -1,0 +1,1 @@
+"""Boards: Gerber and Excellon files, alone or in a ZIP archive."""

@@ -1,0 +1,95 @@
+"""Isolation of the nets of a board: the tool runs beside the copper, as wide as it is at the top.
+
+       ├ r ┤                  copper  ▒▒▒▒▒╲   ╱▒▒▒▒▒▒
+            the drawn edge ┊           ▒▒▒▒▒╲ ╱▒▒▒▒▒▒▒
+                                       board  V
+
+The axis runs r(D) beside the copper: the radius of the tool D above its tip, where the top of the
+copper passes it. That is a chamfer whose bevel has no width, so that a V bit and a mill are the
+same here. `isolation` adds rings farther out, which overlap at the bottom of the copper. Whether
+the nets are apart then, and whole, is proved on the predicted cut (`camtool.stock.nets`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from camtool.errors import OptionError
+from camtool.operations.chamfer.work import chamfer
+from camtool.planning.items import Chosen, Setting, Work
+from camtool.planning.job import Operation, Stock
+from camtool.planning.naming import key_of
+from camtool.records import replace
+
+OVERLAP = 0.2
+"""Rings overlap by this share of the width of the tool at the bottom of the copper."""
+
+MAX_RINGS = 50
+"""More rings than this are refused: a wider tool clears such an area."""
+
+
+def isolated(operation: Operation, _: Stock | None) -> Operation:
+    """Return the operation with the depth at which its tool passes the drawn edge.
+
+    OptionError without a depth, for one that leaves copper, and for an isolation below the tool's.
+    """
+    copper_mm = operation.own_value("copper")
+    if operation.depth_mm is None:
+        raise OptionError(
+            "an isolation has no depth",
+            where=key_of(operation, "depth"),
+            mend='say how deep the tip goes, more than the copper: depth = "0.1mm"',
+        )
+    if not 0.0 < copper_mm < operation.depth_mm:
+        raise OptionError(
+            f"{operation.depth_mm:g} mm of depth do not cut through {copper_mm:g} mm of copper",
+            where=key_of(operation, "depth"),
+            mend="give more depth, or the thickness of your copper (copper)",
+        )
+    depth_mm = operation.depth_mm
+    if operation.tool.radius_at(depth_mm - copper_mm) <= 0.0:
+        raise OptionError(
+            "the tool has no width at the bottom of the copper",
+            where=key_of(operation, "tool"),
+            mend="give a tool with a diameter or an angle",
+        )
+    settled = replace(operation, tip_offset_mm=depth_mm)
+    width_mm = operation.own_value("isolation")
+    if width_mm is not None and width_mm < 2.0 * operation.tool.radius_at(depth_mm - copper_mm):
+        least = 2.0 * operation.tool.radius_at(depth_mm - copper_mm)
+        raise OptionError(
+            f"an isolation of {width_mm:g} mm is less than one cut of this tool, {least:.4g} mm",
+            where=key_of(operation, "isolation"),
+            mend="leave it out, or take a finer tool",
+        )
+    if len(_rings_mm(settled)) > MAX_RINGS:
+        raise OptionError(
+            f"an isolation of {width_mm:g} mm needs {len(_rings_mm(settled))} rings",
+            where=key_of(operation, "isolation"),
+            mend=f"give less, for at most {MAX_RINGS} rings, or clear the rest with a wider tool",
+        )
+    return settled
+
+
+def isolate(chosen: Chosen, setting: Setting) -> Work:
+    """Return the contours round the copper, the ring beside it first; only that one must go all
+    the way round, so only its findings count."""
+    first, *rings = (
+        chamfer(chosen, replace(setting, operation=replace(setting.operation, allowance_mm=each)))
+        for each in _rings_mm(setting.operation)
+    )
+    items = [*first.items]
+    for ring in rings:
+        items += ring.items
+    return Work(tuple(items), first.findings)
+
+
+def _rings_mm(operation: Operation) -> list[float]:
+    """Return the distances of the rings from the first one, mm: evenly, with OVERLAP."""
+    width_mm = operation.own_value("isolation")
+    copper_mm = operation.own_value("copper")
+    one = 2.0 * operation.tool.radius_at((operation.depth_mm or 0.0) - copper_mm)
+    if width_mm is None or width_mm <= one:
+        return [0.0]
+    count = math.ceil((width_mm - one) / ((1.0 - OVERLAP) * one))
+    return [(width_mm - one) * k / count for k in range(count + 1)]
