@@ -16,12 +16,16 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
-from camtool.simulation.motion import Chunk, Effects, Ledger
+from camtool.simulation.motion import Chunk, Effects, Ledger, Options
 from camtool.simulation.rows import block_of
 from camtool.toolpath.moves import Toolpath
 
-COMPENSATED = Effects(play=False, scale=False, squareness=False, repeatability=False)
-"""The effects of a run whose pulses are wanted: steps that the controller adds, no mechanics."""
+OUTPUTS = Options(
+    effects=Effects(play=False, scale=False, squareness=False, repeatability=False),
+    chunk_steps=1 << 13,
+)
+"""The options of a run whose pulses are wanted: steps that the controller adds, no mechanics; a
+sample may be some dozen changes of lines."""
 
 
 class Pulses(Struct, frozen=True, eq=False):
@@ -65,7 +69,7 @@ from it to the end of its pass."""
 def row_pulses(
     chunks: Iterable[Chunk], path: Toolpath, machine: Machine, waits: Waits | None = None
 ) -> Iterator[Pulses]:
-    """Yield the pulses of a run with the effects `COMPENSATED`, chunk by chunk. `path` is the
+    """Yield the pulses of a run with the options `OUTPUTS`, chunk by chunk. `path` is the
     toolpath as the controller rounds it. Without `waits` the samples of a row within a chunk share
     its time equally. ProgramError for an arc that never ends."""
     run = _RowRun(path, machine, waits)

@@ -22,8 +22,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Ints
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
-from camtool.simulation.motion import Options
-from camtool.simulation.pulses import COMPENSATED, Pulses, in_order, reversals_of
+from camtool.simulation.pulses import OUTPUTS, Pulses, in_order, reversals_of
 from camtool.target.signals import Board, Coils, SignalModel
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -67,7 +66,7 @@ class FlashcutSignals(SignalModel):
 
     def pulses(self, toolpath: Toolpath, machine: _Machine) -> Iterator[Pulses]:
         """Yield the states of all coils."""
-        run = FlashcutRun(toolpath, machine, Options(effects=COMPENSATED))
+        run = FlashcutRun(toolpath, machine, OUTPUTS)
         states = _CoilRun(toolpath, run, machine)
         for batch in run.batches():
             yield states.pulses(batch)

@@ -37,6 +37,9 @@ CLOCK_HZ = 16e6
 STEP_PULSE_S = 10e-6
 """$0 (defaults.h)."""
 
+TICK_S = 1e-7
+"""Times are given to 0.1 µs, more than a cycle: a viewer that stores each tick takes no finer."""
+
 SEGMENTS_AT_ONCE = 256
 
 MIN_PER_S = 60.0
@@ -52,7 +55,7 @@ class GrblSignals(SignalModel):
                 StepDirection(name, ("PORTD", 2 + k), ("PORTD", 5 + k), STEP_PULSE_S)
                 for k, name in enumerate("XYZ")
             ),
-            1e-10,
+            TICK_S,
             "us",
             (
                 "steps last 10 µs ($0), no line is inverted ($2, $3)",

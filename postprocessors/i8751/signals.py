@@ -14,8 +14,7 @@ import numpy as np
 from camtool.arrays import Floats, Ints
 from camtool.machine.model import Machine
 from camtool.simulation.legs import coded_steps_mm
-from camtool.simulation.motion import Options
-from camtool.simulation.pulses import COMPENSATED, Pulses, row_pulses
+from camtool.simulation.pulses import OUTPUTS, Pulses, row_pulses
 from camtool.target.signals import Board, Coils, SignalModel
 from camtool.toolpath.moves import Toolpath
 
@@ -66,5 +65,5 @@ class I8751Signals(SignalModel):
         def waits(row: Ints, number: Ints) -> tuple[Floats, Floats]:
             return times.around(np.abs(travel[row]), number)
 
-        chunks = model.run(toolpath, machine, Options(effects=COMPENSATED))
+        chunks = model.run(toolpath, machine, OUTPUTS)
         return row_pulses(chunks, path, machine, waits)

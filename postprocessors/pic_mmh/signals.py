@@ -10,8 +10,7 @@ from collections.abc import Iterator
 
 from camtool.machine.model import Machine
 from camtool.records import replace
-from camtool.simulation.motion import Options
-from camtool.simulation.pulses import COMPENSATED, Pulses, row_pulses
+from camtool.simulation.pulses import OUTPUTS, Pulses, row_pulses
 from camtool.target.signals import Board, Coils, SignalModel
 from camtool.toolpath.moves import Toolpath
 
@@ -52,9 +51,7 @@ class PicMmhSignals(SignalModel):
         """Yield the outputs of the interpolator. Where idle passes take a period too, the model
         runs pass by pass, which alone says where they are."""
         by_pass = machine.controller.time_base == "iteration"
-        options = Options(effects=COMPENSATED)
-        if by_pass:
-            options = replace(options, chunk_steps=1)
+        options = replace(OUTPUTS, chunk_steps=1) if by_pass else OUTPUTS
         model = PicMmhModel()
         path = model.quantised(toolpath, machine)
         return row_pulses(model.run(toolpath, machine, options), path, machine)

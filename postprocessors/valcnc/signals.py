@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from camtool.machine.model import Machine
-from camtool.simulation.motion import Options
-from camtool.simulation.pulses import COMPENSATED, Pulses, row_pulses
+from camtool.simulation.pulses import OUTPUTS, Pulses, row_pulses
 from camtool.target.signals import Board, SignalModel, StepDirection
 from camtool.toolpath.moves import Toolpath
 
@@ -47,5 +46,5 @@ class ValcncSignals(SignalModel):
         """Yield the passes of the counter."""
         model = ValcncModel()
         path = model.quantised(toolpath, machine)
-        chunks = model.run(toolpath, machine, Options(effects=COMPENSATED))
+        chunks = model.run(toolpath, machine, OUTPUTS)
         return row_pulses(chunks, path, machine)

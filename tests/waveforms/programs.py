@@ -9,8 +9,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from camtool.arrays import Ints
-from camtool.simulation.motion import Options
-from camtool.simulation.pulses import COMPENSATED
+from camtool.records import replace
+from camtool.simulation.pulses import OUTPUTS
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.signals import NoSignals
 from camtool.toolpath.builder import ToolpathBuilder
@@ -96,7 +96,7 @@ class Totals:
 
 def totals(path: Toolpath, target: LoadedTarget) -> Totals:
     steps, reversals, seconds = np.zeros(3, np.int64), np.zeros(3, np.int64), 0.0
-    for chunk in target.simulate(path, Options(effects=COMPENSATED, chunk_steps=97)):
+    for chunk in target.simulate(path, replace(OUTPUTS, chunk_steps=97)):
         steps += chunk.ledger.steps.sum(axis=0)
         reversals += chunk.ledger.reversals.sum(axis=0)
         seconds += float(chunk.ledger.duration_s.sum())

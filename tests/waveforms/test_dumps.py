@@ -9,12 +9,12 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from vcd.reader import TokenKind, tokenize
 
+import camtool
 from camtool.errors import OptionError
 from camtool.target.signals import Coils, StepDirection
 from camtool.waveforms.levels import lines_of, port_names
@@ -22,6 +22,8 @@ from camtool.waveforms.signals import Signals
 from camtool.waveforms.table import table
 from tests.strategies import examples
 from tests.waveforms.programs import BENCHES, of_text, paths, signals
+
+ROOT = Path(__file__).parents[2]
 
 Changes = dict[str, list[tuple[int, int]]]
 
@@ -112,7 +114,7 @@ def test_a_dump_says_the_same_as_the_table(name: str, data: st.DataObject) -> No
     found = signals(data.draw(paths(bench, reach=60)), bench.target())
     scale, changes = dump_of(found)
     board = found.board
-    assert scale == {1e-3: "1 ms", 1e-6: "1 us", 1e-7: "100 ns", 1e-10: "100 ps"}[board.tick_s]
+    assert scale == {1e-3: "1 ms", 1e-6: "1 us", 1e-7: "100 ns"}[board.tick_s]
     per_unit = round({"ms": 1e-3, "us": 1e-6}[board.unit] / board.tick_s)
     last: dict[str, int] = {}
     wanted: Changes = defaultdict(list)
@@ -182,13 +184,24 @@ def test_a_table_of_too_many_rows_is_refused() -> None:
         list(table(found.board, found.levels(), found.blocks, max_rows=20))
 
 
-def test_the_format_of_the_port_bytes(tmp_path: Path) -> None:
-    """The first bytes of a line, as docs/signals.md shows them."""
-    found = of_text("flashcut", LINE, ("axes.x.compensation_mm=0", "axes.y.compensation_mm=0"))
-    found.save(tmp_path / "a.csv")
-    lines = (tmp_path / "a.csv").read_text().splitlines()
-    assert lines[0] == "time_ms,0x378,0xBC00,x,y,z,spindle,block"
-    values = np.array([[int(word) for word in line.split(",")] for line in lines[1:]])
-    states = [0b1001, 0b1100, 0b0110, 0b0011]
-    x_states = values[1:, 1][np.diff(values[:, 3]) != 0] & 15
-    assert x_states.tolist()[:8] == states * 2
+def test_the_page_shows_the_bytes_of_the_thesis_line(tmp_path: Path) -> None:
+    """The rows of docs/signals.md are the first ones of its line at 3 ms; and `save` writes what
+    `content` gives, whole or not at all."""
+    program = (ROOT / "samples" / "oscilloscope" / "flashcut-10x5.nc").read_text()
+    found = of_text("flashcut", program, ("controller.half_period_ms=3",))
+    file = tmp_path / "a.csv"
+    found.save(file)
+    lines = file.read_text().splitlines()
+    page = (ROOT / "docs" / "signals.md").read_text(encoding="utf-8")
+    assert "```\n" + "\n".join(lines[:5]) + "\n```" in page
+    with pytest.raises(OptionError, match=r"the program ends after 42\.104 s"):
+        found.save(file, from_s=50.0)
+    assert file.read_text().splitlines() == lines
+    assert [each.name for each in tmp_path.iterdir()] == ["a.csv"]
+
+
+def test_signals_in_python() -> None:
+    found = camtool.signals(LINE.encode(), "flashcut")
+    assert isinstance(found, camtool.Signals)
+    assert found.count().steps.tolist() == [105, 55, 0, 105]
+    assert sum(len(part.tick) for part in found.levels()) > 400

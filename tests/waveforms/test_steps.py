@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.simulation.motion import Options
-from camtool.simulation.pulses import Pulses
+from camtool.records import replace
+from camtool.simulation.pulses import OUTPUTS, Pulses
 from camtool.toolpath.moves import Toolpath
 from tests.strategies import examples
 from tests.waveforms.programs import BENCHES, paths, signals, totals
@@ -88,8 +86,8 @@ def test_pulses_are_in_order_and_chunks_change_none(name: str, data: st.DataObje
         assert (part.at_s <= part.until_s + 1e-9).all()
     with pytest.MonkeyPatch.context() as patch:
         for module in ("pic_mmh", "valcnc", "i8751", "flashcut"):
-            options = f"camtool_postprocessors.{module}.signals.Options"
-            patch.setattr(options, partial(Options, chunk_steps=7))
+            options = f"camtool_postprocessors.{module}.signals.OUTPUTS"
+            patch.setattr(options, replace(OUTPUTS, chunk_steps=7))
         patch.setattr("camtool_postprocessors.grbl.signals.SEGMENTS_AT_ONCE", 3)
         small = list(signals(path, target).pulses())
     for motor in range(many[0].moves.shape[1]):
