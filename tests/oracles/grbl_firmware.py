@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from camtool.arrays import Floats, Ints
+from camtool.target.twin import TwinTrace
 
 BOARD = Path(__file__).parent / "grbl_board"
 HEADERS = ("avr/io.h", "avr/pgmspace.h", "avr/interrupt.h", "avr/wdt.h", "util/delay.h")
@@ -313,3 +314,97 @@ BYTE_S = 1389 / 16e6
 """What a byte takes on the line, in ticks of the board."""
 LATE_S = 0.001
 """What it says is heard so much later."""
+
+
+# The firmware as a virtual controller, on a line with faults, a pseudo-terminal or none.
+
+
+class FirmwareSlides:
+    """The slides of the firmware's machine, as `camtool.target.twin.Slides` shows those of a
+    twin."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self.commanded_mm: Floats = np.zeros(3)
+
+    @property
+    def trace(self) -> TwinTrace:
+        """All that they have done, by the pulses of the step pins."""
+        ticks = np.fromfile(self._file, dtype=TICK_OF_SESSION)
+        places = ticks["slides"].astype(np.float64) / STEPS_PER_MM
+        block = np.full(len(places), -1, dtype=np.int64)
+        return TwinTrace(ticks["at"] * TICK_S, block, places, places)
+
+
+class FirmwareTwin:
+    """The firmware in the place of a `camtool.target.twin.Twin`: its caller moves its clock. Its
+    board is not reset when the port is opened. `settings` are sent to it first."""
+
+    wire = "115200 8N1"
+    byte_s = BYTE_S
+
+    def __init__(
+        self,
+        program: Path,
+        folder: Path,
+        settings: Sequence[str] = (),
+        switches: Sequence[Switch] = (),
+    ) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        rows = [f"switch {each.pin} {each.axis} {each.least} {each.most}\n" for each in switches]
+        (folder / "switches").write_text("".join(rows), encoding="ascii")
+        names = [folder / "memory", folder / "switches", folder / "live-steps"]
+        self.process = subprocess.Popen(
+            [program, *names], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        self.slides = FirmwareSlides(folder / "live-steps")
+        self.received = bytearray()
+        """All bytes that it was sent."""
+        self.now, self._busy = 0.0, False
+        self._answer()
+        for line in settings:
+            self.receive(f"{line}\n".encode(), self.now)
+            self.advance(self.now + 0.05)
+
+    @property
+    def is_moving(self) -> bool:
+        """True while the timer of its steps runs, or it is not idle."""
+        return self._busy
+
+    def connect(self, now: float) -> bytes:
+        """Open the line, which resets nothing."""
+        return self.advance(now)
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        """Receive bytes at a time; return what it says until then and at once."""
+        self.received += data
+        self.now = max(now, self.now)
+        assert self.process.stdin is not None
+        self.process.stdin.write(b"%d %s\n" % (round(self.now / TICK_S), data.hex().encode()))
+        self.process.stdin.flush()
+        return self._answer()
+
+    def advance(self, now: float) -> bytes:
+        """Let time pass."""
+        return self.receive(b"", now)
+
+    def wake_s(self) -> float | None:
+        """It may say something at any time while it is busy: it is asked every millisecond."""
+        return self.now + 0.001 if self._busy else None
+
+    next_s = wake_s
+
+    def _answer(self) -> bytes:
+        assert self.process.stdout is not None
+        x, y, z, busy, said = self.process.stdout.readline().split()
+        self.slides.commanded_mm = np.array([int(x), int(y), int(z)]) / STEPS_PER_MM
+        self._busy = bool(int(busy))
+        return b"" if said == b"-" else bytes.fromhex(said.decode())
+
+    def close(self) -> None:
+        """End the process."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.close()
+        self.process.wait()
+        self.process.stdout.close()

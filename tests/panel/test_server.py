@@ -37,10 +37,11 @@ def served(
     settings: Sequence[str] = (),
     speed: float = SPEED,
     folder: Path | None = None,
+    machine: Any = None,
 ) -> Iterator[tuple[PanelServer, Any]]:
-    """A panel of a virtual machine, served in a thread."""
+    """A panel of a virtual machine, or of another one, served in a thread."""
     target = load_target(name, settings=settings)
-    twin = target.twin(list(choices))
+    twin = machine or target.twin(list(choices))
     with hosted(twin, speed) as port:
         session = Session(target, Port(port), opened_line, speed=speed)
         server = PanelServer(session, program, folder)

@@ -16,6 +16,11 @@
      t TICKS HEX                  bytes, so long after the last byte before them
      p TICKS MASK                 buttons that are pressed from then on: 1 reset, 2 hold, 4 start
 
+   Called with three it is told the time by its caller: an image as above, a script with switches
+   alone, and where positions go. Lines come in, `TICKS HEX`: it runs to that time, and then these
+   bytes come; each is answered by a line `X Y Z BUSY HEX`: the true position of the slides, whether
+   anything will happen by itself, and what grbl has said meanwhile. At the end of its input it ends.
+
    A byte takes 10 bits at 115200 baud. Answers are lines `ENTRY TICKS HEX`: what was sent while this
    entry was the last, a line of text each, and when its first byte was. The last line is
    `end TICKS`. */
@@ -50,7 +55,8 @@ static const char *image_name;
 static uint64_t now, begun, tick_at = NEVER;
 static uint8_t memory[1024];
 static int32_t slides[N_AXIS];
-static bool session, in_tick;
+static bool session, live, in_tick, in_delay;
+static uint64_t limit; /* live: time goes on to here */
 
 /* The script. */
 
@@ -74,6 +80,14 @@ static void flush_text(void)
   text_size = 0;
 }
 
+static char said[1 << 16];
+static int said_size;
+
+static void heard_text(uint8_t octet)
+{
+  if (said_size + 2 < (int)sizeof said) { said_size += sprintf(said + said_size, "%02x", octet); }
+}
+
 void board_sent(void)
 {
   while (UCSR0B & (1 << UDRIE0)) {
@@ -81,6 +95,10 @@ void board_sent(void)
     sent_out++;
     if (!session) {
       if (UDR0 != '\r') { putchar(UDR0); }
+      continue;
+    }
+    if (live) {
+      heard_text(UDR0);
       continue;
     }
     if (!text_size) { text_at = now; }
@@ -91,7 +109,8 @@ void board_sent(void)
 
 static void over(void)
 {
-  if (session) {
+  if (live) { }
+  else if (session) {
     flush_text();
     fprintf(answers, "end %llu\n", (unsigned long long)now);
     fclose(answers);
@@ -211,6 +230,49 @@ static bool step_to(uint64_t until)
   return true;
 }
 
+static uint8_t *unhexed(const char *from, int *count)
+{
+  uint8_t *bytes = malloc(strlen(from) / 2 + 1);
+  unsigned int octet;
+  for (*count = 0; sscanf(from, "%2x", &octet) == 1; from += 2) { bytes[(*count)++] = octet; }
+  return bytes;
+}
+
+/* Live: answer, and take the next order. */
+
+static uint8_t *coming;
+static int coming_count, came;
+
+static void take_order(void)
+{
+  static char row[1 << 17], hex[1 << 17];
+  unsigned long long ticks = 0;
+  if (steps) { fflush(steps); }
+  printf("%d %d %d %d %s\n", slides[0], slides[1], slides[2],
+         (int)(in_delay || (TIMSK1 & (1 << OCIE1A)) || sys.state != STATE_IDLE), said_size ? said : "-");
+  fflush(stdout);
+  said_size = 0;
+  said[0] = 0;
+  hex[0] = 0;
+  if (!fgets(row, sizeof row, stdin) || sscanf(row, "%llu %131000s", &ticks, hex) < 1) { over(); }
+  if (ticks > limit) { limit = ticks; }
+  free(coming);
+  coming = unhexed(hex, &coming_count);
+  came = 0;
+}
+
+/* Live: nothing more happens before the limit. */
+static void reach_limit(void)
+{
+  if (now < limit) { now = limit; }
+  if (came < coming_count) {
+    UDR0 = coming[came++];
+    USART_RX_vect();
+    return;
+  }
+  take_order();
+}
+
 void board_wait(void)
 {
   if (!session) {
@@ -232,6 +294,10 @@ void board_wait(void)
   last = seen;
   if (spins < SPINS) { return; } /* it may do something yet without an interrupt */
   spins = 0;
+  if (live) {
+    if (!step_to(limit)) { reach_limit(); }
+    return;
+  }
   if (step_to(NEVER - 1)) { return; }
   if (current + 1 >= entry_count) { over(); }
   begin_entry();
@@ -250,8 +316,17 @@ void board_suspended(void) { if (session && sys.suspend) { board_wait(); } }
 void board_delay(float seconds)
 {
   uint64_t until = now + (uint64_t)(16e6f * seconds + 0.5f);
-  if (session) { while (step_to(until)) { } }
-  now = until;
+  if (live) {
+    in_delay = true;
+    while (now < until) {
+      if (step_to(until < limit ? until : limit)) { continue; }
+      if (until <= limit) { break; }
+      reach_limit();
+    }
+    in_delay = false;
+  }
+  else if (session) { while (step_to(until)) { } }
+  if (now < until) { now = until; }
 }
 
 /* The serial line of the first kind is always full; the second waits for the script. */
@@ -305,14 +380,6 @@ int memcpy_from_eeprom_with_checksum(char *to, unsigned int at, unsigned int siz
   return memory[at + size] == checksum(memory + at, size);
 }
 
-static uint8_t *unhexed(const char *from, int *count)
-{
-  uint8_t *bytes = malloc(strlen(from) / 2 + 1);
-  unsigned int octet;
-  for (*count = 0; sscanf(from, "%2x", &octet) == 1; from += 2) { bytes[(*count)++] = octet; }
-  return bytes;
-}
-
 static void read_script(const char *name)
 {
   static char row[1 << 16], hex[1 << 16];
@@ -347,7 +414,11 @@ int main(int count, char **names)
     return grbl_main();
   }
   session = true;
-  if (count != 5 || !(answers = fopen(names[3], "w")) || !(steps = fopen(names[4], "wb"))) { return 2; }
+  if (count == 4) {
+    live = true;
+    if (!(steps = fopen(names[3], "wb"))) { return 2; }
+  }
+  else if (count != 5 || !(answers = fopen(names[3], "w")) || !(steps = fopen(names[4], "wb"))) { return 2; }
   read_script(names[2]);
   image_name = names[1];
   FILE *image = fopen(image_name, "rb");
