@@ -327,6 +327,9 @@ GOUGE_BEYOND = Sentence(
     WARNING,
 )
 GOUGE_MORE = Sentence(ProgramCode.GOUGE, "{measured:# more place|# more places} like this")
+GOUGE_AT_LEAST = Sentence(
+    ProgramCode.GOUGE, "at least {measured:# more place|# more places} like this"
+)
 GOUGE_BY_POCKET = Sentence(
     ProgramCode.GOUGE,
     "the pocket {pocket} clears away {contour}, {measured:.4g} mm wide, which another operation "

@@ -31,6 +31,7 @@ from camtool.planning.findings import (
     BRANCHED_REGION,
     BRANCHED_REGION_MORE,
     GOUGE,
+    GOUGE_AT_LEAST,
     GOUGE_BY_POCKET,
     GOUGE_BY_POCKET_MORE,
     GOUGE_MORE,
@@ -47,6 +48,10 @@ from camtool.planning.sides import Sides, runs_beside
 
 GOUGE_TOLERANCE_MM = 1e-4
 """Another contour may be cut into by this much before it is a gouge: a tenth of a micrometre."""
+
+MAX_COUNTED = 100
+"""Once so many are found, only those that may be errors are looked for: of hundreds of contours
+that cross, each pair is one."""
 
 SAMPLES_ROUND = 500
 """Number of places of a path at which its distance across another one is measured."""
@@ -65,7 +70,8 @@ def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation
     if not runs_beside(operation) or operation.contract.frees_nets:
         return []
     gouges = list(_gouges(work, chosen, sides, operation))
-    findings = shortened_list(gouges, GOUGE_MORE)
+    more = GOUGE_MORE if len(gouges) < MAX_COUNTED else GOUGE_AT_LEAST
+    findings = shortened_list(gouges, more)
     if operation.side == "auto":
         findings += by_uncut(sides, operation, chosen.source[chosen.lines.closed])
     return findings
@@ -114,11 +120,16 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     wall_rows = np.flatnonzero(is_wall)
     walls = sides.lines.select(wall_rows.tolist())
     paths = Polylines.of(item.path for item in beside_items)
+    count = 0
     for one, wall_row in near_paths(paths, walls, radius + bevel + max(allowance, 0.0)):
         item, other = beside_items[one], int(wall_rows[wall_row])
-        wall = walls[wall_row]
         if item.source == other:
             continue
+        # Where the job names the side, contours of the same operation are no error.
+        is_asked = operation.side != "auto" and other in own_rows
+        if count >= MAX_COUNTED and (is_asked or not sided[other]):
+            continue
+        wall = walls[wall_row]
         nearest_approach = approach(item.path, wall)
         reach = radius if other in own_rows else radius + bevel
         reach -= _taken_back(sides, other, item.path)
@@ -127,6 +138,7 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
                 other in own_rows
                 and nearest_approach.distance < radius + allowance - GOUGE_TOLERANCE_MM
             ):
+                count += 1
                 yield GOUGE_OF_ALLOWANCE(
                     where=at_place(item.name, nearest_approach.point),
                     measured=nearest_approach.distance,
@@ -142,7 +154,8 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         is_kept = bool(sided[other])
         if not is_kept and _lies_in(drawn, wall):
             continue  # the edge of the stock, or of a sheet: nothing says that it stays
-        is_asked = operation.side != "auto" and (other in own_rows or _cross(drawn, wall))
+        is_asked = is_asked or (operation.side != "auto" and _cross(drawn, wall))
+        count += 1
         amount = reach - nearest_approach.distance
         if nearest_approach.distance <= POSITION_EPS_MM:
             amount = reach + _overshoot(item.path, wall, drawn)

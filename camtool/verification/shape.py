@@ -26,8 +26,8 @@ from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.findings import Code, Finding, TargetCode
-from camtool.geometry.boxes import distances_from, moves_of
-from camtool.geometry.measure import point_at
+from camtool.geometry.boxes import BoxIndex, distances_from, moves_of
+from camtool.geometry.measure import point_at, segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.machine.model import Machine
 from camtool.planning.job import Tool
@@ -70,7 +70,11 @@ MAX_MOVES = 10_000
 """Programs of more cutting moves get no shape: to sweep them would take longest of all ..."""
 
 MAX_POINTS = 200_000
-"""... and so do programs whose path would need more points than this."""
+"""... and so do programs whose path would need more points than this, ..."""
+
+MAX_CROSSINGS, MAX_PAIRS = 50_000, 3_000_000
+"""... and those whose moves cross each other more often than the first; at most the second number
+of pairs of moves is looked at, about."""
 
 
 SLIDE_SPACING_MM = 0.01
@@ -145,7 +149,29 @@ def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
         chord = math.sqrt(8.0 * least * cutter.tolerance_mm)
         length = float(row_lengths(decoded.toolpath).sum())
         points += math.ceil(4.0 * length / chord)
-    return points if points <= MAX_POINTS else None
+    return points if points <= MAX_POINTS and not _cross_too_often(decoded.segments) else None
+
+
+def _cross_too_often(segments: Segments) -> bool:
+    """True if the chords of segments cross each other more than `MAX_CROSSINGS` times."""
+    boxes = segment_boxes(segments)
+    looked_at = crossings = 0
+    for rows in BoxIndex(boxes).pairs(boxes):
+        (a, b), (c, d) = ((segments.start[row], segments.end[row]) for row in rows)
+        is_crossing = _left_of(a, b, c) * _left_of(a, b, d) < 0.0
+        is_crossing &= _left_of(c, d, a) * _left_of(c, d, b) < 0.0
+        looked_at += len(a)
+        crossings += int(np.count_nonzero(is_crossing)) // 2  # each pair comes twice
+        if crossings > MAX_CROSSINGS or looked_at > MAX_PAIRS:
+            break
+    return crossings > MAX_CROSSINGS
+
+
+def _left_of(start: Floats, end: Floats, point: Floats) -> Floats:
+    """Return (J,) mm²: the area that a line (J, 2), (J, 2) and a point (J, 2) span, above 0 on the
+    left."""
+    (along_x, along_y), (x, y) = (end - start).T, (point - start).T
+    return np.asarray(along_x * y - along_y * x)
 
 
 class WantedShape(Struct, frozen=True, eq=False):

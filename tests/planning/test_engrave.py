@@ -17,6 +17,7 @@ from camtool.findings import Finding, Severity
 from camtool.geometry.measure import sample
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines
+from camtool.operations.engrave import work as engraving
 from camtool.operations.engrave.work import engrave
 from camtool.planning.items import Chosen, Contour, Feeds, Setting
 from camtool.planning.job import Operation, Tool
@@ -129,6 +130,19 @@ def free_width(paths: list[Polyline]) -> float:
         return float(np.hypot(*(one[:, None] - other[None]).transpose(2, 0, 1)).min())
     outline = shapely.Polygon(sample(paths[0], 0.01))
     return 2.0 * float(shapely.length(shapely.maximum_inscribed_circle(outline)))
+
+
+def test_of_many_lines_that_cross_the_first_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [shapes.opened((0, 0.3 * k), (60, 0.3 * k)) for k in range(100)]
+    columns = [shapes.opened((0.3 * k, 0), (0.3 * k, 60)) for k in range(100)]
+    paths = [path for pair in zip(rows, columns, strict=True) for path in pair]
+    (every,) = narrow(paths, Tool(0.5))
+    monkeypatch.setattr(engraving, "MAX_PAIRS", 1_000)
+    monkeypatch.setattr(engraving, "FIRST_LINES", 8)
+    (some,) = narrow(paths, Tool(0.5))
+    assert some.limit == pytest.approx(every.limit, rel=1e-3)
+    counts = [int(re.findall(r"at (\d+) more", each.message)[0]) for each in (some, every)]
+    assert 100 < counts[0] < counts[1] / 2
 
 
 def test_what_crosses_or_ends_beside_another_line_does_not_run_together() -> None:

@@ -222,6 +222,18 @@ def test_no_gouge(paths: list[Polyline]) -> None:
     assert contours(drawing_of(paths), job_of(tool_diameter_mm=0.5)).findings == ()
 
 
+@pytest.mark.parametrize(("count", "more"), [(10, "48 more places"), (40, "at least 88 more")])
+def test_gouges_of_many_circles_that_cross_are_counted_up_to_a_bound(
+    count: int, more: str
+) -> None:
+    """Each of a row crosses those that are no farther than four places from it."""
+    circles = [_circle(0.6 * k, 0, 1) for k in range(count)]
+    found = contours(drawing_of(circles), job_of(tool_diameter_mm=0.5, side="outside")).findings
+    gouges = [str(each) for each in found if each.code == ProgramCode.GOUGE]
+    assert len(gouges) == 13
+    assert more in gouges[-1]
+
+
 def test_on_the_line_nothing_is_a_gouge() -> None:
     paths = [_circle(0, 0, 1), _circle(2.1, 0, 1)]
     found = contours(drawing_of(paths), job_of(tool_diameter_mm=0.5, side="on")).findings

@@ -19,6 +19,7 @@ from camtool.toolpath.wanted import ProtectedRegion
 from camtool.verification.cuts import CutMoves, cut_moves
 from camtool.verification.findings import VerificationCode
 from camtool.verification.shape import (
+    MAX_CROSSINGS,
     MAX_MOVES,
     CommandedMotion,
     Cutter,
@@ -142,6 +143,17 @@ def test_what_is_too_much_work_has_no_shape() -> None:
     long = cut_moves(b.finish(), flat_cuts=False)
     assert points_wanted(long, Cutter(1.0)) is None
     assert points_wanted(circle(5000.0), Cutter(0.001)) is None
+
+
+@pytest.mark.parametrize(("count", "has_shape"), [(200, True), (300, False)])
+def test_lines_that_cross_each_other_too_often_have_no_shape(count: int, has_shape: bool) -> None:
+    b = ToolpathBuilder((0.0, 0.0, -1.0))
+    for number in range(count):  # each of the lines across meets all of those up
+        b.rapid(-1.0, number + 0.5).line(count + 1.0, number + 0.5, feed=1.0)
+        b.rapid(number + 0.5, -1.0).line(number + 0.5, count + 1.0, feed=1.0)
+    cuts = cut_moves(b.finish(), flat_cuts=False)
+    assert count**2 > MAX_CROSSINGS or has_shape
+    assert (points_wanted(cuts, Cutter(0.1)) is not None) == has_shape
 
 
 def test_the_shape_of_a_long_way_of_small_arcs_is_true() -> None:

@@ -16,7 +16,7 @@ from camtool.arrays import Bools, Floats
 from camtool.errors import OptionError
 from camtool.findings import Finding
 from camtool.geometry.measure import point_at
-from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.findings import LINES_RUN_TOGETHER
 from camtool.planning.items import Chosen, Setting, Work, contours_along
 from camtool.planning.naming import at_place, key_of
@@ -30,6 +30,10 @@ MIN_GAP_SHARE = 0.1
 MIN_GAP_SHARE_AT_ENDS = 0.5
 """... and so do those of which one ends so near to the other: strokes of letters are drawn so."""
 
+
+FIRST_LINES, MAX_PAIRS = 128, 5_000
+"""At least the first lines are looked at, and as many more, by doubling, as have no more than the
+second number of pairs near each other: hundreds of lines that cross enclose 100,000 places."""
 
 WIDTH_SLACK = 0.01
 """A tool fits between lines that are nearer than it is wide by this part of that."""
@@ -70,8 +74,7 @@ def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
 
 def leaves_all(lines: Polylines, width: float) -> bool:
     """True if a groove of this width, mm, keeps all that is between the lines."""
-    chords = np.array([*_chords(lines)], dtype=object)
-    return not len(lines) or not _narrow_places(chords, lines.closed, width)
+    return not len(lines) or not _narrow_places(_chords(lines, width), lines.closed, width)
 
 
 def widest_groove(lines: Polylines, width: float) -> tuple[float, Any, int, int] | None:
@@ -80,7 +83,7 @@ def widest_groove(lines: Polylines, width: float) -> tuple[float, Any, int, int]
     this `width`, mm; None if there are none."""
     if width == 0.0 or not len(lines):
         return None
-    chords = np.array([*_chords(lines)], dtype=object)
+    chords = _chords(lines, width)
     all_places = narrow_places = _narrow_places(chords, lines.closed, width)
     fits = None
     while narrow_places:  # what touches in a wide groove may be apart in a narrower one
@@ -100,7 +103,7 @@ def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float,
     gaps = shapely.distance(lines[near_rows], lines[other])
     spans = shapely.shortest_line(lines[near_rows], lines[other])
     ends = np.stack([shapely.get_point(lines, 0), shapely.get_point(lines, -1)], axis=1)
-    ends[closed] = None
+    ends[closed[: len(lines)]] = None
     at_end = np.zeros(len(near_rows), dtype=np.bool_)
     for rows in (near_rows, other):
         for end in (0, 1):
@@ -160,16 +163,31 @@ def _connected(count: int, one: Any, other: Any) -> Any:
         label = min_label
 
 
-def _chords(lines: Polylines) -> Iterator[Any]:
-    """Each path as a line of shapely."""
+def _chords(lines: Polylines, width: float) -> Any:
+    """Return paths as lines of shapely: all of them, or the first ones where more would have too
+    many pairs nearer to each other than this width, mm."""
     import shapely
 
-    for path in lines:
-        segments = Segments.of(path)
-        count = np.maximum(1, np.ceil(np.abs(segments.sweep) / CHORD_RAD)).astype(np.int64)
-        count = np.where(segments.is_arc, count, 1)
-        row = np.repeat(np.arange(len(segments)), count)
-        first = np.repeat(np.cumsum(count) - count, count)
-        share: Floats = (np.arange(len(row)) - first + 1.0) / count[row]
-        points = point_at(segments, row, share)
-        yield shapely.linestrings(np.concatenate([path.vertices[:1, :2], points]))
+    chords = np.array([*map(_chord_line, lines)], dtype=object)
+    count = FIRST_LINES
+    while count < len(chords):
+        first = chords[: 2 * count]
+        near, _ = shapely.STRtree(first).query(first, predicate="dwithin", distance=width)
+        if len(near) - len(first) > 2 * MAX_PAIRS:
+            break
+        count *= 2
+    return chords[:count]
+
+
+def _chord_line(path: Polyline) -> Any:
+    """Return a path as a line of shapely."""
+    import shapely
+
+    segments = Segments.of(path)
+    count = np.maximum(1, np.ceil(np.abs(segments.sweep) / CHORD_RAD)).astype(np.int64)
+    count = np.where(segments.is_arc, count, 1)
+    row = np.repeat(np.arange(len(segments)), count)
+    first = np.repeat(np.cumsum(count) - count, count)
+    share: Floats = (np.arange(len(row)) - first + 1.0) / count[row]
+    points = point_at(segments, row, share)
+    return shapely.linestrings(np.concatenate([path.vertices[:1, :2], points]))
