@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, overload
@@ -176,6 +177,11 @@ class SlideStart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     start_direction: Literal["+", "-"] = "+"
     machine_zero_mm: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
 
+    @property
+    def compensates_by_region(self) -> bool:
+        """True if the compensation of an axis is its play where it turns, by `[play_map]`."""
+        return False
+
 
 class PathController(SlideStart, frozen=True, tag_field="model", tag="path"):
     """Any controller, as if it followed the programmed lines and arcs exactly.
@@ -234,6 +240,11 @@ class PlayCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(
                 f"play_mm must be {rows} rows (along y_mm) of {columns} numbers (along x_mm)"
             )
+
+    def play_at(self, x_mm: float, y_mm: float) -> float:
+        """Return the play, mm, at a place in table coordinates."""
+        row = bisect_right(self.y_mm[1:-1], y_mm)
+        return self.play_mm[row][bisect_right(self.x_mm[1:-1], x_mm)]
 
 
 class PlayMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -429,7 +429,10 @@ def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
     """Compute the residual of an axis with this backlash (None: its own); compensation is in whole
     steps."""
     play = axis.backlash_mm if play_mm is None else play_mm
-    whole_steps_mm = float(to_steps(axis.compensation_mm, axis.coded_step_mm)) * axis.coded_step_mm
+    added_mm = axis.compensation_mm
+    if play_mm is not None and machine.controller.compensates_by_region:
+        added_mm = play_mm * axis.coded_step_mm / axis.real_step_mm
+    whole_steps_mm = float(to_steps(added_mm, axis.coded_step_mm)) * axis.coded_step_mm
     at_motor = replace(
         axis,
         backlash_mm=play * axis.coded_step_mm / axis.real_step_mm,

@@ -66,6 +66,7 @@ class Mechanics:
         convention = machine.controller.start_play
         self.compensation_steps = np.zeros(3, dtype=np.int64)
         """(3,) steps that the controller adds at each reversal."""
+        self._coded_mm = [axis.coded_step_mm for axis in machine.axes]
         self.axes = np.zeros((3, 5))
         """(3, 5) of `play_fill`, in mm."""
         self.states = np.zeros((3, 6))
@@ -105,6 +106,11 @@ class Mechanics:
         if self._lean:
             slide[:, 0] += slide[:, 1] * self._lean
         return slide, reversals
+
+    def compensate(self, axis: int, steps: int) -> None:
+        """Set the steps that the controller adds at each reversal of an axis from now on."""
+        self.compensation_steps[axis] = steps
+        self.axes[axis, 3] = steps * self._coded_mm[axis]
 
     def place(self, position_mm: Floats) -> None:
         """Set the position of the controller to `position_mm` (3,) without a reversal: after an

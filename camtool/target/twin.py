@@ -170,9 +170,7 @@ class Slides:
     def compensate(self, axis: int, added_mm: float) -> None:
         """Set the length that the controller adds at each reversal of an axis from now on, in
         whole steps."""
-        steps = round(added_mm / self._step_mm[axis])
-        self._mechanics.compensation_steps[axis] = steps
-        self._mechanics.axes[axis, 3] = steps * self._step_mm[axis]
+        self._mechanics.compensate(axis, round(added_mm / self._step_mm[axis]))
 
     @property
     def trace(self) -> TwinTrace:

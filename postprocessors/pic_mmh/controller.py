@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from msgspec import Struct
@@ -37,7 +37,7 @@ from camtool.machine.model import Machine
 from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, one_row
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Effects, Options, one_row
 from camtool.simulation.rows import block_of, refuse
 from camtool.toolpath.moves import Kind, Toolpath, read_only
 
@@ -184,12 +184,19 @@ class PicMmhRun:
         self._said = self._ends.copy()
         self._stops = self._stop_samples()
         self._mechanics = Mechanics(machine, self._position * self._coded_mm, options.effects)
+        self._compensations: Floats | None = None
+        if options.effects.compensation and machine.controller.compensates_by_region:
+            self._compensations = compensations(toolpath, machine)
         self._buffer = np.empty((options.chunk_steps, 2), dtype=np.int64)
 
     def run(self) -> Iterator[Chunk]:
         """The chunks of all rows up to the end of the program."""
         for row, number in enumerate(self._toolpath.kind.tolist()):
             kind = Kind(number)
+            if self._compensations is not None:
+                for axis, added_mm in enumerate(self._compensations[row].tolist()):
+                    coded_mm = float(self._coded_mm[axis])
+                    self._mechanics.compensate(axis, int(to_steps(added_mm, coded_mm)))
             rest_chunk, has_moved = self._rest_chunk(row, kind, self._position), False
             for chunk in self._motion_chunks(row, kind):
                 has_moved = True
@@ -201,7 +208,7 @@ class PicMmhRun:
 
     def fused_run(self) -> FusedLegs | None:
         """All rows up to the end of the program as legs."""
-        if not self._mechanics.plain:
+        if not self._mechanics.plain or self._compensations is not None:
             return None
         toolpath = self._toolpath
         rows = toolpath.executed_rows
@@ -410,6 +417,66 @@ class PicMmhRun:
             )
         columns = [to_steps(points[:, axis], float(coded_mm[axis])) for axis in axes]
         return np.column_stack(columns)
+
+
+# Compensation by region: what is set before each row.
+
+UM_PER_MM = 1000.0
+
+
+def compensations(toolpath: Toolpath, machine: Machine[Any, PicMmhDialect]) -> Floats:
+    """Return the compensation (N, 2) mm of X and Y that is set before each row.
+
+    An axis that turns away from `start_direction` is given the play of the region in which it
+    turns, as the motor makes it, in whole micrometres; the same is taken back when it turns again,
+    wherever that is: the motor then stands where the controller counts, and nothing adds up. A row
+    has one value: where an axis turns back in it and away again, the second turn gets that of the
+    first. MachineError without regions.
+    """
+    controller, cells = machine.controller, machine.play_map.used
+    if not any(cells):
+        raise MachineError(
+            "there are no regions to compensate",
+            where='key controller.compensation = "by-region"',
+            mend="set play_map.use = true, and give [play_map.x] and [play_map.y]",
+        )
+    coded_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+    zero = controller.machine_zero_mm
+    away = -1 if controller.start_direction == "+" else 1
+    state = [(-away, axis.compensation_mm) for axis in machine.axes]
+    plain_controller = replace(controller, compensation="everywhere")
+    plain_machine = replace(machine, controller=plain_controller)
+    model, silent = PicMmhModel(), Options(effects=Effects(False, False, False, False, False))
+    ends = model.quantised(toolpath, machine).end
+    position = model.quantised(toolpath, machine).start
+    result = np.zeros((len(toolpath), 2))
+    has_turned, last_row = [False, False], -1
+    for chunk in model.run(toolpath, plain_machine, silent):
+        row = int(chunk.ledger.row[0])
+        if row != last_row:
+            has_turned, last_row = [False, False], row
+        for axis in (0, 1):
+            direction, added_mm = state[axis]
+            places = np.concatenate([position[None, :], chunk.commanded])
+            ways = np.sign(np.rint(np.diff(places[:, axis]) / coded_mm[axis])).astype(np.int64)
+            moved = np.flatnonzero(ways)
+            before = np.concatenate([[direction], ways[moved][:-1]])
+            for index in moved[ways[moved] != before].tolist():
+                table, direction = cells[axis], int(ways[index])
+                if direction == away and table is not None and not has_turned[axis]:
+                    x, y = (places[index + 1, :2] - zero[:2]).tolist()
+                    record = list(machine.axes)[axis]
+                    of_motor_mm = table.play_at(x, y) * record.coded_step_mm / record.real_step_mm
+                    added_mm = round(of_motor_mm * UM_PER_MM) / UM_PER_MM
+                has_turned[axis] = True
+            state[axis] = direction, added_mm
+            result[row, axis] = added_mm
+        if len(chunk.commanded):
+            position = chunk.commanded[-1]
+        if not chunk.ledger.ended.all():
+            position = ends[row]
+    result[last_row + 1 :] = [added_mm for _, added_mm in state[:2]]
+    return result
 
 
 # The interpolators as one kind of thing: a filler that writes the next positions to a buffer.

@@ -29,13 +29,21 @@ ArcEnd = Literal["equal", "final-quadrant", "nearest"]
 class PicMmhController(SlideStart, frozen=True, tag_field="model", tag="pic-mmh"):
     """The PIC18F8720's firmware; each option is a point on which its thesis leaves a choice.
 
-    `arc_end`: how an arc knows its end, see `steps`.
+    `arc_end`: how an arc knows its end, see `steps`. `compensation`: the sender sets it once
+    ("everywhere"), or between blocks, to the play of the region in which the axis turns away from
+    `start_direction` ("by-region"; the thesis's own proposal, L3243-3249).
     """
 
     arcs: Interpolator = "dsm"
     arc_end: ArcEnd = "final-quadrant"
     initial_error: Literal["zero", "rounded-radius"] = "zero"
     time_base: Literal["event", "iteration"] = "event"
+    compensation: Literal["everywhere", "by-region"] = "everywhere"
+
+    @property
+    def compensates_by_region(self) -> bool:
+        """True if the sender changes the compensation between blocks."""
+        return self.compensation == "by-region"
 
 
 class PicMmhLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):

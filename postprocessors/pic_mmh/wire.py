@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from camtool.errors import MachineError
 from camtool.target.terminal import Terminal
@@ -27,7 +27,11 @@ from camtool.target.wire import (
     WireState,
 )
 
+from .controller import compensations
 from .dialect import PicMmhLink, PicMmhMachine
+
+if TYPE_CHECKING:
+    from camtool.toolpath.moves import Toolpath
 
 ALTO: Final = b"A;"
 _ZEROES: Final = (b"Q;", b"G54;")
@@ -76,8 +80,11 @@ class PicMmhWire(Wire):
     zeroes_each = False
 
     def packets(self, data: bytes, machine: PicMmhMachine, forecast: Forecast) -> Sequence[Packet]:
-        """The compensations, then the blocks."""
-        packets = [Packet(text) for text in _compensations(machine)]
+        """The compensations, then the blocks; by region, a compensation before each block for
+        which it changes."""
+        before = tuple(axis.compensation_mm for axis in machine.axes)[:2]
+        packets = [Packet(text) for text in _compensations(before)]
+        by_block = _by_block(forecast.decoded, machine)
         *blocks, _ = data.split(b";")
         room = machine.dialect.buffer_chars
         for number, block in enumerate(blocks):
@@ -88,7 +95,10 @@ class PicMmhWire(Wire):
                     where=f"block {number + 1}",
                 )
             seconds = forecast.seconds_of(number)
-            counts = (_reports(forecast, number, machine),)
+            added_mm = by_block.get(number, before)
+            packets += [Packet(text) for text in _compensations(added_mm, before)]
+            before = added_mm
+            counts = (_reports(forecast, number, machine, added_mm),)
             packets.append(Packet(text, number, seconds, counts))
         return packets
 
@@ -163,21 +173,37 @@ def _reverses_s(machine: PicMmhMachine) -> list[float]:
     return [count / _by_hand_hz(machine) for count in steps]
 
 
-def _compensations(machine: PicMmhMachine) -> list[bytes]:
-    """`BX204;` `BY178;`: what the simulation reckons with, in µm."""
+def _compensations(added_mm: Sequence[float], before_mm: Sequence[float] = ()) -> list[bytes]:
+    """`BX204;` `BY178;`: what the simulation reckons with, in µm, where it is not as before."""
     commands = []
-    for letter, axis in zip("XY", machine.axes, strict=False):
-        um = round(axis.compensation_mm * 1000.0)
-        if abs(um - axis.compensation_mm * 1000.0) > 1e-6 or um > MAX_COMPENSATION_UM:
+    for index, (letter, added) in enumerate(zip("XY", added_mm, strict=True)):
+        if before_mm and before_mm[index] == added:
+            continue
+        um = round(added * 1000.0)
+        if abs(um - added * 1000.0) > 1e-6 or um > MAX_COMPENSATION_UM:
             raise MachineError(
-                f"the controller takes a compensation in whole µm, up to {MAX_COMPENSATION_UM}",
-                where=f"axes.{letter.lower()}.compensation_mm",
+                f"the controller takes a compensation in whole µm, up to {MAX_COMPENSATION_UM}, "
+                f"not {added * 1000.0:g}",
+                where=f"axes.{letter.lower()}.compensation_mm, or the cells of [play_map]",
             )
         commands.append(f"B{letter}{um:03d};".encode())
     return commands
 
 
-def _reports(forecast: Forecast, block: int, machine: PicMmhMachine) -> int:
+def _by_block(decoded: Toolpath, machine: PicMmhMachine) -> dict[int, tuple[float, ...]]:
+    """Return the compensation of X and Y, mm, of each block where it is by region; else none."""
+    if not machine.controller.compensates_by_region:
+        return {}
+    rows = compensations(decoded, machine)
+    return {
+        int(block): tuple(added_mm)
+        for block, added_mm in zip(decoded.block.tolist(), rows.tolist(), strict=True)
+    }
+
+
+def _reports(
+    forecast: Forecast, block: int, machine: PicMmhMachine, added_mm: Sequence[float]
+) -> int:
     """Return the number of bytes that report the steps of a block."""
     link = machine.link
     assert isinstance(link, PicMmhLink)
@@ -186,9 +212,12 @@ def _reports(forecast: Forecast, block: int, machine: PicMmhMachine) -> int:
     letters = link.step_byte == "letters"
     count = int(forecast.steps[block].sum() if letters else forecast.outputs[block])
     if link.compensation == "reported":
+        lengths = (*added_mm, machine.axes.z.compensation_mm)
         count += sum(
-            int(reversals) * round(axis.compensation_mm / axis.coded_step_mm)
-            for reversals, axis in zip(forecast.reversals[block], machine.axes, strict=True)
+            int(reversals) * round(length / axis.coded_step_mm)
+            for reversals, axis, length in zip(
+                forecast.reversals[block], machine.axes, lengths, strict=True
+            )
         )
     return count
 
