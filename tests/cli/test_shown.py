@@ -49,7 +49,7 @@ def dxf(layers: tuple[str, ...]) -> bytes:
             ]
             rows += ["11", str(x + x1), "21", str(y1)]
         rows += ["0", "TEXT", "100", "AcDbEntity", "8", layer, "100", "AcDbText"]
-        rows += ["10", "0", "20", "0", "40", "1", "1", layer]
+        rows += ["10", "0", "20", "0", "40", "1", "1", layer[:300]]
     rows += ["0", "ENDSEC", "0", "EOF"]
     return ("\n".join(rows) + "\n").encode("utf-8", "surrogateescape")
 
