@@ -39,7 +39,7 @@ def one_line(text: str) -> str:
     """
     shown = text if text.isprintable() else "".join(map(_visible, text))
     if len(shown) > MAX_WORD_CHARS:
-        shown = _LONG.sub(lambda found: _shortened(found[0], MAX_WORD_CHARS), shown)
+        shown = _LONG.sub(lambda match: _shortened(match[0], MAX_WORD_CHARS), shown)
     return shown if len(shown) <= MAX_LINE_CHARS else _shortened(shown, MAX_LINE_CHARS)
 
 
@@ -52,7 +52,7 @@ def to_json(value: Any, indent: int = 2) -> str:
         text = msgspec.json.format(msgspec.json.encode(value), indent=indent).decode()
     except UnicodeEncodeError:
         text = json.dumps(msgspec.to_builtins(value), indent=indent or None, ensure_ascii=False)
-    return _INVISIBLE.sub(lambda found: json.dumps(found[0])[1:-1], text) + "\n"
+    return _INVISIBLE.sub(lambda match: json.dumps(match[0])[1:-1], text) + "\n"
 
 
 def _visible(char: str) -> str:

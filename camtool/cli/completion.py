@@ -306,7 +306,7 @@ def dxf_layers(file: Path) -> set[str]:
 
 def _decode_name(name: str) -> str:
     r"""Decode a name: older files write \U+00F6 for characters that are not ASCII."""
-    return re.sub(r"\\U\+([0-9A-Fa-f]{4})", lambda found: chr(int(found[1], 16)), name).strip()
+    return re.sub(r"\\U\+([0-9A-Fa-f]{4})", lambda match: chr(int(match[1], 16)), name).strip()
 
 
 def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:

@@ -81,7 +81,7 @@ def tint(text: str) -> str:
     words = "|".join(COLOURS)
     return re.sub(
         rf"^(camtool: )({words})\b",
-        lambda found: found[1] + click.style(found[2], fg=COLOURS[found[2]], bold=True),
+        lambda match: match[1] + click.style(match[2], fg=COLOURS[match[2]], bold=True),
         text,
     )
 

@@ -36,9 +36,9 @@ def ports(names: tuple[str, ...], ask: bool, as_json: bool, quiet: bool, verbose
         raise OptionError("a PORT is for --ask", where="ports")
     port_list = [each for each in list_serial_ports() if not names or each.name in names]
     rows: list[dict[str, Any]] = [asdict(each) for each in port_list]
-    known = {row["name"] for row in rows}
+    listed = {row["name"] for row in rows}
     rows += [
-        {"name": name, "description": "", "hardware": ""} for name in names if name not in known
+        {"name": name, "description": "", "hardware": ""} for name in names if name not in listed
     ]
     if ask:
         wires = _wires()

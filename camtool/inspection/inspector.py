@@ -115,9 +115,9 @@ class _FarCut(Struct, frozen=True, eq=False):
             return values
         spokes = (self.cut.side * self.cut.stations.normals) * np.array(self.turn.signs)
         angle = np.mod(np.arctan2(spokes[:, 1], spokes[:, 0]), 2.0 * math.pi)
-        here = np.rint(angle / self.cut.stations.wide - 0.5).astype(np.int64) % len(angle)
+        station = np.rint(angle / self.cut.stations.wide - 0.5).astype(np.int64) % len(angle)
         moved = np.empty_like(values)
-        moved[:, here] = values
+        moved[:, station] = values
         return moved
 
     def edges(self, machine: Machine, wider_mm: float) -> Floats:
@@ -161,11 +161,11 @@ class _OtherSetups:
             return None
         turn = job.placement.turn.back.then(run.job.placement.turn)
         far_cut = _FarCut(inspector, feature, cut, turn)
-        here = far_cut.to_here(placed)
-        self.cuts[id(here)] = far_cut
+        own_cut = far_cut.to_here(placed)
+        self.cuts[id(own_cut)] = far_cut
         if setup not in self.setups:
             self.setups.append(setup)
-        return here
+        return own_cut
 
     @property
     def flip_errors_mm(self) -> list[float | None]:

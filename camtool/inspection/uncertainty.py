@@ -329,10 +329,10 @@ def _flip_inputs(errors_mm: Sequence[float | None]) -> Iterator[Input]:
     """Yield the inputs of a part that is turned over, in X and in Y. `flip_error` is a bound, so
     all that lies within counts as equally likely: 1/√3 of it is the standard uncertainty (JCGM
     100:2008, 4.3.7)."""
-    known = [each for each in errors_mm if each is not None]
+    stated_mm = [each for each in errors_mm if each is not None]
     standard = None
-    if len(known) == len(errors_mm):
-        standard = math.sqrt(sum(each * each for each in known) / 3.0)
+    if len(stated_mm) == len(errors_mm):
+        standard = math.sqrt(sum(each * each for each in stated_mm) / 3.0)
     missing = () if standard is not None else ("flip_error",)
     for column, axis in enumerate("xy"):
         direction = Direction(f"flip.{axis}", _with_flip(column))

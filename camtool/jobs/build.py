@@ -116,10 +116,10 @@ def read_job_file(path: Path, data: bytes | None = None) -> JobTables:
     return tables_of(values, path)
 
 
-def tables_of_flags(given: Mapping[str, Any]) -> JobTables:
+def tables_of_flags(values: Mapping[str, Any]) -> JobTables:
     """The tables of the flags that were given, by the names of their keys."""
 
-    flags = Table({key: Given(value, flag_name(key)) for key, value in given.items()})
+    flags = Table({key: Given(value, flag_name(key)) for key, value in values.items()})
     return JobTables(flags.only(WHOLE), flags.only(PLACE), defaults=flags.only(OF_OPERATIONS))
 
 

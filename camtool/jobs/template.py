@@ -131,8 +131,8 @@ def _sided(drawing: Drawing, part: Part, operations: Sequence[Proposed]) -> Part
             holder = int(levels.parent[holder])
         if holder >= 0:
             side = "outside" if levels.depth[part.rows[0]] % 2 == 0 else "inside"
-            said = ("side", f'"{side}"', "what is around it is only marked")
-            return replace(part, keys=(*part.keys, said))
+            side_key = ("side", f'"{side}"', "what is around it is only marked")
+            return replace(part, keys=(*part.keys, side_key))
     return part
 
 

@@ -295,11 +295,11 @@ def _protected_regions(step: Step) -> Iterator[ProtectedRegion]:
         runs = tuple(run.vertices for run in step.runs)
         yield ProtectedRegion(runs, lines, depth[order] % 2 == 1, True, operation.beyond_mm)
         return
-    beside = operation.contract.leaves_walls and runs_beside(operation)
-    beside = beside and operation.corners == "none"
-    rim, judged = chosen.rim[closed], closed if beside else closed[:0]
-    for mine in _regions(operation, nesting, rim) if beside else ():
-        order = np.flatnonzero(mine)[np.argsort(depth[mine], kind="stable")]
+    has_wall = operation.contract.leaves_walls and runs_beside(operation)
+    has_wall = has_wall and operation.corners == "none"
+    rim, judged = chosen.rim[closed], closed if has_wall else closed[:0]
+    for region in _regions(operation, nesting, rim) if has_wall else ():
+        order = np.flatnonzero(region)[np.argsort(depth[region], kind="stable")]
         rows, stays = closed[order], rim[order]
         # Beside a rim the rest of the stock is waste; beside a hole it is part.
         for is_rim in (True, False):

@@ -122,8 +122,8 @@ def _tabs_lost(contours: Sequence[Contour], rough: Step) -> Iterator[Finding]:
     spans = np.array([bridge.half_span_mm for bridge in rough.bridges])
     for contour in contours:
         if contour.path.closed and not is_hole(contour):
-            apart = nearest(centres, Segments.of(Polylines.of([contour.path]))).distance
-            own = int((apart <= spans + rough.operation.allowance_mm + POSITION_EPS_MM).sum())
+            distances = nearest(centres, Segments.of(Polylines.of([contour.path]))).distance
+            own = int((distances <= spans + rough.operation.allowance_mm + POSITION_EPS_MM).sum())
             if own < (tabs.count or 1):
                 yield TAB_LEFT_OUT_ROUGH(
                     where=at_place(contour.name, contour.path.start.tolist()),

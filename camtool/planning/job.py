@@ -196,15 +196,15 @@ drawings larger than any machine; parts, copies and cuts that lie beside the sto
 
 
 def refuse_endless(
-    moves: float, where: str, asked: str, mend: str, *, is_long: bool = False
+    moves: float, where: str, request: str, mend: str, *, is_long: bool = False
 ) -> None:
     """OptionError when more than MAX_MOVES moves (MAX_LONG_MOVES if `is_long`) are estimated to
-    result from what was `asked`, such as "10000 passes"."""
+    result from a `request` such as "10000 passes"."""
     max_moves = MAX_LONG_MOVES if is_long else MAX_MOVES
     if moves > max_moves:
         meant = f", or --allow long if it is meant (up to {MAX_LONG_MOVES:,})"
         raise OptionError(
-            f"{asked} would make {moves:.3g} moves, more than {max_moves:,}",
+            f"{request} would make {moves:.3g} moves, more than {max_moves:,}",
             where=where,
             mend=mend if moves > MAX_LONG_MOVES else mend + meant,
         )
@@ -222,10 +222,10 @@ def _quantity(name: str, value: float, unit: str) -> str:
     return f"{name} {value:g} {unit}".rstrip()
 
 
-def one_of(name: str, value: str, known: Sequence[str]) -> None:
+def one_of(name: str, value: str, words: Sequence[str]) -> None:
     """Refuse a word that is not known."""
-    if value not in known:
-        raise OptionError(f"unknown {name} {value!r}", mend=f"use one of {', '.join(known)}")
+    if value not in words:
+        raise OptionError(f"unknown {name} {value!r}", mend=f"use one of {', '.join(words)}")
 
 
 def refuse_range(key: str, limits: tuple[float, float] | None, named: str = "") -> None:

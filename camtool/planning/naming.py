@@ -136,8 +136,8 @@ def setup_words(job: Job) -> str:
 def flip_error_words(*setups: JobSetup) -> str:
     """Return in words how far what is cut in these set-ups may lie beside each other."""
     errors = [setup.flip_error_mm for setup in setups if setup.flip is not None]
-    known = [error for error in errors if error is not None]
-    return f"up to {max(known):g} mm" if known and known == errors else "an unknown length"
+    lengths = [error for error in errors if error is not None]
+    return f"up to {max(lengths):g} mm" if lengths and lengths == errors else "an unknown length"
 
 
 def pins_of(job: Job) -> tuple[tuple[float, float], ...]:
@@ -152,10 +152,10 @@ def flip_lines_of(job: Job) -> tuple[tuple[str, float], ...]:
     each along "x" or "y", with its place in the frame of the set-up, mm."""
     if job.setup_of is None:
         return ()
-    whole, own = job.setup_of
+    whole_job, own = job.setup_of
     lines: dict[tuple[str, float], None] = {}
-    for setup in whole.setups if own.flip is None else (own,):
-        place = whole.flip_line_mm(setup)
+    for setup in whole_job.setups if own.flip is None else (own,):
+        place = whole_job.flip_line_mm(setup)
         if setup.flip is not None and place is not None:
             across = 0 if setup.flip == "y" else 1
             lines[setup.flip, job.placement.turn.point((place, place))[across]] = None

@@ -60,12 +60,12 @@ def with_pins(chosen: Chosen, placed: Drawing, job: Job, operation: Operation) -
         return chosen
     pins = pins_of(job)
     if not pins:
-        found = _proposed_for(placed, job)
+        places = _proposed_for(placed, job)
         raise OptionError(
             "there are no alignment pins to drill",
             where=key_of(operation, "kind"),
             mend="write them in the [[setups]] that is turned over: "
-            + (pins_text(found) if found else "pins = [[x, y], [x, y]]"),
+            + (pins_text(places) if places else "pins = [[x, y], [x, y]]"),
         )
     names = tuple(f"alignment pin {number}" for number in range(1, len(pins) + 1))
     return replace(chosen, points=np.array(pins), point_names=names)
@@ -75,8 +75,8 @@ def pin_findings(placed: Drawing, job: Job) -> list[Finding]:
     """Return a remark that proposes pins, where a set-up turns the part over without any."""
     if job.setup_of is None or job.setup_of[1].flip is None or pins_of(job):
         return []
-    found = _proposed_for(placed, job)
-    return [PINS_PROPOSED(pins=pins_text(found), diameter=_pin_mm(job))] if found else []
+    places = _proposed_for(placed, job)
+    return [PINS_PROPOSED(pins=pins_text(places), diameter=_pin_mm(job))] if places else []
 
 
 def pins_text(pins: Sequence[Pin]) -> str:
@@ -94,8 +94,8 @@ def _proposed_for(placed: Drawing, job: Job) -> list[Pin]:
         return []
     (left, right), (low, high) = extents(Polylines.joined(drawn)).tolist()
     wide = max(each.tool.diameter_mm for each in job.whole.operations)
-    found = proposed_pins(stock, (left, low, right, high), lines[0], _pin_mm(job), wide)
-    return sorted(map(job.placement.turn.back.point, found or ()))
+    places = proposed_pins(stock, (left, low, right, high), lines[0], _pin_mm(job), wide)
+    return sorted(map(job.placement.turn.back.point, places or ()))
 
 
 def _pin_mm(job: Job) -> float:

@@ -191,12 +191,12 @@ class Sides(Struct, eq=False, dict=True):
     def beyond_mm(self) -> Floats:
         """(M, 2) how far profiles cut beyond contours, mm: where what is without them stays, and
         where what is within them stays."""
-        beyond = np.zeros((len(self.lines), 2))
+        amounts = np.zeros((len(self.lines), 2))
         for number, each in enumerate(self.operations):
             if each.beyond_mm and runs_beside(each):
                 rows = np.flatnonzero(self.cuts[number] & self.lines.closed)
-                np.maximum.at(beyond, (rows, self.holds(each)[rows].astype(int)), each.beyond_mm)
-        return beyond
+                np.maximum.at(amounts, (rows, self.holds(each)[rows].astype(int)), each.beyond_mm)
+        return amounts
 
     def _rim(self, bounds: Bools) -> Bools:
         return np.asarray(self.nesting.levels_by(bounds).depth % 2 == 0)
@@ -354,22 +354,22 @@ def regions_of(nesting: Nesting, rim: Bools) -> Iterator[Bools]:
     contrary because of contours that were not chosen, and what is left by depth and side."""
     left = np.ones(len(rim), dtype=np.bool_)
     for even in (True, False):
-        mine = left.copy()
-        while mine.any():
-            rows = np.flatnonzero(mine)
+        region = left.copy()
+        while region.any():
+            rows = np.flatnonzero(region)
             depth = nesting.among(rows).levels.depth
             wrong = ((depth % 2 == 0) == even) != rim[rows]
             if not wrong.any():
-                yield mine
+                yield region
                 break
-            mine[rows[wrong]] = False
-        left &= ~mine
+            region[rows[wrong]] = False
+        left &= ~region
     depth = nesting.levels.depth
     for level in np.unique(depth[left]).tolist():
         for is_rim in (True, False):
-            mine = left & (depth == level) & (rim == is_rim)
-            if mine.any():
-                yield mine
+            region = left & (depth == level) & (rim == is_rim)
+            if region.any():
+                yield region
 
 
 def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:

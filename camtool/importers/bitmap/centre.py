@@ -65,8 +65,8 @@ def thin(dark: Bools) -> Bools:
             removed = edge[_removable(pixels[edge[:, None] + around], turn)]
             pixels[removed] = False
             changed |= len(removed) > 0
-            beside = (removed[:, None] + around).ravel()
-            edge = np.concatenate([edge, beside])
+            neighbours = (removed[:, None] + around).ravel()
+            edge = np.concatenate([edge, neighbours])
             edge = np.unique(edge[pixels[edge]])
     return pixels.reshape(height + 2, wide)[1:-1, 1:-1]
 

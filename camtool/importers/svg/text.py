@@ -192,10 +192,10 @@ class _Flow(Struct, eq=False):
     def _place(self, node: Node, style: SvgStyle, first: int) -> None:
         lengths = self.lengths_of(style)
         for name, axis in _PLACES:
-            given = node.get(name)
-            if not given:
+            content = node.get(name)
+            if not content:
                 continue
-            listed = _BETWEEN.split(given)
+            listed = _BETWEEN.split(content)
             self._by_letter |= len(listed) > 1
             for place, word in enumerate(listed[: max(len(self.letters) - first, 1)], first):
                 value = lengths.length(word, axis, name)

@@ -30,18 +30,18 @@ def propose(paths: Remaining) -> list[Part]:
     sources, closed = paths.drawing.sources, paths.drawing.paths.closed
     parts: list[Part] = []
     text = tuple(row for row in paths.rows if is_text(sources[row]))
-    beside = _text_beside_parts(paths.drawing, text) if paths.habit != "engrave" else set()
+    notes = _text_beside_parts(paths.drawing, text) if paths.habit != "engrave" else set()
     keys = (("select", '["text"]', ""),)
     for rows, is_left in (
-        (tuple(row for row in text if row not in beside), False),
-        (tuple(row for row in text if row in beside), True),
+        (tuple(row for row in text if row not in notes), False),
+        (tuple(row for row in text if row in notes), True),
     ):
         if rows:
             name = f"{paths.title} text{' beside parts' if is_left else ''}"
             part = Part(name, "engrave", rows, 0, keys, "not text", is_left=is_left)
             part = _cut(paths, part, "text is engraved", always_deep=True)
-            said = "it does not lie within a part; engrave it with --ask"
-            parts.append(replace(part, why=said) if is_left else part)
+            remark = "it does not lie within a part; engrave it with --ask"
+            parts.append(replace(part, why=remark) if is_left else part)
     paths = paths.without([Part("", "", text, excludes="not text")])
     open_ = tuple(row for row in paths.rows if not closed[row])
     is_named = paths.habit == "engrave"
@@ -88,11 +88,11 @@ def propose(paths: Remaining) -> list[Part]:
 def _undrilled(widths_mm: Collection[float], mill_mm: float) -> str:
     """Return why holes are only marked, and the drills that would make them."""
     sizes = sorted({round(width, 2) for width in widths_mm})
-    told = ", ".join(f"{size:g}" for size in sizes[:SIZES_TOLD])
+    listed = ", ".join(f"{size:g}" for size in sizes[:SIZES_TOLD])
     more = ", …" if len(sizes) > SIZES_TOLD else ""
     return (
         f"holes narrower than the mill of {mill_mm:g} mm are marked: the library has no drill of"
-        f" {told}{more} mm with presets for the material; add one to drill them"
+        f" {listed}{more} mm with presets for the material; add one to drill them"
     )
 
 
@@ -106,7 +106,7 @@ def _text_beside_parts(drawing: Drawing, text: Sequence[int]) -> set[int]:
     by_source: dict[str, list[int]] = {}
     for row in text:
         by_source.setdefault(drawing.sources[row], []).append(row)
-    beside = set[int]()
+    notes = set[int]()
     for rows in by_source.values():
         size = np.ptp(extents(lines.select(rows)), axis=1)
         if float(size.prod()) >= largest:
@@ -116,8 +116,8 @@ def _text_beside_parts(drawing: Drawing, text: Sequence[int]) -> set[int]:
             while 0 <= holder < len(lettered) and lettered[holder]:
                 holder = int(levels.parent[holder])
             if holder < 0:
-                beside.update(rows)
-    return beside
+                notes.update(rows)
+    return notes
 
 
 def _cut(remaining: Remaining, part: Part, reason: str, *, always_deep: bool = False) -> Part:

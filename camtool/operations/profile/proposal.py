@@ -100,15 +100,15 @@ def _by_tabs(
         np.ptp(path_extents(lines), axis=2).max(axis=1).round(3), return_inverse=True
     )
     room = 0.5 * (path_lengths(lines) + math.pi * tool) / (3.0 * tool)
-    least = np.full(len(sizes), MAX_TABS, dtype=np.int64)
-    np.minimum.at(least, of, room.astype(np.int64))
-    counts = np.minimum.accumulate(least[::-1])[::-1][of]
+    fewest = np.full(len(sizes), MAX_TABS, dtype=np.int64)
+    np.minimum.at(fewest, of, room.astype(np.int64))
+    counts = np.minimum.accumulate(fewest[::-1])[::-1][of]
     # Tabs are measured from the full depth of the cut, which is below the stock.
     height = min(max(thickness / 3.0, MIN_TAB_HEIGHT_MM), thickness)
     height += remaining.proposal.breakthrough_mm
-    made: list[tuple[Keys, list[int]]] = []
+    groups: list[tuple[Keys, list[int]]] = []
     for count in np.unique(counts).tolist():
         tabs = f'"{count}:{2.0 * tool:.3g}mm:{height:.3g}mm"'
         key = (("tabs", tabs, "so that it stays where it is; cut them by hand"),)
-        made.append((key if count else (), np.array(rows)[counts == count].tolist()))
-    return made
+        groups.append((key if count else (), np.array(rows)[counts == count].tolist()))
+    return groups
