@@ -55,6 +55,7 @@ COMMANDS = {
     "console": "Type to a controller.",
     "convert": "A program of one machine as that of another.",
     "coupon": "Drawings to cut and measure.",
+    "draw": "A page to draw a figure on.",
     "diff": "What two programs or jobs cut differently.",
     "filter": "LinuxCNC opens a drawing.",
     "home": "Home a machine.",
