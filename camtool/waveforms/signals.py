@@ -5,7 +5,6 @@ Everything is made anew by each call, in chunks: memory does not grow with the p
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -29,6 +28,9 @@ from camtool.waveforms.vcd import dump
 
 PICTURE_MOMENTS = 120
 """A picture without a span shows so many changes."""
+
+MAX_S = 1e9
+"""No stretch begins later or is longer: 30 years."""
 
 KINDS = (".vcd", ".csv", ".svg", ".png")
 """Kinds of files, by the ends of their names."""
@@ -200,10 +202,15 @@ class Signals:
     def _ticks(self, from_s: float, span_s: float | None) -> tuple[int, int | None]:
         """Return the first tick of a stretch and the last; OptionError for numbers that are none
         of a stretch."""
-        if not (math.isfinite(from_s) and from_s >= 0.0):
-            raise OptionError(f"a stretch from {from_s:g} s on is none", mend="give 0 or more")
-        if span_s is not None and not (math.isfinite(span_s) and span_s > 0.0):
-            raise OptionError(f"a stretch of {span_s:g} s is none", mend="give more than 0")
+        if not 0.0 <= from_s <= MAX_S:
+            raise OptionError(
+                f"a stretch from {from_s:g} s on is none", mend=f"give 0 to {MAX_S:g}"
+            )
+        if span_s is not None and not 0.0 < span_s <= MAX_S:
+            raise OptionError(
+                f"a stretch of {span_s:g} s is none",
+                mend=f"give more than 0, and at most {MAX_S:g}",
+            )
         tick_s = self.board.tick_s
         first = round(from_s / tick_s)
         return first, None if span_s is None else first + max(round(span_s / tick_s), 1)

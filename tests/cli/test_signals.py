@@ -60,6 +60,11 @@ def test_several_files_at_once(camtool: Run, line: Path, tmp_path: Path) -> None
         (("--from", "43s", "-o", "a.csv"), "the program ends after 42.104 s; from 43 s on"),
         (("--from", "43s", "-o", "a.vcd"), "give less than 42.104"),
         (("--from", "-1s", "-o", "a.vcd"), "a stretch from -1 s on is none"),
+        (
+            ("--from", "1e300", "-o", "a.vcd"),
+            "a stretch from 1e+300 s on is none; give 0 to 1e+09",
+        ),
+        (("--span", "1e300", "-o", "a.csv"), "a stretch of 1e+300 s is none"),
         (("--span", "0s", "-o", "a.svg"), "a stretch of 0 s is none; give more than 0"),
         (("-o", "a.svg", "--span", "42s"), "changes are more than a picture shows, 20,000"),
         (("-o", "a.svg", "--motors", "X,W"), "there is no motor 'W'; use X, Y, Z, spindle"),
