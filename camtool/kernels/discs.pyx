@@ -82,8 +82,8 @@ cpdef void largest_discs(
         else:
             sx, sy = _from_corner(-table[own, UX], -table[own, UY], table, own, t[k] - 1.0)
         pose = (x, y, nx, ny, sx, sy)
-        radius, best = (
-            _largest(table, links, boxes, own, guess[k, 0], guess[k, 1], pose, t[k] < 0.5)
+        radius, best = _largest(
+            table, links, boxes, own, guess[k, 0], guess[k, 1], pose, t[k] < 0.5
         )
         cx, cy = x + radius * nx, y + radius * ny
         result[k, 0], result[k, 1], result[k, 2] = cx, cy, radius
@@ -197,23 +197,18 @@ cdef double _limit(
     tx, ty = table[neighbour, TX], table[neighbour, TY]
     tilt = _turn(table, links, own if at_start else links[own, 1])
     turns = tilt + _turn(table, links, neighbour), tilt + _turn(table, links, links[neighbour, 1])
+    upper = min(radius, limit)
     # A neighbour behind a convex corner is seen from that corner.
     if precedes and at_start and links[own, 2] == CONVEX:
         sight = (table[neighbour, UX], table[neighbour, UY], pose[4], pose[5])
-        return (
-            min(limit, _touching(table, neighbour, sight, pose, min(radius, limit), -1.0, turns))
-        )
+        return min(limit, _touching(table, neighbour, sight, pose, upper, -1.0, turns))
     if follows and not at_start and links[neighbour, 2] == CONVEX:
         sight = (tx, ty, pose[4], pose[5])
-        return (
-            min(limit, _touching(table, neighbour, sight, pose, min(radius, limit), -1.0, turns))
-        )
+        return min(limit, _touching(table, neighbour, sight, pose, upper, -1.0, turns))
     min_distance = _min_distance(table, links, own, neighbour)
     return min(
         limit,
-        _touching(
-            table, neighbour, (tx, ty, wx, wy), pose, min(radius, limit), min_distance, turns
-        ),
+        _touching(table, neighbour, (tx, ty, wx, wy), pose, upper, min_distance, turns),
     )
 
 

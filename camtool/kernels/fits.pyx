@@ -685,8 +685,8 @@ cdef longest_spans(
     state, guess = 0, count
     while states[state] < count - 1:
         state += CANDIDATES
-        best, row, bulge = (
-            furthest_state(point, leave, arrive, limit, states, state, guess, target)
+        best, row, bulge = furthest_state(
+            point, leave, arrive, limit, states, state, guess, target
         )
         previous, low, guess = states[state - CANDIDATES], states[row], best - states[row]
         for m in range(CANDIDATES):

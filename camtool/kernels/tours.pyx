@@ -88,9 +88,8 @@ cdef class Step:
 
     def __init__(self) -> None:
         self.gain = 0.0
-        self.low, self.high, self.second_high, self.flip, self.who, self.new_row = (
-            0, -1, -1, 0, -1, -1
-        )
+        self.low, self.high, self.second_high = 0, -1, -1
+        self.flip, self.who, self.new_row = 0, -1, -1
 
     cdef void set(
         self, double gain, Int low, Int high, Int second_high, Int flip, Int who, Int new_row
