@@ -101,6 +101,13 @@ def probe(
     machine. Exit code 1, and no file, when a point was not touched.
     """
 
+    check_sizes({"--step": step, "--clear": clear, "--lowest": lowest or None}, {"--feed": feed})
+    check_sizes({"--margin": margin or None}, {})
+    if not lowest < clear:
+        raise OptionError(
+            f"{lowest:g} mm is not below the height between points, {clear:g} mm",
+            where="--lowest",
+        )
     target = machine.load()
     wire = wire_of(target)
     out = output or str(Path(program).with_suffix(".surface.csv"))
@@ -143,6 +150,26 @@ def probe(
         quiet=quiet,
     )
     return 0
+
+
+MIN_MM, MAX_MM = 0.001, 10_000.0
+"""Lengths of a probe: a last decimal of a coordinate, and more than any machine travels."""
+MIN_FEED, MAX_FEED = 0.1, 100_000.0
+"""mm/min: what one decimal can say, and more than any machine moves."""
+
+
+def check_sizes(lengths: Mapping[str, float | None], feeds: Mapping[str, float]) -> None:
+    """Raise OptionError for a length (mm) or a feed (mm/min) that is out of range; lengths below 0
+    count by their size."""
+    for values, low, high, unit in (
+        (lengths, MIN_MM, MAX_MM, "mm"),
+        (feeds, MIN_FEED, MAX_FEED, "mm/min"),
+    ):
+        for name, value in values.items():
+            if value is not None and not low <= abs(value) <= high:
+                raise OptionError(
+                    f"{value:g} {unit} is not between {low:g} and {high:g}", where=name
+                )
 
 
 def asked_to_begin(words: str) -> bool:

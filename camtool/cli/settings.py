@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import click
 
@@ -175,8 +176,7 @@ def _settings_of(file: str) -> dict[str, str]:
             continue
         name, value = _name_value(text)
         try:
-            float(value)
-            is_setting = name[:1] == "$" and int(name[1:]) >= 0
+            is_setting = name[:1] == "$" and int(name[1:]) >= 0 and math.isfinite(float(value))
         except ValueError:
             is_setting = False
         if not is_setting or name in values:

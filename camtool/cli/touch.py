@@ -11,7 +11,7 @@ import click
 from camtool.cli.home import BAUD, PORT, UNLOCK, axes_of, carried
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, feed, length, machine_options, talk_options
-from camtool.cli.probe import JOURNAL, asked_to_begin, journaled
+from camtool.cli.probe import JOURNAL, asked_to_begin, check_sizes, journaled
 from camtool.errors import OptionError
 from camtool.sending.prepare import manner_of, wire_of
 from camtool.toolpath import probing
@@ -119,24 +119,23 @@ def touch(
     wrong = values.keys() - set(AXES_OF[what])
     if wrong:
         raise OptionError(f"a {what} has no {wrong.pop().upper()}", where="touch")
-    lengths = {
+    sizes = {
         "--reach": reach,
         "--back": back,
         "--clear": clear,
-        "--feed": feed,
-        "--slow": slow,
-        "--travel": travel,
         "--thickness": thickness,
         "--size": size,
         "--depth": depth,
+        "--along": along,
     }
-    for name, value in lengths.items():
-        if value is not None and value <= 0.0:
+    for name, value in sizes.items():
+        if value is not None and value <= 0.0 and not (name == "--along" and what == "skew"):
             raise OptionError(f"{value:g} is not above 0", where=name)
+    sizes["--tool-diameter"] = tool_diameter or None
+    check_sizes(sizes, {"--feed": feed, "--slow": slow, "--travel": travel})
+    check_sizes({f"{axis.upper()}{value:g}": value or None for axis, value in values.items()}, {})
     if tool_diameter is not None and tool_diameter < 0.0:
         raise OptionError(f"{tool_diameter:g} mm is below 0", where="--tool-diameter")
-    if not along:
-        raise OptionError("0 mm is no way along a side", where="--along")
     if what not in ("plate", "skew"):
         _needed("--tool-diameter", tool_diameter)
     how = probing.Touch(

@@ -405,7 +405,7 @@ def grid_over(toolpath: Toolpath, step_mm: float) -> tuple[Floats, Floats]:
     nodes = []
     for axis in (0, 1):
         width = float(high[axis] - low[axis])
-        count = max(math.ceil(width / step_mm - 1e-9) + 1, MIN_NODES)
+        count = max(math.ceil(min(width / step_mm, MAX_POINTS) - 1e-9) + 1, MIN_NODES)
         # A program that cuts along one line has a grid of the step's width.
         half = 0.5 * (max(width, step_mm) if width < 1e-6 else width)
         middle = 0.5 * float(high[axis] + low[axis])

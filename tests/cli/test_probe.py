@@ -130,3 +130,21 @@ def test_a_machine_without_a_probe_says_so(tmp_path: Path) -> None:
     code, said = run("probe", str(file), "-t", "pic-mmh", "--port", "/dev/null", "--yes")
     assert code == 2
     assert "no command to probe" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--step", "1e-300"], "--step"),
+        (["--step", "0.05"], "points"),
+        (["--clear", "1e308"], "--clear"),
+        (["--feed", "1e308"], "--feed"),
+        (["--feed", "0.01"], "--feed"),
+        (["--margin", "1e308"], "--margin"),
+        (["--lowest", "3mm"], "--lowest"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(program: Path, words: list[str], named: str) -> None:
+    code, said = run("probe", str(program), "-t", "grbl", "--port", "/dev/null", "--yes", *words)
+    assert code == 2, said
+    assert named in said.partition("camtool: error: ")[2]

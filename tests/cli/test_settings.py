@@ -148,6 +148,7 @@ def test_a_setting_that_is_refused_says_what_was_written(tmp_path: Path) -> None
     ("text", "named"),
     [
         ("$110=fast\n", "line 1"),
+        ("$110=nan\n", "is no setting"),
         ("$110=800\n$110=700\n", "given twice"),
         ("G0 X1\n", "is no setting"),
         ("$999=1\n", "$999: the controller has no such setting"),

@@ -228,6 +228,13 @@ def test_the_journal_has_each_touch(tmp_path: Path) -> None:
         (["plate", "X1", "--thickness", "1mm"], "has no X"),
         (["plate", "--thickness", "1mm", "--reach", "0"], "--reach"),
         (["skew", "--towards", "x+", "--along", "0"], "--along"),
+        (["corner", "--towards", "x+y+", "--along", "-3", "--tool-diameter", "3"], "--along"),
+        (["plate", "--thickness", "1e308"], "--thickness"),
+        (["plate", "--thickness", "1mm", "--reach", "1e300"], "--reach"),
+        (["plate", "--thickness", "1mm", "--feed", "1e300"], "--feed"),
+        (["plate", "--thickness", "1mm", "--slow", "1e-9"], "--slow"),
+        (["plate", "Z1e300", "--thickness", "1mm"], "Z1e+300"),
+        (["bore", "--tool-diameter", "1e100"], "--tool-diameter"),
     ],
 )
 def test_what_is_missing_is_said_before_the_port_is_opened(words: list[str], named: str) -> None:
