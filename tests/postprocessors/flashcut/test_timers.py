@@ -1,7 +1,9 @@
 """The timers of the parallel-port machine against a clock that is looked at each millisecond."""
 
 import itertools
+import math
 import random
+from fractions import Fraction
 from typing import Literal
 
 import numpy as np
@@ -32,12 +34,17 @@ class Ran:
         moves = Moves(what, target, np.full(count, p, np.int64), np.arange(count))
         rules, counters = fresh(late)
         move, parts = 0, [np.empty((0, 3))]
+        self.times = list[tuple[int, int]]()
         while move < count:
             issued = Issued(
                 np.empty((room, 3)), *np.empty((3, room), np.int64), self.ms, self.steps
             )
             move, filled = timers_fill(moves, move, rules, counters, issued)
             parts.append(issued.commanded[:filled])
+            pairs = zip(
+                issued.move[:filled].tolist(), issued.since_ms[:filled].tolist(), strict=True
+            )
+            self.times += pairs
         self.commanded = np.concatenate(parts)
 
     @property
@@ -157,3 +164,24 @@ def test_the_longest_displacements_do_not_overflow() -> None:
         wanted = [(time // every, time // short) for time in times]
         assert np.rint(issued.commanded[:, :2] / STEP).tolist() == [list(pair) for pair in wanted]
         assert issued.since_ms.tolist() == [time // (m if late else 1) for time in times]
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_samples_know_their_milliseconds(late: bool) -> None:
+    """Multiples of the half period and a millisecond for the longer axis, of its own for the other
+    one, up to the last step of the longer one, whatever room there is."""
+    draw = random.Random(7)
+    for _ in range(60):
+        ways = [(draw.randint(-30, 30), draw.randint(-30, 30)) for _ in range(4)]
+        p = draw.randint(1, 12)
+        wanted = list[tuple[int, int]]()
+        for move, (nx, ny) in enumerate(ways):
+            n, m = max(abs(nx), abs(ny)), min(abs(nx), abs(ny))
+            short = Fraction(0)
+            if m:
+                short = Fraction(p * n, m) if late else Fraction(p * n // m + 1)
+            times = {Fraction(k * (p + 1)) for k in range(1, n + 1)}
+            times |= {j * short for j in range(1, 400) if m and j * short <= n * (p + 1)}
+            wanted += [(move, math.floor(time)) for time in sorted(times)]
+        for room in (1, 7, 1 << 12):
+            assert Ran(ways, p, late, room).times == wanted
