@@ -67,12 +67,20 @@ from it to the end of its pass."""
 
 
 def row_pulses(
-    chunks: Iterable[Chunk], path: Toolpath, machine: Machine, waits: Waits | None = None
+    chunks: Iterable[Chunk],
+    path: Toolpath,
+    machine: Machine,
+    waits: Waits | None = None,
+    added: Ints | None = None,
 ) -> Iterator[Pulses]:
     """Yield the pulses of a run with the options `OUTPUTS`, chunk by chunk. `path` is the
     toolpath as the controller rounds it. Without `waits` the samples of a row within a chunk share
-    its time equally. ProgramError for an arc that never ends."""
-    run = _RowRun(path, machine, waits)
+    its time equally. `added` (N, 3): the steps that the controller adds at a reversal in each row;
+    None: those of the machine. ProgramError for an arc that never ends."""
+    if added is None:
+        of_axes = [to_steps(axis.compensation_mm, axis.coded_step_mm) for axis in machine.axes]
+        added = np.broadcast_to(np.array(of_axes), (len(path), 3))
+    run = _RowRun(path, machine, waits, added)
     for chunk in chunks:
         yield run.pulses(chunk)
 
@@ -80,12 +88,9 @@ def row_pulses(
 class _RowRun:
     """State of a run: where the motors are, in which direction they moved last, and the time."""
 
-    def __init__(self, path: Toolpath, machine: Machine, waits: Waits | None) -> None:
-        self._path, self._waits = path, waits
+    def __init__(self, path: Toolpath, machine: Machine, waits: Waits | None, added: Ints) -> None:
+        self._path, self._waits, self._added = path, waits, added
         self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-        self._added = np.array(
-            [to_steps(axis.compensation_mm, axis.coded_step_mm) for axis in machine.axes]
-        )
         self._position = np.rint(path.start / self._step_mm).astype(np.int64)
         self._sense = np.full(3, 1 if machine.controller.start_direction == "+" else -1)
         self._row, self._done = -1, 0
@@ -108,7 +113,7 @@ class _RowRun:
             self._position = steps[-1]
         position = row - ledger.row[0] if len(row) else row
         begin_s, before_s, added_s, end_s = self._times(ledger, row, position)
-        counts = turns * self._added
+        counts = turns * self._added[row]
         each_s = added_s[position]
         first_s = begin_s + before_s
         if counts.any():
@@ -128,7 +133,7 @@ class _RowRun:
         """Begin (K,) of the passes of all samples without added steps, s from there to the sample
         (K,), s (R,) that an added step takes, and the end of the chunk without them."""
         net_s = ledger.duration_s - ledger.compensation_s
-        added = ledger.reversals @ self._added
+        added = (ledger.reversals * self._added[ledger.row]).sum(axis=1)
         each_s = ledger.compensation_s / np.maximum(added, 1)
         samples = np.bincount(position, minlength=len(ledger.row))
         begin_s = self._clock_s + np.cumsum(net_s) - net_s

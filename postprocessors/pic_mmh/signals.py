@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
 from camtool.records import replace
 from camtool.simulation.pulses import OUTPUTS, Pulses, row_pulses
 from camtool.target.signals import Board, Coils, SignalModel
 from camtool.toolpath.moves import Toolpath
 
-from .controller import PicMmhModel
+from .controller import PicMmhModel, compensations
 from .dialect import PicMmhController, PicMmhDialect
 
 _Machine = Machine[PicMmhController, PicMmhDialect]
@@ -52,6 +55,10 @@ class PicMmhSignals(SignalModel):
         runs pass by pass, which alone says where they are."""
         by_pass = machine.controller.time_base == "iteration"
         options = replace(OUTPUTS, chunk_steps=1) if by_pass else OUTPUTS
-        model = PicMmhModel()
-        path = model.quantised(toolpath, machine)
-        return row_pulses(model.run(toolpath, machine, options), path, machine)
+        model, added = PicMmhModel(), None
+        if machine.controller.compensates_by_region:
+            added = np.zeros((len(toolpath), 3), dtype=np.int64)
+            for axis, added_mm in enumerate(compensations(toolpath, machine).T):
+                added[:, axis] = to_steps(added_mm, list(machine.axes)[axis].coded_step_mm)
+        path, chunks = model.quantised(toolpath, machine), model.run(toolpath, machine, options)
+        return row_pulses(chunks, path, machine, added=added)

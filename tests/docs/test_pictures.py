@@ -23,6 +23,8 @@ _spec.loader.exec_module(make_images)
 COMMANDS: dict[str, list[str]] = make_images.commands()
 DRAWN = "offset-stages.png"
 """What docs/images/make_images.py draws without a command."""
+BROWSED = {"panel.png": "docs/panel.md"}
+"""Pictures that a browser takes of a page, and the pages that show them."""
 
 MAX_CHANGED_SHARE, CHANGED = 5e-4, 48
 """So many of the pixels may be another by more than this: another version of the renderer may
@@ -72,7 +74,7 @@ def test_the_comparison_can_fail() -> None:
 
 
 def test_every_picture_is_shown_and_has_its_command() -> None:
-    pages = [ROOT / "README.md", *(ROOT / page for page in make_images.PAGES)]
+    pages = [ROOT / page for page in ("README.md", *make_images.PAGES, *BROWSED.values())]
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
     shown = set(re.findall(r"\]\((?:docs/)?images/(\S+?\.png)\)", text))
-    assert shown == {*COMMANDS, DRAWN} == {path.name for path in IMAGES.glob("*.png")}
+    assert shown == {*COMMANDS, DRAWN, *BROWSED} == {path.name for path in IMAGES.glob("*.png")}

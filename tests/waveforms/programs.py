@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from camtool_postprocessors.pic_mmh.controller import compensations
 from hypothesis import strategies as st
 
 from camtool.arrays import Ints
@@ -95,13 +96,16 @@ class Totals:
 
 
 def totals(path: Toolpath, target: LoadedTarget) -> Totals:
-    steps, reversals, seconds = np.zeros(3, np.int64), np.zeros(3, np.int64), 0.0
+    steps, added, seconds = np.zeros(3, np.int64), np.zeros(3, np.int64), 0.0
+    each = np.zeros((len(path), 3), dtype=np.int64)
+    each[:] = [round(axis.compensation_mm / axis.coded_step_mm) for axis in target.machine.axes]
+    if getattr(target.machine.controller, "compensates_by_region", False):
+        each[:, :2] = np.rint(compensations(path, target.machine) / 0.00014)
     for chunk in target.simulate(path, replace(OUTPUTS, chunk_steps=97)):
         steps += chunk.ledger.steps.sum(axis=0)
-        reversals += chunk.ledger.reversals.sum(axis=0)
+        added += (chunk.ledger.reversals * each[chunk.ledger.row]).sum(axis=0)
         seconds += float(chunk.ledger.duration_s.sum())
-    each = [round(axis.compensation_mm / axis.coded_step_mm) for axis in target.machine.axes]
-    return Totals(steps, reversals * np.array(each), seconds)
+    return Totals(steps, added, seconds)
 
 
 def signals(path: Toolpath, target: LoadedTarget) -> Signals:

@@ -19,6 +19,7 @@ READINGS = {
         ("controller.time_base=iteration", "axes.x.compensation_mm=0.0014"),
         ("controller.arcs=dda", "axes.y.compensation_mm=0.00028"),
         ("controller.start_direction=-",),
+        ("controller.compensation=by-region", "play_map.use=true"),
     ),
     "valcnc": (
         (),
