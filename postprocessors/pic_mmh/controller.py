@@ -195,6 +195,8 @@ class PicMmhRun:
             kind = Kind(number)
             if self._compensations is not None:
                 for axis, added_mm in enumerate(self._compensations[row].tolist()):
+                    if math.isnan(added_mm):
+                        continue
                     coded_mm = float(self._coded_mm[axis])
                     self._mechanics.compensate(axis, int(to_steps(added_mm, coded_mm)))
             rest_chunk, has_moved = self._rest_chunk(row, kind, self._position), False
@@ -431,7 +433,8 @@ def compensations(toolpath: Toolpath, machine: Machine[Any, PicMmhDialect]) -> F
     turns, as the motor makes it, in whole micrometres; the same is taken back when it turns again,
     wherever that is: the motor then stands where the controller counts, and nothing adds up. A row
     has one value: where an axis turns back in it and away again, the second turn gets that of the
-    first. MachineError without regions.
+    first. NaN until the first turn away: what the controller has then is what it has given at the
+    last one, if the program goes on. MachineError without regions.
     """
     controller, cells = machine.controller, machine.play_map.used
     if not any(cells):
@@ -443,7 +446,8 @@ def compensations(toolpath: Toolpath, machine: Machine[Any, PicMmhDialect]) -> F
     coded_mm = np.array([axis.coded_step_mm for axis in machine.axes])
     zero = controller.machine_zero_mm
     away = -1 if controller.start_direction == "+" else 1
-    state = [(-away, axis.compensation_mm) for axis in machine.axes]
+    axes = zip(machine.axes, cells, strict=True)
+    state = [(-away, math.nan if table else axis.compensation_mm) for axis, table in axes]
     plain_controller = replace(controller, compensation="everywhere")
     plain_machine = replace(machine, controller=plain_controller)
     model, silent = PicMmhModel(), Options(effects=Effects(False, False, False, False, False))

@@ -82,9 +82,10 @@ class PicMmhWire(Wire):
     def packets(self, data: bytes, machine: PicMmhMachine, forecast: Forecast) -> Sequence[Packet]:
         """The compensations, then the blocks; by region, a compensation before each block for
         which it changes."""
-        before = tuple(axis.compensation_mm for axis in machine.axes)[:2]
-        packets = [Packet(text) for text in _compensations(before)]
+        fixed_mm = tuple(axis.compensation_mm for axis in machine.axes)[:2]
         by_block = _by_block(forecast.decoded, machine)
+        before = next(iter(by_block.values()), fixed_mm)
+        packets = [Packet(text) for text in _compensations(before)]
         *blocks, _ = data.split(b";")
         room = machine.dialect.buffer_chars
         for number, block in enumerate(blocks):
@@ -98,7 +99,11 @@ class PicMmhWire(Wire):
             added_mm = by_block.get(number, before)
             packets += [Packet(text) for text in _compensations(added_mm, before)]
             before = added_mm
-            counts = (_reports(forecast, number, machine, added_mm),)
+            made_mm = [
+                fixed if math.isnan(added) else added
+                for added, fixed in zip(added_mm, fixed_mm, strict=True)
+            ]
+            counts = (_reports(forecast, number, machine, made_mm),)
             packets.append(Packet(text, number, seconds, counts))
         return packets
 
@@ -174,10 +179,11 @@ def _reverses_s(machine: PicMmhMachine) -> list[float]:
 
 
 def _compensations(added_mm: Sequence[float], before_mm: Sequence[float] = ()) -> list[bytes]:
-    """`BX204;` `BY178;`: what the simulation reckons with, in µm, where it is not as before."""
+    """`BX204;` `BY178;`: what the simulation reckons with, in µm, where it is known, and not
+    as before."""
     commands = []
     for index, (letter, added) in enumerate(zip("XY", added_mm, strict=True)):
-        if before_mm and before_mm[index] == added:
+        if math.isnan(added) or (before_mm and before_mm[index] == added):
             continue
         um = round(added * 1000.0)
         if abs(um - added * 1000.0) > 1e-6 or um > MAX_COMPENSATION_UM:

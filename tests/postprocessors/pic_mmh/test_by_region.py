@@ -10,6 +10,7 @@ from camtool_postprocessors.pic_mmh.wire import PicMmhWire
 
 from camtool.arrays import Floats
 from camtool.errors import MachineError
+from camtool.records import replace
 from camtool.sending.faults import WiredTwin
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import load_target
@@ -108,13 +109,25 @@ def test_reports_of_compensation_are_counted_by_region() -> None:
 
 def test_the_play_is_sent_where_an_axis_turns_away() -> None:
     strings = sent(ACROSS.split(b"G03")[0] + b"M30;", *SETTINGS)
-    assert strings[:2] == [b"BX204;", b"BY178;"]
-    turns = [(a, b) for a, b in pairwise(strings[2:]) if a[:1] == b"B" and b[:1] == b"G"]
+    # Before that a program that goes on may have an axis to turn back, by what it was given.
+    assert strings[:2] == [b"G54;", b"G90;"]
+    turns = [(a, b) for a, b in pairwise(strings) if a[:1] == b"B" and b[:1] == b"G"]
     # X turns back at X9 mm (H3), Y at Y6.5 mm (V3), X away again at X5 mm (H2).
     assert turns[0] == (b"BX187;", b"G01X08000.00Y06500.00F08;")
     assert turns[1] == (b"BY173;", b"G01X01000.00Y06000.00F08;")
     assert turns[2] == (b"BX201;", b"G01X04000.00Y02000.00F08;")
     assert len(turns) == 3
+
+
+def test_an_axis_without_regions_keeps_its_own() -> None:
+    loaded = load_target("pic-mmh", settings=SETTINGS)
+    machine = replace(loaded.machine, play_map=replace(loaded.machine.play_map, y=None))
+    decoded = loaded.target.read(ACROSS, machine)
+    forecast = forecast_of(decoded, replace(loaded, machine=machine))
+    strings = [each.data for each in PicMmhWire().packets(ACROSS, machine, forecast)]
+    assert strings[0] == b"BY178;"
+    assert [each for each in strings if each[:2] == b"BY"] == [b"BY178;"]
+    assert {each for each in strings if each[:2] == b"BX"} >= {b"BX187;", b"BX201;"}
 
 
 def error_um(program: bytes, *settings: str) -> Floats:
