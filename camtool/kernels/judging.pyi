@@ -6,6 +6,8 @@ import numpy.typing as npt
 from camtool.arrays import Floats, Indices, Ints
 
 BEFORE_FIRST: int
+STRIDE: int
+CIRCLE: int
 BINS: int
 COLUMNS: int
 COMMANDED_X: int
@@ -76,5 +78,6 @@ class Sums(NamedTuple):
     bins: Floats
     trace: Floats
     pen: Floats
+    pieces: list[Floats]
 
 def judge_samples(row: Ints, commanded: Floats, slide: Floats, task: Task, sums: Sums) -> int: ...

@@ -40,24 +40,9 @@ cdef Int LAST_BELOW = move_tree.LAST
 # the number and make bins whose width is between 1/256 and 1/128 of their value.
 
 
-cpdef enum:
-    # Bits of the mantissa that tell bins apart: bins are at most 2⁻⁷, 0.8 %, wide.
-    MANTISSA_BITS = 7
-    # How far a float's bits are shifted to leave those that tell bins apart.
-    SHIFT = 52 - MANTISSA_BITS
-
-
 def leading_bits(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
     """The leading bits of each float64 ≥ 0, as integers in the order of the values."""
     return np.right_shift(np.ascontiguousarray(values).view(np.int64), SHIFT)
-
-
-cpdef enum:
-    # The leading bits of an error are its bin plus this. Bin 0 is for errors below 2⁻³⁰ mm, a
-    # thousandth of a nanometre.
-    BEFORE_FIRST = ((1023 - 30) << MANTISSA_BITS) - 1
-    # Number of bins; the last one is for all errors above 2²⁰ mm, a kilometre.
-    BINS = ((1023 + 20) << MANTISSA_BITS) - BEFORE_FIRST + 1
 
 
 # Sums, largest and smallest of finite numbers, one loop over a block for all that it is asked for.
@@ -73,14 +58,14 @@ cpdef enum:
     LANES = 32
 
 
-cdef inline void fill_lanes(double* lanes, double value) noexcept:
+cdef inline void fill_lanes(double* lanes, double value) noexcept nogil:
     """Set all lanes to one value."""
     cdef Int lane
     for lane in range(LANES):
         lanes[lane] = value
 
 
-cdef inline double sum_of_lanes(double* lanes) noexcept:
+cdef inline double sum_of_lanes(double* lanes) noexcept nogil:
     """The sum of all partial sums, in pairs; they are changed."""
     cdef Int width, lane
     width = LANES // 2
@@ -91,7 +76,7 @@ cdef inline double sum_of_lanes(double* lanes) noexcept:
     return lanes[0]
 
 
-cdef inline double largest_of_lanes(double* lanes) noexcept:
+cdef inline double largest_of_lanes(double* lanes) noexcept nogil:
     """The largest of all lanes, in pairs; they are changed."""
     cdef Int width, lane
     width = LANES // 2
@@ -102,7 +87,7 @@ cdef inline double largest_of_lanes(double* lanes) noexcept:
     return lanes[0]
 
 
-cdef inline double smallest_of_lanes(double* lanes) noexcept:
+cdef inline double smallest_of_lanes(double* lanes) noexcept nogil:
     """The smallest of all lanes, in pairs; they are changed."""
     cdef Int width, lane
     width = LANES // 2
@@ -113,14 +98,14 @@ cdef inline double smallest_of_lanes(double* lanes) noexcept:
     return lanes[0]
 
 
-cpdef double largest(double[::1] values, Int low, Int high) noexcept:
+cpdef double largest(double[::1] values, Int low, Int high) noexcept nogil:
     """Return the largest of values[low:high], which is not empty."""
     cdef double found
     _find_largest(values, low, high, &found)
     return found
 
 
-cdef wide _find_largest(double[::1] values, Int low, Int high, double* result) noexcept:
+cdef wide _find_largest(double[::1] values, Int low, Int high, double* result) noexcept nogil:
     cdef Int j, k, lane
     cdef double found
     cdef double[LANES] lanes
@@ -151,18 +136,8 @@ cdef wide _find_largest(double[::1] values, Int low, Int high, double* result) n
 # as loops without branches over blocks of points, which the processor runs several at a time.
 
 
-cpdef enum:
-    # Numbers of an arc: centre x, y; radius; turn (+1 ccw, −1 cw); normals into the wedge at its
-    # start x, y and its end x, y; 1 when it is wider than half a turn, 2 for a whole turn, else 0.
-    COLUMNS = 9
-
 # Up to this part of its radius from a circle the series of a root stands for it.
 cdef double NEAR = 2.0**-9
-
-cpdef enum:
-    # Last column of a full circle.
-    FULL = 2
-    CX = 0, CY, RADIUS, TURN, UX, UY, VX, VY, WIDE
 
 
 class Shapes(NamedTuple):
@@ -185,7 +160,7 @@ cdef class Curves:
 cdef wide _to_line(
     const double[:, :] start, const double[:, :] end, Int row, double[::1] x, double[::1] y,
     double[::1] errors
-) noexcept:
+) noexcept nogil:
     cdef Int k
     cdef double square, over
     ax, ay = start[row, 0], start[row, 1]
@@ -203,7 +178,7 @@ cdef wide _to_line(
 
 cdef wide _count_outside(
     double[:, ::1] arcs, Int row, double[::1] x, double[::1] y, Int* result
-) noexcept:
+) noexcept nogil:
     """Count the points outside of the wedge of an arc."""
     cdef Int k, outside
     cdef bint above_half
@@ -219,20 +194,20 @@ cdef wide _count_outside(
 
 cdef inline bint _all_in_wedge(
     double[:, ::1] arcs, Int row, double[::1] x, double[::1] y
-) noexcept:
+) noexcept nogil:
     cdef Int outside
     _count_outside(arcs, row, x, y, &outside)
     return outside == 0
 
 
-cdef inline double _depth(double from_start, double from_end, bint above_half) noexcept:
+cdef inline double _depth(double from_start, double from_end, bint above_half) noexcept nogil:
     """Not below 0 in the wedge, from what a point is to the inside of its two edges."""
     if above_half:
         return larger(from_start, from_end)
     return smaller(from_start, from_end)
 
 
-cdef inline double _off(double above, double half, double part) noexcept:
+cdef inline double _off(double above, double half, double part) noexcept nogil:
     """Return the distance of a point outside a circle with |p|² − R² = `above`, if that is small.
 
     With `half` = 1 / 2R, h = above / 2R, `part` = 1 / 2R² and q = h / R = above / 2R² that is
@@ -248,19 +223,20 @@ cdef inline double _off(double above, double half, double part) noexcept:
 
 cdef inline double _outside(
     double px, double py, double radius, double half, double part
-) noexcept:
+) noexcept nogil:
     """Return the distance of a point outside the circle; (px, py) is about the centre, `half` and
     `part` are those of `_off`. The point alone decides between series and root, so equal points
     have equal last bits."""
+    cdef bint is_near
     above = px * px + py * py - radius * radius
     apart = math.sqrt(px * px + py * py) - radius
-    near = abs(above) <= 2.0 * NEAR * (radius * radius)
-    return _off(above, half, part) if near else apart
+    is_near = abs(above) <= 2.0 * NEAR * (radius * radius)
+    return _off(above, half, part) if is_near else apart
 
 
 cdef wide _to_circle(
     double[:, ::1] arcs, Int row, double[::1] x, double[::1] y, double[::1] errors
-) noexcept:
+) noexcept nogil:
     cdef Int k, far
     cx, cy, radius, turn = arcs[row, CX], arcs[row, CY], arcs[row, RADIUS], arcs[row, TURN]
     square, half, part = radius * radius, 0.5 / radius, 0.5 / (radius * radius)
@@ -280,7 +256,7 @@ cdef wide _to_circle(
 cdef wide _to_arc(
     const double[:, :] start, const double[:, :] end, Int row, double[:, ::1] arcs, Int at,
     double[::1] x, double[::1] y, double[::1] errors
-) noexcept:
+) noexcept nogil:
     cdef Int k
     cdef bint above_half, inside
     ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
@@ -299,7 +275,7 @@ cdef wide _to_arc(
 
 cpdef void set_errors(
     Curves curves, Int row, double[::1] x, double[::1] y, double[::1] errors
-) noexcept:
+) noexcept nogil:
     """Set `errors` (n ≥ 1,) to those of the points x, y (n,) against one move."""
     cdef Int at
     at = curves.arc[row]
@@ -311,17 +287,17 @@ cpdef void set_errors(
         _to_arc(curves.start, curves.end, row, curves.arcs, at, x, y, errors)
 
 
-cdef inline double smaller(double one, double other) noexcept:
+cdef inline double smaller(double one, double other) noexcept nogil:
     """The smaller of two numbers, neither of which is NaN."""
     return one if one < other else other
 
 
-cdef inline double larger(double one, double other) noexcept:
+cdef inline double larger(double one, double other) noexcept nogil:
     """The larger of two numbers, neither of which is NaN."""
     return one if one > other else other
 
 
-cdef inline Int first_of(double[::1] values, Int low, Int high, double value) noexcept:
+cdef inline Int first_of(double[::1] values, Int low, Int high, double value) noexcept nogil:
     """Return the first index of `value` in values[low:high], where it is."""
     cdef Int found
     _find_first(values, low, high, value, &found)
@@ -330,7 +306,7 @@ cdef inline Int first_of(double[::1] values, Int low, Int high, double value) no
 
 cdef wide _find_first(
     double[::1] values, Int low, Int high, double value, Int* result
-) noexcept:
+) noexcept nogil:
     cdef Int j, k, same
     k, same = low, 0
     while k + RUN <= high and same == 0:
@@ -380,11 +356,6 @@ cdef double SLACK = 1e-12
 # See `SLACK`.
 cdef double SLACK_MM = 1e-12
 
-cpdef enum:
-    # A box about points, float64: its middle; the direction of their way; half of how long and
-    # wide it is along that, and along X and Y.
-    MIDDLE_X = 0, MIDDLE_Y, WAY_X, WAY_Y, HALF_LONG, HALF_WIDE, HALF_X, HALF_Y
-
 
 class Moves(NamedTuple):
     """K moves, their heights (K, 2), and the nodes (2L, 6) and order (K,) of `move_tree`."""
@@ -418,9 +389,9 @@ cdef class Search:
         self.looked = 0
 
 
-cdef inline bint _counts(
+cdef inline bint is_searched(
     Int k, Int first, Int last, double z_low, double z_high, const double[:, :] heights
-) noexcept:
+) noexcept nogil:
     """True if a move is one of first:last, at heights that overlap z_low … z_high."""
     if k < first or k >= last:
         return False
@@ -430,18 +401,17 @@ cdef inline bint _counts(
 cdef Int _nearest(
     double x, double y, double within, Int first, Int last, double z_low, double z_high,
     Search search
-) noexcept:
+) noexcept nogil:
     """The move nearest to a point, if it is nearer than `within` mm, else −1; of those first:last
     whose heights overlap z_low … z_high."""
     cdef Int leaves, height, node, low, place, k, nearest
     cdef double best
     cdef int[::1] order
     cdef Int[::1] stack
-    cdef Curves curves
     cdef double[:, ::1] nodes
     cdef const double[:, :] heights
     cdef double[::1] spot_x, spot_y, spot_error
-    curves, heights, nodes, order = search.curves, search.heights, search.nodes, search.order
+    heights, nodes, order = search.heights, search.nodes, search.order
     spot_x, spot_y, spot_error, stack = search.x, search.y, search.error, search.stack
     spot_x[0], spot_y[0] = x, y
     leaves = len(nodes) // 2
@@ -461,21 +431,21 @@ cdef Int _nearest(
         low = (node - leaves) * LEAF
         for place in range(low, min(low + LEAF, len(order))):
             k = order[place]
-            if _counts(k, first, last, z_low, z_high, heights):
+            if is_searched(k, first, last, z_low, z_high, heights):
                 search.looked += 1
-                set_errors(curves, k, spot_x, spot_y, spot_error)
+                set_errors(search.curves, k, spot_x, spot_y, spot_error)
                 if abs(spot_error[0]) < best:
                     best, nearest = abs(spot_error[0]), k
     return nearest
 
 
-cdef inline double _looser(double limit) noexcept:
+cdef inline double _looser(double limit) noexcept nogil:
     return limit * (1.0 + SLACK) + SLACK_MM
 
 
 cdef wide _set_box(
     double[::1] x, double[::1] y, double[::1] errors, double[::1] box
-) noexcept:
+) noexcept nogil:
     """Set the box about the points x, y (n ≥ 1,) and what is as near to them as their errors. Its
     middle is that of the way from the first to the last point."""
     cdef Int count, k, j, lane
@@ -514,7 +484,7 @@ cdef wide _set_box(
     box[HALF_Y] = abs(way_y) * long + abs(way_x) * wide
 
 
-cdef inline bint _node_near(double[:, ::1] nodes, Int node, double[::1] box) noexcept:
+cdef inline bint node_near(double[:, ::1] nodes, Int node, double[::1] box) noexcept nogil:
     """True if the box of a node may have a point in the box."""
     cdef double low_x, low_y, high_x, high_y, beside, reach
     low_x, low_y = nodes[node, 0] - box[MIDDLE_X], nodes[node, 1] - box[MIDDLE_Y]
@@ -528,7 +498,7 @@ cdef inline bint _node_near(double[:, ::1] nodes, Int node, double[::1] box) noe
     return bool(abs(beside) <= (reach + 2.0 * box[HALF_WIDE]) * (1.0 + SLACK))
 
 
-cdef inline bint _move_near(Curves curves, Int k, double[::1] box) noexcept:
+cdef inline bint move_near(Curves curves, Int k, double[::1] box) noexcept nogil:
     """True if a move may have a point in the box; an arc counts as its full circle."""
     cdef Int at
     cdef double ax, ay, way_x, way_y, long, wide, px, py, along, beside, near_long, near_wide
@@ -558,16 +528,16 @@ cdef inline bint _move_near(Curves curves, Int k, double[::1] box) noexcept:
     return bool(side <= reach + SLACK * (abs(along * across) + abs(beside * further)))
 
 
-cdef bint _is_there(Curves curves, Int[::1] found, Int count, Int move) noexcept:
+cdef bint _is_there(Curves curves, Int[::1] found, Int count, Int move) noexcept nogil:
     """True if the move is one of the first `count` in the list; turns of a circle are equal."""
     cdef Int n
     n = 0
-    while n < count and not _are_same(curves, found[n], move):
+    while n < count and not are_same(curves, found[n], move):
         n += 1
     return n < count
 
 
-cdef inline bint _are_same(Curves curves, Int one, Int other) noexcept:
+cdef inline bint are_same(Curves curves, Int one, Int other) noexcept nogil:
     cdef Int at, there, k, axis
     for axis in range(2):
         if curves.start[one, axis] != curves.start[other, axis]:
@@ -582,7 +552,7 @@ cdef inline bint _are_same(Curves curves, Int one, Int other) noexcept:
     return k == COLUMNS
 
 
-cdef double _squareness(Curves curves, Int k, double x, double y) noexcept:
+cdef double squareness(Curves curves, Int k, double x, double y) noexcept nogil:
     """Return the distance (mm) of a point from the infinite line; of an arc, from the arc, or
     beyond its ends from the tangent there."""
     cdef Int at
@@ -610,23 +580,22 @@ cdef double _squareness(Curves curves, Int k, double x, double y) noexcept:
 
 cdef void _lowered(
     double[::1] x, double[::1] y, Int move, Search search, double[::1] errors, Int[::1] by
-) noexcept:
+) noexcept nogil:
     """Lower the errors of the points x, y (n,), which are those against the moves `by` (n,), to
     those against one more; of equally near moves that one counts to which a point is more
     square."""
     cdef Int k
     cdef double less, square
-    cdef Curves curves
     cdef double[::1] other
-    curves, other = search.curves, search.other
-    set_errors(curves, move, x, y, other[: len(x)])
+    other = search.other
+    set_errors(search.curves, move, x, y, other[: len(x)])
     for k in range(len(x)):
         less = abs(errors[k]) - abs(other[k])
         if less < -TIE_MM:
             continue
         if less <= TIE_MM:
-            square = _squareness(curves, by[k], x[k], y[k]) + TIE_MM
-            if _squareness(curves, move, x[k], y[k]) <= square:
+            square = squareness(search.curves, by[k], x[k], y[k]) + TIE_MM
+            if squareness(search.curves, move, x[k], y[k]) <= square:
                 continue
         errors[k], by[k] = other[k], move
 
@@ -634,17 +603,16 @@ cdef void _lowered(
 cdef Int _list_near(
     double[::1] x, double[::1] y, double[::1] errors, Int own, Int first, Int last, double z_low,
     double z_high, Search search
-) noexcept:
+) noexcept nogil:
     """List the moves that may be nearer to some of the points x, y (n,) than their own, from which
     they have these errors; it comes first. How many these are, or 0 where they are too many."""
     cdef Int leaves, height, node, low, place, k, count, most, some
     cdef int[::1] order
     cdef Int[::1] stack, found
-    cdef Curves curves
     cdef double[:, ::1] nodes
     cdef const double[:, :] heights
     cdef double[::1] box
-    curves, heights, nodes, order = search.curves, search.heights, search.nodes, search.order
+    heights, nodes, order = search.heights, search.nodes, search.order
     stack, found, box = search.stack, search.found, search.box
     _set_box(x, y, errors, box)
     some = len(x)
@@ -658,7 +626,7 @@ cdef Int _list_near(
         search.looked += 1
         if nodes[node, FIRST_BELOW] >= last or nodes[node, LAST_BELOW] <= first:
             continue
-        if not _node_near(nodes, node, box):
+        if not node_near(nodes, node, box):
             continue
         if node < leaves:
             stack[height], stack[height + 1] = 2 * node + 1, 2 * node
@@ -667,11 +635,11 @@ cdef Int _list_near(
         low = (node - leaves) * LEAF
         for place in range(low, min(low + LEAF, len(order))):
             k = order[place]
-            if not _counts(k, first, last, z_low, z_high, heights):
+            if not is_searched(k, first, last, z_low, z_high, heights):
                 continue
             search.looked += 1
             # To look for it among more than there are points takes longer than to compare it.
-            if _move_near(curves, k, box) and not _is_there(curves, found, min(count, some), k):
+            if move_near(search.curves, k, box) and not _is_there(search.curves, found, min(count, some), k):
                 if count == most:
                     return 0
                 found[count] = k
@@ -682,7 +650,7 @@ cdef Int _list_near(
 cpdef bint nearest_errors(
     double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,
     Search search, double[::1] out
-) noexcept:
+) noexcept nogil:
     """The error of each of the points x, y (1 ≤ n ≤ `BLOCK`,) against the nearest of the moves
     first:last whose heights overlap z_low … z_high, or of all of these where none does; signed as
     `set_errors` does, of equally near moves by that to which the point is most square, or by
@@ -691,11 +659,10 @@ cpdef bint nearest_errors(
     cdef Int begin, end, height, low, high, middle, k, n, near
     cdef bint told
     cdef double far
-    cdef Curves curves
     cdef Int[::1] parts, by, found, mine
     cdef double[::1] here_x, here_y, here
-    curves, parts, middle = search.curves, search.parts, len(x) // 2
-    if not _counts(own, first, last, z_low, z_high, search.heights):
+    parts, middle = search.parts, len(x) // 2
+    if not is_searched(own, first, last, z_low, z_high, search.heights):
         far = math.INFINITY
         own = _nearest(x[middle], y[middle], far, first, last, z_low, z_high, search)
         if own < 0:
@@ -705,7 +672,7 @@ cpdef bint nearest_errors(
             for k in range(len(x)):
                 out[k] = far
             return False
-    set_errors(curves, own, x, y, out)
+    set_errors(search.curves, own, x, y, out)
     by, found = search.by, search.found
     begin = _first_off(out, 0)
     while begin < len(x):
@@ -739,7 +706,7 @@ cpdef bint nearest_errors(
     return True
 
 
-cdef Int _first_off(double[::1] errors, Int low) noexcept:
+cdef Int _first_off(double[::1] errors, Int low) noexcept nogil:
     """The first point from `low` on that does not lie on its own move, or the end of all."""
     cdef Int k
     k = low
@@ -748,7 +715,7 @@ cdef Int _first_off(double[::1] errors, Int low) noexcept:
     return k
 
 
-cdef Int _end_of_off(double[::1] errors, Int low) noexcept:
+cdef Int _end_of_off(double[::1] errors, Int low) noexcept nogil:
     """Return the first index from `low` on, which is off its own move, at which `ON_OWN` points on
     that move begin, or the number of points."""
     cdef Int end, k
@@ -793,7 +760,7 @@ def empty_bins(count: int) -> Floats:
     return bins
 
 
-cdef Int _bin_of(double x, double y, double[:, ::1] directions) noexcept:
+cdef Int _bin_of(double x, double y, double[:, ::1] directions) noexcept nogil:
     """The bin of a point: by its angle, and on the edge of two bins by the cross products."""
     cdef Int which
     turn = math.atan2(y, x) / (2.0 * math.M_PI)
@@ -810,7 +777,7 @@ cdef Int _bin_of(double x, double y, double[:, ::1] directions) noexcept:
 cdef wide _count_in_bin(
     double[::1] x, double[::1] y, Int low, double cx, double cy, double[:, ::1] directions,
     Int which, Int* result
-) noexcept:
+) noexcept nogil:
     """Count the consecutive points x, y (n,) from `low` on in the bin `which`: at least one."""
     cdef Int j, k, outside
     cdef bint out
@@ -835,7 +802,7 @@ cdef wide _count_in_bin(
 cpdef void fill_bins(
     double[::1] x, double[::1] y, double cx, double cy, double[:, ::1] directions,
     double[:, ::1] bins
-) noexcept:
+) noexcept nogil:
     """Put the points x, y (n,) about the centre (cx, cy) into `bins` (720, 9)."""
     cdef Int done, which, stay
     done = 0
@@ -849,7 +816,7 @@ cpdef void fill_bins(
 cdef wide _add(
     double[::1] x, double[::1] y, Int low, Int high, double cx, double cy, double[:, ::1] bins,
     Int which
-) noexcept:
+) noexcept nogil:
     """Put the points low … high − 1 into one bin."""
     cdef Int j, k, lane
     cdef double px, py, square, sum_x, sum_y, least, most
@@ -889,7 +856,7 @@ cdef wide _add(
 cdef void _place(
     double[::1] x, double[::1] y, Int low, double cx, double cy, double square,
     double[:, ::1] bins, Int which, Int column
-) noexcept:
+) noexcept nogil:
     """Keep the first point from `low` on whose distance from the centre has this square."""
     cdef Int k
     k = low
@@ -903,17 +870,6 @@ cdef void _place(
 # error, and each row's last.
 #
 # The pen holds what is not yet written: the largest of the present run, and the last sample.
-
-
-cpdef enum:
-    # The pen, float64: samples of a run, 0 where nothing is wanted; points written, and how many
-    # may be besides the ends of rows; the row (−1: none yet); samples in the present run; its
-    # largest error and where; the last sample's error and where, and whether it is the largest of
-    # its run or written already.
-    STRIDE = 0, WRITTEN, ROOM, ROW, IN_RUN, PEAK, PEAK_X, PEAK_Y, LAST_ERROR, LAST_X, LAST_Y,
-    LAST_IS_WRITTEN
-    # Numbers of a pen.
-    PEN = 12
 
 
 def new_pen(stride: int, room: int) -> Floats:
@@ -932,14 +888,14 @@ def unwritten(pen: Floats) -> Floats:
     return np.array(held).reshape(-1, 4)
 
 
-cdef void _write(double[::1] pen, double x, double y, double error, double[:, ::1] trace) noexcept:
+cdef void _write(double[::1] pen, double x, double y, double error, double[:, ::1] trace) noexcept nogil:
     cdef Int at
     at = int(pen[WRITTEN])
     trace[at, 0], trace[at, 1], trace[at, 2], trace[at, 3] = x, y, error, pen[ROW]
     pen[WRITTEN] += 1.0
 
 
-cdef void _end_run(double[::1] pen, double[:, ::1] trace) noexcept:
+cdef void end_run(double[::1] pen, double[:, ::1] trace) noexcept nogil:
     if pen[IN_RUN] > 0.0 and pen[WRITTEN] < pen[ROOM]:
         _write(pen, pen[PEAK_X], pen[PEAK_Y], pen[PEAK], trace)
     elif pen[IN_RUN] > 0.0:
@@ -947,9 +903,9 @@ cdef void _end_run(double[::1] pen, double[:, ::1] trace) noexcept:
     pen[IN_RUN], pen[PEAK] = 0.0, -1.0
 
 
-cdef void end_row(double[::1] pen, double[:, ::1] trace) noexcept:
+cdef void end_row(double[::1] pen, double[:, ::1] trace) noexcept nogil:
     """Write what the pen holds."""
-    _end_run(pen, trace)
+    end_run(pen, trace)
     if pen[ROW] >= 0.0 and pen[LAST_IS_WRITTEN] == 0.0:
         _write(pen, pen[LAST_X], pen[LAST_Y], pen[LAST_ERROR], trace)
         pen[LAST_IS_WRITTEN] = 1.0
@@ -958,7 +914,7 @@ cdef void end_row(double[::1] pen, double[:, ::1] trace) noexcept:
 cpdef void trace_block(
     Int row, double[::1] x, double[::1] y, double[::1] error, double most, double[::1] pen,
     double[:, ::1] trace
-) noexcept:
+) noexcept nogil:
     """Take points x, y (n,) of one row; `error` (n,) of them, the largest of which is `most`,
     where that is above 0; else they have none. What is full of points takes only the ends of
     rows; a pen whose runs have no samples writes nothing."""
@@ -987,7 +943,7 @@ cpdef void trace_block(
         pen[LAST_X], pen[LAST_Y] = x[high - 1], y[high - 1]
         pen[LAST_ERROR] = error[high - 1] if most > 0.0 else 0.0
         if pen[IN_RUN] >= pen[STRIDE]:
-            _end_run(pen, trace)
+            end_run(pen, trace)
         low = high
 
 
@@ -995,18 +951,6 @@ cpdef void trace_block(
 # stay finite, which all loops here and below take for granted. What judges steps on the way keeps
 # to it by its own limits: five digits of micrometres, and the ranges of a machine file.
 cdef double FARTHEST_MM = 1e9
-
-cpdef enum:
-    # Columns of the rows: how many samples; of those of rows that cut the largest error and the
-    # sum of squares; how many have a total, that with its sum and its place; extents; last
-    # positions.
-    SAMPLES = 0, INNER_MAX, INNER_SQUARES, LAG_MAX, LAG_SQUARES, KNOWN, TOTAL_MAX, TOTAL_SQUARES,
-    TOTAL_SUM, TOTAL_X, TOTAL_Y, LOW_X, LOW_Y, HIGH_X, HIGH_Y, END_X, END_Y, COMMANDED_X,
-    COMMANDED_Y
-    # How many columns.
-    ROW_COLUMNS = 19
-    # Columns of `Task.rows`.
-    OWN = 0, FIRST, LAST, CIRCLE, SLOT, BESIDE
 
 
 class Task(NamedTuple):
@@ -1034,13 +978,15 @@ class Task(NamedTuple):
 class Sums(NamedTuple):
     """Results: rows (N, 19), those of the task; histograms (2, 4 BINS) of interpolation and
     total, every fourth sample in the same place of its four; bins (S, 720, 9); trace (T, 4) x, y,
-    error, row, and its pen."""
+    error, row, and its pen; pieces of lines whose errors the histograms lack
+    (`camtool.kernels.lines`)."""
 
     rows: Floats
     histograms: Ints
     bins: Floats
     trace: Floats
     pen: Floats
+    pieces: list[Floats]
 
 
 cdef class Judge:
@@ -1064,7 +1010,7 @@ cdef class Judge:
 cdef wide _spread(
     double[:, ::1] figures, Int row, double[::1] x, double[::1] y, double[::1] slide_x,
     double[::1] slide_y, double* largest_square, double* sum_of_squares
-) noexcept:
+) noexcept nogil:
     """Widen the extents of the slides; compute the largest square of mechanics and their sum."""
     cdef Int j, k, lane
     cdef double low_x, low_y, high_x, high_y, most, sum_, here_x, here_y, off_x, off_y, square
@@ -1117,7 +1063,7 @@ cdef struct ErrorSums:
 cdef wide _sizes(
     double[::1] errors, double off, double[::1] size, Int[::1] bits, int[::1] places,
     ErrorSums* result
-) noexcept:
+) noexcept nogil:
     """Compute the sizes of errors, all `off` larger than they are alone, and their places in a
     histogram, where four samples take turns so that none waits for the one before. `bits` are
     those of `size`."""
@@ -1148,21 +1094,20 @@ cdef wide _sizes(
     result.largest, result.squares, result.signed_errors = most, squares, signed
 
 
-cdef inline int _place_of(Int bits, Int turn) noexcept:
+cdef inline int _place_of(Int bits, Int turn) noexcept nogil:
     """The place of a size ≥ 0 in a histogram, from its bits."""
     return 4 * min(max((bits >> SHIFT) - BEFORE_FIRST, 0), BINS - 1) + turn
 
 
-cdef void _count(int[::1] places, Int count, Int[:, ::1] histograms, Int which) noexcept:
+cdef void _count(int[::1] places, Int count, Int[:, ::1] histograms, Int which) noexcept nogil:
     cdef Int k
     for k in range(count):
         histograms[which, places[k]] += 1
 
 
-cdef void judge_block(Int row, Int count, Judge judge) noexcept:
+cdef void judge_block(Int row, Int count, Judge judge) noexcept nogil:
     """Judge the first `count` samples of the room, all of one row."""
     cdef Int last, own, of_program, k, circle, first, upto, beside
-    cdef Search search
     cdef Int[:, ::1] rows
     cdef Int[::1] bits
     cdef int[::1] places
@@ -1197,8 +1142,8 @@ cdef void judge_block(Int row, Int count, Judge judge) noexcept:
         _count(places, count, judge.histograms, 0)
         first, upto = rows[row, FIRST], rows[row, LAST]
         z_low, z_high = window[row, 0], window[row, 1]
-        beside, search = rows[row, BESIDE], judge.search
-        if nearest_errors(slide_x, slide_y, beside, first, upto, z_low, z_high, search, errors):
+        beside = rows[row, BESIDE]
+        if nearest_errors(slide_x, slide_y, beside, first, upto, z_low, z_high, judge.search, errors):
             _sizes(errors, judge.off[row], size, bits, places, &sums)
             shown = sums.largest
             figures[row, TOTAL_SQUARES] += sums.squares

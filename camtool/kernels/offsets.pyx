@@ -52,7 +52,7 @@ cdef void _widen(double[:, ::1] tree, Int node, double[:, ::1] boxes, Int row) n
         tree[node, k + 2] = max(tree[node, k + 2], boxes[row, k + 2])
 
 
-cdef (Int, Int) rows_under(double[:, ::1] tree, Int node, Int count) noexcept:
+cdef (Int, Int) rows_under(double[:, ::1] tree, Int node, Int count) noexcept nogil:
     """The rows low … high − 1 of `count` in all that a node holds."""
     cdef Int leaves, span, low
     leaves = len(tree) // 2
@@ -64,7 +64,7 @@ cdef (Int, Int) rows_under(double[:, ::1] tree, Int node, Int count) noexcept:
     return low, min(low + span, count)
 
 
-cdef inline double apart_square(double[:, ::1] tree, Int node, double x, double y) noexcept:
+cdef inline double apart_square(double[:, ::1] tree, Int node, double x, double y) noexcept nogil:
     """Square of the distance of a point from the box of a node."""
     dx = max(tree[node, 0] - x, 0.0, x - tree[node, 2])
     dy = max(tree[node, 1] - y, 0.0, y - tree[node, 3])
@@ -91,7 +91,7 @@ cdef inline (Int, Int) next_leaf(
 
 cdef Int wait_for_children(
     double[:, ::1] tree, Int node, double x, double y, Int[::1] stack, Int height
-) noexcept:
+) noexcept nogil:
     """Put the children of a node on a stack of `height` nodes, the one nearer to a point on top;
     returns the new height."""
     cdef Int left, right

@@ -19,6 +19,7 @@ from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options, still_ledger
 from camtool.simulation.rows import refuse
+from camtool.simulation.step_lines import LineRows, LineRun
 from camtool.toolpath.moves import Kind, Toolpath
 
 
@@ -40,6 +41,9 @@ class LegProgram(Struct, frozen=True, eq=False):
     compensation_s: float
 
 
+_NO_STEPS = np.zeros((0, 3), dtype=np.int64)
+
+
 class LegRun:
     """A run of legs on a machine."""
 
@@ -58,6 +62,44 @@ class LegRun:
         if len(rows):
             ledger = self._still(rows)
             yield Chunk(np.empty(0, dtype=np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
+
+    def fused_run(self, blocks: Iterator[Legs]) -> LineRun | None:
+        """Return the lines of all legs, judged as they are; None where the mechanics differ from
+        place to place."""
+        if not self._mechanics.even:
+            return None
+        standing = self._standing
+        return LineRun(
+            self._lines(blocks),
+            len(standing.waits),
+            self._step_mm,
+            self._mechanics,
+            rounds=False,
+            compensation_s=standing.compensation_s,
+        )
+
+    def _lines(self, blocks: Iterator[Legs]) -> Iterator[LineRows]:
+        """Yield the legs as lines, whole rows at a time: the last row of a block may go on in the
+        next one."""
+        low, begun = 0, Legs(_NO_STEPS[:, 0], _NO_STEPS, np.zeros(0))
+        for legs in blocks:
+            row = np.concatenate([begun.row, legs.row])
+            steps = np.concatenate([begun.steps, legs.steps])
+            seconds = np.concatenate([begun.seconds, legs.seconds])
+            high = int(row[-1]) if len(row) else low
+            done = int(np.searchsorted(row, high))
+            yield self._line_rows(low, high, Legs(row[:done], steps[:done], seconds[:done]))
+            low, begun = high, Legs(row[done:], steps[done:], seconds[done:])
+        yield self._line_rows(low, len(self._standing.waits), begun)
+
+    def _line_rows(self, low: int, high: int, legs: Legs) -> LineRows:
+        start = self._position + np.cumsum(legs.steps, axis=0) - legs.steps
+        self._position = self._position + legs.steps.sum(axis=0)
+        seconds = self._standing.waits[low:high].copy()
+        moving = legs.row - low
+        seconds[moving] = 0.0
+        np.add.at(seconds, moving, legs.seconds)
+        return LineRows(low, high, seconds, legs.row, start, np.ascontiguousarray(legs.steps))
 
     def _still(self, rows: Ints) -> Ledger:
         """Return a ledger of rows without motion."""

@@ -80,15 +80,21 @@ class Mechanics:
             added_mm = float(self.compensation_steps[index]) * coded_mm
             self.axes[index] = scale, low, high, added_mm, REVERSAL_STEPS * coded_mm
             self.states[index] = play_start(float(start_mm[index]), scale, direction)
-        self._lean = math.tan(machine.mechanics.squareness_rad) if effects.squareness else 0.0
+        self.lean = math.tan(machine.mechanics.squareness_rad) if effects.squareness else 0.0
+        """By how much Y leans towards X: a tangent."""
         shares = np.array(play_limits(1.0, convention, direction))
         self._varied = _varied(machine, effects, shares)
 
     @property
+    def even(self) -> bool:
+        """True if `axes`, `states` and `lean` hold all of the mechanics: backlash is the same
+        everywhere, and nothing scatters."""
+        return self._varied is None
+
+    @property
     def plain(self) -> bool:
-        """True if `axes` and `states` hold all of the mechanics: backlash is the same everywhere,
-        nothing scatters, X and Y are square."""
-        return self._varied is None and self._lean == 0.0
+        """True if `axes` and `states` alone hold all of it: X and Y are square, too."""
+        return self.even and self.lean == 0.0
 
     def follow(self, commanded_mm: Floats, offsets: Ints) -> tuple[Floats, Ints]:
         """Return the positions of the slides (K, 3) mm for the commanded positions (K, 3) mm,
@@ -103,8 +109,8 @@ class Mechanics:
             v = self._varied
             backlash = v.at(commanded_mm)
             play_varied_fill(*arguments, backlash, v.shares, v.scatter, v.seed, slide, reversals)
-        if self._lean:
-            slide[:, 0] += slide[:, 1] * self._lean
+        if self.lean:
+            slide[:, 0] += slide[:, 1] * self.lean
         return slide, reversals
 
     def compensate(self, axis: int, steps: int) -> None:

@@ -13,7 +13,8 @@ figures of contours, the worst moves, and sums of the whole motion (`Tally`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from bisect import bisect_left
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from msgspec import Struct
@@ -21,12 +22,16 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.kernels import judging as at
 from camtool.kernels.judging import BEFORE_FIRST, BINS, SHIFT, leading_bits
+from camtool.kernels.lines import COUNT, PIECE_COLUMNS, WHICH, count_below
 from camtool.simulation.motion import Ledger, still_ledger
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 from camtool.verification.cuts import CutMoves
 from camtool.verification.matching import Match
 
 PERCENTILE = 0.95
+
+PIECES_GUESSED = 500
+"""From so many pieces of lines it is guessed where the percentile is; then all are counted."""
 
 
 class Figure:
@@ -41,6 +46,7 @@ class Figure:
         self._max = -math.inf
         self._squares = 0.0
         self._histogram = np.zeros(BINS, dtype=np.int64)
+        self._pieces = np.empty((0, PIECE_COLUMNS))
 
     def add(self, errors: Floats, points: Floats, rows: Ints | Indices) -> None:
         """Add errors (J,) mm, measured at points (J, 2) mm of these rows (J,)."""
@@ -72,6 +78,11 @@ class Figure:
         bin."""
         self._histogram += histogram.reshape(BINS, -1).sum(axis=1)
 
+    def add_pieces(self, which: int, pieces: list[Floats]) -> None:
+        """Add the errors of pieces of lines (`camtool.kernels.lines`) that no histogram has."""
+        own = [part[part[:, WHICH] == which] for part in pieces]
+        self._pieces = np.concatenate([self._pieces, *own])
+
     @property
     def max(self) -> float:
         """Largest error, mm, exact."""
@@ -88,12 +99,40 @@ class Figure:
         if not self.count:
             return math.nan
         rank = math.ceil(PERCENTILE * self.count)
-        bin_index = int(np.searchsorted(np.cumsum(self._histogram), rank))
+        known = np.cumsum(self._histogram)
+        few = self._pieces[:: len(self._pieces) // PIECES_GUESSED + 1]
+        more = float(self._pieces[:, COUNT].sum()) / max(float(few[:, COUNT].sum()), 1.0)
+        guess = bisect_left(range(BINS), rank, key=lambda k: int(known[k] + more * _below(few, k)))
+        bin_index = _first_at_least(rank, guess, lambda k: int(known[k]) + _below(self._pieces, k))
         if bin_index == 0:
             return 0.0
-        edges = np.array([bin_index, bin_index + 1], dtype=np.int64) + BEFORE_FIRST
-        middle = float(np.left_shift(edges, SHIFT).view(np.float64).mean())
-        return min(middle, self._max)
+        return min(0.5 * (_edge(bin_index) + _edge(bin_index + 1)), self._max)
+
+
+def _below(pieces: Floats, bin_index: int) -> int:
+    """Count the errors of pieces in a bin and in those before it."""
+    return count_below(pieces, _edge(bin_index + 1))
+
+
+def _edge(bin_index: int) -> float:
+    """Return the least number of a bin."""
+    bits = np.array([bin_index + BEFORE_FIRST], dtype=np.int64)
+    return float(np.left_shift(bits, SHIFT).view(np.float64)[0])
+
+
+def _first_at_least(wanted: int, guess: int, count: Callable[[int], int]) -> int:
+    """Return the first bin up to which there are so many, searched from a good guess on."""
+    low, high, step = -1, guess, 1
+    while high < BINS - 1 and count(high) < wanted:
+        low, high, step = high, min(high + step, BINS - 1), 2 * step
+    step = 1
+    while high - low > 1:
+        middle = high - step if high - step > low else (low + high) // 2
+        if count(middle) >= wanted:
+            high, step = middle, 2 * step
+        else:
+            low = middle
+    return high
 
 
 # Figures of rows: taken from the judge's columns some rows at a time, and only their sums kept.

@@ -153,9 +153,10 @@ class SlidePass:
         """End of the motion: evaluate what remains; the path of the slides, thinned."""
         self._close(len(self._is_cut))
         self._sum_up()
-        self.rows.inner.add_sizes(self._sums.histograms[0])
-        self.rows.whole.add_sizes(self._sums.histograms[1])
         sums = self._sums
+        for which, figure in enumerate((self.rows.inner, self.rows.whole)):
+            figure.add_sizes(sums.histograms[which])
+            figure.add_pieces(which, sums.pieces)
         del self._tasks, self._task, self._sums
         return trace_of(sums, self._start, self._is_cut, self._most)
 
@@ -279,6 +280,7 @@ def _sums(rows: int, slots: int, trace: TraceSize) -> Sums:
         bins=empty_bins(slots),
         trace=np.empty((room + rows + 2 if trace.stride else 2, 4)),
         pen=new_pen(trace.stride, room),
+        pieces=[],
     )
 
 

@@ -40,6 +40,7 @@ from camtool.simulation.speed_plan import (
     axis_limits,
     max_along,
 )
+from camtool.simulation.step_lines import LineRows, LineRun
 from camtool.toolpath.moves import EVENTS_AT_REST, Kind, Toolpath, are_arcs
 
 from .dialect import GrblController, GrblDialect
@@ -65,10 +66,25 @@ class GrblModel(ControllerModel[GrblController, GrblDialect]):
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
+        path, mechanics = self._at_start(toolpath, machine, options)
+        return row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
+
+    def fused_run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> LineRun | None:
+        """Return the lines of all rows; None where the mechanics differ from place to place."""
+        path, mechanics = self._at_start(toolpath, machine, options)
+        if not mechanics.even:
+            return None
+        rows = path.executed_rows
+        blocks = map(GrblSamples.lines, _rows_to_end(path, machine))
+        return LineRun(blocks, rows, coded_steps_mm(machine), mechanics, rounds=True)
+
+    def _at_start(
+        self, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> tuple[Toolpath, Mechanics]:
+        """Return the path, and the slides at its start."""
         path = self.quantised(toolpath, machine)
         start_mm = _nearest_steps(path.start.astype(np.float32), machine) * coded_steps_mm(machine)
-        mechanics = Mechanics(machine, start_mm, options.effects)
-        return row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
+        return path, Mechanics(machine, start_mm, options.effects)
 
     def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
         """(N,) s that each row takes."""
@@ -185,6 +201,19 @@ class GrblSamples:
         self._step_mm = coded_steps_mm(machine)
         self._offsets = np.concatenate([[0], np.cumsum(blocks.events, dtype=np.int64)])
         self.first = self._offsets[np.searchsorted(blocks.row, rows)]
+
+    @staticmethod
+    def lines(rows: SampledRows) -> LineRows:
+        """Return the lines of rows whose samples these are."""
+        assert isinstance(rows.samples, GrblSamples)
+        blocks = rows.samples._blocks
+        columns = (blocks.row, blocks.start, blocks.way)
+        return LineRows(
+            rows.low,
+            rows.high,
+            rows.seconds,
+            *(one.astype(np.int64, order="C") for one in columns),
+        )
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
         """Row and position of the events low:high."""

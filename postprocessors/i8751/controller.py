@@ -25,6 +25,7 @@ from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import LegProgram, LegRun, Legs, check_rows, coded_steps_mm, waits_s
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import refuse, with_ends
+from camtool.simulation.step_lines import LineRun
 from camtool.toolpath.moves import Toolpath
 
 from .dialect import I8751Controller, I8751Dialect
@@ -41,13 +42,13 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
-        _check(toolpath, machine)
-        count = toolpath.executed_rows
-        times = PulseTimes(machine.dialect)
-        start_steps = _in_steps(toolpath.start[None, :], machine)[0]
-        leg_program = LegProgram(start_steps, waits_s(toolpath, count), float(times.periods_s[0]))
-        blocks = _blocks(toolpath.first(count), machine, times)
-        return LegRun(leg_program, machine, options).run(blocks)
+        legs, blocks = _leg_run(toolpath, machine, options)
+        return legs.run(blocks)
+
+    def fused_run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> LineRun | None:
+        """Return the legs of all rows; None where the mechanics differ from place to place."""
+        legs, blocks = _leg_run(toolpath, machine, options)
+        return legs.fused_run(blocks)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The same with start and ends at their nearest steps; ProgramError for arcs, homing."""
@@ -73,6 +74,18 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
             f"{elbow} a ramp of its own, from 90 pulses on (dialect.elbow)",
             "the steps of the controller's own arithmetic take no time",
         )
+
+
+def _leg_run(
+    toolpath: Toolpath, machine: _Machine, options: Options
+) -> tuple[LegRun, Iterator[Legs]]:
+    """Return the run of a program, and its legs."""
+    _check(toolpath, machine)
+    count = toolpath.executed_rows
+    times = PulseTimes(machine.dialect)
+    start_steps = _in_steps(toolpath.start[None, :], machine)[0]
+    leg_program = LegProgram(start_steps, waits_s(toolpath, count), float(times.periods_s[0]))
+    return LegRun(leg_program, machine, options), _blocks(toolpath.first(count), machine, times)
 
 
 def _check(toolpath: Toolpath, machine: _Machine) -> None:

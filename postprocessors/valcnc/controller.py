@@ -40,6 +40,7 @@ from camtool.simulation.legs import (
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.path import round_to_steps
 from camtool.simulation.rows import block_of
+from camtool.simulation.step_lines import LineRun
 from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 from .dialect import ValcncController, ValcncDialect
@@ -59,14 +60,20 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
-        return _run(_Pieces(toolpath, machine), toolpath, machine, options)
+        pieces = _Pieces(toolpath, machine)
+        return _leg_run(pieces, toolpath, machine, options).run(pieces.legs())
+
+    def fused_run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> LineRun | None:
+        """Return the lines of all rows; None where the mechanics differ from place to place."""
+        pieces = _Pieces(toolpath, machine)
+        return _leg_run(pieces, toolpath, machine, options).fused_run(pieces.legs())
 
     def run_on(
         self, drawn: DrawingProgress, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> tuple[list[Chunk], DrawingProgress]:
         """The motion of rows that follow others, which ended at `drawn`; and where these end."""
         pieces = _Pieces(toolpath, machine, drawn)
-        chunks = list(_run(pieces, toolpath, machine, options))
+        chunks = list(_leg_run(pieces, toolpath, machine, options).run(pieces.legs()))
         return chunks, pieces.drawn
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
@@ -125,13 +132,11 @@ class DrawingProgress(Struct, frozen=True, eq=False):
     steps: Ints
 
 
-def _run(
-    pieces: _Pieces, toolpath: Toolpath, machine: _Machine, options: Options
-) -> Iterator[Chunk]:
+def _leg_run(pieces: _Pieces, toolpath: Toolpath, machine: _Machine, options: Options) -> LegRun:
     period_s = 1.0 / machine.controller.step_rate_hz
     waits = waits_s(toolpath, toolpath.executed_rows)
     leg_program = LegProgram(pieces.drawn.steps, waits, period_s)
-    return LegRun(leg_program, machine, options).run(pieces.legs())
+    return LegRun(leg_program, machine, options)
 
 
 class _Pieces:
