@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import hmac
+import re
 import secrets
 from collections.abc import Awaitable, Callable, Iterable
 from contextlib import suppress
@@ -26,7 +27,8 @@ from camtool.machine.model import Machine
 from camtool.panel.program import LoadedProgram
 from camtool.panel.session import AXES, Session
 from camtool.sending.drive import Request
-from camtool.target.wire import HandAction, Override, ToolAt, Wire, WireState
+from camtool.target.wire import HandAction, Override, Place, ToolAt, Wire, WireState
+from camtool.toolpath import probing
 
 if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
@@ -38,6 +40,9 @@ PUSH_S: Final = 0.05
 
 ASKS_S: Final = 5.0
 """Interval of pings; a page that does not answer is gone, s."""
+
+MAX_PROBE_MM: Final = 10_000.0
+"""Lengths and feeds of the probe are below this."""
 
 MAX_MESSAGE_BYTES: Final = 4096
 
@@ -86,6 +91,20 @@ class LoadRequest(Struct, frozen=True, tag="load", tag_field="do", forbid_unknow
     """Read and judge a program of the panel's folder."""
 
     name: str
+
+
+class TouchRequest(Struct, frozen=True, tag="touch", tag_field="do", forbid_unknown_fields=True):
+    """Touch a plate of this `thickness`, an edge, corner or bore, or the skew of a side `along` so
+    many mm, with a tip of this `diameter`, in the direction `towards` ("x+", "x-y+"); no more than
+    `reach` away, at `feed`."""
+
+    what: Literal["plate", "edge", "corner", "bore", "skew"]
+    towards: str = ""
+    thickness: float = 0.0
+    along: float = 10.0
+    diameter: float = 0.0
+    reach: float = 10.0
+    feed: float = 100.0
 
 
 class ReleaseRequest(
@@ -162,6 +181,7 @@ Wanted = (
     JogRequest
     | GoRequest
     | LeaveRequest
+    | TouchRequest
     | LoadRequest
     | KeepRequest
     | ReleaseRequest
@@ -344,6 +364,7 @@ class PanelServer:
                 "reported": session.wire.place == "told",
                 "tool_at": _tool_at_choices(session.wire),
                 "programs": [each.name for each in self._programs()],
+                "probes": type(session.wire).probing is not Wire.probing,
                 "overrides": list(session.wire.overrides),
                 "ready": list(session.wire.ready),
                 "stopping": session.wire.stopping,
@@ -406,6 +427,8 @@ class PanelServer:
                     session.go_home(feed)
                 else:
                     session.go(places, feed)
+            case TouchRequest():
+                session.touch(wanted.what, _cycle_of(wanted))
             case LeaveRequest():
                 session.leave_stop()
             case LoadRequest():
@@ -500,6 +523,42 @@ class PanelServer:
             self.session.run_program(one, options)
         except CamtoolError as error:
             self.session.tell(str(error), bad=True)
+
+
+def _cycle_of(wanted: TouchRequest) -> Callable[[Place], probing.Measured]:
+    """Return the cycle of touches; OptionError for numbers and directions that make none."""
+    sizes = wanted.reach, wanted.feed, wanted.along, wanted.thickness + 1.0, wanted.diameter + 1.0
+    pairs = re.findall(r"([xy])([+-])", wanted.towards)
+    axes: list[Any] = [axis for axis, _ in pairs]
+    senses = [1 if sense == "+" else -1 for _, sense in pairs]
+    count = {"edge": 1, "skew": 1, "corner": 2}.get(wanted.what, 0)
+    if not all(0.0 < size < MAX_PROBE_MM for size in sizes):
+        raise OptionError("a length or feed of the probe is out of range", mend="give it above 0")
+    if count and (len(set(axes)), len(axes)) != (count, count):
+        mend = "choose one of X and Y, or both for a corner"
+        raise OptionError(f"{wanted.towards!r} is no way towards a {wanted.what}", mend=mend)
+    how = probing.Touch(
+        reach_mm=wanted.reach,
+        fast=wanted.feed,
+        slow=0.25 * wanted.feed,
+        radius_mm=0.5 * wanted.diameter,
+        sets_zero=wanted.what != "skew",
+    )
+
+    def measure(start: Place) -> probing.Measured:
+        match wanted.what:
+            case "plate":
+                return probing.plate(start, how, wanted.thickness)
+            case "bore":
+                return probing.bore(start, how)
+            case "edge":
+                return probing.edge(start, axes[0], senses[0], how)
+            case "skew":
+                return probing.skew(start, axes[0], senses[0], how, wanted.along)
+        by_axis = dict(zip(axes, senses, strict=True))
+        return probing.corner(start, (by_axis["x"], by_axis["y"]), how, wanted.along)
+
+    return measure
 
 
 def _tool_at_choices(wire: Wire) -> list[ToolAt]:

@@ -30,6 +30,7 @@ from camtool.target.wire import (
     Conversation,
     Hand,
     HandAction,
+    Manner,
     Override,
     Place,
     WireState,
@@ -38,6 +39,7 @@ from camtool.target.wire import (
 
 if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
+    from camtool.toolpath.probing import Measured, ProbeScript
 
 TICK_S: Final = 0.02
 """Interval at which requests are carried out, s."""
@@ -151,6 +153,7 @@ class Session:
         self._held_until: float | None = None
         self._closing = threading.Event()
         self._opens = threading.Event()
+        self._touch: tuple[str, Callable[[Place], Measured]] | None = None
         self._course: Course | None = None
         self._legs: deque[tuple[Mapping[str, float], float]] = deque()
         self._leg: Mapping[str, float] = {}
@@ -190,7 +193,7 @@ class Session:
         with suppress(queue.Empty):
             while True:
                 self._requests.get_nowait()
-        self._held_until = self._next = None
+        self._held_until = self._next = self._touch = None
         self._legs.clear()
         self._requests.put(Request.STOP)
 
@@ -230,6 +233,13 @@ class Session:
             raise MachineError("it was not homed from here", mend="home it")
         columns = zip(AXES, at, machine_at, home, strict=True)
         self.go({axis: end + one - other for axis, one, other, end in columns}, feed)
+
+    def touch(self, what: str, measure: Callable[[Place], Measured]) -> None:
+        """Touch a part or a plate, by a cycle of `camtool.toolpath.probing`; MachineError if the
+        machine is not ready."""
+        self._check_ready()
+        self._touch = what, measure
+        self._by_hand(lambda hand, now: hand.close(now))
 
     def leave_stop(self) -> None:
         """End a program that waits at a stop, so that the machine can be moved by hand, as to
@@ -321,11 +331,7 @@ class Session:
 
     def run_program(self, one: Consignment, options: SendOptions) -> None:
         """Send a program; MachineError if the machine is not ready."""
-        if self.state.state != WireState.READY.value:
-            raise MachineError(
-                f"the machine is not ready ({self.state.state})",
-                mend="wait until it stands, or connect it",
-            )
+        self._check_ready()
         at = self.state.place_mm
         if self.wire.place == "kept" and at is not None:
             start = one.begin_mm
@@ -337,6 +343,13 @@ class Session:
                 )
         self._next, self._change_first = (one, options), 0
         self._by_hand(lambda hand, now: hand.close(now))
+
+    def _check_ready(self) -> None:
+        if self.state.state != WireState.READY.value:
+            raise MachineError(
+                f"the machine is not ready ({self.state.state})",
+                mend="wait until it stands, or connect it",
+            )
 
     def tell(self, text: str, *, bad: bool = False) -> None:
         """Add a message."""
@@ -384,23 +397,58 @@ class Session:
             if following is not None:
                 self._send(line, *following)
                 continue
+            touch, self._touch = self._touch, None
             manner = manner_of(self.target, late_s=LATE_S * self.speed, at_mm=self._place_mm)
+            if touch is not None:
+                self._measure(line, manner, *touch)
+                continue
             hand = self.wire.hand(self.target.machine, manner)
             hand.machine_mm, hand.is_homed = self._machine_mm, self._is_homed
-            driver = Driver(
-                line,
-                wish=self._wish,
-                watch=self._show,
-                tell=self.tell,
-                speed=self.speed,
-                tick_s=TICK_S,
-            )
-            driver.carry(hand)
+            self._driver(line).carry(hand)
             if hand.state is WireState.FAILED:
                 self.tell(hand.why, bad=True)
                 return
             if hand.state is WireState.STOPPED:
                 self.tell(hand.why)
+
+    def _driver(self, line: LineToController) -> Driver:
+        return Driver(
+            line,
+            wish=self._wish,
+            watch=self._show,
+            tell=self.tell,
+            speed=self.speed,
+            tick_s=TICK_S,
+        )
+
+    def _measure(
+        self,
+        line: LineToController,
+        manner: Manner,
+        what: str,
+        measure: Callable[[Place], Measured],
+    ) -> None:
+        """Carry out a cycle of touches, and tell what it has measured."""
+        measured: dict[str, float] = {}
+
+        def cycle(start: Place) -> ProbeScript:
+            measured.update((yield from measure(start)))
+
+        try:
+            conversation = self.wire.probing(cycle, self.target.machine, manner)
+        except CamtoolError as error:
+            self.tell(str(error), bad=True)
+            return
+        self._driver(line).carry(conversation)
+        if conversation.state is WireState.FINISHED:
+            figures = []
+            for name, value in measured.items():
+                quantity, _, unit = name.rpartition("_")
+                letter = quantity.upper() if len(quantity) == 1 else quantity
+                figures.append(f"{letter} {value:.3f} {unit}")
+            self.tell(f"{what}: {', '.join(figures)}")
+        else:
+            self.tell(f"{what}: {conversation.why}", bad=True)
 
     def _send(self, line: LineToController, one: Consignment, options: SendOptions) -> None:
         """Send a program to its end."""

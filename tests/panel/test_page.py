@@ -501,6 +501,21 @@ def test_a_screen_reader_hears_a_name_of_each_control(grbl: At) -> None:
     assert "status" in tree
 
 
+def test_a_plate_is_touched_from_the_page(browser: Any, tmp_path: Path) -> None:
+    machine = Machine("grbl", CHANGE, ".nc", choices=("probe_mm=-3",))
+    with opened(machine, browser, tmp_path) as at:
+        at.page.locator("#touch-thickness").fill("1.5")
+        at.page.locator("#touch-feed").fill("400")
+        at.press("Touch")
+        at.until_told("plate: top_z -3.0")
+        at.until(lambda: at.at(2) == pytest.approx(4.5, abs=0.01))
+        at.page.locator("#touch-what").select_option("corner")
+        at.press("Touch")
+        at.until_told("is no way towards a corner")
+    with opened(Machine("valcnc", b"", ".nc"), browser, tmp_path, b"G00X1Y1Z1\n") as at:
+        assert not at.page.locator("#touch").is_visible()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", [(1280, 900), (390, 844)])
 def test_nothing_is_wider_than_the_screen(

@@ -14,10 +14,12 @@ import pytest
 from camtool.errors import MachineError, OptionError
 from camtool.panel.program import LoadedProgram
 from camtool.panel.session import Session
+from camtool.records import replace
 from camtool.sending.drive import Request
 from camtool.sending.journal import read_journal
 from camtool.sending.line import Port, opened_line
 from camtool.target.registry import load_target
+from camtool.toolpath.probing import Touch, plate
 from tests.sending.test_ends import hosted
 from tests.waiting import HANG_S
 
@@ -363,3 +365,21 @@ def test_at_a_stop_the_tool_is_touched_off_and_the_program_goes_on(tmp_path: Pat
     between = (behind[:, 0] > 1.01) & (behind[:, 0] < 1.99)
     assert behind[between][:, 2].min() == pytest.approx(1.5, abs=0.01)
     assert read_journal(loaded.journal).finished
+
+
+def test_a_plate_is_touched_and_its_lower_side_is_zero() -> None:
+    how = Touch(reach_mm=10.0, fast=400.0, slow=100.0)
+    with at_panel("grbl", "probe_mm=-9") as at:
+        at.until_state("ready")
+        at.session.touch("plate", lambda start: plate(start, how, 1.5))
+        at.until_told("plate: top_z -9.0")
+        at.until(lambda: at.session.state.state == "ready" and at.at_mm[2] > 1.0)
+        assert at.at_mm[2] == pytest.approx(10.5, abs=0.01)
+        at.session.touch("plate", lambda start: plate(start, replace(how, reach_mm=5.0), 0.0))
+        at.until_told("nothing was touched")
+        at.until(lambda: at.session.state.state == "ready")
+        assert not at.twin.is_moving
+    with at_panel("pic-mmh") as at:
+        at.until_state("ready")
+        at.session.touch("plate", lambda start: plate(start, how, 0.0))
+        at.until_told("no command to probe")

@@ -56,6 +56,7 @@ function begin(data) {
   find("typed").hidden = !can("line");
   find("go").hidden = !can("jog");
   find("go-machine").hidden = !can("home");
+  find("touch").hidden = !data.probes;
   const cannot = Object.keys(ORDERS).filter((action) => !can(action) && !(action === "unlock" && !can("home")));
   const missing = cannot.map((action) => ORDERS[action]).concat(data.overrides.length ? [] : ["override feed or spindle"]);
   find("cannot").textContent = missing.length ? `Over its line this controller cannot: ${missing.join(", ")}.` : "";
@@ -215,7 +216,7 @@ function draw() {
   });
   monitor();
   halt(ready);
-  for (const each of document.querySelectorAll("#pad button, .needs-ready, #home, #unlock, #zero-all, #typed button, #go button, #load")) {
+  for (const each of document.querySelectorAll("#pad button, .needs-ready, #home, #unlock, #zero-all, #typed button, #go button, #load, #touch button")) {
     each.disabled = !ready && !(each.closest("#pad") && held);
   }
   const program = first && first.program;
@@ -384,6 +385,12 @@ find("go").addEventListener("submit", (event) => {
   const places = {};
   for (const axis of AXES) if (find(`go-${axis}`).value !== "") places[axis] = Number(find(`go-${axis}`).value);
   if (Object.keys(places).length) go(places);
+});
+find("touch").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const number = (name) => Number(find(`touch-${name}`).value), what = find("touch-what").value;
+  const towards = ["edge", "corner", "skew"].includes(what) ? find("touch-towards").value : "";
+  send({ do: "touch", what, towards, ...Object.fromEntries(["thickness", "diameter", "along", "reach", "feed"].map((name) => [name, number(name)])) });
 });
 find("go-part").addEventListener("click", () => go({ x: 0, y: 0 }));
 find("go-part-z").addEventListener("click", () => go({ z: 0 }));
