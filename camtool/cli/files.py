@@ -13,6 +13,7 @@ import errno
 import hashlib
 import io
 import os
+import re
 import stat
 import sys
 import tempfile
@@ -31,6 +32,9 @@ STDOUT = "-"
 
 KEPT = 40
 """The most characters of a file's name in that of its temporary file: names are limited."""
+
+MAX_KIND_CHARS = 40
+"""So many characters of a tool's or a set-up's name go into the name of a file."""
 
 READER_S = 10.0
 """A named pipe is refused when nobody has opened it for reading for so long."""
@@ -355,3 +359,11 @@ def is_foreign(place: str | Path, maker: str) -> bool:
     except OSError:  # whatever it is, it is none of ours
         return True
     return data != seal(data[: data.rfind(SEAL)], maker)
+
+
+def part_name(name: str, number: int, count: int, kind: str) -> str:
+    """Return the name of a file of one part of `count`, such as a set-up or a tool: with its
+    number and its kind, so that the parts sort in their order."""
+    plain = re.sub(r"[^A-Za-z0-9_]+", "-", kind).strip("-")[:MAX_KIND_CHARS] or "tool"
+    path = PurePath(name)
+    return str(path.with_name(f"{path.stem}-{number:0{len(str(count))}}-{plain}{path.suffix}"))

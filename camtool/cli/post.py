@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.files import STDOUT, check_ours, check_places, write_all
+from camtool.cli.files import STDOUT, check_ours, check_places, part_name, write_all
 from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import (
     REPORT_NAMES,
@@ -273,9 +272,6 @@ MAX_PLACEHOLDERS = 2
 SHORT = {"flat": "mill", "v": "bit"}
 """Short names of kinds of tools in names of files; other kinds keep their name."""
 
-MAX_NAME_CHARS = 40
-"""So many characters of a tool's name go into the name of a file."""
-
 
 @dataclass(frozen=True)
 class RequestedOutputs:
@@ -422,12 +418,9 @@ def _part(run: Run, requested: RequestedOutputs, number: int, count: int) -> Req
     tool = _tool(run)
     kind = "tool" if tool is None else tool.name or SHORT.get(tool.kind, tool.kind)
     kind = (run.job and setup_name(run.job)) or kind
-    plain_name = re.sub(r"[^A-Za-z0-9_]+", "-", kind).strip("-")[:MAX_NAME_CHARS] or "tool"
-    mark = f"-{number:0{len(str(count))}}-{plain_name}"
 
     def marked(name: str | None) -> str | None:
-        path = None if name is None else PurePath(name)
-        return None if path is None else str(path.with_name(f"{path.stem}{mark}{path.suffix}"))
+        return None if name is None else part_name(name, number, count, kind)
 
     machine = run.target.machine.target
     program = requested.program(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.files import check_places, read_bytes, write_all
+from camtool.cli.files import check_places, part_name, read_bytes, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings
 from camtool.cli.options import (
@@ -79,7 +80,8 @@ def preview(
     """Draw FILE: a drawing; with --target its toolpath; or a program of that target.
 
     With --target, a file with the target's own extension (such as .pic), or whose content is no
-    drawing, is taken for its program. With --compensate, a toolpath is shown as it is written.
+    drawing, is taken for its program. With --compensate, a toolpath is shown as it is written. Of
+    a job with set-ups there is a picture of each, PICTURE-1-NAME, unless --setup names one.
     """
     if simulate and machine.name() is None:
         raise click.UsageError("--simulate needs --target")
@@ -92,14 +94,40 @@ def preview(
     # A viewer plays the program, which needs the times of the machine's model.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
-    scene_source = SceneSource(machine, simulate, asks_for_path, job, drawing, output)
-    scenes = [scene_source.scene(name) for name in sources]
-    painted = picture.painter(lambda: [scene for scene, _ in scenes], quiet=quiet)
-    write_all({output: painted(output)})
-    for _, findings in scenes:
-        say_findings(findings, quiet=quiet, verbose=verbose)
-    say(f"written: {output}", quiet=quiet)
+    files: dict[str, bytes] = {}
+    seen: dict[Finding, None] = {}
+    for name, of_setup in _each_setup(sources, output, machine, job, drawing, asks_for_path):
+        scene_source = SceneSource(machine, simulate, asks_for_path, of_setup, drawing, name)
+        scenes = [scene_source.scene(each) for each in sources]
+        shown = [scene for scene, _ in scenes]
+        painted = picture.painter(partial(list, shown), quiet=quiet)
+        files[name] = painted(name)
+        seen |= dict.fromkeys(finding for _, findings in scenes for finding in findings)
+    write_all(files)
+    say_findings(tuple(seen), quiet=quiet, verbose=verbose)
+    for name in files:
+        say(f"written: {name}", quiet=quiet)
     return 0
+
+
+def _each_setup(
+    sources: list[str],
+    output: str,
+    machine: MachineFlags,
+    job: JobFlags,
+    drawing: DrawingFlags,
+    asks_for_path: bool,
+) -> list[tuple[str, JobFlags]]:
+    """Return the pictures with the flags of their jobs: one of each set-up of the job, where none
+    is named."""
+    is_planned = asks_for_path and machine.name() is not None and job.setup is None
+    if is_planned and not drawing.is_program(sources[0], machine.load()):
+        names = [each.name for each in job.job(drawing).setups]
+        return [
+            (part_name(output, number, len(names), name), replace(job, setup=name))
+            for number, name in enumerate(names, 1)
+        ] or [(output, job)]
+    return [(output, job)]
 
 
 def _canvas(machine: MachineFlags, *, simulate: bool) -> Canvas:

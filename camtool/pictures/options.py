@@ -18,7 +18,7 @@ POINTS_OF_A_PAGE = 400_000
 """Most points of the slides' path that the viewer gets: enough for the ends of 200,000 moves and
 the largest error within each."""
 
-VIEWS = ("plan", "iso", "front", "side", "top", "leftover", "gouge")
+VIEWS = ("plan", "iso", "bottom", "front", "side", "top", "leftover", "gouge")
 """Views: the moves from above; the stock after the program, aslant, from the front, from the right
 and from above; and, by colour, where it is higher or lower than wanted."""
 

@@ -90,8 +90,9 @@ CAMERAS = {
     "side": Camera((-1.0, 0.0), 0.0, (-1.0, -0.6), 1.15),
     "top": Camera((0.0, 1.0), 1.0, (-0.8, 0.7), 1.9),
 }
-"""Views by name. In "iso" lengths along all three axes are seen at one scale; "front" and "side"
-are those of a drawing, level with the table."""
+CAMERAS["bottom"] = CAMERAS["iso"]
+"""Views by name; in "bottom" the block is turned over. In "iso" lengths along all three axes are
+seen at one scale; "front" and "side" are those of a drawing, level with the table."""
 
 
 class Stage(Struct, frozen=True, eq=False):

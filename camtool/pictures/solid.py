@@ -1,8 +1,9 @@
 """Pictures of the stock after a program: its shaded height map on a page.
 
-`iso` shows the block from outside, aslant, `front` and `side` as a drawing does, with its sizes
-along its edges; `top`, `leftover` and `gouge` show it from above, with axes. The raster is a PNG
-within the SVG; all that is written stands in the SVG itself.
+`iso` shows the block from outside, aslant, and `bottom` too, turned over about the axis X; `front`
+and `side` as a drawing does; all with its sizes along its edges. `top`, `leftover`, `gouge` show
+it from above, with axes. The raster is a PNG within the SVG; all that is written stands in the SVG
+itself.
 """
 
 from __future__ import annotations
@@ -75,6 +76,7 @@ from camtool.pictures.view import (
     round_step,
 )
 from camtool.records import replace
+from camtool.stock.before import WHOLE
 from camtool.stock.heightmap import Box, HeightMap, cell_for, height_map
 
 MAP_CELLS = 3_000_000
@@ -187,6 +189,9 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
     map_found = height_map(pair.moves, box, cell, owners=True)
     cut_mm = -float(map_found.heights.min(initial=0.0))
     material = map_found if pair.before is None else pair.before.shown_in(map_found)
+    if options.view == "bottom":
+        before = replace(pair.before or WHOLE, thickness_mm=pair.thickness_mm)
+        return Solid(pair, before.turned_over(material), (box[2], -box[1]), cut_mm)
     if options.view not in BAR_NAMES:
         return Solid(pair, material, box[2:], cut_mm)
     lowest, highest = _wanted_heights(pair, map_found, box, options)
@@ -298,7 +303,7 @@ def _from_outside(
     """The page of a view of the block with its sizes."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     camera, bar = CAMERAS[options.view], _bar_of(solid, options)
-    level = options.view in LEVEL
+    level, is_below = options.view in LEVEL, options.view == "bottom"
     corners = _corners(solid, camera)
     low, high = corners.min(axis=0), corners.max(axis=0)
     box_right = width - MARGIN - (0.0 if level else bar.width)
@@ -307,9 +312,11 @@ def _from_outside(
     shown = np.column_stack([low - np.array([0.0, room]), high + np.array([0.0, 0.5 * room])])
     view = fit(shown, MARGIN, top + 20.0, box_right - thick, (0.2, 0.8))
     all_across = PageBox(0.0, top, width, view.box.bottom + 20.0)
-    faults = _on_the_stock(faults_of(scene), solid, camera)
+    marks = faults_of(scene)
+    # Places on the upper face are not seen from below.
+    faults = _on_the_stock(replace(marks, places=()) if is_below else marks, solid, camera)
     entries = [*_entries(scene, options), *faults.entries(view)]
-    along = replace(view, scale=view.scale * ISO_SCALE) if options.view == "iso" else view
+    along = replace(view, scale=view.scale * ISO_SCALE) if camera is CAMERAS["iso"] else view
     table, bar_y = table_of(entries, along, view.box)
     legend_y = view.box.bottom + LEGEND_DROP - 30.0
     sizes = (width, foot_of(table, legend_y))
@@ -318,7 +325,8 @@ def _from_outside(
         sizes,
         options,
         _raster(_stage(solid, bar, options), camera, view, all_across, options),
-        _deepest(solid, camera, view) if level else _ghost(scene, camera, view),
+        _deepest(solid, camera, view) if level else "",
+        "" if level or is_below else _ghost(scene, camera, view),
         faults.draw(Plot(view)) if faults else "",
         head,
         _sizes(solid, camera, view),
@@ -421,7 +429,7 @@ def _entries(scene: Scene, options: PictureOptions) -> list[LegendEntry]:
     """The legend."""
     if options.view in LEVEL:
         return [LegendEntry(line_swatch(OUTLINE, GHOST_PEN, DASHES), "deepest cuts behind")]
-    if scene.drawing is None or not len(scene.drawing.paths) or options.view == "top":
+    if scene.drawing is None or not len(scene.drawing.paths) or options.view in ("top", "bottom"):
         return []
     return [LegendEntry(line_swatch(OUTLINE, GHOST_PEN), "drawing")]
 

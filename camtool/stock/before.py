@@ -105,6 +105,17 @@ class StockBefore(Struct, frozen=True, eq=False):
             heights = np.where(is_gone, np.float32(TOP_MM - self.thickness_mm), heights)
         return replace(drawn, heights=heights)
 
+    def turned_over(self, drawn: HeightMap) -> HeightMap:
+        """Return the map of what is left of a stock, turned over about the axis X: its lower face
+        is at 0, and has the cuts from below and the holes."""
+        heights = np.where(drawn.heights <= -self.thickness_mm + THROUGH_SLACK_MM, -np.inf, 0.0)
+        for each in self.below:
+            heights = np.minimum(heights, each.heights_in(drawn))
+        left, bottom = drawn.corner_mm
+        top = bottom + len(heights) * drawn.cell_mm
+        heights = heights.clip(-self.thickness_mm)[::-1].astype(np.float32)
+        return replace(drawn, heights=heights, corner_mm=(left, -top), owner=None)
+
     def deepest_below(self, point: Floats) -> str:
         """Return the name of the set-up that has cut deepest from below over a point (2,)."""
         depths = [each.tree.heights(each.turn.points(point[None]))[0][0] for each in self.below]

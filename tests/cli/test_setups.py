@@ -444,3 +444,15 @@ def test_a_dimension_between_two_faces_counts_how_far_they_lie_apart(
     assert not any("flip" in each["input"] for each in wide["contributions"])
     assert said["planned"]["flip_error_mm"] == (0.05 if error else None)
     assert said["planned"]["pins_mm"] == [[30.0, 2.0], [30.0, 37.0]]
+
+
+def test_a_preview_shows_each_setup(camtool: Run, tmp_path: Path) -> None:
+    write_part(tmp_path)
+    flags = ("-t", "grbl", "--job", "part.toml", "--view", "bottom", "--size", "300")
+    done = camtool("preview", "part.dxf", *flags, "-o", "all.svg")
+    assert done.returncode == 0, done.stderr
+    for number, name in enumerate(("top", "bottom"), 1):
+        whole = (tmp_path / f"all-{number}-{name}.svg").read_bytes()
+        one = camtool("preview", "part.dxf", *flags, "-o", "one.svg", "--setup", name)
+        assert one.returncode == 0, one.stderr
+        assert (tmp_path / "one.svg").read_bytes() == whole

@@ -261,3 +261,19 @@ def test_a_shank_has_room_where_the_other_face_is_cut_through() -> None:
         request = stock_request(two.steps, two.job, 0.01, before=before)
         found = list(stock_findings(two.toolpath, moves, request, 0.01))
         assert len(codes(found, "TOOL_IN_STOCK")) == count
+
+
+@settings(max_examples=10)
+@given(seed=st.integers(0, 10_000))
+def test_a_stock_turned_over_shows_the_columns_from_below(seed: int) -> None:
+    cuts = [(random_moves(seed, 12), "same"), (random_moves(seed + 1, 12), "x")]
+    above, below = (SetupCut.of(turn, moves, MAPS[turn]) for moves, turn in cuts)
+    before = StockBefore((above,), (below,), THICK)
+    whole = height_map(above.moves.select(slice(0)), (0.0, 0.0, 10.0, 10.0), 0.5)
+    seen = before.turned_over(before.shown_in(whole))
+    x, y = np.meshgrid(seen.x, seen.y)
+    floor, top = literal_column(cuts, np.column_stack([x.ravel(), -y.ravel()]))
+    depths = np.where(np.isfinite(floor), -THICK - floor, 0.0)
+    wanted = np.where(np.maximum(floor, -THICK) >= top, -THICK, depths)
+    off = np.abs(seen.heights.ravel() - wanted) > 1e-5
+    assert off.mean() < 0.01  # cells on the rim of a tool
