@@ -291,7 +291,9 @@ def scene_of(
         rounds=() if verification is None else rounds_of(verification),
         tabs=tabs,
         inspected=() if verification is None else verification.report.inspection,
-        playback=_playback(toolpath, verification, machine, listing),
+        playback=_playback(
+            toolpath, verification, machine, listing, _bounds(drawing, job, toolpath)
+        ),
         cut=_stock_pair(
             toolpath,
             job,
@@ -516,6 +518,7 @@ def _playback(
     verification: Verification | None,
     machine: Machine | None,
     listing: Callable[[], Listing | None] | None,
+    bounds: ReportTable,
 ) -> Callable[[], Playback] | None:
     """The function that gives how the toolpath runs: as simulated where there is a verification,
     otherwise by its feeds."""
@@ -532,10 +535,31 @@ def _playback(
                 trace_row=verification.trace.row,
                 tables=tuple(_tables(verification.report)),
             )
+        times = replace(times, tables=(*times.tables[:1], bounds, *times.tables[1:]))
         lines = None if listing is None else listing()
         return times if lines is None else replace(times, blocks=lines.blocks, binary=lines.binary)
 
     return playback
+
+
+def _bounds(drawing: Drawing | None, job: Job | None, toolpath: Toolpath | None) -> ReportTable:
+    """The table of how far drawing, stock and program reach along the axes."""
+    from camtool.verification.report import mm
+
+    boxes: list[tuple[str, list[list[float]]]] = []
+    if drawing is not None and len(drawing.paths):
+        boxes.append(("drawing", extents(drawing.paths).tolist()))
+    stock = None if job is None else job.stock
+    if stock is not None and stock.box_mm is not None:
+        left, low, right, high = stock.box_mm
+        boxes.append(("stock", [[left, right], [low, high], [-stock.thickness_mm, 0.0]]))
+    if toolpath is not None and len(toolpath):
+        boxes.append(("program", toolpath_extents(toolpath).tolist()))
+    lines = [
+        TableLine((name, *(f"{mm(low)} to {mm(high)}" for low, high in box)))
+        for name, box in boxes
+    ]
+    return ReportTable("Bounds", ("mm", "X", "Y", "Z"), tuple(lines))
 
 
 def _tables(report: Report) -> Iterator[ReportTable]:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import camtool
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures.colours import BINS
 from camtool.pictures.content import content_of
@@ -275,3 +276,13 @@ def test_the_package_holds_every_file() -> None:
     assert files <= held
     assert {file.name for file in files if file.suffix == ".js"} == set(SCRIPTS)
     assert (folder / "__init__.py").exists()
+
+
+def test_the_page_lists_the_bounds_of_drawing_stock_and_program() -> None:
+    run = camtool.post("samples/plate.dxf", "grbl", camtool.read_job("samples/plate.toml"))
+    tables = head_of(viewer_page(run.scene()).decode("utf-8"))["tables"]
+    (bounds,) = (each for each in tables if each["title"] == "Bounds")
+    cells = {row["cells"][0]: row["cells"][1:] for row in bounds["rows"]}
+    assert cells["stock"][2] == "−6.000 to 0.000"
+    assert set(cells) == {"drawing", "stock", "program"}
+    assert cells["program"][2] == "−6.000 to 25.000"

@@ -16,11 +16,13 @@ from PIL import Image
 
 import camtool
 from camtool.arrays import Floats
+from camtool.geometry.turn import Turn
 from camtool.kernels.stock import StockTree
 from camtool.pictures.scene import ReportTable, Scene, StockPair, TableLine, stock_pair
 from camtool.pictures.viewer.page import viewer_page
 from camtool.planning.job import Job, Tool
 from camtool.records import replace
+from camtool.stock.before import SetupCut, StockBefore
 from camtool.stock.cutters import cutter_profile
 from camtool.stock.heights import stock_tree
 from camtool.stock.moves import StockMoves, stock_moves_of_toolpath
@@ -254,6 +256,22 @@ class TestShown:
         assert picture(view) != whole
         view.press("End")
         assert picture(view) == whole
+
+    def test_it_begins_with_what_the_setups_before_have_left(self, shown: Any) -> None:
+        """A slot of another set-up stands at the start; a cut less deep along it adds nothing."""
+        path = slot(-1.0)
+        left = SetupCut.of("first", cuts_of(slot(-1.5), (0, MILL)), Turn())
+        before = StockBefore(above=(left,))
+        moves = cuts_of(path, (0, MILL))
+        pair = StockPair(moves, moves, BOX, 3.0, known=True, before=before)
+        view = shown(replace(scene_of_cuts(path, (0, MILL)), cut=lambda: pair))
+        view.press("g")
+        for key in ("Home", "End"):
+            view.press(key)
+            view.press("t")
+            view.settled()
+            view.page.mouse.move(*view.place_of(0.5, 0.5))
+            assert "Z -1.500" in view.text("#tip")
 
     def test_section_path_and_colours_change_it(self, view: Any) -> None:
         seen = {picture(view)}

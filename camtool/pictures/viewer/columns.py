@@ -22,6 +22,7 @@ from camtool.pictures.content import Content
 from camtool.pictures.layers import LineGroup, Part
 from camtool.pictures.scene import Playback, Scene, StockPair
 from camtool.pictures.trace import ErrorTrace, bins_of, nearest_points
+from camtool.stock.before import WHOLE
 from camtool.stock.heightmap import HeightMap, add_moves
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
@@ -97,23 +98,36 @@ class StockBox(Struct, frozen=True):
     grid: tuple[int, int]
 
 
-def goal_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
-    """The heights that the stock should have, row by row on its grid, each as often as the column
-    of counts says, in shares of 1/GOAL_COUNTS of its thickness; empty where this is not known."""
-    values, counts = np.empty(0, dtype=INT), np.empty(0, dtype=INT)
-    if stock is not None and pair is not None and pair.wanted is not None:
+def height_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
+    """The heights that the stock should have, and those that the set-ups before have left; empty
+    where they are not known, or nothing was cut before."""
+    goal, begun = None, None
+    if stock is not None and pair is not None:
         left, low, right, _ = stock.box
         across, upwards = stock.grid
         cell = (right - left) / (across - 1)
         corner = (left - 0.5 * cell, low - 0.5 * cell)
-        heights = HeightMap(np.zeros((upwards, across), dtype=np.float32), cell, corner)
-        add_moves(heights, pair.wanted)
+        whole = HeightMap(np.zeros((upwards, across), dtype=np.float32), cell, corner)
+        before = pair.before or WHOLE
+        if before.above or before.below:
+            begun = before.shown_in(whole)
+        if pair.wanted is not None:
+            add_moves(whole, pair.wanted)
+            goal = before.shown_in(whole)
+    return {**_run_columns("goal", goal, stock), **_run_columns("begun", begun, stock)}
+
+
+def _run_columns(name: str, heights: HeightMap | None, stock: StockBox | None) -> Columns:
+    """Heights row by row on the grid of the stock, each as often as the column of counts says, in
+    shares of 1/GOAL_COUNTS of its thickness; empty without heights."""
+    values, counts = np.empty(0, dtype=INT), np.empty(0, dtype=INT)
+    if heights is not None and stock is not None:
         shares = np.rint(heights.heights.ravel() * (GOAL_COUNTS / -stock.bottom))
         rounded = np.maximum(shares, -GOAL_COUNTS).astype(INT)
         begins = np.concatenate([[0], np.flatnonzero(np.diff(rounded)) + 1])
         values = rounded[begins]
         counts = np.diff(np.append(begins, rounded.size)).astype(INT)
-    return {"goal_height": values, "goal_count": counts}
+    return {f"{name}_height": values, f"{name}_count": counts}
 
 
 def slide_columns(pair: StockPair | None, rows: int, cell_mm: float) -> Columns:

@@ -253,7 +253,8 @@ class Depth {
     if (!gl) return false;
     this.gl = gl;
     this.bottom = this.head.stock.bottom;
-    this.solid = new Solid(this.head.stock, this.turns, this.slides);
+    const { begun_height: begun, begun_count: counts } = this.layers.columns;
+    this.solid = new Solid(this.head.stock, this.turns, this.slides, this.heights(begun, counts));
     this.surface = program(gl, SURFACE, STUFF);
     this.curtain = program(gl, CURTAIN, STUFF);
     this.given = program(gl, GIVEN, SHADED);
@@ -274,6 +275,11 @@ class Depth {
     gl.texImage2D(gl.TEXTURE_2D, 0, format, width, height, 0, kind, type, null);
   }
 
+  /** Heights on the grid, of their shares of the thickness. */
+  heights(shares, counts) {
+    return repeated(shares, counts).map((count) => (count * -this.bottom) / GOAL_COUNTS);
+  }
+
   /** A tile of the mesh, drawn once for each place; level tiles are fans, with all of their edge, or they
    * would leave gaps beside others. */
   makeMesh() {
@@ -285,8 +291,7 @@ class Depth {
     const { goal_height: goals, goal_count: counts } = this.layers.columns;
     this.texture(3, gl.R32F, gl.RED, gl.FLOAT, goals.length ? nx : 1, goals.length ? ny : 1);
     if (goals.length) {
-      const share = -this.bottom / GOAL_COUNTS, all = repeated(goals, counts).map((count) => count * share);
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, nx, ny, gl.RED, gl.FLOAT, all);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, nx, ny, gl.RED, gl.FLOAT, this.heights(goals, counts));
     }
     const faces = [], middle = (TILE / 2) * (RIM + 1), last = TILE * RIM;
     for (let k = 0; k < TILE; k++) {

@@ -33,8 +33,8 @@ class Cutter {
 class Solid {
   /** `box` [left, low, right, high] mm of the stock with its top at 0; `grid` how many heights it
    * has along X and Y, the outermost on its edges; `turns` [[row, cutter]]: from which row on each
-   * cuts; `slides` the moves of their tips. */
-  constructor({ box, grid }, turns, slides) {
+   * cuts; `slides` the moves of their tips; `begun` the heights before the first move, if not 0. */
+  constructor({ box, grid }, turns, slides, begun = []) {
     [this.left, this.low] = box;
     [this.nx, this.ny] = grid;
     this.dx = (box[2] - box[0]) / (this.nx - 1);
@@ -43,6 +43,7 @@ class Solid {
     this.turns = turns;
     this.slides = slides;
     this.heights = new Float32Array(this.nx * this.ny);
+    this.heights.set(begun);
     this.by = new Int32Array(this.nx * this.ny).fill(-1);
     this.row = this.share = 0;
     this.turn = 0;
