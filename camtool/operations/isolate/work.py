@@ -12,7 +12,7 @@ the nets are apart then, and whole, is proved on the predicted cut (`camtool.sto
 
 from __future__ import annotations
 
-import math
+import numpy as np
 
 from camtool.errors import OptionError
 from camtool.operations.chamfer.work import chamfer
@@ -47,7 +47,7 @@ def isolated(operation: Operation, _: Stock | None) -> Operation:
             mend="give more depth, or the thickness of your copper (copper)",
         )
     depth_mm = operation.depth_mm
-    if operation.tool.radius_at(depth_mm - copper_mm) <= 0.0:
+    if _one_cut_mm(operation) <= 0.0:
         raise OptionError(
             "the tool has no width at the bottom of the copper",
             where=key_of(operation, "tool"),
@@ -55,18 +55,18 @@ def isolated(operation: Operation, _: Stock | None) -> Operation:
         )
     settled = replace(operation, tip_offset_mm=depth_mm)
     width_mm = operation.own_value("isolation")
-    if width_mm is not None and width_mm < 2.0 * operation.tool.radius_at(depth_mm - copper_mm):
-        least = 2.0 * operation.tool.radius_at(depth_mm - copper_mm)
+    one_mm = _one_cut_mm(operation)
+    if width_mm is not None and width_mm < one_mm:
         raise OptionError(
-            f"an isolation of {width_mm:g} mm is less than one cut of this tool, {least:.4g} mm",
+            f"an isolation of {width_mm:g} mm is less than one cut of this tool, {one_mm:.4g} mm",
             where=key_of(operation, "isolation"),
             mend="leave it out, or take a finer tool",
         )
-    if len(_rings_mm(settled)) > MAX_RINGS:
+    if _ring_count(settled) > MAX_RINGS:
         raise OptionError(
-            f"an isolation of {width_mm:g} mm needs {len(_rings_mm(settled))} rings",
+            f"an isolation of {width_mm:g} mm needs more than {MAX_RINGS} rings",
             where=key_of(operation, "isolation"),
-            mend=f"give less, for at most {MAX_RINGS} rings, or clear the rest with a wider tool",
+            mend="give less, or clear the rest with a wider tool",
         )
     return settled
 
@@ -84,12 +84,24 @@ def isolate(chosen: Chosen, setting: Setting) -> Work:
     return Work(tuple(items), first.findings)
 
 
+def _one_cut_mm(operation: Operation) -> float:
+    """Return the width of one cut at the bottom of the copper, mm."""
+    copper_mm = operation.own_value("copper")
+    return 2.0 * operation.tool.radius_at((operation.depth_mm or 0.0) - copper_mm)
+
+
+def _ring_count(operation: Operation) -> float:
+    """Return the number of rings, as a whole float: widths of any size are looked at."""
+    width_mm, one_mm = operation.own_value("isolation"), _one_cut_mm(operation)
+    if width_mm is None or width_mm <= one_mm:
+        return 1.0
+    return float(np.ceil((width_mm - one_mm) / ((1.0 - OVERLAP) * one_mm))) + 1.0
+
+
 def _rings_mm(operation: Operation) -> list[float]:
     """Return the distances of the rings from the first one, mm: evenly, with OVERLAP."""
-    width_mm = operation.own_value("isolation")
-    copper_mm = operation.own_value("copper")
-    one = 2.0 * operation.tool.radius_at((operation.depth_mm or 0.0) - copper_mm)
-    if width_mm is None or width_mm <= one:
+    count = round(_ring_count(operation))
+    if count == 1:
         return [0.0]
-    count = math.ceil((width_mm - one) / ((1.0 - OVERLAP) * one))
-    return [(width_mm - one) * k / count for k in range(count + 1)]
+    wider_mm = operation.own_value("isolation") - _one_cut_mm(operation)
+    return [wider_mm * k / (count - 1) for k in range(count)]
