@@ -39,6 +39,13 @@ cpdef enum:
     # Reductions of two numbers below 2⁶³ by Euclid's algorithm: at most 91.
     MAX_LEVELS = 96
 
+# No line has as many steps.
+cdef Int MAX_LEVEL = 1LL << 40
+
+# A form that changes with the position, or begins, by so many times what a step changes is that of
+# a straight line: a billion steps are 1e-21 of it.
+cdef double STEPS_DO_NOT_COUNT = 1e30
+
 
 cdef Int most_events() noexcept nogil:
     """Return below how many events the sums of a line fit: less where the compiler has no integers
@@ -188,7 +195,11 @@ cdef struct Below:
 
 
 cdef inline Int _floored(double value) noexcept nogil:
+    """Return the whole part of a number, at most MAX_LEVEL away from 0: where a form hardly
+    depends on the steps, levels lie farther away, and one event is undecided at most."""
     cdef Int integer
+    if not -<double>MAX_LEVEL < value < <double>MAX_LEVEL:
+        return MAX_LEVEL if value > 0.0 else -MAX_LEVEL
     integer = <Int>value
     return integer - 1 if value < <double>integer else integer
 
@@ -205,6 +216,18 @@ cdef inline Int _clamped_up(double value, Int count) noexcept nogil:
     cdef Int integer
     integer = _clamped(value, count)
     return integer + 1 if <double>integer < value and integer < count else integer
+
+
+cdef inline bint _is_straight(
+    Int count, Int size, Int phase, Int events, double along, double across, double level
+) noexcept nogil:
+    """True if the steps do not count: there are none, or all of them together are less than a
+    billionth of a rounding error of the rest."""
+    return (
+        math.fabs(across) * STEPS_DO_NOT_COUNT < max(math.fabs(along), level)
+        or across == 0.0
+        or (2 * size * (count - 1) + phase) < 2 * events
+    )
 
 
 cdef Below _split(
@@ -246,9 +269,14 @@ cdef Fixed _fixed(double first, double step, Int count) noexcept nogil:
         bits -= 1
     line.modulus = (<Int>1) << bits
     line.lift, line.steep = _floored(first), _floored(step)
-    line.offset = <Int>((first - <double>line.lift) * <double>line.modulus)
-    line.slope = <Int>((step - <double>line.steep) * <double>line.modulus)
+    line.offset = <Int>(_share(first - <double>line.lift) * <double>line.modulus)
+    line.slope = <Int>(_share(step - <double>line.steep) * <double>line.modulus)
     return line
+
+
+cdef inline double _share(double value) noexcept nogil:
+    """Return a number between 0 and 1, and 0 for any other."""
+    return value if 0.0 <= value <= 1.0 else 0.0
 
 
 cdef Int _count(
@@ -259,11 +287,15 @@ cdef Int _count(
     cdef Below parts
     cdef Fixed line
     cdef Int begin, before, total
+    cdef double value
     parts = _split(count, size, phase, events, along, across, room)
     if parts.some == 0:
         return parts.sure
     begin = parts.some_from
     before = 2 * size * begin + phase
+    if parts.some == 1:
+        value = along * begin + across * (before // (2 * events))
+        return parts.sure + 1 if value <= room else parts.sure
     line = _fixed((room - along * begin) / across, -along / across, parts.some)
     total = parts.sure + parts.some * (line.lift + 1)
     total += line.steep * (parts.some * (parts.some - 1) // 2)
@@ -303,7 +335,7 @@ cdef Int _count_window(
     double level, double limit
 ) noexcept nogil:
     cdef Int below, beyond
-    if across == 0.0 or (2 * size * (count - 1) + phase) < 2 * events:
+    if _is_straight(count, size, phase, events, along, across, max(math.fabs(level), limit)):
         return _count_straight(count, along, level, limit)
     if across < 0.0:
         along, across, level = -along, -across, -level
@@ -358,7 +390,9 @@ cdef double _negative_window(
     cdef SawSums sums
     cdef Below parts
     cdef double all_
-    if across == 0.0 or (2 * size * (count - 1) + phase) < 2 * events:
+    if _is_straight(
+        count, size, phase, events, <double>along, <double>across, math.fabs(<double>level)
+    ):
         return _negative_straight(count, along, level)
     if across < 0.0:
         # The negative ones are all less the positive ones, which are the negative ones of −d.
@@ -413,6 +447,8 @@ cdef double _some_sum(
         return 0.0
     before = 2 * size * parts.some_from + phase
     base_level = level + along * parts.some_from + across * (before // (2 * events))
+    if n == 1:
+        return <double>base_level if base_level < 0.0 else 0.0
     line = _fixed(<double>(-base_level / across), <double>(-along / across), n)
     _floor_sums(n - 1, line.slope, line.offset, line.modulus, &real_sums[0])
     _floor_sums(n - 1, 2 * size, before % (2 * events), 2 * events, &step_sums[0])

@@ -86,6 +86,22 @@ def test_counts_of_values_up_to_a_limit(data: st.DataObject) -> None:
     assert counted_along(count, line, form, -1.0) == 0
 
 
+@pytest.mark.parametrize("across", [1e-300, -1e-300, 1e-25, -1e-18, 5e-324])
+@pytest.mark.parametrize("along", [0.5, -0.25, 0.0])
+def test_forms_that_hardly_depend_on_the_steps(along: float, across: float) -> None:
+    """A nominal line along the major axis, but for rounding: levels are farther away than any."""
+    count, line = 41, (7, 3, 50)
+    for level in (-10.0, 0.0, 4.0, 1e-20):
+        values = values_of_line(steps_of_line(count, *line), along, across, level)
+        exact = float(sum(one for one in values if one < 0))
+        assert negative_along(count, line, (along, across, level)) == pytest.approx(
+            exact, abs=1e-12
+        )
+        for limit in (0.3, 4.1, 20.3):
+            expected = sum(abs(one) <= limit for one in values)
+            assert counted_along(count, line, (along, across, level), limit) == expected
+
+
 @given(st.data())
 def test_the_sum_of_negative_values(data: st.DataObject) -> None:
     count, line = data.draw(windows())
