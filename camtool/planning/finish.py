@@ -57,9 +57,12 @@ OF_WALLS = (
     PlanningCode.NOT_RELIEVED,
     PlanningCode.CORNER_FAR,
     PlanningCode.FINISH_IN_PASSES,
-    PlanningCode.TAB_LEFT_OUT,
 )
 """What is said of the wall: by the stage that cuts it. All else is said by the first one."""
+
+OF_BOTH = (PlanningCode.LEAD_LEFT_OUT, PlanningCode.TAB_LEFT_OUT)
+"""What either stage says of its own: tabs are made in the roughing, and may be missing on a wall
+round which it does not get."""
 
 
 def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]:
@@ -70,7 +73,7 @@ def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]
     if operation.stage == "rough":
         own_codes = {ProgramCode.GOUGE} if operation.contract.runs_beside else set()
         return [each for each in findings if each.code in own_codes or each.code not in OF_WALLS]
-    return [each for each in findings if each.code in (*OF_WALLS, PlanningCode.LEAD_LEFT_OUT)]
+    return [each for each in findings if each.code in (*OF_WALLS, *OF_BOTH)]
 
 
 def along_walls(

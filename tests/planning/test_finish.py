@@ -234,3 +234,13 @@ def test_the_job_says_what_each_stage_does() -> None:
 def test_what_no_finishing_pass_can_be(settings: dict[str, object], words: str) -> None:
     with pytest.raises(OptionError, match=words):
         Job((Operation(tool=Tool(1.0), **settings),))  # type: ignore[arg-type]
+
+
+def test_holes_without_tabs_are_told_with_a_finishing_pass_too(machine: Machine) -> None:
+    """The piece of a window comes loose, whether its wall is finished or not."""
+    paths = [box(0, 0, 22, 26), box(6, 6, 14, 18)]
+    for finish_mm in (None, 0.15):
+        operation = Operation(tool=Tool(3.0), depth_mm=6.0, finish_mm=finish_mm, tabs=Tabs(2))
+        findings = planned(drawing_of(paths), Job((operation,)), machine).toolpath.findings
+        codes = [finding.code for finding in findings]
+        assert codes.count(PlanningCode.TAB_LEFT_OUT) == 1, finish_mm
