@@ -81,6 +81,7 @@ class LinuxcncTwin(Twin):
         self._halts: list[float] = []  # where it waits, s of the program
         self._segment_s = 0.0
         self._homing = False
+        self._overrides = {"feed": 100, "spindle": 100}
         self._jogs: dict[int, float] = {}  # axes that are being jogged, and their speeds, mm/s
         self._target: Floats = np.zeros(3)  # of the jogs
         self._choices = choices
@@ -165,7 +166,8 @@ class LinuxcncTwin(Twin):
             "probe_value": lambda: str(int(self._is_touching())),
             "probe_tripped": lambda: "YES" if self._parameters[5070] else "NO",
             "linear_unit_conversion": lambda: "MM",
-            "feed_override": lambda: "100",
+            "feed_override": lambda: str(self._overrides["feed"]),
+            "spindle_override": lambda: str(self._overrides["spindle"]),
             "echo": lambda: _on_off(self._echo),
             "verbose": lambda: _on_off(self._verbose),
             "enable": lambda: _on_off(self._enabled),
@@ -223,6 +225,8 @@ class LinuxcncTwin(Twin):
             "mdi": self._mdi,
             "jog_incr": self._jog,
             "teleop_enable": lambda _: self._homed,
+            "feed_override": lambda value: self._override("feed", value, math.inf),
+            "spindle_override": lambda value: self._override("spindle", value, 100.0),
         }
         if name not in orders or not self._enabled:
             return False
@@ -230,6 +234,15 @@ class LinuxcncTwin(Twin):
         if is_done:
             self.commands.append(f"{name} {value}".strip().encode())
         return is_done
+
+    def _override(self, name: str, value: str, highest: float) -> bool:
+        """Take an override, %, as setFeedOverride and setSpindleOverride of emcrsh.cc do; its
+        motion is that of 100 %."""
+        if not 0.0 <= float(value) <= highest:
+            self._say(f"error: invalid: {value} (valid: 0-{highest:g})")
+            return False
+        self._overrides[name] = round(float(value))
+        return True
 
     def _set_estop(self, value: str) -> bool:
         self._estop = value.lower() == "on"

@@ -206,6 +206,8 @@ class LinuxcncConversation(Conversation):
         self._begun = self._aborting = self._pausing = self._going_on = False
         self._changes: dict[Override, int] = {}
         """Overrides that it is to be told, %."""
+        self._taken: dict[Override, int] = {}
+        """Overrides that it has taken, %."""
         self._why_aborted = ""
         self._said = ""
         """Errors that it has reported."""
@@ -272,6 +274,9 @@ class LinuxcncConversation(Conversation):
             if not text or self.is_over or text == self._asked or not self._asked:
                 continue
             if not text.upper().startswith(self._skips):
+                continue
+            if text.startswith(("error: ", "warning: ")):  # its answer follows
+                self._tell(f"it says: {text}")
                 continue
             self._asked = self._skips = ""
             self._go(text, now)
@@ -451,7 +456,13 @@ class LinuxcncConversation(Conversation):
         """Send the user's pause or resume, and follow the status of the running program."""
         while self._changes:
             name, percent = self._changes.popitem()
-            yield from self._set(f"{name}_override {percent}")
+            order = f"set {name}_override"
+            answer = yield f"{order} {percent}"
+            if answer.upper() == f"{order} ack".upper():
+                self._taken[name] = percent
+            else:  # linuxcncrsh takes no spindle above 100 %; that ends no program
+                self.overrides[name] = self._taken.get(name, 100)
+                self._tell(f"it refuses {percent} % of its {name}")
         if self._pausing:
             self._pausing = False
             yield from self._set("pause")

@@ -135,6 +135,30 @@ def test_m0_waits_for_the_user() -> None:
     same_motion(twin, program, loaded)
 
 
+def test_overrides_while_it_is_held_and_one_that_is_refused_end_no_program() -> None:
+    """linuxcncrsh takes no override of the spindle above 100 %."""
+    seen: list[WireState] = []
+    told: list[dict[str, int]] = []
+
+    def wish(talk: Any, now: float) -> None:
+        seen.append(talk.state)
+        if talk.acknowledged >= 8 and WireState.PAUSED not in seen:
+            talk.pause(now)
+        elif talk.state is WireState.PAUSED and not told:
+            told.append(dict(talk.overrides))
+            talk.override("feed", 90, now)
+            talk.override("spindle", 110, now)
+        elif talk.state is WireState.PAUSED and talk.overrides["spindle"] == 100:
+            told.append(dict(talk.overrides))
+            talk.resume(now)
+
+    twin, talk, loaded = met(PROGRAM, wish=wish)
+    assert talk.state is WireState.FINISHED, talk.why
+    assert told == [{}, {"feed": 90, "spindle": 100}]
+    assert b"feed_override 90" in twin.commands
+    same_motion(twin, PROGRAM, loaded)
+
+
 @pytest.mark.parametrize("at_s", [1.0, 2.5, 4.0])
 def test_a_stop_aborts_and_nothing_moves_behind_it(at_s: float) -> None:
     def wish(talk: Conversation, now: float) -> None:
