@@ -42,7 +42,11 @@ from camtool.toolpath.lower import (
     within_feeds,
     without_coolant,
 )
-from camtool.toolpath.moves import Kind, feeds_below_top, mounted_before, toolpath_extents
+from camtool.toolpath.moves import (
+    changes_between_cuts,
+    feeds_below_top,
+    toolpath_extents,
+)
 from camtool.toolpath.program import Program
 from camtool.toolpath.surface import Surface, follow, surface_error
 from camtool.toolpath.touching import untouched_place
@@ -754,10 +758,8 @@ def _swept_mm(
 
 def _touch_mm(wanted_path: Toolpath) -> tuple[tuple[float, float] | None, ...]:
     """Return where each tool that is mounted in the program can be touched off."""
-    import numpy as np
-
-    rows = np.flatnonzero((wanted_path.kind == Kind.TOOL_CHANGE) & ~mounted_before(wanted_path))
-    return tuple(untouched_place(wanted_path, row) for row in rows.tolist())
+    rows = changes_between_cuts(wanted_path).tolist()
+    return tuple(untouched_place(wanted_path, row) for row in rows)
 
 
 def _stock(job: Job) -> PlannedStock | None:

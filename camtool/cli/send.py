@@ -221,7 +221,7 @@ def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
 def _refuse_waiting(one: Consignment, *, single: bool, at_stop: str | None) -> None:
     """Refuse programs that would wait for an answer if nobody can answer; with `at_stop`, their
     stops are answered or are to be waited for."""
-    asks = sum(bool(packet.ask) for packet in one.packets[1:])
+    asks = sum(bool(packet.ask) and not packet.waits for packet in one.packets[1:])
     if asks:
         raise click.UsageError(f"it waits for an answer {asks} times: run it at a terminal")
     if single:

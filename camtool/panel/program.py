@@ -59,8 +59,7 @@ class Course:
 
     def following_block(self, talk: Conversation) -> int:
         """Return the block behind the one that stops the program, from 1."""
-        stop = self.one.packets[min(talk.acknowledged, len(self.one.packets) - 1)].block
-        return self.one.block_of(stop) + 2
+        return self.one.block_of(self.one.packets[talk.stop_index].block) + 2
 
     def waiting_bytes(self, talk: Conversation) -> int:
         """Return the bytes that were sent and are not acknowledged."""

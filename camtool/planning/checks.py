@@ -71,8 +71,8 @@ from camtool.toolpath.moves import (
     STOCK_TOP_MM,
     Kind,
     Toolpath,
+    changes_between_cuts,
     feeds_below_top,
-    mounted_before,
     toolpath_extents,
 )
 
@@ -356,16 +356,16 @@ def _tools_not_said(job: Job) -> Iterator[Finding]:
 
 def _change_not_stated(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
     """The first change of tools on a machine that does not state where they are changed."""
-    changes = (toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath)
+    changes = changes_between_cuts(toolpath)
     keys = [key for key in ("change_mm", "change_z_mm") if getattr(machine.defaults, key) is None]
-    if not keys or not changes.any():
+    if not keys or not len(changes):
         return
-    row = int(changes.argmax())
+    row = int(changes[0])
     x, y, z = toolpath.end[row].tolist()
     yield TOOL_CHANGE_NOT_STATED(
         where=f"{_place(toolpath, row)} at X {x:.3f} Y {y:.3f}",
         measured=z,
-        count=int(changes.sum()),
+        count=len(changes),
         machine=machine.target.name,
         keys=" and ".join(keys),
     )

@@ -66,12 +66,13 @@ class Rest(Struct, frozen=True, eq=False):
 
 class Consignment(Struct, frozen=True, eq=False):
     """A program ready to be sent. `run`: the verified program; `rest`: the bytes that are sent
-    instead of the whole program; `forecast`: the simulation of what is sent."""
+    instead of the whole program; `forecast`: the simulation of what is sent, `data`."""
 
     run: Run
     wire: Wire
     forecast: Forecast
     packets: tuple[Packet, ...]
+    data: bytes = b""
     rest: Rest | None = None
     standing: ResumePoint | None = None
 
@@ -79,13 +80,6 @@ class Consignment(Struct, frozen=True, eq=False):
     def first(self) -> int:
         """Block with which it begins."""
         return 0 if self.rest is None else self.rest.first
-
-    @property
-    def data(self) -> bytes:
-        """Bytes that are sent."""
-        if self.rest is not None:
-            return self.rest.data
-        return self.run.program.data if self.run.program else b""
 
     @property
     def blocks(self) -> int:
@@ -241,8 +235,9 @@ def consignment(
         forecast = forecast_of(decoded, target)
     else:
         forecast = forecast_of_run(run)
+    data = wire.with_stops(data, target.machine, decoded)
     packets = tuple(wire.packets(data, target.machine, forecast))
-    return Consignment(run, wire, forecast, packets, rest_program, resume_point)
+    return Consignment(run, wire, forecast, packets, data, rest_program, resume_point)
 
 
 def _resume_point(state: JournalState, decoded: Toolpath, tool_at: ToolAt) -> ResumePoint:

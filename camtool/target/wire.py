@@ -85,9 +85,9 @@ class Packet(Struct, frozen=True):
     `block`: the last block of the program that is done when it is done, −1 before the first;
     `seconds`: how long the machine is busy with it, by the simulation. `counts`: how many reports
     of it the controller may give, where it gives any. `ask`: what the user must do or allow before
-    it goes out. `note`: what the user must know while the machine waits in it; `waits`: true if it
-    does so until somebody lets it go on. `end_mm`: where it
-    ends, in the work frame, where the conversation looks at that.
+    it goes out. `note`: what the user must know while the machine waits in it; `waits`: true if
+    the program waits there until somebody lets it go on. `end_mm`: where it ends, in the work
+    frame, where the conversation looks at that.
     """
 
     data: bytes
@@ -279,6 +279,11 @@ class Conversation(ABC):
         return actions
 
     @property
+    def stop_index(self) -> int:
+        """Index of the packet at which it waits for the user."""
+        return min(self.acknowledged, len(self.packets) - 1)
+
+    @property
     def at_mm(self) -> Place | None:
         """Position that the machine reports, mm in the work frame in which the program began; None
         if it reports none."""
@@ -445,6 +450,7 @@ class PacketByPacket(Conversation):
         packet = self.packets[self.done]
         if packet.ask and not self._asked:
             self.state, self.why, self.next_s = WireState.WAITING, packet.ask, NEVER
+            self.is_program_stop = packet.waits
             return
         self._asked, self._busy = False, True
         self.sent = self.done + 1
@@ -801,6 +807,11 @@ class Wire(ABC):
         x, y, z = (math.inf if (each := axis.travel_mm) is None else each for axis in machine.axes)
         u, v, w = (0.0 if math.isfinite(each) else -math.inf for each in (x, y, z))
         return (u, v, w), (x, y, z)
+
+    def with_stops(self, data: bytes, machine: Machine[Any, Any], path: Toolpath) -> bytes:
+        """Return a program as the controller is to get it: it stops where the user mounts another
+        tool, if it does not by itself. Blocks stay as they are counted; `path` is what they do."""
+        return data
 
     @abstractmethod
     def packets(

@@ -443,3 +443,8 @@ def mounted_before(toolpath: Toolpath) -> Bools:
     changer the operator mounts this tool before the program starts."""
     fed = np.cumsum(toolpath.is_feed) > 0
     return np.asarray((toolpath.kind == Kind.TOOL_CHANGE) & ~fed)
+
+
+def changes_between_cuts(toolpath: Toolpath) -> Ints:
+    """Return the rows of the other tool changes, at which the operator has to be waited for."""
+    return np.flatnonzero((toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath))

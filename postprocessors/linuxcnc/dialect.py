@@ -89,11 +89,14 @@ Word = Annotated[str, Meta(pattern=r"^[!-~]+$")]
 class LinuxcncLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """linuxcncrsh: the passwords of its line (`--connectpw`) and of its commands (`--enablepw`),
     and the `folder` in which the computer of LinuxCNC finds the programs that are sent, where that
-    is not the path that they have here."""
+    is not the path that they have here. `stops_at_tools`: programs that are sent stop behind each
+    tool change between cuts, until the user has touched off and lets them go on; false for a
+    machine that changes and measures its tools itself."""
 
     password: Word = "EMC"
     enable_password: Word = "EMCTOO"
     folder: Word | None = None
+    stops_at_tools: bool = True
 
 
 LinuxcncMachine = Machine[SlideStart, LinuxcncDialect]

@@ -34,6 +34,7 @@ from camtool.target.wire import (
     Wire,
     WireState,
 )
+from camtool.toolpath.moves import Kind, Toolpath, changes_between_cuts
 from camtool.toolpath.probing import CycleRun, ProbeCycle, ProbeStep
 
 from ..gcode.blocks import has_words
@@ -69,7 +70,10 @@ _FRAMES = re.compile(rb"G0*(?:10|52|5[5-9]|92)(?!\d)", re.IGNORECASE)
 _WAITS = re.compile(r"M0*(?:[01]|60)(?![\d.])", re.IGNORECASE)
 """Words that wait for the operator; M1 does so where the switch of optional stops is on, which the
 program cannot know."""
-_COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
+_COMMENT = re.compile(r"\(([^()]*)\)|;(.*)|\s")
+_CODE = r"\([^()]*\)|;.*|(M[ \t]*0*6(?![\d.])|G[ \t]*0*43(?![\d.]))"
+_CHANGES = re.compile(_CODE, re.IGNORECASE)
+"""Comments, and words that change the tool and put its length in force."""
 
 _ENDS = re.compile(rb"[\r\n]+")
 _LINES = re.compile(r"\r\n|\n|\r")
@@ -97,20 +101,50 @@ class LinuxcncWire(Wire):
     overrides = ("feed", "spindle")
     question = b"hello EMC camtool 1.0\r\n"
 
+    def with_stops(self, data: bytes, machine: LinuxcncMachine, path: Toolpath) -> bytes:
+        """M0 behind each tool change between cuts, where the length of the tool is in force: on
+        the line of its M6, or of a G43 behind that, before anything moves or turns."""
+        if not _link(machine).stops_at_tools:
+            return data
+        changes = set(path.block[changes_between_cuts(path)].tolist())
+        turns = np.isin(path.kind, (Kind.SPINDLE_CW, Kind.SPINDLE_CCW))
+        acting = set(path.block[path.is_motion | turns].tolist())
+        lines = re.split(r"(\r\n|\n|\r)", data.decode("latin-1"))
+        numbers = [k for k in range(0, len(lines), 2) if has_words(lines[k])]
+        for change in changes:
+            last = change + 1
+            while last < len(numbers) and last not in acting | changes:
+                last += 1
+            group = numbers[change:last]
+            if any(_WAITS.search(_COMMENT.sub("", lines[k])) for k in group):
+                continue  # it stops there already
+            named = [k for k in group if any(_CHANGES.findall(lines[k]))]
+            for k in named[-1:]:
+                lines[k] = _CHANGES.sub(
+                    lambda found: f"M0 {found[0]}" if found[1] else found[0], lines[k]
+                )
+        return "".join(lines).encode("latin-1")
+
     def packets(
         self, data: bytes, machine: LinuxcncMachine, forecast: Forecast
     ) -> Sequence[Packet]:
-        """A packet is a line that is a block; nothing of it goes over the line."""
+        """A packet is a line that is a block; nothing of it goes over the line. One that stops has
+        the comments since the last motion as its note."""
         packets: list[Packet] = []
+        notes: list[str] = []
         steady = bool((np.diff(forecast.decoded.block) >= 0).all())
         for number, line in enumerate(_LINES.split(data.decode("latin-1")), 1):
+            notes += [(one or other).strip() for one, other in _COMMENT.findall(line)]
             if has_words(line) and len(packets) < len(forecast):
                 block = len(packets)
                 seconds = float(forecast.seconds[block])
                 # Where lines are executed again, none is done for certain before the end.
                 counts = (number if steady else 0,)
                 waits = bool(_WAITS.search(_COMMENT.sub("", line)))
-                packets.append(Packet(line.encode("latin-1"), block, seconds, counts, waits=waits))
+                note = "; ".join(filter(None, notes)) if waits else ""
+                notes = notes if not (waits or seconds) else []
+                text = line.encode("latin-1")
+                packets.append(Packet(text, block, seconds, counts, note=note, waits=waits))
         if not packets:
             raise MachineError("the program has no blocks")
         ends = forecast.end_mm[~np.isnan(forecast.end_mm).any(axis=1)]
@@ -206,6 +240,7 @@ class LinuxcncConversation(Conversation):
         self._begun = self._aborting = self._pausing = self._going_on = False
         self._changes: dict[Override, int] = {}
         """Overrides that it is to be told, %."""
+        self._passed = -1  # the last stop behind which it has gone on
         self._taken: dict[Override, int] = {}
         """Overrides that it has taken, %."""
         self._why_aborted = ""
@@ -229,6 +264,7 @@ class LinuxcncConversation(Conversation):
         """Go on, or with the next line where single blocks are wanted."""
         if self.state in HALTS or self.state is WireState.PAUSING:
             self._pausing, self._going_on = False, True
+            self._passed = self.stop_index if self.state is WireState.WAITING else self._passed
             self.state, self.why = WireState.SENDING, ""
 
     def override(self, name: Override, percent: int, now: float) -> None:
@@ -247,6 +283,17 @@ class LinuxcncConversation(Conversation):
             return
         self._unwrite()
         self._end(WireState.STOPPED, "stopped before it was told to move")
+
+    @property
+    def stop_index(self) -> int:
+        """Index of the next stop, of those between the motions about the line that it reports."""
+        low = high = min(self.acknowledged, len(self.packets) - 1)
+        while low > 0 and not self.packets[low - 1].seconds:
+            low -= 1
+        while high + 1 < len(self.packets) and not self.packets[high + 1].seconds:
+            high += 1
+        stops = (k for k in range(max(low, self._passed + 1), high + 1) if self.packets[k].waits)
+        return next(stops, super().stop_index)
 
     @property
     def _unattended(self) -> str:
@@ -475,8 +522,9 @@ class LinuxcncConversation(Conversation):
             elif self.state is WireState.SENDING and self.single:
                 self.state, self.why = WireState.PAUSED, "single block"
             elif self.state is WireState.SENDING:
-                self.state, self.why = WireState.WAITING, "the program waits"
-                self.is_program_stop = True
+                note = self.packets[self.stop_index].note
+                self.state, self.is_program_stop = WireState.WAITING, True
+                self.why = f"the program waits: {note}" if note else "the program waits"
         elif status == "RUNNING" and self.state in HALTS:
             self.state, self.why = (
                 WireState.SENDING,

@@ -26,6 +26,7 @@ from camtool.target.wire import (
     Wire,
     WireState,
 )
+from camtool.toolpath.moves import changes_between_cuts
 
 from .controller import compensations
 from .dialect import PicMmhLink, PicMmhMachine
@@ -81,11 +82,14 @@ class PicMmhWire(Wire):
 
     def packets(self, data: bytes, machine: PicMmhMachine, forecast: Forecast) -> Sequence[Packet]:
         """The compensations, then the blocks; by region, a compensation before each block for
-        which it changes."""
+        which it changes. Whether M06 waits the thesis does not say: the user is asked before it
+        goes out."""
         fixed_mm = tuple(axis.compensation_mm for axis in machine.axes)[:2]
-        by_block = _by_block(forecast.decoded, machine)
+        decoded = forecast.decoded
+        by_block = _by_block(decoded, machine)
         before = next(iter(by_block.values()), fixed_mm)
         packets = [Packet(text) for text in _compensations(before)]
+        changes = set(decoded.block[changes_between_cuts(decoded)].tolist())
         *blocks, _ = data.split(b";")
         room = machine.dialect.buffer_chars
         for number, block in enumerate(blocks):
@@ -104,7 +108,9 @@ class PicMmhWire(Wire):
                 for added, fixed in zip(added_mm, fixed_mm, strict=True)
             ]
             counts = (_reports(forecast, number, machine, made_mm),)
-            packets.append(Packet(text, number, seconds, counts))
+            stops = number in changes
+            ask = f"mount tool {int(text[4:6])} and touch it off" if stops else ""
+            packets.append(Packet(text, number, seconds, counts, ask, waits=stops))
         return packets
 
     def conversation(

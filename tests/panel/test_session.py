@@ -367,6 +367,52 @@ def test_at_a_stop_the_tool_is_touched_off_and_the_program_goes_on(tmp_path: Pat
     assert read_journal(loaded.journal).finished
 
 
+LINUXCNC_CHANGE = (
+    b"G21 G90 G61\nT1 M6\nG43 H1\nG0 Z1\nM3 S900\nG1 X2 F300\nM5\n"
+    b"(T2: end mill 3 mm, sticks out 18 mm)\nT2 M6\nG43 H2\nM3 S900\n"
+    b"G0 X0 Y0\nG1 Z0 F300\nG1 X1 Y1\nG0 Z1\nM2\n"
+)
+
+
+def test_linuxcnc_stops_at_m6_for_the_tool_to_be_touched_off(tmp_path: Path) -> None:
+    loaded = program(tmp_path, LINUXCNC_CHANGE, "linuxcnc")
+    with at_panel("linuxcnc") as at:
+        at.until_state("ready")
+        start(at, loaded)
+        at.until(lambda: at.session.state.stops)
+        assert "T2: end mill 3 mm, sticks out 18 mm" in at.session.state.why
+        assert at.at_mm == pytest.approx((2.0, 0.0, 1.0), abs=0.01)
+        at.session.leave_stop()
+        at.until_told("touch off; it goes on with block 10")
+        at.until(lambda: at.session.state.state == "ready")
+        at.session.order("zero", {"z": 1.5})
+        at.until(lambda: at.at_mm[2] == pytest.approx(1.5, abs=0.01))
+        at.until(lambda: at.session.state.state == "ready")
+        cut = len(at.twin.slides.trace)
+        start(at, loaded, first=9, more=True)
+        at.until_told("finished")
+    behind = at.twin.slides.trace.commanded[cut:]
+    assert behind[:, 2].min() == pytest.approx(-0.5, abs=0.01)
+    assert behind[:, 0].max() == pytest.approx(2.0, abs=0.01)
+    assert read_journal(loaded.journal).finished
+
+
+def test_pic_mmh_is_asked_for_before_m06(tmp_path: Path) -> None:
+    """Nothing says that this controller waits at M06: the sender does, before the block."""
+    data = b"G54;G90;M06T01;G01X00010.00Y00000.00F08;M06T04;G01X00000.00Y00000.00F08;M30;"
+    loaded = program(tmp_path, data, "pic-mmh")
+    with at_panel("pic-mmh") as at:
+        at.until_state("ready")
+        start(at, loaded)
+        at.until(lambda: at.session.state.stops)
+        assert at.session.state.why == "mount tool 4 and touch it off"
+        assert b"M06T04;" not in b"".join(at.twin.decoded)
+        assert b"M06T01;" in b"".join(at.twin.decoded)
+        at.session.request(Request.RESUME)
+        at.until_told("finished")
+        assert b"M06T04;" in b"".join(at.twin.decoded)
+
+
 def test_a_plate_is_touched_and_its_lower_side_is_zero() -> None:
     how = Touch(reach_mm=10.0, fast=400.0, slow=100.0)
     with at_panel("grbl", "probe_mm=-9") as at:

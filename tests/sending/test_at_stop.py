@@ -19,12 +19,15 @@ from tests.waiting import HANG_S
 
 PROGRAM = b"G21 G90\n(turn the part `touch stolen` over)\nM0\nG1 X1 F300\nM0\nG1 X0\n"
 
+LINUXCNC = b"G21 G90\nT1 M6\nG43 H1\nG0 Z1\nG1 X1 F300\nT2 M6\nG43 H2\nG1 X0\nM2\n"
+PIC_MMH = b"G54;G90;M06T01;G01X00003.00Y00000.00F08;M06T02;G01X00000.00Y00000.00F08;M30;"
+
 
 def sent(
-    folder: Path, port: str, *more: str, program: bytes = PROGRAM
+    folder: Path, port: str, *more: str, program: bytes = PROGRAM, target: str = "grbl"
 ) -> subprocess.CompletedProcess[str]:
     (folder / "part.nc").write_bytes(program)
-    words = ["send", "part.nc", "-t", "grbl", "--port", port, "--yes", "--speed", "10", *more]
+    words = ["send", "part.nc", "-t", target, "--port", port, "--yes", "--speed", "10", *more]
     return subprocess.run(
         [sys.executable, "-m", "camtool", *words],
         cwd=folder,
@@ -46,6 +49,28 @@ def test_a_command_is_run_at_each_stop(tmp_path: Path) -> None:
     assert "turn the part `touch stolen` over" in first
     assert "turn" not in second
     assert not (tmp_path / "stolen").exists()
+    assert read_journal(tmp_path / "part.nc.journal").finished
+
+
+@pytest.mark.parametrize(
+    ("target", "block", "program"),
+    [
+        ("linuxcnc", "block 7 (M0 G43 H2)", LINUXCNC),
+        ("pic-mmh", "block 5 (M06T02;)", PIC_MMH),
+    ],
+)
+def test_a_tool_change_between_cuts_is_a_stop(
+    tmp_path: Path, target: str, block: str, program: bytes
+) -> None:
+    twin = load_target(target).twin([])
+    with hosted(twin, 10.0) as port:
+        refused = sent(tmp_path, port, program=program, target=target)
+        assert refused.returncode == 2
+        assert f"in {block}:" in " ".join(refused.stderr.split())
+        command = 'echo "$CAMTOOL_WHY" >> stops'
+        done = sent(tmp_path, port, "--at-stop", command, program=program, target=target)
+    assert done.returncode == 0, done.stderr
+    assert len((tmp_path / "stops").read_text().splitlines()) == 1
     assert read_journal(tmp_path / "part.nc.journal").finished
 
 

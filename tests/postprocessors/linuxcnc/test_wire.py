@@ -135,6 +135,39 @@ def test_m0_waits_for_the_user() -> None:
     same_motion(twin, program, loaded)
 
 
+CHANGE = (
+    b"G21 G90 G61\nT1 M6\nG43 H1\nG0 Z5\nM3 S1000\nG1 X4 F600\n(wide part)\nG1 X5\nM5\n"
+    b"(T2: end mill 3 mm, sticks out 18 mm) (M6 here)\nT2 m06 (by hand)\nG43 H2 ; its length\n"
+    b"M3 S900\nG1 X9\nM5\nT3M6\nG1 X2\nT4 M6\nM0\nG1 X0\nM2\n"
+)
+
+
+def test_it_stops_behind_each_tool_change_between_cuts() -> None:
+    """On the line that puts the length in force, or else on that of M6; never twice."""
+    loaded = load_target("linuxcnc")
+    wire: Any = loaded.target.wire()
+    decoded = loaded.target.read(CHANGE, loaded.machine)
+    sent = wire.with_stops(CHANGE, loaded.machine, decoded)
+    assert sent == CHANGE.replace(b"G43 H2", b"M0 G43 H2").replace(b"T3M6", b"T3M0 M6")
+    again = loaded.target.read(sent, loaded.machine)
+    assert np.array_equal(again.end[again.is_motion], decoded.end[decoded.is_motion])
+    own = load_target("linuxcnc", settings=("link.stops_at_tools=false",))
+    assert wire.with_stops(CHANGE, own.machine, decoded) == CHANGE
+    stops: list[tuple[str, int]] = []
+
+    def wish(talk: Any, now: float) -> None:
+        if talk.state is WireState.WAITING:
+            stops.append((talk.why, talk.packets[talk.stop_index].block))
+            talk.resume(now)
+
+    twin, talk, _ = met(sent, wish=wish)
+    assert talk.state is WireState.FINISHED, talk.why
+    note = "T2: end mill 3 mm, sticks out 18 mm; M6 here; by hand; its length"
+    waits = "the program waits"
+    assert stops == [(f"{waits}: {note}", 9), (waits, 13), (waits, 16)]
+    same_motion(twin, CHANGE, loaded)
+
+
 def test_overrides_while_it_is_held_and_one_that_is_refused_end_no_program() -> None:
     """linuxcncrsh takes no override of the spindle above 100 %."""
     seen: list[WireState] = []
