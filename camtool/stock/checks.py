@@ -389,11 +389,12 @@ class _Checks:
         """Yield PASS_TOO_DEEP for feeds that take more at once than their operation allows."""
         limit = self._chips_mm()
         feeds = ~self.moves.rapid[self.cuts.move] & self._in_stock(self.cuts.points)
+        # No move cuts below its lower end, nor above the top of the stock.
+        lowest = np.minimum(self.moves.start[:, 2], self.moves.end[:, 2])
+        feeds &= (STOCK_TOP_MM - lowest > limit + self.deep_mm)[self.cuts.move]
         points, move = np.ascontiguousarray(self.cuts.points[feeds]), self.cuts.move[feeds]
         before = self.stock.tops(points, move)
-        # No move cuts below its lower end.
-        lowest = np.minimum(self.moves.start[move, 2], self.moves.end[move, 2])
-        doubtful = before - lowest > limit[move] + self.deep_mm
+        doubtful = before - lowest[move] > limit[move] + self.deep_mm
         points, move, before = points[doubtful], move[doubtful], before[doubtful]
         after = np.maximum(self.stock.tops(points, move + 1), self.before.floors(points))
         chip = before - after
