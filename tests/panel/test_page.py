@@ -487,6 +487,16 @@ def test_the_whole_page_by_the_keyboard_alone(grbl: At) -> None:
     at.until_told("[VER:1.1")
 
 
+def test_the_loaded_program_is_the_chosen_one(grbl: At, tmp_path: Path) -> None:
+    """A page that comes later offers to load it again, and not the first of the folder."""
+    load(grbl)
+    (tmp_path / "another.nc").write_bytes(PROGRAM)
+    grbl.page.reload()
+    grbl.page.wait_for_function("() => first && first.program !== null")
+    assert grbl.page.locator("#load-name option").all_inner_texts() == ["another.nc", "part.nc"]
+    assert grbl.page.locator("#load-name").input_value() == "part.nc"
+
+
 def test_a_screen_reader_hears_a_name_of_each_control(grbl: At) -> None:
     """By the accessibility tree of Chromium."""
     load(grbl)

@@ -66,14 +66,14 @@ function begin(data) {
   stepSizes(machine, can("hold"));
   overrides(data.overrides);
   choices("tool-at", data.tool_at.map((name) => [name, TOOL_AT[name]]));
-  choices("load-name", data.programs.map((name) => [name, name]));
+  choices("load-name", data.programs.map((name) => [name, name]), data.program && data.program.name);
   find("load-box").hidden = !data.programs.length;
   if (program) showProgram(program);
 }
 
-/** Replace the options of a select, and keep what was chosen. */
-function choices(id, pairs) {
-  const select = find(id), chosen = select.value;
+/** Replace the options of a select, and keep what was chosen; at first it is `first`. */
+function choices(id, pairs, first) {
+  const select = find(id), chosen = select.value || first;
   select.replaceChildren(...pairs.map(([value, text]) => new Option(text, value)));
   if (pairs.some(([value]) => value === chosen)) select.value = chosen;
 }
