@@ -252,6 +252,21 @@ def test_a_program_is_driven_and_its_path_is_the_predicted_one(tmp_path: Path) -
         assert "emergency stop" in stopped.stderr
 
 
+def test_it_stops_behind_a_tool_change(tmp_path: Path) -> None:
+    program = tmp_path / "part.ngc"
+    program.write_bytes(
+        b"G21 G90 G17\nT1 M6\nG43 H1\nG0 Z3\nG1 X2 F300\n(T2: end mill 3 mm)\nT2 M6\nG43 H2\n"
+        b"G1 X4\nG0 Z3\nM2\n"
+    )
+    stops = tmp_path / "stops"
+    with live(tmp_path) as (port, _):
+        at = ["-t", "linuxcnc", "--port", f"socket://127.0.0.1:{port}", "--yes"]
+        command = f'echo "$CAMTOOL_WHY" >> {stops}'
+        sent = camtool("send", str(program), *at, "--home", "--at-stop", command)
+        assert sent.returncode == 0, sent.stderr
+    assert stops.read_text() == "the program waits: T2: end mill 3 mm\n"
+
+
 def test_its_probe_finds_a_blank_that_lies_aslant(tmp_path: Path) -> None:
     program = tmp_path / "part.ngc"
     program.write_bytes(b"G21 G90 G17\nG0 Z3\nG0 X2 Y1\nG1 Z-1 F300\nG1 X22\nG1 Y11\nG0 Z3\nM2\n")
