@@ -72,6 +72,14 @@ LAST_PART = 0.5
 """Fraction of its acceleration that the last move before a wait uses in the mode "blend", and a
 move that overlaps with another."""
 
+MOVES_BEFORE = 2
+"""Moves that are planned once more with a block: what a blend leaves of the last of them depends
+on the corner at its start."""
+
+RAMP_S = 0.01
+"""A cut that lasts no longer, and does not end at rest, changes its speed evenly from its start to
+its end (1 / ARC_BLEND_RAMP_FREQ, `tpActivateSegment`)."""
+
 REST_PERIODS = 2.0
 """Servo periods that coming to rest takes beyond the trapezoid in whole periods, the nearest
 number: 1 to 3 in all, by where the last of them ends (measured on 278 stops)."""
@@ -142,9 +150,9 @@ class PlannedWindow(Struct, frozen=True, eq=False):
 class _Run:
     """Run of a program, planned in windows of some thousand rows.
 
-    A block of rows begins where a move does. Planned with it are the move before it, for the
-    corner between them, and as many moves behind it as the planner knows of. Moves begin at
-    places: twice a row, and one more in the middle of an arc that is two lines.
+    A block of rows begins where a move does. Planned with it are `MOVES_BEFORE` moves before it,
+    for the corner between them, and as many moves behind it as the planner knows of. Moves begin
+    at places: twice a row, and one more in the middle of an arc that is two lines.
     """
 
     def __init__(self, path: Toolpath, machine: _Machine) -> None:
@@ -174,14 +182,15 @@ class _Run:
 
     def _block(self, low: int, high: int) -> SampledRows:
         """The rows of the moves low:high."""
-        base, rows = self._place(low - 1), 2 * len(self._path)
-        own_moves = slice(min(low, 1), min(low, 1) + high - low)
+        base, rows = self._place(low - MOVES_BEFORE), 2 * len(self._path)
+        before = min(low, MOVES_BEFORE)
+        own_moves = slice(before, before + high - low)
         window = lookahead = self._machine.controller.lookahead_moves
         while True:
             end = self._place(high + lookahead)
             window_plan = self._planned(base, end)
             places = slice(2 * own_moves.start, None if end == rows else -1)
-            lasting, speeds = _speeds(window_plan, places, self._rules.modes, self._before)
+            lasting, speeds = _speeds(window_plan, places, self._rules, self._before)
             overlap = np.append(window_plan.corners.overlap[1:], 0.0)
             overlaps = _in_turns(0.0, overlap)[lasting]
             done_count = int(lasting[: 2 * own_moves.stop].sum())
@@ -189,13 +198,14 @@ class _Run:
                 break
             lookahead *= 2  # some of the moves are too short to be planned
         part_seconds = np.zeros(len(lasting) + 1)
-        part_seconds[:-1][lasting] = self._in_periods(speeds, overlaps, done_count)
+        cuts = np.repeat(window_plan.moves.cuts, 2)[lasting]
+        part_seconds[:-1][lasting] = self._in_periods(speeds, overlaps, cuts, done_count)
         block_rows, first = slice(self._place(low) // 2, self._place(high) // 2), base // 2
         seconds = _seconds(window_plan, part_seconds)[
             block_rows.start - first : block_rows.stop - first
         ]
         samples = LinuxcncSamples(window_plan, self._machine, self._spacing_mm, self._passed_mm)
-        self._passed_mm = samples.passed_mm(own_moves.stop - 1)
+        self._passed_mm = samples.passed_mm(own_moves.stop - min(high, MOVES_BEFORE))
         return SampledRows(block_rows.start, block_rows.stop, first, samples, seconds)
 
     def _place(self, move: int) -> int:
@@ -214,14 +224,20 @@ class _Run:
         moves = moves_of(tangents, chain, self._rules)
         return PlannedWindow(origin, tangents, moves, corners_of(moves, tangents, self._rules))
 
-    def _in_periods(self, plan: SpeedPlan, overlaps: Floats, done_count: int) -> Floats:
+    def _in_periods(
+        self, plan: SpeedPlan, overlaps: Floats, cuts: Bools, done_count: int
+    ) -> Floats:
         """(N,) s of each block, less its overlap (N,) with the next; from rest to rest it takes
-        whole servo periods, and `REST_PERIODS`. The next plan begins behind the first `done_count`
-        of these."""
+        whole servo periods, and `REST_PERIODS`. Short ones of `cuts` (N,) change their speed
+        evenly. The next plan begins behind the first `done_count` of these."""
         controller = self._machine.controller
         period_s = controller.servo_period_s
         squares = plan.squares(controller.lookahead_moves)
         seconds = plan.seconds(squares)
+        speeds = np.sqrt(squares)
+        ramps = np.flatnonzero(cuts & (overlaps == 0.0) & (speeds[1:] > 0.0))
+        evenly = 2.0 * plan.length_mm[ramps] / (speeds[ramps] + speeds[ramps + 1])
+        seconds[ramps] = np.where(evenly < RAMP_S, evenly, seconds[ramps])
         seconds -= np.minimum(overlaps, 0.5 * seconds)
         has_rest = (squares[1:] == 0.0) & (overlaps == 0.0)
         rests = np.flatnonzero(has_rest)  # blocks behind which the machine stands
@@ -354,10 +370,12 @@ class LinuxcncSamples(CountedSamples):
 
 
 def _speeds(
-    window_plan: PlannedWindow, places: slice, modes: CornerModes, before: EntryState
+    window_plan: PlannedWindow, places: slice, rules: CornerRules, before: EntryState
 ) -> tuple[Bools, SpeedPlan]:
     """Blends and moves as blocks of their own. At even places of all (2 M,) stands the blend
-    before a move, then the move: which of them last and lie in `places`, and these.
+    before a move, then the move: which of them last and lie in `places`, and these. A line that
+    joins the blend at its end is no block of its own. No block is faster than its length in
+    `MIN_PERIODS` (`tpComputeOptimalVelocity`).
 
     In the mode "blend" the last move before a wait accelerates by half: it was kept ready for a
     blend that never came (`tcGetOverallMaxAccel`). So do moves that overlap. In all modes it is
@@ -365,32 +383,50 @@ def _speeds(
     half (`tpCalculateOptimizationInitialVel`).
     """
     moves, corners = window_plan.moves, window_plan.corners
-    own_length = moves.length - corners.reach_on
-    own_length -= np.append(corners.reach[1:], 0.0)
-    path_lengths = _in_turns(corners.length, np.maximum(own_length, 0.0, out=own_length))
+    own_length, joined_length = _lengths(moves, corners)
+    path_lengths = _in_turns(corners.length + joined_length, own_length)
     lasting = np.zeros(len(path_lengths), dtype=np.bool_)
     lasting[places] = path_lengths[places] > MIN_LENGTH_MM
-    along, fastest = _tangential_limits(moves, modes, corners)
+    along, fastest = _tangential_limits(moves, rules.modes, corners)
     entry_speed = np.where(corners.length > 0.0, np.inf, corners.speed)
     entered = np.minimum(entry_speed, np.where(moves.last, np.sqrt(along * own_length), np.inf))
+    highest = _in_turns(corners.speed, np.minimum(moves.speed, fastest))
+    np.minimum(highest, path_lengths / (MIN_PERIODS * rules.period_s), out=highest)
     return lasting, SpeedPlan(
         path_lengths[lasting],
-        _in_turns(corners.speed, np.minimum(moves.speed, fastest))[lasting],
+        highest[lasting],
         _in_turns(corners.acceleration, along)[lasting],
-        _in_turns(np.inf, entered)[lasting],
+        _in_turns(np.where(corners.joins, np.roll(entered, 1), np.inf), entered)[lasting],
         before,
     )
+
+
+def _lengths(moves: PlannerMoves, corners: PlannerCorners) -> tuple[Floats, Floats]:
+    """Return the lengths (M,) mm of moves without their blends, 0 of lines that join one, and the
+    lengths (M,) mm of the lines that join the blends at the starts of moves."""
+    own_length = moves.length - corners.reach_on
+    own_length[:-1] -= corners.reach[1:]
+    np.maximum(own_length, 0.0, out=own_length)
+    joined_length = np.where(corners.joins, np.roll(own_length, 1), 0.0)
+    own_length[:-1][corners.joins[1:]] = 0.0
+    return own_length, joined_length
 
 
 def _seconds(window_plan: PlannedWindow, part_seconds: Floats) -> Floats:
     """(N,) s of each row, with what each blend and move takes, `part_seconds` (2 M + 1,).
 
-    Half of a blend belongs to the row on either side; the rows of a merged line share its time by
-    their lengths.
+    Half of a blend belongs to the row on either side, and a line that joins it to the row before;
+    the rows of a merged line share its time by their lengths.
     """
-    path, moves = window_plan.tangents.path, window_plan.moves
+    path, moves, corners = window_plan.tangents.path, window_plan.moves, window_plan.corners
+    _, joined_length = _lengths(moves, corners)
+    joined = np.flatnonzero(joined_length)
+    later_share = np.full(len(moves.length) + 1, 0.5)
+    later_share[joined] *= corners.length[joined] / (corners.length + joined_length)[joined]
     seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
-    move_seconds = part_seconds[1::2] + 0.5 * (part_seconds[0:-1:2] + part_seconds[2::2])
+    blend_seconds = part_seconds[0::2]
+    later_seconds = later_share * blend_seconds
+    move_seconds = part_seconds[1::2] + later_seconds[:-1] + (blend_seconds - later_seconds)[1:]
     moving = np.flatnonzero(moves.row_of >= 0)
     move = moves.row_of[moving]
     seconds[moving] = move_seconds[move] * (move_lengths(path)[moving] / moves.length[move])
@@ -592,8 +628,8 @@ class PlannerMoves(Struct, frozen=True, eq=False):
     programmed, within the limits), acceleration mm/s² (of the whole machine in that direction),
     each (M,); is_arc (M,), and of arcs the `highest` speed (M,) mm/s and the acceleration `bend`
     (M,) mm/s² that turns the tool at it, 0 of lines;
-    waits (M,): the machine comes to rest before this move, whatever the corner; like (M,): this
-    move and the one before are both rapids or both at a feed."""
+    waits (M,): the machine comes to rest before this move, whatever the corner; same_kind
+    (M,): this move and the one before are both rapids or both at a feed; cuts (M,): at a feed."""
 
     row_of: Ints
     row: Ints
@@ -606,6 +642,7 @@ class PlannerMoves(Struct, frozen=True, eq=False):
     bend: Floats
     waits: Bools
     same_kind: Bools
+    cuts: Bools
 
     @property
     def last(self) -> Bools:
@@ -644,14 +681,14 @@ def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> PlannerMove
     arm, limits = tangents.arm_of(lead[arcs]), (rules.rate, rules.acceleration)
     bend = np.zeros(len(lead))
     highest[arcs], along[arcs], bend[arcs] = _arc_limits(tangents.arms, arm, length[arcs], limits)
-    highest = np.minimum(highest, length / (MIN_PERIODS * period_s))
+    highest = np.minimum(highest, length / period_s)
     cuts = path.is_feed[lead]
     speed = np.minimum(np.where(cuts, path.feed[lead], np.inf) / 60.0, highest)
     waits = np.diff(np.cumsum(np.isin(path.kind, EVENTS_AT_REST))[lead], prepend=-1) > 0
     same_kind = cuts == np.roll(cuts, 1)
     mode = path.mode[lead]
     return PlannerMoves(
-        row_of, lead, mode, length, speed, along, is_arc, highest, bend, waits, same_kind
+        row_of, lead, mode, length, speed, along, is_arc, highest, bend, waits, same_kind, cuts
     )
 
 
@@ -816,7 +853,7 @@ class PlannerCorners(Struct, frozen=True, eq=False):
     `shape` (3, M, 3): their centres, and from there to where they begin and end. Where moves
     overlap: `before` and `after` (M,) mm, how far from the corner they do, `overlap` (M,) s, for
     how long, and `ramp` (M,), in which part of that time the second of them speeds up; 0
-    elsewhere."""
+    elsewhere. `joins` (M,): the line before the corner is part of the blend."""
 
     speed: Floats
     lost_share: Floats
@@ -829,6 +866,7 @@ class PlannerCorners(Struct, frozen=True, eq=False):
     after: Floats
     overlap: Floats
     ramp: Floats
+    joins: Bools
 
 
 class CornerRules(Struct, frozen=True):
@@ -876,13 +914,20 @@ def corners_of(moves: PlannerMoves, tangents: Tangents, rules: CornerRules) -> P
         tangents.at_starts(moves.row),
     )
     used_mm = np.zeros(len(moves.length))  # of each move, by the blend at its start
+    lines = ~moves.is_arc & (moves.same_kind | ~moves.cuts)
+    joinable = lines
     for _ in range(MAX_ROUNDS):
-        corners = _meet(moves, tangents, bends, used_mm, rules)
-        if not moves.is_arc.any() or (corners.reach_on == used_mm).all():
+        corners = _meet(moves, tangents, bends, used_mm, joinable, rules)
+        free = lines & (corners.overlap == 0.0)
+        if (corners.reach_on == used_mm).all() and (free == joinable).all():
             break
-        used_mm = corners.reach_on
+        used_mm, joinable = corners.reach_on, free
     return corners
 
+
+GAP_PERIODS = 4.0
+"""A line of which the blend at its end leaves less than so many servo periods at the blend's speed
+becomes part of the blend (ARC_BLEND_GAP_CYCLES, `blendCheckConsume`)."""
 
 MAX_ROUNDS = 4
 """Most rounds of planning the corners with the lengths that the blends of the round before
@@ -890,14 +935,22 @@ leave."""
 
 
 def _meet(
-    moves: PlannerMoves, tangents: Tangents, bends: Bends, used_mm: Floats, rules: CornerRules
+    moves: PlannerMoves,
+    tangents: Tangents,
+    bends: Bends,
+    used_mm: Floats,
+    joinable: Bools,
+    rules: CornerRules,
 ) -> PlannerCorners:
-    """All corners, where blends at the starts of moves use so much (M,) mm of them."""
+    """All corners, where blends at the starts of moves use so much (M,) mm of them. Lines that
+    overlap with the move before, or wait for the spindle behind a rapid, are not `joinable` (M,)
+    (`tcCanConsume`)."""
     count = len(moves.length)
     zeros = [np.zeros(count) for _ in range(10)]
     corners = PlannerCorners(
         zeros[0], zeros[1], zeros[2], zeros[3], zeros[4], zeros[5], np.zeros((3, count, 3)),
         zeros[6], zeros[7], zeros[8], zeros[9],
+        np.zeros(count, dtype=np.bool_),
     )  # fmt: skip
     rows = np.arange(count)
     before = moves.mode[rows - 1]
@@ -918,9 +971,11 @@ def _meet(
     normal = np.cross(bends.before, bends.after)
     flat = np.hypot(normal[:, 0], normal[:, 1]) <= COPLANAR * np.linalg.norm(normal, axis=1)
     straight = np.flatnonzero(blends & ~curved)
-    _round_lines(corners, moves, tangents, straight, bends.subset(straight), used_mm, rules)
+    _round_lines(
+        corners, moves, tangents, straight, bends.subset(straight), used_mm, joinable, rules
+    )
     bent = np.flatnonzero(blends & curved & flat)
-    _round_arcs(corners, moves, tangents, bent, bends.subset(bent), used_mm, rules)
+    _round_arcs(corners, moves, tangents, bent, bends.subset(bent), used_mm, joinable, rules)
     blended = np.flatnonzero(blends)
     kink = highest[blended] * rules.kink_ratio / part[blended]
     _choose(corners, moves, tangents, blended, kink, used_mm, rules)
@@ -943,8 +998,8 @@ def _choose(
     overlap = _worth(moves, tangents, rows, used_mm, rules)
     overlaps = (overlap >= kink) & (overlap >= arc)
     bends = ~overlaps & (kink >= arc)
-    for column in (corners.reach, corners.reach_on, corners.length):
-        column[rows[overlaps | bends]] = 0.0
+    for column in (corners.reach, corners.reach_on, corners.length, corners.joins):
+        column[rows[overlaps | bends]] = 0
     corners.speed[rows[overlaps]] = 0.0
     _overlap(corners, moves, tangents, rows[overlaps], rules)
     corners.speed[rows[bends]] = kink[bends]
@@ -1088,14 +1143,20 @@ def _fill(
     reach: tuple[Floats, Floats],
     shape: Floats,
     is_valid: Bools,
+    left_mm: Floats,
     rules: CornerRules,
 ) -> None:
     """Fill in blends that reach so far on both moves, with centre and spokes `shape` (3, K, 3),
-    where they are `is_valid` (K,)."""
+    where they are `is_valid` (K,). They leave `left_mm` (K,) of the moves before, inf of those
+    that may not join."""
     rows, shape = rows[is_valid], shape[:, is_valid]
     length = np.linalg.norm(shape[1], axis=1) * _angle_between(shape[1], shape[2])
-    lasting = length / (MIN_PERIODS * rules.period_s)
-    corners.speed[rows] = np.minimum(rounds.speed[is_valid], lasting)
+    speed = rounds.speed[is_valid]
+    left_mm = left_mm[is_valid]
+    joins = left_mm < GAP_PERIODS * rules.period_s * speed
+    lasting = (length + np.where(joins, left_mm, 0.0)) / rules.period_s
+    corners.joins[rows] = joins
+    corners.speed[rows] = np.minimum(speed, lasting)
     corners.reach[rows], corners.reach_on[rows] = reach[0][is_valid], reach[1][is_valid]
     corners.acceleration[rows] = TANGENT_RATIO * rounds.acceleration[is_valid]
     corners.length[rows] = length
@@ -1109,6 +1170,7 @@ def _round_lines(
     rows: Ints,
     bends: Bends,
     used_mm: Floats,
+    joinable: Bools,
     rules: CornerRules,
 ) -> None:
     """Fill in the blends between lines at the corners `rows`."""
@@ -1138,7 +1200,9 @@ def _round_lines(
         ]
     )
     is_valid = (bent > MIN_BEND_RAD) & (rounds.radius * bent > MIN_LENGTH_MM)
-    _fill(corners, rows, rounds, (reach, reach), shape, is_valid, rules)
+    left_mm = moves.length[rows - 1] - used_mm[rows - 1] - reach
+    left_mm[~joinable[rows - 1]] = np.inf
+    _fill(corners, rows, rounds, (reach, reach), shape, is_valid, left_mm, rules)
 
 
 CLIPPED_RAD = 0.49 * np.pi
@@ -1218,6 +1282,7 @@ def _round_arcs(
     rows: Ints,
     bends: Bends,
     used_mm: Floats,
+    joinable: Bools,
     rules: CornerRules,
 ) -> None:
     """Fill in the blends at corners with arcs, all in XY, at the corners `rows`."""
@@ -1269,7 +1334,9 @@ def _round_arcs(
         [np.column_stack([centre.real, centre.imag, height])]
         + [np.column_stack([each.real, each.imag, 0.0 * height]) for each in spokes]
     )
-    _fill(corners, rows, rounds, (reach[0], reach[1]), shape, is_valid, rules)
+    left_mm = moves.length[rows - 1] - used_mm[rows - 1] - reach[0]
+    left_mm[~joinable[rows - 1]] = np.inf
+    _fill(corners, rows, rounds, (reach[0], reach[1]), shape, is_valid, left_mm, rules)
 
 
 def _centre_of(

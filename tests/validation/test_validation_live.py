@@ -60,7 +60,6 @@ CAUSES = {
 """Why programs are off by more than is aimed at."""
 
 CHORDS = "arcs in XZ and YZ are chords in a toolpath"
-SHORT = "moves of one to ten periods: LinuxCNC joins lines to blends, and speeds up evenly"
 STOPS = {
     "interp_state/sloc_testing": "stops, each of them late on a busy computer",
     "quick-tests/axis_letter": "0.08 s lost at the first stop, on a busy computer",
@@ -85,10 +84,7 @@ OF_PLANNER = {
     "violation_checks/sam_violation2_verbatim": CHORDS,
     "violation_checks/stellabee-kink-test": CHORDS,
     "violation_checks/stellabee-violation-spirals": CHORDS,
-    "performance/circle_small_segments_ncd": SHORT,
-    "performance/contour": SHORT,
-    "performance/random_lines_0.001in": SHORT,
-    "performance/wheels": SHORT,
+    "performance/random_lines_0.001in": "moves of 1 µm, one to two servo periods each",
     "diagnostic/lineno-test": "a dwell before the first move, which the recording leaves out",
     **STOPS,
 }
