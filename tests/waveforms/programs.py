@@ -100,7 +100,8 @@ def totals(path: Toolpath, target: LoadedTarget) -> Totals:
     each = np.zeros((len(path), 3), dtype=np.int64)
     each[:] = [round(axis.compensation_mm / axis.coded_step_mm) for axis in target.machine.axes]
     if getattr(target.machine.controller, "compensates_by_region", False):
-        each[:, :2] = np.rint(compensations(path, target.machine) / 0.00014)
+        # NaN until an axis turns away for the first time: nothing is added until then.
+        each[:, :2] = np.rint(np.nan_to_num(compensations(path, target.machine)) / 0.00014)
     for chunk in target.simulate(path, replace(OUTPUTS, chunk_steps=97)):
         steps += chunk.ledger.steps.sum(axis=0)
         added += (chunk.ledger.reversals * each[chunk.ledger.row]).sum(axis=0)
