@@ -58,7 +58,8 @@ class PicMmhSignals(SignalModel):
         model, added = PicMmhModel(), None
         if machine.controller.compensates_by_region:
             added = np.zeros((len(toolpath), 3), dtype=np.int64)
-            for axis, added_mm in enumerate(compensations(toolpath, machine).T):
+            # NaN until an axis turns away for the first time: nothing is added until then.
+            for axis, added_mm in enumerate(np.nan_to_num(compensations(toolpath, machine)).T):
                 added[:, axis] = to_steps(added_mm, list(machine.axes)[axis].coded_step_mm)
         path, chunks = model.quantised(toolpath, machine), model.run(toolpath, machine, options)
         return row_pulses(chunks, path, machine, added=added)
