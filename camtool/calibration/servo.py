@@ -299,9 +299,9 @@ SETTLING = 4.0
 
 class LoopDesign(Struct, frozen=True):
     """The gains of an axis. `ki`, `kp` of the continuous loop, `kid`, `kpd` of the digital one;
-    `stored` (kid, kpd) as the controller stores them. `wanted`, `digital`, `got`: natural
-    frequency (rad/s), damping and settling time (s) of the continuous loop, of the digital loop
-    with the gains as computed, and with the stored gains. `poles` of the last."""
+    `stored` (kid, kpd) as the controller stores them. `wanted`, `got`: natural frequency (rad/s),
+    damping and settling time (s) of the continuous loop, and of the digital loop with the stored
+    gains, whose `poles` these are."""
 
     ki: float
     kp: float
@@ -309,7 +309,6 @@ class LoopDesign(Struct, frozen=True):
     kpd: float
     stored: tuple[float, float]
     wanted: tuple[float, float, float]
-    digital: tuple[float, float, float]
     got: tuple[float, float, float]
     poles: tuple[complex, complex]
 
@@ -358,7 +357,6 @@ def design(motor: MotorModel, loop: SpeedLoop, settling_s: float, damping: float
         kpd=kpd,
         stored=stored,
         wanted=(natural, damping, settling_s),
-        digital=_character(loop_poles(motor, loop.tick_s, kid, kpd), loop.tick_s),
         got=_character(poles, loop.tick_s),
         poles=poles,
     )

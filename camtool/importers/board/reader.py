@@ -392,11 +392,10 @@ def _bent_stroke(arc: Any) -> BaseGeometry:
 def _region(region: Any) -> BaseGeometry:
     """Return the area of a region; cuts into it and back make holes."""
     points: list[Floats] = []
-    for (x1, y1), _, (clockwise, (cx, cy)) in region.segments:
+    for (x1, y1), (x2, y2), (clockwise, (cx, cy)) in region.segments:
         if clockwise is None:
             points.append(np.array([[x1, y1]]))
             continue
-        (x2, y2) = _
         centre = np.array([cx, cy])
         start = math.atan2(y1 - cy, x1 - cx)
         sweep = (math.atan2(y2 - cy, x2 - cx) - start) % (2.0 * math.pi) or 2.0 * math.pi
