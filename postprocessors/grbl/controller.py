@@ -1,4 +1,4 @@
-"""grbl 1.1: arcs as chords, lines of whole steps, speeds planned some blocks ahead.
+"""grbl 1.1, grblHAL, FluidNC: arcs as chords, lines of whole steps, speeds planned blocks ahead.
 
 What it does with a program, in the order of this file:
 
@@ -170,7 +170,7 @@ def sample_rows(
     """Yield the motion of all rows, some thousand at a time."""
     for planned in plan_rows(path, machine, controller):
         low, high, blocks = planned.low, planned.high, planned.blocks
-        seconds, count = dwells_of(path, low, high), len(blocks)
+        seconds, count = dwells_of(path, low, high, controller), len(blocks)
         own_s = planned.plan.seconds(planned.squares)[:count]
         own_s += idle_delay_s(controller) * planned.rests
         np.add.at(seconds, blocks.row - low, own_s)
@@ -178,18 +178,19 @@ def sample_rows(
         yield SampledRows(low, high, low, samples, seconds, iterates=True)
 
 
-def dwells_of(path: Toolpath, low: int, high: int) -> Floats:
+def dwells_of(path: Toolpath, low: int, high: int, controller: GrblController) -> Floats:
     """Return (high − low,) s that the rows low:high dwell."""
     seconds = np.zeros(high - low)
     dwells = low + np.flatnonzero(path.kind[low:high] == Kind.DWELL)
-    seconds[dwells - low] = [dwell_s(value) for value in path.value[dwells].tolist()]
+    values = path.value[dwells].tolist()
+    seconds[dwells - low] = [dwell_s(value, controller.firmware) for value in values]
     return seconds
 
 
 def idle_delay_s(controller: GrblController) -> float:
     """Return the time, s, that it waits at each stop ($1)."""
-    is_on = controller.idle_delay_ms == ALWAYS_ON
-    return 0.0 if is_on else controller.idle_delay_ms / 1000.0
+    waits = controller.firmware == "grbl" and controller.idle_delay_ms != ALWAYS_ON
+    return controller.idle_delay_ms / 1000.0 if waits else 0.0
 
 
 class GrblSamples:
@@ -257,8 +258,11 @@ def _controller(machine: _Machine) -> GrblController:
     return machine.controller
 
 
-def dwell_s(seconds: float) -> float:
-    """Return how long `delay_sec` of the firmware really waits, s; it counts in 32-bit floats."""
+def dwell_s(seconds: float, firmware: str = "grbl") -> float:
+    """Return how long a dwell really lasts, s, which is counted in 32-bit floats: `delay_sec` of
+    grbl and grblHAL, `mc_dwell` of FluidNC."""
+    if firmware == "FluidNC":
+        return math.floor(np.float32(1000.0) * np.float32(seconds)) / 1000.0
     per_second = np.float32(1.0 / DWELL_STEP_S)
     return math.ceil(per_second * np.float32(seconds)) * DWELL_STEP_S
 
@@ -469,6 +473,7 @@ def stops_of(path: Toolpath, controller: GrblController) -> Stops:
 # (AVR); sine, cosine and arc tangent may differ from its library's in the last bit.
 
 Singles = npt.NDArray[np.float32]
+Reals = npt.NDArray[np.floating]
 
 MAX_DIGITS = 8
 """grbl drops the digits of a number after this many (MAX_INT_DIGITS, nuts_bolts.c)."""
@@ -502,7 +507,7 @@ def targets_of(
     asks = (kind <= Kind.ARC_CCW) | np.isin(kind, (Kind.HOME_XY, Kind.HOME_Z))
     counts = np.where(asks, 1, 0)
     arcs = np.flatnonzero(are_arcs(kind))
-    chords = _Chords(path, machine, begins[arcs], ends[arcs], rows[arcs])
+    chords = _Chords(path, machine, begins[arcs], ends[arcs], rows[arcs], controller.firmware)
     counts[arcs] = chords.segments(controller)
     row = np.repeat(np.arange(len(rows)), counts)
     mm = ends[row]
@@ -538,24 +543,33 @@ def as_read(values: Floats, machine: _Machine) -> Singles:
 
 
 class _Chords:
-    """The arcs of a program, J of them, from `begin` to `end` (J, 3) mm."""
+    """The arcs of a program, J of them, from `begin` to `end` (J, 3) mm. grblHAL keeps the centre
+    and the radius vector in 64 bits (`mc_arc` of its motion_control.c), the others in 32."""
 
     def __init__(
-        self, path: Toolpath, machine: _Machine, begin: Singles, end: Singles, arcs: Ints
+        self,
+        path: Toolpath,
+        machine: _Machine,
+        begin: Singles,
+        end: Singles,
+        arcs: Ints,
+        firmware: str,
     ) -> None:
         self._begin, self._end = begin, end
+        self._real: type[np.floating] = np.float64 if firmware == "grblHAL" else np.float32
         offset = as_read(path.centre[arcs] - path.starts_of(arcs)[:, :2], machine)
         self._offset = offset
-        self._centre = begin[:, :2] + offset
+        first: Reals = begin[:, :2].astype(self._real)
+        self._centre = first + offset
         self._radius = np.sqrt(offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1])
-        rx, ry = -offset[:, 0], -offset[:, 1]
+        rx, ry = (-offset).T.astype(self._real)
         tx, ty = end[:, 0] - self._centre[:, 0], end[:, 1] - self._centre[:, 1]
-        turn = np.arctan2(rx * ty - ry * tx, rx * tx + ry * ty)
-        full_turn = np.float32(2.0 * np.pi)
+        turn = np.arctan2(rx * ty - ry * tx, rx * tx + ry * ty).astype(np.float32)
+        full_turn = self._real(2.0 * np.pi)
         clockwise = path.kind[arcs] == Kind.ARC_CW
         downward = np.where(turn >= -FULL_TURN_RAD, turn - full_turn, turn)
         upward = np.where(turn <= FULL_TURN_RAD, turn + full_turn, turn)
-        self._turn = np.where(clockwise, downward, upward)
+        self._turn = np.where(clockwise, downward, upward).astype(np.float32)
 
     def segments(self, controller: GrblController) -> Ints:
         """(J,) chords of each: ⌊|½ φ r| / √(δ (2r − δ))⌋, δ the arc tolerance; at least the one
@@ -583,15 +597,16 @@ class _Chords:
         angle = (number - since_correction).astype(np.float32) * theta
         cos_i, sin_i = np.cos(angle), np.sin(angle)
         anew = number >= since_correction + 1
-        x = np.where(anew, x0 * cos_i - y0 * sin_i, x0)
-        y = np.where(anew, x0 * sin_i + y0 * cos_i, y0)
+        x = np.where(anew, x0 * cos_i - y0 * sin_i, x0).astype(self._real)
+        y = np.where(anew, x0 * sin_i + y0 * cos_i, y0).astype(self._real)
         cos_t = np.float32(2.0) - theta * theta
         sin_t = theta * np.float32(0.16666667) * (cos_t + np.float32(4.0))
         cos_t = cos_t * np.float32(0.5)
         for step in range(1, correction + 1):
             corrected = np.flatnonzero(since_correction >= step)
             c, s, u, v = cos_t[corrected], sin_t[corrected], x[corrected], y[corrected]
-            x[corrected], y[corrected] = u * c - v * s, u * s + v * c
+            x[corrected] = u * c - v * s
+            y[corrected] = (u * s + v * c).astype(np.float32)
         points = np.empty((len(arc), 3), dtype=np.float32)
         points[:, 0] = self._centre[arc, 0] + x
         points[:, 1] = self._centre[arc, 1] + y

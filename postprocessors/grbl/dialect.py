@@ -37,8 +37,12 @@ class GrblDialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
-    """A controller on grbl 1.1, and the options of its model.
+    """A controller on grbl 1.1 or a descendant of it, and the options of its model.
 
+    `firmware`: whose arithmetic it has where they differ (docs/controllers/grbl.md). grbl 1.1
+    computes arcs in 32-bit floats, counts dwells in 50 ms and waits `idle_delay_ms` at each stop.
+    grblHAL has the radius of an arc in 64 bits and waits at no stop. FluidNC waits at none either,
+    and counts dwells in ms.
     `arc_tolerance_mm` is its $12 and `junction_deviation_mm` its $11 (defaults.h, general
     machine). `buffer_blocks`: places of its planner's ring, of which one stays empty
     (BLOCK_BUFFER_SIZE, planner.h). `arc_correction`: chords between two that it computes by sine
@@ -49,6 +53,7 @@ class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
     `laser_mode` is its $32: a laser instead of a spindle, whose power changes while it moves.
     """
 
+    firmware: Literal["grbl", "grblHAL", "FluidNC"] = "grbl"
     arc_tolerance_mm: Tolerance = 0.002
     junction_deviation_mm: Slack = 0.01
     buffer_blocks: Annotated[int, Meta(ge=3, le=10_000)] = 16

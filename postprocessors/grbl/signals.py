@@ -88,13 +88,14 @@ class _Clock:
     """The time so far, in cycles of the processor."""
 
     def __init__(self, path: Toolpath, machine: _Machine) -> None:
-        self._path, self._idle = path, round(idle_delay_s(machine.controller) * CLOCK_HZ)
+        self._path, self._controller = path, machine.controller
+        self._idle = round(idle_delay_s(machine.controller) * CLOCK_HZ)
         self._cycles = 0
 
     def window(self, planned: PlannedBlocks) -> Iterator[Pulses]:
         """Yield the pulses of the blocks of a window."""
         blocks, row = planned.blocks, planned.blocks.row - planned.low
-        dwells_s = dwells_of(self._path, planned.low, planned.high)
+        dwells_s = dwells_of(self._path, planned.low, planned.high, self._controller)
         dwelt = np.cumsum(np.rint(dwells_s * CLOCK_HZ).astype(np.int64))
         upto = dwelt[row]
         waits = np.diff(upto, prepend=0)

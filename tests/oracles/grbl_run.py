@@ -45,17 +45,20 @@ def chord_ends(
     clockwise: bool,
     tolerance_mm: float,
     correction: int = 12,
+    real: type[np.floating] = np.float32,
 ) -> list[tuple[np.float32, ...]]:
-    """The targets of one arc, the end of the arc last; begin and end (x, y, z) mm."""
+    """The targets of one arc, the end of the arc last; begin and end (x, y, z) mm. `real`: the
+    type of the centre and the radius vector; grblHAL's is a double, but for what it sums up in a
+    float before."""
     i, j = offset
-    cx, cy = begin[0] + i, begin[1] + j
-    rx, ry = -i, -j
-    tx, ty = end[0] - cx, end[1] - cy
-    turn = np.arctan2(rx * ty - ry * tx, rx * tx + ry * ty)
+    cx, cy = real(begin[0]) + real(i), real(begin[1]) + real(j)
+    rx, ry = real(-i), real(-j)
+    tx, ty = real(end[0]) - cx, real(end[1]) - cy
+    turn = F(np.arctan2(rx * ty - ry * tx, rx * tx + ry * ty))
     if clockwise and turn >= F(-5e-7):
-        turn = turn - F(2.0 * np.pi)
+        turn = F(turn - real(2.0 * np.pi))
     if not clockwise and turn <= F(5e-7):
-        turn = turn + F(2.0 * np.pi)
+        turn = F(turn + real(2.0 * np.pi))
     radius = np.sqrt(i * i + j * j)
     inner = F(tolerance_mm) * (F(2.0) * radius - F(tolerance_mm))
     segments = 0
@@ -71,14 +74,14 @@ def chord_ends(
         z, count = begin[2], 0
         for number in range(1, segments):
             if count < correction:
-                rx, ry = rx * cos_t - ry * sin_t, rx * sin_t + ry * cos_t
+                rx, ry = rx * cos_t - ry * sin_t, real(F(rx * sin_t + ry * cos_t))
                 count += 1
             else:
                 c, s = np.cos(F(number) * theta), np.sin(F(number) * theta)
-                rx, ry = -i * c + j * s, -i * s - j * c
+                rx, ry = real(-i * c + j * s), real(-i * s - j * c)
                 count = 0
             z = z + rise
-            points.append((cx + rx, cy + ry, z))
+            points.append((F(cx + rx), F(cy + ry), z))
     return [*points, end]
 
 

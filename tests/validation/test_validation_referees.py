@@ -1,8 +1,8 @@
-"""Recordings of grbl's own firmware and of LinuxCNC's own motion against their models.
+"""Recordings of the firmware of grbl and grblHAL and of LinuxCNC's motion against their models.
 
-`referees/README.md` says where they come from. grbl: positions step for step, by their digest, and
-times within 0.2 %; LinuxCNC: paths within 15 µm, times within 0.5 %. The tables go into
-docs/validation.md.
+`referees/README.md` says where they come from. grbl, grblHAL: positions step for step, by their
+digest, and times within 0.2 %; LinuxCNC: paths within 15 µm, times within 0.5 %. The tables go
+into docs/validation.md.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from tests.validation.pieces import UM
 
 REFEREES = Path(__file__).parent / "referees"
 GRBL = sorted((REFEREES / "grbl").glob("*.json"))
+GRBLHAL = sorted((REFEREES / "grblhal").glob("*.json"))
 LINUXCNC = sorted((REFEREES / "linuxcnc").glob("*.ngc"))
 
 GRBL_TIME_PART = 0.002
@@ -110,6 +111,43 @@ def test_grbl(bless: bool) -> None:
         )
     heads = ["program", "$1", "$32", "events, all equal", "grbl, s", "model, s", "%"]
     check("referee-grbl", heads, rows, bless)
+
+
+GRBLHAL_BLOCKS = 101
+"""$398 of its 100 blocks; one place of a ring stays empty."""
+
+
+def grblhal_settings(said: dict[str, float]) -> list[str]:
+    """The settings of the machine file for its settings that a recording says."""
+    keys = {"11": "max_rate_mm_min", "12": "acceleration_mm_s2"}
+    axes = {name: value for name, value in said.items() if name != "$1"}
+    return [
+        "controller.firmware=grblHAL",
+        f"controller.buffer_blocks={GRBLHAL_BLOCKS}",
+        "controller.least_step_hz=0.01",
+        *(f"axes.{'xyz'[int(name[-1])]}.{keys[name[1:3]]}={axes[name]}" for name in axes),
+    ]
+
+
+def test_grblhal(bless: bool) -> None:
+    """The programs begin with a dwell of 0.2 s, behind which its buffer is full; the clock of the
+    recordings begins with the first move."""
+    assert len(GRBLHAL) == 11
+    rows = []
+    for file in GRBLHAL:
+        said: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        settings = grblhal_settings(said["settings"])
+        motion, seconds = run("grbl", said["program"].encode(), *settings)
+        seconds -= 0.2
+        recorded, wanted_s = said["without_smoothing"], said["with_smoothing"]["time_s"]
+        assert abs(seconds - wanted_s) < GRBL_TIME_PART * wanted_s, file.name
+        steps = samples(motion) / 0.004
+        assert len(steps) == recorded["step_ticks"], file.name
+        assert digest(steps) == recorded["sha256_of_int32_xyz_rows"], file.name
+        apart = signed(100.0 * (seconds / wanted_s - 1.0), 2)
+        rows.append([file.stem, str(len(steps)), mm(wanted_s), mm(seconds), apart])
+    heads = ["program", "events, all equal", "grblHAL, s", "model, s", "%"]
+    check("referee-grblhal", heads, rows, bless)
 
 
 def test_linuxcnc(bless: bool) -> None:

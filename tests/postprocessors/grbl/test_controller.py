@@ -292,6 +292,21 @@ def test_each_stop_holds_what_comes_next(idle_ms: int) -> None:
     assert seconds(ToolpathBuilder().event(Kind.END).finish(), held) == [0.0]
 
 
+@pytest.mark.parametrize(
+    ("firmware", "dwell_s"), [("grbl", 0.15), ("grblHAL", 0.15), ("FluidNC", 0.111)]
+)
+def test_dwells_and_stops_of_each_firmware(firmware: str, dwell_s: float) -> None:
+    """FluidNC counts whole ms, the others 50 ms; only grbl waits at a stop ($1 = 25 ms)."""
+    builder = ToolpathBuilder().rapid(1.0, 0.0, 0.0).event(Kind.DWELL, 0.1119)
+    path = builder.rapid(0.0, 0.0, 0.0).finish()
+    found = seconds(path, grbl_machine(f"controller.firmware={firmware}"))
+    assert found[1] == pytest.approx(dwell_s)
+    idle_s = 0.025 if firmware == "grbl" else 0.0
+    assert np.array(found)[[0, 2]] - np.array(seconds(path, awake()))[[0, 2]] == pytest.approx(
+        idle_s
+    )
+
+
 @pytest.mark.parametrize("feed", [1.0, 3.0, 5.0])
 def test_no_step_takes_longer_than_the_timer_s_longest_tick(feed: float) -> None:
     """65535 · 8 cycles of 16 MHz a step, along an axis and aslant."""

@@ -51,8 +51,10 @@ def test_numbers_with_other_decimals_are_the_nearest_floats() -> None:
 
 @pytest.mark.parametrize("ccw", [True, False])
 @pytest.mark.parametrize("rise", [0.0, -0.7])
-def test_chords_are_those_of_the_loop(ccw: bool, rise: float) -> None:
-    machine = grbl_machine()
+@pytest.mark.parametrize("firmware", ["grbl", "grblHAL", "FluidNC"])
+def test_chords_are_those_of_the_loop(ccw: bool, rise: float, firmware: str) -> None:
+    machine = grbl_machine(f"controller.firmware={firmware}")
+    real = np.float64 if firmware == "grblHAL" else np.float32
     controller = machine.controller
     assert isinstance(controller, GrblController)
     for radius in (0.0005, 0.0015, 0.01, 0.3, 1.0, 7.7, 60.0):
@@ -67,8 +69,20 @@ def test_chords_are_those_of_the_loop(ccw: bool, rise: float) -> None:
             targets = targets_of(path, np.arange(len(path)), machine, controller)
             begin, end = as_read(path.start, machine), as_read(path.end[0], machine)
             offset = as_read(path.centre[0] - path.start[:2], machine)
-            wanted = chord_ends(tuple(begin), tuple(end), tuple(offset), not ccw, 0.002)
+            wanted = chord_ends(tuple(begin), tuple(end), tuple(offset), not ccw, 0.002, real=real)
             assert targets.mm.tolist() == [[float(v) for v in point] for point in wanted]
+
+
+@pytest.mark.parametrize(("firmware", "chords"), [("grbl", 1), ("FluidNC", 1), ("grblHAL", 45)])
+def test_a_small_circle_far_from_zero_is_lost_in_32_bits(firmware: str, chords: int) -> None:
+    """At 50 mm the last place of a float is 4 nm, which at a radius of 0.8 mm is more than the
+    5e-7 rad below which an arc is a full circle."""
+    machine = grbl_machine(f"controller.firmware={firmware}")
+    assert isinstance(machine.controller, GrblController)
+    builder = ToolpathBuilder((50.0, 16.667, 0.0))
+    path = builder.arc(50.0, 16.667, centre=(49.893, 15.842), ccw=True, feed=100.0).finish()
+    targets = targets_of(path, np.arange(len(path)), machine, machine.controller)
+    assert len(targets.mm) == chords
 
 
 def test_bresenham_exhaustive() -> None:
