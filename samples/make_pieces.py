@@ -12,20 +12,27 @@ import sys
 from pathlib import Path
 
 from dxf_writer import dxf
-from make_samples import rounded, straight
+from emblems import emblem, puma
+from make_samples import straight
 from shapes import Layer, Line, Polyline, Shape, Sheet
 
 APART = 0.2
 """Distance of two parallel lines, which the theses do not give."""
 
-OUTLINES = {
-    "puma-5": (4.86, 4.96),
-    "puma-1.2": (1.17, 1.19),
-    "puma-1": (0.97, 0.99),
-    "gmm-5": (5.0, 4.997),
-    "gmm-1.2": (1.21, 1.08),
+PUMAS = {
+    "pic-mmh-puma-5": (4.86, 4.96, 0.35),
+    "pic-mmh-puma-1.2": (1.17, 1.19, 0.08),
+    "pic-mmh-puma-1": (0.97, 0.99, 0.07),
+    "flashcut-puma": (4.0, 4.082, 0.288),
 }
-"""Overall sizes of logos whose shapes are in lost figures: rounded rectangles replace them."""
+EMBLEMS = {
+    "pic-mmh-gmm-5": (5.0, 4.997),
+    "pic-mmh-gmm-1.2": (1.21, 1.08),
+    "flashcut-lmm": (12.0, 11.993),
+}
+"""Overall sizes, and of the pumas the width of the ears. Their shapes are in lost figures, and
+`emblems` redraws them. The sizes on the parallel-port machine, 4 and 12 mm, are those that the
+other thesis gives for the parts of its predecessor."""
 
 
 def two_lines(length: float, axis: int) -> Shape:
@@ -46,19 +53,17 @@ def rectangle(width: float, height: float) -> Shape:
     return straight([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
 
 
-def outline(width: float, height: float) -> Shape:
-    """A rectangle whose corners have a radius of a quarter of its shorter side."""
-    return rounded(0.0, 0.0, width, height, 0.25 * min(width, height))
-
+COLOURS = (5, 1, 3, 6)
+"""Colours of the layers, by index."""
 
 DIAGONALS: list[Shape] = [Line((0.0, 0.0), (10.0, 5.0)), Line((10.0, 0.0), (0.0, 5.0))]
 """Diagonals of the rectangle, on a layer of their own, because they are cut more slowly."""
 
 
-def pieces() -> dict[str, list[Shape]]:
-    """The shapes of each drawing, by name."""
+def pieces() -> dict[str, dict[str, list[Shape]]]:
+    """The shapes of each drawing by layer, by the drawing's name."""
     middle = (3.0, 3.0)
-    found: dict[str, list[Shape]] = {
+    plain: dict[str, list[Shape]] = {
         "pic-mmh-lines-x": [two_lines(2.5, 0)],
         "pic-mmh-lines-y": [two_lines(1.2, 1)],
         "pic-mmh-square": [rectangle(-2.5, -2.5)],
@@ -72,8 +77,11 @@ def pieces() -> dict[str, list[Shape]]:
         "flashcut-diagonals": [rectangle(10.0, 5.0)],
         "flashcut-circle": [clockwise((5.0, 5.0), 5.0)],
     }
-    for name, size in OUTLINES.items():
-        found[f"pic-mmh-{name}"] = [outline(*size)]
+    found = {name: {"CUT": shapes} for name, shapes in plain.items()}
+    found["flashcut-diagonals"]["SLOW"] = DIAGONALS
+    found |= {name: puma(*size) for name, size in PUMAS.items()}
+    found["pic-mmh-puma-1.2-halves"] = puma(*PUMAS["pic-mmh-puma-1.2"], halves=True)
+    found |= {name: emblem(*size) for name, size in EMBLEMS.items()}
     return found
 
 
@@ -81,9 +89,10 @@ def main(folder: Path) -> None:
     """Write all pieces into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, shapes in pieces().items():
-        layers = [Layer("CUT", 5, "#0000ff", shapes)]
-        if name == "flashcut-diagonals":
-            layers.append(Layer("SLOW", 1, "#ff0000", DIAGONALS))
+        layers = [
+            Layer(layer, COLOURS[k], "#000000", held)
+            for k, (layer, held) in enumerate(shapes.items())
+        ]
         text = dxf(Sheet(name, (10.0, 10.0), layers, {}))
         (folder / f"{name}.dxf").write_text(text, encoding="ascii", newline="\n")
 

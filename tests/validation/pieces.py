@@ -12,6 +12,7 @@ import numpy as np
 from camtool.geometry.drawing import Drawing
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
+from camtool.jobs.build import job_of_file
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, job_of
@@ -64,14 +65,21 @@ def drawing(name: str) -> Drawing:
     return read_drawing(PIECES / f"{name}.dxf", options=ReadOptions())
 
 
+def own_job(name: str) -> Job:
+    """Return the job file of a piece, or the job without any settings."""
+    files = {"halves": "puma-halves", "puma": "puma", "gmm": "emblem", "lmm": "emblem"}
+    file = next((files[word] for word in files if word in name), "")
+    return job_of_file(PIECES / f"{file}.toml") if file else job_of()
+
+
 @cache
 def piece(name: str, *settings: str, job: Job | None = None, at: Any = None) -> Piece:
-    """`samples/pieces/NAME.dxf` on the target that its name begins with; `at` mm: where its zero
-    lies on the table."""
+    """Post `samples/pieces/NAME.dxf` for the target that its name begins with, by its own job if
+    it has one; `at` mm: where its zero lies on the table."""
     target_name = next(each for each in ("pic-mmh", "flashcut") if name.startswith(each))
     zero = () if at is None else (f"controller.machine_zero_mm=[{-at[0]}, {-at[1]}, 0.0]",)
     target = load_target(target_name, settings=[*settings, *zero])
-    posted = post_drawing(drawing(name), job or job_of(), target)
+    posted = post_drawing(drawing(name), job or own_job(name), target)
     assert posted.verification is not None
     assert posted.decoded is not None
     return Piece(posted.verification.report, posted.decoded, target.machine)
