@@ -5,6 +5,7 @@
     post_by_setup    the same as a program for each set-up of the job
     verify_program   bytes of any program → judged, against a drawing if there is one
     convert_program  bytes of a program of one target → the program of another, judged as above
+    lint_program     bytes of a program → decoded, judged without its motion
     read_program     bytes of a program → decoded, not judged
 
 Nothing here reads or writes a file.
@@ -60,6 +61,7 @@ from camtool.verification.case import (
     tool_mm,
 )
 from camtool.verification.cuts import is_flat, rapid_length_mm
+from camtool.verification.motion_findings import program_findings
 from camtool.verification.report import (
     BaselineReport,
     Planned,
@@ -567,6 +569,18 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
     return Run(
         source=source, target=target, program=program, decoded=decoded, findings=decoded.findings
     )
+
+
+def lint_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
+    """A program as the controller decodes it, with all that is found without simulating it;
+    ProgramError as `read_program`."""
+    run = read_program(data, target, source=source)
+    assert run.decoded is not None
+    case = Case(run.decoded, target)
+    findings = _merge_findings(
+        run.findings, program_findings(case), _stock_findings(case, None, Job())
+    )
+    return replace(run, findings=findings)
 
 
 def _decode(data: bytes, target: LoadedTarget, file: str) -> Toolpath:

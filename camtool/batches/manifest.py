@@ -3,7 +3,7 @@
 It has a line of JSON for each drawing, appended when the drawing's files are written, so that it
 can be used even after a crash: incomplete lines are skipped, and the last of several lines for one
 drawing counts. A run that ends normally rewrites it, sorted, without the drawings whose files are
-all gone.
+all gone. Drawings that failed stay in it.
 """
 
 from __future__ import annotations
@@ -16,9 +16,11 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import msgspec
 from msgspec import Struct, field
 
 from camtool.records import replace
+from camtool.verification.report import FoundAt
 
 NAME = ".camtool-batch.jsonl"
 
@@ -26,7 +28,8 @@ NAME = ".camtool-batch.jsonl"
 class ManifestEntry(Struct, frozen=True):
     """One drawing: `key`, the digest of everything that its outputs depend on, and the digests of
     its outputs by name; `earlier` has those of outputs that the last run did not make again, such
-    as programs for another machine."""
+    as programs for another machine. A drawing that failed has its `error` and the `code` of the
+    finding that is it, and no files."""
 
     key: str
     files: Mapping[str, str]
@@ -34,6 +37,9 @@ class ManifestEntry(Struct, frozen=True):
     figures: Mapping[str, float] = field(default_factory=dict)
     verdicts: Mapping[str, int] = field(default_factory=dict)
     earlier: Mapping[str, str] = field(default_factory=dict)
+    error: str = ""
+    code: str = ""
+    findings: tuple[FoundAt, ...] = ()
 
     @property
     def all_outputs(self) -> dict[str, str]:
@@ -94,15 +100,17 @@ class Manifest:
 
     def tidy(self, write: Callable[[dict[str, bytes]], None]) -> None:
         """Rewrite the manifest with one line for each drawing that has files, if it differs."""
-        present = [stem for stem in sorted(self._entries) if self._has_files(self._entries[stem])]
+        present = [stem for stem in sorted(self._entries) if self._is_used(self._entries[stem])]
         if self._tidy and len(present) == len(self._entries):
             return
         lines = [_line(stem, self._entries[stem]) for stem in present]
         write({str(self._place): ("\n".join(lines) + "\n").encode()})
         self._entries, self._tidy = {stem: self._entries[stem] for stem in present}, True
 
-    def _has_files(self, entry: ManifestEntry) -> bool:
-        return any(os.path.lexists(self._out / name) for name in entry.all_outputs)
+    def _is_used(self, entry: ManifestEntry) -> bool:
+        return bool(entry.error) or any(
+            os.path.lexists(self._out / name) for name in entry.all_outputs
+        )
 
     def _has_digest(self, name: str, digest: str) -> bool:
         try:
@@ -112,15 +120,7 @@ class Manifest:
 
 
 def _line(stem: str, entry: ManifestEntry) -> str:
-    row = {
-        "stem": stem,
-        "key": entry.key,
-        "files": dict(entry.files),
-        "warnings": entry.warnings,
-        "figures": dict(entry.figures),
-        "verdicts": dict(entry.verdicts),
-        "earlier": dict(entry.earlier),
-    }
+    row = {"stem": stem, **msgspec.to_builtins(entry)}
     return json.dumps(row, ensure_ascii=True, sort_keys=True)
 
 
@@ -136,11 +136,10 @@ def _read(place: Path) -> tuple[dict[str, ManifestEntry], bool]:
         try:
             row: dict[str, Any] = json.loads(line)
             stem = row.pop("stem")
-            entry = ManifestEntry(**row)
-        except (ValueError, TypeError, KeyError, AttributeError):
+            entry = msgspec.convert(row, ManifestEntry)
+        except (ValueError, TypeError, KeyError, AttributeError, msgspec.ValidationError):
             continue
-        digests = (entry.files, entry.earlier)
-        if isinstance(stem, str) and all(isinstance(each, dict) for each in digests):
+        if isinstance(stem, str):
             entries[stem] = entry
     return entries, len(lines) == len(entries) and list(entries) == sorted(entries)
 

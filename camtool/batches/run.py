@@ -17,6 +17,7 @@ from camtool.batches.manifest import (
     file_digest,
 )
 from camtool.errors import OutputError
+from camtool.verification.report import FoundAt
 
 # Messages to and from workers: small records that can be pickled.
 
@@ -43,7 +44,7 @@ class DrawingTask:
 class DrawingResult:
     """One drawing in the summary: `remarks` are its findings, one line each, errors first;
     `figures` a few numbers; `verdicts` the counts of inspected dimensions by verdict; `code` the
-    code of the finding that is the error, "" for other errors."""
+    code of the finding that is the error, "" for other errors; `findings` the worst of them."""
 
     error: str | None = None
     remarks: tuple[str, ...] = ()
@@ -52,12 +53,14 @@ class DrawingResult:
     verdicts: Mapping[str, int] = field(default_factory=dict)
     seconds: float = 0.0
     code: str = ""
+    findings: tuple[FoundAt, ...] = ()
 
 
 @dataclass(frozen=True)
 class Outputs(DrawingResult):
     """The outputs of a drawing: `files` by extension, none when there is an `error`; `content` is
-    the digest of the bytes of the drawing."""
+    the digest of the bytes of the drawing, "" where another run may end otherwise with the same
+    drawing and job."""
 
     content: str = ""
     files: Mapping[str, bytes] = field(default_factory=dict)
@@ -97,12 +100,14 @@ class OutcomeState(StrEnum):
 
 @dataclass(frozen=True)
 class Outcome(DrawingResult):
-    """The outcome of one drawing; `files` are relative to the output folder."""
+    """The outcome of one drawing; `files` are relative to the output folder; `remembered`: it
+    failed in an earlier run, and nothing that it depends on has changed since."""
 
     source: str
     stem: str
     state: OutcomeState
     files: tuple[str, ...] = ()
+    remembered: bool = False
 
 
 # The run.
@@ -119,13 +124,15 @@ to be up to date."""
 class BatchSettings:
     """Settings of a batch: the output folder `out` and the function `write`; the digests of
     everything that outputs depend on besides the drawing (`base` for all, `own` for each task by
-    stem); `force` makes all outputs again, and replaces files that no batch made."""
+    stem); `force` makes all outputs again, and replaces files that no batch made; `again` tries
+    drawings again that failed and did not change."""
 
     out: Path
     write: Writer
     base: str
     own: Mapping[str, str]
     force: bool = False
+    again: bool = False
 
     def key(self, task: DrawingTask, content: str) -> str:
         """Return the digest of everything that the outputs of a drawing depend on."""
@@ -142,17 +149,24 @@ def run_batch(
     outdated: list[DrawingTask] = []
     for task in tasks:
         entry = None if order.force else _up_to_date(task, order, manifest)
-        if entry is None:
+        if entry is None or (entry.error and order.again):
             outdated.append(task)
             continue
         yield Outcome(
             task.source,
             task.stem,
-            OutcomeState.UP_TO_DATE,
+            OutcomeState.FAILED if entry.error else OutcomeState.UP_TO_DATE,
             tuple(entry.files),
+            remembered=bool(entry.error),
+            error=entry.error or None,
+            remarks=tuple(f"{task.source}: {each.to_line()}" for each in entry.findings)
+            if entry.error
+            else (),
             warnings=entry.warnings,
             figures=entry.figures,
             verdicts=entry.verdicts,
+            code=entry.code,
+            findings=entry.findings,
         )
     if not outdated:
         return
@@ -178,28 +192,29 @@ def _record(
 ) -> Outcome:
     """Write the files of a result and return its outcome."""
     error, remarks = outputs.error, outputs.remarks
-    names: tuple[str, ...] = ()
+    files = {f"{task.stem}{extension}": data for extension, data in outputs.files.items()}
     if error is None:
-        files = {f"{task.stem}{extension}": data for extension, data in outputs.files.items()}
         error = _write_files(task, files, order, manifest)
-        if error is None:
-            names = tuple(files)
-            entry = ManifestEntry(
-                order.key(task, outputs.content),
-                {name: content_digest(data) for name, data in files.items()},
-                outputs.warnings,
-                dict(outputs.figures),
-                dict(outputs.verdicts),
-            )
-            try:
-                manifest.add(task.stem, entry)
-            except OSError as fault:
-                remarks = (*remarks, f"{task.source}: is not in the manifest ({fault.strerror})")
+    if outputs.content and error == outputs.error:
+        entry = ManifestEntry(
+            order.key(task, outputs.content),
+            {name: content_digest(data) for name, data in files.items()},
+            outputs.warnings,
+            dict(outputs.figures),
+            dict(outputs.verdicts),
+            error=error or "",
+            code=outputs.code,
+            findings=outputs.findings,
+        )
+        try:
+            manifest.add(task.stem, entry)
+        except OSError as fault:
+            remarks = (*remarks, f"{task.source}: is not in the manifest ({fault.strerror})")
     return Outcome(
         task.source,
         task.stem,
         OutcomeState.MADE if error is None else OutcomeState.FAILED,
-        names,
+        tuple(files) if error is None else (),
         error=error,
         remarks=remarks,
         warnings=outputs.warnings,
@@ -207,6 +222,7 @@ def _record(
         verdicts=outputs.verdicts,
         seconds=outputs.seconds,
         code=outputs.code,
+        findings=outputs.findings,
     )
 
 

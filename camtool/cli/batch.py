@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from camtool.cli.checks import CheckOutputs, check_outputs
 from camtool.cli.files import check_places
 from camtool.cli.options import (
     DrawingFlags,
@@ -43,6 +44,7 @@ _RUN = "How the batch runs"
     is_flag=True,
     help="Ignore part.toml and part.tolerances.toml beside part.dxf.",
 )
+@check_outputs
 @option(_RUN, "--jobs", "-j", type=click.IntRange(min=1), help="Processes.  [one for each core]")
 @option(_RUN, "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, tcp://host:8786.")
 @option(
@@ -53,6 +55,7 @@ _RUN = "How the batch runs"
     help="Time limit for each drawing, such as 60s.",
 )
 @option(_RUN, "--force", is_flag=True, help="Make all again; replace files of others.")
+@option(_RUN, "--again", is_flag=True, help="Try unchanged drawings again that failed.")
 @option(_RUN, "--fail-fast", is_flag=True, help="Stop at the first that fails.")
 @picture_options
 @gate_options
@@ -67,12 +70,14 @@ def batch(
     preview: str | None,
     reports: bool,
     summary: str | None,
+    checks: CheckOutputs,
     no_verify: bool,
     no_own_jobs: bool,
     jobs: int | None,
     scheduler: str | None,
     timeout: float | None,
     force: bool,
+    again: bool,
     fail_fast: bool,
     picture: PictureFlags,
     gates: GateFlags,
@@ -84,8 +89,9 @@ def batch(
 ) -> int:
     """Turn DRAWINGS (files, folders, quoted patterns such as 'parts/**/*.dxf') into programs.
 
-    Folders are kept below --out. Drawings that are up to date by content are skipped. A drawing
-    that fails does not stop the others; exit code 1 when any failed. Files that no batch made, or
+    Folders are kept below --out. Drawings that are up to date by content are skipped, and so are
+    those that failed and did not change, unless --again. A drawing that fails does not stop the
+    others; exit code 1 when any failed. Files that no batch made, or
     that were changed since, are replaced only with --force. A job file beside a drawing,
     part.toml for part.dxf, is its job, and part.tolerances.toml has its dimensions; --job and
     --tolerances are for those without one.
@@ -96,7 +102,7 @@ def batch(
         raise click.UsageError("--jobs and --timeout are for processes here, not for a cluster")
     picture.check([preview and f".{preview}"], UNVERIFIED if no_verify else RESULT)
     inspection.check(without="--no-verify" if no_verify else None)
-    check_places([*machine.files(), *job.files(), *inspection.files()], [summary])
+    check_places([*machine.files(), *job.files(), *inspection.files()], [summary, *checks.names])
 
     from camtool.cli.batch_messages import Verbosity
     from camtool.cli.batch_run import BatchFlags, BatchRun, RunSettings
@@ -112,7 +118,7 @@ def batch(
         looks=picture,
         require=inspection.require,
     )
-    running = RunSettings(jobs, scheduler, timeout, force, fail_fast)
-    run = BatchRun(work, Path(out), running, summary, Verbosity(quiet, verbose))
+    running = RunSettings(jobs, scheduler, timeout, force, again, fail_fast)
+    run = BatchRun(work, Path(out), running, summary, checks, Verbosity(quiet, verbose))
     flags = BatchFlags(job, inspection, own=not no_own_jobs, inspects=not no_verify)
     return run.run(sources, flags, machine.files())

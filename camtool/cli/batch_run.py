@@ -36,11 +36,14 @@ from camtool.batches.run import (
 )
 from camtool.cli.batch_messages import Display, Verbosity, display, say_summary, summary_json
 from camtool.cli.batch_work import SVG, JobOrder, PostWork
+from camtool.cli.check_formats import CheckedFile, refused_file
+from camtool.cli.checks import CheckOutputs
 from camtool.cli.files import is_foreign, refuse_same, write_all
 from camtool.cli.messages import say
 from camtool.cli.options import InspectionFlags, JobFlags, own_job, own_tolerances
 from camtool.errors import CamtoolError, OutputError
 from camtool.records import replace
+from camtool.toolpath.findings import INPUT_REFUSED
 
 if TYPE_CHECKING:
     from camtool.inspection.tolerances import Asked
@@ -52,12 +55,13 @@ EXIT_SIGNAL = 128
 @dataclass(frozen=True)
 class RunSettings:
     """Settings of a run: local processes or a cluster, the limits, and whether everything is made
-    again."""
+    again, or what failed."""
 
     jobs: int | None
     scheduler: str | None
     timeout: float | None
     force: bool
+    again: bool
     fail_fast: bool
 
 
@@ -115,6 +119,7 @@ class BatchRun:
     out: Path
     running: RunSettings
     summary: str | None
+    checks: CheckOutputs
     verbosity: Verbosity
 
     def run(self, sources: Sequence[str], flags: BatchFlags, reads: Sequence[str]) -> int:
@@ -171,7 +176,9 @@ class BatchRun:
         ]
         sources = [task.source for task in ordered.tasks]
         sources += [failed.source for failed in ordered.failed]
-        refuse_same([*sources, *reads, *jobs], [*own_files, self.summary, *makes])
+        refuse_same(
+            [*sources, *reads, *jobs], [*own_files, self.summary, *self.checks.names, *makes]
+        )
         places = RealPaths()
         for task in ordered.tasks if self.work.preview == SVG else ():
             picture = self.out / f"{task.stem}{SVG}"
@@ -239,8 +246,8 @@ class BatchRun:
         self, ordered: OrderedTasks, manifest: Manifest, stop: Stop, shown: Display
     ) -> Generator[Outcome]:
         """Yield the outcomes until something stops the run."""
-        force = self.running.force
-        order = BatchSettings(self.out, write_all, self.work.digest(), ordered.own, force)
+        force, again = self.running.force, self.running.again
+        order = BatchSettings(self.out, write_all, self.work.digest(), ordered.own, force, again)
         pool = LazyPool(lambda: pool_for(self, shown.note), shown.begin)
         with closing(run_batch(ordered.tasks, order, manifest, pool)) as outcomes:
             for outcome in chain(ordered.failed, outcomes):
@@ -257,9 +264,25 @@ class BatchRun:
         except OutputError as error:  # the lines written so far are there
             say(f"camtool: warning: {error}", quiet=False)
         say_summary(outcomes, seconds, quiet=self.verbosity.quiet)
+        target = self.work.target
+        files = self.checks.files([self._checked(each) for each in outcomes], target.target.codes)
         if self.summary is not None:
-            target = self.work.target.machine.target.name
-            write_all({self.summary: summary_json(outcomes, target, seconds)})
+            files[self.summary] = summary_json(outcomes, target.machine.target.name, seconds)
+        write_all(files)
+
+    def _checked(self, outcome: Outcome) -> CheckedFile:
+        """Return a drawing with its findings, for pipelines."""
+        name, error = outcome.source, outcome.error
+        findings = tuple(
+            each.at(str(self.out / each.file), each.line) if each.file in outcome.files else each
+            for each in outcome.findings
+        )
+        checked = CheckedFile(name, findings)
+        if error is not None and not checked.errors:
+            return refused_file(CamtoolError(error.removeprefix(f"{name}: ")), name)
+        is_refused = any(each.code == INPUT_REFUSED.code.name for each in checked.errors)
+        passed_over = "not run" if outcome.state is OutcomeState.NOT_RUN else ""
+        return replace(checked, is_refused=is_refused, passed_over=passed_over)
 
 
 def pool_for(batch: BatchRun, note: Callable[[str], None]) -> Pool:

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 
 from camtool.batches.manifest import code_digest, content_digest, digest_of, packages_digest
 from camtool.batches.run import DrawingTask, Outputs
+from camtool.cli.check_formats import found_in, refused_file
 from camtool.cli.files import seal
 from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags
+from camtool.errors import CamtoolError
 from camtool.findings import Finding, Severity
 from camtool.importers.read import file_bytes, read_bytes
 from camtool.plain import one_line
@@ -81,9 +83,18 @@ class PostWork:
 
     def make(self, task: DrawingTask, data: bytes | None) -> Outputs:
         """Make program, picture and report of a drawing; none of them if it has an error."""
+        data = file_bytes(task.path) if data is None else data
+        try:
+            outputs = self._outputs(task, data)
+        except CamtoolError as error:
+            refused = refused_file(error, task.source)
+            outputs = Outputs(error=str(error), findings=refused.findings)
+        return replace(outputs, content=content_digest(data))
+
+    def _outputs(self, task: DrawingTask, data: bytes) -> Outputs:
+        """Return the outputs of a drawing of these bytes, without their digest."""
         from camtool.pipeline import post_drawing
 
-        data = file_bytes(task.path) if data is None else data
         order: JobOrder = task.order
         # Reports and pictures are UTF-8, which names of files need not be.
         name = task.source.encode("utf-8", "backslashreplace").decode()
@@ -98,11 +109,10 @@ class PostWork:
                 trace_points=None if self.preview else 0,
             )
             run = self._inspected(run, order)
-        outputs = _result_of(task, run)
+        outputs = _result_of(task, run, self._program(task, run))
         if outputs.error is not None:
             return outputs
-        files = dict(self._files(task, run))
-        return replace(outputs, content=content_digest(data), files=files, figures=_figures(run))
+        return replace(outputs, files=dict(self._files(task, run)), figures=_figures(run))
 
     def digest(self) -> str:
         """Return the digest of everything that outputs depend on except drawing and job."""
@@ -131,6 +141,13 @@ class PostWork:
 
         return inspect(run, Tolerances(*dimensions_of(run.drawing, order.asked), self.require))
 
+    def _program(self, task: DrawingTask, run: Run) -> str | None:
+        """Return the name of the program's file in the output folder, None if it is not
+        written."""
+        if run.failed or run.program is None:
+            return None
+        return f"{task.stem}{run.program.extension}"
+
     def _files(self, task: DrawingTask, run: Run) -> Iterator[tuple[str, bytes]]:
         if run.program is not None:
             yield run.program.extension, run.program.data
@@ -146,20 +163,24 @@ def _is_code(path: Path) -> bool:
     return path.suffix in (".py", ".toml") and path.is_file()
 
 
-def _result_of(task: DrawingTask, run: Run) -> Outputs:
+def _result_of(task: DrawingTask, run: Run, program: str | None) -> Outputs:
     """Return the result for the client: the error of a drawing that must not be written, and its
-    worst findings."""
+    worst findings; `program` is the name of the program's file."""
 
     def lines(severity: Severity) -> list[Finding]:
         return [each for each in run.findings if each.severity == severity]
 
     errors, warnings = lines(Severity.ERROR), lines(Severity.WARNING)
-    remarks = tuple(
-        f"{task.source}: {one_line(str(finding))}" for finding in (*errors, *warnings)[:REMARKS]
-    )
+    worst = replace(run, findings=(*errors, *warnings)[:REMARKS])
+    remarks = tuple(f"{task.source}: {one_line(str(finding))}" for finding in worst.findings)
     report = run.report
     verdicts = Counter(each.verdict for each in report.inspection) if report else {}
-    outputs = Outputs(remarks=remarks, warnings=len(warnings), verdicts=dict(verdicts))
+    outputs = Outputs(
+        remarks=remarks,
+        warnings=len(warnings),
+        verdicts=dict(verdicts),
+        findings=found_in(worst, program),
+    )
     if not run.failed and run.program is not None:
         return outputs
     suffix = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""

@@ -62,6 +62,7 @@ COMMANDS = {
     "init": "A machine file of your own.",
     "job": "Job files: begin one, or see what one says.",
     "jog": "Move a machine by so much.",
+    "lint": "Faults of programs, without simulating them.",
     "measure": "Depths of the stock after a program.",
     "meet": "What would make its dimensions hold.",
     "panel": "A page that moves the machine.",
@@ -120,6 +121,7 @@ def cli() -> None:
     camtool check   logo.dxf                    what is in the drawing
     camtool post    logo.dxf --target pic-mmh   drawing to verified program
     camtool verify  logo.pic --target pic-mmh   judge any program of a machine
+    camtool lint    parts/*.nc -t grbl          faults of programs, without simulating
     camtool batch   drawings/ -t pic-mmh -o build/   many, those that have changed
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program

@@ -86,18 +86,22 @@ def tint(text: str) -> str:
     )
 
 
-def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> None:
+def say_findings(
+    findings: Iterable[Finding], *, quiet: bool, verbose: bool, file: str = ""
+) -> None:
     """Show errors always, warnings unless quiet, remarks when verbose: one line each, and one line
-    for many alike, unless verbose."""
+    for many alike, unless verbose. `file` is the name of one of several files that these are
+    about."""
+    head = f"camtool: {file}: " if file else "camtool: "
     min_severity = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
     shown = [finding for finding in findings if finding.severity >= min_severity]
     for finding, alike_count in (
         [(each, 0) for each in shown] if verbose else summarise_findings(shown)
     ):
-        say(f"camtool: {finding}", quiet=False)
+        say(f"{head}{finding}", quiet=False)
         if alike_count:
             name = f"{finding.severity.name.lower()} {finding.code.name}"
-            say(f"camtool: {name}: and {alike_count} more (-v shows all)", quiet=False)
+            say(f"{head}{name}: and {alike_count} more (-v shows all)", quiet=False)
 
 
 # Summaries and tables: names are bold, values that exceed a limit are coloured.

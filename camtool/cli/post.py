@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from camtool.cli.checks import CheckOutputs, check_outputs
 from camtool.cli.files import STDOUT, check_ours, check_places, part_name, write_all
 from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import (
@@ -181,6 +182,7 @@ def posting_options(command: Command) -> Command:
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @report_option
+@check_outputs
 @click.option("--watch", "watching", is_flag=True, help="Again when a file has changed.")
 @click.option(
     "--before-after",
@@ -201,6 +203,7 @@ def post(
     preview: str | None,
     report: str | None,
     page: str | None,
+    checks: CheckOutputs,
     watching: bool,
     before_after: bool,
     split: str | None,
@@ -215,9 +218,9 @@ def post(
     and mechanics, and compared with the drawing. Exit code 1 (and no file) when something is
     wrong.
     """
-    if watching and STDOUT in (source, output, report, page):
+    if watching and STDOUT in (source, output, report, page, *checks.names):
         raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
-    outputs = ReportOutputs(preview, report, page)
+    outputs = ReportOutputs(preview, report, page, checks)
     picture.check(outputs.pictures, UNVERIFIED if posting.no_verify else RESULT)
     posting.inspection.check(without=None if split is None else "--split")
     if split is not None and STDOUT in (output or source, preview, page):
@@ -232,6 +235,10 @@ def post(
         reads = [*posting.files(source), str(target.file)]
         requested = RequestedOutputs(source, output, outputs, reads)
         requested.check(target.machine.target.extension, verified=not posting.no_verify)
+        with checks.reporting_refusal(source):
+            return _post(target, requested)
+
+    def _post(target: LoadedTarget, requested: RequestedOutputs) -> int:
         job = posting.job.job(posting.drawing)
         if job.setups:
             _refuse_beside_setups(posting, split, (output or source, preview, page), job)
@@ -316,7 +323,8 @@ def finish(
     outputs = requested.outputs
     say_findings(run.findings, quiet=quiet, verbose=verbose)
     if run.failed or run.program is None:
-        write_all(_page_alone(run, outputs, picture))
+        unwritten = {**_page_alone(run, outputs, picture), **outputs.check_files([(run, None)])}
+        write_all(unwritten)
         no = "nothing" if outputs.page is None else "no program"
         say(
             f"camtool: error: {requested.source}: {no} was written; fix the errors above",
@@ -328,7 +336,8 @@ def finish(
     output = requested.program(run.program.extension)
     if requested.output is None:
         _check_ours(run, output)
-    write_all({output: run.program.data, **outputs.files(run, picture)})
+    files = {output: run.program.data, **outputs.files(run, picture)}
+    write_all({**files, **outputs.check_files([(run, output)])})
     _say_written(run, output, quiet=quiet)
     return 0
 
@@ -369,15 +378,16 @@ def finish_parts(
     parts = [_part(run, requested, number, len(runs)) for number, run in enumerate(runs, 1)]
     report, names = requested.outputs.report, [str(part.output) for part in parts]
     every = [name for part in parts for name in part.places()]
-    check_places(requested.reads, [*every, report])
+    checks = requested.outputs.checks
+    check_places(requested.reads, [*every, report, *checks.names])
     for part in parts:
         part.outputs.check(())
     files: dict[str, bytes] = {}
     if any(run.failed or run.program is None for run in runs):
         for run, part, picture in zip(runs, parts, pictures, strict=True):
             files |= _page_alone(run, part.outputs, picture)
-        write_all(files)
         no = "no program" if files else "nothing"
+        write_all(files | requested.outputs.check_files((run, None) for run in runs))
         say(
             f"camtool: error: {requested.source}: {no} was written; fix the errors above",
             quiet=False,
@@ -389,7 +399,7 @@ def finish_parts(
         files |= {name: run.program.data, **part.outputs.files(run, picture)}
     if report is not None:
         files[report] = _programs_json(runs, parts)
-    write_all(files)
+    write_all(files | requested.outputs.check_files(zip(runs, names, strict=True)))
     for run, name in zip(runs, names, strict=True):
         _say_written(run, name, quiet=quiet)
     return 0
@@ -428,7 +438,11 @@ def _part(run: Run, requested: RequestedOutputs, number: int, count: int) -> Req
     )
     outputs = requested.outputs
     part_outputs = replace(
-        outputs, preview=marked(outputs.preview), page=marked(outputs.page), report=None
+        outputs,
+        preview=marked(outputs.preview),
+        page=marked(outputs.page),
+        report=None,
+        checks=CheckOutputs(),
     )
     return RequestedOutputs(requested.source, marked(program), part_outputs, requested.reads)
 

@@ -11,12 +11,13 @@ import base64
 import hashlib
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from camtool.cli.checks import CheckOutputs
 from camtool.cli.files import STDOUT, check_places, is_foreign, seal
 from camtool.cli.picture_options import FLAGS as PICTURE_FLAGS
 from camtool.cli.picture_options import Painter, is_viewer
@@ -34,7 +35,8 @@ EMBEDDED = "picture.svg"
 _CAPTION = "The predicted result"
 _PLACES = ("target", "machine", "settings", "output", "preview", "report", "page")
 _LOOKS = (*PICTURE_FLAGS, "beside", "before_after")
-_NOT_LISTED = frozenset((*_PLACES, *_LOOKS, "quiet", "verbose", "watching"))
+_CHECKS = tuple(each.name for each in fields(CheckOutputs))
+_NOT_LISTED = frozenset((*_PLACES, *_LOOKS, *_CHECKS, "quiet", "verbose", "watching"))
 """Flags that a page does not list: places, looks of pictures, verbosity; the machine has a row of
 its own."""
 
@@ -56,11 +58,12 @@ def _page_name(ctx: click.Context, param: click.Parameter, value: str | None) ->
 @dataclass(frozen=True)
 class ReportOutputs:
     """The requested outputs of a program: a picture, the report as JSON, a page (the values of
-    `--preview`, `--json` and `--report`); None is not requested."""
+    `--preview`, `--json` and `--report`), None is not requested; and findings for pipelines."""
 
     preview: str | None = None
     report: str | None = None
     page: str | None = None
+    checks: CheckOutputs = field(default_factory=CheckOutputs)
 
     @property
     def linked(self) -> str | None:
@@ -88,6 +91,7 @@ class ReportOutputs:
         """Raise OutputError, before any work is done, when a place of these or of `other_names`
         cannot be written, is one of `reads`, or holds a picture that the page did not write."""
         names = [*other_names, self.preview, self.report, self.page, self.beside]
+        names += self.checks.names
         check_places(reads, names)
         if self.beside is not None and is_foreign(self.beside, str(self.page)):
             raise OutputError(
@@ -104,6 +108,17 @@ class ReportOutputs:
         if self.report is not None and run.report is not None:
             files[self.report] = run.report.to_json().encode()
         return {**files, **self.page_files(run, picture)}
+
+    def check_files(self, runs: Iterable[tuple[Run, str | None]]) -> dict[str, bytes]:
+        """Return the findings for pipelines of all programs of one source, each with the name of
+        its file; None: it is not written."""
+        if not self.checks.names:
+            return {}
+        from camtool.cli.check_formats import checked_run
+
+        every = list(runs)
+        checked = [checked_run(run, program) for run, program in every]
+        return self.checks.files(checked, every[0][0].target.target.codes)
 
     def page_files(self, run: Run, picture: Painter) -> dict[str, bytes]:
         """Return the page, and the picture beside it if it has one of its own."""

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING
 
 import click
 
+from camtool.cli.files import check_places, write_all
 from camtool.cli.messages import say
 from camtool.cli.options import OWN_JOB, SectionedCommand, talk_options
 from camtool.cli.post import Posting, posting_options
 from camtool.errors import CamtoolError, InputError
 from camtool.findings import Severity
 from camtool.importers.options import SUFFIXES
+from camtool.plain import to_json
 from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
-    from camtool.toolpath.program import Program
 
 
 @click.command(cls=SectionedCommand, short_help="Programs that are out of date.")
@@ -32,12 +33,14 @@ if TYPE_CHECKING:
     help="Where the programs are, in folders as the drawings: what camtool batch has as --out.  "
     "[beside the drawings]",
 )
+@click.option("--json", "report", metavar="FILE", help="Each with its state; - is stdout.")
 @click.option("--missing", is_flag=True, help="A drawing without a program is an error too.")
 @talk_options
 def stale(
     files: tuple[str, ...],
     posting: Posting,
     programs: str | None,
+    report: str | None,
     missing: bool,
     quiet: bool,
     verbose: bool,
@@ -54,30 +57,45 @@ def stale(
     drawings_by_name = (
         named_drawings(files) if programs is None else drawings_of(files, Path(programs))
     )
-    worst = 0
+    check_places([*files, *posting.machine.files()], [report])
+    rows: list[ComparedProgram] = []
     for name, drawings in drawings_by_name.items():
-        if not missing and not _has_program(name):
-            say(f"camtool: {name}: has no program", quiet=not verbose)
-            continue
-        faults: list[StaleProgram] = []
-        for drawing in drawings:
-            expected = _post_now(drawing, posting, target)
-            fault = _fault(drawing, name, expected, missing=missing)
-            faults += [] if fault is None else [fault]
-            if fault is None:  # of several drawings of one name, the program needs to match one
-                break
-        else:
-            say(f"camtool: error: {faults[0].words}", quiet=False)
-            worst = max(worst, faults[0].code)
-    return worst
+        rows.append(_compare(name, drawings, posting, target, missing=missing))
+        if rows[-1].code:
+            say(f"camtool: error: {rows[-1].why}", quiet=False)
+        elif rows[-1].program is None:
+            say(f"camtool: {rows[-1].why}", quiet=not verbose)
+    if report is not None:
+        write_all({report: to_json(rows).encode()})
+    return max((row.code for row in rows), default=0)
 
 
 @dataclass(frozen=True)
-class StaleProgram:
-    """The reason why a program is out of date, and the exit code for it."""
+class ComparedProgram:
+    """A program and the drawing that it was compared with; None where there is none. `state`:
+    "current", "stale", "missing", or "unknown" where the drawing cannot be posted any more; `why`
+    in words, and the exit code for it."""
 
-    code: int
-    words: str
+    drawing: str
+    program: str | None
+    state: str
+    why: str = ""
+    code: int = 0
+
+
+def _compare(
+    name: Path, drawings: Sequence[Path], posting: Posting, target: LoadedTarget, *, missing: bool
+) -> ComparedProgram:
+    """Compare the program of this name with its drawing: of several, it needs to match one."""
+    if not missing and not _has_program(name):
+        return ComparedProgram(str(drawings[0]), None, "missing", f"{name}: has no program")
+    faults = []
+    for drawing in drawings:
+        row = _compare_with(drawing, name, posting, target, missing=missing)
+        if not row.code:
+            return row
+        faults.append(row)
+    return faults[0]
 
 
 def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
@@ -138,29 +156,26 @@ def _has_program(name: Path) -> bool:
     return any(file.suffix.lower() not in (*SUFFIXES, OWN_JOB) for file in _files_named(name))
 
 
-def _post_now(drawing: Path, posting: Posting, target: LoadedTarget) -> Program | StaleProgram:
-    """Return the program that camtool writes for a drawing now, or the reason why there is
-    none."""
+def _compare_with(
+    drawing: Path, name: Path, posting: Posting, target: LoadedTarget, *, missing: bool
+) -> ComparedProgram:
+    """Compare the program of this name with what camtool writes for a drawing now."""
     try:
         run = posting.of(str(drawing)).make(str(drawing), target)
     except CamtoolError as error:
-        return StaleProgram(error.exit_code, str(error))
+        return ComparedProgram(str(drawing), None, "unknown", str(error), error.exit_code)
     program = run.program
     if run.failed or program is None:
         grave = next(each for each in run.findings if each.severity >= Severity.ERROR)
-        return StaleProgram(1, f"{drawing}: cannot be posted any more: {grave}")
-    return program
-
-
-def _fault(
-    drawing: Path, name: Path, expected: Program | StaleProgram, *, missing: bool
-) -> StaleProgram | None:
-    """Return the reason why the program of a drawing is out of date; None if it is not."""
-    if isinstance(expected, StaleProgram):
-        return expected
-    place = Path(f"{name}{expected.extension}")
+        why = f"{drawing}: cannot be posted any more: {grave}"
+        return ComparedProgram(str(drawing), None, "unknown", why, 1)
+    place = Path(f"{name}{program.extension}")
     if not place.is_file():
-        return StaleProgram(1, f"{place}: is not there; post {drawing}") if missing else None
-    if place.read_bytes() == expected.data:
-        return None
-    return StaleProgram(1, f"{place}: is not what camtool writes of {drawing} now; post it again")
+        if not missing:
+            return ComparedProgram(str(drawing), None, "missing", f"{place}: is not there")
+        why = f"{place}: is not there; post {drawing}"
+        return ComparedProgram(str(drawing), None, "missing", why, 1)
+    if place.read_bytes() == program.data:
+        return ComparedProgram(str(drawing), str(place), "current")
+    why = f"{place}: is not what camtool writes of {drawing} now; post it again"
+    return ComparedProgram(str(drawing), str(place), "stale", why, 1)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from camtool.cli.checks import CheckOutputs, check_outputs
 from camtool.cli.files import STDOUT, display_name, read_bytes, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import (
@@ -99,6 +100,7 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @report_option
+@check_outputs
 @click.option(
     "--beside",
     metavar="PROGRAM",
@@ -122,6 +124,7 @@ def verify(
     preview: str | None,
     report: str | None,
     page: str | None,
+    checks: CheckOutputs,
     beside: str | None,
     picture: PictureFlags,
     gates: GateFlags,
@@ -143,7 +146,8 @@ def verify(
     it cuts, on which side and with what tool (or --tool-diameter), and with --align where the
     drawing lies; then how far it is from them, and what is not cut.
     """
-    wishes = VerifyOutputs(ReportOutputs(preview, report, page), picture, beside, quiet, verbose)
+    outputs = ReportOutputs(preview, report, page, checks)
+    wishes = VerifyOutputs(outputs, picture, beside, quiet, verbose)
     wishes.check(comparing=compare is not None, gated=gates.given)
     finding = _finds_contours(job, against, align=align, comparing=compare is not None)
     leaves_none = "--compare" if compare is not None else None
@@ -166,10 +170,10 @@ def verify(
         align=align,
     )
     target = machine.load()
-    job_used = job.job(drawing)
-    read = drawing.read(against, target.machine, job_used) if against else None
-    case = VerifySettings(target, judging, read, job_used, finding)
-    with job.name_job_file():
+    with checks.reporting_refusal(program), job.name_job_file():
+        job_used = job.job(drawing)
+        read = drawing.read(against, target.machine, job_used) if against else None
+        case = VerifySettings(target, judging, read, job_used, finding)
         if compare is not None:
             return _compare(program, _variants(compare, machine, judging), case, wishes)
         return _judge(program, case, inspection, wishes)
@@ -223,6 +227,10 @@ class VerifyOutputs:
             return
         if outputs.page is not None:
             raise click.UsageError("--report is for a single variant; drop --compare")
+        if outputs.checks.names:
+            raise click.UsageError(
+                "--sarif, --junit and --annotations are for a single variant; drop --compare"
+            )
         if gated:
             raise click.UsageError("limits are for a single variant; drop --compare")
         if self.beside is not None:
@@ -270,8 +278,9 @@ def _judge(
     def scenes() -> list[Scene]:
         return [run.scene(), *([case.judge(wishes.beside).scene()] if wishes.beside else [])]
 
-    write_all(outputs.files(run, wishes.looks.painter(scenes, quiet=wishes.quiet)))
-    to_stdout = STDOUT in (outputs.report, outputs.page)
+    files = outputs.files(run, wishes.looks.painter(scenes, quiet=wishes.quiet))
+    write_all({**files, **outputs.check_files([(run, run.source)])})
+    to_stdout = STDOUT in (outputs.report, outputs.page, *outputs.checks.names)
     if run.report is not None and not to_stdout and not wishes.quiet:
         show_facts(run.report.to_text(findings=False), REPORT_NAMES, report_marks(run.findings))
         if case.judging.worst:

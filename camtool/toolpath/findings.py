@@ -188,6 +188,14 @@ class ProgramCode(Code):
         "and the last decimal of a height",
         "a surface with a smaller step; or report it with the program and the surface",
     )
+    INPUT_REFUSED = (
+        326,
+        ERROR,
+        "a file cannot be used: a drawing or program that cannot be read or decoded, a job that "
+        "this machine cannot cut. Where such an error ends a command with code 2, this is its "
+        "code in the files for pipelines; `lint` goes on with the next program",
+        "what the message says",
+    )
     ARC_MISSES_END = (
         401,
         (ERROR, WARNING),
@@ -210,6 +218,7 @@ EVENT_LEFT_OUT_COOLANT = Sentence(
     "and flood of [coolant] in its file)",
     severity=WARNING,
 )
+INPUT_REFUSED = Sentence(ProgramCode.INPUT_REFUSED, "{message}")
 FEED_ABOVE_LIMIT_LOWERED = Sentence(
     ProgramCode.FEED_ABOVE_LIMIT,
     "{cuts:# cut|# cuts} of up to {measured:g} mm/min {cuts:is|are} written at {limit:g}, the "

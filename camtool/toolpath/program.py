@@ -48,7 +48,9 @@ class Program:
 
 class Listing(Struct, frozen=True):
     """A printable program: its lines `blocks` (B,), numbered as in `Toolpath.block`; `binary` if
-    they are bytes in hexadecimal."""
+    they are bytes in hexadecimal; `lines` (B,): the line of the file, from 1, on which each
+    begins, () where they are no part of a text."""
 
     blocks: tuple[str, ...]
     binary: bool = False
+    lines: tuple[int, ...] = ()

@@ -11,11 +11,11 @@ from camtool.arrays import Floats
 from camtool.findings import Finding, Severity
 from camtool.machine.model import Machine
 from camtool.planning.naming import own_numbers
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from camtool.units import UM_PER_MM
 from camtool.verification.case import Case
 from camtool.verification.coverage import at_point, block_name, first_items, holes_of
-from camtool.verification.cuts import CutMoves
+from camtool.verification.cuts import CutMoves, cut_moves, is_flat
 from camtool.verification.figures import RowFigures, Tally
 from camtool.verification.findings import (
     ARC_MISSES_END,
@@ -32,6 +32,20 @@ from camtool.verification.findings import (
 AXES = "XYZ"
 TRAVEL_EPS_MM = 1e-6
 """A span may exceed the travel by this much, by rounding alone."""
+
+
+def program_findings(case: Case) -> tuple[Finding, ...]:
+    """Return the findings that need no motion: what the decoded moves and the machine alone
+    say."""
+    decoded, machine = case.decoded, case.machine
+    quantised = case.target.model.quantised(decoded, machine)
+    cuts = cut_moves(quantised, flat_cuts=is_flat(decoded))
+    return (
+        *case.target.model.findings(decoded, machine, case.simulation),
+        *_out_of_travel(machine, toolpath_extents(decoded)),
+        *_nothing_moves(cuts),
+        *_homing(quantised, machine),
+    )
 
 
 def motion_findings(

@@ -358,6 +358,23 @@ class FindingReport(msgspec.Struct, frozen=True):
     limit: float | None = None
     unit: str = ""
 
+    def to_line(self) -> str:
+        """Return the finding as lines for people have it."""
+        place = f" [{self.where}]" if self.where else ""
+        return one_line(f"{self.severity} {self.code}{place}: {self.message}")
+
+    def at(self, file: str, line: int | None) -> FoundAt:
+        """Return the finding in a line of a file; None and 0: in the file as a whole."""
+        values = {**asdict(self), "file": file, "line": line or None}
+        return FoundAt(**values)
+
+
+class FoundAt(FindingReport, frozen=True):
+    """A finding in a line of a file, from 1; `line` None: in the file as a whole."""
+
+    file: str = ""
+    line: int | None = None
+
 
 class PlannedOperation(msgspec.Struct, frozen=True):
     """Tool, feeds, depth and passes of an operation; feeds in mm/min. `spindle_rpm` is None
@@ -498,9 +515,7 @@ class Report(msgspec.Struct, frozen=True):
         """Return the summary that `camtool post` and `camtool verify` print, without a final
         newline, and with a line for each finding unless `findings=False`."""
         lines = [f"{name:<10} {value}" for name, value in summary_lines(self)]
-        for item in self.findings if findings else ():
-            place = f" [{item.where}]" if item.where else ""
-            lines.append(f"{item.severity} {item.code}{place}: {item.message}")
+        lines += [item.to_line() for item in self.findings if findings]
         return "\n".join(map(one_line, lines))
 
     def worst_text(self) -> str:

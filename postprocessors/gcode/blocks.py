@@ -301,7 +301,8 @@ def listing(data: bytes) -> Listing:
     """The blocks of a program that its reader takes, each as its line stands in the file: the
     lines with a word besides their number."""
     lines = (line.decode("latin-1") for line in _LINE_END.split(data))
-    return Listing(tuple(line.strip() for line in lines if has_words(line)))
+    numbered = [(line.strip(), number) for number, line in enumerate(lines, 1) if has_words(line)]
+    return Listing(tuple(line for line, _ in numbered), lines=tuple(n for _, n in numbered))
 
 
 def has_words(line: str) -> bool:

@@ -76,7 +76,11 @@ class PicMmh(Target):
         from .read import BLANKS
 
         *blocks, _ = data.decode("ascii").split(";")
-        return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks))
+        lines, line = [], 1
+        for block in blocks:
+            lines.append(line + block[: len(block) - len(block.lstrip(BLANKS))].count("\n"))
+            line += block.count("\n")
+        return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks), lines=tuple(lines))
 
     def twin_settings(self) -> type[PicMmhTwinSettings]:
         """Return the record of what its thesis leaves open of the wire."""

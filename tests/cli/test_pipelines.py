@@ -1,5 +1,6 @@
 """What docs/pipelines.md promises: the hooks, the Makefile and the action, run as they stand."""
 
+import json
 import os
 import re
 import shlex
@@ -251,3 +252,27 @@ def test_the_page_names_every_input_of_the_action_and_every_hook() -> None:
         assert f"`{name}`" in PAGE, name
     for block in re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL):
         assert yaml.safe_load(block)
+
+
+def test_stale_lists_each_program_with_its_state(camtool: Run, tmp_path: Path) -> None:
+    flags = ("-t", "grbl", "--tool-diameter", "1", "--depth", "1")
+    for name in ("a", "b", "c", "d"):
+        ring(tmp_path / "parts" / f"{name}.svg")
+        if name != "c":
+            program = ("-o", f"parts/{name}.nc")
+            assert camtool("post", f"parts/{name}.svg", *flags, *program).returncode == 0
+    ring(tmp_path / "parts" / "b.svg", radius=9.0)
+    ring(tmp_path / "parts" / "d.svg", radius=9000.0)
+    done = camtool("stale", "parts", *flags, "--missing", "--json", "-")
+    assert done.returncode == 1
+    rows = json.loads(done.stdout)
+    assert [(row["state"], row["program"], row["code"]) for row in rows] == [
+        ("current", "parts/a.nc", 0),
+        ("stale", "parts/b.nc", 1),
+        ("missing", None, 1),
+        ("unknown", None, 1),
+    ]
+    errors = [f"camtool: error: {row['why']}" for row in rows if row["code"]]
+    assert done.stderr.decode().splitlines() == errors
+    rows = json.loads(camtool("stale", "parts", *flags, "--json", "-").stdout)
+    assert rows[2]["code"] == 0, "nobody asked for a program of every drawing"
