@@ -9,16 +9,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeVar
 
-from camtool.errors import PostError
+from camtool.errors import OptionError, PostError
 from camtool.findings import Finding, Severity, worst
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
 from camtool.toolpath.moves import Kind, Toolpath
 
 if TYPE_CHECKING:
+    from camtool.pictures.options import PictureOptions
     from camtool.pictures.overlay import Overlay
     from camtool.pictures.scene import Scene
     from camtool.planning.job import Job
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
     from camtool.verification.report import Report
     from camtool.verification.verify import Verification
+    from camtool.waveforms.plot import PlotKind
 
 
 class Shown(ABC):
@@ -125,6 +127,29 @@ class Run(Shown):
             wanted_path=self.wanted,
             target=self.target,
         )
+
+    def plot(
+        self,
+        kind: PlotKind,
+        file: str | Path,
+        from_s: float = 0.0,
+        span_s: float | None = None,
+        options: PictureOptions | None = None,
+    ) -> bytes:
+        """Return a picture over time for a file of this name, .svg or .png: of "speed",
+        "position" or "error", from `from_s` on for `span_s` (None: up to the end). OptionError
+        without a verification, and for a stretch outside of the program."""
+        from camtool.pictures.options import AS_USUAL
+        from camtool.waveforms.plot import TimeSpan, plot_file
+
+        if self.verification is None:
+            raise OptionError(
+                f"{self.source} is not simulated, so there is nothing to plot",
+                mend="see findings, and verify it",
+            )
+        stretch = TimeSpan(from_s, span_s)
+        look = AS_USUAL if options is None else options
+        return plot_file(kind, self.verification, str(file), self.title, stretch, look)
 
     def __str__(self) -> str:
         return repr(self) if self.report is None else self.report.to_text()

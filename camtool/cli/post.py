@@ -50,6 +50,7 @@ from camtool.cli.picture_options import (
     picture_name,
     picture_options,
 )
+from camtool.cli.plot_options import PlotFlags, plot_options
 from camtool.cli.report import ReportOutputs, report_option
 from camtool.errors import CamtoolError, OptionError
 from camtool.pictures.options import points_for
@@ -195,6 +196,7 @@ def posting_options(command: Command) -> Command:
     help="A program for each tool in turn: DRAWING-1-mill.ext, DRAWING-2-drill.ext ...",
 )
 @posting_options
+@plot_options
 @picture_options
 @talk_options
 def post(
@@ -207,6 +209,7 @@ def post(
     watching: bool,
     before_after: bool,
     split: str | None,
+    plots: PlotFlags,
     picture: PictureFlags,
     posting: Posting,
     quiet: bool,
@@ -220,8 +223,13 @@ def post(
     """
     if watching and STDOUT in (source, output, report, page, *checks.names):
         raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
-    outputs = ReportOutputs(preview, report, page, checks)
-    picture.check(outputs.pictures, UNVERIFIED if posting.no_verify else RESULT)
+    outputs = ReportOutputs(preview, report, page, checks, plots)
+    plots.check(picture.given, pictures=bool(outputs.pictures))
+    if posting.no_verify:
+        plots.refuse("needs the simulated machine; drop --no-verify")
+    if split is not None:
+        plots.refuse("is of one program; drop --split, and verify a program of it with --plot")
+    picture.check([*outputs.pictures, *plots.names], UNVERIFIED if posting.no_verify else RESULT)
     posting.inspection.check(without=None if split is None else "--split")
     if split is not None and STDOUT in (output or source, preview, page):
         raise click.UsageError("--split writes several files; name the one that they begin with")
@@ -241,7 +249,7 @@ def post(
     def _post(target: LoadedTarget, requested: RequestedOutputs) -> int:
         job = posting.job.job(posting.drawing)
         if job.setups:
-            _refuse_beside_setups(posting, split, (output or source, preview, page), job)
+            _refuse_beside_setups(posting, plots, split, (output or source, preview, page), job)
         if split is not None or job.setups:
             runs = posting.make_parts(
                 source, target, job, by_tool=split is not None, pictures=outputs.pictures
@@ -259,9 +267,14 @@ def post(
 
 
 def _refuse_beside_setups(
-    posting: Posting, split: str | None, names: Sequence[str | None], job: Job
+    posting: Posting,
+    plots: PlotFlags,
+    split: str | None,
+    names: Sequence[str | None],
+    job: Job,
 ) -> None:
     """Refuse what programs of several set-ups cannot have."""
+    plots.refuse("is of one program; name a set-up with --setup")
     setup_names = ", ".join(each.name for each in job.setups)
     one = f"name one of them with --setup: {setup_names}"
     if split is not None:

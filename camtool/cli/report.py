@@ -21,6 +21,7 @@ from camtool.cli.checks import CheckOutputs
 from camtool.cli.files import STDOUT, check_places, is_foreign, seal
 from camtool.cli.picture_options import FLAGS as PICTURE_FLAGS
 from camtool.cli.picture_options import Painter, is_viewer
+from camtool.cli.plot_options import PlotFlags
 from camtool.errors import OutputError
 from camtool.plain import one_line
 
@@ -33,8 +34,8 @@ EMBEDDED = "picture.svg"
 """The picture within a page of HTML."""
 
 _CAPTION = "The predicted result"
-_PLACES = ("target", "machine", "settings", "output", "preview", "report", "page")
-_LOOKS = (*PICTURE_FLAGS, "beside", "before_after")
+_PLACES = ("target", "machine", "settings", "output", "preview", "report", "page", "plot")
+_LOOKS = (*PICTURE_FLAGS, "beside", "before_after", "plot_from", "plot_span")
 _CHECKS = tuple(each.name for each in fields(CheckOutputs))
 _NOT_LISTED = frozenset((*_PLACES, *_LOOKS, *_CHECKS, "quiet", "verbose", "watching"))
 """Flags that a page does not list: places, looks of pictures, verbosity; the machine has a row of
@@ -58,12 +59,14 @@ def _page_name(ctx: click.Context, param: click.Parameter, value: str | None) ->
 @dataclass(frozen=True)
 class ReportOutputs:
     """The requested outputs of a program: a picture, the report as JSON, a page (the values of
-    `--preview`, `--json` and `--report`), None is not requested; and findings for pipelines."""
+    `--preview`, `--json` and `--report`), None is not requested; findings for pipelines, and plots
+    over time."""
 
     preview: str | None = None
     report: str | None = None
     page: str | None = None
     checks: CheckOutputs = field(default_factory=CheckOutputs)
+    plots: PlotFlags = field(default_factory=PlotFlags)
 
     @property
     def linked(self) -> str | None:
@@ -91,7 +94,7 @@ class ReportOutputs:
         """Raise OutputError, before any work is done, when a place of these or of `other_names`
         cannot be written, is one of `reads`, or holds a picture that the page did not write."""
         names = [*other_names, self.preview, self.report, self.page, self.beside]
-        names += self.checks.names
+        names += [*self.checks.names, *self.plots.names]
         check_places(reads, names)
         if self.beside is not None and is_foreign(self.beside, str(self.page)):
             raise OutputError(
@@ -107,6 +110,7 @@ class ReportOutputs:
             files[self.preview] = picture(self.preview)
         if self.report is not None and run.report is not None:
             files[self.report] = run.report.to_json().encode()
+        files |= self.plots.files(run, picture.flags.options())
         return {**files, **self.page_files(run, picture)}
 
     def check_files(self, runs: Iterable[tuple[Run, str | None]]) -> dict[str, bytes]:

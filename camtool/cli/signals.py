@@ -11,25 +11,19 @@ import click
 from camtool.cli.files import check_places, display_name, read_bytes, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
-from camtool.errors import OptionError
+from camtool.cli.options import (
+    MachineFlags,
+    SectionedCommand,
+    duration,
+    machine_options,
+    talk_options,
+)
 from camtool.pictures.options import PictureOptions
-from camtool.units import parse_time
 
 if TYPE_CHECKING:
     from camtool.waveforms.signals import Signals
 
 KINDS = (".vcd", ".csv", ".svg", ".png")
-
-
-def _seconds(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
-    """Parse `2`, `0.5s` or `60ms`."""
-    if value is None:
-        return None
-    try:
-        return parse_time(value)
-    except OptionError as error:
-        raise click.BadParameter(str(error), ctx, param) from error
 
 
 def _outputs(
@@ -59,13 +53,13 @@ def _outputs(
     "--from",
     "start",
     metavar="TIME",
-    callback=_seconds,
+    callback=duration,
     help="Begin so long after the start of the program, such as 1.5s or 20ms.",
 )
 @click.option(
     "--span",
     metavar="TIME",
-    callback=_seconds,
+    callback=duration,
     help="Only so long; a picture without it shows the first changes.",
 )
 @click.option("--motors", metavar="NAME,...", help="Only these motors in a picture, such as X,Y.")

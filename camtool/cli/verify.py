@@ -43,6 +43,7 @@ from camtool.cli.picture_options import (
     picture_name,
     picture_options,
 )
+from camtool.cli.plot_options import PlotFlags, plot_options
 from camtool.cli.report import ReportOutputs, report_option
 from camtool.jobs.keys import PLACE
 from camtool.pictures.options import points_for
@@ -106,6 +107,7 @@ if TYPE_CHECKING:
     metavar="PROGRAM",
     help="Another program beside it in the picture: one scale, one map of errors.",
 )
+@plot_options
 @picture_options
 @gate_options
 @inspection_options
@@ -126,6 +128,7 @@ def verify(
     page: str | None,
     checks: CheckOutputs,
     beside: str | None,
+    plots: PlotFlags,
     picture: PictureFlags,
     gates: GateFlags,
     inspection: InspectionFlags,
@@ -146,7 +149,7 @@ def verify(
     it cuts, on which side and with what tool (or --tool-diameter), and with --align where the
     drawing lies; then how far it is from them, and what is not cut.
     """
-    outputs = ReportOutputs(preview, report, page, checks)
+    outputs = ReportOutputs(preview, report, page, checks, plots)
     wishes = VerifyOutputs(outputs, picture, beside, quiet, verbose)
     wishes.check(comparing=compare is not None, gated=gates.given)
     finding = _finds_contours(job, against, align=align, comparing=compare is not None)
@@ -220,11 +223,13 @@ class VerifyOutputs:
     def check(self, *, comparing: bool, gated: bool) -> None:
         """Raise a usage error for flags that contradict each other."""
         outputs = self.outputs
+        outputs.plots.check(self.looks.given, pictures=bool(outputs.pictures))
         if not comparing:
-            self.looks.check(outputs.pictures, RESULT)
+            self.looks.check([*outputs.pictures, *outputs.plots.names], RESULT)
             if self.beside is not None:
                 check_beside("--beside", outputs.pictures)
             return
+        outputs.plots.refuse("is of a single variant; drop --compare")
         if outputs.page is not None:
             raise click.UsageError("--report is for a single variant; drop --compare")
         if outputs.checks.names:

@@ -44,7 +44,9 @@ from camtool.simulation.samples import (
     row_chunks,
     row_seconds,
     sample_spacing_mm,
+    timed_row_chunks,
 )
+from camtool.simulation.timing import TimedChunk
 from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 SPREAD_STEPS = 2.0
@@ -67,6 +69,16 @@ class PathModel(ControllerModel[PathController, Any]):
         path = self.quantised(toolpath, machine)
         mechanics = Mechanics(machine, path.start, options.effects)
         return row_chunks(_sampled(path, machine), mechanics, options.chunk_steps)
+
+    samples_per_speed = 1
+
+    def timed(
+        self, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> Iterator[TimedChunk]:
+        """Yield the motion with the times of its samples."""
+        path = self.quantised(toolpath, machine)
+        mechanics = Mechanics(machine, path.start, options.effects)
+        return timed_row_chunks(_sampled(path, machine), mechanics, options.chunk_steps)
 
     def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
         """Return (N,) s that each row takes."""

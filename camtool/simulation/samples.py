@@ -21,6 +21,7 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, still_ledger
+from camtool.simulation.timing import TimedChunk
 from camtool.toolpath.moves import PolarArcs, Toolpath, are_arcs
 
 MAX_SAMPLES = 1_000_000
@@ -50,6 +51,10 @@ class SampleSource(Protocol):
     def steps(self, bounds: Ints) -> Ints:
         """Return (R, 3) steps of the axes within samples bounds[r]:bounds[r+1], which are of the
         last window."""
+
+    def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
+        """Return (K,) s from the starts of their rows to the samples low:high; `rows_s` (R,) is
+        what each row takes."""
 
 
 class SampledRows(Struct, frozen=True, eq=False):
@@ -81,6 +86,30 @@ def row_chunks(
     samples."""
     for block in blocks:
         yield from _chunks(block, mechanics, chunk_steps)
+
+
+def timed_row_chunks(
+    blocks: Iterable[SampledRows], mechanics: Mechanics, chunk_steps: int
+) -> Iterator[TimedChunk]:
+    """Yield the chunks of all rows as `row_chunks`, with the times of their samples."""
+    clock_s, reached_s = 0.0, 0.0
+    for block in blocks:
+        rows_s = np.concatenate([np.zeros(block.low - block.base), block.seconds])
+        starts_s = clock_s + np.cumsum(rows_s) - rows_s
+        number = int(block.samples.first[block.low - block.base])
+        for chunk in _chunks(block, mechanics, chunk_steps):
+            start_s = starts_s[chunk.row - block.base]
+            high = number + len(chunk.row)
+            at_s = start_s
+            if len(chunk.row):
+                at_s = start_s + block.samples.moments_s(number, high, rows_s)
+                at_s = np.maximum.accumulate(np.maximum(at_s, reached_s))
+            begin_s = np.minimum(
+                np.maximum(start_s, np.concatenate([[reached_s], at_s])[:-1]), at_s
+            )
+            yield TimedChunk(chunk, at_s, begin_s, at_s)
+            number, reached_s = high, float(at_s[-1]) if len(at_s) else reached_s
+        clock_s += float(block.seconds.sum())
 
 
 def _chunks(block: SampledRows, mechanics: Mechanics, chunk_steps: int) -> Iterator[Chunk]:
@@ -194,6 +223,11 @@ class PathSamples:
             last = part[of_arc] == parts[of_arc]
             share[of_arc] = np.where(last, end, begin + (end - begin) * share[of_arc])
         return np.repeat(self._pieces.row[pieces], sample_counts), share
+
+    def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
+        """Return (K,) s from the starts of their rows to the samples low:high, at even speed."""
+        row, share = self.places(low, high)
+        return np.asarray(share * rows_s[row])
 
     def points(self, row: Ints, share: Floats) -> Floats:
         """Return (K, 3) mm: the points at shares (K,) of the lengths of rows (K,)."""

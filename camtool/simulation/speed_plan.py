@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Floats
+from camtool.arrays import Floats, Ints
 from camtool.errors import MachineError
 from camtool.kernels.motion import entry_speeds
 from camtool.machine.model import Machine
@@ -61,6 +61,21 @@ class SpeedPlan(Struct, frozen=True, eq=False):
         ramps = (2.0 * peak**2 - first**2 - last**2) / (2.0 * a)
         steady = np.maximum(d - ramps, 0.0) / peak
         return np.asarray((2.0 * peak - first - last) / a + steady)
+
+    def moments_s(self, squares: Floats, block: Ints, way_mm: Floats) -> Floats:
+        """Return (K,) s from the starts of blocks (K,) to `way_mm` (K,) along them, with the
+        `squares` (N + 1,) of its method."""
+        a, d = self.acceleration_mm_s2[block], self.length_mm[block]
+        first, last = squares[:-1][block], squares[1:][block]
+        peak_square = np.minimum(self.speed_mm_s[block] ** 2, a * d + 0.5 * (first + last))
+        up_mm, down_mm = 0.5 * (peak_square - first) / a, 0.5 * (peak_square - last) / a
+        way_mm = np.minimum(way_mm, d)
+        rising_mm, falling_mm = np.minimum(way_mm, up_mm), np.minimum(d - way_mm, down_mm)
+        steady_mm = np.clip(way_mm - up_mm, 0.0, np.maximum(d - up_mm - down_mm, 0.0))
+        peak = np.sqrt(peak_square)
+        rising_s = (np.sqrt(first + 2.0 * a * rising_mm) - np.sqrt(first)) / a
+        falling_s = (peak - np.sqrt(last + 2.0 * a * falling_mm)) / a
+        return np.asarray(rising_s + steady_mm / peak + falling_s)
 
     def entry_after(self, count: int, squares: Floats) -> EntryState:
         """Return the entry state of the blocks behind the first `count` ones."""

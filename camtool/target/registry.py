@@ -29,6 +29,7 @@ from camtool.target.loader import machine_of, missing_keys, names_of, resolved_t
 if TYPE_CHECKING:
     from camtool.simulation.controller import ControllerModel
     from camtool.simulation.motion import Chunk, Options
+    from camtool.simulation.timing import TimedChunk
     from camtool.target.twin import Twin
     from camtool.toolpath.moves import Toolpath
 
@@ -88,6 +89,11 @@ class LoadedTarget:
         options = options or Options()
         self.check_options(options)
         return self.model.run(toolpath, self.machine, options)
+
+    def timed(self, toolpath: Toolpath, options: Options) -> Iterator[TimedChunk]:
+        """The motion as of `simulate`, with the times of its samples."""
+        self.check_options(options)
+        return self.model.timed(toolpath, self.machine, options)
 
     def check_options(self, options: Options) -> None:
         """OptionError for options that the machine's controller does not have."""

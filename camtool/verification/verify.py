@@ -76,13 +76,14 @@ __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """The report, the findings in it, the path of the slides for pictures, the figures of each
-    row, the moves with which the path was compared, which of their rows each decoded row follows
-    (N,), −1 for none, and full circles."""
+    """The report, the findings in it, the case that was judged, the path of the slides for
+    pictures, the figures of each row, the moves with which the path was compared, which of their
+    rows each decoded row follows (N,), −1 for none, and full circles."""
 
     report: Report
     trace: SlideTrace
     findings: tuple[Finding, ...]
+    case: Case
     rows: RowFigures
     wanted: CutMoves
     follows: Indices
@@ -114,7 +115,7 @@ def judge(
 ) -> Verification:
     """Judge a case by the chunks of its motion, or by a run that is judged as it is simulated."""
     progress = progress or Progress()
-    paths, coverage, conformance, direction_faults = _compare_cuts(case)
+    paths, coverage, conformance, direction_faults = compare_cuts(case)
     cuts, wanted_cuts = paths.decoded, paths.wanted
     cutter = cutter_of(case.options, cuts) if case.options.shape else None
     shape_points = points_wanted(cuts, cutter)
@@ -150,10 +151,12 @@ def judge(
     result = ReportBuilder(case, cuts, looped, coverage, slides, tally, conformance)
     report = result.report(extents, findings, trace, shape)
     follows = coverage.match.row
-    return Verification(report, trace, findings, rows, wanted_cuts, follows, slides.seen_circles())
+    return Verification(
+        report, trace, findings, case, rows, wanted_cuts, follows, slides.seen_circles()
+    )
 
 
-def _compare_cuts(
+def compare_cuts(
     case: Case,
 ) -> tuple[Paths, Coverage, Conformance | None, tuple[Finding, ...]]:
     """Compare the decoded with the wanted cuts: return the paths by which the slides are judged,

@@ -44,7 +44,7 @@ def commands() -> dict[str, list[str]]:
     """The commands of the pages by the picture that they make, last the name of that, without the
     name of the program."""
     text = "".join((ROOT / page).read_text(encoding="utf-8") for page in PAGES)
-    makes = r"^camtool (.* (?:-o|--preview) docs/images/(\S+))$"
+    makes = r"^camtool (.* (?:-o|--preview|--plot \w+) docs/images/(\S+))$"
     lines = re.findall(makes, text.replace("\\\n", " "), re.MULTILINE)
     return {name: shlex.split(line) for line, name in lines} | {FIRST: first_command()}
 

@@ -33,6 +33,7 @@ from camtool.simulation.legs import waits_s
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.simulation.rows import check_positions, check_rows, refuse, with_event_positions
+from camtool.simulation.timing import TimedChunk, reversals_of
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import FlashcutController, FlashcutDialect
@@ -62,6 +63,13 @@ class FlashcutModel(ControllerModel[FlashcutController, FlashcutDialect]):
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
         return FlashcutRun(toolpath, machine, options).run()
+
+    def timed(
+        self, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> Iterator[TimedChunk]:
+        """The motion with the milliseconds of its timers."""
+        run = FlashcutRun(toolpath, machine, options)
+        return run.timed(MoveClock(run, machine))
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The moves as the program says them, homing at machine zero: the controller keeps lengths
@@ -114,6 +122,7 @@ class FlashcutRun:
         self.waits_s = waits_s(path, len(path))
         """(R,) s of rows without motion."""
         self._table = MoveTable.of(path, machine)
+        self.start_mm = path.start
         self._mechanics = Mechanics(machine, path.start, options.effects)
         self._parts = controller.half_periods_per_step
         self._compensation_ms = controller.compensation_half_period_ms
@@ -126,11 +135,22 @@ class FlashcutRun:
             late_longer=controller.clock == "late-longer",
         )
         self._counters = Counters(np.zeros(3, np.int64), path.start.copy(), np.zeros(10, np.int64))
-        self._samples = options.chunk_steps
+        self._samples, self._reached_s = options.chunk_steps, 0.0
 
     def run(self) -> Iterator[Chunk]:
         """The chunks of all rows up to the end of the program."""
         return map(self._chunk, self.batches())
+
+    def timed(self, clock: MoveClock) -> Iterator[TimedChunk]:
+        """The chunks with the times of their samples, each of which ends its period."""
+        for batch in self.batches():
+            times = clock.take(batch)
+            move_s = times.begin_ms[times.number] / MS_PER_S
+            since_s = self._parts * batch.issued.since_ms[: batch.filled] / MS_PER_S
+            at_s = move_s + since_s
+            before_s = np.concatenate([[self._reached_s], at_s])[:-1]
+            self._reached_s = float(at_s[-1]) if batch.filled else self._reached_s
+            yield TimedChunk(self._chunk(batch), at_s, np.maximum(before_s, move_s), at_s)
 
     def batches(self) -> Iterator[TimerBatch]:
         """Yield the samples of all rows up to the end of the program."""
@@ -209,6 +229,109 @@ class TimerBatch(Struct, frozen=True, eq=False):
     filled: int
     move: int
     under_way: Ints
+
+
+MS_PER_S = 1000.0
+
+
+class MoveTimes(Struct, frozen=True, eq=False):
+    """The K samples of a batch as `steps` (K, 3) since the one before, with their `row` (K,), and
+    which of M moves each is of, `number` (K,).
+
+    Of these moves: when each begins, `begin_ms` (M,), the half period of a tick of its longer axis
+    `half_period_ms` (M,), its directions `ways` (M, 3), the row `first_row` (M,), and the steps
+    `added` (M, 3) right before it, each of which takes `added_step_ms` (M,). `is_under_way`: the
+    last of them goes on in the next batch.
+    """
+
+    steps: Ints
+    row: Ints
+    number: Ints
+    begin_ms: Ints
+    half_period_ms: Ints
+    ways: Ints
+    first_row: Ints
+    added: Ints
+    added_step_ms: Ints
+    is_under_way: bool
+
+
+class MoveClock:
+    """Clock of the moves of a run: where and which way the motors go, and the time so far, ms."""
+
+    def __init__(self, run: FlashcutRun, machine: _Machine) -> None:
+        controller, axes = machine.controller, list(machine.axes)
+        self._parts = controller.half_periods_per_step
+        self._compensation_ms = controller.compensation_half_period_ms
+        self._step_mm = np.array([axis.coded_step_mm for axis in axes])
+        self._added = np.array(
+            [to_steps(axis.compensation_mm, axis.coded_step_mm) for axis in axes]
+        )
+        self._origin = run.start_mm
+        self._position = np.zeros(3, dtype=np.int64)
+        self._sense = np.full(3, 1 if controller.start_direction == "+" else -1)
+        self._waits_ms = np.rint(run.waits_s * MS_PER_S).astype(np.int64)
+        self.now_ms = 0
+        """The end of what is done."""
+        self._row = -1
+        """The last row whose wait is in the time."""
+        self._begin_ms: int | None = None
+        """The start of the move that is under way."""
+
+    def take(self, batch: TimerBatch) -> MoveTimes:
+        """Return the times of the next batch."""
+        issued, filled = batch.issued, batch.filled
+        row, move = issued.row[:filled] + batch.low, issued.move[:filled]
+        places = np.rint((issued.commanded[:filled] - self._origin) / self._step_mm)
+        steps = np.diff(places.astype(np.int64), axis=0, prepend=self._position[None, :])
+        first = np.flatnonzero(np.diff(move, prepend=-1))
+        under_way = bool(filled and batch.under_way[0] > 0 and move[-1] == batch.move)
+        ways = np.zeros((len(first), 3), dtype=np.int64)
+        half = batch.moves.half_period[move[first]]
+        each = (half if self._compensation_ms is None else self._compensation_ms) + np.zeros_like(
+            half
+        )
+        added_step_ms = self._parts * (each + 1)
+        begin_ms, added = np.zeros(len(first), dtype=np.int64), np.zeros_like(ways)
+        if filled:
+            self._position = places[-1].astype(np.int64)
+            for axis in range(3):
+                ways[:, axis] = np.sign(np.add.reduceat(steps[:, axis], first))
+            if under_way:
+                for column, sense in zip(batch.under_way[2:4], batch.under_way[4:6], strict=True):
+                    if column >= 0:
+                        ways[-1, column] = sense
+            turns, self._sense = reversals_of(ways, self._sense)
+            added = turns * self._added
+            lasts_ms = self._parts * issued.since_ms[np.append(first[1:], filled) - 1]
+            for k, start in enumerate(first.tolist()):
+                if k == 0 and self._begin_ms is not None:
+                    begin_ms[k], added[k] = self._begin_ms, 0
+                else:
+                    self._wait(int(row[start]))
+                    begin_ms[k] = self.now_ms + added[k].sum() * added_step_ms[k]
+                self.now_ms = int(begin_ms[k] + lasts_ms[k])
+            self._begin_ms = int(begin_ms[-1]) if under_way else None
+        if not under_way:
+            self._wait(int(batch.low + batch.rows[-1]))
+        number = np.searchsorted(move[first], move)
+        return MoveTimes(
+            steps,
+            row,
+            number,
+            begin_ms,
+            half + 1,
+            ways,
+            row[first],
+            added,
+            added_step_ms,
+            under_way,
+        )
+
+    def _wait(self, row: int) -> None:
+        """Let the waits of the rows up to this one pass."""
+        self.now_ms += int(self._waits_ms[self._row + 1 : row + 1].sum())
+        self._row = max(self._row, row)
 
 
 # Rows of a toolpath as the displacements that the parallel-port machine's program makes of them.

@@ -20,13 +20,12 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Ints
-from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
-from camtool.simulation.pulses import OUTPUTS, Pulses, in_order, reversals_of
+from camtool.simulation.pulses import OUTPUTS, Pulses, in_order
 from camtool.target.signals import Board, Coils, SignalModel
 from camtool.toolpath.moves import Kind, Toolpath
 
-from .controller import FlashcutRun, TimerBatch
+from .controller import MS_PER_S, FlashcutRun, MoveClock, MoveTimes, TimerBatch
 from .dialect import FlashcutController, FlashcutDialect
 
 _Machine = Machine[FlashcutController, FlashcutDialect]
@@ -40,8 +39,6 @@ PLACES = ("X", "0x378", 0), ("Y", "0x378", 4), ("Z", "0xBC00", 4), ("spindle", "
 """Motor, port and lowest bit (Tabla 3.7)."""
 
 SPINDLE = 3
-
-MS_PER_S = 1000.0
 
 
 class FlashcutSignals(SignalModel):
@@ -90,7 +87,8 @@ class _Steps(Struct, frozen=True, eq=False):
 
 
 class _CoilRun:
-    """State of a run: where and which way the motors go, and the time so far, ms."""
+    """State of a run: the moves with their times, and states that come later than those of the
+    next batch may."""
 
     def __init__(self, toolpath: Toolpath, run: FlashcutRun, machine: _Machine) -> None:
         controller = machine.controller
@@ -98,103 +96,40 @@ class _CoilRun:
             controller.half_periods_per_step,
             states_per_step(controller),
         )
-        self._compensation_ms = controller.compensation_half_period_ms
-        axes = list(machine.axes)
-        self._step_mm = np.array([axis.coded_step_mm for axis in axes])
-        self._added = np.array(
-            [to_steps(axis.compensation_mm, axis.coded_step_mm) for axis in axes]
-        )
-        self._origin = toolpath.start
-        self._position = np.zeros(3, dtype=np.int64)
-        self._sense = np.full(3, 1 if controller.start_direction == "+" else -1)
-        self._waits_ms = np.rint(run.waits_s * MS_PER_S).astype(np.int64)
+        self._clock = MoveClock(run, machine)
         self._spindle = _spindle_senses(toolpath, spins_always=not machine.dialect.spindle_stops)
-        self._clock_ms = 0
-        """The end of all moves that are complete."""
-        self._row = -1
-        """The last row whose wait is in the clock."""
-        self._begin_ms = 0
-        """The start of the move that is under way, of which `_done` is known."""
         self._done: tuple[int, Ints] | None = None
         """Of the move under way: its time so far, and the last step (3,) of each axis, ms."""
         self._pending = Pulses.none(len(PLACES))
 
     def pulses(self, batch: TimerBatch) -> Pulses:
         """Return the states of the next batch that are surely before those of the one after it."""
-        issued, filled = batch.issued, batch.filled
-        row, move = issued.row[:filled] + batch.low, issued.move[:filled]
-        since = issued.since_ms[:filled]
-        places = np.rint((issued.commanded[:filled] - self._origin) / self._step_mm)
-        moves = np.diff(places.astype(np.int64), axis=0, prepend=self._position[None, :])
-        under_way = bool(filled and batch.under_way[0] > 0 and move[-1] == batch.move)
+        filled = batch.filled
+        move, since = batch.issued.move[:filled], batch.issued.since_ms[:filled]
+        times = self._clock.take(batch)
         steps: list[_Steps] = []
-        safe_ms = self._clock_ms
+        safe_ms = self._clock.now_ms
         if filled:
-            self._position = places[-1].astype(np.int64)
-            begins, half, lasts = self._begin_moves(batch, row, moves, under_way, steps)
-            number = np.searchsorted(begins[0], move)
-            begin_ms = begins[1][number]
-            last_of_axis = self._axis_steps(moves, move, since, begin_ms, row, steps)
-            self._spindle_steps(move, since, begin_ms, row, half[number], steps)
-            if under_way:
-                self._begin_ms = int(begins[1][-1])
+            for k in np.flatnonzero(times.added.any(axis=1)).tolist():
+                steps += self._compensation(times, k)
+            begin_ms = times.begin_ms[times.number]
+            last_of_axis = self._axis_steps(times.steps, move, since, begin_ms, times.row, steps)
+            half = times.half_period_ms[times.number]
+            self._spindle_steps(move, since, begin_ms, times.row, half, steps)
+            if times.is_under_way:
                 self._done = int(since[-1]), last_of_axis
                 slow = last_of_axis[batch.under_way[2:4][batch.under_way[2:4] >= 0]]
-                safe_ms = self._begin_ms + self._parts * int(slow.min())
+                safe_ms = int(times.begin_ms[-1]) + self._parts * int(slow.min())
             else:
-                self._clock_ms, self._done = lasts, None
-        if not under_way:
-            self._wait(int(batch.low + batch.rows[-1]))
-            safe_ms = self._clock_ms
+                self._done = None
         return self._released([self._states_of(each) for each in steps], safe_ms)
 
-    def _wait(self, row: int) -> None:
-        """Let the waits of the rows up to this one pass."""
-        self._clock_ms += int(self._waits_ms[self._row + 1 : row + 1].sum())
-        self._row = max(self._row, row)
-
-    def _begin_moves(
-        self, batch: TimerBatch, row: Ints, moves: Ints, under_way: bool, steps: list[_Steps]
-    ) -> tuple[tuple[Ints, Ints], Ints, int]:
-        """Return the moves with samples and their starts, ms, their half periods with their
-        lateness, ms, and the end of the last one; `steps` gets their compensations, which come
-        before."""
-        numbers = batch.issued.move[: batch.filled]
-        first = np.flatnonzero(np.diff(numbers, prepend=-1))
-        ends = np.append(first[1:], batch.filled) - 1
-        ways = np.zeros((len(first), 3), dtype=np.int64)
-        for axis in range(3):
-            ways[:, axis] = np.sign(np.add.reduceat(moves[:, axis], first))
-        if under_way:
-            for column, sense in zip(batch.under_way[2:4], batch.under_way[4:6], strict=True):
-                if column >= 0:
-                    ways[-1, column] = sense
-        turns, self._sense = reversals_of(ways, self._sense)
-        half = batch.moves.half_period[numbers[first]]
-        each = (half if self._compensation_ms is None else self._compensation_ms) + np.zeros_like(
-            half
-        )
-        each_ms = self._parts * (each + 1)
-        added = turns * self._added
-        durations = self._parts * batch.issued.since_ms[ends]
-        begin_ms = np.empty(len(first), dtype=np.int64)
-        for k, start in enumerate(first.tolist()):
-            if k == 0 and self._done is not None:
-                begin_ms[k] = self._begin_ms
-            else:
-                self._wait(int(row[start]))
-                begin_ms[k] = self._clock_ms + added[k].sum() * each_ms[k]
-                if added[k].any():
-                    steps += self._compensation(
-                        added[k], ways[k], int(row[start]), int(each_ms[k])
-                    )
-            self._clock_ms = int(begin_ms[k] + durations[k])
-        return (numbers[first], begin_ms), half + 1, self._clock_ms
-
-    def _compensation(self, counts: Ints, ways: Ints, row: int, each_ms: int) -> list[_Steps]:
-        """The steps of a compensation from the present time on, with those of the spindle."""
+    def _compensation(self, times: MoveTimes, k: int) -> list[_Steps]:
+        """The steps of the compensation before a move, with those of the spindle."""
+        counts, ways = times.added[k], times.ways[k]
+        row, each_ms = int(times.first_row[k]), int(times.added_step_ms[k])
         total = int(counts.sum())
-        starts = self._clock_ms + each_ms * np.arange(total)
+        starts = int(times.begin_ms[k]) + each_ms * np.arange(-total, 0)
         axis = np.repeat(np.arange(3), counts)
         rows, is_added = np.full(total, row), np.ones(total, dtype=np.bool_)
         steps = [_Steps(SPINDLE, starts, starts + each_ms, self._spindle[rows], rows, is_added)]

@@ -32,7 +32,12 @@ from camtool.simulation.legs import coded_steps_mm
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import check_rows
-from camtool.simulation.samples import SampledRows, row_chunks, row_seconds
+from camtool.simulation.samples import (
+    SampledRows,
+    row_chunks,
+    row_seconds,
+    timed_row_chunks,
+)
 from camtool.simulation.speed_plan import (
     FROM_REST,
     EntryState,
@@ -41,6 +46,7 @@ from camtool.simulation.speed_plan import (
     max_along,
 )
 from camtool.simulation.step_lines import LineRows, LineRun
+from camtool.simulation.timing import TimedChunk
 from camtool.toolpath.moves import EVENTS_AT_REST, Kind, Toolpath, are_arcs
 
 from .dialect import GrblController, GrblDialect
@@ -68,6 +74,13 @@ class GrblModel(ControllerModel[GrblController, GrblDialect]):
         """The motion, chunk by chunk."""
         path, mechanics = self._at_start(toolpath, machine, options)
         return row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
+
+    def timed(
+        self, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> Iterator[TimedChunk]:
+        """The motion with the times of its steps by the planned trapezoids."""
+        path, mechanics = self._at_start(toolpath, machine, options)
+        return timed_row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
 
     def fused_run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> LineRun | None:
         """Return the lines of all rows; None where the mechanics differ from place to place."""
@@ -174,7 +187,7 @@ def sample_rows(
         own_s = planned.plan.seconds(planned.squares)[:count]
         own_s += idle_delay_s(controller) * planned.rests
         np.add.at(seconds, blocks.row - low, own_s)
-        samples = GrblSamples(blocks, np.arange(low, high + 1), machine)
+        samples = GrblSamples(planned, own_s, machine)
         yield SampledRows(low, high, low, samples, seconds, iterates=True)
 
 
@@ -196,11 +209,14 @@ def idle_delay_s(controller: GrblController) -> float:
 class GrblSamples:
     """All step events of some rows, numbered from 0; none are held."""
 
-    def __init__(self, blocks: Blocks, rows: Ints, machine: _Machine) -> None:
-        """`rows` (R+1,) of which the blocks are, and the one behind them."""
-        self._blocks, self._low = blocks, int(rows[0])
+    def __init__(self, planned: PlannedBlocks, seconds: Floats, machine: _Machine) -> None:
+        """`seconds` (B,) of the planned blocks."""
+        blocks = planned.blocks
+        self._blocks, self._low = blocks, planned.low
+        self._planned, self._seconds = planned, seconds
         self._step_mm = coded_steps_mm(machine)
         self._offsets = np.concatenate([[0], np.cumsum(blocks.events, dtype=np.int64)])
+        rows = np.arange(planned.low, planned.high + 1)
         self.first = self._offsets[np.searchsorted(blocks.row, rows)]
 
     @staticmethod
@@ -231,6 +247,16 @@ class GrblSamples:
         bounds = np.clip(self._offsets[begin : end + 1], low, high)
         row = blocks.row[begin:end].astype(np.int64) - self._low
         return np.repeat(row, np.diff(bounds)), commanded
+
+    def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
+        """Return (K,) s from the starts of their rows to the events low:high."""
+        plan, row = self._planned.plan, self._blocks.row
+        block = np.searchsorted(self._offsets, np.arange(low, high), side="right") - 1
+        event = np.arange(low + 1, high + 1) - self._offsets[block]
+        way_mm = plan.length_mm[block] * (event / self._blocks.events[block])
+        begin_s = np.cumsum(self._seconds) - self._seconds
+        begin_s -= begin_s[np.searchsorted(row, row)]
+        return np.asarray(begin_s[block] + plan.moments_s(self._planned.squares, block, way_mm))
 
     def steps(self, bounds: Ints) -> Ints:
         """Steps of each axis between events."""

@@ -26,6 +26,7 @@ from camtool.simulation.legs import LegProgram, LegRun, Legs, check_rows, coded_
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import refuse, with_ends
 from camtool.simulation.step_lines import LineRun
+from camtool.simulation.timing import SampleClock
 from camtool.toolpath.moves import Toolpath
 
 from .dialect import I8751Controller, I8751Dialect
@@ -49,6 +50,18 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
         """Return the legs of all rows; None where the mechanics differ from place to place."""
         legs, blocks = _leg_run(toolpath, machine, options)
         return legs.fused_run(blocks)
+
+    def clock(self, toolpath: Toolpath, machine: _Machine) -> SampleClock:
+        """The ramps, pulse by pulse."""
+        path, times = self.quantised(toolpath, machine), PulseTimes(machine.dialect)
+        travel = np.rint(
+            np.diff(path.end, axis=0, prepend=path.start[None, :]) / coded_steps_mm(machine)
+        ).astype(np.int64)
+
+        def waits(row: Ints, number: Ints) -> tuple[Floats, Floats]:
+            return times.around(np.abs(travel[row]), number)
+
+        return SampleClock(path, machine, waits)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The same with start and ends at their nearest steps; ProgramError for arcs, homing."""

@@ -9,18 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from camtool.arrays import Floats, Ints
 from camtool.machine.model import Machine
-from camtool.simulation.legs import coded_steps_mm
 from camtool.simulation.pulses import OUTPUTS, Pulses, row_pulses
 from camtool.target.signals import Board, Coils, SignalModel
 from camtool.toolpath.moves import Toolpath
 
 from .controller import I8751Model
 from .dialect import I8751Controller, I8751Dialect
-from .pulses import PulseTimes
 
 _Machine = Machine[I8751Controller, I8751Dialect]
 
@@ -56,14 +51,6 @@ class I8751Signals(SignalModel):
 
     def pulses(self, toolpath: Toolpath, machine: _Machine) -> Iterator[Pulses]:
         """Yield the pulses with their ramps."""
-        model, times = I8751Model(), PulseTimes(machine.dialect)
-        path = model.quantised(toolpath, machine)
-        travel = np.rint(
-            np.diff(path.end, axis=0, prepend=path.start[None, :]) / coded_steps_mm(machine)
-        ).astype(np.int64)
-
-        def waits(row: Ints, number: Ints) -> tuple[Floats, Floats]:
-            return times.around(np.abs(travel[row]), number)
-
+        model = I8751Model()
         chunks = model.run(toolpath, machine, OUTPUTS)
-        return row_pulses(chunks, path, machine, waits)
+        return row_pulses(chunks, model.clock(toolpath, machine), toolpath)

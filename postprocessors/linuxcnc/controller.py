@@ -42,6 +42,7 @@ from camtool.simulation.samples import (
     row_seconds,
     sample_spacing_mm,
     spacing_along,
+    timed_row_chunks,
 )
 from camtool.simulation.speed_plan import (
     FROM_REST,
@@ -50,6 +51,7 @@ from camtool.simulation.speed_plan import (
     axis_limits,
     max_along,
 )
+from camtool.simulation.timing import TimedChunk
 from camtool.toolpath.moves import (
     EVENTS_AT_REST,
     Kind,
@@ -93,6 +95,20 @@ class LinuxcncModel(ControllerModel[LinuxcncController, LinuxcncDialect]):
         path = self.quantised(toolpath, machine)
         mechanics = Mechanics(machine, path.start, options.effects)
         return row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
+
+    samples_per_speed = 1
+
+    def speed_period_s(self, machine: _Machine) -> float:
+        """The period in which its trajectory planner runs."""
+        return machine.controller.servo_period_s
+
+    def timed(
+        self, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> Iterator[TimedChunk]:
+        """The motion with the times of its samples by the planned trapezoids."""
+        path = self.quantised(toolpath, machine)
+        mechanics = Mechanics(machine, path.start, options.effects)
+        return timed_row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
 
     def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
         """(N,) s that each row takes."""
@@ -199,12 +215,16 @@ class _Run:
             lookahead *= 2  # some of the moves are too short to be planned
         part_seconds = np.zeros(len(lasting) + 1)
         cuts = np.repeat(window_plan.moves.cuts, 2)[lasting]
-        part_seconds[:-1][lasting] = self._in_periods(speeds, overlaps, cuts, done_count)
+        squares = speeds.squares(self._machine.controller.lookahead_moves)
+        part_seconds[:-1][lasting] = self._in_periods(
+            speeds, squares, (overlaps, cuts), done_count
+        )
         block_rows, first = slice(self._place(low) // 2, self._place(high) // 2), base // 2
-        seconds = _seconds(window_plan, part_seconds)[
-            block_rows.start - first : block_rows.stop - first
-        ]
-        samples = LinuxcncSamples(window_plan, self._machine, self._spacing_mm, self._passed_mm)
+        profile = _Profile.of(window_plan, part_seconds, speeds, squares, lasting)
+        seconds = profile.origin_s[block_rows.start - first : block_rows.stop - first]
+        samples = LinuxcncSamples(
+            window_plan, profile, self._machine, self._spacing_mm, self._passed_mm
+        )
         self._passed_mm = samples.passed_mm(own_moves.stop - min(high, MOVES_BEFORE))
         return SampledRows(block_rows.start, block_rows.stop, first, samples, seconds)
 
@@ -225,14 +245,17 @@ class _Run:
         return PlannedWindow(origin, tangents, moves, corners_of(moves, tangents, self._rules))
 
     def _in_periods(
-        self, plan: SpeedPlan, overlaps: Floats, cuts: Bools, done_count: int
+        self,
+        plan: SpeedPlan,
+        squares: Floats,
+        overlaps_and_cuts: tuple[Floats, Bools],
+        done_count: int,
     ) -> Floats:
         """(N,) s of each block, less its overlap (N,) with the next; from rest to rest it takes
-        whole servo periods, and `REST_PERIODS`. Short ones of `cuts` (N,) change their speed
+        whole servo periods, and `REST_PERIODS`. Short ones of the cuts (N,) change their speed
         evenly. The next plan begins behind the first `done_count` of these."""
-        controller = self._machine.controller
-        period_s = controller.servo_period_s
-        squares = plan.squares(controller.lookahead_moves)
+        overlaps, cuts = overlaps_and_cuts
+        period_s = self._machine.controller.servo_period_s
         seconds = plan.seconds(squares)
         speeds = np.sqrt(squares)
         ramps = np.flatnonzero(cuts & (overlaps == 0.0) & (speeds[1:] > 0.0))
@@ -259,6 +282,7 @@ class LinuxcncSamples(CountedSamples):
     def __init__(
         self,
         window_plan: PlannedWindow,
+        profile: _Profile,
         machine: _Machine,
         spacing_mm: float,
         passed_mm: tuple[float, float],
@@ -267,7 +291,7 @@ class LinuxcncSamples(CountedSamples):
         not depend, in their last bits, on where a block begins."""
         path, moves, corners = window_plan.tangents.path, window_plan.moves, window_plan.corners
         super().__init__(path, machine, spacing_mm)
-        self._origin = window_plan.origin
+        self._origin, self._profile = window_plan.origin, profile
         halves = np.searchsorted(self._origin, np.arange(int(self._origin[-1]) + 2))
         self.first = self.first[halves]
         self._tangents = window_plan.tangents
@@ -298,6 +322,12 @@ class LinuxcncSamples(CountedSamples):
         """Row and position of the samples low:high."""
         row, points = super().window(low, high)
         return self._origin[row], points
+
+    def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
+        """(K,) s from the starts of their rows to the samples low:high."""
+        row, share = self.places(low, high)
+        along = self._into[row] + share * self._row_length[row]
+        return self._profile.moments_s(row, self._into[row], along)
 
     def points(self, row: Ints, share: Floats) -> Floats:
         """(K, 3) mm: the points at shares (K,) of the ways of rows (K,), blended."""
@@ -412,25 +442,95 @@ def _lengths(moves: PlannerMoves, corners: PlannerCorners) -> tuple[Floats, Floa
     return own_length, joined_length
 
 
-def _seconds(window_plan: PlannedWindow, part_seconds: Floats) -> Floats:
-    """(N,) s of each row, with what each blend and move takes, `part_seconds` (2 M + 1,).
+class _Profile(Struct, frozen=True, eq=False):
+    """The times of the parts of a window: s (M,) of the half of the blend at the start of each
+    move, of what blends leave of it, and of the half of the blend at its end; `rows_s` (P,) of the
+    rows of the path, and `origin_s` of the rows that these are, or are halves of.
+
+    `block` (M,) of the plan that a move is, −1 for one that blends leave nothing of.
+    """
+
+    window_plan: PlannedWindow
+    begin_s: Floats
+    own_s: Floats
+    end_s: Floats
+    rows_s: Floats
+    origin_s: Floats
+    plan: SpeedPlan
+    squares: Floats
+    block: Ints
+
+    @classmethod
+    def of(
+        cls,
+        window_plan: PlannedWindow,
+        part_seconds: Floats,
+        plan: SpeedPlan,
+        squares: Floats,
+        lasting: Bools,
+    ) -> _Profile:
+        """The times with what each blend and move takes, `part_seconds` (2 M + 1,); `lasting`
+        (2 M,): those that are blocks of the plan."""
+        begin_s, end_s = _blend_seconds(window_plan, part_seconds)
+        own_s = part_seconds[1::2]
+        path, moves = window_plan.tangents.path, window_plan.moves
+        rows_s = np.where(path.kind == Kind.DWELL, path.value, 0.0)
+        moving = np.flatnonzero(moves.row_of >= 0)
+        move = moves.row_of[moving]
+        move_s = own_s + begin_s + end_s
+        rows_s[moving] = move_s[move] * (move_lengths(path)[moving] / moves.length[move])
+        origin_s = np.asarray(np.bincount(window_plan.origin, rows_s), dtype=np.float64)
+        of_part = np.where(lasting, np.cumsum(lasting) - 1, -1)
+        block = of_part[1::2]
+        return cls(window_plan, begin_s, own_s, end_s, rows_s, origin_s, plan, squares, block)
+
+    def moments_s(self, row: Ints, into: Floats, along: Floats) -> Floats:
+        """(K,) s from the starts of the program's rows to `along` (K,) mm of the moves of rows
+        (K,) of the path, which begin `into` (K,) mm of these."""
+        moves, corners = self.window_plan.moves, self.window_plan.corners
+        move = moves.row_of[row]
+        reach, length = np.append(corners.reach, 0.0), moves.length[move]
+        first, last = np.append(corners.reach_on, 0.0)[move], reach[move + 1]
+        move_s = self.own_s + self.begin_s + self.end_s
+        moment_s = move_s[move] * along / length  # evenly, where blends leave nothing of the move
+        planned = np.flatnonzero(self.block[move] >= 0)
+        one, block = move[planned], self.block[move[planned]]
+        way_mm = np.maximum(along - first, 0.0)[planned]
+        whole_s = self.plan.moments_s(self.squares, block, self.plan.length_mm[block])
+        own_share = self.plan.moments_s(self.squares, block, way_mm) / whole_s
+        begun = _part_of(along[planned], first[planned])
+        ended = 1.0 - _part_of((length - along)[planned], last[planned])
+        moment_s[planned] = (
+            self.begin_s[one] * begun + self.own_s[one] * own_share + self.end_s[one] * ended
+        )
+        starts_s, origin = np.cumsum(self.rows_s) - self.rows_s, self.window_plan.origin
+        first_row = np.searchsorted(origin, origin[row])
+        before_s = move_s[move] * into / length
+        return np.asarray(moment_s - before_s + starts_s[row] - starts_s[first_row])
+
+
+def _part_of(reached: Floats, length: Floats) -> Floats:
+    """(K,) the part 0 … 1 of `length` (K,) that `reached` (K,) is; 1 of nothing."""
+    parts = np.ones(len(length))
+    np.divide(reached, length, out=parts, where=length > 0.0)
+    return np.clip(parts, 0.0, 1.0)
+
+
+def _blend_seconds(window_plan: PlannedWindow, part_seconds: Floats) -> tuple[Floats, Floats]:
+    """(M,), (M,) s of the blends at the start and at the end of each move, with what each blend
+    and move takes, `part_seconds` (2 M + 1,).
 
     Half of a blend belongs to the row on either side, and a line that joins it to the row before;
     the rows of a merged line share its time by their lengths.
     """
-    path, moves, corners = window_plan.tangents.path, window_plan.moves, window_plan.corners
+    moves, corners = window_plan.moves, window_plan.corners
     _, joined_length = _lengths(moves, corners)
     joined = np.flatnonzero(joined_length)
     later_share = np.full(len(moves.length) + 1, 0.5)
     later_share[joined] *= corners.length[joined] / (corners.length + joined_length)[joined]
-    seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
     blend_seconds = part_seconds[0::2]
     later_seconds = later_share * blend_seconds
-    move_seconds = part_seconds[1::2] + later_seconds[:-1] + (blend_seconds - later_seconds)[1:]
-    moving = np.flatnonzero(moves.row_of >= 0)
-    move = moves.row_of[moving]
-    seconds[moving] = move_seconds[move] * (move_lengths(path)[moving] / moves.length[move])
-    return np.asarray(np.bincount(window_plan.origin, seconds), dtype=np.float64)
+    return later_seconds[:-1], (blend_seconds - later_seconds)[1:]
 
 
 def _in_turns(blends: Floats | float, moves: Floats) -> Floats:

@@ -33,6 +33,7 @@ from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.simulation.rows import refuse, with_event_positions
+from camtool.simulation.timing import TimedChunk
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import MatlabRouterController, MatlabRouterDialect, dialect_of
@@ -67,6 +68,20 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
         return _Run(self.quantised(toolpath, machine), machine, options).run()
+
+    samples_per_speed = 1
+
+    def timed(
+        self, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> Iterator[TimedChunk]:
+        """The motion at each tick; dwells and the numbers of a job on their way come before."""
+        run = _Run(self.quantised(toolpath, machine), machine, options)
+        ticks = 0
+        for chunk in run.run():
+            tick = np.arange(ticks, ticks + len(chunk.row))
+            begin_s = tick * TICK_S + run.standing_s[chunk.row]
+            yield TimedChunk(chunk, begin_s + TICK_S, begin_s, begin_s + TICK_S)
+            ticks += len(tick)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The same with all ends on whole counts from home, homing at home. ProgramError for arcs,
@@ -123,6 +138,8 @@ class _Run:
     def __init__(self, path: Toolpath, machine: _Machine, options: Options) -> None:
         self._rows = path.executed_rows
         self._lines: MasterOrders = lines_of(path, self._rows, machine)
+        self.standing_s = np.cumsum(self._lines.extra_s)
+        """(R,) s that rows up to each take besides its ticks."""
         self._program = program_of(self._lines.orders, self._lines.pauses_s, machine)
         self._state = state_of(path.start, machine)
         self._account = account_of(self._rows)

@@ -39,6 +39,7 @@ from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Effects, Options, one_row
 from camtool.simulation.rows import block_of, refuse
+from camtool.simulation.timing import SampleClock, TimedChunk
 from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 from . import steps as loops
@@ -80,6 +81,22 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
             centre[arcs] = _on_grid(centre[arcs], coded_mm[:2])
         return replace(toolpath, start=start, end=end, centre=read_only(centre))
 
+    def timed(
+        self, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> Iterator[TimedChunk]:
+        """The motion with the times of its outputs."""
+        return super().timed(toolpath, machine, options_by_pass(machine, options))
+
+    def clock(self, toolpath: Toolpath, machine: _Machine) -> SampleClock:
+        """Outputs a period apart, and the steps that compensate backlash, by region too."""
+        added = None
+        if machine.controller.compensates_by_region:
+            added = np.zeros((len(toolpath), 3), dtype=np.int64)
+            # NaN until an axis turns away for the first time: nothing is added until then.
+            for axis, added_mm in enumerate(np.nan_to_num(compensations(toolpath, machine)).T):
+                added[:, axis] = to_steps(added_mm, list(machine.axes)[axis].coded_step_mm)
+        return SampleClock(self.quantised(toolpath, machine), machine, added=added)
+
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """Return the interpolator of arcs: dsm, dda or stairs."""
         return options.interpolator or machine.controller.arcs
@@ -111,6 +128,13 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
         """The same motion as that of `run`, judged as it is made, without chunks; None where the
         mechanics needs these. Raises as `run` does, all at once."""
         return PicMmhRun(toolpath, machine, options).fused_run()
+
+
+def options_by_pass(machine: _Machine, options: Options) -> Options:
+    """Return the options of a run whose times are wanted: where idle passes take a period too, the
+    model runs pass by pass, which alone says where they are."""
+    by_pass = machine.controller.time_base == "iteration"
+    return replace(options, chunk_steps=1) if by_pass else options
 
 
 def _on_grid(points: Floats, coded_mm: list[float]) -> Floats:

@@ -8,16 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
-from camtool.records import replace
 from camtool.simulation.pulses import OUTPUTS, Pulses, row_pulses
 from camtool.target.signals import Board, Coils, SignalModel
 from camtool.toolpath.moves import Toolpath
 
-from .controller import PicMmhModel, compensations
+from .controller import PicMmhModel, options_by_pass
 from .dialect import PicMmhController, PicMmhDialect
 
 _Machine = Machine[PicMmhController, PicMmhDialect]
@@ -51,15 +47,7 @@ class PicMmhSignals(SignalModel):
         )
 
     def pulses(self, toolpath: Toolpath, machine: _Machine) -> Iterator[Pulses]:
-        """Yield the outputs of the interpolator. Where idle passes take a period too, the model
-        runs pass by pass, which alone says where they are."""
-        by_pass = machine.controller.time_base == "iteration"
-        options = replace(OUTPUTS, chunk_steps=1) if by_pass else OUTPUTS
-        model, added = PicMmhModel(), None
-        if machine.controller.compensates_by_region:
-            added = np.zeros((len(toolpath), 3), dtype=np.int64)
-            # NaN until an axis turns away for the first time: nothing is added until then.
-            for axis, added_mm in enumerate(np.nan_to_num(compensations(toolpath, machine)).T):
-                added[:, axis] = to_steps(added_mm, list(machine.axes)[axis].coded_step_mm)
-        path, chunks = model.quantised(toolpath, machine), model.run(toolpath, machine, options)
-        return row_pulses(chunks, path, machine, added=added)
+        """Yield the outputs of the interpolator."""
+        model = PicMmhModel()
+        chunks = model.run(toolpath, machine, options_by_pass(machine, OUTPUTS))
+        return row_pulses(chunks, model.clock(toolpath, machine), toolpath)

@@ -45,6 +45,5 @@ class ValcncSignals(SignalModel):
     def pulses(self, toolpath: Toolpath, machine: _Machine) -> Iterator[Pulses]:
         """Yield the passes of the counter."""
         model = ValcncModel()
-        path = model.quantised(toolpath, machine)
         chunks = model.run(toolpath, machine, OUTPUTS)
-        return row_pulses(chunks, path, machine)
+        return row_pulses(chunks, model.clock(toolpath, machine), toolpath)
