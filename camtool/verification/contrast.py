@@ -25,6 +25,7 @@ class ContrastRow(msgspec.Struct, frozen=True):
     total_rms_um: float | None
     circular_um: float | None
     iterations: int
+    iterations_cutting: int
     reversals_cutting: int
     endless: int
     time_s: float
@@ -42,6 +43,7 @@ def contrast_row(name: str, report: Report) -> ContrastRow:
         total_rms_um=error.total.rms,
         circular_um=max(circular, default=None),
         iterations=report.steps.iterations,
+        iterations_cutting=report.steps.iterations_cutting,
         reversals_cutting=report.cutting_reversals,
         endless=sum(finding.code == "ARC_MISSES_END" for finding in report.findings),
         time_s=report.time_s,
@@ -59,7 +61,7 @@ def contrast_table(rows: Sequence[ContrastRow]) -> str:
             row.name,
             *map(_um_words, (row.interpolation_max_um, row.mechanics_max_um, row.total_max_um)),
             *map(_um_words, (row.total_rms_um, row.circular_um)),
-            *map(str, (row.iterations, row.reversals_cutting, row.endless)),
+            *map(str, (row.iterations_cutting, row.reversals_cutting, row.endless)),
             clock(row.time_s),
         )
         for row in rows

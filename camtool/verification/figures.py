@@ -269,7 +269,7 @@ class LedgerSums:
         self.endless: dict[int, tuple[float, float]] = {}
         self.steps, self.reversals = np.zeros((2, 3), dtype=np.int64)
         self.cutting_reversals = np.zeros(3, dtype=np.int64)
-        self.iterations, self.compensation_s = 0, 0.0
+        self.iterations, self.cutting_iterations, self.compensation_s = 0, 0, 0.0
 
     def add(self, ledger: Ledger, is_cut: Bools) -> None:
         """Add the ledger of a chunk, with each row at most once; `is_cut` (N,): the rows that
@@ -281,17 +281,19 @@ class LedgerSums:
         self.ended[rows] &= ledger.ended
         self.steps += ledger.steps.sum(axis=0)
         self.iterations += int(ledger.iterations.sum())
+        self.cutting_iterations += int(ledger.iterations[is_cut[rows]].sum())
         self.compensation_s += float(ledger.compensation_s.sum())
         self.reversals += ledger.reversals.sum(axis=0)
         self.cutting_reversals += ledger.reversals[is_cut[rows]].sum(axis=0)
 
 
 class Tally(Struct, frozen=True, eq=False):
-    """Sums over the whole program. Reversals and times are divided into cutting and the rest;
-    `compensation_s` is a part of cutting and air."""
+    """Sums over the whole program. Iterations, reversals and times are divided into cutting and
+    the rest; `compensation_s` is a part of cutting and air."""
 
     steps: Ints
     iterations: int
+    cutting_iterations: int
     reversals: Ints
     cutting_reversals: Ints
     cutting_s: float
@@ -313,6 +315,7 @@ def tally_of(books: LedgerSums, decoded: Toolpath, is_cut: Bools) -> Tally:
     return Tally(
         steps=books.steps,
         iterations=books.iterations,
+        cutting_iterations=books.cutting_iterations,
         reversals=books.reversals,
         cutting_reversals=books.cutting_reversals,
         cutting_s=float(books.seconds[is_cut].sum()),

@@ -109,12 +109,13 @@ class ExtentsMm(msgspec.Struct, frozen=True):
 
 
 class StepCounts(msgspec.Struct, frozen=True):
-    """Steps of each axis, and iterations of the interpolator."""
+    """Steps of each axis, and iterations of the interpolator: all, and those while cutting."""
 
     x: int
     y: int
     z: int
     iterations: int
+    iterations_cutting: int
 
 
 class AxisCounts(msgspec.Struct, frozen=True):

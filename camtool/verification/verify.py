@@ -520,7 +520,7 @@ def _blocks(case: Case) -> int | None:
 
 def _steps(tally: Tally) -> record.StepCounts:
     x, y, z = tally.steps.tolist()
-    return record.StepCounts(x, y, z, tally.iterations)
+    return record.StepCounts(x, y, z, tally.iterations, tally.cutting_iterations)
 
 
 def _time_split(tally: Tally, link_s: float) -> record.TimeSplit:

@@ -27,13 +27,18 @@ def rows(camtool: Run, *arguments: str) -> list[dict[str, object]]:
 def test_interpolators_side_by_side(camtool: Run, circle: str) -> None:
     found = {row["name"]: row for row in rows(camtool, circle, "--compare", "interpolators")}
     assert list(found) == ["dsm", "dda", "stairs"]
-    # Tabla 7, L1438-1458, and the 30 steps of the way to the circle with the line's idle pass.
-    way = found["dsm"]["iterations"] - 168  # type: ignore[operator]
-    assert way in (30, 31)
-    assert found["dda"]["iterations"] == 188 + way
-    assert found["stairs"]["iterations"] == 240 + way
+    # Tabla 7, L1438-1458: those of the circle, without the way to it.
+    counts = {name: row["iterations_cutting"] for name, row in found.items()}
+    assert counts == {"dsm": 168, "dda": 188, "stairs": 240}
     assert found["dsm"]["interpolation_max_um"] <= 0.07  # type: ignore[operator]
     assert found["stairs"]["interpolation_max_um"] <= 0.14  # type: ignore[operator]
+
+
+def test_the_report_counts_the_iterations_of_the_way_too(camtool: Run, circle: str) -> None:
+    done = camtool("verify", circle, "-t", "pic-mmh", "--json", "-")
+    steps = json.loads(done.stdout)["steps"]
+    assert steps["iterations_cutting"] == 168
+    assert steps["iterations"] - 168 in (30, 31)  # 30 steps and the line's idle pass
 
 
 def test_play_side_by_side(camtool: Run, circle: str) -> None:

@@ -47,7 +47,7 @@ WANTED_KEYS = {
     "": "target source moves blocks bytes extents_mm time_s steps reversals error_um closure_um "
     "dimensions circles findings",
     "extents_mm": "x y z",
-    "steps": "x y z iterations",
+    "steps": "x y z iterations iterations_cutting",
     "reversals": "x y z",
     "error_um": "fit rounding interpolation mechanics total",
     "error_um.fit": "max rms",
