@@ -139,7 +139,12 @@ class PicMmhWire(Wire):
         """`H;`; `Q;`, which is for all axes; `PX+1000;`; `JX+;`, until it is stopped."""
         if action == "home":
             packets = [Packet(b"H;", counts=(UNTIL_SILENT, 3 * RETREAT_STEPS))]
-        elif action == "zero" and set("xyz") <= values.keys() and not any(values.values()):
+        elif action == "zero":
+            if not (values.keys() >= set("xyz") and not any(values.values())):
+                raise MachineError(
+                    "Q; makes the place where the tool stands part zero of all axes, and no other",
+                    mend="zero all axes at once (camtool zero)",
+                )
             packets = [Packet(b"Q;")]
         elif action == "jog":
             hz = _by_hand_hz(machine)

@@ -132,3 +132,15 @@ def test_one_that_is_not_understood_at_first_may_have_another_rate(heard: bytes)
         talk.tick(talk.next_s)
     assert talk.state is WireState.FAILED
     assert "is --baud its rate?" in talk.why
+
+
+@pytest.mark.parametrize(
+    "values", [{"z": 0.0}, {"x": 0.0, "y": 0.0}, {"x": 1.0, "y": 0.0, "z": 0.0}]
+)
+def test_part_zero_is_that_of_all_axes(values: dict[str, float]) -> None:
+    """Q; has no axes (L3504): for one of them alone there is no string."""
+    target = load_target("pic-mmh")
+    wire = PicMmhWire()
+    with pytest.raises(MachineError, match="part zero of all axes"):
+        wire.command("zero", target.machine, values, Manner())
+    wire.command("zero", target.machine, dict.fromkeys("xyz", 0.0), Manner())
