@@ -126,7 +126,7 @@ class PostWork:
             __version__,
             packages_digest("camtool"),
             code_digest(Path(__file__).parents[1].rglob("*.py")),
-            code_digest(each for each in target.file.parent.iterdir() if _is_code(each)),
+            code_digest(each for each in target.folder.iterdir() if _is_code(each)),
             target.file.name,
             msgspec.json.encode(target.machine, order="deterministic"),
             repr(self.drawing),

@@ -279,7 +279,13 @@ def _controller_settings(
 ) -> tuple[str, Sequence[ControllerSetting]]:
     """Return the name of the target, and the settings of the machine that its controller
     reports."""
-    from camtool.target.registry import each_target, find_target, load_target, target_names
+    from camtool.target.registry import (
+        each_target,
+        find_target,
+        load_target,
+        own_names,
+        target_names,
+    )
 
     if port is not None:
         if target is None:
@@ -296,7 +302,11 @@ def _controller_settings(
         settings, text = "what was pasted", questions.ask_lines(listing) if listing else ""
         if not text:
             return target, ()
-    targets = each_target(find_target) if target is None else ((target, find_target(target)),)
+    targets = (
+        each_target(find_target, names=own_names())
+        if target is None
+        else ((target, find_target(target)),)
+    )
     listings = []
     for name, (each, _) in targets:
         listings.append(f"{each.settings_listing} for {name}") if each.settings_listing else None
@@ -323,8 +333,7 @@ def machine_text(
     from camtool.target.template import machine_template
 
     base = list_target(target)
-    base_text = base.file.read_text(encoding="utf-8")
-    text = machine_template(name, target, base_text, base.needs, given_settings)
+    text = machine_template(name, target, base.text, base.needs, given_settings)
     try:
         loaded_target(target, (parse_table(text), f"{name}.toml"))
     except MachineError as error:

@@ -15,7 +15,7 @@ from camtool.errors import InputError, OptionError
 from camtool.plain import one_line
 from camtool.sending.asking import Answer, ask, questions
 from camtool.sending.line import list_serial_ports
-from camtool.target.registry import each_target, find_target
+from camtool.target.registry import each_target, find_target, own_names
 from camtool.target.wire import Wire
 
 
@@ -61,7 +61,7 @@ def ports(names: tuple[str, ...], ask: bool, as_json: bool, quiet: bool, verbose
 def _wires() -> list[Wire]:
     """Return the wires of all targets that have one."""
 
-    wires = [target.wire() for _, (target, _) in each_target(find_target)]
+    wires = [target.wire() for _, (target, _) in each_target(find_target, names=own_names())]
     return [wire for wire in wires if isinstance(wire, Wire)]
 
 

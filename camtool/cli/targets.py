@@ -87,7 +87,7 @@ def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool)
     from camtool.target.template import machine_template
 
     base = list_target(extends)
-    text = machine_template(name, extends, base.file.read_text(encoding="utf-8"), base.needs)
+    text = machine_template(name, extends, base.text, base.needs)
     output = output or f"{name}.toml"
     check_places([str(base.file)], [output])
     check_new(output)

@@ -12,10 +12,11 @@ from camtool.arrays import Floats, Ints, Octets
 
 cpdef enum:
     # Columns of a style: least digits before the point, decimals, how many of these stay where
-    # they are 0, and whether numbers that are not negative have a sign too.
-    DIGITS = 0, DECIMALS, KEPT, PLUS
+    # they are 0, whether numbers that are not negative have a sign too, and whether a number
+    # without decimals has a point all the same.
+    DIGITS = 0, DECIMALS, KEPT, PLUS, BARE_POINT
     # How many columns.
-    STYLE_COLUMNS = 4
+    STYLE_COLUMNS = 5
     # No number has more characters: sign, 20 digits, point, and digits that a style adds.
     MAX_NUMBER_CHARS = 48
     _ZERO = 48, _POINT = 46, _PLUS = 43, _MINUS = 45, _BLANK = 32
@@ -44,6 +45,11 @@ cdef Int _put_number(Int value, Int[::1] style, unsigned char[::1] out, Int at) 
         out[k] = _ZERO + size % 10
         size //= 10
         k -= 1
+    if digits == decimals:  # no digit stands before the point
+        out[at] = _POINT
+    if decimals == 0 and style[BARE_POINT] != 0:
+        out[end] = _POINT
+        end += 1
     return end
 
 
@@ -55,7 +61,7 @@ cpdef void put_words(
 
     values (M, K) whole units; written (M, K): 1 for words that a row has; `fixed`: what stands
     before the numbers, and last what ends a row that has words, cut at fixed_ends (K + 1,); styles
-    (K, 4); `blanks`: whether words are parted by one.
+    (K, 5); `blanks`: whether words are parted by one.
     """
     cdef Int columns, at, row, begin, column, k
     columns, at = len(styles), 0

@@ -53,13 +53,17 @@ def resolved_table(
                 where="key extends",
                 mend=f'write extends = "{base["target"]["name"]}" or change --target',
             )
-        extra = {key: value for key, value in user_table.items() if key != "extends"}
-        table = _overlaid(target, table, extra)
+        table = extended_table(target, table, user_table)
     file = name
     for setting in settings:
         table, name = _overlaid(target, table, _parse_setting(setting)), f"--set {setting}"
     _refuse_incomplete(table, file)
     return {key: table[key] for key in table if key != NEEDS}, name
+
+
+def extended_table(target: Target, below: Table, above: Table) -> Table:
+    """The table of a file laid over that of what it extends."""
+    return _overlaid(target, below, {key: above[key] for key in above if key != "extends"})
 
 
 def machine_of(target: Target, table: Table, name: str) -> Machine:

@@ -4,6 +4,9 @@ A third party adds a target as camtool adds its own: by an entry point of the gr
 `camtool.postprocessors` with the name of the target, which points at a `Target` (see
 `camtool.target.contract`) in a package with `machine.toml` beside its `__init__.py`. Only the
 target that is asked for is imported. A broken plug-in is reported by name and harms no other.
+
+A folder `machines/` beside a target's `machine.toml` has further machines: files as a user's, each
+of which extends a target, or another one of them, and is known by its own name.
 """
 
 from __future__ import annotations
@@ -13,6 +16,8 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
@@ -24,7 +29,15 @@ from camtool.plugins import EntryPoint, entry_points
 from camtool.records import replace
 from camtool.tables import Table, read_table
 from camtool.target.contract import Target
-from camtool.target.loader import machine_of, missing_keys, names_of, resolved_table
+from camtool.target.loader import (
+    extended_by,
+    extended_table,
+    machine_of,
+    missing_keys,
+    names_of,
+    resolved_table,
+)
+from camtool.target.template import joined_text
 
 if TYPE_CHECKING:
     from camtool.simulation.controller import ControllerModel
@@ -37,8 +50,14 @@ GROUP = "camtool.postprocessors"
 
 MACHINE_FILE = "machine.toml"
 
+SHIPPED_FOLDER = "machines"
+"""Folder beside a target's own file, with the files of further machines."""
+
 OWN_PREFIX = "camtool_postprocessors."
 """Prefix of camtool's own modules: exceptions in them are faults of camtool itself."""
+
+MAX_CHAIN = 8
+"""Most machine files that extend each other in a row."""
 
 NOT_SAID = "not said"
 
@@ -54,14 +73,15 @@ def choices_of(record: type[msgspec.Struct]) -> Iterator[tuple[str, str]]:
 @dataclass(frozen=True)
 class LoadedTarget:
     """A machine and its target. `file` is the target's own machine file, `table` its values with
-    those of the user. `placeholders`: which numbers are examples of no particular machine, since
-    the user has given no others."""
+    those of the user, `base` those without (None: they are all in `file`). `placeholders`: which
+    numbers are examples of no particular machine, since the user has given no others."""
 
     machine: Machine
     target: Target
     file: Path
     table: Table
     placeholders: tuple[str, ...] = ()
+    base: Table | None = None
 
     @property
     def model(self) -> ControllerModel[Any, Any]:
@@ -71,6 +91,12 @@ class LoadedTarget:
 
             return PathModel()
         return self.target.model()
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the target's own code."""
+        folder = self.file.parent
+        return folder.parent if folder.name == SHIPPED_FOLDER else folder
 
     @property
     def interpolators(self) -> tuple[str, ...]:
@@ -156,7 +182,7 @@ class LoadedTarget:
         Keys of `needs` always differ: the target's own value is `not said`.
         """
         values = dict(_flat("", self.values()))
-        base = read_table(self.file)
+        base = read_table(self.file) if self.base is None else self.base
         needs = missing_keys(base, str(self.file))
         settings = [f"{key}={json.dumps(values[key])}" for key in needs if key in values]
         table, name = resolved_table(self.target, base, str(self.file), None, settings)
@@ -176,16 +202,50 @@ class LoadedTarget:
 @dataclass(frozen=True)
 class ListedTarget:
     """A target in a list. `needs` are the keys that the user's machine file must give before it
-    can be loaded, such as "axes.x.coded_step_mm"; () when it is complete."""
+    can be loaded, such as "axes.x.coded_step_mm"; () when it is complete. `files_below`: those
+    that its file extends, the lowest first."""
 
     target: TargetNames
     needs: tuple[str, ...]
     file: Path
+    files_below: tuple[Path, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """The text of its machine file, with what it takes from the files that it extends."""
+        files = (*self.files_below, self.file)
+        return joined_text([file.read_text(encoding="utf-8") for file in files])
+
+
+def own_names() -> list[str]:
+    """The names of all installed targets, sorted; no target is imported."""
+    return sorted(point.name for point in entry_points(GROUP))
 
 
 def target_names() -> list[str]:
-    """The names of all installed targets, sorted; no target is imported."""
-    return sorted(point.name for point in entry_points(GROUP))
+    """The names of all installed targets and of the machines that come with them, sorted."""
+    return sorted({*own_names(), *shipped_files()})
+
+
+def shipped_files() -> dict[str, Path]:
+    """The files of the machines that come with the installed targets, by their names."""
+    modules = tuple(dict.fromkeys(point.module for point in entry_points(GROUP)))
+    return dict(_shipped_files(modules))
+
+
+@cache
+def _shipped_files(modules: tuple[str, ...]) -> tuple[tuple[str, Path], ...]:
+    """(name, file) of the machines beside the targets of these modules."""
+    machines = []
+    for module in modules:
+        try:
+            spec = find_spec(module)
+        except ImportError:  # a broken plug-in: reported where it is loaded
+            continue
+        for folder in (spec.submodule_search_locations or ()) if spec else ():
+            files = sorted(Path(folder, SHIPPED_FOLDER).glob("*.toml"))
+            machines += [(file.stem, file) for file in files]
+    return tuple(machines)
 
 
 def load_target(
@@ -204,11 +264,12 @@ def loaded_target(
 ) -> LoadedTarget:
     """The same with the table of a user's machine file, and that file's name."""
     target, file = find_target(name)
-    table, last = resolved_table(target, read_table(file), str(file), user, settings)
+    base = base_table(name, target, file)
+    table, last = resolved_table(target, base, str(file), user, settings)
     machine = machine_of(target, table, last)
     user_values = {} if user is None else user[0]
     unsaid = tuple(_placeholders(user_values, settings)) if target.any_machine else ()
-    return LoadedTarget(machine, target, file, table, unsaid)
+    return LoadedTarget(machine, target, file, table, unsaid, base)
 
 
 NUMBERS = {
@@ -234,24 +295,37 @@ def _placeholders(user_table: Table, settings: Sequence[str]) -> Iterator[str]:
 def list_target(name: str) -> ListedTarget:
     """The target `name` for a list, complete or not; raises as `load_target` does."""
     target, file = find_target(name)
-    table = read_table(file)
+    table = base_table(name, target, file)
     needs = missing_keys(table, str(file))
     if not needs:
         machine_of(target, *resolved_table(target, table, str(file)))
-    return ListedTarget(names_of(table, str(file)), needs, file)
+    return ListedTarget(names_of(table, str(file)), needs, file, _files_below(name))
+
+
+def _files_below(name: str) -> tuple[Path, ...]:
+    """The files that the file of a machine extends, the lowest first; () for a target."""
+    if name in own_names() or name not in shipped_files():
+        return ()
+    below = extended_by(shipped_files()[name])
+    return (*_files_below(below), find_target(below)[1])
 
 
 Taken = TypeVar("Taken")
 
 
 def each_target(
-    take: Callable[[str], Taken], *, prefix: str = "", broken: list[CamtoolError] | None = None
+    take: Callable[[str], Taken],
+    *,
+    names: Sequence[str] | None = None,
+    prefix: str = "",
+    broken: list[CamtoolError] | None = None,
 ) -> Iterator[tuple[str, Taken]]:
-    """(name, what `take` returns for it) of the targets whose names start with `prefix`.
+    """(name, what `take` returns for it) of the targets whose names start with `prefix`, or of
+    those of `names`.
 
     A plug-in that is broken harms no other: it is left out, and its error is appended to `broken`.
     """
-    for name in target_names():
+    for name in target_names() if names is None else names:
         if name.startswith(prefix):
             try:
                 taken_value = take(name)
@@ -262,6 +336,30 @@ def each_target(
             yield name, taken_value
 
 
+def own_target_of(name: str) -> str:
+    """The installed target that the machine of this name is on: its own name for a target."""
+    names = own_names()
+    for _ in range(MAX_CHAIN):
+        if name in names or name not in shipped_files():
+            return name
+        name = extended_by(shipped_files()[name])
+    raise MachineError(
+        "machines that extend each other in a ring", where=f"target {name}", mend="mend extends"
+    )
+
+
+def base_table(name: str, target: Target, file: Path) -> Table:
+    """The table of a target, or of a machine that comes with one, laid over what it extends; with
+    keys of `needs`."""
+    table = read_table(file)
+    if name in own_names() or "extends" not in table:
+        return table
+    below_name = extended_by(file)
+    below_target, below_file = find_target(below_name)
+    below = base_table(below_name, below_target, below_file)
+    return extended_table(target, below, table)
+
+
 def filter_target() -> str | None:
     """The target that `camtool filter` uses by default."""
     targets = each_target(find_target)
@@ -269,7 +367,11 @@ def filter_target() -> str | None:
 
 
 def find_target(name: str) -> tuple[Target, Path]:
-    """The target of this name and its own machine file; raises as `load_target` does."""
+    """The target of this name and its own machine file; raises as `load_target` does. For a
+    machine that comes with a target: that target, and the machine's file."""
+    if name not in own_names() and name in shipped_files():
+        target, _ = _load(_entry_point(own_target_of(name)))
+        return target, shipped_files()[name]
     return _load(_entry_point(name))
 
 
@@ -278,7 +380,8 @@ def _entry_point(name: str) -> EntryPoint:
     none."""
     points = {point.name: point for point in entry_points(GROUP)}
     if name not in points:
-        near_names = difflib.get_close_matches(name, points, n=3, cutoff=0.4) or sorted(points)
+        names = [*points, *shipped_files()]
+        near_names = difflib.get_close_matches(name, names, n=3, cutoff=0.4) or sorted(points)
         raise UnknownTargetError(
             f"unknown target {name!r}", mend=f"did you mean {' or '.join(near_names)}?"
         )

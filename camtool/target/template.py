@@ -118,6 +118,27 @@ def machine_template(
     return "\n".join(lines) + "\n"
 
 
+def joined_text(texts: Sequence[str]) -> str:
+    """Return the text of a machine file with those of the files that it extends, the lowest first:
+    each key once, as the highest of them says it."""
+    if len(texts) == 1:
+        return texts[0]
+    tables: dict[str, dict[str, str]] = {}
+    for text in texts:
+        table = ""
+        for line in text.splitlines():
+            heading, key = _TABLE.match(line), _KEY.match(line)
+            if heading:
+                table = heading[1]
+            elif key and table:
+                rows = tables.setdefault(table, {})
+                rows.setdefault(key[2], line)
+                if key[1] is None:
+                    rows[key[2]] = line
+    lines = [f"[{table}]\n" + "\n".join(rows.values()) + "\n" for table, rows in tables.items()]
+    return "\n".join(lines)
+
+
 def _rows(
     table: str, rows: Iterable[str], settings: dict[str, ControllerSetting], needs: set[str]
 ) -> Iterator[str]:

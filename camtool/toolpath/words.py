@@ -26,7 +26,8 @@ class WordColumn(Struct, frozen=True, eq=False):
     decimal (M,), and the mask of blocks that have it (M,).
 
     `kept`: decimals that are written even if they are 0 (None: all); `digits`: least number of
-    digits before the point; `plus`: write a sign before numbers that are not negative.
+    digits before the point; `plus`: write a sign before numbers that are not negative;
+    `bare_point`: write a point behind a number without decimals.
     """
 
     letter: str
@@ -36,12 +37,13 @@ class WordColumn(Struct, frozen=True, eq=False):
     kept: int | None = None
     digits: int = 1
     plus: bool = False
+    bare_point: bool = False
 
     @property
-    def style(self) -> tuple[int, int, int, int]:
-        """Digits, decimals, kept decimals and sign, as `camtool.kernels.words` takes them."""
+    def style(self) -> tuple[int, int, int, int, int]:
+        """The columns of a style, as `camtool.kernels.words` takes them."""
         decimals_kept = self.decimals if self.kept is None else self.kept
-        return self.digits, self.decimals, decimals_kept, int(self.plus)
+        return self.digits, self.decimals, decimals_kept, int(self.plus), int(self.bare_point)
 
 
 class TextLines(Struct, frozen=True, eq=False):

@@ -119,7 +119,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
         number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
         blocks = {**events.blocks, **cycle_blocks(holes, feed_words, number)}
         events = replace(events, blocks=blocks)
-    unmoved = _first_change(toolpath, events) if style.change_first else 0
+    unmoved = first_change(toolpath, events) if style.change_first else 0
     rows_sent = sent_rows(toolpath, arcs, feeds, events.changes, holes, unmoved)
     arc_counts = arcs.counts
     del arcs, feeds
@@ -144,7 +144,11 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
     data = b"".join(
         [
             *(f"{line}\n".encode("ascii") for line in head),
-            order.text(rows_sent, dialect, decimals, *remarks),
+            order.text(
+                motion_words(rows_sent, dialect, decimals),
+                *remarks,
+                numbers=LineNumbers() if dialect.block_numbers else None,
+            ),
             *(f"{line}\n".encode("ascii") for line in frame),
         ]
     )
@@ -155,13 +159,13 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
         of_row,
         (
             *rounded_feeds,
-            *_arc_findings(toolpath, arc_counts, rows_sent.dropped),
-            *_rounded(toolpath, events.rounded),
+            *arc_findings(toolpath, arc_counts, rows_sent.dropped),
+            *rounding_findings(toolpath, events.rounded),
         ),
     )
 
 
-def _first_change(toolpath: Toolpath, events: Events) -> int:
+def first_change(toolpath: Toolpath, events: Events) -> int:
     """The row of the first tool change where nothing but rapids straight up is before it; else 0.
     Behind the change the tool goes to its height anyway."""
     row = events.changes[0] if events.changes else 0
@@ -245,24 +249,26 @@ class BlockOrder:
 
     def text(
         self,
-        rows_sent: Sent,
-        dialect: GcodeDialect,
-        feed_decimals: int,
+        columns: Sequence[WordColumn],
         commented: Ints,
         comment_at: Callable[[int], str],
+        *,
+        numbers: LineNumbers | None = None,
+        blanks: bool = True,
     ) -> bytes:
-        """All blocks, with C lines of comments, the k-th before block commented[k] (from 0); these
-        ascend."""
+        """All blocks, those of motions by `columns` of M rows, with C lines of comments ("" for
+        none), the k-th before block commented[k] (from 0); these ascend."""
         other_blocks, before = self._sorted()
         indices = np.array([indices for indices, _, _ in other_blocks], dtype=np.int64)
-        number = before + np.arange(1, len(other_blocks) + 1)
-        columns = motion_words(rows_sent, dialect, feed_decimals)
-        if dialect.block_numbers:
-            every = np.arange(len(rows_sent.row))
-            numbers = self._before[1:] + np.searchsorted(indices, every, side="right")
-            columns.insert(0, WordColumn("N", numbers, rows_sent.is_motion))
+        number = before + np.arange(len(other_blocks))
+        labels = [""] * len(number)
+        if numbers is not None:
+            every = np.arange(len(self._is_motion))
+            index = self._before[1:] - 1 + np.searchsorted(indices, every, side="right")
+            columns = [numbers.column(index, self._is_motion), *columns]
+            labels = [numbers.label(k, blanks=blanks) for k in number.tolist()]
         # In front of a row: the other blocks, each behind its comments; then those of a motion.
-        other, moves = np.searchsorted(number - 1, commented), ~np.isin(commented, number - 1)
+        other, moves = np.searchsorted(number, commented), ~np.isin(commented, number)
         motion = (commented - other)[moves]
         place, rank = np.empty(len(commented), dtype=np.int64), 2 * other
         place[moves] = np.searchsorted(self._before, motion, side="right") - 1
@@ -273,13 +279,37 @@ class BlockOrder:
 
         def lines() -> Iterator[tuple[int, str]]:
             for k, row in zip(order.tolist(), rows[order].tolist(), strict=True):
-                if k >= len(other_blocks):
-                    yield row, comment_at(k - len(other_blocks))
-                else:
-                    block = other_blocks[k][1]
-                    yield row, f"N{number[k]} {block}" if dialect.block_numbers else block
+                if k < len(other_blocks):
+                    yield row, f"{labels[k]}{other_blocks[k][1]}"
+                elif remark := comment_at(k - len(other_blocks)):
+                    yield row, remark
 
-        return texts_of(columns, blanks=True).with_lines(lines())
+        return texts_of(columns, blanks=blanks).with_lines(lines())
+
+
+class LineNumbers(Struct, frozen=True):
+    """Numbers of blocks: N`first`, by `step`, with at least `digits` digits, up to `highest`
+    (None: without end), behind which they begin again."""
+
+    first: int = 1
+    step: int = 1
+    digits: int = 1
+    highest: int | None = None
+
+    def of(self, index: Ints) -> Ints:
+        """Return the numbers (K,) of blocks, whose indices (K,) count from 0."""
+        if self.highest is not None:
+            index = index % ((self.highest - self.first) // self.step + 1)
+        return self.first + self.step * index
+
+    def column(self, index: Ints, written: Bools) -> WordColumn:
+        """Return the words N of blocks."""
+        return WordColumn("N", self.of(index), written, digits=self.digits)
+
+    def label(self, index: int, *, blanks: bool) -> str:
+        """Return the word N of one block, and a blank behind it."""
+        number = int(self.of(np.array([index]))[0])
+        return f"N{number:0{self.digits}}{' ' if blanks else ''}"
 
 
 def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[str]:
@@ -296,7 +326,7 @@ def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[s
     ]
 
 
-def _arc_findings(toolpath: Toolpath, counts: ArcCounts, dropped: int) -> Iterator[Finding]:
+def arc_findings(toolpath: Toolpath, counts: ArcCounts, dropped: int) -> Iterator[Finding]:
     if mended := counts.recentred + counts.split + counts.lines:
         yield ARC_MENDED(
             where=toolpath.place(counts.first),
@@ -309,7 +339,7 @@ def _arc_findings(toolpath: Toolpath, counts: ArcCounts, dropped: int) -> Iterat
         yield MOVE_COLLAPSED(measured=collapsed, dropped=dropped, flat=counts.flat)
 
 
-def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> Iterator[Finding]:
+def rounding_findings(toolpath: Toolpath, rows: tuple[int, ...]) -> Iterator[Finding]:
     if rows:
         yield VALUE_ROUNDED(where=toolpath.place(rows[0]), count=len(rows))
 
@@ -476,7 +506,7 @@ def motion_words(rows_sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> 
     turns[rows] = np.diff(rows_sent.kind[rows], prepend=-1) != 0
     is_arc = motion & (rows_sent.kind >= Kind.ARC_CW)
     fed = (motion & (rows_sent.kind >= Kind.LINE)) | (rows_sent.kind == CYCLE)
-    feed = motion & _changes(rows_sent.feed, fed)
+    feed = motion & changes_of(rows_sent.feed, fed)
     return [
         WordColumn("G", rows_sent.kind, turns | (rows_sent.forget & motion)),
         *(
@@ -491,7 +521,7 @@ def motion_words(rows_sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> 
     ]
 
 
-def _changes(values: Ints, counts: Bools) -> Bools:
+def changes_of(values: Ints, counts: Bools) -> Bools:
     """(M,) true where a row that counts has another value than the last one that counted."""
     rows = np.flatnonzero(counts)
     is_changed = np.zeros(len(values), dtype=bool)
@@ -554,8 +584,12 @@ def events_of(toolpath: Toolpath, words: EventWords) -> Events:
         elif event.kind != Kind.MESSAGE:
             if block := words(event):
                 blocks[row] = block
-            spindle_on = (spindle_on or event.kind in SPINDLE) and SPINDLE_OFF not in block
-            cools = (cools or event.kind in COOLS) and COOLANT_OFF not in block
+            spindle_on = event.kind in SPINDLE or (
+                spindle_on and event.kind != Kind.SPINDLE_OFF and SPINDLE_OFF not in block
+            )
+            cools = event.kind in COOLS or (
+                cools and event.kind != Kind.COOLANT_OFF and COOLANT_OFF not in block
+            )
             if _is_rounded(event):
                 rounded.append(row)
     changes = tuple(row for row in blocks if toolpath.kind[row] == Kind.TOOL_CHANGE)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from camtool_postprocessors.gcode.blocks import listing as lines_of
 
-from camtool.target.registry import LoadedTarget, load_target, target_names
+from camtool.target.registry import LoadedTarget, load_target, own_names
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Listing
@@ -105,6 +105,7 @@ def said_records(block: str, at: np.ndarray) -> np.ndarray:
 ALL: dict[str, tuple[Place, tuple[float, float, float]]] = {
     "grbl": (said_words(1.0), (5.0, -0.1, 8.0)),
     "linuxcnc": (said_words(1.0), (5.0, -0.1, 8.0)),
+    "iso": (said_words(1.0), (5.0, -0.1, 8.0)),
     "flashcut": (said_words(1.0), (0.2, -0.1, 8.0)),
     "pic-mmh": (said_words(0.001), (0.2, -0.1, 1.0)),
     # Its controller counts an eighth of what it is told.
@@ -116,7 +117,7 @@ ALL: dict[str, tuple[Place, tuple[float, float, float]]] = {
 
 
 def test_all_targets_are_here() -> None:
-    assert set(ALL) == set(target_names())
+    assert set(ALL) == set(own_names())
 
 
 @pytest.mark.parametrize("name", list(ALL))

@@ -10,6 +10,9 @@ ROOT = Path(__file__).parents[3] / "postprocessors"
 SHARED = {"gcode.dialect", "gcode.findings"}
 
 
+OTHERS = [("grbl", "linuxcnc"), ("linuxcnc", "grbl"), ("iso", "grbl"), ("iso", "linuxcnc")]
+
+
 def neighbours(module: str) -> set[str]:
     """The modules of this room that a module imports."""
     folder, _, name = module.partition(".")
@@ -35,13 +38,13 @@ def reached(module: str) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("name", ["grbl", "linuxcnc"])
+@pytest.mark.parametrize("name", ["grbl", "linuxcnc", "iso"])
 def test_what_both_need_are_options_only(name: str) -> None:
     both = reached(f"{name}.write") & reached(f"{name}.read")
     assert both == SHARED | {f"{name}.dialect"} | ({f"{name}.findings"} & both)
 
 
-@pytest.mark.parametrize(("name", "other"), [("grbl", "linuxcnc"), ("linuxcnc", "grbl")])
+@pytest.mark.parametrize(("name", "other"), OTHERS)
 def test_no_dialect_needs_another(name: str, other: str) -> None:
     needed = reached(f"{name}.__init__")
     assert not any(module.startswith(f"{other}.") for module in needed)
