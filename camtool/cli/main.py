@@ -57,6 +57,7 @@ COMMANDS = {
     "coupon": "Drawings to cut and measure.",
     "draw": "A page to draw a figure on.",
     "diff": "What two programs or jobs cut differently.",
+    "explain": "Each block of a program in words.",
     "filter": "LinuxCNC opens a drawing.",
     "home": "Home a machine.",
     "init": "A machine file of your own.",
@@ -121,6 +122,7 @@ def cli() -> None:
     camtool check   logo.dxf                    what is in the drawing
     camtool post    logo.dxf --target pic-mmh   drawing to verified program
     camtool verify  logo.pic --target pic-mmh   judge any program of a machine
+    camtool explain logo.pic -t pic-mmh         each block in words
     camtool lint    parts/*.nc -t grbl          faults of programs, without simulating
     camtool batch   drawings/ -t pic-mmh -o build/   many, those that have changed
     camtool convert logo.pic --from pic-mmh --to grbl

@@ -78,6 +78,8 @@ class Target(ABC):
     ways: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Keys of the machine file that say how its controller draws, with what each may be: what
     `camtool meet` may propose."""
+    meanings: ClassVar[Mapping[str, str]] = {}
+    """What words say that move nothing, such as "G21", for `camtool explain`."""
     codes: ClassVar[tuple[TargetCode, ...]] = ()
     """The codes of its own findings; their names start with the name of the target and a dot."""
     starts_spindle: ClassVar[bool] = False

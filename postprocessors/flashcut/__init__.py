@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from camtool.target.contract import Target
 
+from ..gcode.meanings import MEANINGS
 from .dialect import FlashcutController, FlashcutDialect, FlashcutMachine, check
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ class Flashcut(Target):
     """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "flashcut"
+    meanings = MEANINGS
     no_twin = (
         "its PC drives the coils itself, by the parallel port and its own clock, so there is no "
         "wire to listen to"

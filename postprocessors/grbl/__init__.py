@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from camtool.target.contract import ControllerSetting, Target
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
+from ..gcode.meanings import MEANINGS
 from .dialect import GrblController, GrblDialect, GrblMachine
 from .findings import CODES
 
@@ -27,6 +28,7 @@ class Grbl(Target):
     """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "grbl"
+    meanings = MEANINGS
     controllers = (GrblController,)
     dialect = GrblDialect
     starts_spindle = True

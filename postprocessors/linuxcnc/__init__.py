@@ -10,6 +10,7 @@ from camtool.target.contract import ControllerSetting, Target
 from camtool.target.signals import NoSignals
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
+from ..gcode.meanings import MEANINGS
 from .dialect import LinuxcncController, LinuxcncDialect, LinuxcncLink, LinuxcncMachine
 from .findings import CODES
 
@@ -29,6 +30,7 @@ class Linuxcnc(Target):
     """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "linuxcnc"
+    meanings = MEANINGS
     controllers = (LinuxcncController,)
     dialect = LinuxcncDialect
     link = LinuxcncLink

@@ -6,7 +6,8 @@ docs/controllers/pic-mmh.md what the controller does with it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, get_args
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final, get_args
 
 from camtool.target.contract import Target
 
@@ -22,11 +23,14 @@ if TYPE_CHECKING:
     from .twin import PicMmhTwin, PicMmhTwinSettings
     from .wire import PicMmhWire
 
+MEANINGS: Final[Mapping[str, str]] = {"G90": "positions are absolute"}
+
 
 class PicMmh(Target):
     """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "pic-mmh"
+    meanings = MEANINGS
     controllers = (PicMmhController,)
     dialect = PicMmhDialect
     link = PicMmhLink

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from camtool.target.contract import Target
 
+from ..gcode.meanings import MEANINGS
 from .dialect import ValcncController, ValcncDialect, ValcncLink, ValcncMachine, check, scales_of
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ class Valcnc(Target):
     """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "valcnc"
+    meanings = MEANINGS
     controllers = (ValcncController,)
     dialect = ValcncDialect
     link = ValcncLink
