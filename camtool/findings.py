@@ -13,7 +13,7 @@ motion and result, 5xx inspection, 6xx stock.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import IntEnum
 from string import Formatter
 from typing import Any, Final, Protocol, Self, TypeVar
@@ -83,6 +83,37 @@ class Finding:
     def __str__(self) -> str:
         place = f" [{self.where}]" if self.where else ""
         return one_line(f"{self.severity.name.lower()} {self.code.name}{place}: {self.message}")
+
+
+@dataclass(frozen=True)
+class FindingReport:
+    """A finding, by the names of its code and severity."""
+
+    code: str
+    severity: str
+    message: str
+    where: str
+    measured: float | None = None
+    limit: float | None = None
+    unit: str = ""
+
+    def to_line(self) -> str:
+        """Return the finding as lines for people have it."""
+        place = f" [{self.where}]" if self.where else ""
+        return one_line(f"{self.severity} {self.code}{place}: {self.message}")
+
+    def at(self, file: str, line: int | None) -> FoundAt:
+        """Return the finding in a line of a file; None and 0: in the file as a whole."""
+        values = {**asdict(self), "file": file, "line": line or None}
+        return FoundAt(**values)
+
+
+@dataclass(frozen=True)
+class FoundAt(FindingReport):
+    """A finding in a line of a file, from 1; `line` None: in the file as a whole."""
+
+    file: str = ""
+    line: int | None = None
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from typing import Any
 import msgspec
 from msgspec import Struct, field
 
+from camtool.findings import FoundAt
 from camtool.records import replace
-from camtool.verification.report import FoundAt
 
 NAME = ".camtool-batch.jsonl"
 

@@ -17,7 +17,7 @@ from camtool.batches.manifest import (
     file_digest,
 )
 from camtool.errors import OutputError
-from camtool.verification.report import FoundAt
+from camtool.findings import FoundAt
 
 # Messages to and from workers: small records that can be pickled.
 

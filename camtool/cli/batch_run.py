@@ -36,16 +36,15 @@ from camtool.batches.run import (
 )
 from camtool.cli.batch_messages import Display, Verbosity, display, say_summary, summary_json
 from camtool.cli.batch_work import SVG, JobOrder, PostWork
-from camtool.cli.check_formats import CheckedFile, refused_file
 from camtool.cli.checks import CheckOutputs
 from camtool.cli.files import is_foreign, refuse_same, write_all
 from camtool.cli.messages import say
 from camtool.cli.options import InspectionFlags, JobFlags, own_job, own_tolerances
 from camtool.errors import CamtoolError, OutputError
 from camtool.records import replace
-from camtool.toolpath.findings import INPUT_REFUSED
 
 if TYPE_CHECKING:
+    from camtool.cli.check_formats import CheckedFile
     from camtool.inspection.tolerances import Asked
 
 EXIT_SIGNAL = 128
@@ -265,13 +264,19 @@ class BatchRun:
             say(f"camtool: warning: {error}", quiet=False)
         say_summary(outcomes, seconds, quiet=self.verbosity.quiet)
         target = self.work.target
-        files = self.checks.files([self._checked(each) for each in outcomes], target.target.codes)
+        files: dict[str, bytes] = {}
+        if self.checks.names:
+            checked = [self._checked(each) for each in outcomes]
+            files = self.checks.files(checked, target.target.codes)
         if self.summary is not None:
             files[self.summary] = summary_json(outcomes, target.machine.target.name, seconds)
         write_all(files)
 
     def _checked(self, outcome: Outcome) -> CheckedFile:
         """Return a drawing with its findings, for pipelines."""
+        from camtool.cli.check_formats import CheckedFile, refused_file
+        from camtool.toolpath.findings import INPUT_REFUSED
+
         name, error = outcome.source, outcome.error
         findings = tuple(
             each.at(str(self.out / each.file), each.line) if each.file in outcome.files else each

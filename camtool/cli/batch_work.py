@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from camtool.batches.manifest import code_digest, content_digest, digest_of, packages_digest
 from camtool.batches.run import DrawingTask, Outputs
-from camtool.cli.check_formats import found_in, refused_file
 from camtool.cli.files import seal
 from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags
@@ -87,6 +86,8 @@ class PostWork:
         try:
             outputs = self._outputs(task, data)
         except CamtoolError as error:
+            from camtool.cli.check_formats import refused_file
+
             refused = refused_file(error, task.source)
             outputs = Outputs(error=str(error), findings=refused.findings)
         return replace(outputs, content=content_digest(data))
@@ -166,6 +167,8 @@ def _is_code(path: Path) -> bool:
 def _result_of(task: DrawingTask, run: Run, program: str | None) -> Outputs:
     """Return the result for the client: the error of a drawing that must not be written, and its
     worst findings; `program` is the name of the program's file."""
+
+    from camtool.cli.check_formats import found_in
 
     def lines(severity: Severity) -> list[Finding]:
         return [each for each in run.findings if each.severity == severity]

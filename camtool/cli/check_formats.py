@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
 
 from camtool.errors import CamtoolError
-from camtool.findings import Code, TargetCode
+from camtool.findings import Code, FindingReport, FoundAt, TargetCode
 from camtool.geometry.findings import ContourCode
 from camtool.importers.findings import DrawingCode
 from camtool.inspection.findings import InspectionCode
@@ -27,7 +27,7 @@ from camtool.planning.findings import PlanningCode
 from camtool.stock.findings import StockCode
 from camtool.toolpath.findings import INPUT_REFUSED, ProgramCode
 from camtool.verification.findings import VerificationCode
-from camtool.verification.report import FindingReport, FoundAt, finding_reports
+from camtool.verification.report import finding_reports
 from camtool.version import __version__
 
 if TYPE_CHECKING:

@@ -198,11 +198,11 @@ class _Teller:
         if move.centre is not None:
             turn = "clockwise" if sweep < 0.0 else "counter-clockwise"
             is_full = "X" not in axes and "Y" not in axes
-            way = "full circle" if is_full else "arc"
+            shape = "full circle" if is_full else "arc"
             end = "" if is_full and not axes else f" {place}"
             centre, radius = _place((*move.centre, 0.0), "XY"), _radius(move, move.centre)
             size = "" if is_full else f", {abs(math.degrees(sweep)):.4g}°"
-            return f"{way} {turn}{end} around {centre} mm, radius {_mm(radius)} mm{size}"
+            return f"{shape} {turn}{end} around {centre} mm, radius {_mm(radius)} mm{size}"
         name = "rapid" if move.kind == Kind.RAPID else "line"
         if axes == "Z":
             name += " down" if move.end[2] < move.start[2] else " up"

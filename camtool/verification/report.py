@@ -24,7 +24,7 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import asdict
 
-from camtool.findings import Finding
+from camtool.findings import Finding, FindingReport
 from camtool.plain import one_line, to_json
 from camtool.planning.naming import range_words
 from camtool.records import replace
@@ -346,35 +346,6 @@ class InspectedReport(msgspec.Struct, frozen=True):
         if self.standard_um is None:
             return None
         return COVERAGE * self.standard_um + (self.unknown_um or 0.0)
-
-
-class FindingReport(msgspec.Struct, frozen=True):
-    """A finding, by the names of its code and severity."""
-
-    code: str
-    severity: str
-    message: str
-    where: str
-    measured: float | None = None
-    limit: float | None = None
-    unit: str = ""
-
-    def to_line(self) -> str:
-        """Return the finding as lines for people have it."""
-        place = f" [{self.where}]" if self.where else ""
-        return one_line(f"{self.severity} {self.code}{place}: {self.message}")
-
-    def at(self, file: str, line: int | None) -> FoundAt:
-        """Return the finding in a line of a file; None and 0: in the file as a whole."""
-        values = {**asdict(self), "file": file, "line": line or None}
-        return FoundAt(**values)
-
-
-class FoundAt(FindingReport, frozen=True):
-    """A finding in a line of a file, from 1; `line` None: in the file as a whole."""
-
-    file: str = ""
-    line: int | None = None
 
 
 class PlannedOperation(msgspec.Struct, frozen=True):
