@@ -8,7 +8,9 @@ from camtool.cli.files import STDOUT, check_places, display_name, read_bytes, wr
 from camtool.cli.messages import say_findings, show_text
 from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 from camtool.errors import OptionError
+from camtool.pipeline import read_program
 from camtool.plain import one_line, to_json
+from camtool.toolpath.explain import explain as explained_blocks
 
 MAX_TEXT_CHARS = 40
 """Blocks are shown in a column as wide as the longest, up to this many characters."""
@@ -41,10 +43,6 @@ def explain(
     if first is not None and last is not None and last < first:
         raise OptionError(f"ends before line {first} of --from", where=f"--to {last}")
     check_places([program, *machine.files()], [report])
-
-    from camtool.pipeline import read_program
-    from camtool.toolpath.explain import explain as explained_blocks
-
     target, name = machine.load(), display_name(program)
     data = read_bytes(program)
     run = read_program(data, target, source=name)

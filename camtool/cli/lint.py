@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from camtool.cli.check_formats import CheckedFile, checked_run, refused_file
 from camtool.cli.checks import CheckOutputs, check_outputs
 from camtool.cli.files import STDOUT, check_places, display_name, read_bytes, write_all
 from camtool.cli.messages import say, say_findings
 from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 from camtool.errors import CamtoolError
+from camtool.pipeline import lint_program
 from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
-    from camtool.cli.check_formats import CheckedFile
     from camtool.target.registry import LoadedTarget
 
 EXIT_BAD_INPUT = 2
@@ -61,9 +62,6 @@ def lint(
 
 def _check(program: str, target: LoadedTarget, *, quiet: bool, verbose: bool) -> CheckedFile:
     """Return a program with its findings, which are shown."""
-    from camtool.cli.check_formats import checked_run, refused_file
-    from camtool.pipeline import lint_program
-
     name = display_name(program)
     try:
         data = read_bytes(program)

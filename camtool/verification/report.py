@@ -987,7 +987,7 @@ def page_json(page: ReportPage) -> str:
     body["setup"] = None if page.setup is None else asdict(page.setup)
     if page.report is not None:
         body |= msgspec.to_builtins(page.report)
-    body["findings"] = msgspec.to_builtins(page.findings, builtin_types=(FindingReport,))
+    body["findings"] = msgspec.to_builtins(page.findings)
     return to_json(body)
 
 
