@@ -10,7 +10,7 @@ What is executed is bounded: `MAX_CALL_LEVELS` calls within calls, and `most_lin
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
@@ -134,8 +134,9 @@ class Flow:
 
     # Reading
 
-    def step(self) -> ParsedLine | None:
-        """The next line of words; None at the % that ends the program."""
+    def step(self, within: int = 0) -> ParsedLine | None:
+        """The next line of words; None at the % that ends the program, and behind an O word
+        that leaves fewer than `within` calls under way."""
         while True:
             if self.at >= self.text.count:
                 self._end_of_file()
@@ -166,9 +167,22 @@ class Flow:
                 continue
             if line.flow is not None and self._is_of_flow(line):
                 self._obey(line)
+                if within and self.level < within:
+                    return None
                 continue
             if self._seeking is None:
                 return line
+
+    def lines_of_sub(self, number: int) -> Iterator[ParsedLine]:
+        """Yield the lines of words of a sub as if it were called here."""
+        line, place, level = self.current, self.here, self.level + 1
+        self.current = ParsedLine(f"o{number}call")
+        self._obey(self.current)
+        while (inner := self.step(level)) is not None:
+            yield inner
+        if self.level >= level:
+            raise LineFault("the program ends within the contour of a cycle", None)
+        self.current, self.here = line, place
 
     @property
     def level(self) -> int:

@@ -18,7 +18,7 @@ from camtool.toolpath.moves import Kind, PathMode
 from ..gcode.faults import LineFault
 from .dialect import ToolTableEntry
 from .frames import FRAMES, HOMES
-from .lines import LinuxcncBlock
+from .lines import RELATIVE, LinuxcncBlock
 from .moves import REFUSED, BlockMoves
 from .needs import check, motion_of
 from .state import MM_PER_INCH
@@ -42,13 +42,12 @@ class Interpreter(BlockMoves):
 
     def execute(self, block: LinuxcncBlock) -> None:
         """Carry out a block; Fault where LinuxCNC would refuse it."""
+        for letter in RELATIVE:
+            if letter in block.words:
+                raise LineFault(f"the letter {letter.upper()} is no word here", letter)
         motion = motion_of(self, block)
         check(self, block, motion)
-        for name, value in block.settings:
-            if isinstance(name, str):
-                self.given.set_named(name, value)
-            else:
-                self.given.set_numbered(name, value)
+        self.set_parameters(block)
         words, g = block.words, block.g
         if block.comment:
             self._comment(block.comment)
@@ -73,6 +72,14 @@ class Interpreter(BlockMoves):
             self._move(motion, block, words)
         if "stop" in block.m:
             self._stop(block.m["stop"])
+
+    def set_parameters(self, block: LinuxcncBlock) -> None:
+        """Set the parameters that a block assigns."""
+        for name, value in block.settings:
+            if isinstance(name, str):
+                self.given.set_named(name, value)
+            else:
+                self.given.set_numbered(name, value)
 
     # Comments, feed, speed, tools
 

@@ -63,12 +63,15 @@ TENTHS: Final = 1e-3
 AXES: Final = "xyzabc"
 """U, V and W are unknown to a machine that does not have them."""
 
+RELATIVE: Final = "uw"
+"""Words of X and Z from where the contour of a lathe cycle stands, and of nothing else."""
+
 WHOLE_WORDS: Final = "hlt"
 """Words whose numbers are whole."""
 
 NEVER_NEGATIVE: Final = {"f": "a feed", "s": "a speed", "t": "a tool", "l": "a count"}
 
-_WORDS: Final = frozenset("abcdefghijklmpqrstxyz$@^")
+_WORDS: Final = frozenset("abcdefghijklmpqrstuwxyz$@^")
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9.])")
 _BLOCK_NUMBER: Final = re.compile(r"n[0-9]+(?:\.[0-9]+)?")
 _BLANKS: Final = str.maketrans("", "", " \t\r")

@@ -1,7 +1,6 @@
 """The moves of a block: straight ones, arcs, splines, and the way home.
 
-Cycles, threads and cutter compensation have files of their own, which only programs load that use
-them.
+Cycles, threads, splines and cutter compensation have files of their own.
 """
 
 from __future__ import annotations
@@ -15,6 +14,8 @@ from camtool.toolpath.moves import Kind
 
 from ..gcode.faults import LineFault
 from ..gcode.part_moves import PLANES, too_many
+from .contour_cycles import BlockMotions, run_cycle
+from .cycles import drill, follow_spindle, thread
 from .frames import HOMES, FrameCodes
 from .lines import AXES, LinuxcncBlock
 from .needs import LATHE_CYCLES
@@ -42,9 +43,6 @@ AXIS_LETTERS: Final = f"{AXES}@^"
 
 REFUSED: Final = {
     **dict.fromkeys((382, 383, 384, 385), "probes, which cannot be simulated"),
-    **dict.fromkeys(
-        (700, *LATHE_CYCLES), "is a lathe's cycle, which is not read; write its moves"
-    ),
     **dict.fromkeys((171, 181, 191), "is a plane of U, V and W, which are not simulated"),
 }
 """G codes that LinuxCNC knows and that are not read."""
@@ -92,13 +90,9 @@ class BlockMoves(FrameCodes):
 
     def _other(self, motion: int, block: LinuxcncBlock, words: dict[str, float]) -> None:
         if _is_cycle(motion):
-            from .cycles import drill
-
             self.canon.feed = self._rate(block)
             drill(self, LinuxcncBlock(words, block.g, block.m, None), motion)
         elif motion in (330, 331, 760):
-            from .cycles import follow_spindle, thread
-
             self._arc_refused = False
             self.motion = motion
             end = self._ends(words, block.g)
@@ -106,6 +100,9 @@ class BlockMoves(FrameCodes):
                 thread(self, block, end)
             else:
                 follow_spindle(self, block, end, motion)
+        elif motion in (700, *LATHE_CYCLES):
+            moves = BlockMotions(self._straight, self._arc, self._centre, self._centre_of_radius)
+            run_cycle(self, moves, words, motion)
         elif motion == 52:
             self._control_point(block, words)
         else:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from ..gcode.faults import LineFault
-from .lines import AXES, LinuxcncBlock
+from .lines import AXES, RELATIVE, LinuxcncBlock
 from .state import InterpreterState
 
 TURNS_TOLERANCE: Final = 1e-3
@@ -54,7 +54,7 @@ def motion_of(state: InterpreterState, block: LinuxcncBlock) -> int | None:
     """The motion that a block asks for (enhance_block)."""
     words, g = block.words, block.g
     polar = "@" in words or "^" in words
-    axes = any(letter in words for letter in AXES)
+    axes = any(letter in words for letter in (*AXES, *RELATIVE))
     if polar and ("x" in words or "y" in words):
         raise LineFault("both polar coordinates and X or Y", "@")
     if polar and state.plane != 170:

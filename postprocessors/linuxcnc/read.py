@@ -52,7 +52,7 @@ from .findings import (
 )
 from .flow import EndOfFile, Flow
 from .interpreter import Interpreter
-from .lines import ParsedLine
+from .lines import LinuxcncBlock, ParsedLine
 from .state import InterpreterNotes, Mounted
 from .texts import Folder, ProgramText
 
@@ -96,6 +96,7 @@ class _Reader:
             restore=self._restore,
         )
         self.machine.calls = self.flow.calls
+        self.machine.read_sub = self._read_sub
         self.flow.keep = self._branches = BRANCHES.search(self.text.data) is not None
         self._rule = ArcRule(
             gap_mm=min(dialect.arc_difference_mm, dialect.arc_most_difference_mm),
@@ -157,6 +158,13 @@ class _Reader:
         machine.execute(line.block(machine.given))
         flow.lines_read += machine.effort
         machine.effort = 0
+
+    def _read_sub(self, number: int) -> Iterator[LinuxcncBlock]:
+        """Yield the blocks of a sub, whose parameters are set."""
+        for line in self.flow.lines_of_sub(number):
+            block = line.block(self.machine.given)
+            self.machine.set_parameters(block)
+            yield block
 
     def _restore(self, saved: object) -> None:
         from .modes import ActiveModes, restore

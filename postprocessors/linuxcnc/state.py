@@ -5,7 +5,7 @@ Numbers are in the units of the program, as LinuxCNC has them; `Canon` makes row
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Final
 
 from msgspec import Struct, field
@@ -18,6 +18,7 @@ from ..gcode.part_moves import PLANES
 from .canon import Canon
 from .dialect import LinuxcncDialect, LinuxcncMachine, ToolTableEntry
 from .flow import Call
+from .lines import LinuxcncBlock
 from .parameters import Parameters
 
 if TYPE_CHECKING:
@@ -98,6 +99,8 @@ class InterpreterState:
         self.canon = Canon(path, dialect.arc_full_turn_rad)
         self.calls: list[Call] = [Call()]
         """The calls that are under way, the program itself first: flow's own."""
+        self.read_sub: Callable[[int], Iterator[LinuxcncBlock]] = lambda number: iter(())
+        """Yields the blocks of a sub, which are not carried out."""
         self._dialect = dialect
         self._machine = machine
         self._cools = bool(machine.coolant.kinds)

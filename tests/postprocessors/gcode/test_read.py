@@ -290,7 +290,7 @@ def test_refused_by_grbl(text: str, line: int, column: int, message: str) -> Non
         ("M66 P0 L3\n", 1, 1, "without a time Q"),
         ("M101\n", 1, 1, "runs a program of the machine"),
         ("G0 U1\n", 1, 4, "the letter U is no word"),
-        ("G71 X1\n", 1, 1, "does not know|lathe's cycle"),
+        ("G71 X1\n", 1, 1, "does not know|a plane other than XZ"),
         ("G41 D5\n", 1, 1, "whose diameter only the tool table knows"),
         ("G41.1 G0 X5\n", 1, 7, "G41.1 without D"),
         ("G95 G1 X1 F1\n", 1, 1, "of a spindle at speed 0"),

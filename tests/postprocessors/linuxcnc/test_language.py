@@ -66,9 +66,16 @@ READ_PART = 0.95
 codes, at least this part is read alike."""
 TABLE = Path("/usr/share/doc/linuxcnc/examples/sample-configs/common/tool.tbl")
 
+NO_WAY_OUT = "a contour without a way out, to which LinuxCNC adds one since 2.9.3"
+
 # Of the programs that LinuxCNC brings: what is not read, or otherwise than by rs274, and why.
 OTHERWISE = {
     "base.ngc": "#<_task>, and so a tool that only the machine has",
+    "g71-endless-loop.ngc": "a contour of a lathe cycle that rs274 cannot end before 2.9.3",
+    "g71-endless-loop_2.ngc": "the same",
+    "g72-iterations-missing.ngc": NO_WAY_OUT,
+    "lathe_g7x_face_boring.ngc": NO_WAY_OUT,
+    "lathe_g7x_quadrants.ngc": NO_WAY_OUT,
     "skeleton.ngc": "rs274 forgets the tool's length at a tool change",
     "useful-subroutines.ngc": "a lead-in that is exactly as long as the tool's radius",
 }
@@ -128,7 +135,7 @@ class TestReferee:
             if canonical(calls) and not probing:
                 moving += 1
                 alike += not found
-            known = file.name in OTHERWISE or "is a lathe's cycle" in found or probing
+            known = file.name in OTHERWISE or probing
             if found and not known:
                 wrong.append(f"{file}: {found}")
         print(f"{alike} of {moving} programs that move are read alike")
