@@ -51,6 +51,7 @@ __all__ = [
     "job_of",
     "load_target",
     "meet",
+    "offset",
     "plan",
     "post",
     "post_by_setup",

@@ -9,11 +9,13 @@ it; what is wrong with a part is a finding in the result, not an exception.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, Unpack
+
+import numpy as np
 
 from camtool.bounds import program_bytes
 from camtool.calibration.calibrate import Calibration, to_text
@@ -22,8 +24,12 @@ from camtool.calibration.measurements import Measurements, read_measurements
 from camtool.comparison import Comparison, ProgramVariant, compare_program, variants_of
 from camtool.errors import CamtoolError, OptionError
 from camtool.geometry.drawing import Drawing
-from camtool.importers.options import Reading, options_of
+from camtool.geometry.nesting import Nesting, oriented
+from camtool.geometry.polylines import Polylines
+from camtool.importers.options import Reading, ReadOptions, options_of
+from camtool.importers.read import content, read_bytes
 from camtool.jobs.keys import field_value
+from camtool.libraries.read import is_path, path_of, read_objects
 from camtool.pictures.options import PictureOptions
 from camtool.pictures.picture import Picture
 from camtool.pictures.scene import Scene
@@ -83,6 +89,7 @@ __all__ = [
     "job_of",
     "load_target",
     "meet",
+    "offset",
     "plan",
     "post",
     "post_by_setup",
@@ -107,10 +114,18 @@ def _patterns(patterns: str | Sequence[str]) -> tuple[str, ...]:
     return (patterns,) if isinstance(patterns, str) else tuple(patterns)
 
 
+Drawable: TypeAlias = Any
+"""A Drawing; the path of a file; an object of ezdxf (document, layout), shapely, svgpathtools,
+numpy ((N, 2) points, (N, 3) with bulges) or build123d (sketch, face, part, builder); a list of
+such objects, or {layer: objects}. Objects count in mm if they have no unit of their own, or in the
+`units` that `read_drawing` is given (docs/python.md)."""
+
+
 def read_drawing(
-    file: str | Path, *, target: str | LoadedTarget | None = None, **reading: Unpack[Reading]
+    drawing: Drawable, *, target: str | LoadedTarget | None = None, **reading: Unpack[Reading]
 ) -> ShownDrawing:
-    """The drawing in a DXF, SVG, point list, STEP file, build123d script, PNG or JPEG; mm, Y up.
+    """The drawing in a DXF, SVG, point list, STEP file, build123d script, PNG or JPEG, or of
+    objects of other libraries (`Drawable`); mm, Y up.
 
     `paths` holds M contours of lines and arcs in columns: `vertices` (N, 3) of x, y mm and bulge,
     `offsets` (M+1,), `closed` (M,); `layers`, `colours` and `sources` have M items each. Lines
@@ -118,16 +133,17 @@ def read_drawing(
     `target` if one is given. Tolerances apply to the part: give its `scale` where a job scales it.
     Raises DrawingError, and OptionError for options that cannot be. Source: docs/formats.md.
     """
-    from camtool.importers.read import read_drawing as read
-
-    return ShownDrawing.of(read(Path(file), options=options_of(reading, _machine_of(target))))
+    options = options_of(reading, _machine_of(target))
+    if isinstance(drawing, Drawing):
+        raise OptionError("drawing is read already", mend="pass it on, or read its source anew")
+    return ShownDrawing.of(_reader_of(drawing)(options))
 
 
 def read_job(
     file: str | Path,
     *,
     operations: Sequence[str] = (),
-    drawing: Drawing | str | Path | None = None,
+    drawing: Drawable | None = None,
     target: str | LoadedTarget | None = None,
     libraries: Sequence[str | Path] = (),
 ) -> Job:
@@ -149,18 +165,21 @@ def read_job(
     return job
 
 
-def as_drawing(
-    drawing: Drawing | str | Path, target: str | LoadedTarget | None, job: Job
-) -> Drawing:
-    """The drawing, or the contents of its file on the layers of the job's operations."""
-    from camtool.importers.read import content
-    from camtool.jobs.drawing import read_for_job
+def as_drawing(drawing: Drawable, target: str | LoadedTarget | None, job: Job) -> Drawing:
+    """The drawing, or that of its file or objects, on the layers of the job's operations."""
+    from camtool.jobs.drawing import chosen_for_job
 
     if isinstance(drawing, Drawing):
         return drawing
-    data, name = content(Path(drawing))
     options = options_of({"text": job.text} if job.text else {}, _machine_of(target))
-    return ShownDrawing.of(read_for_job(data, name, options, job))
+    return ShownDrawing.of(chosen_for_job(_reader_of(drawing), options, job))
+
+
+def _reader_of(drawing: Drawable) -> Callable[[ReadOptions], Drawing]:
+    """Return the function that reads the file or the objects with given options."""
+    if not is_path(drawing):
+        return partial(read_objects, drawing)
+    return partial(read_bytes, *content(path_of(drawing)))
 
 
 def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
@@ -185,6 +204,43 @@ def job_of(**settings: Any) -> Job:
     unknown name, and OptionError, which names the field, for a value that it cannot have.
     """
     return made(**{name: field_value(name, value) for name, value in settings.items()})
+
+
+# Offsets.
+
+
+def offset(
+    drawing: Drawable,
+    distance_mm: float,
+    *,
+    joins: Literal["round", "mitre", "sharp"] = "round",
+    mitre_limit: float = 2.0,
+) -> ShownDrawing:
+    """The closed contours of a drawing, grown by a distance in mm, or shrunk by one below 0; each
+    layer is a region, in which holes become smaller as the part grows. Arcs stay arcs.
+
+    `joins`: what is about outer corners; a "mitre" longer than `mitre_limit` times the distance
+    is cut off. Open contours and marks are left out. Raises OptionError for joins that do not
+    exist, and where nothing is left. Source: camtool/geometry/offset.py.
+    """
+    from camtool.geometry.offset import offset_shape
+
+    read = as_drawing(drawing, None, Job())
+    layers = np.array(read.layers, dtype=object)
+    parts: list[Polylines] = []
+    names: list[str] = []
+    for layer in dict.fromkeys(read.layers):
+        rows = np.flatnonzero((layers == layer) & read.paths.closed)
+        region = oriented(Nesting(read.paths.select(rows)))
+        parts.append(offset_shape(region, -distance_mm, joins=joins, mitre_limit=mitre_limit))
+        names += [layer] * len(parts[-1])
+    if not names:
+        raise OptionError(
+            f"an offset of {distance_mm:g} mm leaves nothing", mend="give a smaller distance"
+        )
+    source = f"offset {distance_mm:g} mm"
+    columns = tuple(names), ("",) * len(names), (source,) * len(names)
+    return ShownDrawing(Polylines.joined(parts), *columns, file=read.file, units=read.units)
 
 
 # Machines.
@@ -242,9 +298,7 @@ def _as_toml(value: Any) -> str:
 # Toolpaths and programs.
 
 
-def plan(
-    drawing: Drawing | str | Path, target: str | LoadedTarget, job: Job | None = None
-) -> ShownToolpath:
+def plan(drawing: Drawable, target: str | LoadedTarget, job: Job | None = None) -> ShownToolpath:
     """The moves that cut the drawing: work frame, mm, mm/min, in order of execution.
 
     N rows in columns: `kind` (N,), `end` (N, 3), `centre` (N, 2), `feed` (N,). Without a job, a
@@ -261,7 +315,7 @@ def plan(
 
 
 def post(
-    drawing: Drawing | str | Path,
+    drawing: Drawable,
     target: str | LoadedTarget,
     job: Job | None = None,
     *,
@@ -282,7 +336,7 @@ def post(
 
 
 def post_by_tool(
-    drawing: Drawing | str | Path,
+    drawing: Drawable,
     target: str | LoadedTarget,
     job: Job | None = None,
     *,
@@ -302,7 +356,7 @@ def post_by_tool(
 
 
 def post_by_setup(
-    drawing: Drawing | str | Path,
+    drawing: Drawable,
     target: str | LoadedTarget,
     job: Job,
     *,
@@ -350,7 +404,7 @@ def inspect(
 
 
 def meet(
-    drawing: Drawing | str | Path,
+    drawing: Drawable,
     target: str | LoadedTarget,
     tolerances: str | Path | None = None,
     *,
@@ -425,7 +479,7 @@ def verify(
     program: bytes | Program | str | Path,
     target: str | LoadedTarget,
     *,
-    against: Drawing | str | Path | None = None,
+    against: Drawable | None = None,
     job: Job | None = None,
     judging: Judging | None = None,
 ) -> Run:
@@ -463,7 +517,7 @@ def compare(
     target: str | LoadedTarget,
     ways: str | Mapping[str, str | LoadedTarget],
     *,
-    against: Drawing | str | Path | None = None,
+    against: Drawable | None = None,
     job: Job | None = None,
     judging: Judging | None = None,
 ) -> Comparison:
@@ -571,13 +625,14 @@ class Looks(TypedDict, total=False):
 
 
 def preview(
-    what: Drawing | Toolpath | Shown,
-    *beside: Drawing | Toolpath | Shown,
+    what: Toolpath | Shown | Drawable,
+    *beside: Toolpath | Shown | Drawable,
     titles: Sequence[str] = (),
     **looks: Unpack[Looks],
 ) -> Picture:
-    """The picture of the result of another call: a drawing, a toolpath, the predicted path of the
-    slides in colours of its error (µm, with a scale), or several such paths.
+    """The picture of a drawing, also of a file or of objects, or of the result of another call: a
+    toolpath, the predicted path of the slides in colours of its error (µm, with a scale), or
+    several such paths.
 
     Several values are drawn `beside` each other, at one scale and with one scale of errors;
     `titles` replace their own, in order. Raises OptionError for looks that make no picture.
@@ -605,4 +660,4 @@ def _as_shown(value: Any) -> Shown:
         return ShownDrawing.of(value)
     if isinstance(value, Toolpath):
         return ShownToolpath.of(value)
-    raise TypeError(f"{type(value).__name__} has no picture")
+    return read_drawing(value)

@@ -8,6 +8,7 @@ shown as escapes. JSON text has JSON's own escapes instead, so that its reader g
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from typing import Any
@@ -67,3 +68,8 @@ def _visible(char: str) -> str:
 def _shortened(text: str, length: int) -> str:
     head = 3 * length // 5
     return f"{text[:head]}…{text[head + 1 - length :]}"
+
+
+def embedded_address(svg: bytes) -> str:
+    """Return the address of a picture that is embedded in a page."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"

@@ -6,17 +6,35 @@ and toolpaths that `import camtool` returns are here too: they show a picture in
 
 from __future__ import annotations
 
+import hashlib
+import html
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from camtool.errors import OptionError, PostError
 from camtool.findings import Finding, Severity, worst
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
+from camtool.libraries.exports import (
+    CHORD_MM,
+    ezdxf_of,
+    shapely_of,
+    shapely_of_moves,
+    shapely_of_trace,
+    svgpathtools_of,
+)
+from camtool.plain import embedded_address, one_line
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verification.report import (
+    ChangedValue,
+    ReportPage,
+    Setup,
+    finding_reports,
+    page_html,
+)
 
 if TYPE_CHECKING:
     from camtool.pictures.options import PictureOptions
@@ -28,6 +46,9 @@ if TYPE_CHECKING:
     from camtool.verification.report import Report
     from camtool.verification.verify import Verification
     from camtool.waveforms.plot import PlotKind
+
+
+_CAPTION = "The predicted result"
 
 
 class Shown(ABC):
@@ -151,6 +172,45 @@ class Run(Shown):
         look = AS_USUAL if options is None else options
         return plot_file(kind, self.verification, str(file), self.title, stretch, look)
 
+    def report_page(
+        self,
+        pictures: tuple[tuple[str, str], ...] = (),
+        stock: str = "",
+        flags: tuple[tuple[str, str], ...] = (),
+    ) -> ReportPage:
+        """Return the page of the run with captions and addresses of pictures, the address of a
+        picture of the stock, and the flags that made it."""
+        machine, program = self.target.machine, self.program
+        setup = Setup(
+            machine=f"{machine.target.name}: {machine.target.title}",
+            machine_sha256=machine.digest,
+            program_sha256=None if program is None else hashlib.sha256(program.data).hexdigest(),
+            changed=tuple(ChangedValue(*change) for change in self.target.changed_values()),
+            flags=flags,
+        )
+        title, findings = one_line(self.title), finding_reports(self.findings)
+        return ReportPage(title, self.report, findings, setup, pictures, stock)
+
+    def to_shapely(self, tolerance_mm: float = CHORD_MM) -> dict[str, Any]:
+        """The program's "cuts" and "rapids" as lines of shapely with heights, mm in the work frame
+        (without a program those that are planned), and what the slides cut: "predicted", without
+        heights, where it was verified."""
+        toolpath = self.wanted if self.decoded is None else self.decoded
+        lines = {} if toolpath is None else shapely_of_moves(toolpath, tolerance_mm)
+        if self.verification is not None:
+            trace = self.verification.trace
+            lines["predicted"] = shapely_of_trace(trace.points, trace.cutting)
+        return lines
+
+    def _repr_html_(self) -> str:
+        """Return the page in a frame, which runs no script."""
+        picture = embedded_address(self._repr_svg_().encode())
+        page = page_html(self.report_page(((_CAPTION, picture),)))
+        return (
+            f'<iframe sandbox title="{html.escape(self.title)}" srcdoc="{html.escape(page)}" '
+            'style="width:100%;height:45em;border:0"></iframe>'
+        )
+
     def __str__(self) -> str:
         return repr(self) if self.report is None else self.report.to_text()
 
@@ -176,6 +236,21 @@ class ShownDrawing(Shown, Drawing):
         from camtool.pictures.scene import scene_of_drawing
 
         return scene_of_drawing(self, PurePath(self.file).name)
+
+    def to_shapely(self, tolerance_mm: float = CHORD_MM) -> dict[str, Any]:
+        """The drawing as {layer: geometry of shapely}: closed paths as polygons with their holes,
+        open ones as lines, marks as points; mm, arcs as chords within the tolerance."""
+        return shapely_of(self, tolerance_mm)
+
+    def to_ezdxf(self) -> Any:
+        """The drawing as a document of ezdxf in mm, with its layers and colours; arcs stay
+        arcs."""
+        return ezdxf_of(self)
+
+    def to_svgpathtools(self) -> dict[str, list[Any]]:
+        """The drawing as {layer: Paths of svgpathtools}, mm, Y down; arcs stay arcs, marks are
+        left out."""
+        return svgpathtools_of(self)
 
     def __repr__(self) -> str:
         closed = int(self.paths.closed.sum())
@@ -215,6 +290,11 @@ class ShownToolpath(Shown, Toolpath):
             machine=None if self.target is None else self.target.machine,
             tabs=self.tabs_mm,
         )
+
+    def to_shapely(self, tolerance_mm: float = CHORD_MM) -> dict[str, Any]:
+        """The "cuts" and the "rapids" as lines of shapely with heights, mm in the work frame; arcs
+        as chords within the tolerance."""
+        return shapely_of_moves(self, tolerance_mm)
 
     def __repr__(self) -> str:
         moves = int((self.kind <= int(Kind.ARC_CCW)).sum())

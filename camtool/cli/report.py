@@ -7,8 +7,6 @@ place of a file that the page did not bring along; Markdown on stdout has none.
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
@@ -23,11 +21,11 @@ from camtool.cli.picture_options import FLAGS as PICTURE_FLAGS
 from camtool.cli.picture_options import Painter, is_viewer
 from camtool.cli.plot_options import PlotFlags
 from camtool.errors import OutputError
-from camtool.plain import one_line
+from camtool.plain import embedded_address
 
 if TYPE_CHECKING:
     from camtool.run import Run
-    from camtool.verification.report import ReportPage, Setup
+    from camtool.verification.report import ReportPage
 
 PAGES = (".html", ".md", ".json")
 EMBEDDED = "picture.svg"
@@ -135,21 +133,16 @@ class ReportOutputs:
             return {name: page_json(_page(run, ())).encode()}
         if name != STDOUT and suffix == ".html":
             pictures = ((_CAPTION, picture(EMBEDDED)), *picture.closeups())
-            shown = tuple((caption, _embedded_address(data)) for caption, data in pictures)
+            shown = tuple((caption, embedded_address(data)) for caption, data in pictures)
             plan = None if run.report is None else run.report.planned
             stock = picture.stock(None if plan is None else plan.swept_mm)
-            page = _page(run, shown, "" if stock is None else _embedded_address(stock))
+            page = _page(run, shown, "" if stock is None else embedded_address(stock))
             return {name: page_html(page).encode()}
         links = () if self.linked is None else ((_CAPTION, _relative_address(name, self.linked)),)
         files = {name: page_markdown(_page(run, links)).encode()}
         if self.beside is None:
             return files
         return {**files, self.beside: seal(picture(self.beside), name)}
-
-
-def _embedded_address(svg: bytes) -> str:
-    """Return the address of a picture embedded in the page."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 
 def _relative_address(page_name: str, picture_name: str) -> str:
@@ -159,25 +152,7 @@ def _relative_address(page_name: str, picture_name: str) -> str:
 
 
 def _page(run: Run, pictures: tuple[tuple[str, str], ...], stock: str = "") -> ReportPage:
-    from camtool.verification.report import ReportPage, finding_reports
-
-    title = one_line(run.title)
-    return ReportPage(
-        title, run.report, finding_reports(run.findings), _setup(run), pictures, stock
-    )
-
-
-def _setup(run: Run) -> Setup:
-    from camtool.verification.report import ChangedValue, Setup
-
-    machine, program = run.target.machine, run.program
-    return Setup(
-        machine=f"{machine.target.name}: {machine.target.title}",
-        machine_sha256=machine.digest,
-        program_sha256=None if program is None else hashlib.sha256(program.data).hexdigest(),
-        changed=tuple(ChangedValue(*change) for change in run.target.changed_values()),
-        flags=_flags_given(),
-    )
+    return run.report_page(pictures, stock, _flags_given())
 
 
 def _flags_given() -> tuple[tuple[str, str], ...]:

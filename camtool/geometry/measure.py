@@ -1,4 +1,4 @@
-"""Lengths, areas, extents, points and tangents of lines and arcs; never of chords in their place.
+"""Lengths, areas, extents, points and tangents of lines and arcs, not of chords; and chords.
 
 Nothing here uses the centre of an arc. With the chord vector d, the bulge b = tan(sweep/4) and
 f the part of the sweep that is done, a point of the arc is
@@ -147,6 +147,35 @@ def point_at(segments: Segments, row_indices: Ints, t: Floats) -> Floats:
     turn_left = np.column_stack([-chord[:, 1], chord[:, 0]])
     points[arcs] += (ratio * np.sin(turn))[:, None] * turn_left
     return np.asarray(points + 0.0)  # no −0
+
+
+class ChordPoints(Struct, frozen=True, eq=False):
+    """Lines and arcs as chords: `points` (P, 2) mm, the `segment` (P,) of each, and its `share`
+    (P,) of the length of that segment. Every segment has a point of its own at both its ends."""
+
+    points: Floats
+    segment: Ints
+    share: Floats
+
+    @property
+    def once(self) -> Floats:
+        """The points without the end of each segment: those of a closed path, each once."""
+        return self.points[self.share < 1.0]
+
+
+def chords_of(segments: Segments, tolerance_mm: float, min_count: int = 1) -> ChordPoints:
+    """Return the segments as chords that lie within `tolerance_mm` of them, at least `min_count`
+    for each arc."""
+    arcs = segments.is_arc
+    radius = np.where(arcs, segments.radius, 1.0)
+    within = 1.0 - tolerance_mm / np.maximum(radius, tolerance_mm)
+    widest = 2.0 * np.arccos(np.clip(within, -1.0, 1.0))
+    parts = np.where(arcs, np.maximum(np.ceil(np.abs(segments.sweep) / widest), min_count), 1.0)
+    parts = np.maximum(parts, 1.0).astype(np.int64)
+    segment = np.repeat(np.arange(len(parts)), parts + 1)
+    first = np.cumsum(parts + 1) - parts - 1
+    share = (np.arange(len(segment)) - np.repeat(first, parts + 1)) / parts[segment]
+    return ChordPoints(point_at(segments, segment, share), segment, share)
 
 
 def sample(p: Polyline, step_mm: float) -> Floats:

@@ -18,6 +18,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.errors import DrawingError
 from camtool.findings import Finding, Severity
@@ -64,6 +65,39 @@ from camtool.records import replace
 from camtool.units import UM_PER_MM
 
 _SOURCES_NAMED = 3
+
+
+def unit_or_mm(options: ReadOptions, why: str) -> Units:
+    """Return the unit that was asked for, else mm, for the reason `why`."""
+    if options.units is None:
+        return Units("mm", 1.0, why)
+    return Units(options.units.lower(), options.mm_per(options.units), "as asked")
+
+
+class Found(Struct, frozen=True, eq=False):
+    """What a reader found, for `assemble`: pieces and marks in mm, and the unit that they had."""
+
+    pieces: list[Piece]
+    units: Units
+    used: dict[str, int] = field(default_factory=dict)
+    skipped: list[Skipped] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+    marks: Sequence[Mark] = ()
+    callouts: Sequence[Callout] = ()
+
+    def drawing(self, file: str, options: ReadOptions) -> Drawing:
+        """Return the Drawing of all of it."""
+        return assemble(
+            self.pieces,
+            file=file,
+            units=self.units,
+            used=self.used,
+            skipped=self.skipped,
+            findings=self.findings,
+            options=options,
+            marks=self.marks,
+            callouts=self.callouts,
+        )
 
 
 def assemble(

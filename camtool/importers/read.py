@@ -77,7 +77,7 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
             raise
         return drawing
     if name != "bitmap":
-        _refuse_flags_of_pictures(options, file)
+        refuse_flags_of_pictures(options, file)
     module = importlib.import_module(f"camtool.importers.{name}.reader")
     return cast(Reader, module).read(data, file, options.as_drawn())
 
@@ -91,7 +91,7 @@ def _read_by_others(data: bytes, file: str, suffix: str, options: ReadOptions) -
         try:
             importer = cast(Importer, point.load())
             if importer.recognises(data, suffix):
-                _refuse_flags_of_pictures(options, file)
+                refuse_flags_of_pictures(options, file)
                 return importer.read(data, file, options.as_drawn())
         except CamtoolError:
             raise
@@ -105,7 +105,7 @@ def _read_by_others(data: bytes, file: str, suffix: str, options: ReadOptions) -
     return None
 
 
-def _refuse_flags_of_pictures(options: ReadOptions, file: str) -> None:
+def refuse_flags_of_pictures(options: ReadOptions, file: str) -> None:
     """OptionError for an option that has no effect on drawings of lines."""
     for name, flag, _ in flags_of(ReadOptions):
         if flag.for_pixels and getattr(options, name) != getattr(DEFAULTS, name):

@@ -31,11 +31,18 @@ def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Draw
     """The drawing in the content of a file, of the layers that the job's operations take, in all
     set-ups of the part, or of those that `options` select. OptionError for a layer or colour of
     the job that the drawing has not, unless `options` select some."""
+    return chosen_for_job(partial(read_bytes, data, file), options, job)
+
+
+def chosen_for_job(
+    read: Callable[[ReadOptions], Drawing], options: ReadOptions, job: Job
+) -> Drawing:
+    """As `read_for_job`, of the drawing that a call reads."""
     job = job.whole
     selection, wanted_layers = options.select, layers_of(job)
     options = replace(options, select=replace(selection, layers=selection.layers or wanted_layers))
     try:
-        drawing = read_to_scale(partial(read_bytes, data, file), options, job)
+        drawing = read_to_scale(read, options, job)
     except NoMatchError as error:
         if selection.layers or error.pattern not in wanted_layers:
             raise

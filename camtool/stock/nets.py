@@ -24,7 +24,8 @@ from msgspec import Struct
 from shapely.geometry.base import BaseGeometry
 
 from camtool.arrays import Floats, Ints
-from camtool.geometry.polylines import Polylines
+from camtool.geometry.measure import chords_of
+from camtool.geometry.polylines import Polylines, Segments
 from camtool.stock.moves import StockMoves
 from camtool.stock.wanted import CopperNets
 
@@ -114,40 +115,11 @@ def judge_nets(
 
 def _area(contours: Polylines) -> BaseGeometry:
     """Return the area within an odd number of contours."""
-    rings = [shapely.LinearRing(_chords(path.vertices)) for path in contours]
+    rings = [
+        shapely.LinearRing(chords_of(Segments.of(path), FLAT_MM, min_count=2).once)
+        for path in contours
+    ]
     return shapely.build_area(shapely.GeometryCollection(rings))
-
-
-def _chords(vertices: Floats) -> Floats:
-    """Return points (n, 2) on a closed path, vertices (V, 3): arcs as chords within FLAT_MM."""
-    points: list[Floats] = []
-    for (x, y, bulge), (x_end, y_end, _) in zip(
-        vertices.tolist(), np.roll(vertices, -1, axis=0).tolist(), strict=True
-    ):
-        points.append(np.array([[x, y]]))
-        if bulge:
-            sweep = 4.0 * math.atan(bulge)
-            chord = math.hypot(x_end - x, y_end - y)
-            radius = abs(chord / (2.0 * math.sin(0.5 * sweep)))
-            within = 2.0 * math.acos(max(1.0 - FLAT_MM / radius, -1.0))
-            count = max(1, math.ceil(abs(sweep) / within))
-            half = 0.5 * chord / math.tan(0.5 * sweep)
-            centre = np.array(
-                [
-                    0.5 * (x + x_end) - half * (y_end - y) / chord,
-                    0.5 * (y + y_end) + half * (x_end - x) / chord,
-                ]
-            )
-            spoke = np.array([x, y]) - centre
-            angles = sweep * np.arange(1, count) / count
-            cosine, sine = np.cos(angles), np.sin(angles)
-            points.append(
-                centre
-                + np.column_stack(
-                    [spoke[0] * cosine - spoke[1] * sine, spoke[0] * sine + spoke[1] * cosine]
-                )
-            )
-    return np.concatenate(points)
 
 
 # Grooves at the bottom of the copper.

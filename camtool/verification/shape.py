@@ -27,7 +27,7 @@ from msgspec import Struct
 from camtool.arrays import Floats, Ints
 from camtool.findings import Code, Finding, TargetCode
 from camtool.geometry.boxes import BoxIndex, distances_from, moves_of
-from camtool.geometry.measure import point_at, segment_boxes
+from camtool.geometry.measure import chords_of, segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.machine.model import Machine
 from camtool.planning.job import Tool
@@ -445,14 +445,6 @@ def _protected_area(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
 
 def _chord_lines(segments: Segments, ends_z: Floats, tolerance: float) -> _Lines:
     """Return lines and arcs as chords, with the heights (K, 2) of their ends."""
-    radius = np.where(segments.is_arc, segments.radius, 1.0)
-    most = 2.0 * np.arccos(np.clip(1.0 - tolerance / np.maximum(radius, tolerance), -1.0, 1.0))
-    parts = np.where(segments.is_arc, np.ceil(np.abs(segments.sweep) / most), 1.0)
-    parts = np.maximum(parts, 1.0).astype(np.int64)
-    segment = np.repeat(np.arange(len(parts)), parts + 1)
-    share = (np.arange(len(segment)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)) / (
-        parts[segment]
-    )
-    points: Floats = point_at(segments, segment, share)
-    low, high = ends_z[segment].T
-    return _Lines(points, low + share * (high - low), segment)
+    chords = chords_of(segments, tolerance)
+    low, high = ends_z[chords.segment].T
+    return _Lines(chords.points, low + chords.share * (high - low), chords.segment)

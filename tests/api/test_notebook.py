@@ -52,7 +52,8 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
 def test_everything_with_a_picture_shows_it(values: dict[str, object]) -> None:
     for name, value in values.items():
         bundle = displayed(value)
-        assert set(bundle) == {"text/plain", "image/svg+xml"}, name
+        page = {"text/html"} if isinstance(value, camtool.Run) else set()
+        assert set(bundle) == {"text/plain", "image/svg+xml"} | page, name
         assert "\n" not in bundle["text/plain"], name
         page = ElementTree.fromstring(bundle["image/svg+xml"])
         assert page.tag == "{http://www.w3.org/2000/svg}svg", name
@@ -64,3 +65,16 @@ def test_the_rest_is_text(values: dict[str, object]) -> None:
     assert list(displayed(found)) == ["text/plain"]
     assert list(displayed(camtool.Run)) == ["text/plain"]
     assert displayed(values["posted"]) == displayed(values["posted"])
+
+
+def test_a_run_shows_its_page_in_a_frame(values: dict[str, object]) -> None:
+    """The frame holds the page of `--report`, which runs no script: the picture, and figures."""
+    frame = ElementTree.fromstring(
+        displayed(values["posted"])["text/html"].replace(" sandbox", "")
+    )
+    page = frame.attrib["srcdoc"]
+    assert page.startswith("<!")
+    assert "<script" not in page
+    assert "square.csv" in page
+    assert "data:image/svg+xml;base64," in page
+    assert "µm" in page

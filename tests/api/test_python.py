@@ -164,7 +164,7 @@ def test_everything_has_a_picture(posted: Run) -> None:
     assert all(svg.startswith("<svg") for svg in pictures)
     assert pictures[0] != pictures[1] != pictures[2]
     assert camtool.preview(posted).svg == posted._repr_svg_()
-    with pytest.raises(TypeError, match="int has no picture"):
+    with pytest.raises(camtool.CamtoolError, match="drawing is of type int"):
         camtool.preview(3)  # type: ignore[arg-type]
 
 

@@ -53,6 +53,7 @@ ALLOWED = {
     "machine": BASE | {"geometry", "kernels"},
     "toolpath": BASE | {"geometry", "kernels", "machine"},
     "importers": SHARED,
+    "libraries": SHARED | {"importers"},
     "planning": SHARED,
     "simulation": SHARED,
     "stock": SHARED | {"simulation", "planning", "target"},
@@ -64,7 +65,7 @@ ALLOWED = {
     "calibration": TARGETS,
     "jobs": TARGETS | {"importers", "planning"},
     "operations": SHARED | {"planning", "jobs"},
-    "run": JUDGE | {"stock", "verification", "pictures", "waveforms"},
+    "run": JUDGE | {"libraries", "stock", "verification", "pictures", "waveforms"},
     "pipeline": JUDGE | {"stock", "verification", "run"},
     "comparison": JUDGE | {"stock", "verification", "pictures", "run", "pipeline"},
     "inspection": MADE - {"pictures"} | {"jobs"},
@@ -74,7 +75,7 @@ ALLOWED = {
     "cli": MADE
     | {"inspection", "calibration", "batches", "sending", "panel", "jobs", "project", "waveforms"},
     "__main__": {"cli"},
-    "api": MADE | {"inspection", "calibration", "jobs", "waveforms"},
+    "api": MADE | {"libraries", "inspection", "calibration", "jobs", "waveforms"},
     "__init__": {"api", "errors", "version"},
 }
 HEAVY = {

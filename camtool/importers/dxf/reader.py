@@ -15,8 +15,8 @@ from typing import Any
 from camtool.errors import DrawingError
 from camtool.findings import Finding, Severity
 from camtool.geometry.drawing import Drawing, Skipped, Units
-from camtool.importers.assemble import assemble, font_findings
-from camtool.importers.dxf.load import load, quiet, without_collector
+from camtool.importers.assemble import Found, font_findings
+from camtool.importers.dxf.load import Loaded, load, quiet, without_collector
 from camtool.importers.dxf.walk import DxfWalk
 from camtool.importers.findings import (
     CALLOUT_NOT_READ,
@@ -35,32 +35,37 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     when it cannot be read."""
     with without_collector():
         loaded = load(data, file, plain=options.layout is None)
-        units, findings = units_of(loaded.header, options)
-        walk = DxfWalk(loaded, file, options)
-        with quiet():
-            walk.space(_space(loaded.document, options.layout, file), units.mm_per_unit)
-    repairs = loaded.repairs
-    del loaded, walk.loaded  # what the file holds is in the pieces now
-    return assemble(
+        content = walk_space(
+            loaded, layout_of(loaded.document, options.layout, file), file, options
+        )
+    del loaded  # what the file holds is in the pieces now
+    return content.drawing(file, options)
+
+
+def walk_space(loaded: Loaded, space: Any, file: str, options: ReadOptions) -> Found:
+    """Return what model space or a layout of a document holds; DrawingError as `read`."""
+    units, findings = units_of(loaded.header, options)
+    walk = DxfWalk(loaded, file, options)
+    with quiet():
+        walk.space(space, units.mm_per_unit)
+    return Found(
         walk.pieces,
+        units,
         marks=walk.marks,
         callouts=walk.callouts,
-        file=file,
-        units=units,
         used=dict(walk.used),
         skipped=[Skipped(kind, count, reason) for (kind, reason), count in walk.skipped.items()],
         findings=[
-            *_repair_findings(repairs),
+            *_repair_findings(loaded.repairs),
             *findings,
             *_not_applied_findings(walk.lacking),
             *_not_callouts(walk.unread),
             *font_findings(walk.fonts),
         ],
-        options=options,
     )
 
 
-def _space(document: Any, layout: str | None, file: str) -> Any:
+def layout_of(document: Any, layout: str | None, file: str) -> Any:
     """Model space, or the layout of this name in any case."""
     if layout is None:
         return document.modelspace()

@@ -18,7 +18,7 @@ import numpy as np
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.fit import split_bulges
-from camtool.importers.assemble import assemble
+from camtool.importers.assemble import assemble, unit_or_mm
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import MAX_POINTS, Piece, too_many_points
 from camtool.importers.points.matlab import is_matlab, parse_matlab
@@ -38,7 +38,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     """The Drawing of a file of points; DrawingError naming line and column."""
     table = _table(data, file)
     units = _units(table, options)
-    pieces = [_piece(stroke, units.mm_per_unit) for stroke in table.strokes]
+    pieces = [piece_of(stroke, units.mm_per_unit) for stroke in table.strokes]
     del data, table  # their numbers are in the pieces
     return assemble(
         pieces,
@@ -80,15 +80,14 @@ def _decoded(data: bytes, file: str) -> str:
 
 def _units(table: PointTable, options: ReadOptions) -> Units:
     """The caller's unit, else the file's, else mm."""
-    if options.units is not None:
-        return Units(options.units.lower(), options.mm_per(options.units), "as asked")
-    if table.unit is not None:
+    if options.units is None and table.unit is not None:
         size = table.mm_per_unit
         return Units(table.unit, options.mm_per(table.unit) if size is None else size, table.why)
-    return Units("mm", 1.0, "points are mm unless another unit is named")
+    return unit_or_mm(options, "points are mm unless another unit is named")
 
 
-def _piece(stroke: Stroke, mm_per_unit: float) -> Piece:
+def piece_of(stroke: Stroke, mm_per_unit: float) -> Piece:
+    """Return a stroke in mm, its arcs of more than a half circle cut in two."""
     points = stroke.points
     vertices = np.zeros((len(points), 3))
     closed = stroke.closed

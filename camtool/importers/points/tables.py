@@ -504,6 +504,25 @@ def _array(data: bytes, file: str, name: str) -> Floats:
     """The points (n, 2) or (n, 3) of one .npy."""
     where = f"array {name}" if name else None
     shape, fortran, dtype, begin = _header(data, file, where)
+    check_type(shape, dtype, file, where)
+    expected_bytes = math.prod(shape) * dtype.itemsize
+    if len(data) - begin != expected_bytes:
+        raise DrawingError(
+            f"holds {len(data) - begin} bytes of numbers, wanted {expected_bytes}",
+            file=file,
+            where=where,
+        )
+    raw = np.frombuffer(data, dtype, offset=begin)
+    with np.errstate(over="ignore", invalid="ignore"):
+        points = raw.reshape(shape, order="F" if fortran else "C").astype(np.float64)
+    check_numbers(points, file, name)
+    return points
+
+
+def check_type(
+    shape: tuple[int, ...], dtype: np.dtype[np.generic], file: str, where: str | None
+) -> None:
+    """Refuse an array that is no list of points by its type or its shape: DrawingError."""
     if dtype.hasobject or dtype.kind not in "fiu":
         content = "objects" if dtype.hasobject else f"numbers of type {dtype}"[:60]
         raise DrawingError(f"holds {content}, no coordinates", file=file, where=where, mend=_SAVE)
@@ -515,18 +534,6 @@ def _array(data: bytes, file: str, name: str) -> Floats:
             where=where,
             mend="transpose it (array.T): a row is a point" if is_transposed else _SAVE,
         )
-    expected_bytes = math.prod(shape) * dtype.itemsize
-    if len(data) - begin != expected_bytes:
-        raise DrawingError(
-            f"holds {len(data) - begin} bytes of numbers, wanted {expected_bytes}",
-            file=file,
-            where=where,
-        )
-    raw = np.frombuffer(data, dtype, offset=begin)
-    with np.errstate(over="ignore", invalid="ignore"):
-        points = raw.reshape(shape, order="F" if fortran else "C").astype(np.float64)
-    _check(points, file, name)
-    return points
 
 
 def _header(
@@ -552,8 +559,8 @@ def _header(
     return shape, bool(fortran), dtype, stream.tell()
 
 
-def _check(points: Floats, file: str, name: str) -> None:
-    """DrawingError naming the first row that is no point."""
+def check_numbers(points: Floats, file: str, name: str) -> None:
+    """Refuse the first row that is no point, with its number: DrawingError."""
     head = f"array {name}, " if name else ""
     odd = ~np.isfinite(points).all(axis=1)
     if odd.any():

@@ -291,9 +291,17 @@ def run_script(data: bytes, file: str) -> list[Body]:
         raise DrawingError(f"is no Python: {error.msg}", where=where, mend=_MEND) from error
     # Whatever the script raises is a fault of the script.
     except Exception as error:
+        if is_missing(error):
+            raise
         error_text = f"{type(error).__name__}: {error}".rstrip(": ")
         raise _script_error(f"stopped with {error_text}", error, file) from error
     return _bodies_of_result(names)
+
+
+def is_missing(error: Exception) -> bool:
+    """True if build123d, or OpenCASCADE below it, is not installed."""
+    name = getattr(error, "name", None) if isinstance(error, ModuleNotFoundError) else None
+    return (name or "").partition(".")[0] in ("build123d", "OCP")
 
 
 def _script_error(message: str, error: BaseException, file: str) -> DrawingError:
@@ -316,7 +324,7 @@ def _bodies_of_result(names: dict[str, Any]) -> list[Body]:
             "and of `if __name__ == ...`",
         )
     try:
-        shapes = _shapes(names[name])
+        shapes = shapes_in(names[name])
     except TypeError as error:
         raise DrawingError(
             f"{name} is of type {error}, no shape",
@@ -328,16 +336,16 @@ def _bodies_of_result(names: dict[str, Any]) -> list[Body]:
     return bodies
 
 
-def _shapes(value: Any) -> list[Any]:
+def shapes_in(value: Any) -> list[Any]:
     """The shapes in a builder, a shape or a list of them; TypeError naming another type."""
     from build123d import BuildLine, BuildPart, BuildSketch, Shape
 
     for builder, inside in ((BuildPart, "part"), (BuildSketch, "sketch"), (BuildLine, "line")):
         if isinstance(value, builder):
             inner = getattr(value, inside)
-            return [] if inner is None else _shapes(inner)
-    if isinstance(value, Shape) and value.wrapped is not None:
-        return [value]
+            return [] if inner is None else shapes_in(inner)
+    if isinstance(value, Shape):
+        return [value] if value else []  # an empty one has no shape of OpenCASCADE
     if isinstance(value, list | tuple):
-        return [shape for item in value for shape in _shapes(item)]
+        return [shape for item in value for shape in shapes_in(item)]
     raise TypeError(type(value).__name__)

@@ -29,9 +29,9 @@ from msgspec import Struct
 
 from camtool.errors import DrawingError
 from camtool.findings import Finding
-from camtool.geometry.drawing import Drawing, Skipped, Units
+from camtool.geometry.drawing import Drawing, Skipped
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.importers.assemble import assemble
+from camtool.importers.assemble import Found, unit_or_mm
 from camtool.importers.findings import (
     FILE_REPAIRED_BODIES,
     FILE_REPAIRED_IN_PART,
@@ -59,20 +59,21 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         "height": height,
         "tolerance": max(options.tolerance_mm / scale, POSITION_EPS_MM),
     }
-    answer = run_worker(data, request, file)
-    units = (
-        Units("mm", 1.0, unit.why)
-        if options.units is None
-        else Units(options.units.lower(), options.mm_per(options.units), "as asked")
+    return found_in(run_worker(data, request, file), unit.why, scale, options).drawing(
+        file, options
     )
-    return assemble(
+
+
+def found_in(answer: dict[str, Any], why: str, scale: float, options: ReadOptions) -> Found:
+    """Return what the worker's answer holds, `scale` mm for each of its mm; `why` says from where
+    its unit is known."""
+    height = None if options.section_z_mm is None else options.section_z_mm / scale
+    return Found(
         _pieces(answer["outlines"], scale),
-        file=file,
-        units=units,
+        unit_or_mm(options, why),
         used=dict(Counter(outline["kind"] for outline in answer["outlines"])),
         skipped=[Skipped("body", count, reason) for reason, count in answer["missed"].items()],
         findings=[*_faults(answer), *_section_finding(answer, scale, height)],
-        options=options,
     )
 
 

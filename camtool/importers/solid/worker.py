@@ -8,11 +8,12 @@ from __future__ import annotations
 import contextlib
 import json
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from camtool.errors import CamtoolError, DrawingError, GeometryError
-from camtool.importers.solid.bodies import Body
+from camtool.importers.solid.bodies import Body, is_missing
 from camtool.importers.solid.outline import Outlines, outlines
 
 _DAMAGED = "cannot be read: its structure is damaged"
@@ -41,15 +42,30 @@ def find_outlines(request: dict[str, Any]) -> dict[str, Any]:
     lengths in the model's mm. `file` is the model's name for messages.
     """
     script = request["kind"] == "script"
+    return outlines_of(
+        lambda: _bodies(request), request["height"], request["tolerance"], script=script
+    )
+
+
+def outlines_of(
+    bodies_of: Callable[[], list[Body]], height: float | None, tolerance: float, *, script: bool
+) -> dict[str, Any]:
+    """Return the outlines of the bodies that a call makes, as plain lists and numbers.
+
+    DrawingError where OpenCASCADE fails on them: those of a `script`, or else of a file."""
     try:
-        bodies = _bodies(request)
-        result = outlines(bodies, request["height"], request["tolerance"])
+        bodies = bodies_of()
+        result = outlines(bodies, height, tolerance)
         faulty = sum(not _is_valid(body) for body in bodies)
     except GeometryError as error:
         raise DrawingError(
             f"holds a curve that is not valid: {error.message}", mend=_AGAIN
         ) from error
     except Exception as error:
+        if is_missing(error):
+            raise DrawingError(
+                "is read by build123d, which is not installed here", mend="pip install build123d"
+            ) from error
         if not _is_of_kernel(error):
             raise
         message = "OpenCASCADE fails on the model" if script else _DAMAGED
