@@ -151,7 +151,7 @@ def nearest_points(points: Floats, wanted_path: Segments) -> Floats:
     from camtool.kernels.fits import nearest_rows
 
     boxes = segment_boxes(wanted_path)
-    bulge = np.ascontiguousarray(wanted_path.bulge)  # of lines alone one number, seen as many
+    bulge = np.array(wanted_path.bulge)  # of lines alone one number, seen as many, or as one
     row = nearest_rows(points, wanted_path.start, wanted_path.end, bulge, boxes)
     begin, end, sweep = wanted_path.start[row], wanted_path.end[row], wanted_path.sweep[row]
     chord = end - begin

@@ -51,6 +51,9 @@ def test_cuts_that_are_the_toolpath_s_own_lines_have_nearest_points() -> None:
     wanted = cut_moves(path, flat_cuts=False).segments
     foot = nearest_points(np.array([[1.0, 0.5], [4.2, 2.0]]), wanted)
     assert foot.tolist() == [[1.0, 0.0], [4.0, 2.0]]
+    alone = ToolpathBuilder().rapid(0, 0, -1).line(4, 0, feed=1).finish()
+    foot = nearest_points(np.array([[1.0, 0.5]]), cut_moves(alone, flat_cuts=False).segments)
+    assert foot.tolist() == [[1.0, 0.0]]
 
 
 def test_the_deviation_grows_by_the_factor_and_points_on_the_path_stay() -> None:
