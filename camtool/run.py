@@ -160,7 +160,6 @@ class Run(Shown):
         """Return a picture over time for a file of this name, .svg or .png: of "speed",
         "position" or "error", from `from_s` on for `span_s` (None: up to the end). OptionError
         without a verification, and for a stretch outside of the program."""
-        from camtool.pictures.options import AS_USUAL
         from camtool.waveforms.plot import TimeSpan, plot_file
 
         if self.verification is None:
@@ -169,8 +168,7 @@ class Run(Shown):
                 mend="see findings, and verify it",
             )
         stretch = TimeSpan(from_s, span_s)
-        look = AS_USUAL if options is None else options
-        return plot_file(kind, self.verification, str(file), self.title, stretch, look)
+        return plot_file(kind, self.verification, str(file), self.title, stretch, options)
 
     def report_page(
         self,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from camtool.arrays import Floats, Ints
+
 
 class MotorModel(Struct, frozen=True):
     """A motor of first order with dry friction: τ dω/dt = gain · (u − friction · sign ω) − ω, and
@@ -36,3 +38,23 @@ class SpeedLoop(Struct, frozen=True):
     kpd: tuple[float, ...]
     gain_unit: float
     is_whole: bool
+    counts_per_turn: int = 1024
+
+
+class ServoTicks(Struct, frozen=True, eq=False):
+    """K passes of the speed loops of a program: when each ends, `at_s` (K,), whose sample it is,
+    `row` (K,) of the toolpath, and which of its orders the controller runs, `line` (K,), −1 for
+    none. Of each axis (K, 3): the loop's `reference` and the mean `speed`, counts in a tick, the
+    `drive`, percent; where the order asks the motor to be, `wanted`, and where it is, `reached`,
+    counts from home. `goal` (K, 3) is the speed of the order, without ramps.
+    """
+
+    at_s: Floats
+    row: Ints
+    line: Ints
+    reference: Floats
+    speed: Floats
+    drive: Floats
+    wanted: Floats
+    reached: Floats
+    goal: Floats

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import msgspec
@@ -27,7 +27,7 @@ from camtool.target.signals import NoSignals, SignalModel
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from camtool.machine.servo import SpeedLoop
+    from camtool.machine.servo import ServoTicks, SpeedLoop
     from camtool.simulation.controller import ControllerModel
     from camtool.target.twin import Twin
     from camtool.target.wire import NoWire, Wire
@@ -123,6 +123,11 @@ class Target(ABC):
 
     def loop_keys(self, loop: SpeedLoop) -> Mapping[str, Any]:
         """Return the keys of `[controller]` that say this loop."""
+        raise NotImplementedError(f"{self.name} has no speed loop")
+
+    def servo_ticks(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Iterator[ServoTicks]:
+        """Yield the passes of its speed loops, in order, as many and at the same times as the
+        samples of its model. Raises as `ControllerModel.run`."""
         raise NotImplementedError(f"{self.name} has no speed loop")
 
     def settings_from(self, text: str) -> Sequence[ControllerSetting] | None:

@@ -70,7 +70,7 @@ def plot_file(
     name: str,
     title: str,
     stretch: TimeSpan = ALL_TIME,
-    options: PictureOptions = AS_USUAL,
+    options: PictureOptions | None = None,
 ) -> bytes:
     """Return the picture for a file `name`, .svg or .png. OptionError for a stretch outside of the
     program, OutputError for another kind of file."""
@@ -79,7 +79,7 @@ def plot_file(
         plot = time_plot(kind, verification, title, stretch, columns_for(sized))
         return lanes_svg(plot, sized)
 
-    return rendered(drawn, name, options)
+    return rendered(drawn, name, options or AS_USUAL)
 
 
 def time_plot(

@@ -35,6 +35,7 @@ PAGES = (
     "docs/pictures.md",
     "docs/gallery.md",
     "docs/validation.md",
+    "docs/calibration.md",
 )
 FIRST = "logo.png"
 DISTANCE_MM = 1.6

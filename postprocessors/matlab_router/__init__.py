@@ -21,8 +21,10 @@ from .dialect import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from camtool.machine.model import Machine
-    from camtool.machine.servo import SpeedLoop
+    from camtool.machine.servo import ServoTicks, SpeedLoop
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -67,6 +69,12 @@ class MatlabRouter(Target):
 
         is_router = isinstance(machine.controller, MatlabRouterController)
         return speed_loop(machine.controller) if is_router else None
+
+    def servo_ticks(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Iterator[ServoTicks]:
+        """Yield the passes of the slaves' interrupts."""
+        from .controller import servo_ticks
+
+        return servo_ticks(toolpath, machine)
 
     def loop_keys(self, loop: SpeedLoop) -> dict[str, Any]:
         """Return the keys of `[controller]` that say this loop."""

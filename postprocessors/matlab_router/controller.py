@@ -27,7 +27,7 @@ from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import MachineError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
-from camtool.machine.servo import MotorModel, SpeedLoop
+from camtool.machine.servo import MotorModel, ServoTicks, SpeedLoop
 from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
@@ -39,11 +39,18 @@ from camtool.toolpath.moves import Kind, Toolpath
 from .dialect import MatlabRouterController, MatlabRouterDialect, dialect_of
 from .steps import (
     COUNT,
+    DRIVE,
+    FIRST_ROW,
+    FOLLOWING,
     HOME_AMOUNT,
+    HOME_SPEED,
+    HOMING,
     PART_COUNT,
     PLACE,
+    REF,
     SECOND_ROW,
     SHOWN,
+    STAGE,
     TABLE_COUNTS,
     TARGET,
     TURN,
@@ -57,6 +64,8 @@ _Machine = Machine[MatlabRouterController, MatlabRouterDialect]
 
 MAX_DISTANCE_UNITS = 32767
 """Distances from home are an int16 of tenths of a millimetre (L4625-4635)."""
+
+TICKS_AT_ONCE = 1 << 12
 
 UNIT_MM = 0.1
 """The unit of the program (L3202-3204)."""
@@ -137,6 +146,7 @@ class _Run:
 
     def __init__(self, path: Toolpath, machine: _Machine, options: Options) -> None:
         self._rows = path.executed_rows
+        self._path = path
         self._lines: MasterOrders = lines_of(path, self._rows, machine)
         self.standing_s = np.cumsum(self._lines.extra_s)
         """(R,) s that rows up to each take besides its ticks."""
@@ -167,6 +177,78 @@ class _Run:
             if filled or last > complete:
                 yield self._chunk((complete, going, last), row, positions[:filled])
             complete = going
+
+    def ticks(self) -> Iterator[ServoTicks]:
+        """The passes of the slaves' interrupts, read from the compiled loop tick by tick."""
+        start, travel, goal = self._ordered_motion()
+        orders, top = self._lines.orders, int(self._program.table[-1])
+        motors, slaves = self._state.motors, self._state.slaves
+        positions, row = np.empty((1, 3), dtype=np.int64), np.empty(1, dtype=np.int64)
+        tick, is_done = 0, False
+        while not is_done:
+            rows: list[int] = []
+            lines: list[int] = []
+            parts: list[tuple[Floats, ...]] = []
+            while len(rows) < TICKS_AT_ONCE and not is_done:
+                # Motors coast after their order; that is part of it, up to the next one.
+                line = int(self._state.clock[1])
+                since = tick + 1.0 - float(self._state.begin[0])
+                if line == len(orders) or since <= 0.0:
+                    line, since = line - 1, math.inf
+                order = max(line, 0)
+                to_go = slaves[:, TARGET] - slaves[:, COUNT]
+                before = motors[:, PLACE].copy()
+                filled, is_done = slaves_fill(
+                    self._program, self._state, self._account, positions, row
+                )
+                if not filled:
+                    break
+                reference = np.where(
+                    slaves[:, STAGE] == HOMING, goal[order], slaves[:, REF].astype(float)
+                )
+                if self._program.text:
+                    fast = np.minimum(
+                        np.abs(slaves[:, REF]), top * np.sqrt(np.abs(to_go) / TABLE_COUNTS)
+                    )
+                    follows = slaves[:, STAGE] == FOLLOWING
+                    reference = np.where(follows, np.copysign(fast, to_go), reference)
+                gone = np.abs(travel[order])
+                if line < 0:
+                    gone = np.zeros(3)
+                elif math.isfinite(since):
+                    gone = np.minimum(np.abs(goal[order]) * since, gone)
+                reached = motors[:, PLACE].copy()
+                parts.append(
+                    (
+                        reference,
+                        reached - before,
+                        motors[:, DRIVE].copy(),
+                        start[order] + np.sign(travel[order]) * gone,
+                        reached,
+                        goal[order],
+                    )
+                )
+                rows.append(int(row[0]))
+                lines.append(line)
+                tick += 1
+            if rows:
+                of_row = np.array(rows)
+                at_s = (tick - len(rows) + 1 + np.arange(len(rows))) * TICK_S
+                columns = np.array(parts).transpose(1, 0, 2)
+                yield ServoTicks(at_s + self.standing_s[of_row], of_row, np.array(lines), *columns)
+
+    def _ordered_motion(self) -> tuple[Floats, Floats, Floats]:
+        """Return (L, 3), (L, 3) where each line begins and its way, counts from home, and (L, 3)
+        its speeds with sign, counts in a tick; one line without motion where there is none."""
+        orders, path = self._lines.orders, self._path
+        if not len(orders):
+            return np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3))
+        first, second = orders[:, FIRST_ROW], orders[:, SECOND_ROW]
+        start = (path.starts_of(first) - self._home) / self._count_mm
+        end = (path.end[second] - self._home) / self._count_mm
+        homes = orders[:, :3] == HOME_AMOUNT
+        speed = np.where(homes, self._program.axes[:, HOME_SPEED], np.abs(orders[:, 3:6]))
+        return start, end - start, np.sign(end - start) * speed
 
     def _chunk(self, span: tuple[int, int, int], row: Ints, count: Ints) -> Chunk:
         """The samples of a chunk; `span`: rows up to the first are accounted for already, those up
@@ -492,7 +574,14 @@ def speed_loop(router: MatlabRouterController) -> SpeedLoop:
         kpd=router.kpd or (TEXT_KPD if is_text else (159.0,) * 3),
         gain_unit=GAIN_UNIT,
         is_whole=not is_text,
+        counts_per_turn=TURN,
     )
+
+
+def servo_ticks(toolpath: Toolpath, machine: _Machine) -> Iterator[ServoTicks]:
+    """Yield the passes of the slaves' interrupts while they run a toolpath."""
+    path = MatlabRouterModel().quantised(toolpath, machine)
+    return _Run(path, machine, Options()).ticks()
 
 
 def loop_keys(loop: SpeedLoop) -> dict[str, Any]:

@@ -3,11 +3,18 @@ from typing import NamedTuple
 from camtool.arrays import Bools, Floats, Indices, Ints
 
 COUNT: int
+DRIVE: int
+FIRST_ROW: int
+FOLLOWING: int
 HOME_AMOUNT: int
+HOME_SPEED: int
+HOMING: int
 PART_COUNT: int
 PLACE: int
+REF: int
 SECOND_ROW: int
 SHOWN: int
+STAGE: int
 TABLE_COUNTS: int
 TARGET: int
 TURN: int
