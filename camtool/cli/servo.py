@@ -29,7 +29,7 @@ from camtool.errors import OptionError
 from camtool.pictures.options import PictureOptions
 from camtool.plain import one_line, to_json
 from camtool.records import replace
-from camtool.tables import toml_lines
+from camtool.tables import read_table, toml_lines
 
 if TYPE_CHECKING:
     from camtool.arrays import Floats
@@ -85,8 +85,7 @@ def identify(
 
     Two drives, or a motor that coasts to rest at the end, determine the friction.
     """
-    from camtool.calibration.servo import identify as identified
-    from camtool.calibration.servo import read_response
+    from camtool.calibration import servo as bench
 
     check_places([*responses, *machine.files()], [output, report])
     if output is not None and output != STDOUT:
@@ -94,10 +93,10 @@ def identify(
     loaded = machine.load()
     loop = _loop(loaded)
     tables = [
-        read_response(read_bytes(name).decode("utf-8", "replace"), name, drive)
+        bench.read_response(read_bytes(name).decode("utf-8", "replace"), name, drive)
         for name in responses
     ]
-    result = identified(tables, loop.tick_s)
+    result = bench.identify(tables, loop.tick_s)
     index = AXES.index(axis)
     motors = [*loop.motors]
     motors[index] = result.motor
@@ -162,8 +161,7 @@ def design(
 ) -> None:
     """Compute Ki, Kp and the digital Kid, Kpd for the motors of the machine, and what the rounding
     of stored gains and the sampling make of settling time, damping and overshoot."""
-    from camtool.calibration.servo import design as designed
-    from camtool.calibration.servo import simulate_step
+    from camtool.calibration import servo as bench
 
     check_places(machine.files(), [output, report])
     if output is not None and output != STDOUT:
@@ -174,8 +172,8 @@ def design(
     designs: dict[str, tuple[LoopDesign, LoopStep]] = {}
     for index, name in enumerate(AXES):
         if axis is None or name == axis.lower():
-            gains = designed(loop.motors[index], loop, settling, damping)
-            step = simulate_step(loop.motors[index], loop, gains.stored, reference)
+            gains = bench.design(loop.motors[index], loop, settling, damping)
+            step = bench.simulate_step(loop.motors[index], loop, gains.stored, reference)
             designs[name] = gains, step
             kid[index], kpd[index] = gains.stored
     changed = replace(loop, kid=tuple(kid), kpd=tuple(kpd))
@@ -452,8 +450,6 @@ def _machine_file(
     flags: MachineFlags, loaded: LoadedTarget, loop: SpeedLoop, origin: str
 ) -> bytes:
     """Return the text of a machine file with this loop over what the user's file says."""
-    from camtool.tables import read_table
-
     table: dict[str, Any] = {"extends": str(flags.name())}
     if flags.machine is not None:
         table = read_table(Path(flags.machine))

@@ -500,13 +500,33 @@ class _Profile(Struct, frozen=True, eq=False):
         own_share = self.plan.moments_s(self.squares, block, way_mm) / whole_s
         begun = _part_of(along[planned], first[planned])
         ended = 1.0 - _part_of((length - along)[planned], last[planned])
-        moment_s[planned] = (
-            self.begin_s[one] * begun + self.own_s[one] * own_share + self.end_s[one] * ended
-        )
+        # A move that overlaps with the next one goes on into the time of that.
+        overlap_s = np.minimum(np.append(corners.overlap[1:], 0.0), self.own_s)
+        own_s = (self.own_s + overlap_s)[one] * own_share
+        moment_s[planned] = self.begin_s[one] * begun + own_s + self.end_s[one] * ended
+        self._put_overlaps(moment_s, move, along, overlap_s)
         starts_s, origin = np.cumsum(self.rows_s) - self.rows_s, self.window_plan.origin
         first_row = np.searchsorted(origin, origin[row])
         before_s = move_s[move] * into / length
         return np.asarray(moment_s - before_s + starts_s[row] - starts_s[first_row])
+
+    def _put_overlaps(
+        self, moment_s: Floats, move: Ints, along: Floats, overlap_s: Floats
+    ) -> None:
+        """Put moments (K,) where moves overlap to the time that the two share, `overlap_s` (M,),
+        which begins with the second one: as `LinuxcncSamples` puts the points."""
+        corners, length = self.window_plan.corners, self.window_plan.moves.length
+        before, behind = np.append(corners.before, 0.0), np.append(corners.after, 0.0)
+        turn = _turn_of(before, behind, np.append(corners.ramp, 1.0))
+        leftover = np.maximum(length[move] - along, 0.0)
+        ends = np.flatnonzero(leftover < before[move + 1])
+        one, corner = move[ends], move[ends] + 1
+        x = turn[corner] * (1.0 - leftover[ends] / before[corner])
+        moment_s[ends] = self.own_s[one] + x * overlap_s[one]
+        begins = np.flatnonzero(along < behind[move])
+        corner = move[begins]
+        x = turn[corner] + (1.0 - turn[corner]) * along[begins] / behind[corner]
+        moment_s[begins] = x * overlap_s[corner - 1]
 
 
 def _part_of(reached: Floats, length: Floats) -> Floats:

@@ -22,6 +22,7 @@ from .dialect import (
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from types import ModuleType
 
     from camtool.machine.model import Machine
     from camtool.machine.servo import ServoTicks, SpeedLoop
@@ -31,6 +32,13 @@ if TYPE_CHECKING:
     from .controller import MatlabRouterModel
     from .twin import MatlabRouterTwin, MatlabRouterTwinSettings
     from .wire import MatlabRouterWire
+
+
+def _controller() -> ModuleType:
+    """Import the model of the controller."""
+    from . import controller
+
+    return controller
 
 
 class MatlabRouter(Target):
@@ -59,28 +67,23 @@ class MatlabRouter(Target):
 
     def model(self) -> MatlabRouterModel:
         """The model of its controller."""
-        from .controller import MatlabRouterModel
-
-        return MatlabRouterModel()
+        model: MatlabRouterModel = _controller().MatlabRouterModel()
+        return model
 
     def speed_loop(self, machine: Machine[Any, Any]) -> SpeedLoop | None:
         """Return the loops of the slaves; None for a machine with the exact path."""
-        from .controller import speed_loop
-
         is_router = isinstance(machine.controller, MatlabRouterController)
-        return speed_loop(machine.controller) if is_router else None
+        return _controller().speed_loop(machine.controller) if is_router else None
 
     def servo_ticks(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Iterator[ServoTicks]:
         """Yield the passes of the slaves' interrupts."""
-        from .controller import servo_ticks
-
-        return servo_ticks(toolpath, machine)
+        ticks: Iterator[ServoTicks] = _controller().servo_ticks(toolpath, machine)
+        return ticks
 
     def loop_keys(self, loop: SpeedLoop) -> dict[str, Any]:
         """Return the keys of `[controller]` that say this loop."""
-        from .controller import loop_keys
-
-        return loop_keys(loop)
+        keys: dict[str, Any] = _controller().loop_keys(loop)
+        return keys
 
     def signals(self) -> NoSignals:
         """None; docs/signals.md."""

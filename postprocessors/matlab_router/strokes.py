@@ -127,13 +127,15 @@ def _refuse_depths(
 
 
 def _refuse_holes(toolpath: Toolpath, number: Ints, below: Bools, cut: Bools, rows: Ints) -> None:
-    """A plunge without a line behind it: the master has no job of no lines."""
+    """Refuse a plunge without a line behind it: the master lowers the tool while it stands, and
+    switches it on with the first line (L6552-6560), so a job of one point drills nothing."""
     hole = below & ~np.isin(number, number[cut])
     refuse(
         toolpath,
         hole,
-        "a plunge without a line behind it: this machine drills no holes",
-        "leave it out, or draw a short line",
+        "a plunge without a line behind it: this machine drills no holes, because its tool stands "
+        "until the first line",
+        "leave it out, or draw a line of 0.2 mm or more, in which the tool turns",
         rows=rows,
     )
 

@@ -229,7 +229,7 @@ REFUSED = {
         .rapid(20, 20)
         .line(z=-1, feed=99)
         .line(30, 20, feed=99),
-        "drills no holes",
+        r"drills no holes, because its tool stands until the first line",
     ),
     "outside": (builder().line(z=-1, feed=99).line(200.2, 10, feed=99), r"X 200\.2 mm from home"),
     "left of home": (builder().line(z=-1, feed=99).line(-0.2, 10, feed=99), r"X -0\.2 mm"),
