@@ -29,6 +29,10 @@ MAX_SAMPLES = 1_000_000
 
 ROWS_AT_ONCE = 1 << 14
 
+MIN_WAIT_S = 1e-3
+"""A row that begins no later behind the last sample follows it without a stop: rows that a
+controller joins to one move share its time by their lengths."""
+
 SPACING_EPS = 1e-6
 """Samples may be farther apart by this part of their spacing, because of rounding."""
 
@@ -92,7 +96,7 @@ def timed_row_chunks(
     blocks: Iterable[SampledRows], mechanics: Mechanics, chunk_steps: int
 ) -> Iterator[TimedChunk]:
     """Yield the chunks of all rows as `row_chunks`, with the times of their samples."""
-    clock_s, reached_s = 0.0, 0.0
+    clock_s, reached_s, last_row = 0.0, 0.0, -1
     for block in blocks:
         rows_s = np.concatenate([np.zeros(block.low - block.base), block.seconds])
         starts_s = clock_s + np.cumsum(rows_s) - rows_s
@@ -104,9 +108,11 @@ def timed_row_chunks(
             if len(chunk.row):
                 at_s = start_s + block.samples.moments_s(number, high, rows_s)
                 at_s = np.maximum.accumulate(np.maximum(at_s, reached_s))
-            begin_s = np.minimum(
-                np.maximum(start_s, np.concatenate([[reached_s], at_s])[:-1]), at_s
-            )
+            begin_s = np.concatenate([[reached_s], at_s])[:-1]
+            waited = np.flatnonzero(np.diff(chunk.row, prepend=last_row))
+            waited = waited[(start_s - begin_s)[waited] > MIN_WAIT_S]
+            begin_s[waited] = np.minimum(start_s[waited], at_s[waited])
+            last_row = int(chunk.row[-1]) if len(chunk.row) else last_row
             yield TimedChunk(chunk, at_s, begin_s, at_s)
             number, reached_s = high, float(at_s[-1]) if len(at_s) else reached_s
         clock_s += float(block.seconds.sum())
