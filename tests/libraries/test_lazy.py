@@ -30,7 +30,7 @@ COMMANDS = [
 
 
 def run(
-    folder: Path, *arguments: str, blocked: bool = False
+    folder: Path, *arguments: str, blocked: bool = False, text: str = BLOCKER
 ) -> subprocess.CompletedProcess[str]:
     """Run `camtool ARGUMENTS`; OUT in them is a file of the folder. The last line of stdout names
     the packages that were loaded. `blocked`: those of SOLIDS cannot be imported."""
@@ -42,7 +42,7 @@ def run(
     place = folder / "blocker"
     place.mkdir(exist_ok=True)
     for name in SOLIDS if blocked else ():
-        (place / f"{name}.py").write_text(BLOCKER)
+        (place / f"{name}.py").write_text(text)
     files = [each.replace("OUT", str(folder / "out")) for each in arguments]
     return subprocess.run(
         [sys.executable, "-c", code, *files],
@@ -89,3 +89,15 @@ def test_a_solid_without_them_is_one_line(
         f"camtool: error: {file}: is read by build123d, which is not installed here; "
         "pip install build123d\n"
     )
+
+
+def test_a_library_of_the_system_that_is_missing_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "a.step"
+    file.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nEND-ISO-10303-21;\n")
+    text = 'raise ImportError("libX11.so.6: cannot open shared object file", name=__name__)'
+    done = run(tmp_path, "check", str(file), blocked=True, text=text)
+    assert done.returncode == 2, done.stderr
+    assert (
+        "which cannot be loaded here (libX11.so.6: cannot open shared object file)" in done.stderr
+    )
+    assert "apt install libx11-6" in done.stderr

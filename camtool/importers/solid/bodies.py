@@ -299,8 +299,8 @@ def run_script(data: bytes, file: str) -> list[Body]:
 
 
 def is_missing(error: Exception) -> bool:
-    """True if build123d, or OpenCASCADE below it, is not installed."""
-    name = getattr(error, "name", None) if isinstance(error, ModuleNotFoundError) else None
+    """True if build123d, or OpenCASCADE below it, is not installed or cannot be loaded."""
+    name = error.name if isinstance(error, ImportError) else None
     return (name or "").partition(".")[0] in ("build123d", "OCP")
 
 

@@ -63,14 +63,24 @@ def outlines_of(
         ) from error
     except Exception as error:
         if is_missing(error):
-            raise DrawingError(
-                "is read by build123d, which is not installed here", mend="pip install build123d"
-            ) from error
+            raise _missing_error(error) from error
         if not _is_of_kernel(error):
             raise
         message = "OpenCASCADE fails on the model" if script else _DAMAGED
         raise DrawingError(message, mend="correct the script" if script else _AGAIN) from error
     return _as_plain_lists(result) | {"faulty": faulty, "bodies": len(bodies)}
+
+
+def _missing_error(error: Exception) -> DrawingError:
+    """Return the error for a library that is not there, or that lacks one of the system's."""
+    if isinstance(error, ModuleNotFoundError):
+        return DrawingError(
+            "is read by build123d, which is not installed here", mend="pip install build123d"
+        )
+    return DrawingError(
+        f"is read by build123d, which cannot be loaded here ({error})",
+        mend="install what it names (Debian: apt install libx11-6 libexpat1)",
+    )
 
 
 def _is_of_kernel(error: Exception) -> bool:
