@@ -38,6 +38,9 @@ if sys.argv[1] == "targets":
     sys.exit()
 place = pathlib.Path(sys.argv[sys.argv.index("--report") + 1])
 place.write_text("# " + place.name)
+at = sys.argv.index("--annotations")
+pathlib.Path(sys.argv[at + 1]).write_text("")
+del sys.argv[at : at + 2]
 with open(os.environ["RECORD"], "a") as stream:
     print(json.dumps(sys.argv[1:]), file=stream)
 sys.exit("fails" in sys.argv[2])
@@ -104,9 +107,14 @@ def run_step(
     script.write_text(chosen["run"])
     command = ["bash", "--noprofile", "--norc", "-eo", "pipefail", str(script)]
     done = subprocess.run(
-        command, cwd=folder, env={**os.environ, **env}, capture_output=True, check=False
+        command,
+        cwd=folder,
+        env={**os.environ, **env},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,  # one log, in the order of its lines
+        check=False,
     )
-    log = (done.stdout + done.stderr).decode()
+    log = done.stdout.decode()
     texts = {file: (there / file).read_text() if (there / file).exists() else ""
              for file in files.values()}  # fmt: skip
     outputs = dict(line.split("=") for line in texts["output"].splitlines())
@@ -372,16 +380,24 @@ def test_a_summary_stays_below_what_github_takes(tmp_path: Path, recorder: str) 
 # what stands in the file
 
 
-def test_camtool_is_installed_from_where_the_action_is() -> None:
+def test_camtool_is_installed_from_where_the_action_is(tmp_path: Path) -> None:
     chosen = step("Install camtool")
     contexts = {"github": {"action_path": "/a place/camtool"}}
     source = evaluated(chosen["env"]["CAMTOOL_SOURCE"], contexts)
     script = f"python() {{ printf '<%s>' \"$@\"; }}; {chosen['run']}"
     command = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script]
-    done = subprocess.run(
-        command, env=os.environ | {"CAMTOOL_SOURCE": source}, capture_output=True, check=True
-    )
-    assert done.stdout == b"<-m><pip><install><--quiet></a place/camtool>"
+    wheels = tmp_path / "the wheels"
+    env = os.environ | {"CAMTOOL_SOURCE": source, "WHEELS": str(wheels)}
+
+    def said() -> str:
+        return subprocess.run(command, env=env, capture_output=True, check=True).stdout.decode()
+
+    install = f"<-m><pip><install><--quiet><--no-index><--find-links><{wheels}><camtool>"
+    wheel = f"<-m><pip><wheel><--quiet><--wheel-dir><{wheels}></a place/camtool>"
+    assert said() == wheel + install
+    wheels.mkdir()
+    (wheels / "camtool-0.1.0-cp312-cp312-linux_x86_64.whl").touch()
+    assert said() == install, "what was kept is not built again"
 
 
 def test_nothing_of_a_pull_request_stands_in_the_script() -> None:
@@ -389,3 +405,60 @@ def test_nothing_of_a_pull_request_stands_in_the_script() -> None:
     assert set(step()["env"]) >= {"MODE", "TARGET", "FILES", "FLAGS", "ALL", "BASE", "OUT"}
     assert ACTION["runs"]["using"] == "composite"
     assert all("shell" in step for step in STEPS if "run" in step)
+
+
+def commands_of(log: str) -> list[str]:
+    """Return the commands that GitHub's runner obeys in a log: lines that begin with `::`, and
+    `##[` anywhere, unless they are stopped (actions/runner, ActionCommandManager)."""
+    obeyed, token = [], None
+    for line in log.splitlines():
+        stripped = line.lstrip()
+        if token is not None:
+            if stripped == f"::{token}::":
+                token = None
+        elif stripped.startswith("::stop-commands::"):
+            token = stripped.removeprefix("::stop-commands::")
+        elif stripped.startswith("::") or "##[" in line:
+            obeyed.append(stripped)
+    return obeyed
+
+
+def test_findings_are_annotations_and_nothing_else_is_a_command(repository: Path) -> None:
+    owned = "::error::owned%0A##[error]owned"
+    hole = f'<g id="a\n{owned}"><circle cx="20" cy="20" r="0.2"/></g></svg>'
+    text = RING.format(radius=10).replace("</svg>", hole)
+    base = committed(repository, {"parts/odd.svg": text,
+                                  f"parts/{owned}.svg": RING.format(radius=0.2)})  # fmt: skip
+    ran = run_step(repository, request(base), target="grbl", flags="--tool-diameter 1mm -v")
+    assert ran.code == 0, ran.log
+    commands = commands_of(ran.log)
+    assert "##[error]owned" in ran.log, "the log has the names as they are"
+    assert any(re.match(r"::warning file=parts/odd\.svg,line=\d,", line) for line in commands), (
+        commands
+    )
+    assert any(line.startswith("::warning file=parts/%3A%3Aerror") for line in commands)
+    assert all(line.startswith("::warning file=parts/") for line in commands), commands
+
+
+def test_the_wheels_are_kept_until_the_sources_change(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    named = run_step(tmp_path / "a", {}, name="wheels")
+    assert named.code == 0, named.log
+    key = named.outputs["key"]
+    version = f"{sys.version_info[0]}.{sys.version_info[1]}-"
+    assert re.fullmatch(re.escape(version) + "[0-9a-f]{64}", key)
+    kept = next(each for each in STEPS if str(each.get("uses", "")).startswith("actions/cache@"))
+    assert kept["with"]["key"].endswith("${{ steps.wheels.outputs.key }}")
+    install = step("Install camtool")["env"]
+    assert install["WHEELS"] == kept["with"]["path"]
+    copy = tmp_path / "source"
+    shutil.copytree(ROOT / "camtool" / "cli", copy / "camtool" / "cli")
+    script, keys = step("wheels")["run"], set()
+    for text in ("a", "b", "a"):
+        (copy / "camtool" / "more.py").write_text(text)
+        output = tmp_path / "output"
+        output.write_text("")
+        env = {**os.environ, "CAMTOOL_SOURCE": str(copy), "GITHUB_OUTPUT": str(output)}
+        subprocess.run(["bash", "-ec", script], env=env, check=True)
+        keys.add(output.read_text())
+    assert len(keys) == 2
