@@ -275,7 +275,6 @@ class BatchRun:
     def _checked(self, outcome: Outcome) -> CheckedFile:
         """Return a drawing with its findings, for pipelines."""
         from camtool.cli.check_formats import CheckedFile, refused_file
-        from camtool.toolpath.findings import INPUT_REFUSED
 
         name, error = outcome.source, outcome.error
         findings = tuple(
@@ -285,9 +284,8 @@ class BatchRun:
         checked = CheckedFile(name, findings)
         if error is not None and not checked.errors:
             return refused_file(CamtoolError(error.removeprefix(f"{name}: ")), name)
-        is_refused = any(each.code == INPUT_REFUSED.code.name for each in checked.errors)
         passed_over = "not run" if outcome.state is OutcomeState.NOT_RUN else ""
-        return replace(checked, is_refused=is_refused, passed_over=passed_over)
+        return replace(checked, passed_over=passed_over)
 
 
 def pool_for(batch: BatchRun, note: Callable[[str], None]) -> Pool:

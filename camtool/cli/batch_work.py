@@ -86,10 +86,7 @@ class PostWork:
         try:
             outputs = self._outputs(task, data)
         except CamtoolError as error:
-            from camtool.cli.check_formats import refused_file
-
-            refused = refused_file(error, task.source)
-            outputs = Outputs(error=str(error), findings=refused.findings)
+            outputs = Outputs(error=str(error))
         return replace(outputs, content=content_digest(data))
 
     def _outputs(self, task: DrawingTask, data: bytes) -> Outputs:

@@ -50,7 +50,7 @@ COMMANDS: Final = {"info": "notice", "warning": "warning", "error": "error"}
 SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 
 _BLOCK: Final = re.compile(r"block (\d{1,9})\b")
-_LINE: Final = re.compile(r"(?:^|, |\bat )line (\d{1,9})\b")
+_LINE: Final = re.compile(r"(?:^|, |: |\bat )line (\d{1,9})\b")
 _ENTITY: Final = re.compile(r"\b[A-Z][A-Z0-9_]* ([0-9A-F]{1,16})(?= |$)")
 """An entity of a DXF file by its kind and its handle: CIRCLE 2C."""
 
@@ -100,7 +100,7 @@ def refused_file(error: CamtoolError, name: str, *, unread: bool = False) -> Che
     mend = f"; {error.mend}" if error.mend else ""
     where = error.where or ""
     finding = INPUT_REFUSED(where=where, message=f"{error.message}{mend}")
-    line = _LINE.search(where)
+    line = _LINE.search(where or error.message)
     refusal = finding_reports([finding])[0].at(error.file or name, line and int(line[1]))
     return CheckedFile(name, (refusal,), is_refused=True, unread=unread)
 

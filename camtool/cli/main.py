@@ -61,6 +61,7 @@ COMMANDS = {
     "filter": "LinuxCNC opens a drawing.",
     "home": "Home a machine.",
     "init": "A machine file of your own.",
+    "inkscape": "Save and check programs from Inkscape.",
     "job": "Job files: begin one, or see what one says.",
     "jog": "Move a machine by so much.",
     "lint": "Faults of programs, without simulating them.",
