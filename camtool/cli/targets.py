@@ -96,6 +96,14 @@ def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool)
     say(f"written: {place}; take the # away from what differs", quiet=quiet)
 
 
+GRADES: dict[str, str] = {
+    "step-true": "each step of its controller is computed",
+    "timed": "its speeds and corners are computed, not its steps",
+    "path only": "its programs are written, read and judged; its controller follows them exactly",
+}
+"""What the model of a controller knows, in the order of the list."""
+
+
 def target_items(incomplete: str) -> Iterator[CompletionItem]:
     """Return the machines, each with its title."""
     from click.shell_completion import CompletionItem
@@ -117,7 +125,9 @@ def _list(as_json: bool) -> None:
     for name, listed in each_target(list_target, broken=broken):
         target = listed.target
         row = {"name": name, "title": target.title, "extension": target.extension}
+        row |= {"grade": listed.grade, "rests_on": target.rests_on}
         rows.append({**row, "needs": list(listed.needs)})
+    rows.sort(key=lambda row: list(GRADES).index(row["grade"]))
     machines = list(_own_machines(broken))
     for error in broken:
         say(f"camtool: warning: {error}", quiet=False)
@@ -128,11 +138,19 @@ def _list(as_json: bool) -> None:
         _table(rows, machines)
         return
     width = max((len(row["name"]) for row in [*rows, *machines]), default=0)
+    grade = ""
     for row in rows:
+        if row["grade"] != grade:
+            grade = row["grade"]
+            show_text(f"# {grade}: {GRADES[grade]}")
         needs = f" (needs --machine FILE: {', '.join(row['needs'])})" if row["needs"] else ""
         show_text(
             one_line(f"{row['name']:<{width}}  {row['extension']:<6}  {row['title']}{needs}")
         )
+        if row["rests_on"]:
+            show_text(one_line(f"{'':<{width}}  {'':<6}  by {row['rests_on']}"))
+    if machines:
+        show_text("# yours")
     for row in machines:
         default = ", the default" if row["default"] else ""
         show_text(
@@ -162,12 +180,13 @@ def _table(rows: list[dict[str, Any]], machines: list[dict[str, Any]]) -> None:
     from rich.text import Text
 
     table = Table(box=None, pad_edge=False)
-    for heading in ("target", "file", "machine", "needs --machine FILE with"):
+    for heading in ("target", "file", "machine", "model", "by", "needs --machine FILE with"):
         table.add_column(heading)
     for row in rows:
         # Titles and keys come from files: they are text, no markup.
         name, cells = Text(row["name"], style="bold"), (row["extension"], one_line(row["title"]))
-        table.add_row(name, *map(Text, (*cells, ", ".join(row["needs"]))))
+        model_cells = (row["grade"], one_line(row["rests_on"]), ", ".join(row["needs"]))
+        table.add_row(name, *map(Text, (*cells, *model_cells)))
     for row in machines:
         name, default = Text(row["name"], style="bold"), ", the default" if row["default"] else ""
         table.add_row(

@@ -39,13 +39,20 @@ if TYPE_CHECKING:
     from camtool.arrays import Bools, Floats
 
 
+Grade = Literal["step-true", "timed", "path only"]
+"""What the model of a controller knows: each step, times and corners, or the path alone."""
+
+
 class TargetNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Names of the machine and of its programs."""
+    """Names of the machine and of its programs. `rests_on`: what its figures rest on, in words;
+    `grade`: of its model on this machine, where that is not the target's own."""
 
     name: str
     title: str
     dialect: str
     extension: str
+    rests_on: str = ""
+    grade: Grade | None = None
 
 
 FEED_TOLERANCE = 1e-9

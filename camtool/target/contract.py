@@ -21,7 +21,7 @@ from msgspec import Struct
 
 from camtool.errors import MachineError
 from camtool.findings import TargetCode
-from camtool.machine.model import Axis, Link, Machine, SlideStart
+from camtool.machine.model import Axis, Grade, Link, Machine, SlideStart
 from camtool.target.signals import NoSignals, SignalModel
 
 if TYPE_CHECKING:
@@ -88,6 +88,8 @@ class Target(ABC):
     """True if a program can switch coolant."""
     any_machine: ClassVar[bool] = False
     """True if the machine file describes no particular machine: travel and rates are examples."""
+    grade: ClassVar[Grade] = "step-true"
+    """What the model of its controllers knows."""
     filter_default: ClassVar[bool] = False
     """True if `camtool filter` uses it by default."""
     no_twin: ClassVar[str] = "its wire is not modelled"
@@ -112,6 +114,11 @@ class Target(ABC):
 
     def check(self, machine: Machine[Any, Any]) -> None:  # noqa: B027 - most need not
         """MachineError for values of a machine that contradict each other."""
+
+    def grade_of(self, machine: Machine[Any, Any]) -> Grade:
+        """Return what the model of this machine's controller knows, which is not the exact
+        path."""
+        return machine.target.grade or self.grade
 
     def model(self) -> ControllerModel[Any, Any]:
         """The model of its controllers; needed only where `controllers` names any."""

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 import msgspec
 
 from camtool.errors import CamtoolError, MachineError, OptionError, PostError, UnknownTargetError
-from camtool.machine.model import Machine, PathController, TargetNames
+from camtool.machine.model import Grade, Machine, PathController, TargetNames
 from camtool.plugins import EntryPoint, entry_points
 from camtool.records import replace
 from camtool.tables import Table, read_table
@@ -203,12 +203,13 @@ class LoadedTarget:
 class ListedTarget:
     """A target in a list. `needs` are the keys that the user's machine file must give before it
     can be loaded, such as "axes.x.coded_step_mm"; () when it is complete. `files_below`: those
-    that its file extends, the lowest first."""
+    that its file extends, the lowest first. `grade`: what its model knows."""
 
     target: TargetNames
     needs: tuple[str, ...]
     file: Path
     files_below: tuple[Path, ...] = ()
+    grade: Grade = "step-true"
 
     @property
     def text(self) -> str:
@@ -296,10 +297,17 @@ def list_target(name: str) -> ListedTarget:
     """The target `name` for a list, complete or not; raises as `load_target` does."""
     target, file = find_target(name)
     table = base_table(name, target, file)
-    needs = missing_keys(table, str(file))
+    needs, names = missing_keys(table, str(file)), names_of(table, str(file))
+    grade = names.grade or target.grade
     if not needs:
-        machine_of(target, *resolved_table(target, table, str(file)))
-    return ListedTarget(names_of(table, str(file)), needs, file, _files_below(name))
+        grade = grade_of(target, machine_of(target, *resolved_table(target, table, str(file))))
+    return ListedTarget(names, needs, file, _files_below(name), grade)
+
+
+def grade_of(target: Target, machine: Machine) -> Grade:
+    """Return what the model of a machine's controller knows."""
+    exact = isinstance(machine.controller, PathController)
+    return "path only" if exact else target.grade_of(machine)
 
 
 def _files_below(name: str) -> tuple[Path, ...]:
@@ -381,7 +389,7 @@ def _entry_point(name: str) -> EntryPoint:
     points = {point.name: point for point in entry_points(GROUP)}
     if name not in points:
         names = [*points, *shipped_files()]
-        near_names = difflib.get_close_matches(name, names, n=3, cutoff=0.4) or sorted(points)
+        near_names = difflib.get_close_matches(name, names, n=3, cutoff=0.5) or sorted(points)
         raise UnknownTargetError(
             f"unknown target {name!r}", mend=f"did you mean {' or '.join(near_names)}?"
         )

@@ -12,10 +12,10 @@ from camtool.target.contract import Target
 
 from .dialect import IsoDialect, IsoMachine
 from .findings import CODES
-from .planners import controller_records
+from .planners import controller_records, planner_of
 
 if TYPE_CHECKING:
-    from camtool.machine.model import Axis
+    from camtool.machine.model import Axis, Grade
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -51,6 +51,11 @@ class Iso(Target):
         from .read import read_program
 
         return read_program(data, machine)
+
+    def grade_of(self, machine: IsoMachine) -> Grade:
+        """Return what the machine's planner knows."""
+        planner = planner_of(machine)
+        return machine.target.grade or ("path only" if planner is None else planner.grade)
 
     def model(self) -> PlannedModel:
         """The model of the machine's planner."""

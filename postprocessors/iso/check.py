@@ -7,6 +7,7 @@ and events are read by the dialect's own reader.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from typing import Final, NoReturn
@@ -55,6 +56,7 @@ class _Check:
         """Run all checks, those of numbers first."""
         feed_decimals(self._machine)
         self._check_numbers()
+        self._check_rapids()
         self._check_arcs()
         self._check_comments()
         self._check_lines()
@@ -107,6 +109,21 @@ class _Check:
                 f"{self._dialect.arcs.difference_mm:g} mm is hardly more than the last decimal is "
                 f"worth, {unit_mm:g} mm: rounding alone makes the radii of an arc differ by that",
                 f"use {2.0 * unit_mm:g}, or more decimals",
+            )
+
+    def _check_rapids(self) -> None:
+        feeds = self._dialect.feeds
+        if feeds.rapids != "programmed":
+            return
+        if feeds.mode != "per-minute":
+            self._fail(
+                "feeds.rapids", "rapids at F need a feed per minute", 'use mode = "per-minute"'
+            )
+        if not math.isfinite(self._machine.rapid_mm_min):
+            self._fail(
+                "feeds.rapids",
+                "nothing says how fast a rapid is",
+                "give limits.rapid_mm_min, or the highest rates of the axes",
             )
 
     def _letters(self) -> str:
@@ -313,7 +330,7 @@ class _Check:
                 )
         for key in ("dwell", "tool_change"):
             templates = getattr(events, key)
-            names_found = _FIELD.findall(" ".join(templates))
+            names_found = set(_FIELD.findall(" ".join(templates)))
             if templates and len(names_found) != 1:
                 self._fail(
                     f"events.{key}",

@@ -115,10 +115,12 @@ class ProgramFormat(Struct, frozen=True, forbid_unknown_fields=True):
 
 class FeedFormat(Struct, frozen=True, forbid_unknown_fields=True):
     """What F means: a feed per minute (G94), per revolution (G95), or the inverse of a move's time
-    in minutes (G93), and the decimals of the last two."""
+    in minutes (G93), and the `decimals` of the last two. `rapids`: whether G0 goes as fast as the
+    machine can ("own"), or at F as G1 does ("programmed"), and gets that of rapids written."""
 
     mode: Literal["per-minute", "per-revolution", "inverse-time"] = "per-minute"
     decimals: Annotated[int, Meta(ge=1, le=6)] = 4
+    rapids: Literal["own", "programmed"] = "own"
 
 
 class ArcFormat(Struct, frozen=True, forbid_unknown_fields=True):

@@ -249,7 +249,7 @@ class _Reader:
             upcoming = items[k : k + len(each.lines)]
             blocks = [item.packed for item in upcoming if isinstance(item, Block)]
             values = each.values(blocks) if len(blocks) == len(each.lines) else None
-            if values is not None:
+            if values is not None and _agree(each, values):
                 self._refuse_never(upcoming)
                 self._add_event(each, values)
                 return len(each.lines)
@@ -776,6 +776,12 @@ class _Execution:
             reader._moves, reader._shift, self._dialect.cycles, returns_high=modes.returns_high
         )
         run_hole(hole, cycle, (x, y), reader.position[2])
+
+
+def _agree(event: EventPattern, texts: list[str]) -> bool:
+    """True if fields of the same name, such as the tool and its length, have the same text."""
+    pairs = {(name, text) for (name, _), text in zip(event.fields, texts, strict=True)}
+    return len(pairs) == len({name for name, _ in pairs})
 
 
 def _is_known(word: _Word, cycles: dict[int, CycleWords]) -> bool:

@@ -307,8 +307,13 @@ def _columns(sent: Sent, path: Toolpath, machine: IsoMachine, form: TextForm) ->
         feed_values = _inverse_times(sent, path, machine, form)
         fed = is_cut
     else:
-        fed = motion & changes_of(feed_values, is_cut | (sent.kind == CYCLE))
-        fed = is_cut if dialect.words.feed == "all" else fed
+        at_feed = is_cut
+        if dialect.feeds.rapids == "programmed":
+            at_feed, scale = motion, 10.0**form.feed_decimals / dialect.unit.mm
+            rapid = math.floor(machine.rapid_mm_min * scale + 1e-6)
+            feed_values = np.where(sent.kind == Kind.RAPID, rapid, feed_values)
+        fed = motion & changes_of(feed_values, at_feed | (sent.kind == CYCLE))
+        fed = at_feed if dialect.words.feed == "all" else fed
     return [
         form.code(sent.kind, turns),
         *(form.length(axis, sent.end[:, k], sent.written[:, k]) for k, axis in enumerate("XYZ")),

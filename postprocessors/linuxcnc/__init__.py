@@ -38,6 +38,7 @@ class Linuxcnc(Target):
     starts_spindle = True
     switches_coolant = True
     any_machine = True
+    grade = "timed"
     settings_listing = "its INI file"
     filter_default = True
     codes = CODES

@@ -16,11 +16,21 @@ def test_all_are_listed_and_what_the_user_must_give_is_said(camtool: Run) -> Non
     done = camtool("targets")
     assert done.returncode == 0
     lines = done.stdout.decode().splitlines()
-    assert [line.split()[0] for line in lines] == target_names()
+    headings = [line for line in lines if line.startswith("# ")]
+    assert [line.partition(":")[0] for line in headings] == [
+        "# step-true",
+        "# timed",
+        "# path only",
+    ]
+    names = [line.split()[0] for line in lines if line[0] not in "# "]
+    assert sorted(names) == target_names()
     assert sum("needs --machine FILE: axes.x.coded_step_mm" in line for line in lines) == 1
-    assert [row["name"] for row in json.loads(camtool("targets", "--json").stdout)["targets"]] == (
-        target_names()
-    )
+    rows = json.loads(camtool("targets", "--json").stdout)["targets"]
+    assert sorted(row["name"] for row in rows) == target_names()
+    grades = {row["name"]: row["grade"] for row in rows}
+    assert (grades["grbl"], grades["linuxcnc"]) == ("step-true", "timed")
+    assert grades["haas"] == "path only"
+    assert all(row["rests_on"] for row in rows if row["name"] in ("haas", "fluidnc"))
 
 
 def values_in(table: dict[str, Any]) -> Iterator[Any]:

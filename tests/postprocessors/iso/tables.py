@@ -112,7 +112,13 @@ def tables(draw: st.DrawFn) -> dict[str, Any]:
             "retract": draw(BOOLS),
             "never": ("G92",),
         },
-        "feeds": {"mode": mode, "decimals": draw(st.integers(4, 6))},
+        "feeds": {
+            "mode": mode,
+            "decimals": draw(st.integers(4, 6)),
+            "rapids": draw(st.sampled_from(["own", "programmed"]))
+            if mode == "per-minute"
+            else "own",
+        },
         "arcs": arcs,
         "events": {
             "spindle_cw": (clockwise,),

@@ -59,6 +59,11 @@ DRILL = "G98 G81 X{x} Y{y} Z{z} R{r} F{f}"
             "use",
             "use = false",
         ),
+        (
+            {"feeds": {"mode": "inverse-time", "rapids": "programmed"}},
+            "rapids",
+            'use mode = "per-minute"',
+        ),
         ({"program": {"head": ("G17 G20 G90 {feeds}",)}}, "head", "the units"),
         ({"program": {"head": ("{units} G91",)}}, "head", "relative coordinates"),
         ({"program": {"head": ("{units} G95",)}}, "head", "the mode of feeds"),

@@ -71,12 +71,16 @@ def check_feed(feed: float, decoded: Toolpath, rows: np.ndarray, loaded: LoadedT
     got = decoded.feed[rows]
     if dialect.feeds.mode == "per-minute":
         unit = dialect.unit
-        allowed = 0.1 * unit.mm / 10.0**unit.more_decimals * (1.0 + 1e-6)
+        allowed: Any = 0.1 * unit.mm / 10.0**unit.more_decimals * (1.0 + 1e-6)
     elif dialect.feeds.mode == "per-revolution":
         allowed = 1200.0 * 25.4 * 10.0**-dialect.feeds.decimals
     else:  # F is the inverse of a time, the length in it that of the rounded move
-        allowed = 100.0 * 25.4 * 10.0**-dialect.feeds.decimals + 0.02 * feed
-    assert (np.abs(got - feed) <= allowed).all()
+        length = np.linalg.norm(decoded.end[rows] - decoded.starts[rows], axis=1)
+        arms = np.linalg.norm(decoded.starts[rows, :2] - decoded.centre[rows], axis=1)
+        length = np.maximum(length, np.nan_to_num(arms))
+        part = 0.02 + 4.0 * dialect.last_decimal_mm / np.maximum(length, 1e-9)
+        allowed = 100.0 * 25.4 * 10.0**-dialect.feeds.decimals + part * feed
+    assert bool((np.abs(got - feed) <= allowed).all())
 
 
 @st.composite
