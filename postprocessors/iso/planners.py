@@ -2,8 +2,8 @@
 
 A planner is a record, which names what its controller may be set to, and a model, which turns the
 decoded toolpath and the machine into chunks of motion (`camtool.simulation.controller`). A new one
-is a file of its own in this folder with its model, a record in `dialect.py` or beside it, and a
-line in `PLANNERS`:
+is a file of its own in this folder with its model, a record in `controllers.py`, and a line in
+`PLANNERS`:
 
     "marlin": Planner(MarlinController, "timed", _marlin)
 
@@ -28,6 +28,8 @@ from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.path import PathModel
 from camtool.toolpath.moves import Toolpath
 
+from .controllers import KlipperController, MarlinController, TrapezoidController
+
 AnyMachine = Machine[Any, Any]
 
 
@@ -39,7 +41,29 @@ class Planner(Struct, frozen=True):
     model: Callable[[], ControllerModel[Any, Any]]
 
 
-PLANNERS: Final[Mapping[str, Planner]] = {}
+def _klipper() -> ControllerModel[Any, Any]:
+    from .klipper import KlipperModel
+
+    return KlipperModel()
+
+
+def _marlin() -> ControllerModel[Any, Any]:
+    from .marlin import MarlinModel
+
+    return MarlinModel()
+
+
+def _trapezoid() -> ControllerModel[Any, Any]:
+    from .trapezoid import TrapezoidModel
+
+    return TrapezoidModel()
+
+
+PLANNERS: Final[Mapping[str, Planner]] = {
+    "klipper": Planner(KlipperController, "timed", _klipper),
+    "marlin": Planner(MarlinController, "timed", _marlin),
+    "trapezoid": Planner(TrapezoidController, "timed", _trapezoid),
+}
 """Planners by the name that `[controller] model` gives, which is the tag of their record."""
 
 

@@ -1,22 +1,30 @@
-"""Recordings of the firmware of grbl and grblHAL and of LinuxCNC's motion against their models.
+"""Recordings of the firmware of grbl, grblHAL and Klipper, and of LinuxCNC's motion, against their
+models.
 
 `referees/README.md` says where they come from. grbl, grblHAL: positions step for step, by their
-digest, and times within 0.2 %; LinuxCNC: paths within 15 µm, times within 0.5 %. The tables go
-into docs/validation.md.
+digest, and times within 0.2 %; Klipper: within a step at any time; LinuxCNC: paths within 15 µm,
+times within 0.5 %. The tables go into docs/validation.md.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from camtool_postprocessors.iso.controllers import KlipperController
+from camtool_postprocessors.iso.klipper import KlipperModel
+from camtool_postprocessors.iso.timed import PlannedMoves
 
 from camtool.arrays import Floats
+from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.simulation.motion import IDEAL, Options
 from camtool.target.registry import load_target
+from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.targets import simulate
 from tests.validation.page import check, mm, signed
@@ -25,6 +33,7 @@ from tests.validation.pieces import UM
 REFEREES = Path(__file__).parent / "referees"
 GRBL = sorted((REFEREES / "grbl").glob("*.json"))
 GRBLHAL = sorted((REFEREES / "grblhal").glob("*.json"))
+KLIPPERS = sorted((REFEREES / "klipper").glob("*.json"))
 LINUXCNC = sorted((REFEREES / "linuxcnc").glob("*.ngc"))
 
 GRBL_TIME_PART = 0.002
@@ -113,6 +122,12 @@ def test_grbl(bless: bool) -> None:
     check("referee-grbl", heads, rows, bless)
 
 
+STEP_MM = 0.004
+MAX_PAIRS = 12
+"""Klipper leaves out a step and the one back if they are within 0.75 ms (SDS_FILTER_TIME)."""
+KLIPPER_IDLE_S = 0.03
+"""Half a step at either end of a program, where it is slow."""
+
 GRBLHAL_BLOCKS = 101
 """$398 of its 100 blocks; one place of a ring stays empty."""
 
@@ -148,6 +163,94 @@ def test_grblhal(bless: bool) -> None:
         rows.append([file.stem, str(len(steps)), mm(wanted_s), mm(seconds), apart])
     heads = ["program", "events, all equal", "grblHAL, s", "model, s", "%"]
     check("referee-grblhal", heads, rows, bless)
+
+
+KLIPPER_AXES = {
+    **{f"axes.{axis}.max_rate_mm_min": 3000.0 for axis in "xyz"},
+    "limits.rapid_mm_min": 3000.0,
+}
+KLIPPER = KlipperController(
+    max_velocity_mm_s=50.0,
+    max_accel_mm_s2=250.0,
+    max_z_velocity_mm_s=25.0,
+    max_z_accel_mm_s2=100.0,
+    arc_resolution_mm=0.1,
+)
+KLIPPER_STEPS = 1.0
+"""Half a step is where a motor waits for the next; its steps are sent within 25 µs, in which 0.3
+steps pass at 50 mm/s."""
+
+
+def klipper_path(program: str) -> tuple[Toolpath, Machine[Any, Any]]:
+    """Read a program for Klipper, whose words are those of grbl but for dwells in ms."""
+    settings = [f"{key}={value}" for key, value in KLIPPER_AXES.items()]
+    target = load_target("grbl", settings=settings)
+    machine = replace(target.machine, controller=KLIPPER)
+    text = re.sub(r"G4 P([0-9.]+)", lambda found: f"G4 P{float(found[1]) / 1000.0:g}", program)
+    return target.target.read(text.encode(), target.machine), machine
+
+
+def place_at(moves: PlannedMoves, waits: Floats, at_s: Floats) -> Floats:
+    """The places (T, 3) mm at times (T,) of planned moves, each of which waits and then moves."""
+    ramps = moves.ramps_s()
+    begin = np.concatenate([[0.0], np.cumsum(waits + ramps.sum(axis=0))])
+    move = np.clip(np.searchsorted(begin, at_s, side="right") - 1, 0, len(waits) - 1)
+    left, travelled = at_s - begin[move] - waits[move], np.zeros(len(at_s))
+    a = moves.acceleration[move] * [[1.0], [0.0], [-1.0]]
+    for ramp, first, slope in zip(
+        ramps[:, move], (moves.entry[move], moves.peak[move], moves.peak[move]), a, strict=True
+    ):
+        spent = np.clip(left, 0.0, ramp)
+        travelled += first * spent + 0.5 * slope * spent**2
+        left = left - ramp
+    share = travelled / np.where(moves.length > 0.0, moves.length, 1.0)[move]
+    starts = moves.path.starts[move]
+    return np.asarray(starts + (moves.path.end[move] - starts) * share[:, None])
+
+
+def first_step_s(moves: PlannedMoves, waits: Floats, axis: int) -> float:
+    """When an axis first passes half a step."""
+    first = int((moves.path.end[:, axis] != 0.0).argmax())
+    low, high = 0.0, float((moves.seconds() + waits)[: first + 1].sum())
+    while high - low > 1e-7:
+        middle = 0.5 * (low + high)
+        place = place_at(moves, waits, np.array([middle]))
+        low, high = (low, middle) if abs(place[0, axis]) > 0.5 * STEP_MM else (middle, high)
+    return high
+
+
+def test_klipper(bless: bool) -> None:
+    """Where the motors stand at the moment of each 1/400 of the steps, and how many there are."""
+    assert len(KLIPPERS) == 10
+    rows = []
+    for file in KLIPPERS:
+        said: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        path, machine = klipper_path(said["program"])
+        model = KlipperModel()
+        moves = model.planned(path, machine)
+        waits = np.where(moves.path.kind == Kind.DWELL, moves.path.value, 0.0)
+        recorded = np.array(said["positions"])
+        axis = int(np.flatnonzero(recorded[0, 1:])[0])
+        begin_s = first_step_s(moves, waits, axis)
+        place = place_at(moves, waits, recorded[:, 0] + begin_s) / STEP_MM
+        apart = np.abs(place - recorded[:, 1:]).max()
+        assert apart < KLIPPER_STEPS, file.name
+        motion = rows_of(model.run(path, machine, Options(effects=IDEAL)))
+        counts = np.sum([row.steps for row in motion], axis=0)
+        pairs = (counts - said["steps"]) / 2
+        assert (pairs == np.rint(pairs)).all(), file.name
+        assert pairs.min() >= 0.0, file.name
+        assert pairs.max() <= MAX_PAIRS, file.name
+        seconds = sum(row.duration_s for row in motion)
+        idle_s = seconds - begin_s - float(recorded[-1, 0])
+        assert 0.0 <= idle_s < KLIPPER_IDLE_S, file.name
+        total = str(sum(said["steps"]))
+        left_out = str(int(pairs.sum()) * 2)
+        times = mm(recorded[-1, 0]), mm(seconds)
+        rows.append([file.stem, total, left_out, *times, mm(apart, 2)])
+    heads = ["program", "steps", "left out by Klipper", "Klipper, first to last step, s"]
+    heads += ["model, all, s", "steps apart"]
+    check("referee-klipper", heads, rows, bless)
 
 
 def test_linuxcnc(bless: bool) -> None:

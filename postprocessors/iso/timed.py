@@ -1,0 +1,165 @@
+"""What the models of timed planners share: chords in place of arcs, samples, and trapezoids.
+
+A timed planner says how fast each of its moves may be, and how it meets the next one. The slides
+follow its moves, rounded to the nearest steps; acceleration changes times, not places.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Bools, Floats, Ints
+from camtool.kernels.lattice import to_steps
+from camtool.machine.model import Machine
+from camtool.simulation.controller import ControllerModel
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import Chunk, Options
+from camtool.simulation.rows import check_rows
+from camtool.simulation.samples import (
+    ROWS_AT_ONCE,
+    CountedSamples,
+    SampledRows,
+    row_chunks,
+    row_seconds,
+    sample_spacing_mm,
+)
+from camtool.toolpath.moves import Kind, Toolpath, read_only
+
+_Machine = Machine[Any, Any]
+
+
+class PlannedMoves(Struct, frozen=True, eq=False):
+    """The moves of a planner, M rows of a toolpath: `row` (M,) of the program that each is a part
+    of; the speeds `entry`, `peak` and `exit` (M,) mm/s, `acceleration` (M,) mm/s² and `length`
+    (M,) mm, which is 0 where nothing moves. `wait_s` (M,): how long it stands before a move; None
+    where it never does."""
+
+    path: Toolpath
+    row: Ints
+    length: Floats
+    acceleration: Floats
+    entry: Floats
+    peak: Floats
+    exit: Floats
+    wait_s: Floats | None = None
+
+    def ramps_s(self) -> Floats:
+        """Return (3, M) s: how long each accelerates, cruises and brakes."""
+        moves = self.length > 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first = (self.peak - self.entry) / self.acceleration
+            last = (self.peak - self.exit) / self.acceleration
+            ramps_mm = 0.5 * (first * (self.peak + self.entry) + last * (self.peak + self.exit))
+            steady = np.maximum(self.length - ramps_mm, 0.0) / self.peak
+        return np.where(moves, [first, steady, last], 0.0)
+
+    def seconds(self) -> Floats:
+        """Return (M,) s that each move takes."""
+        seconds = np.asarray(self.ramps_s().sum(axis=0))
+        return seconds if self.wait_s is None else seconds + self.wait_s
+
+
+class TimedModel(ControllerModel[Any, Any]):
+    """A planner that says times."""
+
+    @abstractmethod
+    def planned(self, path: Toolpath, machine: _Machine) -> PlannedMoves:
+        """Return the moves of a program up to its end, in its order."""
+
+    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
+        """Yield the motion; ProgramError, which names the block, for rows that cannot be
+        followed."""
+        path = self._to_end(toolpath, machine)
+        mechanics = Mechanics(machine, path.start, options.effects)
+        return row_chunks(self._sampled(path, machine), mechanics, options.chunk_steps)
+
+    def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
+        """Return (N,) s that each row takes."""
+        blocks = self._sampled(self._to_end(toolpath, machine), machine)
+        return row_seconds(blocks, len(toolpath))
+
+    def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
+        """Return a coded step, or more where the program would have too many samples."""
+        return sample_spacing_mm(toolpath, machine)
+
+    def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
+        """Return "chords": lines in place of arcs."""
+        return "chords"
+
+    def _to_end(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
+        path = self.quantised(toolpath, machine)
+        check_rows(path, path.executed_rows)
+        return path.first(path.executed_rows)
+
+    def _sampled(self, path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
+        moves = self.planned(path, machine)
+        seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
+        np.add.at(seconds, moves.row, moves.seconds())
+        spacing_mm = sample_spacing_mm(path, machine)
+        for low in range(0, len(path), ROWS_AT_ONCE):
+            high = min(low + ROWS_AT_ONCE, len(path))
+            first, last = np.searchsorted(moves.row, [low, high]).tolist()
+            samples = MoveSamples(
+                moves.path.part(first, last),
+                moves.row[first:last] - low,
+                high - low,
+                machine,
+                spacing_mm,
+            )
+            yield SampledRows(low, high, low, samples, seconds[low:high])
+
+
+class MoveSamples(CountedSamples):
+    """The samples of moves, each a part of one of `rows` rows, at the nearest steps."""
+
+    def __init__(
+        self, path: Toolpath, row: Ints, rows: int, machine: _Machine, spacing_mm: float
+    ) -> None:
+        super().__init__(path, machine, spacing_mm)
+        self._row = row
+        self.first = self.first[np.searchsorted(row, np.arange(rows + 1))]
+
+    def window(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Return row and position of the samples low:high."""
+        move, points = super().window(low, high)
+        for axis, step in enumerate(self._step_mm):
+            points[:, axis] = to_steps(points[:, axis], step) * step
+        return self._row[move], points
+
+
+def with_chords(path: Toolpath, counts: Ints, inner: Floats) -> tuple[Toolpath, Ints]:
+    """Return the toolpath with lines in place of its arcs, and the row (M,) of each move.
+
+    `counts` (N,) moves of each row, at least 1; `inner` (M − N, 3) mm: the ends of all moves but
+    the last one of each row, in order.
+    """
+    row = np.repeat(np.arange(len(path)), counts)
+    end = path.end[row]
+    is_inner = np.ones(len(row), dtype=np.bool_)
+    is_inner[np.cumsum(counts) - 1] = False
+    end[is_inner] = inner
+    kind = np.where(path.is_arc, Kind.LINE, path.kind).astype(path.kind.dtype)[row]
+    centre = np.broadcast_to(read_only(np.full((1, 2), np.nan)), (len(row), 2))
+    lines = path.picked(row, kind=kind, end=read_only(end), centre=centre)
+    return lines, row
+
+
+def directions(path: Toolpath) -> tuple[Floats, Floats]:
+    """Return the lengths (M,) mm of straight moves, 0 of events, and unit vectors (M, 3)."""
+    travel = np.diff(path.end, axis=0, prepend=path.start[None, :])
+    length = np.sqrt((travel**2).sum(axis=1))
+    return length, travel / np.where(length > 0.0, length, 1.0)[:, None]
+
+
+def sections(moving: Ints, stops: Bools) -> Iterator[Ints]:
+    """Yield the indices `moving` (K,) in parts between which the machine stands: `stops` (M,) are
+    the rows at which it does."""
+    passed = np.concatenate([[0], np.cumsum(stops)])[moving]
+    for part in np.split(moving, np.flatnonzero(np.diff(passed)) + 1):
+        if len(part):
+            yield part
