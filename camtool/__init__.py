@@ -44,6 +44,7 @@ __all__ = [
     "Toolpath",
     "Verification",
     "calibrate",
+    "check",
     "compare",
     "convert",
     "cut_stock",

@@ -24,6 +24,7 @@ from camtool.calibration.measurements import Measurements, read_measurements
 from camtool.comparison import Comparison, ProgramVariant, compare_program, variants_of
 from camtool.errors import CamtoolError, OptionError
 from camtool.geometry.drawing import Drawing
+from camtool.geometry.facts import facts_of
 from camtool.geometry.nesting import Nesting, oriented
 from camtool.geometry.polylines import Polylines
 from camtool.importers.options import Reading, ReadOptions, options_of
@@ -82,6 +83,7 @@ __all__ = [
     "Toolpath",
     "Verification",
     "calibrate",
+    "check",
     "compare",
     "convert",
     "cut_stock",
@@ -137,6 +139,20 @@ def read_drawing(
     if isinstance(drawing, Drawing):
         raise OptionError("drawing is read already", mend="pass it on, or read its source anew")
     return ShownDrawing.of(_reader_of(drawing)(options))
+
+
+def check(
+    drawing: Drawable, *, target: str | LoadedTarget | None = None, **reading: Unpack[Reading]
+) -> dict[str, Any]:
+    """The facts about a drawing that `camtool check --json` writes: unit, size, layers, the
+    smallest features, open ends, repairs and findings; mm.
+
+    Options are those of `read_drawing`, and none for a drawing that is read already. Raises as
+    `read_drawing` does. Source: docs/formats.md.
+    """
+    if isinstance(drawing, Drawing) and not reading and target is None:
+        return facts_of(drawing)
+    return facts_of(read_drawing(drawing, target=target, **reading))
 
 
 def read_job(

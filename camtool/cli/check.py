@@ -18,7 +18,7 @@ from camtool.findings import Severity, worst
 from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
-    from camtool.geometry.drawing import Drawing
+    pass
 
 
 @click.command(cls=SectionedCommand, short_help="What is in a drawing.")
@@ -79,7 +79,9 @@ class _Check:
         """Show the facts of one drawing; return them, and True if any of them is an error."""
         check_places([source], [self.report, self.preview])
         read = self.drawing.read(source)
-        facts = _facts(read)
+        from camtool.geometry.facts import facts_of
+
+        facts = facts_of(read)
         files: dict[str, bytes] = {}
         if self.report is not None:
             files[self.report] = to_json(facts).encode()
@@ -96,39 +98,6 @@ class _Check:
             show_facts(_table(facts, verbose=self.verbose), NAME_WIDTH, MARKS)
         say_findings(read.findings, quiet=self.quiet, verbose=self.verbose)
         return 1 if worst(read.findings) >= Severity.ERROR else 0
-
-
-def _facts(drawing: Drawing) -> dict[str, Any]:
-    """Return the facts about a drawing in the order of display; lengths in mm."""
-    from camtool.geometry.facts import drawing_extents, drawing_facts
-
-    (left_x, right), (bottom, top) = drawing_extents(drawing).tolist()
-    return {
-        "file": drawing.file,
-        "units": {
-            "name": drawing.units.name,
-            "mm_per_unit": drawing.units.mm_per_unit,
-            "why": drawing.units.why,
-        },
-        "size_mm": [right - left_x, top - bottom],
-        "extents_mm": {"x": [left_x, right], "y": [bottom, top]},
-        **drawing_facts(drawing),
-        "fit_um": {"max": drawing.fit.max_mm * 1000.0, "rms": drawing.fit.rms_mm * 1000.0},
-        "entities_used": drawing.used,
-        "entities_not_used": [
-            {"kind": item.kind, "count": item.count, "reason": item.reason}
-            for item in drawing.skipped
-        ],
-        "findings": [
-            {
-                "code": finding.code.name,
-                "severity": finding.severity.name.lower(),
-                "message": finding.message,
-                "where": finding.where,
-            }
-            for finding in drawing.findings
-        ],
-    }
 
 
 # The facts as lines for people. Long lists show their first rows; the JSON has all of them.

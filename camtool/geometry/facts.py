@@ -39,6 +39,37 @@ def drawing_extents(drawing: Drawing) -> Floats:
     return np.column_stack([stacked[:, :, 0].min(axis=0), stacked[:, :, 1].max(axis=0)])
 
 
+def facts_of(drawing: Drawing) -> dict[str, Any]:
+    """Return what `camtool check --json` says of a drawing, in its order; lengths in mm."""
+    (left_x, right), (bottom, top) = drawing_extents(drawing).tolist()
+    return {
+        "file": drawing.file,
+        "units": {
+            "name": drawing.units.name,
+            "mm_per_unit": drawing.units.mm_per_unit,
+            "why": drawing.units.why,
+        },
+        "size_mm": [right - left_x, top - bottom],
+        "extents_mm": {"x": [left_x, right], "y": [bottom, top]},
+        **drawing_facts(drawing),
+        "fit_um": {"max": drawing.fit.max_mm * 1000.0, "rms": drawing.fit.rms_mm * 1000.0},
+        "entities_used": drawing.used,
+        "entities_not_used": [
+            {"kind": item.kind, "count": item.count, "reason": item.reason}
+            for item in drawing.skipped
+        ],
+        "findings": [
+            {
+                "code": finding.code.name,
+                "severity": finding.severity.name.lower(),
+                "message": finding.message,
+                "where": finding.where,
+            }
+            for finding in drawing.findings
+        ],
+    }
+
+
 def drawing_facts(drawing: Drawing) -> dict[str, Any]:
     """All that can be counted, ready for JSON; lengths in mm, places as [x, y].
 

@@ -42,6 +42,8 @@ LIBRARIES = {
 }
 """The libraries that camtool itself reads, and the module for each."""
 
+_BUILTIN = "builtins"
+
 MAX_NESTING = 8
 """Lists within lists go no deeper."""
 
@@ -87,14 +89,14 @@ def path_of(value: Any) -> Path:
 
 def library_of(value: object) -> EntryPoint | None:
     """Return the reader of the library that the object is of; None for an object of no library."""
-    points = {point.name: point for point in entry_points(GROUP)}
-    for kind in type(value).__mro__:
-        package = kind.__module__.partition(".")[0]
+    packages = [kind.__module__.partition(".")[0] for kind in type(value).__mro__]
+    for package in packages:
         if package in LIBRARIES:
             return EntryPoint(package, LIBRARIES[package])
-        if package in points:
-            return points[package]
-    return None
+    if packages == [_BUILTIN] * len(packages):
+        return None
+    points = {point.name: point for point in entry_points(GROUP)}
+    return next((points[package] for package in packages if package in points), None)
 
 
 def read_objects(value: object, options: ReadOptions = DEFAULTS) -> Drawing:

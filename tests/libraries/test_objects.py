@@ -1,6 +1,7 @@
 """Objects of ezdxf, shapely, svgpathtools, numpy and build123d are read as drawings."""
 
 import io
+import json
 import math
 import subprocess
 import sys
@@ -202,6 +203,24 @@ def test_everything_that_takes_a_drawing_takes_objects() -> None:
     assert "<svg" in camtool.preview(plate, run).svg
     with pytest.raises(camtool.CamtoolError, match="no layer matches 'CUTS'; did you mean CUT"):
         camtool.post(plate, "grbl", camtool.job_of(layers="CUTS"))
+
+
+def test_check_says_what_the_command_says(tmp_path: Path) -> None:
+    facts = camtool.check("samples/logo.dxf")
+    done = subprocess.run(
+        [sys.executable, "-m", "camtool", "check", "samples/logo.dxf", "--json", "-"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+    )
+    assert facts == json.loads(done.stdout)
+    assert camtool.check(camtool.read_drawing("samples/logo.dxf")) == facts
+    assert camtool.check({"CUT": box(0, 0, 4, 3)}, units="in")["size_mm"] == pytest.approx(
+        [101.6, 76.2]
+    )
+    with pytest.raises(camtool.CamtoolError, match="drawing is read already"):
+        camtool.check(camtool.read_drawing(box(0, 0, 1, 1)), units="in")
 
 
 NAN = float("nan")
