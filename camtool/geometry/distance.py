@@ -39,9 +39,6 @@ NEAREST_SPARE_MM = 1e-9
 NEAREST_SPARE = 1e-9
 """... and by no more than this part of the distance."""
 
-PAIRS_AT_A_TIME = 1 << 18
-"""Pairs of segments that `approach` holds together: it bounds the memory."""
-
 FEW_PAIRS = 256
 """Up to this many distances are computed one by one: building an index would take longer."""
 
@@ -110,36 +107,57 @@ def approach(a: Polyline, b: Polyline) -> NearestApproach:
     else:
         from_vertices = nearest(a.vertices[:, :2], second).distance
     best = _approach(from_vertices, a.vertices[:, :2])
-    step = max(1, PAIRS_AT_A_TIME // len(second))
-    for begin in range(0, len(first), step):
-        distances = _box_distance(boxes[begin : begin + step], other_boxes)
-        i, j = np.nonzero(distances <= best.distance)
-        if len(i):
-            candidate = _approach(*paired_distances(first[i + begin], second[j]))
-            best = min(best, candidate, key=lambda each: each.distance)
+    for i, j in box_pairs(boxes, other_boxes, reach_mm=best.distance):
+        order = np.lexsort((j, i))
+        candidate = _approach(*paired_distances(first[i[order]], second[j[order]]))
+        best = min(best, candidate, key=lambda each: each.distance)
     return best
 
 
 def near_paths(lines: Polylines, targets: Polylines, reach_mm: float) -> Iterator[tuple[int, int]]:
-    """Yield pairs of paths whose boxes come within `reach_mm` of each other."""
-    one, other = (
-        path_extents(each).transpose(0, 2, 1).reshape(-1, 4) for each in (lines, targets)
-    )
-    for rows, columns in box_pairs(one, other, reach_mm=reach_mm):
-        yield from zip(rows.tolist(), columns.tolist(), strict=True)
+    """Yield pairs of paths that may come within `reach_mm` of each other: their boxes do, and
+    where they have many segments, the boxes of some of these."""
+    one, other = _PathBoxes.of(lines), _PathBoxes.of(targets)
+    for rows, columns in box_pairs(one.paths, other.paths, reach_mm=reach_mm):
+        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+            if one.comes_near(row, other, column, reach_mm):
+                yield row, column
+
+
+class _PathBoxes(Struct, frozen=True, eq=False):
+    """Boxes (M, 4) of paths and (K, 4) of their segments, path after path from `first` (M+1,)
+    on."""
+
+    paths: Floats
+    segments: Floats
+    first: Ints
+
+    @classmethod
+    def of(cls, lines: Polylines) -> _PathBoxes:
+        segments = Segments.of(lines)
+        paths = path_extents(lines).transpose(0, 2, 1).reshape(-1, 4)
+        first = np.searchsorted(segments.path, np.arange(len(lines) + 1))
+        return cls(paths, segment_boxes(segments), first)
+
+    def comes_near(self, row: int, others: _PathBoxes, column: int, reach_mm: float) -> bool:
+        """True if a box of a segment comes within the reach of one of another path, or where the
+        two have too few of them to ask."""
+        one = self.segments[self.first[row] : self.first[row + 1]]
+        other = others.segments[others.first[column] : others.first[column + 1]]
+        if len(one) * len(other) <= FEW_PAIRS:
+            return True
+        (low, high), (other_low, other_high) = (
+            (boxes[:2] - reach_mm, boxes[2:] + reach_mm)
+            for boxes in (self.paths[row], others.paths[column])
+        )
+        one = one[((one[:, :2] <= other_high) & (one[:, 2:] >= other_low)).all(axis=1)]
+        other = other[((other[:, :2] <= high) & (other[:, 2:] >= low)).all(axis=1)]
+        return any(len(rows) for rows, _ in box_pairs(one, other, reach_mm=reach_mm))
 
 
 def _approach(distance: Floats, points: Floats) -> NearestApproach:
     row = int(distance.argmin())
     return NearestApproach(float(distance[row]), (float(points[row, 0]), float(points[row, 1])))
-
-
-def _box_distance(boxes: Floats, other_boxes: Floats) -> Floats:
-    """Return the distance (N, M) of boxes (N, 4) and (M, 4)."""
-    low = np.maximum(boxes[:, None, :2], other_boxes[None, :, :2])
-    high = np.minimum(boxes[:, None, 2:], other_boxes[None, :, 2:])
-    gaps = np.maximum(low - high, 0.0)
-    return np.asarray(np.hypot(gaps[..., 0], gaps[..., 1]))
 
 
 class _SegmentRows(Struct, frozen=True, eq=False):

@@ -76,6 +76,7 @@ from camtool.geometry.measure import (
     path_extents,
     path_lengths,
     point_at,
+    segment_lengths,
     signed_areas,
     turn_left,
 )
@@ -121,6 +122,10 @@ that cross again beside the corner, decide which side is the inner one."""
 SHARP_LIMIT = 100.0
 """A sharp corner is cut off at this many times the distance from the source: this concerns corners
 sharper than 1.1°."""
+
+MAX_DEAD_END_MM = 1e-3
+"""What a tool sweeps is not known where the outline ends in nothing for more than this: rounding
+alone leaves a tenth of it."""
 
 JOINS = ("round", "mitre", "sharp")
 
@@ -174,6 +179,43 @@ def offset_each(
     owner = np.concatenate(owners)
     order = np.argsort(owner, kind="stable")
     return Polylines.of(loops_so_far).select(order), owner[order]
+
+
+def swept_outline(lines: Polylines, radius_mm: float) -> Polylines | None:
+    """Return the boundary of all points within a radius of paths, with the region on its left.
+
+    The paths may be open, cross themselves and each other, and repeat each other: each has both of
+    its sides as elements, so that whatever ends one of them is there. None where rounding hides
+    how the boundary goes on (MAX_DEAD_END_MM).
+    """
+    offset = Offset(radius_mm)
+    raw = raw_offset(_both_sides(lines), offset)
+    source = source_arrays(Segments.of(lines), raw.kites)
+    elements = trim_raw(raw, source, offset).elements
+    slices = slice_elements(elements, None)
+    slices = without_doubles(slices[valid_slices(slices, elements, source, offset)], elements)
+    leads_on = leading_on(*slices.ends)
+    dead_ends = slices[~leads_on]
+    lengths = segment_lengths(elements[dead_ends.element]) * (dead_ends.t1 - dead_ends.t0)
+    if lengths.max(initial=0.0) > MAX_DEAD_END_MM or not leads_on.any():
+        return None
+    slices = slices[leads_on]
+    return reverse_lines(paths_of(trace_loops(slices, elements), slices, elements)[0])
+
+
+def _both_sides(lines: Polylines) -> Polylines:
+    """Return closed paths that have both sides of all paths on their left: open ones there and
+    back, closed ones once each way."""
+    backwards = reverse_lines(lines)
+    there_and_back = (
+        Polyline(np.concatenate([path.vertices[:-1], back.vertices[:-1]]), closed=True)
+        for path, back in zip(lines, backwards, strict=True)
+        if not path.closed
+    )
+    closed = np.flatnonzero(lines.closed)
+    return Polylines.joined(
+        [Polylines.of(there_and_back), lines.select(closed), backwards.select(closed)]
+    )
 
 
 def _checked_offset(

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import io
 import re
-import zipfile
 import zlib
 
 from camtool.errors import DrawingError
@@ -186,6 +185,8 @@ def is_excellon(head: str) -> bool:
 
 def _is_board_archive(data: bytes) -> bool:
     """True if a ZIP archive holds a Gerber or Excellon file."""
+    import zipfile
+
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             for entry in archive.infolist()[:MAX_ENTRIES]:

@@ -161,10 +161,9 @@ def cover(
     match = with_neighbours(match)
     if not is_judged:
         return Coverage(match, rounding, ())
-    is_alike = _contours_alike(wanted.cuts, alike_rows, row_from)
-    became = np.where(is_alike, ANY_CONTOUR, became)
+    has_copy = _rows_copied(wanted.cuts, alike_rows, row_from)
     cut = np.append(
-        is_alike | _fits_contour(wanted.cuts, became, decoded.moves, limits, spacing_mm), True
+        _fits_contour(wanted.cuts, became, has_copy, decoded.moves, limits, spacing_mm), True
     )
     missing = list[UncoveredContour]()
     for remaining in samples_by_parts(
@@ -254,16 +253,13 @@ def _judged_together(cuts: CutMoves, own_contour: Ints, alike_rows: Ints) -> Ind
     return np.where(np.append(is_separate, False)[cuts.contour], rows, cuts.contour)
 
 
-def _contours_alike(wanted: CutMoves, alike_rows: Ints, row_from: Indices | None) -> Bools:
-    """Return (C,) true for wanted contours from each of whose rows one was written that lies
-    `alike_rows` it."""
-    is_alike = np.zeros(wanted.contour_count, dtype=np.bool_)
+def _rows_copied(wanted: CutMoves, alike_rows: Ints, row_from: Indices | None) -> Bools:
+    """Return (N,) true for the wanted rows from which one was written that lies `alike_rows`
+    them."""
+    has_copy = np.zeros(len(wanted.contour), dtype=np.bool_)
     if row_from is not None:
-        has_copy = np.zeros(len(wanted.contour), dtype=np.bool_)
         has_copy[row_from[alike_rows]] = True
-        is_alike[:] = True
-        is_alike[wanted.contour[wanted.rows[~has_copy[wanted.rows]]]] = False
-    return is_alike
+    return has_copy
 
 
 def _rows_alike(
@@ -321,13 +317,22 @@ def _radius_differences(toolpath: Toolpath, arcs: Ints | Indices) -> Floats:
 
 
 def _fits_contour(
-    cuts: CutMoves, own_contour: Ints, other_moves: MoveIndex, limits: Limits, spacing_mm: float
+    cuts: CutMoves,
+    own_contour: Ints,
+    has_copy: Bools,
+    other_moves: MoveIndex,
+    limits: Limits,
+    spacing_mm: float,
 ) -> Bools:
-    """Return (C,) true for the contours of one side that lie within the limits of their
-    `own_contour` contour (C,) of the other side, where they have one."""
-    fit = np.asarray(own_contour != ANY_CONTOUR)
+    """Return (C,) true for the contours of one side all of whose rows (N,) have a copy within the
+    limits, and for those that lie within the limits of their `own_contour` contour (C,) of the
+    other side, where they have one: it holds the copies of their rows."""
+    is_whole = np.ones(len(own_contour), dtype=np.bool_)
+    is_whole[cuts.contour[cuts.rows[~has_copy[cuts.rows]]]] = False
+    fit = np.asarray(is_whole | (own_contour != ANY_CONTOUR))
     limit_mm, depth_mm = limits
-    for samples in samples_by_parts(cuts, spacing_mm, np.append(fit, False)[cuts.contour]):
+    is_asked = np.append(fit & ~is_whole, False)[cuts.contour] & ~has_copy
+    for samples in samples_by_parts(cuts, spacing_mm, is_asked):
         contours = cuts.contour[cuts.row[samples.segment]]
         near_mm = max(limit_mm, MIN_LIMIT_MM)
         nearest = other_moves.nearest(

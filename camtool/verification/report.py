@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -1495,7 +1494,14 @@ def page_html(page: ReportPage) -> str:
 
 
 def _escape(text: str) -> str:
-    return escape(shorten(one_line(text)), quote=True)
+    return _attribute(shorten(one_line(text)))
+
+
+def _attribute(text: str) -> str:
+    """Return a text for an attribute, or between tags, of HTML."""
+    from html import escape  # other reports need none of it
+
+    return escape(text, quote=True)
 
 
 def _html_lines(page: ReportPage) -> Iterator[str]:
@@ -1509,7 +1515,7 @@ def _html_lines(page: ReportPage) -> Iterator[str]:
         yield from _html_setup(page, page.report)
         yield from _html_pairs(tuple(summary_lines(page.report)))
     for caption, address in page.pictures:
-        yield f'<figure><img src="{escape(address, quote=True)}" alt="{_escape(caption)}">'
+        yield f'<figure><img src="{_attribute(address)}" alt="{_escape(caption)}">'
         yield f"<figcaption>{_escape(caption)}</figcaption></figure>"
     yield from _html_findings(page)
     if page.report is not None:
@@ -1533,7 +1539,7 @@ def _html_setup(page: ReportPage, report: Report) -> Iterator[str]:
     machine = () if page.setup is None else (("machine", page.setup.machine),)
     yield from _html_pairs((*machine, *mounting_lines(report)))
     if page.stock:
-        yield f'<img src="{escape(page.stock, quote=True)}" alt="the stock and part zero">'
+        yield f'<img src="{_attribute(page.stock)}" alt="the stock and part zero">'
     for sheet in setup_sheets(report.planned):
         yield from _html_table(sheet, with_heads=True)
     grave = gravest_findings(page)

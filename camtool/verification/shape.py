@@ -7,10 +7,11 @@ largest distance of its points from the other shape. The wanted shape is what th
 the wanted path, without what must stay (`ProtectedRegion`): where the plan itself cuts into a
 drawn wall, that is overcut, however well the path is followed, and a finding (`OVERCUT`).
 
-Arcs and the edges of discs are chords here, with the same tolerance for both shapes. Depths are
-therefore wrong by up to twice the tolerance, and smaller depths are taken as 0. All depths of a
-job are seen as one. The predicted path is the thinned trace, which needs enough points for its
-arcs (`points_wanted`).
+What a cylinder covers is found with true arcs (`swept_outline`), and so is what it should cover;
+of V bits discs are put together, whose edges are chords. To be compared, outlines become chords
+too, with the same tolerance for both shapes. Depths are therefore wrong by up to twice the
+tolerance, and smaller depths are taken as 0. All depths of a job are seen as one. The predicted
+path is the thinned trace, which needs enough points for its arcs (`points_wanted`).
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ from msgspec import Struct
 from camtool.arrays import Floats, Ints
 from camtool.findings import Code, Finding, TargetCode
 from camtool.geometry.boxes import BoxIndex, distances_from, moves_of
-from camtool.geometry.measure import chords_of, segment_boxes
-from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.geometry.measure import chords_of, segment_boxes, signed_areas
+from camtool.geometry.offset import swept_outline
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, without_repeats
 from camtool.machine.model import Machine
 from camtool.planning.job import Tool
 from camtool.simulation.mechanics import Mechanics
@@ -192,13 +194,11 @@ def wanted_shape(
     import shapely
 
     if not kept:
-        lines = _chord_lines(cuts.segments, cuts.ends_z, cutter.tolerance_mm)
-        region = _swept_area(lines, cutter)
+        region = _swept_by(cuts.segments, cuts.ends_z, cutter)
         return None if region is None else WantedShape(cutter, region, 0.0, (0.0, 0.0))
     left, taken = [], []
     for each in kept:
-        lines = _chord_lines(*_cutting_moves(each, cutter), cutter.tolerance_mm)
-        region = _swept_area(lines, cutter)
+        region = _swept_by(*_cutting_moves(each, cutter), cutter)
         if region is None:
             continue
         solid = _protected_area(each, region, cutter.tolerance_mm)
@@ -231,7 +231,7 @@ def machined_shape(
     when nothing is cut."""
     cutter, tolerance = wanted.cutter, wanted.cutter.tolerance_mm
     runs = _runs(trace) if cutter.nose is None else _rows_with_heights(trace, motion)
-    made = _swept_area(_simplify_runs(runs, cutter), cutter)
+    made = _swept_by_runs(runs, cutter)
     if made is None:
         return None
     over_mm2, over_mm, _ = _area_outside(made, wanted.region, tolerance)
@@ -275,7 +275,60 @@ class _Lines(Struct, frozen=True, eq=False):
     line: Ints
 
 
-def _swept_area(lines: _Lines, cutter: Cutter) -> Any:
+def _swept_by(segments: Segments, ends_z: Floats, cutter: Cutter) -> Any:
+    """Return the region that the tool covers at the surface along moves, with the heights (K, 2)
+    of their ends; None without moves."""
+    if cutter.nose is None:
+        return _swept_band(_joined(segments), cutter)
+    return _swept_hulls(_chord_lines(segments, ends_z, cutter.tolerance_mm), cutter)
+
+
+def _swept_band(paths: Polylines, cutter: Cutter) -> Any:
+    """Return the region within the tool's radius of paths; None without paths."""
+    import shapely
+
+    if len(paths) == 0:
+        return None
+    outline = swept_outline(paths, 0.5 * cutter.diameter_mm)
+    if outline is not None:
+        region = _inside_of(outline, cutter.tolerance_mm)
+        if shapely.is_valid(region):
+            return region
+    segments = Segments.of(paths)
+    no_depth = np.zeros((len(segments), 2))
+    return _swept_hulls(_chord_lines(segments, no_depth, cutter.tolerance_mm), cutter)
+
+
+def _inside_of(outline: Polylines, tolerance: float) -> Any:
+    """Return the region on the left of closed paths that do not cross."""
+    import shapely
+
+    segments = Segments.of(outline)
+    chords = chords_of(segments, tolerance)
+    is_leaving = np.append(chords.segment[1:] == chords.segment[:-1], False)
+    # Chords may leave nothing of a ring that is smaller than their tolerance.
+    counts = np.bincount(segments.path[chords.segment[is_leaving]], minlength=len(outline))
+    if counts.min(initial=3) < 3:
+        return _inside_of(outline.select(np.flatnonzero(counts > 2)), tolerance)
+    rings = shapely.linearrings(
+        chords.points[is_leaving], indices=np.repeat(np.arange(len(counts)), counts)
+    )
+    is_outer = signed_areas(outline) > 0.0
+    outer, holes = shapely.polygons(rings[is_outer]), rings[~is_outer]
+    places = shapely.points(outline.vertices[outline.offsets[:-1][~is_outer], :2])
+    hole, holder = shapely.STRtree(outer).query(places, predicate="intersects")
+    # A hole belongs to the smallest of all that it lies in.
+    order = np.lexsort((shapely.area(outer)[holder], hole))
+    hole, first = np.unique(hole[order], return_index=True)
+    return shapely.multipolygons(
+        [
+            shapely.polygons(ring, holes[hole[holder[order][first] == k]])
+            for k, ring in enumerate(rings[is_outer])
+        ]
+    )
+
+
+def _swept_hulls(lines: _Lines, cutter: Cutter) -> Any:
     """Return the region that the tool covers at the surface along lines; None without lines.
 
     Between two neighbouring points the radius of a V bit changes evenly: it covers the convex hull
@@ -286,13 +339,6 @@ def _swept_area(lines: _Lines, cutter: Cutter) -> Any:
     starts = np.flatnonzero(lines.line[1:] == lines.line[:-1])
     if len(starts) == 0:
         return None
-    if cutter.nose is None:
-        # Passes over the same contour repeat its lines, of which one is enough. One buffer of all
-        # lines takes ten times as long where many lines lie on each other.
-        every = shapely.linestrings(lines.points, indices=lines.line)
-        different = shapely.from_wkb(np.unique(shapely.to_wkb(every)))
-        radius_mm = 0.5 * cutter.diameter_mm
-        return shapely.union_all(shapely.buffer(different, radius_mm, quad_segs=cutter.quarter))
     radius = np.maximum(cutter.radius_mm(lines.z), POSITION_EPS_MM)
     discs = shapely.buffer(shapely.points(lines.points), radius, quad_segs=cutter.quarter)
     pairs = np.stack([discs[starts], discs[starts + 1]], axis=1)
@@ -368,45 +414,48 @@ def _lengths(points: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
-def _simplify_runs(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> _Lines:
-    """Return runs as lines simplified within the tolerance; for a cutter without a nose divided at
-    their corners.
-
-    GEOS removes corners that are within 1 % of the distance of a buffer from the line between
-    their neighbours, which would widen a cut by up to that; the ends of a line are kept.
-    """
+def _swept_by_runs(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> Any:
+    """Return the region that the tool covers along runs, simplified within the tolerance; None
+    without any."""
     import shapely
 
-    points: list[Floats] = [np.empty((0, 2))]
-    heights: list[Floats] = [np.empty(0)]
-    line: list[Ints] = [np.empty(0, dtype=np.int64)]
-    count = 0
-    for places, z in runs:
-        if len(places) < 2:
-            continue
-        solid = np.column_stack([places, z])
-        flat = shapely.simplify(shapely.linestrings(solid), 0.5 * cutter.tolerance_mm)
-        kept = shapely.get_coordinates(flat, include_z=True)
-        corner = np.zeros(len(kept), dtype=np.int64)
-        if cutter.nose is None:
-            corner[1:-1] = _off_chords(kept[:, :2]) > 2.0 * cutter.tolerance_mm
-        twice = np.repeat(np.arange(len(kept)), 1 + corner)
-        number = count + np.cumsum(np.append(0, np.diff(twice) == 0))
-        points.append(kept[twice, :2])
-        heights.append(kept[twice, 2])
-        line.append(number)
-        count = int(number[-1]) + 1
-    return _Lines(np.concatenate(points), np.concatenate(heights), np.concatenate(line))
+    count = np.array([len(places) for places, _ in runs if len(places) > 1])
+    if not len(count):
+        return None
+    solid = [np.column_stack(run) for run in runs if len(run[0]) > 1]
+    lines = shapely.linestrings(
+        np.concatenate(solid), indices=np.repeat(np.arange(len(count)), count)
+    )
+    flat, line = shapely.get_coordinates(
+        shapely.simplify(lines, 0.5 * cutter.tolerance_mm), include_z=True, return_index=True
+    )
+    if cutter.nose is not None:
+        return _swept_hulls(_Lines(flat[:, :2], flat[:, 2], line), cutter)
+    flat[:, 2] = 0.0  # not the height: the bulge
+    is_open = np.zeros(len(count), dtype=np.bool_)
+    kept, _ = without_repeats(flat, np.bincount(line, minlength=len(count)), is_open)
+    kept &= np.bincount(line[kept], minlength=len(count))[line] > 1
+    offsets = np.append(0, np.cumsum(np.unique(line[kept], return_counts=True)[1]))
+    return _swept_band(Polylines(flat[kept], offsets, is_open[: len(offsets) - 1]), cutter)
 
 
-def _off_chords(points: Floats) -> Floats:
-    """Return (J − 2,) mm: how far each inner point of (J, 2) is from the line between its
-    neighbours, which is a point where they are one."""
-    chord, arm = points[2:] - points[:-2], points[1:-1] - points[:-2]
-    square = (chord**2).sum(axis=1)
-    share = (arm * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0)
-    off = arm - np.clip(share, 0.0, 1.0)[:, None] * chord
-    return np.asarray(np.hypot(*off.T))
+def _joined(segments: Segments) -> Polylines:
+    """Return paths of moves: each goes on while the next move begins where the last one ends, and
+    is closed where it comes back to its start."""
+    begins = np.ones(len(segments), dtype=np.bool_)
+    begins[1:] = (segments.start[1:] != segments.end[:-1]).any(axis=1)
+    first = np.flatnonzero(begins)
+    last = np.append(first[1:], len(segments))[: len(first)] - 1
+    is_closed = (segments.end[last] == segments.start[first]).all(axis=1)
+    ends = last[~is_closed]
+    vertices = np.column_stack([segments.start, segments.bulge])
+    open_ends = np.column_stack([segments.end[ends], np.zeros(len(ends))])
+    counts = np.diff(first, append=len(segments)) + ~is_closed
+    return Polylines(
+        np.insert(vertices, ends + 1, open_ends, axis=0),
+        np.append(0, np.cumsum(counts)),
+        is_closed,
+    )
 
 
 def _cutting_moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:

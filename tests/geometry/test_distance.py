@@ -228,5 +228,5 @@ def test_many_segments_are_handled_in_parts(monkeypatch: pytest.MonkeyPatch) -> 
     ring = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(60)])
     a, b = Polyline(ring, True), moved(Polyline(ring, True), 3.0, 0.0)
     wanted = path_distance(a, b)
-    monkeypatch.setattr("camtool.geometry.distance.PAIRS_AT_A_TIME", 1)
+    monkeypatch.setattr("camtool.geometry.boxes.PAIRS_AT_A_TIME", 1)
     assert path_distance(a, b) == wanted == pytest.approx(1.0)

@@ -7,7 +7,6 @@ import json
 import math
 import re
 import warnings
-import zipfile
 import zlib
 from array import array
 from collections.abc import Iterator
@@ -450,6 +449,8 @@ def parse_npy(data: bytes, file: str) -> PointTable:
 def parse_npz(data: bytes, file: str) -> PointTable:
     """Read each array as a stroke on the layer of its name; DrawingError for an array that is no
     list of points."""
+    import zipfile
+
     strokes: list[Stroke] = []
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
