@@ -119,8 +119,10 @@ def near_paths(lines: Polylines, targets: Polylines, reach_mm: float) -> Iterato
     where they have many segments, the boxes of some of these."""
     one, other = _PathBoxes.of(lines), _PathBoxes.of(targets)
     for rows, columns in box_pairs(one.paths, other.paths, reach_mm=reach_mm):
-        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
-            if one.comes_near(row, other, column, reach_mm):
+        counts = np.diff(one.first)[rows] * np.diff(other.first)[columns]
+        pairs = zip(rows.tolist(), columns.tolist(), (counts > FEW_PAIRS).tolist(), strict=True)
+        for row, column, has_many in pairs:
+            if not has_many or one.comes_near(row, other, column, reach_mm):
                 yield row, column
 
 
@@ -140,12 +142,9 @@ class _PathBoxes(Struct, frozen=True, eq=False):
         return cls(paths, segment_boxes(segments), first)
 
     def comes_near(self, row: int, others: _PathBoxes, column: int, reach_mm: float) -> bool:
-        """True if a box of a segment comes within the reach of one of another path, or where the
-        two have too few of them to ask."""
+        """True if a box of a segment comes within the reach of one of another path."""
         one = self.segments[self.first[row] : self.first[row + 1]]
         other = others.segments[others.first[column] : others.first[column + 1]]
-        if len(one) * len(other) <= FEW_PAIRS:
-            return True
         (low, high), (other_low, other_high) = (
             (boxes[:2] - reach_mm, boxes[2:] + reach_mm)
             for boxes in (self.paths[row], others.paths[column])
