@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import click
 
 from camtool.cli.files import STDOUT, check_places, display_name, read_bytes, write_all
@@ -10,6 +12,7 @@ from camtool.cli.options import MachineFlags, SectionedCommand, machine_options,
 from camtool.errors import OptionError
 from camtool.pipeline import read_program
 from camtool.plain import one_line, to_json
+from camtool.toolpath.explain import ExplainedBlock
 from camtool.toolpath.explain import explain as explained_blocks
 
 MAX_TEXT_CHARS = 40
@@ -49,13 +52,18 @@ def explain(
     decoded = run.decoded
     assert decoded is not None
     listing = None if run.listing is None else run.listing()
-    blocks = list(explained_blocks(decoded, listing, target.target.meanings, first or 1, last))
+    told_blocks: Iterable[ExplainedBlock] = explained_blocks(
+        decoded, listing, target.target.meanings, first or 1, last
+    )
     if report is not None:
-        write_all({report: to_json(blocks).encode()})
+        told_blocks = list(told_blocks)
+        write_all({report: to_json(told_blocks).encode()})
     if report != STDOUT and not quiet:
-        width = min(max((len(each.text) for each in blocks), default=0), MAX_TEXT_CHARS)
-        number_width = len(str(max((each.line or each.block for each in blocks), default=0)))
-        for each in blocks:
+        texts = () if listing is None else listing.blocks
+        width = min(max(map(len, texts), default=0), MAX_TEXT_CHARS)
+        numbers = () if listing is None else listing.lines
+        number_width = len(str(numbers[-1] if numbers else max(len(texts), 1)))
+        for each in told_blocks:
             text = one_line(each.text)
             words = one_line("; ".join(each.words))
             show_text(f"{each.line or each.block:>{number_width}}  {text:<{width}}  {words}")
