@@ -251,7 +251,7 @@ def with_nan() -> LineString:
         (np.zeros((3, 2, 2)), r"drawing: is an array \(3, 2, 2\)"),
         (np.zeros((2, 7)), r"drawing: is an array \(2, 7\); transpose it"),
         (np.array([[1, 2j]]), "drawing: holds numbers of type complex128, no coordinates"),
-        (np.array([[None, 2]]), "drawing: holds objects, no coordinates"),
+        (np.array([[None, 2]]), "drawing: holds objects, no coordinates; give an array"),
         (np.array([[0, 0, 0], [1, 1, 5.0]]), "drawing: row 1: the third column is above 1"),
         (np.ma.masked_equal(np.array(SQUARE), 4), "drawing: has masked numbers; fill them"),
         (np.float64(3), r"drawing is a number of numpy \(float64\); give an array of points"),

@@ -438,7 +438,7 @@ MAX_UNPACKED_BYTES = 1 << 28
 
 MAX_MEMBERS = 100_000
 
-_SAVE = "save it with numpy.save as an array (n, 2) of x, y or (n, 3) of x, y, bulge"
+_SAVE = "give an array of numbers (n, 2) of x, y or (n, 3) of x, y, bulge"
 
 
 def parse_npy(data: bytes, file: str) -> PointTable:
