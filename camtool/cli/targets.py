@@ -11,17 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.files import STDOUT, check_new, check_places, read_bytes, write_all
 from camtool.cli.messages import in_colour, say, show_text
 from camtool.cli.options import MachineFlags, talk_options
-from camtool.errors import CamtoolError
+from camtool.errors import CamtoolError, OptionError
 from camtool.plain import one_line, to_json
 from camtool.project import project_of
+from camtool.tables import parse_table
+from camtool.target.contract import ControllerSetting
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
     from camtool.machine.model import Machine, PlayCells
+    from camtool.target.contract import SampledDialect
+    from camtool.target.registry import LoadedTarget
 
 
 class _Targets(click.Group):
@@ -53,6 +57,7 @@ def targets(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -
     camtool targets                             all machines, yours too
     camtool targets grbl                        everything about one
     camtool targets new my-mill --extends grbl  my-mill.toml, to fill in
+    camtool targets new my-mill --from-program part.nc
     """
     if context.invoked_subcommand is None:
         _list(as_json)
@@ -78,22 +83,122 @@ def show(
 
 @targets.command(short_help="Begin a machine file.")
 @click.argument("name")
-@click.option("--extends", metavar="TARGET", required=True, help="The machine that it is like.")
+@click.option("--extends", metavar="TARGET", help="The machine that it is like.")
+@click.option(
+    "--from-program", metavar="FILE", help="A program of its controller, which shows its dialect."
+)
+@click.option(
+    "--ask/--no-ask", default=None, help="Ask what is not known.  [default: at a terminal]"
+)
+@click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="Say one value.")
 @click.option("-o", "--output", metavar="FILE", help="The file; - is stdout.  [NAME.toml]")
 @talk_options
-def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool) -> None:
-    """Write a machine file for NAME that extends TARGET, with every value as a comment."""
-    from camtool.target.registry import list_target
+def new(
+    name: str,
+    extends: str | None,
+    from_program: str | None,
+    ask: bool | None,
+    values: tuple[str, ...],
+    output: str | None,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Write a machine file for NAME that extends TARGET, with every value as a comment.
+
+    With --from-program, what a program of the controller shows of its dialect of G-code stands in
+    it, and what it leaves open is asked; --extends alone asks for the dialect where TARGET is one
+    whose dialect a file describes.
+    """
+    from camtool.target.registry import find_target, list_target
     from camtool.target.template import machine_template
 
+    data = b"" if from_program is None else read_bytes(from_program)
+    if extends is None:
+        if from_program is None:
+            raise click.UsageError("--extends or --from-program is missing: what is it like?")
+        extends = _described_by_files()
     base = list_target(extends)
-    text = machine_template(name, extends, base.text, base.needs)
+    asks = (sys.stdin.isatty() and output != STDOUT) if ask is None else ask
+    wants_dialect = from_program is not None or ask is True
+    dialect = find_target(extends)[0].dialect_from(data) if wants_dialect or asks else None
+    if dialect is None and wants_dialect:
+        raise OptionError(
+            f"the dialect of {extends} is not described by a file",
+            where="--from-program" if from_program else "--ask",
+            mend=f"use --extends {_described_by_files()}, or leave it out",
+        )
+    said_keys = [setting_of(text) for text in values]
+    settings = [] if dialect is None else _dialect_settings(dialect, asks=asks)
+    keys = {each.key for each in said_keys}
+    settings = [*(each for each in settings if each.key not in keys), *said_keys]
+    text = machine_template(name, extends, base.text, base.needs, settings)
     output = output or f"{name}.toml"
-    check_places([str(base.file)], [output])
+    check_places([str(base.file), *([from_program] if from_program else [])], [output])
     check_new(output)
+    remark = "take the # away from what differs"
+    if from_program is not None:
+        remark = _read_back(text, f"{name}.toml", extends, data, from_program)
+    elif settings:
+        loaded_machine(text, f"{name}.toml", extends)
     write_all({output: text.encode()})
     place = "stdout" if output == STDOUT else output
-    say(f"written: {place}; take the # away from what differs", quiet=quiet)
+    say(f"written: {place}; {remark}", quiet=quiet)
+
+
+def _described_by_files() -> str:
+    """Return the target whose dialect machine files describe."""
+    from camtool.target.registry import each_target, find_target, own_names
+
+    found_targets = each_target(find_target, names=own_names())
+    return next(name for name, (each, _) in found_targets if each.dialect_from(b"") is not None)
+
+
+def _dialect_settings(dialect: SampledDialect, *, asks: bool) -> list[ControllerSetting]:
+    """Return what a program shows, and the answers to what it leaves open; what nobody answers
+    becomes a comment."""
+    settings = list(dialect.settings)
+    for each in dialect.questions:
+        answer: Any = each.default
+        if asks:
+            kind = click.Choice(each.choices) if each.choices else type(each.default)
+            answer = click.prompt(each.question, default=each.default, type=kind, err=True)
+        value = [answer] if each.is_list else answer
+        doubt = "" if asks else f"{each.question}?"
+        settings.append(ControllerSetting(each.key, value, "asked" if asks else "ours", "", doubt))
+    return settings
+
+
+def setting_of(text: str) -> ControllerSetting:
+    """Return the value of a `KEY=VALUE` flag, whose value is TOML or a word."""
+    key, equals, value = text.partition("=")
+    if not equals or "." not in key:
+        raise OptionError(
+            f"{text!r} is no setting", where="--set", mend="such as --set dialect.words.decimals=4"
+        )
+    try:
+        parsed = parse_table(f"v = {value.strip()}")["v"]
+    except ValueError:
+        parsed = value.strip()
+    return ControllerSetting(key.strip(), parsed, "--set")
+
+
+def loaded_machine(text: str, file: str, extends: str) -> LoadedTarget:
+    """Return the target of the text of a machine file; MachineError where it contradicts
+    itself."""
+    from camtool.target.registry import loaded_target
+
+    return loaded_target(extends, (parse_table(text), file))
+
+
+def _read_back(text: str, file: str, extends: str, data: bytes, program: str) -> str:
+    """Return what the reader of the new machine makes of the program that it was made from."""
+    try:
+        loaded = loaded_machine(text, file, extends)
+        path = loaded.target.read(data, loaded.machine)
+    except CamtoolError as error:
+        return f"{program} is not read yet: {error}"
+    moves, arcs = int(path.is_motion.sum()), int(path.is_arc.sum())
+    return f"{program} is read with it: {moves} moves, {arcs} of them arcs"
 
 
 GRADES: dict[str, str] = {

@@ -53,10 +53,28 @@ class ControllerSetting(Struct, frozen=True):
     value of this machine; it becomes a comment of the file then."""
 
     key: str
-    value: float | int | str
+    value: float | int | str | Sequence[str]
     said: str
     where: str = ""
     doubt: str = ""
+
+
+class OpenKey(Struct, frozen=True):
+    """A key of a machine file that a sample program leaves open: the question, our answer, and
+    what else it may be, () for anything. `is_list`: the file has a list of such values."""
+
+    key: str
+    question: str
+    default: float | int | str
+    choices: tuple[str, ...] = ()
+    is_list: bool = False
+
+
+class SampledDialect(Struct, frozen=True):
+    """What a sample program says of its dialect, and what it leaves open."""
+
+    settings: tuple[ControllerSetting, ...]
+    questions: tuple[OpenKey, ...]
 
 
 class Target(ABC):
@@ -140,6 +158,11 @@ class Target(ABC):
     def settings_from(self, text: str) -> Sequence[ControllerSetting] | None:
         """The values of a machine file that the controller's own settings say; None for a text
         that is none of these settings. MachineError for what is missing or cannot be used."""
+        return None
+
+    def dialect_from(self, data: bytes) -> SampledDialect | None:
+        """Return what a program of a controller shows of its dialect, b"" for nothing; None for a
+        target whose dialect no machine file describes."""
         return None
 
     def compare_settings(

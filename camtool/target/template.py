@@ -164,7 +164,7 @@ def _line(setting: ControllerSetting, key: str) -> str:
     text = f"{key} = {json.dumps(setting.value)}"
     if setting.doubt:
         return f"{f'# {text}':<28}# {setting.said}: {setting.doubt}"
-    return f"{text:<28}# {setting.said}"
+    return f"{text:<27} # {setting.said}"
 
 
 def _own_keys(table: str, keys: Iterable[str]) -> list[str]:

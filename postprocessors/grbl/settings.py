@@ -191,7 +191,7 @@ def _difference(
     setting: ControllerSetting, expected: float | None, inverse: bool = False
 ) -> list[str]:
     """A sentence where a setting is not what the machine file says, if it says anything."""
-    value = float(setting.value)
+    value = float(setting.value)  # type: ignore[arg-type]
     shown = 1.0 / value if inverse else value
     if expected is None or abs(shown - expected) <= LISTED_TOLERANCE:
         return []

@@ -16,6 +16,7 @@ from .planners import controller_records, planner_of
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis, Grade
+    from camtool.target.contract import SampledDialect
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -72,6 +73,12 @@ class Iso(Target):
     def unit_mm(self, machine: IsoMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return machine.dialect.last_decimal_mm
+
+    def dialect_from(self, data: bytes) -> SampledDialect:
+        """Return what a sample program shows of its dialect."""
+        from .sample import sampled_dialect
+
+        return sampled_dialect(data)
 
     def made_elsewhere(self, data: bytes) -> bool:
         """True if the program does not begin with camtool's own heading."""

@@ -130,3 +130,49 @@ def test_play_by_region_is_shown_as_it_lies_on_the_table(camtool: Run) -> None:
     assert "backlash of Y by region of the table, µm\n" in used
     assert "not used" not in used
     assert "play of" not in camtool("targets", "grbl").stderr.decode()
+
+
+SAMPLE = b"""%
+O0042 (BRACKET)
+N0010 G17 G20 G90 G94 G54
+N0020 T3 M06
+N0030 G43 H3
+N0040 S1200 M03
+N0050 G00 X.5 Y0. Z.1
+N0060 G04 P500
+N0070 G01 Z-.25 F4.5
+N0080 G02 X1.5 Y0. I1. J0.
+N0090 G03 X.5 Y0. I1. J0.
+N0100 G00 Z.1
+N0110 M05
+N0120 G91 G28 Z0.
+N0130 G90
+N0140 M30
+%
+"""
+
+
+def test_the_command_writes_it_and_reads_the_program_back(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_bytes(SAMPLE)
+    done = camtool("targets", "new", "mine", "--from-program", "part.nc")
+    assert done.returncode == 0, done.stderr
+    assert b"part.nc is read with it: 5 moves, 2 of them arcs" in done.stderr
+    text = (tmp_path / "mine.toml").read_text()
+    assert 'extends = "iso"' in text
+    assert "# whole_letters =" in text
+    again = camtool("targets", "new", "mine", "--from-program", "part.nc")
+    assert again.returncode == 2
+    assert (tmp_path / "mine.toml").read_text() == text
+
+
+def test_flags_say_what_the_program_does_not(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_bytes(SAMPLE)
+    flags = ["--set", "dialect.arcs.difference_mm=0.6", "--set", "dialect.lines.max_chars=80"]
+    done = camtool("targets", "new", "mine", "--from-program", "part.nc", *flags)
+    assert done.returncode == 0, done.stderr
+    table = tomllib.loads((tmp_path / "mine.toml").read_text())["dialect"]
+    assert table["arcs"]["difference_mm"] == 0.6
+    assert table["lines"]["max_chars"] == 80
+    for wrong in (["--extends", "grbl", "--from-program", "part.nc"], [], ["--set", "x"]):
+        assert camtool("targets", "new", "other", *wrong).returncode == 2
+    assert not (tmp_path / "other.toml").exists()
