@@ -299,6 +299,9 @@ def _post_plan(
     decoded = _with_operations(decoded, written, program)
     repeated = _repeated_findings(program, decoded)
     findings = _merge_findings(findings, program.findings, decoded.findings, left_out=repeated)
+    turns_work = target.machine.spindle.turns == "work"
+    if judged_plan is None and turns_work:
+        return replace(run, program=program, decoded=decoded, findings=findings)
     if judged_plan is None:
         stock_findings = _stock_findings(Case(decoded, target), None, job, before=posting.before)
         findings = _merge_findings(findings, stock_findings)
@@ -317,7 +320,7 @@ def _post_plan(
         tool_diameter_mm=tool,
         nose=nose,
         kept=kept_of(full_plan.steps) if (tool or nose) and not posting.brief else (),
-        shape=not posting.brief,
+        shape=not posting.brief and not turns_work,
         trace_points=TRACE_POINTS if posting.trace_points is None else posting.trace_points,
     )
     case = Case(
@@ -346,16 +349,24 @@ def _post_plan(
         pins_mm=pins_of(job),
         flip_error_mm=None if job.setup_of is None else job.setup_of[1].flip_error_mm,
     )
+    steps = judged_plan.steps
     request = stock_request(
-        judged_plan.steps, job, _beside_mm(case), before=posting.before, is_whole=posting.is_whole
+        steps, job, _beside_mm(case), before=posting.before, is_whole=posting.is_whole
     )
     del judged_plan, full_plan  # the paths of the stages are not needed any more
     verification = _judge_program(case, program.data, progress)
-    findings = _merge_findings(
-        findings,
-        _stock_findings(case, request, job, findings, before=posting.before),
-        _stock_gates(case, request, job, posting.gates),
-    )
+    if turns_work:
+        from camtool.verification.section import section_findings
+
+        sections = tuple(section_findings(decoded, target, steps, case.simulation))
+        findings = _merge_findings(findings, sections)
+    else:
+        findings = _merge_findings(
+            findings,
+            _stock_findings(case, request, job, findings, before=posting.before),
+            _stock_gates(case, request, job, posting.gates),
+        )
+    del steps
     figures = _with_times(figures, written, case, verification)
     gate_findings = _gate_findings(verification, posting.gates, findings)
     findings = _merge_findings(findings, verification.findings, gate_findings, left_out=repeated)

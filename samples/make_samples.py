@@ -1,5 +1,5 @@
 """Writes the sample drawings of camtool: logo.dxf, logo.svg, star.csv, coupon.dxf, plate.dxf,
-mount.dxf, mount.svg, sign.svg, tray.svg and board.dxf.
+mount.dxf, mount.svg, sign.svg, tray.svg, board.dxf and screw.dxf.
 
     python samples/make_samples.py [FOLDER]
 
@@ -267,6 +267,13 @@ def board() -> Sheet:
     return Sheet("circuit board", (40.0, 30.0), layers, {})
 
 
+def screw() -> Sheet:
+    """The half section of a screw of 0.8 mm with a head of 1.2 mm: its axis is Y 0."""
+    outline = [(0.0, 0.0), (0.0, 0.32), (-0.08, 0.4), (-2.22, 0.4), (-2.22, 0.6), (-2.6, 0.6)]
+    section = Polyline([(x, y, 0.0) for x, y in outline], closed=False)
+    return Sheet("screw", (0.0, 0.6), [Layer("SECTION", 7, "#000000", [section])], {})
+
+
 def star() -> str:
     """The star as CSV."""
     rows = [
@@ -292,6 +299,7 @@ def main(folder: Path) -> None:
         "sign.svg": svg(sign()),
         "tray.svg": svg(tray()),
         "board.dxf": dxf(board()),
+        "screw.dxf": dxf(screw()),
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="ascii", newline="\n")

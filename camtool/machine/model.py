@@ -142,8 +142,13 @@ class Spindle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The spindle, and who switches it: the program, a hand, or nobody, where there is none.
 
     `default_rpm` is the speed of a job that says none; None: it is asked for. The range is that of
-    the drive, None where it is not known. `spin_up_s` is waited until it is at speed."""
+    the drive, None where it is not known. `spin_up_s` is waited until it is at speed.
 
+    `turns`: it turns the tool, or the work, as that of a lathe does. Then camtool's X runs along
+    its axis and its Y is the radius; `encoder`: feeds can follow its turns, as threads need."""
+
+    turns: Literal["tool", "work"] = "tool"
+    encoder: bool = False
     switched: Literal["program", "hand", "none"] = "program"
     default_rpm: Speed | None = None
     min_rpm: Annotated[float, Meta(ge=0.0, le=1e7)] = 0.0

@@ -358,7 +358,7 @@ def _change_not_stated(toolpath: Toolpath, machine: Machine) -> Iterator[Finding
     """The first change of tools on a machine that does not state where they are changed."""
     changes = changes_between_cuts(toolpath)
     keys = [key for key in ("change_mm", "change_z_mm") if getattr(machine.defaults, key) is None]
-    if not keys or not len(changes):
+    if not keys or not len(changes) or machine.spindle.turns == "work":
         return
     row = int(changes[0])
     x, y, z = toolpath.end[row].tolist()
@@ -449,6 +449,8 @@ def doubtful_settings(
     for step in cutting:
         if asks_speed and step.setting.spindle_rpm is None and step.operation.spindle_rpm is None:
             doubts[CUT_DOUBTFUL_SPEED.words()].append(step)
+        if step.operation.contract.turns_work:
+            continue
         reasons = (
             *_doubtful(step, starts_spindle),
             *_beyond_tool(step, stock),

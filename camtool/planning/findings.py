@@ -117,6 +117,25 @@ class PlanningCode(Code):
         "would meet again, in the waste of the stock",
         "the pins in `[[setups]]`, and an operation of the kind `pins` in the first set-up",
     )
+    NOSE_LEAVES = (
+        237,
+        INFO,
+        "the nose of a turning insert leaves material in a corner of the section, with its place",
+        "none, or an insert with a smaller nose",
+    )
+    OVERHANG_NOT_JUDGED = (
+        238,
+        INFO,
+        "the length of a turned part that stands out of the chuck, and over its thinnest "
+        "diameter: how far it bends is not modelled",
+        "light cuts, or a centre, beyond three diameters",
+    )
+    THREAD_FORM = (
+        239,
+        INFO,
+        "the form of a thread: pitch, diameters, angle and passes",
+        "none",
+    )
     HOLE_SIZE = (
         217,
         WARNING,
@@ -746,4 +765,20 @@ FIT_COARSE = Sentence(
     "the drawing was read for a part {read:.4g} times its size and is scaled {scale:.4g} times: "
     "its curves lie up to {off_um:.4g} µm off; read it with scale={scale:.6g}",
     "mm",
+)
+NOSE_LEAVES = Sentence(
+    PlanningCode.NOSE_LEAVES,
+    "the nose, of radius {nose:g} mm, leaves up to {measured:.4g} mm in a corner",
+    "mm",
+)
+OVERHANG_NOT_JUDGED = Sentence(
+    PlanningCode.OVERHANG_NOT_JUDGED,
+    "{measured:.4g} mm stand out, {share:.3g} times the thinnest diameter: how far they bend is "
+    "not modelled",
+    "mm",
+)
+THREAD_FORM = Sentence(
+    PlanningCode.THREAD_FORM,
+    "pitch {pitch:g} mm, major diameter {major:g} mm, minor {minor:.4g} mm, flanks at "
+    "{flank:g}° to each other, in {measured:# pass|# passes}",
 )

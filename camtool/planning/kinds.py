@@ -80,8 +80,10 @@ class OperationKind:
     `path_error_mm`: its centre paths may be off the drawing's by this much.
 
     The tool: `descent` is how it goes down: in "passes" of one depth each, in one "helix", in
-    "pecks", or along "slopes". `needs_v_bit`: it cuts with a V bit alone. `frees_nets`: what it
-    takes are nets of copper, which are to be whole afterwards, and apart.
+    "pecks", or along "slopes". `needs_v_bit`: it cuts with a V bit alone. `turns_work`: it cuts
+    on a lathe, in the half section of the work, X along the axis and Y the radius, without any
+    height; `follows_spindle`: with feeds that follow the turns of the spindle. `frees_nets`:
+    what it takes are nets of copper, which are to be whole afterwards, and apart.
 
     Words: `cut_name` is what is cut of the stock ("" for parts and holes), `reason` why its
     contours lie on no side, as `camtool job` says it.
@@ -102,6 +104,8 @@ class OperationKind:
     path_error_mm: float = 0.0
     descent: str = "passes"
     needs_v_bit: bool = False
+    turns_work: bool = False
+    follows_spindle: bool = False
     frees_nets: bool = False
     cut_name: str = ""
     reason: str = ""

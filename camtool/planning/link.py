@@ -58,7 +58,10 @@ def link(
     feed_z_mm = machine.defaults.feed_z_mm
     heights = (safe_z_mm, None if feed_z_mm is None or feed_z_mm >= safe_z_mm else feed_z_mm)
     spindle = machine.spindle
-    builder = ToolpathBuilder().rapid(z=float(_rounded(np.array(safe_z_mm))))
+    turns_work = machine.spindle.turns == "work"
+    builder = ToolpathBuilder()
+    if not turns_work:
+        builder.rapid(z=float(_rounded(np.array(safe_z_mm))))
     approach = approaches() if approaches is not None else None
     tool: Tool | None = None
     speed: float | None = None
@@ -74,7 +77,9 @@ def link(
         if changes:
             cooled = _set_coolant(builder, cooled, "off")
             speed = _set_spindle(builder, speed, None, spindle)
-            if tool is not None:
+            if tool is not None and turns_work:
+                builder.rapid(*(machine.defaults.change_mm or machine.defaults.park_mm))
+            elif tool is not None:
                 _go_to_tool_change(builder, machine, lowest)
         builder.operation(_operation_note(setting))
         if changes:
@@ -83,6 +88,10 @@ def link(
         tool = operation.tool
         speed = _set_spindle(builder, speed, setting.spindle_rpm, spindle)
         cooled = _set_coolant(builder, cooled, operation.coolant)
+        if turns_work:
+            _add_section(builder, runs, done_count)
+            done_count += len(runs)
+            continue
         if builder.position[2] > heights[0]:  # from where tools are changed, not down aslant
             builder.rapid(*_rounded(runs.vertices[0, :2]).tolist())
         for run_lot in _lots(runs):
@@ -92,6 +101,29 @@ def link(
     _set_coolant(builder, cooled, "off")
     _set_spindle(builder, speed, None, spindle)
     return builder.rapid(*machine.defaults.park_mm).event(Kind.END)
+
+
+def _add_section(builder: ToolpathBuilder, runs: Runs, before: int) -> None:
+    """Add the moves of runs on a lathe, of which there were so many before: across to each, and
+    along it, without any height."""
+    for index, run in enumerate(runs, before):
+        cut = cuts(run.vertices, run.feed_mm_min, np.array([0, len(run.vertices)]))
+        is_arc = np.isfinite(cut.centre[:, 0]) & np.isfinite(cut.feed)
+        turning = np.where(cut.ccw, Kind.ARC_CCW, Kind.ARC_CW)
+        straight = np.where(np.isnan(cut.feed), Kind.RAPID, Kind.LINE)
+        kind = np.append(int(Kind.RAPID), np.where(is_arc, turning, straight))
+        end = np.concatenate([run.vertices[:1, :3], cut.end])
+        centre = np.concatenate(
+            [[[np.nan, np.nan]], np.where(is_arc[:, None], cut.centre, np.nan)]
+        )
+        builder.moves(
+            kind.astype(np.int64),
+            _rounded(end),
+            _rounded(centre),
+            np.append(np.nan, cut.feed),
+            source=builder.provenance([run.name])[np.zeros(len(kind), dtype=np.int64)],
+            run=np.full(len(kind), index),
+        )
 
 
 def _go_to_tool_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: float) -> None:
@@ -138,6 +170,11 @@ def _operation_note(setting: Setting) -> OperationNote:
         passes=len(setting.levels_mm) if operation.contract.descent == "passes" else None,
         drills=operation.contract.descent == "pecks",
         peck_mm=operation.peck_mm,
+        pitch_mm=(
+            setting.feeds.cut_mm_min / setting.spindle_rpm
+            if operation.contract.follows_spindle and setting.spindle_rpm
+            else None
+        ),
     )
 
 

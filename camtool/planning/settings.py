@@ -58,11 +58,13 @@ class Cone(Struct, frozen=True):
 def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
     """The operation with the machine's numbers where it gives none; OptionError when too fast,
     and for impossible passes."""
-    depth = depth_of(operation, machine)
+    turns_work = operation.contract.turns_work
+    depth = 0.0 if turns_work else depth_of(operation, machine)
     _check_coolant(operation, machine)
     # The helix of a bore has turns, not passes; along the wall one pass takes it all.
     descent = operation.contract.descent
-    in_one = descent == "helix" or operation.stage == "finish"
+    _check_spindle(operation, machine)
+    in_one = descent == "helix" or operation.stage == "finish" or turns_work
     try:
         levels_of = carved_levels if descent == "slopes" else levels
         step, last = operation.step_down_mm, operation.last_pass_mm
@@ -104,6 +106,28 @@ def speed_of(operation: Operation, machine: Machine) -> float | None:
             + (f"; {own_numbers(machine, faster)}" if rpm > spindle.min_rpm else ""),
         )
     return rpm
+
+
+def _check_spindle(operation: Operation, machine: Machine) -> None:
+    """OptionError for turning on a mill, for milling on a lathe, and for feeds that should follow
+    a spindle whose turns nobody counts."""
+    turns_work, kind = machine.spindle.turns == "work", operation.contract
+    if kind.turns_work != turns_work:
+        turned, other = ("work", "tool") if turns_work else ("tool", "work")
+        raise OptionError(
+            f"the spindle of {machine.target.name} turns the {turned}, and {kind.name!r} wants one"
+            f" that turns the {other}",
+            where=key_of(operation, "kind"),
+            mend="use a machine whose file says spindle.turns = "
+            + ('"tool"' if turns_work else '"work"'),
+        )
+    if kind.follows_spindle and not machine.spindle.encoder:
+        raise OptionError(
+            f"{machine.target.name} does not count the turns of its spindle, which the feed of a"
+            " thread must follow",
+            where=key_of(operation, "kind"),
+            mend="use a machine whose file says spindle.encoder = true, if it can",
+        )
 
 
 def _check_coolant(operation: Operation, machine: Machine) -> None:

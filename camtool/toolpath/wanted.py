@@ -72,7 +72,8 @@ class ToolNote(Struct, frozen=True):
 class OperationNote(Struct, frozen=True):
     """An operation as described in a program. `spindle_rpm`: None without a speed; `passes`: None
     for kinds of operation without passes; `drills`: True if the tool goes straight down at single
-    places; `peck_mm`: depth of one peck."""
+    places; `peck_mm`: depth of one peck; `pitch_mm`: its feeds follow the spindle, by this
+    for each turn."""
 
     kind: str
     name: str
@@ -84,6 +85,7 @@ class OperationNote(Struct, frozen=True):
     passes: int | None = None
     drills: bool = False
     peck_mm: float | None = None
+    pitch_mm: float | None = None
 
 
 class Operations(Struct, frozen=True, eq=False):

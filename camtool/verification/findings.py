@@ -16,6 +16,13 @@ class VerificationCode(Code):
         "dialect can express may be a plunge",
         "post again; give `camtool verify` the flags of the post",
     )
+    SECTION_CUT = (
+        428,
+        INFO,
+        "the section that the predicted cut of a lathe leaves: how deep it goes into the wanted "
+        "one, and how much stays, with places",
+        "none",
+    )
     EXTRA_CUT = (
         403,
         ERROR,
@@ -519,4 +526,10 @@ SETTING_DIFFERS_DWELL = Sentence(
     "the tool waits {measured:g} s, where {limit:g} s are asked for; at {places:# place|# places}",
     "s",
     ERROR,
+)
+SECTION_CUT = Sentence(
+    VerificationCode.SECTION_CUT,
+    "the predicted cut goes up to {gouge:.3g} µm into the section (at X {x:.3f} Y {y:.3f}) and "
+    "leaves up to {measured:.3g} µm of it",
+    "um",
 )

@@ -353,6 +353,8 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         return rounded(off_mm * UM_PER_MM) if is_known else None
 
     def _dimensions(self) -> tuple[record.DimensionReport, ...]:
+        if self.case.machine.spindle.turns == "work":  # its sizes are not those of its levels
+            return ()
         return tuple(
             record.DimensionReport(
                 name=size.name,

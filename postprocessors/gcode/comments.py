@@ -33,22 +33,26 @@ Lines = Callable[[int], str]
 """The text of the k-th line."""
 
 
-def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[str]:
+def header(
+    toolpath: Toolpath, machine: Machine, dialect: GcodeDialect, axes: Sequence[str] = "XYZ"
+) -> list[str]:
     """Return the program's maker, machine, drawing, set-up and units, and how far it reaches.
-    Toolpath and dialect are in the program's own units."""
+    Toolpath and dialect are in the program's own units; `axes` are the letters of X, Y and Z."""
     if dialect.comments == "none":
         return []
     style, unit = NumberStyle(dialect.decimals), UNITS[dialect.units].name
     bounds = [
         f"{axis} {' to '.join(format_column(reach, style))}"
-        for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
+        for axis, reach in zip(axes, toolpath_extents(toolpath), strict=True)
+        if axis
     ]
+    zero = " ".join(f"{axis}0" for axis in sorted(axes) if axis)
     origin = [toolpath.made_from, f"settings {machine.short_digest}"] if toolpath.made_from else []
     lines = [
         f"{MAKER}{__version__} for {machine.target.name}: {machine.target.title}",
         *origin,
         *pack(toolpath.setup),
-        f"{unit} and {unit}/min - part zero at X0 Y0 Z0",
+        f"{unit} and {unit}/min - part zero at {zero}",
         *bounds,
     ]
     return [comment(line) for line in lines]
@@ -145,9 +149,15 @@ def _of_operations(
 
 
 def _depth_words(note: OperationNote, unit: Unit) -> Iterator[str]:
+    if note.pitch_mm is not None:
+        yield f"pitch {_length(note.pitch_mm, unit)}"
+        return
     depth_text = f"{_length(note.depth_mm, unit)} deep"
     if note.passes is not None and note.passes > 1:
         depth_text += f" in {note.passes} passes"
+    if note.depth_mm == 0.0:
+        yield f"feed {note.feed_mm_min / unit.mm:.5g} {unit.name}/min"
+        return
     yield depth_text if note.peck_mm is None else f"{depth_text} by {_length(note.peck_mm, unit)}"
     feed = "" if note.drills else f"feed {note.feed_mm_min / unit.mm:.5g} "
     yield f"{feed}plunge {note.plunge_mm_min / unit.mm:.5g} {unit.name}/min"

@@ -46,8 +46,13 @@ class ProgramFrame(Struct, frozen=True):
 class PartMoves:
     """Takes moves in coordinates of the program, and adds rows to the path."""
 
-    def __init__(self, path: ToolpathBuilder, full_turn_rad: float) -> None:
+    def __init__(
+        self, path: ToolpathBuilder, full_turn_rad: float, *, is_lathe: bool = False
+    ) -> None:
+        """`is_lathe`: the part's X is Z of the program, its Y is X, and its Z is Y."""
         self.path = path
+        self._is_lathe = is_lathe
+        self._flat_plane = 180 if is_lathe else 170
         self.mm = 1.0
         """Length of the program's unit, mm."""
         self.plane = 170
@@ -68,7 +73,7 @@ class PartMoves:
     def is_part_frame(self) -> bool:
         """True if the coordinates of the program are those of the part: no shift, turn or scale is
         in force."""
-        return self._same
+        return self._same and not self._is_lathe
 
     def set_frame(self, frame: ProgramFrame) -> None:
         """Set the frame of the coordinates that follow."""
@@ -95,12 +100,12 @@ class PartMoves:
     def to_part(self, x: float, y: float, z: float) -> Point:
         """Return the point in the frame of the part, mm."""
         x, y, z = x * self.mm, y * self.mm, z * self.mm
-        if self._same:
-            return x, y, z
-        (cos, sin), (dx, dy, dz) = self._turn, self._shift
-        if sin:
-            x, y = x * cos - y * sin, x * sin + y * cos
-        return x + dx, y + dy, z + dz
+        if not self._same:
+            (cos, sin), (dx, dy, dz) = self._turn, self._shift
+            if sin:
+                x, y = x * cos - y * sin, x * sin + y * cos
+            x, y, z = x + dx, y + dy, z + dz
+        return (z, x, y) if self._is_lathe else (x, y, z)
 
     def snap(self, place: Point) -> Point:
         """Return the point, with those coordinates of the tool that differ from it by rounding
@@ -132,18 +137,24 @@ class PartMoves:
         self.moved = True
         if len(self.path) + abs(turn) > bounds.MAX_MOVES:
             raise LineFault(too_many("the turns of this arc"), "p", bounds.SPLIT_PROGRAM)
-        if self.plane == 170:
-            self._flat_arc((end[0], end[1], end[2]), centre, turn)
+        if self.plane == self._flat_plane:
+            axes = PLANES[self.plane]
+            places = []
+            for flat in (end, (*centre, 0.0)):
+                place = [0.0, 0.0, 0.0]
+                for axis, value in zip(axes, flat, strict=True):
+                    place[axis] = value
+                places.append(self.to_part(*place))
+            self._flat_arc(places[0], places[1][:2], turn)
         else:
             self._chords(end, centre, turn)
 
-    def _flat_arc(self, end: Point, centre: tuple[float, float], turn: int) -> None:
-        """Whole turns first, each with its share of the height. An arc so short that the
-        controller takes it for a full circle is one, and a line to its end."""
+    def _flat_arc(self, end: Point, middle: tuple[float, float], turn: int) -> None:
+        """An arc in the part's XY, whole turns first, each with its share of the height. An arc so
+        short that the controller takes it for a full circle is one, and a line to its end."""
         path = self.path
         x, y, z = path.position
-        target = self.snap(self.to_part(*end))
-        middle = self.to_part(*centre, 0.0)[:2]
+        target = self.snap(end)
         own_turn = turn_of((x, y), target[:2], middle)
         same_ends = (x, y) == target[:2]
         ccw = turn > 0
@@ -217,7 +228,7 @@ class PartMoves:
 
     def _program(self, place: Point) -> Point:
         """A place in the frame of the part in the coordinates of the program."""
-        x, y, z = place
+        x, y, z = (place[1], place[2], place[0]) if self._is_lathe else place
         if not self._same:
             (cos, sin), (dx, dy, dz) = self._turn, self._shift
             x, y, z = x - dx, y - dy, z - dz

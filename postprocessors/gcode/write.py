@@ -87,7 +87,8 @@ class ProgramStyle(Struct, frozen=True, eq=False):
     around the program that is no block (%), or ""; `path_mode`: the block that asks for a path
     mode, `own_mode`: that of rows that ask for none; `cycles`: holes are written as cycles;
     `change_first`: nothing moves before the first tool is mounted, whose length counts from then.
-    `model`: that of its controller, for the times in comments.
+    `model`: that of its controller, for the times in comments. `axes` and `offsets`: the letters
+    of X, Y and Z, "" for one that is not written, and of I and J.
     """
 
     dialect: GcodeDialect
@@ -101,6 +102,8 @@ class ProgramStyle(Struct, frozen=True, eq=False):
     cycles: bool = False
     change_first: bool = False
     model: ControllerModel[Any, Any] | None = None
+    axes: tuple[str, str, str] = ("X", "Y", "Z")
+    offsets: tuple[str, str] = ("I", "J")
 
 
 def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Program:
@@ -120,7 +123,9 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
         blocks = {**events.blocks, **cycle_blocks(holes, feed_words, number)}
         events = replace(events, blocks=blocks)
     unmoved = first_change(toolpath, events) if style.change_first else 0
-    rows_sent = sent_rows(toolpath, arcs, feeds, events.changes, holes, unmoved)
+    rows_sent = sent_rows(
+        toolpath, arcs, feeds, events.changes, holes, unmoved, raises=bool(style.axes[2])
+    )
     arc_counts = arcs.counts
     del arcs, feeds
     frame = [style.frame] if style.frame else []
@@ -139,13 +144,13 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
     tell = style.mounted
     mounted = {} if tell is None else {row: tell(toolpath, row) for row in events.changes}
     remarks = comments(toolpath, of_row, dialect, style.message, mounted, seconds)
-    head = [*frame, *header(toolpath, machine, dialect)]
+    head = [*frame, *header(toolpath, machine, dialect, style.axes)]
     refuse_too_long(len(head) + len(of_row) + len(remarks[0]) + len(frame), "line")
     data = b"".join(
         [
             *(f"{line}\n".encode("ascii") for line in head),
             order.text(
-                motion_words(rows_sent, dialect, decimals),
+                motion_words(rows_sent, dialect, decimals, style, _pitches(toolpath)),
                 *remarks,
                 numbers=LineNumbers() if dialect.block_numbers else None,
             ),
@@ -382,10 +387,13 @@ def sent_rows(
     changes: Sequence[int] = (),
     holes: Sequence[CycleHole] = (),
     unmoved: int = 0,
+    *,
+    raises: bool = True,
 ) -> Sent:
     """All rows with pieces in place of arcs, without moves that move nothing, and without motions
     among the first `unmoved` rows. `changes`: the rows of tool changes that have a block; of
-    `holes`, which are written as cycles, there is one."""
+    `holes`, which are written as cycles, there is one. `raises`: behind a change of tools the tool
+    is sent to its height once more."""
     origins, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
     if arcs.pieces:
         piece_counts = np.ones(len(toolpath), dtype=np.int64)
@@ -411,7 +419,7 @@ def sent_rows(
         kind[drilled], end[drilled] = CYCLE, arcs.end[[hole.last for hole in holes]]
     raised = np.zeros(len(origins), dtype=np.bool_)
     is_changed = (kind == Kind.TOOL_CHANGE) & np.isin(origins, changes)
-    if raised_rows := _raised_again(kind, end, is_changed):
+    if raises and (raised_rows := _raised_again(kind, end, is_changed)):
         before = np.array(raised_rows) - 1
         origins, kind = (
             np.insert(origins, raised_rows, origins[before]),
@@ -497,26 +505,66 @@ def _first_after(home: Bools, motion: Bools) -> Bools:
     return is_first
 
 
-def motion_words(rows_sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[WordColumn]:
-    """The words of the motions among the rows."""
+PITCH: Final = NumberStyle(6, strip=True)
+"""Pitches of threads, mm or inches for each turn."""
+
+G33: Final = 33
+"""The motion that follows the spindle."""
+
+
+def _pitches(toolpath: Toolpath) -> Floats:
+    """(N,) the feed for each turn of the spindle where it is to be followed, 0 elsewhere."""
+    pitch = np.zeros(len(toolpath))
+    operations = toolpath.operations
+    if operations is not None:
+        begins = operations.begin.tolist()
+        for note, low, high in zip(
+            operations.notes, begins, [*begins[1:], len(toolpath)], strict=True
+        ):
+            pitch[low:high] = note.pitch_mm or 0.0
+    pitch[toolpath.kind != Kind.LINE] = 0.0
+    return pitch
+
+
+def motion_words(
+    rows_sent: Sent,
+    dialect: GcodeDialect,
+    feed_decimals: int,
+    style: ProgramStyle | None = None,
+    pitch: Floats | None = None,
+) -> list[WordColumn]:
+    """The words of the motions among the rows, in the letters of a `style`; `pitch` (N,) of the
+    toolpath's rows that follow the spindle."""
     motion = rows_sent.is_motion
     rows = np.flatnonzero(motion)
     number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
     turns = np.zeros(len(motion), dtype=bool)
-    turns[rows] = np.diff(rows_sent.kind[rows], prepend=-1) != 0
+    codes, axes, offsets = rows_sent.kind, ("X", "Y", "Z"), ("I", "J")
+    if style is not None:
+        axes, offsets = style.axes, style.offsets
+    follows = np.zeros(len(motion), dtype=np.bool_)
+    units = np.zeros(len(motion), dtype=np.int64)
+    if pitch is not None and pitch.any():
+        mm = UNITS[dialect.units].mm
+        units = np.rint(pitch[rows_sent.row] / mm * 10**PITCH.decimals).astype(np.int64)
+        follows = motion & (units > 0)
+        codes = np.where(follows, G33, codes)
+    turns[rows] = np.diff(codes[rows], prepend=-1) != 0
     is_arc = motion & (rows_sent.kind >= Kind.ARC_CW)
-    fed = (motion & (rows_sent.kind >= Kind.LINE)) | (rows_sent.kind == CYCLE)
+    fed = (motion & (rows_sent.kind >= Kind.LINE) & ~follows) | (rows_sent.kind == CYCLE)
     feed = motion & changes_of(rows_sent.feed, fed)
     return [
-        WordColumn("G", rows_sent.kind, turns | (rows_sent.forget & motion)),
+        WordColumn("G", codes, turns | (rows_sent.forget & motion)),
         *(
             word_of(axis, rows_sent.end[:, index], rows_sent.written[:, index], number)
-            for index, axis in enumerate("XYZ")
+            for index, axis in enumerate(axes)
+            if axis
         ),
         *(
             word_of(axis, rows_sent.offset[:, index], is_arc, number)
-            for index, axis in enumerate("IJ")
+            for index, axis in enumerate(offsets)
         ),
+        *([word_of("K", units, follows, PITCH)] if follows.any() else []),
         word_of("F", rows_sent.feed, feed, NumberStyle(feed_decimals, strip=True)),
     ]
 

@@ -36,8 +36,10 @@ class Queued(Struct):
 class Canon(PartMoves):
     """Moves, and those that wait."""
 
-    def __init__(self, path: ToolpathBuilder, full_turn_rad: float) -> None:
-        super().__init__(path, full_turn_rad)
+    def __init__(
+        self, path: ToolpathBuilder, full_turn_rad: float, *, is_lathe: bool = False
+    ) -> None:
+        super().__init__(path, full_turn_rad, is_lathe=is_lathe)
         self.queue: list[Queued | Callable[[], None]] = []
         self._events = 0
         self.nose: tuple[float, float] = (0.0, 0.0)

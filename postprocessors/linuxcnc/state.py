@@ -96,7 +96,8 @@ class InterpreterState:
         self.diameters = False
         self.spindle: Kind | None = None
         self.speed = 0.0
-        self.canon = Canon(path, dialect.arc_full_turn_rad)
+        is_lathe = machine.spindle.turns == "work"
+        self.canon = Canon(path, dialect.arc_full_turn_rad, is_lathe=is_lathe)
         self.calls: list[Call] = [Call()]
         """The calls that are under way, the program itself first: flow's own."""
         self.read_sub: Callable[[int], Iterator[LinuxcncBlock]] = lambda number: iter(())

@@ -15,8 +15,8 @@ from ..gcode.write import Event, ProgramStyle, common_words, tool_number, write_
 from .controller import LinuxcncModel
 from .dialect import LinuxcncDialect, LinuxcncMachine
 
-MODES: Final = "G17 {unit} G40{length} G54 G80 G90 G91.1 G94"
-"""XY plane, mm or inches, no cutter radius, no tool length where the machine uses none, the first
+MODES: Final = "{plane} {unit} G40{length} G54 G80 G90 G91.1 G94"
+"""The plane, mm or inches, no cutter radius, no tool length where the machine uses none, the first
 work frame, no cycle, absolute, I J as offsets, feeds a minute: whatever the last program left."""
 
 MAX_TOOL: Final = 99_999
@@ -31,9 +31,11 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
     dialect, unit = machine.dialect, UNITS[machine.dialect.units]
     # The length in force goes with the tool in the spindle, and with a zero set by that tool.
     no_length = "" if dialect.tool_lengths else " G49"
+    is_lathe = machine.spindle.turns == "work"
+    plane = "G18 G8" if is_lathe else "G17"
     style = ProgramStyle(
         dialect,
-        (MODES.format(unit=unit.word, length=no_length),),
+        (MODES.format(plane=plane, unit=unit.word, length=no_length),),
         lambda event: _words(event, dialect),
         message="MSG,",
         frame="%" if dialect.percent else "",
@@ -42,6 +44,8 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
         change_first=dialect.tool_lengths and dialect.tool_change == "m6",
         model=LinuxcncModel(),
         own_mode=PathMode(dialect.path, dialect.blend_tolerance_mm, dialect.blend_tolerance_mm),
+        axes=("Z", "X", "") if is_lathe else ("X", "Y", "Z"),
+        offsets=("K", "I") if is_lathe else ("I", "J"),
     )
     program = write_modal(toolpath, machine, style)
     if dialect.tool_change == "m6" or not mounted_before(toolpath).any():

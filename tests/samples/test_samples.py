@@ -29,6 +29,7 @@ NAMES = (
     "sign.svg",
     "tray.svg",
     "board.dxf",
+    "screw.dxf",
 )
 
 
