@@ -116,7 +116,8 @@ def _message_pattern(dialect: IsoDialect) -> re.Pattern[str] | None:
     if "".join(template.replace("{text}", "").split()) in ("", "()", ";"):
         return None
     before, _, behind = template.partition("{text}")
-    return re.compile(f"{re.escape(before.lstrip())}(.*){re.escape(behind.rstrip())}")
+    # The text may be empty, and its blanks gone with the end of the line.
+    return re.compile(rf"{re.escape(before.strip())}\s*(.*?)\s*{re.escape(behind.strip())}")
 
 
 # Templates as patterns.
