@@ -49,6 +49,7 @@ class MarlinController(SlideStart, frozen=True, tag_field="model", tag="marlin")
     JD_HANDLE_SMALL_SEGMENTS. `mm_per_arc_segment`, `min_arc_segments`, `arc_correction`,
     `min_steps` and `buffer_blocks`: MM_PER_ARC_SEGMENT, MIN_ARC_SEGMENTS, N_ARC_CORRECTION,
     MIN_STEPS_PER_SEGMENT, BLOCK_BUFFER_SIZE. `min_step_hz`: MINIMAL_STEP_RATE.
+    `min_segment_ms`: M205 B of a firmware with SLOWDOWN, 0 without.
     """
 
     travel_acceleration_mm_s2: Acceleration
@@ -61,6 +62,7 @@ class MarlinController(SlideStart, frozen=True, tag_field="model", tag="marlin")
     min_steps: Annotated[int, Meta(ge=1, le=1000)] = 6
     buffer_blocks: Annotated[int, Meta(ge=4, le=1024)] = 16
     min_step_hz: Annotated[float, Meta(ge=1.0, le=10_000.0)] = 120.0
+    min_segment_ms: Annotated[float, Meta(ge=0.0, le=1000.0)] = 20.0
 
 
 class TrapezoidController(SlideStart, frozen=True, tag_field="model", tag="trapezoid"):

@@ -25,6 +25,7 @@ import math
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.machine.model import Machine
@@ -34,28 +35,25 @@ from camtool.simulation.speed_plan import SpeedPlan, axis_limits
 from camtool.toolpath.moves import EVENTS_AT_REST, Kind, Toolpath, read_only
 
 from .controllers import MarlinController
-from .timed import PlannedMoves, TimedModel, directions, sections, with_chords
+from .timed import PlannedMoves, TimedModel, directions, profile, sections, with_chords
 
 FIRST_MOVE_DELAY_S = 0.1
 """A stop with fewer than `FEW_MOVES` moves behind it waits so long for more of them
 (BLOCK_DELAY_FOR_1ST_MOVE ms, `get_current_block`)."""
 FEW_MOVES = 3
 
+EXACT = 100
+"""Steps of a ramp that are added up one by one, where it is slowest."""
+
 SHORT_MM = 1.0
 OCTAGON_COS = -0.7071067812
 """Moves shorter than this whose corner bends by less than 45° count as parts of an arc
 (JD_HANDLE_SMALL_SEGMENTS)."""
 STRAIGHT_COS = 0.999999
-ARCSINE = (
-    84.31466202,
-    -242.7199627,
-    262.8130562,
-    -131.1123477,
-    29.66153956,
-    -1.451838349,
-    0.032843707,
-)
-"""Its polynomial for an arc sine, highest power first."""
+ANGLE_PARTS = 16
+ANGLE_FACTOR = 1.00751495
+"""Its angle of a corner is linear between cosines of 1 − 2⁻ⁱ, and this much too large at them
+(JD_USE_LOOKUP_TABLE)."""
 
 MIN_SPEED_MM_S = 0.05
 """The speed straight back (MINIMUM_PLANNER_SPEED)."""
@@ -81,18 +79,21 @@ class MarlinModel(TimedModel):
         lines = replace(lines, start=steps[0] * step_mm, end=read_only(steps[1:] * step_mm))
         length, unit = directions(lines)
         events = np.abs(np.diff(steps, axis=0)).max(axis=1).astype(np.float64)
-        speed, acceleration = _limits(lines, length, unit, events, machine)
-        speeds = np.zeros((3, len(lines)))
-        waits = np.zeros(len(lines))
+        feed = np.where(lines.is_feed, lines.feed, machine.rapid_mm_min) / 60.0
+        highest, acceleration = _limits(length, unit, events, machine)
+        speeds, extra_s = np.zeros((3, len(lines))), np.zeros(len(lines))
         for part in sections(np.flatnonzero(length > 0.0), np.isin(lines.kind, EVENTS_AT_REST)):
-            moves = length[part], unit[part], speed[part], acceleration[part]
+            speed = np.minimum(slowed(length[part], feed[part], controller), highest[part])
+            moves = length[part], unit[part], speed, acceleration[part]
             corner = _corners(*moves, machine)
             plan = SpeedPlan(moves[0], moves[2], moves[3], corner)
             squares = plan.squares(controller.buffer_blocks - 1)
-            speeds[:, part] = _trapezoids(plan, squares, events[part], controller.min_step_hz)
-            waits[part[0]] = FIRST_MOVE_DELAY_S if len(part) < FEW_MOVES else 0.0
+            speeds[:, part] = profile(plan, squares)
+            blocks = _rates(plan, squares, events[part], controller.min_step_hz)
+            extra_s[part] = blocks.seconds() - plan.seconds(squares)
+            extra_s[part[0]] += FIRST_MOVE_DELAY_S if len(part) < FEW_MOVES else 0.0
         entry, peak, exit = speeds
-        return PlannedMoves(lines, row, length, acceleration, entry, peak, exit, waits)
+        return PlannedMoves(lines, row, length, acceleration, entry, peak, exit, extra_s)
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
         """Return the assumptions of the times, a sentence each."""
@@ -132,18 +133,29 @@ def kept_steps(steps: Ints, min_steps: int) -> Ints:
     return np.array(places, dtype=np.int64)
 
 
+def slowed(length: Floats, speed: Floats, controller: MarlinController) -> Floats:
+    """Return the speeds (K,) mm/s of the moves behind a stop: those that come while the buffer is
+    less than half full, and are short, get more time (SLOWDOWN). Moves come faster than they are
+    cut, so that each finds as many before it as there are."""
+    ahead = np.arange(2, min(len(speed), controller.buffer_blocks // 2))
+    own_s = length[ahead] / speed[ahead]
+    missing_s = np.maximum(controller.min_segment_ms / 1000.0 - own_s, 0.0)
+    speed = speed.copy()
+    speed[ahead] = length[ahead] / (own_s + 2.0 * missing_s / ahead)
+    return speed
+
+
 def _limits(
-    path: Toolpath, length: Floats, unit: Floats, events: Floats, machine: _Machine
+    length: Floats, unit: Floats, events: Floats, machine: _Machine
 ) -> tuple[Floats, Floats]:
-    """Return the highest speed (M,) mm/s and the acceleration (M,) mm/s² of each move; that is
-    made of whole steps/s² of the axis with the most steps."""
+    """Return the highest speed (M,) mm/s that the axes allow, and the acceleration (M,) mm/s² of
+    each move; that is made of whole steps/s² of the axis with the most steps."""
     controller = machine.controller
     assert isinstance(controller, MarlinController)
     moves = length > 0.0
-    speed = np.where(path.is_feed, path.feed, machine.rapid_mm_min) / 60.0
     rates = axis_limits(machine, "max_rate_mm_min") / 60.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        speed = np.minimum(speed, (rates / np.abs(unit)).min(axis=1))
+        speed = (rates / np.abs(unit)).min(axis=1)
         per_mm = np.where(moves, events / length, 1.0)
     acceleration = np.ceil(controller.travel_acceleration_mm_s2 * per_mm)
     step_mm = coded_steps_mm(machine)
@@ -176,10 +188,22 @@ def _corners(
         square = allowed * controller.junction_deviation_mm * sine / (1.0 - sine)
     if controller.small_segments:
         bends = (length[1:] < SHORT_MM) & (cosine < OCTAGON_COS)
-        angle = 0.5 * math.pi - np.polyval(ARCSINE, -cosine)
+        angle = _angles(-cosine)
         square[bends] = np.minimum(square, length[1:] * allowed / angle)[bends]
     square[cosine > STRAIGHT_COS] = MIN_SPEED_MM_S**2
     return np.concatenate([np.zeros(min(len(unit), 1)), np.sqrt(square)])
+
+
+def _angles(cosine: Floats) -> Floats:
+    """Return (K,) rad: the angles of these cosines, 0 to 1, as its table has them."""
+    share = 1.0 - np.append(0.5 ** np.arange(ANGLE_PARTS), 1e-6)
+    angle = np.arccos(share) * ANGLE_FACTOR
+    angle[0], angle[-1] = 0.5 * math.pi, math.acos(share[-1])
+    slope = np.diff(angle) / np.diff(share)
+    units = np.floor((1.0 - np.clip(cosine, 0.0, 1.0)) * 2.0 ** (ANGLE_PARTS - 1))
+    part = ANGLE_PARTS - 2 - np.floor(np.log2(np.maximum(units, 0.5)))
+    index = np.clip(part, 0, ANGLE_PARTS - 1).astype(np.int64)
+    return np.asarray(angle[index] + slope[index] * (cosine - share[index]))
 
 
 def jerk_corners(unit: Floats, speed: Floats, jerk_mm_s: tuple[float, float, float]) -> Floats:
@@ -209,9 +233,51 @@ def jerk_corners(unit: Floats, speed: Floats, jerk_mm_s: tuple[float, float, flo
     return np.concatenate([safe[:1], np.where(stops, safe[1:], corner)])
 
 
-def _trapezoids(plan: SpeedPlan, squares: Floats, events: Floats, min_step_hz: float) -> Floats:
-    """Return (3, K) mm/s: the speeds at the start, at the peak and at the end of each block, as
-    its stepper has them: whole rates, not below `min_step_hz`."""
+class _Rates(Struct, frozen=True, eq=False):
+    """The blocks of a section, as its stepper has them, K each, in steps and steps/s: the rates at
+    the start, of the cruise and at the end, the acceleration, and how many steps it has in all,
+    accelerates and brakes."""
+
+    first: Floats
+    nominal: Floats
+    last: Floats
+    acceleration: Floats
+    events: Floats
+    up: Floats
+    down: Floats
+
+    def seconds(self) -> Floats:
+        """Return (K,) s: how long each block takes.
+
+        The stepper waits a step at the rate that it has reached before, first twice at the rate of
+        the start. So a ramp from a low rate takes longer than its integral, and one to a low rate
+        shorter. The `EXACT` slowest steps of each ramp are added up one by one.
+        """
+        waits = np.minimum(self.up, self.events - 1.0)
+        seconds, spent, peak = 1.0 / self.first, np.zeros(len(self.first)), self.first
+        for step in range(EXACT):
+            rate = np.minimum(self.first + self.acceleration * spent, self.nominal)
+            peak = np.where(step < waits, rate, peak)
+            spent += np.where(step < waits, 1.0 / rate, 0.0)
+        rest = np.maximum(waits - EXACT, 0.0)
+        reached = np.minimum(np.sqrt(peak**2 + 2.0 * self.acceleration * rest), self.nominal)
+        ramp = (reached - peak) / self.acceleration
+        steady = np.maximum(rest - 0.5 * (reached + peak) * ramp, 0.0) / self.nominal
+        seconds, peak = seconds + spent + ramp + steady, reached
+        down = np.clip(self.down - 1.0, 0.0, self.events - 1.0 - waits)
+        seconds += (self.events - 1.0 - waits - down) / self.nominal
+        early = np.maximum(down - EXACT, 0.0)
+        slower = np.sqrt(np.maximum(peak**2 - 2.0 * self.acceleration * early, self.last**2))
+        spent = (peak - slower) / self.acceleration
+        for step in range(EXACT):
+            rate = np.maximum(peak - self.acceleration * spent, self.last)
+            spent += np.where(step < down - early, 1.0 / rate, 0.0)
+        return np.asarray(seconds + spent)
+
+
+def _rates(plan: SpeedPlan, squares: Floats, events: Floats, min_step_hz: float) -> _Rates:
+    """Return the blocks as `calculate_trapezoid_for_block` makes them: whole rates, not below
+    `min_step_hz` at their ends."""
     per_mm = events / plan.length_mm
     nominal = np.ceil(plan.speed_mm_s * per_mm)
     first, last = (
@@ -223,10 +289,8 @@ def _trapezoids(plan: SpeedPlan, squares: Floats, events: Floats, min_step_hz: f
     down = np.floor((nominal**2 - last**2) / (2.0 * rate))
     short = up + down > events
     meeting = np.ceil((2.0 * rate * events - first**2 + last**2) / (4.0 * rate))
-    until = np.clip(meeting, 0.0, events)
-    peak = np.where(short, np.sqrt(first**2 + 2.0 * rate * until), nominal)
-    peak = np.maximum(np.minimum(peak, nominal), np.maximum(first, last))
-    return np.stack([first, peak, last]) / per_mm
+    up = np.where(short, np.clip(meeting, 0.0, events), up)
+    return _Rates(first, nominal, last, rate, events, up, np.where(short, events - up, down))
 
 
 def _chords(path: Toolpath, controller: MarlinController) -> tuple[Ints, Floats]:

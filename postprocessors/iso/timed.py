@@ -28,6 +28,7 @@ from camtool.simulation.samples import (
     row_seconds,
     sample_spacing_mm,
 )
+from camtool.simulation.speed_plan import SpeedPlan
 from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 _Machine = Machine[Any, Any]
@@ -36,8 +37,8 @@ _Machine = Machine[Any, Any]
 class PlannedMoves(Struct, frozen=True, eq=False):
     """The moves of a planner, M rows of a toolpath: `row` (M,) of the program that each is a part
     of; the speeds `entry`, `peak` and `exit` (M,) mm/s, `acceleration` (M,) mm/s² and `length`
-    (M,) mm, which is 0 where nothing moves. `wait_s` (M,): how long it stands before a move; None
-    where it never does."""
+    (M,) mm, which is 0 where nothing moves. `extra_s` (M,): how much longer than its ramps a move
+    takes; None where it does not."""
 
     path: Toolpath
     row: Ints
@@ -46,7 +47,7 @@ class PlannedMoves(Struct, frozen=True, eq=False):
     entry: Floats
     peak: Floats
     exit: Floats
-    wait_s: Floats | None = None
+    extra_s: Floats | None = None
 
     def ramps_s(self) -> Floats:
         """Return (3, M) s: how long each accelerates, cruises and brakes."""
@@ -61,7 +62,7 @@ class PlannedMoves(Struct, frozen=True, eq=False):
     def seconds(self) -> Floats:
         """Return (M,) s that each move takes."""
         seconds = np.asarray(self.ramps_s().sum(axis=0))
-        return seconds if self.wait_s is None else seconds + self.wait_s
+        return seconds if self.extra_s is None else seconds + self.extra_s
 
 
 class TimedModel(ControllerModel[Any, Any]):
@@ -147,6 +148,14 @@ def with_chords(path: Toolpath, counts: Ints, inner: Floats) -> tuple[Toolpath, 
     centre = np.broadcast_to(read_only(np.full((1, 2), np.nan)), (len(row), 2))
     lines = path.picked(row, kind=kind, end=read_only(end), centre=centre)
     return lines, row
+
+
+def profile(plan: SpeedPlan, squares: Floats) -> Floats:
+    """Return (3, K) mm/s: the speeds at the start, at the peak and at the end of each move of a
+    plan, with the `squares` (K + 1,) of its method."""
+    first, last = np.sqrt(squares[:-1]), np.sqrt(squares[1:])
+    reach = plan.acceleration_mm_s2 * plan.length_mm + 0.5 * (first**2 + last**2)
+    return np.stack([first, np.minimum(plan.speed_mm_s, np.sqrt(reach)), last])
 
 
 def directions(path: Toolpath) -> tuple[Floats, Floats]:

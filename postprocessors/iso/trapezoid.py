@@ -23,7 +23,7 @@ from camtool.simulation.speed_plan import SpeedPlan, axis_limits, max_along
 from camtool.toolpath.moves import EVENTS_AT_REST, Kind, Toolpath
 
 from .controllers import TrapezoidController
-from .timed import PlannedMoves, TimedModel, directions, sections
+from .timed import PlannedMoves, TimedModel, directions, profile, sections
 
 STRAIGHT_COS = 0.999999
 """Beyond this cosine of the turn two moves are straight on."""
@@ -50,10 +50,7 @@ class TrapezoidModel(TimedModel):
         for part in sections(np.flatnonzero(length > 0.0), np.isin(path.kind, EVENTS_AT_REST)):
             corner = _corners(begins[part], ends[part], controller.corner_mm_s)
             plan = SpeedPlan(length[part], speed[part], acceleration[part], corner)
-            entry = np.sqrt(plan.squares(controller.buffer_blocks))
-            first, last = entry[:-1], entry[1:]
-            reach = plan.acceleration_mm_s2 * plan.length_mm + 0.5 * (first**2 + last**2)
-            speeds[:, part] = first, np.minimum(plan.speed_mm_s, np.sqrt(reach)), last
+            speeds[:, part] = profile(plan, plan.squares(controller.buffer_blocks))
         return PlannedMoves(path, np.arange(len(path)), length, acceleration, *speeds)
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:

@@ -101,17 +101,30 @@ def junction_square(
     sine = math.sqrt(0.5 * (1.0 - cosine))
     square = allowed * deviation_mm * sine / (1.0 - sine)
     if small_segments and length_mm < 1.0 and cosine < -0.7071067812:
-        t = -cosine
-        arcsine = 0.032843707 + t * (
-            -1.451838349
-            + t
-            * (
-                29.66153956
-                + t * (-131.1123477 + t * (262.8130562 + t * (-242.7199627 + t * 84.31466202)))
-            )
-        )
-        square = min(square, length_mm * allowed / (math.radians(90.0) - arcsine))
+        square = min(square, length_mm * allowed / corner_angle(-cosine))
     return square
+
+
+def corner_angle(cosine: float) -> float:
+    """The angle of a cosine by its table of 16 lines (JD_USE_LOOKUP_TABLE)."""
+    units = int((1.0 - cosine) * 32768)
+    part = 15 - units.bit_length() if units else 15
+    low = 1.0 - 0.5**part
+    high = 0.5 * low + 0.5 if part < 15 else 0.999999
+    of_low = math.acos(low) * (1.00751495 if part else 1.0)
+    of_high = math.acos(high) * (1.00751495 if part < 15 else 1.0)
+    return of_low + (of_high - of_low) * (cosine - low) / (high - low)
+
+
+def slowed(lengths: Sequence[float], speeds: Sequence[float], places: int) -> list[float]:
+    """The speeds of moves that come while the ring of so many places fills (SLOWDOWN)."""
+    found = list[float]()
+    for queued, (length, speed) in enumerate(zip(lengths, speeds, strict=True)):
+        seconds = length / speed
+        if 2 <= queued <= places // 2 - 1 and seconds < 0.02:
+            seconds += 2.0 * (0.02 - seconds) / queued
+        found.append(length / seconds)
+    return found
 
 
 def jerk_speeds(
@@ -166,18 +179,24 @@ def block_seconds(
     events: int, nominal: int, entry: float, exit: float, accel: int, min_rate: int
 ) -> float:
     """How long a block of `events` steps takes; rates in steps/s, all but the entry and exit whole
-    (`calculate_trapezoid_for_block`, with the times of its stepper as integrals)."""
+    (`calculate_trapezoid_for_block`; `block_phase_isr` of src/module/stepper.cpp)."""
     first = min(max(math.ceil(entry), min_rate), nominal)
     last = min(max(math.ceil(exit), min_rate), nominal)
     up = math.ceil((nominal**2 - first**2) / (2.0 * accel))
     down = math.floor((nominal**2 - last**2) / (2.0 * accel))
     plateau = events - up - down
-    peak = float(nominal)
     if plateau < 0:
         up = math.ceil((2.0 * accel * events - first**2 + last**2) / (4.0 * accel))
-        up = min(max(up, 0), events)
-        peak = min(math.sqrt(first**2 + 2.0 * accel * up), float(nominal))
-        peak = max(peak, first, last)
-    ramps = (peak - first) / accel + (peak - last) / accel
-    steps = (2.0 * peak**2 - first**2 - last**2) / (2.0 * accel)
-    return ramps + max(events - steps, 0.0) / peak
+        up, plateau = min(max(up, 0), events), 0
+    seconds, accelerated, braked, reached = 1.0 / first, 0.0, 0.0, float(first)
+    for done in range(1, events):
+        if done <= up:
+            rate = reached = min(first + accel * accelerated, float(nominal))
+            accelerated += 1.0 / rate
+        elif done > up + plateau:
+            rate = max(reached - accel * braked, float(last))
+            braked += 1.0 / rate
+        else:
+            rate = float(nominal)
+        seconds += 1.0 / rate
+    return seconds

@@ -1,8 +1,8 @@
-"""Recordings of the firmware of grbl, grblHAL and Klipper, and of LinuxCNC's motion, against their
-models.
+"""Recordings of grbl, grblHAL, Klipper and Marlin, and of LinuxCNC's motion, against their models.
 
 `referees/README.md` says where they come from. grbl, grblHAL: positions step for step, by their
-digest, and times within 0.2 %; Klipper: within a step at any time; LinuxCNC: paths within 15 µm,
+digest, and times within 0.2 %; Klipper: within a step at any time; Marlin: paths
+within 2 steps, times within 0.5 % but for one; LinuxCNC: paths within 15 µm,
 times within 0.5 %. The tables go into docs/validation.md.
 """
 
@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from camtool_postprocessors.iso.controllers import KlipperController
+from camtool_postprocessors.iso.controllers import KlipperController, MarlinController
 from camtool_postprocessors.iso.klipper import KlipperModel
+from camtool_postprocessors.iso.marlin import FIRST_MOVE_DELAY_S, MarlinModel
 from camtool_postprocessors.iso.timed import PlannedMoves
+from scipy.spatial import KDTree
 
 from camtool.arrays import Floats
 from camtool.machine.model import Machine
@@ -34,6 +36,7 @@ REFEREES = Path(__file__).parent / "referees"
 GRBL = sorted((REFEREES / "grbl").glob("*.json"))
 GRBLHAL = sorted((REFEREES / "grblhal").glob("*.json"))
 KLIPPERS = sorted((REFEREES / "klipper").glob("*.json"))
+MARLINS = sorted((REFEREES / "marlin").glob("*.json"))
 LINUXCNC = sorted((REFEREES / "linuxcnc").glob("*.ngc"))
 
 GRBL_TIME_PART = 0.002
@@ -251,6 +254,53 @@ def test_klipper(bless: bool) -> None:
     heads = ["program", "steps", "left out by Klipper", "Klipper, first to last step, s"]
     heads += ["model, all, s", "steps apart"]
     check("referee-klipper", heads, rows, bless)
+
+
+MARLIN = MarlinController(travel_acceleration_mm_s2=250.0, mm_per_arc_segment=0.2)
+MARLIN_LIMITS = {"x": (3000.0, 250.0), "y": (3000.0, 250.0), "z": (1500.0, 100.0)}
+MARLIN_STEPS = 2.0
+"""Bresenham lines, between the ends of moves."""
+MARLIN_TIME_PART = 0.005
+MARLIN_MISSES = {"tiny": 0.05}
+FIRST_STEP_S = {"feeds": 1.0 / 21.0}
+"""The first step comes a period of the lowest rate behind the start."""
+
+
+def marlin_path(program: str) -> tuple[Toolpath, Machine[Any, Any]]:
+    """Read a program for Marlin, whose words are those of grbl but for dwells in ms."""
+    path, machine = klipper_path(program)
+    axes = {
+        name: replace(
+            getattr(machine.axes, name), max_rate_mm_min=rate, acceleration_mm_s2=acceleration
+        )
+        for name, (rate, acceleration) in MARLIN_LIMITS.items()
+    }
+    return path, replace(machine, axes=replace(machine.axes, **axes), controller=MARLIN)
+
+
+def test_marlin(bless: bool) -> None:
+    """The positions at 1/400 of the steps lie on the model's path, and times are near."""
+    assert len(MARLINS) == 10
+    rows = []
+    for file in MARLINS:
+        said: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        path, machine = marlin_path(said["program"])
+        motion = rows_of(MarlinModel().run(path, machine, Options(effects=IDEAL)))
+        recorded = np.array(said["positions"])
+        places = np.concatenate([np.zeros((1, 3)), samples(motion) / STEP_MM])
+        apart, _ = KDTree(places).query(recorded[:, 1:])
+        assert apart.max() <= MARLIN_STEPS, file.name
+        assert np.rint(places[-1]).tolist() == recorded[-1, 1:].tolist(), file.name
+        seconds = sum(row.duration_s for row in motion) - FIRST_STEP_S.get(file.stem, 1.0 / 120.0)
+        if file.stem == "dwells":  # a single move before the first dwell
+            seconds -= FIRST_MOVE_DELAY_S
+        wanted_s = float(recorded[-1, 0])
+        part = seconds / wanted_s - 1.0
+        assert abs(part) < MARLIN_MISSES.get(file.stem, MARLIN_TIME_PART), file.name
+        times = mm(wanted_s), mm(seconds), signed(100.0 * part, 2)
+        rows.append([file.stem, str(sum(said["steps"])), *times, mm(float(apart.max()), 1)])
+    heads = ["program", "steps", "Marlin, s", "model, s", "%", "steps apart"]
+    check("referee-marlin", heads, rows, bless)
 
 
 def test_linuxcnc(bless: bool) -> None:
