@@ -19,7 +19,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
-from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
@@ -268,9 +268,10 @@ def scene_of(
     nose = None if job is None or width is not None else nose_of(job)
     several = job is not None and toolpath is not None and width is None and nose is None
     worst = () if verification is None else verification.report.worst
+    turns_work = machine is not None and machine.spindle.turns == "work"
     return Scene(
         title=title,
-        drawing=drawing,
+        drawing=_with_other_half(drawing) if drawing and turns_work else drawing,
         toolpath=toolpath,
         trace_points=trace.points if trace is not None else None,
         trace_error_mm=trace.error_mm if trace is not None else None,
@@ -302,6 +303,21 @@ def scene_of(
             _bands(drawn, job, wanted_path, machine),
             _before(drawn, job, machine),
         ),
+    )
+
+
+def _with_other_half(section: Drawing) -> Drawing:
+    """Return a half section with its mirror image on the other side of the axis, Y 0."""
+    paths = section.paths
+    other = Polylines(paths.vertices * [1.0, -1.0, -1.0], paths.offsets, paths.closed)
+    return replace(
+        section,
+        paths=Polylines.joined([paths, other]),
+        layers=section.layers * 2,
+        colours=section.colours * 2,
+        sources=section.sources * 2,
+        line_types=section.line_types * 2,
+        off_mm=np.concatenate([section.off_mm, section.off_mm]),
     )
 
 

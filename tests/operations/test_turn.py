@@ -9,8 +9,9 @@ import pytest
 
 import camtool
 from camtool.errors import CamtoolError
-from camtool.geometry.measure import sample
+from camtool.geometry.measure import extents, sample
 from camtool.geometry.polylines import Polyline
+from camtool.pictures.scene import scene_of
 from camtool.planning.job import Job
 from camtool.records import replace
 from camtool.target.registry import load_target
@@ -182,6 +183,21 @@ def test_which_machines_turn(tmp_path: Path) -> None:
     )
     with pytest.raises(CamtoolError, match=r"count the turns of its spindle"):
         camtool.post(SAMPLES / "screw.dxf", flashcut, job)
+
+
+def test_the_picture_shows_both_sides_of_the_axis() -> None:
+    run = camtool.post(
+        SAMPLES / "screw.dxf", LATHE, camtool.read_job(SAMPLES / "screw.toml"), check=False
+    )
+    scene = scene_of(
+        title="",
+        drawing=run.drawing,
+        job=run.job,
+        toolpath=run.decoded,
+        machine=LATHE.machine,
+    )
+    assert scene.drawing is not None
+    assert extents(scene.drawing.paths).ravel().tolist() == [-2.6, 0.0, -0.6, 0.6]
 
 
 class TestScrew:
