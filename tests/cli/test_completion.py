@@ -41,10 +41,10 @@ def values(told: click.Command, *line: str) -> list[str]:
     [
         (("ver",), ["verify"]),
         (("post", LOGO, "--target", "pic"), ["pic-mmh"]),
-        (("post", LOGO, "-t", "g"), ["grbl"]),
-        (("convert", "x.pic", "--from", "pic-mmh", "--to", "gr"), ["grbl"]),
+        (("post", LOGO, "-t", "g"), ["grbl", "grblhal"]),
+        (("convert", "x.pic", "--from", "pic-mmh", "--to", "gr"), ["grbl", "grblhal"]),
         (("targets", "linux"), ["linuxcnc"]),
-        (("targets", "new", "mine", "--extends", "grb"), ["grbl"]),
+        (("targets", "new", "mine", "--extends", "grb"), ["grbl", "grblhal"]),
         (("post", LOGO, "--layer", ""), ["CUT", "ENGRAVE"]),
         (("post", LOGO, "--layer", "eng"), ["ENGRAVE"]),
         (("check", LOGO, "--exclude-layer", "C"), ["CUT"]),
@@ -85,7 +85,7 @@ def test_files_are_left_to_the_shell(
 
 
 def test_targets_come_with_their_titles(told: click.Command) -> None:
-    (item,) = items(told, "post", LOGO, "-t", "grbl")
+    item, _ = items(told, "post", LOGO, "-t", "grbl")
     assert item.help is not None
     assert "grbl" in item.help
 

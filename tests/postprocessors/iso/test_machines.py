@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.errors import MachineError
+from camtool.errors import CamtoolError, MachineError
 from camtool.importers.read import read_drawing
 from camtool.machine.model import Axis
 from camtool.pipeline import post_drawing
@@ -127,3 +128,70 @@ def test_a_users_file_may_extend_one(tmp_path: Path) -> None:
 def test_a_wrong_name_gets_a_guess() -> None:
     with pytest.raises(MachineError, match="did you mean haas"):
         load_target("hass")
+
+
+CYCLES = [name for name in ON_ISO if load_target(name).machine.dialect.cycles.use]  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("dwell_s", [None, 0.5])
+@pytest.mark.parametrize("name", CYCLES)
+def test_a_cycle_is_the_moves_that_it_stands_for(name: str, dwell_s: float | None) -> None:
+    drawing = read_drawing(Path("samples/plate.dxf"))
+    decoded = []
+    for use in ("true", "false"):
+        target = load_target(name, settings=[f"dialect.cycles.use={use}"])
+        job = job_of(kind="drill", **({} if dwell_s is None else {"dwell_s": dwell_s}))
+        run = post_drawing(drawing, job, target, check=False)
+        assert run.program is not None
+        assert run.decoded is not None
+        assert (b"G98 G8" in run.program.data) == (use == "true")
+        decoded.append([(row.kind, row.end, row.feed, row.value) for row in run.decoded])
+    assert decoded[0] == decoded[1]
+
+
+@pytest.mark.parametrize("name", CYCLES)
+def test_pecks_end_at_the_same_depth_and_above(name: str) -> None:
+    target = load_target(name, settings=["defaults.feed_z_mm=1.0"])
+    job = job_of(kind="drill", peck_mm=0.4)
+    run = post_drawing(read_drawing(Path("samples/plate.dxf")), job, target, check=False)
+    assert run.program is not None
+    assert run.decoded is not None
+    assert run.wanted is not None
+    assert b"G83" in run.program.data
+    for path in (run.wanted, run.decoded):
+        cuts = path.end[path.is_feed]
+        assert cuts[:, 2].min() == pytest.approx(-1.0)
+    bites = [-(row.end[2] - row.start[2]) for row in run.decoded if row.feed is not None]
+    assert max(bites) <= 0.4 + target.machine.dialect.cycles.clearance_mm + 1e-9  # type: ignore[attr-defined]
+
+
+DRAWINGS = sorted(
+    path for path in Path("samples").iterdir() if path.suffix in (".dxf", ".svg", ".csv")
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(FILES))
+@pytest.mark.parametrize("kind", ["profile", "engrave", "pocket", "drill"])
+def test_every_drawing_is_written_and_read_back(name: str, kind: str) -> None:
+    """Those that an operation can cut at all, on every machine alike."""
+    size = ["axes.x.travel_mm=5000", "axes.y.travel_mm=5000", "dialect.cycles.use=false"]
+    target = load_target(name, settings=size[: 3 if name in ON_ISO else 2])
+    unit_mm = target.target.unit_mm(target.machine, target.machine.axes.x)
+    written = 0
+    for file in DRAWINGS:
+        more = {"tool_diameter_mm": 1.0} if kind == "pocket" else {}
+        try:
+            run = post_drawing(read_drawing(file), job_of(kind=kind, **more), target, check=False)
+        except CamtoolError:
+            continue
+        if run.program is None or run.decoded is None:
+            continue
+        assert run.wanted is not None
+        came_from = run.program.row_of_block[run.decoded.block]
+        rows = np.flatnonzero(run.decoded.is_motion & (came_from >= 0))
+        last = rows[np.append(np.diff(came_from[rows]) != 0, True)]
+        stray = np.abs(run.decoded.end[last] - run.wanted.end[came_from[last]])
+        assert stray.max(initial=0.0) <= 0.51 * unit_mm, file
+        written += 1
+    assert written >= 2
