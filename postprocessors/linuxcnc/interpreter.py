@@ -19,7 +19,6 @@ from ..gcode.faults import LineFault
 from .dialect import ToolTableEntry
 from .frames import FRAMES, HOMES
 from .lines import RELATIVE, LinuxcncBlock
-from .modes import names_of, obey
 from .moves import REFUSED, BlockMoves
 from .needs import check, motion_of
 from .state import MM_PER_INCH
@@ -37,6 +36,8 @@ class Interpreter(BlockMoves):
     """Carries out blocks."""
 
     def _names(self) -> dict[str, Callable[[], float]]:
+        from .modes import names_of
+
         return names_of(self)
 
     def execute(self, block: LinuxcncBlock) -> None:
@@ -198,6 +199,8 @@ class Interpreter(BlockMoves):
                 raise LineFault("M19 with a Q that is not above 0", "q")
             self.spindle = None
         else:
+            from .modes import obey
+
             obey(self, code, self.execute)
 
     def _coolant(self, code: int) -> None:

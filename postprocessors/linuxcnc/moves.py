@@ -1,6 +1,7 @@
 """The moves of a block: straight ones, arcs, splines, and the way home.
 
-Cycles, threads, splines and cutter compensation have files of their own.
+Cycles, threads and cutter compensation have files of their own, which only programs load that use
+them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from camtool.toolpath.moves import Kind
 from ..gcode.faults import LineFault
 from ..gcode.part_moves import PLANES, too_many
 from .contour_cycles import BlockMotions, run_cycle
-from .cycles import drill, follow_spindle, thread
 from .frames import HOMES, FrameCodes
 from .lines import AXES, LinuxcncBlock
 from .needs import LATHE_CYCLES
@@ -89,6 +89,9 @@ class BlockMoves(FrameCodes):
             self.series.height = None
 
     def _other(self, motion: int, block: LinuxcncBlock, words: dict[str, float]) -> None:
+        if _is_cycle(motion) or motion in (330, 331, 760):
+            from .cycles import drill, follow_spindle, thread
+
         if _is_cycle(motion):
             self.canon.feed = self._rate(block)
             drill(self, LinuxcncBlock(words, block.g, block.m, None), motion)

@@ -20,7 +20,7 @@ from tests.drawings import drawing_of
 from tests.oracles.rs274 import interpreted, needs_rs274
 
 SAMPLES = Path(__file__).parents[2] / "samples"
-LATHE = load_target("linuxcnc", machine_file=SAMPLES / "linuxcnc-lathe.toml")
+LATHE = load_target("linuxcnc", machine_file=SAMPLES / "machines" / "linuxcnc-lathe.toml")
 
 JOB = """
 feed = 20
