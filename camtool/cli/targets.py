@@ -14,7 +14,7 @@ import click
 from camtool.cli.files import STDOUT, check_new, check_places, read_bytes, write_all
 from camtool.cli.messages import in_colour, say, show_text
 from camtool.cli.options import MachineFlags, talk_options
-from camtool.errors import CamtoolError, OptionError
+from camtool.errors import CamtoolError, OptionError, ProgramError
 from camtool.plain import one_line, to_json
 from camtool.project import project_of
 from camtool.tables import parse_table
@@ -112,7 +112,7 @@ def new(
     from camtool.target.registry import find_target, list_target
     from camtool.target.template import machine_template
 
-    data = b"" if from_program is None else read_bytes(from_program)
+    data = b"" if from_program is None else read_bytes(from_program) or b"\n"
     if extends is None:
         if from_program is None:
             raise click.UsageError("--extends or --from-program is missing: what is it like?")
@@ -120,7 +120,11 @@ def new(
     base = list_target(extends)
     asks = (sys.stdin.isatty() and output != STDOUT) if ask is None else ask
     wants_dialect = from_program is not None or ask is True
-    dialect = find_target(extends)[0].dialect_from(data) if wants_dialect or asks else None
+    try:
+        dialect = find_target(extends)[0].dialect_from(data) if wants_dialect or asks else None
+    except ProgramError as error:
+        error.file = error.file or from_program
+        raise
     if dialect is None and wants_dialect:
         raise OptionError(
             f"the dialect of {extends} is not described by a file",

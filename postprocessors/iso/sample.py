@@ -15,6 +15,7 @@ from typing import Final
 
 from msgspec import Struct, field
 
+from camtool.errors import ProgramError
 from camtool.target.contract import ControllerSetting, OpenKey, SampledDialect
 
 from .lines import NUMBER
@@ -75,10 +76,16 @@ class _Sample(Struct):
 
 
 def sampled_dialect(data: bytes) -> SampledDialect:
-    """Return the keys that a program shows, and those that it leaves open."""
+    """Return the keys that a program shows, and those that it leaves open; ProgramError for what
+    is no program of G-code."""
     text = data.decode("latin-1")
     sample = _Sample()
     lines = list(_lines(text))
+    if data and not _motions(lines):
+        raise ProgramError(
+            "has no move such as G1 X1: it is no program of G-code",
+            mend="give a program that the controller has run",
+        )
     _see_lines(text, lines, sample)
     if lines:
         motions = _motions(lines)
@@ -162,8 +169,8 @@ def _see_lines(text: str, lines: Sequence[_Line], sample: _Sample) -> None:
             "semicolon",
             "none",
         )
-    if re.match(r"\s*%", text):
-        sample.say("dialect.program.frame", "%", "the first line")
+    if re.search(r"^\s*%\s*$", text, re.MULTILINE):
+        sample.say("dialect.program.frame", "%", "a line of its own")
 
 
 def _see_words(

@@ -1,17 +1,22 @@
 """A machine file from a sample program: what the program shows, what is asked, what is read."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from camtool_postprocessors.iso.sample import sampled_dialect
+from hypothesis import given
+from hypothesis import strategies as st
 
+from camtool.errors import MachineError, ProgramError
 from camtool.tables import parse_table
 from camtool.target.registry import load_target as load
 from camtool.target.registry import loaded_target, own_target_of, shipped_files
 from camtool.target.template import machine_template
 from tests.postprocessors.gcode.parts import part
+from tests.strategies import examples
 
 ON_ISO = sorted(name for name in shipped_files() if own_target_of(name) == "iso")
 
@@ -98,3 +103,25 @@ def test_a_file_made_of_a_program_reads_it_alike(name: str) -> None:
     kept = [(move.kind, move.end) for move in one if move.kind.name in ("RAPID", "LINE")]
     wanted = [(move.kind, move.end) for move in other if move.kind.name in ("RAPID", "LINE")]
     assert kept == wanted
+
+
+@pytest.mark.parametrize("data", [b"\n", b"hello", b"<svg/>", b"G90\nM30\n", b"\x00\xff" * 99])
+def test_what_is_no_program_is_refused(data: bytes) -> None:
+    with pytest.raises(ProgramError, match="no move such as G1 X1"):
+        sampled_dialect(data)
+
+
+WORDS = st.sampled_from(list("GMXYZIJKRFSTHPQN()%;O0123456789.+- \n\r"))
+
+
+@examples(150, 10_000)
+@given(st.binary(max_size=200) | st.lists(WORDS, max_size=120).map("".join).map(str.encode))
+def test_anything_is_a_dialect_or_refused(data: bytes) -> None:
+    try:
+        sampled = sampled_dialect(data)
+    except ProgramError:
+        return
+    base = Path("postprocessors/iso/machine.toml").read_text(encoding="utf-8")
+    text = machine_template("mine", "iso", base, (), sampled.settings)
+    with suppress(MachineError):  # a head of anything may be no head; it is named
+        loaded_target("iso", (parse_table(text), "mine.toml"))
