@@ -33,6 +33,9 @@ from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 _Machine = Machine[Any, Any]
 
+MIN_MOVE_MM = 1e-9
+"""Shorter moves are none (`Move.__init__` of Klipper's toolhead.py)."""
+
 
 class PlannedMoves(Struct, frozen=True, eq=False):
     """The moves of a planner, M rows of a toolpath: `row` (M,) of the program that each is a part
@@ -159,10 +162,13 @@ def profile(plan: SpeedPlan, squares: Floats) -> Floats:
 
 
 def directions(path: Toolpath) -> tuple[Floats, Floats]:
-    """Return the lengths (M,) mm of straight moves, 0 of events, and unit vectors (M, 3)."""
+    """Return the lengths (M,) mm of straight moves, 0 of events and of moves below
+    `MIN_MOVE_MM`, and unit vectors (M, 3), 0 where the length is."""
     travel = np.diff(path.end, axis=0, prepend=path.start[None, :])
     length = np.sqrt((travel**2).sum(axis=1))
-    return length, travel / np.where(length > 0.0, length, 1.0)[:, None]
+    moves = length >= MIN_MOVE_MM
+    unit = np.where(moves[:, None], travel, 0.0) / np.where(moves, length, 1.0)[:, None]
+    return np.where(moves, length, 0.0), unit
 
 
 def sections(moving: Ints, stops: Bools) -> Iterator[Ints]:

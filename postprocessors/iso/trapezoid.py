@@ -23,7 +23,7 @@ from camtool.simulation.speed_plan import SpeedPlan, axis_limits, max_along
 from camtool.toolpath.moves import EVENTS_AT_REST, Kind, Toolpath
 
 from .controllers import TrapezoidController
-from .timed import PlannedMoves, TimedModel, directions, profile, sections
+from .timed import MIN_MOVE_MM, PlannedMoves, TimedModel, directions, profile, sections
 
 STRAIGHT_COS = 0.999999
 """Beyond this cosine of the turn two moves are straight on."""
@@ -44,6 +44,7 @@ class TrapezoidModel(TimedModel):
         controller = machine.controller
         assert isinstance(controller, TrapezoidController)
         length = move_lengths(path)
+        length = np.where(length >= MIN_MOVE_MM, length, 0.0)
         begins, ends = _tangents(path, length)
         speed, acceleration = _limits(path, begins, machine)
         speeds = np.zeros((3, len(path)))

@@ -165,3 +165,9 @@ def test_motors_step_where_their_axes_pass_the_middle_of_a_step() -> None:
     steps = rows[0].commanded / STEP_MM
     assert steps == pytest.approx(np.rint(steps), abs=1e-9)
     assert rows[0].steps.tolist() == [500, 500, 250]
+
+
+def test_a_move_of_no_length_that_can_be_counted_is_none() -> None:
+    builder = ToolpathBuilder().line(0.0, 0.0, -2.2e-309, feed=600.0)
+    path = builder.line(1e-10, 0.0, 0.0, feed=600.0).finish()
+    assert seconds(path).tolist() == [0.0, 0.0]

@@ -79,3 +79,9 @@ def test_accelerations_are_needed() -> None:
     path = ToolpathBuilder().line(1.0, 0.0, 0.0, feed=600.0).finish()
     with pytest.raises(MachineError, match="acceleration_mm_s2"):
         TrapezoidModel().seconds(path, replace(whole, axes=axes))
+
+
+def test_a_move_of_no_length_that_can_be_counted_is_none() -> None:
+    builder = ToolpathBuilder().line(0.0, 0.0, -2.2e-309, feed=600.0)
+    path = builder.line(1e-10, 0.0, 0.0, feed=600.0).finish()
+    assert TrapezoidModel().seconds(path, machine()).tolist() == [0.0, 0.0]
