@@ -83,7 +83,7 @@ def _limits(
     speed = np.minimum(feed, controller.max_velocity_mm_s)
     z_speed = controller.max_z_velocity_mm_s or controller.max_velocity_mm_s
     z_acceleration = controller.max_z_accel_mm_s2 or controller.max_accel_mm_s2
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         ratio = 1.0 / np.abs(unit[:, 2])
     speed = np.minimum(speed, z_speed * ratio)
     return speed, np.minimum(controller.max_accel_mm_s2, z_acceleration * ratio)
@@ -189,7 +189,7 @@ def corners(unit: Floats, delta: Floats, acceleration: Floats, deviation_mm: flo
     sine = np.sqrt(np.maximum(0.5 * (1.0 - cosine), 0.0))
     half_cosine = np.sqrt(np.maximum(0.5 * (1.0 + cosine), 0.0))
     bends = (1.0 - sine > 0.0) & (half_cosine > 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         by_deviation = sine / (1.0 - sine) * deviation_mm
         by_middles = 0.25 * sine / half_cosine
     lower = np.minimum(acceleration[1:], acceleration[:-1]) * by_deviation

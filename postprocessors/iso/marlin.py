@@ -154,7 +154,7 @@ def _limits(
     assert isinstance(controller, MarlinController)
     moves = length > 0.0
     rates = axis_limits(machine, "max_rate_mm_min") / 60.0
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         speed = (rates / np.abs(unit)).min(axis=1)
         per_mm = np.where(moves, events / length, 1.0)
     acceleration = np.ceil(controller.travel_acceleration_mm_s2 * per_mm)
@@ -163,7 +163,7 @@ def _limits(
     for axis in range(3):
         steps = np.rint(length * np.abs(unit[:, axis]) / step_mm[axis])
         slower = (steps > 0.0) & (of_axes[axis] < acceleration)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             possible = np.floor(of_axes[axis] * events / steps)
         acceleration = np.where(slower, np.minimum(acceleration, possible), acceleration)
     return speed, acceleration / per_mm
@@ -182,7 +182,7 @@ def _corners(
     across = np.sqrt((turn**2).sum(axis=1))
     turn /= np.where(across > 0.0, across, 1.0)[:, None]
     of_axes = axis_limits(machine, "acceleration_mm_s2")
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         allowed = np.minimum(acceleration[1:], (of_axes / np.abs(turn)).min(axis=1))
         sine = np.sqrt(0.5 * (1.0 - cosine))
         square = allowed * controller.junction_deviation_mm * sine / (1.0 - sine)
@@ -216,7 +216,7 @@ def jerk_corners(unit: Floats, speed: Floats, jerk_mm_s: tuple[float, float, flo
     """
     jerk = np.array(jerk_mm_s)
     own = np.abs(unit) * speed[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         safe = speed * np.minimum(1.0, np.where(own > jerk, jerk / own, 1.0).min(axis=1))
     lower = np.minimum(speed[1:], speed[:-1])
     factor = np.ones(len(lower))
@@ -226,7 +226,7 @@ def jerk_corners(unit: Floats, speed: Floats, jerk_mm_s: tuple[float, float, flo
         entering = unit[1:, axis] * speed[1:] * factor
         high, low = np.maximum(leaving, entering), np.minimum(leaving, entering)
         change = np.where((low > 0.0) | (high < 0.0), high - low, np.maximum(high, -low))
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             factor *= np.where(change > jerk[axis], jerk[axis] / change, 1.0)
     corner = lower * factor
     stops = (safe[:-1] > 0.99 * corner) & (safe[1:] > 0.99 * corner)

@@ -55,7 +55,7 @@ class PlannedMoves(Struct, frozen=True, eq=False):
     def ramps_s(self) -> Floats:
         """Return (3, M) s: how long each accelerates, cruises and brakes."""
         moves = self.length > 0.0
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             first = (self.peak - self.entry) / self.acceleration
             last = (self.peak - self.exit) / self.acceleration
             ramps_mm = 0.5 * (first * (self.peak + self.entry) + last * (self.peak + self.exit))

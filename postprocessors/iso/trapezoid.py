@@ -102,7 +102,7 @@ def _corners(begins: Floats, ends: Floats, corner_mm_s: float) -> Floats:
     """Return (K,) mm/s: the highest speed at the start of each move; 0 for the first one."""
     cosine = np.clip((begins[1:] * ends[:-1]).sum(axis=1), -1.0, 1.0)
     sine = np.sqrt(0.5 * (1.0 + cosine))  # of half the angle between the way back and the way on
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         square = corner_mm_s**2 * (np.sqrt(2.0) - 1.0) * sine / (1.0 - sine)
     speed = np.where(cosine > STRAIGHT_COS, np.inf, np.sqrt(square))
     return np.concatenate([np.zeros(min(len(begins), 1)), speed])

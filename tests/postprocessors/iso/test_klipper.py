@@ -171,3 +171,8 @@ def test_a_move_of_no_length_that_can_be_counted_is_none() -> None:
     builder = ToolpathBuilder().line(0.0, 0.0, -2.2e-309, feed=600.0)
     path = builder.line(1e-10, 0.0, 0.0, feed=600.0).finish()
     assert seconds(path).tolist() == [0.0, 0.0]
+
+
+def test_an_axis_may_move_next_to_nothing() -> None:
+    path = ToolpathBuilder().line(10.0, 1e-310, -2.2e-309, feed=600.0).finish()
+    assert 1.0 < seconds(path)[0] < 1.3

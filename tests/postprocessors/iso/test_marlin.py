@@ -203,3 +203,8 @@ def test_every_event_of_a_spindle_stops() -> None:
     passes = MarlinModel().planned(path(Kind.MESSAGE), machine())
     assert stops.exit[0] == 0.0
     assert passes.exit[0] == pytest.approx(20.0)
+
+
+def test_an_axis_may_move_next_to_nothing() -> None:
+    path = ToolpathBuilder().line(10.0, 1e-310, -2.2e-309, feed=600.0).finish()
+    assert 1.0 < seconds(path)[0] < 1.3
