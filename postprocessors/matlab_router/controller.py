@@ -157,7 +157,6 @@ class _Run:
         self._home = np.array(machine.controller.machine_zero_mm)
         coded = np.array([axis.coded_step_mm for axis in machine.axes])
         self._count_mm = SIGNS * coded
-        self._count: Ints = self._state.slaves[:, 0].copy()
         self._samples = options.chunk_steps
 
     def run(self) -> Iterator[Chunk]:
@@ -257,7 +256,8 @@ class _Run:
         first = min(first, int(row[0])) if len(row) else first
         rows = np.arange(first, last)
         offsets = np.searchsorted(row, np.arange(first, last + 1))
-        commanded = self._home + count * self._count_mm
+        commanded = count * self._count_mm
+        commanded += self._home
         slide, reversals = NO_SAMPLES, np.zeros((len(rows), 3), dtype=np.int64)
         if len(row):
             slide, reversals = self._mechanics.follow(commanded, offsets)
@@ -270,20 +270,13 @@ class _Run:
             duration_s=seconds,
             compensation_s=np.zeros(len(rows)),
             iterations=np.diff(offsets),
-            steps=self._run_counts(count, offsets),
+            steps=self._account.steps[first:last].copy(),
             reversals=reversals,
             ended=~is_complete | self._account.ended[rows],
         )
+        # The next chunk may go on in the last of these rows.
+        self._account.steps[first:last] = 0
         return Chunk(row, commanded, slide, ledger)
-
-    def _run_counts(self, count: Ints, offsets: Ints) -> Ints:
-        """Compute the counts (R, 3) of each run from tick to tick, on from where the last chunk
-        ended."""
-        along = np.concatenate([self._count[None, :], count])
-        self._count = along[-1]
-        travel = np.abs(np.diff(along, axis=0)).cumsum(axis=0)
-        total = np.concatenate([np.zeros((1, 3), dtype=np.int64), travel])
-        return np.asarray(np.diff(total[offsets], axis=0))
 
 
 # What the master of the Matlab router orders: rows of a toolpath as lines of its slaves.
@@ -638,5 +631,5 @@ def state_of(start_mm: Floats, machine: _Machine) -> State:
 
 def account_of(rows: int) -> Account:
     """Nothing done yet."""
-    zeros = np.zeros(rows)
-    return Account(zeros, zeros.astype(np.int64), np.ones(rows, dtype=np.bool_))
+    steps = np.zeros((rows, 3), dtype=np.int64)
+    return Account(np.zeros(rows), steps, np.ones(rows, dtype=np.bool_))

@@ -35,7 +35,7 @@ class State(NamedTuple):
 
 class Account(NamedTuple):
     ticks: Floats
-    loops: Ints
+    steps: Ints
     ended: Bools
 
 def slaves_fill(

@@ -21,9 +21,9 @@ cpdef enum:
     # Columns of `Program.axes`.
     GAIN = 0, TAU, FRICTION, KID, KPD, CHUNK, PHASE, HOME_SPEED
     # Columns of `State.motors`: counts, counts in a tick, moments in ticks, percent, for the text.
-    PLACE = 0, SPEED, BEGIN, DONE, DRIVE, SPEED_BEFORE
+    PLACE = 0, SPEED, BEGIN, DONE, DRIVE, SPEED_BEFORE, MOTOR_COLUMNS
     # Columns of `State.slaves`.
-    COUNT = 0, UP, WRAPS, STAGE, LEFT, SHOWN, SEEN, SUM, REF, NEXT_REF, TARGET
+    COUNT = 0, UP, WRAPS, STAGE, LEFT, SHOWN, SEEN, SUM, REF, NEXT_REF, TARGET, SLAVE_COLUMNS
     # What a slave does, in its column STAGE; FOLLOWING is the text's way of running a line.
     STILL = 0, WAITING, CRUISING, SLOWING, HOMING, FOLLOWING
     # Columns of `Program.lines` behind the amounts and the speeds of three axes.
@@ -76,10 +76,10 @@ class State(NamedTuple):
 
 
 class Account(NamedTuple):
-    """Results of the rows so far: ticks (N,) that they took, loops (N,) of the slaves, ended (N,)."""
+    """Results of the rows so far: ticks (N,) that they took, steps (N, 3) in counts, ended (N,)."""
 
     ticks: Floats
-    loops: Ints
+    steps: Ints
     ended: Bools
 
 
@@ -95,7 +95,7 @@ cdef Int _int32(Int value) noexcept:
 
 
 cdef void listed_loop(
-    double[::1] motor, Int[::1] slave, double[::1] axis, Int[::1] table
+    double* motor, Int* slave, double* axis, Int* table
 ) noexcept:
     """The interrupt of the listing: L5496-5584."""
     cdef Int phase, shown, change, drive, left, fast, speed, ref, kid, kpd
@@ -120,7 +120,7 @@ cdef void listed_loop(
     motor[DRIVE] = float(drive)
 
 
-cdef void text_loop(double[::1] motor, Int[::1] slave, double[::1] axis, Int top) noexcept:
+cdef void text_loop(double* motor, Int* slave, double* axis, Int top) noexcept:
     """Equations 4.15-4.18 and 4.27: the reference by the way that is left, and the loop in its
     velocity form. Nothing drives an axis that has arrived."""
     speed = float(slave[COUNT] - slave[SHOWN])
@@ -135,7 +135,7 @@ cdef void text_loop(double[::1] motor, Int[::1] slave, double[::1] axis, Int top
     motor[SPEED_BEFORE] = speed
 
 
-cdef Int _seen_way(Int[::1] slave, double[::1] axis, Int up) noexcept:
+cdef Int _seen_way(Int* slave, double* axis, Int up) noexcept:
     """Posi of the main loop, when the counter's direction is `up`."""
     cdef Int phase, shown
     phase = int(axis[PHASE])
@@ -143,7 +143,7 @@ cdef Int _seen_way(Int[::1] slave, double[::1] axis, Int up) noexcept:
     return int((shown if up == 1 else TURN - 1 - shown) + (TURN - 1) * slave[WRAPS])
 
 
-cdef Int to_go_of(Int[::1] slave, double[::1] axis, Int sense) noexcept:
+cdef Int to_go_of(Int* slave, double* axis, Int sense) noexcept:
     """Counts in the direction `sense` until the loop that the slave is in ends.
 
     Posi does not fall: within the turn number k it is c + 1023 k, c = 0 … 1023. It first reaches
@@ -173,7 +173,7 @@ cdef Int to_go_of(Int[::1] slave, double[::1] axis, Int sense) noexcept:
     return int(way) if up == slave[UP] else int(max(way, 1))
 
 
-cdef void next_stage(double[::1] motor, Int[::1] slave, double moment) noexcept:
+cdef void next_stage(double* motor, Int* slave, double moment) noexcept:
     """The count that the slave waited for has come."""
     if slave[STAGE] == CRUISING and slave[LEFT] > 1:
         slave[LEFT] -= 1
@@ -185,7 +185,7 @@ cdef void next_stage(double[::1] motor, Int[::1] slave, double moment) noexcept:
         motor[DONE], motor[DRIVE] = moment, 0.0
 
 
-cdef void start_line(double[::1] motor, Int[::1] slave, bint text) noexcept:
+cdef void start_line(double* motor, Int* slave, bint text) noexcept:
     """The master's word to go. The text's distances add up, so that what an axis went too far is
     taken back by its next line; the listing's begin where the axis is."""
     cdef Int amount
@@ -266,16 +266,17 @@ cdef double _moment(double way, double speed, double aim, double tau, double mos
 
 
 cdef (double, bint) _glide(
-    double[::1] motor, Int[::1] slave, double[::1] axis, double aim, Int sense, double ticks,
-    Int to_go
+    double* motor, Int* slave, double* axis, double aim, Int sense, double ticks,
+    Int to_go, double whole_fade
 ) noexcept:
     """Move one way (`sense`) for so many ticks at most, and so many counts until the loop ends,
-    without a turn; returns the ticks it took and whether the loop ends there."""
+    without a turn; returns the ticks it took and whether the loop ends there. `whole_fade` is
+    1 − q of a whole tick."""
     cdef Int count, new, phase
     cdef bint reached
     cdef double end, fade
     place, speed, tau, count = motor[PLACE], motor[SPEED], axis[TAU], slave[COUNT]
-    fade = -math.expm1(-ticks / tau)
+    fade = whole_fade if ticks == 1.0 else -math.expm1(-ticks / tau)
     end = place + aim * ticks + (speed - aim) * tau * fade
     if sense > 0:
         new = int(math.floor(end))
@@ -299,7 +300,7 @@ cdef (double, bint) _glide(
 
 
 cdef double _home(
-    double[::1] motor, Int[::1] slave, double[::1] axis, double at, Int tick
+    double* motor, Int* slave, double* axis, double at, Int tick
 ) noexcept:
     """Run home evenly from `at` in a tick, and stand there; returns the time within the tick."""
     cdef Int phase, count, k
@@ -309,9 +310,9 @@ cdef double _home(
         count = int(math.floor(motor[PLACE]))
         slave[COUNT] = count
         return 1.0
-    for k in range(len(motor)):
+    for k in range(MOTOR_COLUMNS):
         motor[k] = 0.0
-    for k in range(len(slave)):
+    for k in range(SLAVE_COLUMNS):
         slave[k] = 0
     motor[DONE] = float(tick) + at + needed
     phase = int(axis[PHASE])
@@ -320,7 +321,7 @@ cdef double _home(
 
 
 cdef void _advance(
-    double[::1] motor, Int[::1] slave, double[::1] axis, Int tick, bint text
+    double* motor, Int* slave, double* axis, Int tick, bint text, double whole_fade
 ) noexcept:
     """Advance one motor by one tick, from event to event."""
     cdef Int sense, to_go
@@ -353,7 +354,7 @@ cdef void _advance(
         if speed * aim < 0.0:
             back = axis[TAU] * math.log1p(-speed / aim)
             ticks, turns = min(ticks, back), back <= ticks
-        took, reached = _glide(motor, slave, axis, aim, sense, ticks, to_go)
+        took, reached = _glide(motor, slave, axis, aim, sense, ticks, to_go, whole_fade)
         if reached:
             next_stage(motor, slave, float(tick) + at + took)
             at += took
@@ -370,7 +371,8 @@ cdef class Slaves:
 
     cdef int[:, ::1] lines
     cdef Int[:, ::1] slaves
-    cdef Int[::1] table, clock, loops
+    cdef Int[:, ::1] steps
+    cdef Int[::1] table, clock
     cdef double[:, ::1] axes, motors
     cdef double[::1] pauses, begin, ticks
     cdef uint8_t[::1] ended
@@ -380,7 +382,7 @@ cdef class Slaves:
     def __init__(self, program: Program, state: State, account: Account) -> None:
         self.lines, self.pauses, self.axes, self.table, self.lag, self.text = program
         self.motors, self.slaves, self.clock, self.begin = state
-        self.ticks, self.loops, self.ended = account
+        self.ticks, self.steps, self.ended = account
 
 
 cdef void _open(Slaves all_, Int line) noexcept:
@@ -420,16 +422,17 @@ cdef void _close(Slaves all_, Int line, Int tick) noexcept:
 cdef Int _row(Slaves all_, Int line, Int tick) noexcept:
     """Whose sample the places at a tick are: the start of a row is none of it."""
     cdef Int first, second, axis, ahead
-    cdef int[:, ::1] lines
-    cdef double[::1] begin
-    lines, begin = all_.lines, all_.begin
-    if line == len(lines) or float(tick) <= begin[0]:
+    cdef int* order
+    cdef double* begin
+    begin = &all_.begin[0]
+    if line == len(all_.lines) or float(tick) <= begin[0]:
         return int(all_.clock[2])
-    first, second = lines[line, FIRST_ROW], lines[line, SECOND_ROW]
+    order = &all_.lines[line, 0]
+    first, second = order[FIRST_ROW], order[SECOND_ROW]
     if first != second and begin[1] <= begin[0]:
-        axis = lines[line, PART_AXIS]
-        ahead = all_.slaves[axis, COUNT] - lines[line, PART_COUNT]
-        if (ahead if lines[line, 3 + axis] >= 0 else -ahead) > 0:
+        axis = order[PART_AXIS]
+        ahead = all_.slaves[axis, COUNT] - order[PART_COUNT]
+        if (ahead if order[3 + axis] >= 0 else -ahead) > 0:
             begin[1] = float(tick)
     if begin[1] > begin[0]:
         return int(second)
@@ -453,6 +456,18 @@ cdef void _given_up(double[:, ::1] motors, Int[:, ::1] slaves, Int tick) noexcep
             motors[index, DONE], motors[index, DRIVE] = float(tick), 0.0
 
 
+cdef inline bint _is_at_rest(double* motor, Int* slave, double* axis, Int tick) noexcept:
+    """True if neither the loop nor the motor changes anything in this tick: the axis stands
+    without drive, waits for no word that comes within the tick, and has been seen to stand."""
+    cdef Int phase
+    if motor[SPEED] != 0.0 or motor[DRIVE] != 0.0 or slave[REF] != 0:
+        return False
+    if slave[STAGE] != STILL and (slave[STAGE] != WAITING or motor[BEGIN] < float(tick + 1)):
+        return False
+    phase = int(axis[PHASE])
+    return slave[SEEN] == 0 and slave[SHOWN] == (slave[COUNT] + phase) & (TURN - 1)
+
+
 cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1] row):
     """Counts of the axes at each tick into `out` (n, 3), the rows that they belong to into `row`
     (n,), until these are full or all lines have run and their last pause is over.
@@ -460,48 +475,57 @@ cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1]
     `state` goes on from call to call; `account` grows. Returns samples filled, and whether that
     was all.
     """
-    cdef Int top, count, filled, tick, line, index
-    cdef int[:, ::1] lines
+    cdef Int top, count, filled, tick, line, index, before, of
     cdef Int[:, ::1] slaves
-    cdef Int[::1] table, slave, clock
     cdef Slaves all_
     cdef bint text
-    cdef double[:, ::1] motors, axes
-    cdef double[::1] begin, motor, axis
+    cdef double[3] whole_fade
+    cdef double* begin
+    cdef double* motor
+    cdef double* axis
+    cdef Int* slave
+    cdef Int* steps
     all_ = Slaves(program, state, account)
-    lines, axes, table, begin = all_.lines, all_.axes, all_.table, all_.begin
-    motors, slaves, clock, text = all_.motors, all_.slaves, all_.clock, all_.text
-    top = table[TABLE_COUNTS]
-    count, filled = len(lines), 0
-    tick, line = clock[0], clock[1]
+    begin, slaves, text = &all_.begin[0], all_.slaves, all_.text
+    top = all_.table[TABLE_COUNTS]
+    count, filled = len(all_.lines), 0
+    tick, line = all_.clock[0], all_.clock[1]
+    for index in range(3):
+        whole_fade[index] = -math.expm1(-1.0 / all_.axes[index, TAU])
     while filled < len(out) and (line < count or float(tick) < begin[0]):
         if tick == 0 and count > 0:
             _open(all_, 0)
         for index in range(3):
-            motor, slave, axis = motors[index], slaves[index], axes[index]
+            motor, slave, axis = &all_.motors[index, 0], &slaves[index, 0], &all_.axes[index, 0]
+            out[filled, index] = slave[COUNT]
             if slave[STAGE] == HOMING:
                 motor[DRIVE] = 0.0
             elif text:
                 text_loop(motor, slave, axis, top)
+            elif _is_at_rest(motor, slave, axis, tick):
+                continue
             else:
-                listed_loop(motor, slave, axis, table)
-            _advance(motor, slave, axis, tick, text)
+                listed_loop(motor, slave, axis, &all_.table[0])
+            _advance(motor, slave, axis, tick, text, whole_fade[index])
         tick += 1
-        row[filled] = _row(all_, line, tick)
-        all_.loops[row[filled]] += 1
+        of = _row(all_, line, tick)
+        row[filled] = of
+        steps = &all_.steps[of, 0]
         for index in range(3):
+            before = out[filled, index]
             out[filled, index] = slaves[index, COUNT]
+            steps[index] += abs(slaves[index, COUNT] - before)
         filled += 1
         if line == count or float(tick) < begin[0]:
             continue
-        if float(tick) - begin[0] > float(lines[line, MAX_TICKS]):
+        if float(tick) - begin[0] > float(all_.lines[line, MAX_TICKS]):
             if not _all_still(slaves):
-                all_.ended[lines[line, SECOND_ROW]] = False
-            _given_up(motors, slaves, tick)
+                all_.ended[all_.lines[line, SECOND_ROW]] = False
+            _given_up(all_.motors, slaves, tick)
         if _all_still(slaves):
             _close(all_, line, tick)
             line += 1
             if line < count:
                 _open(all_, line)
-    clock[0], clock[1] = tick, line
+    all_.clock[0], all_.clock[1] = tick, line
     return filled, line == count and float(tick) >= begin[0]

@@ -46,7 +46,7 @@ def filled(
         inside[index, 5] = slave.count if text else slave.conv
     state = State(motors, inside, np.zeros(3, dtype=np.int64), np.zeros(2))
     count = len(orders)
-    account = Account(np.zeros(count), np.zeros(count, np.int64), np.ones(count, np.bool_))
+    account = Account(np.zeros(count), np.zeros((count, 3), np.int64), np.ones(count, np.bool_))
     found, rows, over = [], [], False
     while not over:
         out, row = np.empty((chunk, 3), np.int64), np.empty(chunk, np.int64)
@@ -59,9 +59,13 @@ def filled(
 def same(slaves: list[Slave], orders: list[list[tuple[int, int]]], pauses: list[float]) -> None:
     """The kernel's counts are those of the literal loop, each of them; its times too, but for the
     rounding of a motor that is followed in thousands of pieces."""
-    found, _, account = filled(slaves, orders, pauses)
+    start = [slave.count for slave in slaves]
+    found, rows, account = filled(slaves, orders, pauses)
     counts, begins = run(slaves, orders, pauses, 0.08)
     assert found.tolist() == counts
+    steps = np.zeros_like(account.steps)
+    np.add.at(steps, rows, np.abs(np.diff(found, axis=0, prepend=[start])))
+    assert account.steps.tolist() == steps.tolist()
     assert account.ticks == pytest.approx(np.diff(begins), abs=1e-7)
     assert account.ended.all()
 
@@ -206,7 +210,7 @@ def test_a_loop_that_never_gets_there_is_given_up() -> None:
     state = State(
         np.zeros((3, 6)), np.zeros((3, 11), np.int64), np.zeros(3, np.int64), np.zeros(2)
     )
-    account = Account(np.zeros(1), np.zeros(1, np.int64), np.ones(1, np.bool_))
+    account = Account(np.zeros(1), np.zeros((1, 3), np.int64), np.ones(1, np.bool_))
     out, row = np.empty((1000, 3), np.int64), np.empty(1000, np.int64)
     number, over = slaves_fill(program, state, account, out, row)
     assert (number, over, bool(account.ended[0])) == (53, True, False)
