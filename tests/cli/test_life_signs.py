@@ -4,16 +4,20 @@ import io
 import os
 import pty
 import re
-import subprocess
 import sys
 import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from camtool.cli import life_signs as module
 from camtool.cli.life_signs import LifeSigns, life_signs
+from camtool.cli.main import main
 from camtool.progress import Progress
+from tests.cli.conftest import Run
 from tests.waiting import HANG_S, all_written
 
 
@@ -92,35 +96,38 @@ def test_a_share_is_known_where_the_count_is() -> None:
     assert progress.share is None
 
 
-SLOWLY = """
-import sys, time
-from camtool.cli import life_signs
-from camtool.progress import Progress
-life_signs.AFTER_S, life_signs.EVERY_S = 0.0, 0.001
-begin = Progress.begin
-def begin_slowly(self, *words):
-    begin(self, *words)
-    time.sleep(0.05)
-Progress.begin = begin_slowly
-from camtool.cli.main import main
-sys.argv[0] = "camtool"
-main()
-"""
-"""camtool as if every second were a thousandth; each stage lasts long enough to be seen."""
+@pytest.fixture
+def slowly(at_once: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each stage lasts long enough to be seen."""
+    begin = Progress.begin
+
+    def begin_slowly(self: Progress, *words: Any) -> None:
+        begin(self, *words)
+        time.sleep(0.05)
+
+    monkeypatch.setattr(module, "EVERY_S", 0.001)
+    monkeypatch.setattr(Progress, "begin", begin_slowly)
 
 
 def on_terminal(*arguments: str, folder: Path) -> bytes:
     """Return all that a command writes to a terminal, progress lines included."""
     ours, theirs = pty.openpty()
-    command = [sys.executable, "-c", SLOWLY, *arguments]
-    environment = os.environ | {"TERM": "xterm", "COLUMNS": "100"}
-    with subprocess.Popen(
-        command, stdout=theirs, stderr=theirs, env=environment, cwd=folder
-    ) as process:
-        os.close(theirs)
-        written = all_written(ours)
-    assert process.returncode == 0
-    return written
+    with ThreadPoolExecutor(1) as other, pytest.MonkeyPatch.context() as patch:
+        written = other.submit(all_written, ours)
+        try:
+            with os.fdopen(theirs, "w", buffering=1, encoding="utf-8") as terminal:
+                patch.chdir(folder)
+                patch.setenv("COLUMNS", "100")
+                patch.setattr(sys, "argv", ["camtool", *arguments])
+                patch.setattr(sys, "stdout", terminal)
+                patch.setattr(sys, "stderr", terminal)
+                patch.setattr(sys, "unraisablehook", sys.unraisablehook)
+                with pytest.raises(SystemExit) as stopped:
+                    main()
+        finally:
+            found = written.result()
+    assert not stopped.value.code, found
+    return found
 
 
 def shown_after(written: bytes) -> list[str]:
@@ -152,7 +159,7 @@ def shown_after(written: bytes) -> list[str]:
     ],
 )
 def test_each_command_shows_its_stages_on_a_terminal_and_leaves_none_of_them(
-    line: str, stages: list[str], samples: Path, tmp_path: Path
+    camtool: Run, slowly: None, line: str, stages: list[str], samples: Path, tmp_path: Path
 ) -> None:
     logo = samples / "logo.dxf"
     places = {"logo": str(logo), "program": str(tmp_path / "logo.nc")}
@@ -160,8 +167,8 @@ def test_each_command_shows_its_stages_on_a_terminal_and_leaves_none_of_them(
         (tmp_path / "logo.dxf").write_bytes(logo.read_bytes())
         places["logo"] = str(tmp_path / "logo.dxf")
     if "{program}" in line or "stale" in line:
-        make = [sys.executable, "-m", "camtool", "post", str(logo), "-t", "grbl", "-q"]
-        subprocess.run([*make, "-o", places["program"]], check=True, stderr=subprocess.PIPE)
+        made = camtool("post", logo, "-t", "grbl", "-q", "-o", places["program"])
+        assert made.returncode == 0, made.stderr
     words = [word.format(**places) for word in line.split()]
     written = on_terminal(*words, folder=tmp_path)
     for stage in stages:
@@ -169,12 +176,8 @@ def test_each_command_shows_its_stages_on_a_terminal_and_leaves_none_of_them(
     left = shown_after(written)
     assert not [row for row in left if re.search(r"camtool: .*\d s$", row)], left
     (tmp_path / "new.toml").unlink(missing_ok=True)
-    piped = subprocess.run(
-        [sys.executable, "-c", SLOWLY, *words],
-        capture_output=True,
-        check=True,
-        cwd=tmp_path,
-    )
+    piped = camtool(*words)
+    assert piped.returncode == 0, piped.stderr
     assert b"\r" not in piped.stderr + piped.stdout
 
 
