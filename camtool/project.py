@@ -110,6 +110,8 @@ class Project(Struct, frozen=True):
             return file
         machines = dict(self.machines())
         names = f"known are {', '.join(machines)}; " if machines else ""
+        if NAME.fullmatch(name) and Path(f"{name}.toml").is_file():
+            names = f"--machine {name}.toml is the file of this folder; {names}"
         raise MachineError(
             f"there is no machine {name!r}",
             where="--machine",

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
     from camtool.machine.model import Machine, PlayCells
-    from camtool.target.contract import SampledDialect
+    from camtool.target.contract import OpenKey, SampledDialect
     from camtool.target.registry import LoadedTarget
 
 
@@ -135,8 +135,9 @@ def new(
     settings = [] if dialect is None else _dialect_settings(dialect, asks=asks)
     keys = {each.key for each in said_keys}
     settings = [*(each for each in settings if each.key not in keys), *said_keys]
-    text = machine_template(name, extends, base.text, base.needs, settings)
     output = output or f"{name}.toml"
+    file = f"{name}.toml" if output == STDOUT else one_line(output)
+    text = machine_template(name, extends, base.text, base.needs, settings, file)
     check_places([str(base.file), *([from_program] if from_program else [])], [output])
     check_new(output)
     remark = "take the # away from what differs"
@@ -164,12 +165,23 @@ def _dialect_settings(dialect: SampledDialect, *, asks: bool) -> list[Controller
     for each in dialect.questions:
         answer: Any = each.default
         if asks:
-            kind = click.Choice(each.choices) if each.choices else type(each.default)
-            answer = click.prompt(each.question, default=each.default, type=kind, err=True)
+            answer = _answer_to(each)
         value = [answer] if each.is_list else answer
         doubt = "" if asks else f"{each.question}?"
         settings.append(ControllerSetting(each.key, value, "asked" if asks else "ours", "", doubt))
     return settings
+
+
+def _answer_to(open_key: OpenKey) -> Any:
+    """Return what the user answers; an empty text, which nobody can type, is called none."""
+    if not open_key.choices:
+        return click.prompt(
+            open_key.question, default=open_key.default, type=type(open_key.default), err=True
+        )
+    names = {each or "none": each for each in open_key.choices}
+    default = open_key.default or "none"
+    kind = click.Choice(tuple(names))
+    return names[str(click.prompt(open_key.question, default=default, type=kind, err=True))]
 
 
 def setting_of(text: str) -> ControllerSetting:

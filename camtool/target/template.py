@@ -65,8 +65,10 @@ def machine_template(
     base_text: str,
     needs: Iterable[str] = (),
     settings: Sequence[ControllerSetting] = (),
+    file: str = "",
 ) -> str:
-    """TOML text of the machine `name`, which extends the target `base`.
+    """TOML text of the machine `name`, which extends the target `base`; `file` is how flags call
+    it where they do not find it by its name.
 
     The values that are `settings` stand in it with what says them, as comments where they are in
     doubt. Every other value of the target's
@@ -84,7 +86,7 @@ def machine_template(
     lines = [
         f"# {name}: a machine on {base}. {text} value is that of {base}, as a comment:",
         "# take its # away, and change what differs on your machine.",
-        f"# camtool post drawing.dxf --machine {name}",
+        f"# camtool post drawing.dxf --machine {file or name}",
         "",
         f'extends = "{base}"',
         "",

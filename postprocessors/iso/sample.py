@@ -463,7 +463,7 @@ def _ask_what_is_open(sample: _Sample) -> None:
         )
         sample.ask(
             "dialect.arcs.form",
-            "How are arcs values: I and J as offsets, I and J as the centre, R, or no arcs",
+            "How are arcs said: I and J as offsets, I and J as the centre, R, or no arcs",
             "offsets",
             "offsets",
             "centre",
@@ -474,7 +474,7 @@ def _ask_what_is_open(sample: _Sample) -> None:
         sample.ask("dialect.lines.end", "How lines end", "lf", "lf", "crlf", "cr")
         sample.ask(
             "dialect.events.dwell",
-            "How is a dwell values: {s} are seconds, {ms} milliseconds",
+            "How is a dwell said: {s} are seconds, {ms} milliseconds",
             "G4 P{s}",
             "G4 P{s}",
             "G4 P{ms}",

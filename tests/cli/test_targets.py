@@ -176,3 +176,21 @@ def test_flags_say_what_the_program_does_not(camtool: Run, tmp_path: Path) -> No
     for wrong in (["--extends", "grbl", "--from-program", "part.nc"], [], ["--set", "x"]):
         assert camtool("targets", "new", "other", *wrong).returncode == 2
     assert not (tmp_path / "other.toml").exists()
+
+
+def test_the_command_in_a_new_file_works_where_it_stands(camtool: Run, tmp_path: Path) -> None:
+    sample = str(Path("samples/logo.dxf").absolute())
+    assert camtool("targets", "new", "mine", "--extends", "iso").returncode == 0
+    command = (tmp_path / "mine.toml").read_text(encoding="utf-8").splitlines()[2]
+    assert command == "# camtool post drawing.dxf --machine mine.toml"
+    assert camtool("post", sample, *command.split()[4:], "-o", "a.nc").returncode == 0
+    by_name = camtool("post", sample, "--machine", "mine")
+    assert b"--machine mine.toml is the file of this folder" in by_name.stderr
+
+
+def test_questions_can_be_answered_by_nothing(camtool: Run, tmp_path: Path) -> None:
+    answers = b"\n\n\nnone\n\n\n"
+    done = camtool("targets", "new", "mine", "--ask", "--extends", "iso", stdin=answers)
+    assert done.returncode == 0, done.stderr
+    assert b"The last block (M2, M30, none) [M30]" in done.stderr
+    assert 'end = "" ' in (tmp_path / "mine.toml").read_text(encoding="utf-8")

@@ -1,4 +1,5 @@
-"""docs/dialects/iso.md has every key of a dialect and no other, and each example is one."""
+"""docs/dialects/iso.md has every key of a dialect and no other, and each example is one; so
+has the file that `camtool targets new` begins."""
 
 import re
 from pathlib import Path
@@ -6,9 +7,11 @@ from typing import get_type_hints
 
 import msgspec
 import pytest
-from camtool_postprocessors.iso.dialect import IsoDialect
+from camtool_postprocessors.iso.dialect import ArcFormat, IsoDialect
 
 from camtool.tables import parse_table
+from camtool.target.registry import list_target
+from camtool.target.template import machine_template
 from tests.postprocessors.iso.tables import machine_with
 
 PAGE = Path("docs/dialects/iso.md").read_text(encoding="utf-8")
@@ -39,3 +42,18 @@ def test_each_key_has_an_example_that_is_taken(table: str) -> None:
         assert [key for one in parsed for key in one] == re.findall(r"`(\w+)`", keys)
         for one in parsed:
             machine_with({table: one})
+
+
+def test_a_new_file_shows_every_key_with_its_default() -> None:
+    """Without the # before each line of its dialect, the file that `targets new` begins is the
+    same dialect."""
+    text = machine_template("made-up", "iso", list_target("iso").text)
+    _, *parts = text.split("\n[dialect.")
+    dialect = "".join("[" + part.split("\n[uncertainty", 1)[0] + "\n" for part in parts)
+    tables = parse_table(re.sub(r"^# (?=\w+ = )", "", dialect, flags=re.MULTILINE))
+    for name, kind in TABLES.items():
+        assert sorted(tables[name]) == sorted(kind.__struct_fields__)
+    assert tables["work_offsets_mm"] == {"G54": [0.0, 0.0, 0.0]}
+    assert tables["arcs"].pop("max_sweep_deg") == ArcFormat().sweep_deg
+    tables["work_offsets_mm"] = {}
+    assert msgspec.convert(tables, IsoDialect) == IsoDialect()
