@@ -158,12 +158,13 @@ class EventFormat(Struct, frozen=True, forbid_unknown_fields=True):
     """Blocks of events; () where a program cannot say it.
 
     Fields: `spindle_cw` and `spindle_ccw` have {rpm}, {percent} of `spindle.max_rpm`, or {pwm},
-    which is 255 there; `dwell` {s} or {ms}; `tool_change` {tool}; `message` {text}, "" for a plain
-    comment. `first_tool`: whether the tool of the first cut is changed to by the program, or
-    mounted before it ("by-hand"); `mount_messages`: the operator is told what to mount at each
-    change.
+    which is 255 there; `rpm_decimals` of {rpm}; `dwell` {s} or {ms}; `tool_change` {tool};
+    `message` {text}, "" for a plain comment. `first_tool`: whether the tool of the first cut is
+    changed to by the program, or mounted before it ("by-hand"); `mount_messages`: the operator is
+    told what to mount at each change.
     """
 
+    rpm_decimals: Annotated[int, Meta(ge=0, le=3)] = 3
     spindle_cw: Templates = ("S{rpm} M3",)
     spindle_ccw: Templates = ("S{rpm} M4",)
     spindle_off: Templates = ("M5",)

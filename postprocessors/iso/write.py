@@ -468,7 +468,10 @@ class _EventWords:
         max_rpm = self._machine.spindle.max_rpm or math.nan
 
         def said(scale: float | None) -> Callable[[str], str]:
-            value = event.value if scale is None else event.value / max_rpm * scale
+            if scale is None:
+                value = round(event.value, self._events.rpm_decimals)
+            else:
+                value = event.value / max_rpm * scale
             return lambda letter: self._form.value(letter, value)
 
         values = {name: said(scale) for name, scale in SPEED_SCALES.items() if scale is None}

@@ -128,6 +128,7 @@ def tables(draw: st.DrawFn) -> dict[str, Any]:
             "tool_change": draw(st.sampled_from(CHANGES)),
             "message": draw(st.sampled_from(messages[style])),
             "mount_messages": draw(BOOLS),
+            "rpm_decimals": draw(st.integers(1, 3)),
         },
         "cycles": {
             "use": with_cycles,

@@ -1,5 +1,6 @@
 """The machines that come as files: each stands for itself, and reads what it writes."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -70,7 +71,9 @@ def kept(path: Toolpath, name: str) -> Toolpath:
         if move.kind == Kind.SPINDLE_CCW and not events.spindle_ccw:
             continue
         if move.kind > Kind.ARC_CCW:
-            builder.event(move.kind, move.value)
+            is_speed = move.kind in (Kind.SPINDLE_CW, Kind.SPINDLE_CCW)
+            is_whole = is_speed and events.rpm_decimals == 0 and move.value is not None
+            builder.event(move.kind, math.ceil(move.value) if is_whole else move.value)
         elif move.centre is not None:
             assert move.feed is not None
             x, y, z = move.end
@@ -128,6 +131,15 @@ def test_a_users_file_may_extend_one(tmp_path: Path) -> None:
 def test_a_wrong_name_gets_a_guess() -> None:
     with pytest.raises(MachineError, match="did you mean haas"):
         load_target("hass")
+
+
+def test_fanuc_reads_feeds_without_a_point_as_whole_and_lengths_as_parts() -> None:
+    target = load_target("fanuc")
+    path = target.target.read(
+        b"%\nO1\nG90 G0 X0 Y0\nG1 X1500 F500\nX3. F250.\nM30\n%\n", target.machine
+    )
+    assert [row.end[0] for row in path if row.kind == Kind.LINE] == [1.5, 3.0]
+    assert [row.feed for row in path if row.kind == Kind.LINE] == [500.0, 250.0]
 
 
 CYCLES = [name for name in ON_ISO if load_target(name).machine.dialect.cycles.use]  # type: ignore[attr-defined]
