@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -16,6 +17,7 @@ from typing import NamedTuple
 
 import pytest
 
+import camtool
 from tests.validation.pieces import ROOT
 
 PAGE = ROOT / "docs" / "theses.md"
@@ -58,6 +60,26 @@ def test_every_row_has_a_verdict() -> None:
             row
         )
     assert len(ROWS) >= 40
+
+
+def test_every_row_names_machines_and_samples_that_exist() -> None:
+    known = {each.target.name for each in camtool.targets()}
+    named = {name for row in ROWS for name in re.findall(r"(?<=-t )[\w-]+", row.command)}
+    assert len(named) >= 6
+    assert named <= known
+    files = {path for row in ROWS for path in re.findall(r"samples/[\w./-]+", row.command)}
+    assert len(files) >= 20
+    assert sorted(path for path in files if not (ROOT / path).exists()) == []
+
+
+def test_speeds_of_the_router_are_those_that_the_command_prints() -> None:
+    (row,) = (row for row in ROWS if "servo step" in row.command)
+    words = [sys.executable, "-m", *row.command.split(), "--json", "-"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, check=True)
+    answers = json.loads(done.stdout)["axes"]
+    printed = ", ".join(f"{each['end_rpm']:.0f}" for each in answers) + " rpm at the end of 1 s"
+    assert row.camtool == printed
+    assert printed in PAGE.with_name("validation.md").read_text(encoding="utf-8")
 
 
 @contextmanager
