@@ -42,6 +42,9 @@ NEAREST_SPARE = 1e-9
 FEW_PAIRS = 256
 """Up to this many distances are computed one by one: building an index would take longer."""
 
+PATHS_AT_A_TIME = 256
+"""Pairs of paths with few segments that are measured together: it bounds the memory."""
+
 
 class Nearest(Struct, frozen=True, eq=False):
     """For P points: `distance` (P,) mm to the nearest segment and its row, `segment` (P,)."""
@@ -112,6 +115,85 @@ def approach(a: Polyline, b: Polyline) -> NearestApproach:
         candidate = _approach(*paired_distances(first[i[order]], second[j[order]]))
         best = min(best, candidate, key=lambda each: each.distance)
     return best
+
+
+def approaches(
+    lines: Polylines, others: Polylines, pairs: list[tuple[int, int]]
+) -> list[NearestApproach]:
+    """Return the `approach` of each pair of a path of `lines` and one of `others`; those with few
+    segments are measured together."""
+    one, other = _PathRows.of(lines), _PathRows.of(others)
+    rows, columns = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    segments = np.diff(other.first)[columns]
+    distances = segments * np.maximum(np.diff(lines.offsets), np.diff(one.first))[rows]
+    is_few = (segments * np.diff(one.first)[rows] > 0) & (distances <= FEW_PAIRS)
+    results = dict[int, NearestApproach]()
+    few = np.flatnonzero(is_few)
+    for begin in range(0, len(few), PATHS_AT_A_TIME):
+        batch = few[begin : begin + PATHS_AT_A_TIME]
+        results |= zip(
+            batch.tolist(), one.approaches(rows[batch], other, columns[batch]), strict=True
+        )
+    return [
+        results[k] if k in results else approach(lines[row], others[column])
+        for k, (row, column) in enumerate(pairs)
+    ]
+
+
+class _PathRows(Struct, frozen=True, eq=False):
+    """Paths and their `segments` with boxes (K, 4), path after path from `first` (M+1,) on."""
+
+    paths: Polylines
+    segments: Segments
+    boxes: Floats
+    first: Ints
+
+    @classmethod
+    def of(cls, lines: Polylines) -> _PathRows:
+        segments = Segments.of(lines)
+        first = np.searchsorted(segments.path, np.arange(len(lines) + 1))
+        return cls(lines, segments, segment_boxes(segments), first)
+
+    def approaches(
+        self, rows: Ints, others: _PathRows, columns: Ints
+    ) -> Iterator[NearestApproach]:
+        """Yield the `approach` of each of these rows to one of the others."""
+        vertices = self.paths.vertices[:, :2]
+        pair, i, j = _crossed(self.paths.offsets, rows, others.first, columns)
+        distance = point_to_segment(vertices[i], others.segments[j])
+        _, minima = _least(pair, distance)
+        best, points = distance[minima], vertices[i[minima]]
+        pair, i, j = _crossed(self.first, rows, others.first, columns)
+        low = np.maximum(self.boxes[i, :2], others.boxes[j, :2])
+        high = np.minimum(self.boxes[i, 2:], others.boxes[j, 2:])
+        is_near = (low <= high + best[pair, None]).all(axis=1)
+        pair, i, j = pair[is_near], i[is_near], j[is_near]
+        distance, places = paired_distances(self.segments[i], others.segments[j])
+        of, minima = _least(pair, distance)
+        is_less = distance[minima] < best[of]
+        of, minima = of[is_less], minima[is_less]
+        best[of], points[of] = distance[minima], places[minima]
+        for (x, y), mm in zip(points.tolist(), best.tolist(), strict=True):
+            yield NearestApproach(mm, (x, y))
+
+
+def _crossed(first: Ints, rows: Ints, other_first: Ints, columns: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return each element of a path with each one of the other of its pair, in order: rows (J,)
+    of the pairs and of both elements, which lie path after path from `first` on."""
+    across = np.diff(other_first)[columns]
+    counts = np.diff(first)[rows] * across
+    pair = np.repeat(np.arange(len(rows)), counts)
+    within = np.arange(len(pair)) - (np.cumsum(counts) - counts)[pair]
+    i, j = np.divmod(within, across[pair])
+    return pair, first[rows][pair] + i, other_first[columns][pair] + j
+
+
+def _least(pair: Ints, distance: Floats) -> tuple[Ints, Ints]:
+    """Return the pairs that there are, ascending, and the row of the least distance of each, the
+    first of several."""
+    order = np.lexsort((distance, pair))
+    begins = np.flatnonzero(np.diff(pair, prepend=-1))
+    return pair[begins], order[begins]
 
 
 def near_paths(lines: Polylines, targets: Polylines, reach_mm: float) -> Iterator[tuple[int, int]]:

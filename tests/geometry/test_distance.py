@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry import distance as distances
-from camtool.geometry.distance import approach, nearest, points_to_segments
-from camtool.geometry.polylines import Polyline, Segments, begin_at, reverse, rotate
+from camtool.geometry.distance import approach, approaches, nearest, points_to_segments
+from camtool.geometry.polylines import Polyline, Polylines, Segments, begin_at, reverse, rotate
 from tests.oracles.geometry import dense_points, line_string, sagitta
 from tests.paths import mirrored, moved, scaled
 from tests.strategies import coordinates, polylines
@@ -209,6 +209,24 @@ def test_the_distance_of_paths_stays_when_both_are_moved_about(
     assert path_distance(scaled(a, 3.0), scaled(b, 3.0)) == pytest.approx(3 * wanted, abs=1e-7)
     if a.closed:
         assert path_distance(begin_at(a, start), b) == pytest.approx(wanted, abs=1e-12)
+
+
+@given(
+    st.lists(polylines(max_points=24), min_size=1, max_size=5),
+    coordinates(40.0),
+    st.integers(1, 4),
+)
+def test_paths_measured_together_are_as_far_as_one_by_one(
+    paths: list[Polyline], apart: float, at_a_time: int
+) -> None:
+    lines = Polylines.of(paths)
+    others = Polylines.of([*paths, *(moved(path, apart, 5.0) for path in paths)])
+    pairs = [(i, j) for i in range(len(lines)) for j in range(len(others))]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(distances, "PATHS_AT_A_TIME", at_a_time)
+        found = approaches(lines, others, pairs)
+    assert found == [approach(lines[i], others[j]) for i, j in pairs]
+    assert approaches(lines, others, []) == []
 
 
 @given(polylines(max_points=6), polylines(max_points=6), coordinates(40.0))

@@ -17,7 +17,7 @@ from msgspec import Struct, field
 
 from camtool.arrays import Ints
 from camtool.findings import Finding
-from camtool.geometry.distance import approach, near_paths, nearest
+from camtool.geometry.distance import approaches, near_paths, nearest
 from camtool.geometry.measure import extents, signed_areas
 from camtool.geometry.offset import offset_each, offset_shape
 from camtool.geometry.polylines import (
@@ -134,8 +134,8 @@ def _add_shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set:
     before = len(line_set.lines)
     _round(chosen, path_rows, shape, setting, line_set)
     lines_made = line_set.lines[before:]
-    joined = [each for line in lines_made for each in _joined(chosen, line.sources, setting)]
-    line_set.findings += shortened_list(joined, UNREACHED_BETWEEN_MORE)
+    joined = _joined(chosen, [line.sources for line in lines_made], setting)
+    line_set.findings += shortened_list(list(joined), UNREACHED_BETWEEN_MORE)
     free_side = reverse_lines(shape)
     line_set.findings += cut_away_findings(shape, setting.operation)
     if setting.operation.beyond_mm:  # it reaches where it is to cut beyond the lines
@@ -251,16 +251,19 @@ def _box_centre(chosen: Chosen, k: int) -> str:
     return at_place(chosen.names[k], extents(chosen.lines.select([k])).mean(axis=1))
 
 
-def _joined(chosen: Chosen, path_rows: tuple[int, ...], setting: Setting) -> Iterator[Finding]:
-    """Findings of a line that runs round several paths at once: between them nothing is cut."""
-    if len(path_rows) == 1:
-        return
+def _joined(chosen: Chosen, runs: list[tuple[int, ...]], setting: Setting) -> Iterator[Finding]:
+    """Findings of lines that run round several paths at once: between them nothing is cut."""
     room = 2.0 * setting.operation.away_mm
+    several = [run for run in runs if len(run) > 1]
+    path_rows = [row for run in several for row in run]
+    line_of = [number for number, run in enumerate(several) for _ in run]
     lines = chosen.lines.select(path_rows)
-    for one, other in sorted(near_paths(lines, lines, room)):
-        if one >= other:
-            continue
-        nearest_approach = approach(lines[one], lines[other])
+    pairs = [
+        (one, other)
+        for one, other in sorted(near_paths(lines, lines, room))
+        if one < other and line_of[one] == line_of[other]
+    ]
+    for (one, other), nearest_approach in zip(pairs, approaches(lines, lines, pairs), strict=True):
         if nearest_approach.distance >= room - ROOM_TOLERANCE_MM:
             continue
         yield UNREACHED_BETWEEN(
