@@ -175,6 +175,65 @@ def test_the_effect_reports_and_leaves_the_drawing(extensions: Path, part: Path)
     ]  # fmt: skip
 
 
+# inkex's own parser of entries, and its comparison with the arguments that a script takes. Its
+# test cases for effects need a class of inkex in the script; ours use Python's library alone.
+INKEX = """
+import importlib.util, sys, unittest
+from argparse import ArgumentParser
+from inkex.inx import InxFile
+from inkex.tester.inx import InxMixin
+
+parsers = []
+class Kept(ArgumentParser):
+    def parse_known_args(self, *words):
+        parsers.append(self)
+        return super().parse_known_args(*words)
+
+class Extension:
+    arg_parser = property(lambda self: parsers[-1])
+
+class Entries(InxMixin, unittest.TestCase):
+    def test(self):
+        spec = importlib.util.spec_from_file_location("script", sys.argv[1])
+        script = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(script)
+        script.ArgumentParser = Kept
+        script.read_arguments(["drawing.svg"])
+        kinds = []
+        for path in sys.argv[2:]:
+            inx = InxFile(path)
+            kinds.append((inx.kind, inx.ident))
+            self.assertParams(inx, Extension)
+            self.assertEqual([each.name for each in inx.params], ["target", "flags"])
+        self.assertEqual(
+            kinds, [("effect", "org.camtool.effect"), ("output", "org.camtool.output")]
+        )
+
+unittest.main(argv=["entries"])
+"""
+
+
+@pytest.mark.slow
+def test_the_entries_fit_their_script_by_inkex(extensions: Path, tmp_path: Path) -> None:
+    library = tmp_path / "inkex"
+    # Without what draws its windows, which needs a compiler and GTK.
+    packages = ("inkex", "cssselect", "lxml", "numpy", "tinycss2", "webencodings")
+    pip = (sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target")
+    done = subprocess.run([*pip, library, *packages], capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip(f"inkex is not to be had here: {done.stderr.strip().splitlines()[-1]}")
+    files = [extensions / name for name in inkscape.FILES if name.endswith(".inx")]
+    words = [extensions / "camtool_output.py", *sorted(files)]
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", INKEX, *words],
+        env={**os.environ, "PYTHONPATH": str(library)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("inkscape") is None, reason="Inkscape is not here")
 def test_inkscape_itself_saves_the_program(extensions: Path, part: Path, camtool: Run) -> None:
