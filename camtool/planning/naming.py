@@ -77,10 +77,13 @@ def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
     """Describe how to give the numbers of the user's own machine, which may differ from the
     target's."""
     keys = " ".join(f"--set {each}" for each in settings)
-    return (
-        f"if your machine can do more, use {keys}, or make its own file with camtool init NAME "
-        f"-t {machine.target.dialect} and use it with --machine NAME"
+    name, dialect = machine.target.name, machine.target.dialect
+    its_file = (
+        f"make its own file with camtool init NAME -t {dialect} and use it with --machine NAME"
     )
+    if name != dialect:
+        its_file = f"give them in the machine file of {name}, or in one that extends it"
+    return f"if your machine can do more, use {keys}, or {its_file}"
 
 
 def shortened_list(findings: Sequence[Finding], sentence: Sentence) -> list[Finding]:

@@ -40,3 +40,11 @@ def test_one_drawing(name: str, camtool: Run) -> None:
 @pytest.mark.parametrize("name", sorted(shipped_files()))
 def test_a_job_of_several_tools(name: str, camtool: Run) -> None:
     tour(camtool, name, [PLATE, "--job", JOB, "--set", "spindle.max_rpm=24000"])
+
+
+def test_what_it_cannot_do_points_to_its_own_file(camtool: Run) -> None:
+    """A file of the bare dialect would not speak as the machine does."""
+    done = camtool("post", LOGO, "-t", "haas", "--spindle", "9000", "-o", "a.nc")
+    assert done.returncode != 0
+    assert b"machine file of haas" in done.stderr
+    assert b"-t iso" not in done.stderr

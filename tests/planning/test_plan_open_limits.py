@@ -69,7 +69,7 @@ def test_feeds_above_the_rates_of_the_axes_are_lowered_with_a_word() -> None:
     assert "becomes 80" in cut.message
     assert "--set axes.y.max_rate_mm_min=600," in cut.message
     assert "--set axes.z.max_rate_mm_min=40," in plunge.message
-    assert "camtool init NAME -t" in cut.message
+    assert "in the machine file of made-up" in cut.message
     drawing = drawing_of([Polyline(np.array([[0.0, 0, 0], [4, 0, 0]]))])
     made = plan(drawing, Job(operations=(fast,)), machine)
     assert float(made.feed[made.is_feed].max()) == 80.0
