@@ -890,8 +890,17 @@ def _stock_findings(
     if request.copper:
         slides = slide_moves(decoded, case.target, tools, case.simulation, thin_mm=NETS_THIN_MM)
         findings_found += net_findings(slides, request)
-    if case.compensated is not None:
-        moves = slide_moves(decoded, case.target, tools, case.simulation)
+    limited = any(operation.engagement_rad is not None for operation in request.operations)
+    if limited or case.compensated is not None:
+        slides = slide_moves(decoded, case.target, tools, case.simulation)
+        if limited and decoded.operations is not None:
+            from camtool.stock.engagement import engagement_findings
+
+            box = None if request.stock is None else request.stock.box_mm
+            begin = decoded.operations.begin
+            findings_found += engagement_findings(slides, decoded, begin, request.operations, box)
+        if case.compensated is not None:
+            moves = slides
     return (*findings_found, *stock_findings(decoded, moves, request, case.depth_mm, planning))
 
 

@@ -823,6 +823,14 @@ class Operation:
         return dict(self.own).get(key.field, key.default)
 
     @property
+    def engagement_rad(self) -> float | None:
+        """The angle by which its tool promises to be engaged at most, rad; None: it does not."""
+        if "strategy" not in self.contract.own or self.own_value("strategy") != "adaptive":
+            return None
+        limit: float = self.own_value("engagement")
+        return limit
+
+    @property
     def wall_radius_mm(self) -> float:
         """The tool's radius where it passes the line beside which it runs, mm: half its diameter,
         and for a chamfer how wide its bit is where the bevel ends."""

@@ -142,6 +142,20 @@ def lift_paths(
     return [vertices[begin:end] for begin, end in pairwise(ends)]
 
 
+def helix(centre: Floats, radius: float, towards: Floats, length: float) -> Floats:
+    """Return (k, 3) arcs CCW about a centre of this length in all, seen from above; the last ends
+    nearest to a place."""
+    arm = towards - centre
+    end = math.atan2(arm[1], arm[0])
+    sweep = length / radius
+    count = max(1, math.ceil(sweep / math.pi))
+    angles = end - sweep + sweep / count * np.arange(count + 1)
+    bulge = np.full(count + 1, math.tan(0.25 * sweep / count))
+    bulge[-1] = 0.0
+    points = centre + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.column_stack([points, bulge])
+
+
 def feeds_along(vertices: Floats, feeds: Feeds) -> Floats:
     """Return the feeds (n−1,) mm/min for the moves between vertices (n, 4).
 

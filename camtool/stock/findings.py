@@ -117,6 +117,20 @@ class StockCode(Code):
         "narrowest groove beside a net and the narrowest copper of a net are given",
         "nothing",
     )
+    ENGAGEMENT_TOO_HIGH = (
+        620,
+        WARNING,
+        "the tool is engaged by a larger angle than its operation allows, on the predicted slides "
+        "and outside of entries; chips thinner than 0.4 % of the tool's radius do not count",
+        "a larger limit, a smaller tool, or a wider corner in the drawing",
+    )
+    ENGAGEMENT_KEPT = (
+        621,
+        INFO,
+        "it is proved that the tool is never engaged by more than its operation allows, on the "
+        "predicted slides and outside of entries",
+        "nothing",
+    )
 
 
 CUT_TOO_DEEP = Sentence(
@@ -198,6 +212,16 @@ NETS_APART = Sentence(
     "{operation}: all nets, {measured:.0f}, are apart and whole; the narrowest groove beside one "
     "is {groove}, and the narrowest copper {copper}",
     "nets",
+)
+ENGAGEMENT_TOO_HIGH = Sentence(
+    StockCode.ENGAGEMENT_TOO_HIGH,
+    "{operation}: the tool is engaged by {measured:.2f} degrees, where {limit:.2f} are allowed",
+    "°",
+)
+ENGAGEMENT_KEPT = Sentence(
+    StockCode.ENGAGEMENT_KEPT,
+    "{operation}: the tool is engaged by {measured:.2f} degrees at most; {limit:.2f} are allowed",
+    "°",
 )
 STOCK_NOT_JUDGED_TOOLS = Sentence(
     StockCode.STOCK_NOT_JUDGED,

@@ -2,6 +2,7 @@
 
     closed paths ─nesting─▶ regions ─shrunk by tool and allowance─▶ tool centre regions
     ─contour or zigzag─▶ paths in the plane ─levels, entry─▶ runs
+    ─adaptive (`adaptive.py`)─▶ runs
 
 Closed contours count by nesting: what an odd number of them hold is cleared. Rings run so that
 the teeth go with the feed (climb): round walls CCW and round islands CW, as a spindle turning CW
@@ -37,6 +38,7 @@ from camtool.geometry.polylines import (
     Segments,
     reverse_lines,
 )
+from camtool.operations.pocket.adaptive import adaptive_runs
 from camtool.planning.clearing import (
     SLOT_TOLERANCE,
     ConnectedRegion,
@@ -61,11 +63,14 @@ from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import MeasuredPath, join_paths
-from camtool.planning.ramps import MIN_HELIX_SHARE, feeds_along
+from camtool.planning.ramps import MIN_HELIX_SHARE, feeds_along, helix
 from camtool.planning.reach import cut_away_findings, unreached, unreached_findings
 
 MAX_STEPS = 10_000
 """More steps than this across a pocket are taken as a mistake."""
+
+MAX_FRONTS = 1_000
+"""More fronts than this across an adaptive pocket are taken as a mistake."""
 
 MAX_HELIX_SHARE = 0.5
 """Default of the largest radius of a helix, over the tool's radius."""
@@ -166,6 +171,11 @@ def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
     groups: list[list[CutRun]] = []
     changed_runs: dict[str, CutRun] = {}
     for part in _tool_regions(each.region, setting):
+        if setting.operation.engagement_rad is not None:
+            runs = adaptive_runs(part, setting, each.name)
+            if runs:
+                groups.append(runs)
+                continue
         connected, runs = ConnectedRegion(part), list[CutRun]()
         for path, region in clearing_paths(part, setting.operation):
             way_down = down_for(path, region, connected, setting)
@@ -290,9 +300,19 @@ def _check(chosen: Chosen, operation: Operation) -> None:
 
 
 def _check_step(chosen: Chosen, operation: Operation) -> None:
-    """OptionError for a step-over that would take for ever."""
+    """OptionError for a step-over, or a limit of engagement, that would take for ever."""
     step = operation.step_over * operation.tool.diameter_mm
     size = float(np.ptp(extents(chosen.lines), axis=1).max()) if len(chosen.lines) else 0.0
+    if operation.engagement_rad is not None:
+        step = operation.tool.radius_mm * (1.0 - math.cos(operation.engagement_rad))
+        if size > MAX_FRONTS * step:
+            raise OptionError(
+                f"steps of {step:.4g} mm make more than {MAX_FRONTS} fronts in {size:g} mm",
+                file=chosen.file,
+                where=key_of(operation, "engagement"),
+                mend="give a larger engagement, or a larger tool",
+            )
+        return
     if size > MAX_STEPS * step:
         raise OptionError(
             f"a step-over of {step:g} mm makes more than {MAX_STEPS} rings in {size:g} mm",
@@ -401,27 +421,14 @@ def _entry(
     if way_down.ramp:
         return _ramp(path, drop / slope, heights)
     if way_down.centre is not None:
-        helix = _helix(way_down.centre, way_down.radius_mm, begin, drop / slope)
-        across = link(helix[-1, :2], begin)
+        down = helix(way_down.centre, way_down.radius_mm, begin, drop / slope)
+        across = link(down[-1, :2], begin)
         if across is not None:
             flat = _at_height(across, level)
-            return join_paths([np.insert(helix, 2, _sloping(helix, heights), axis=1), flat])
+            return join_paths([np.insert(down, 2, _sloping(down, heights), axis=1), flat])
     if above == 0.0:
         return np.array([[*begin, level, 0.0]])
     return np.array([[*begin, above, 0.0], [*begin, level, 0.0]])
-
-
-def _helix(centre: Floats, radius: float, towards: Floats, length: float) -> Floats:
-    """(k, 3) arcs CCW about a centre of this length in all; the last ends nearest to a place."""
-    arm = towards - centre
-    end = math.atan2(arm[1], arm[0])
-    sweep = length / radius
-    count = max(1, math.ceil(sweep / math.pi))
-    angles = end - sweep + sweep / count * np.arange(count + 1)
-    bulge = np.full(count + 1, math.tan(0.25 * sweep / count))
-    bulge[-1] = 0.0
-    points = centre + radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    return np.column_stack([points, bulge])
 
 
 def _ramp(path: Floats, length: float, heights: tuple[float, float]) -> Floats:

@@ -1,0 +1,26 @@
+from camtool.arrays import Bools, Floats
+
+ASKEW: int
+ASKEW_END: int
+AX: int
+AY: int
+BX: int
+BY: int
+COLUMNS: int
+HIGH: int
+LOW: int
+RADIUS: int
+
+class Cleared:
+    def __init__(self, extents: Floats, reach_mm: float, box: Floats) -> None: ...
+    def add(self, moves: Floats) -> None: ...
+    def judge(
+        self,
+        moves: Floats,
+        cuts: Bools,
+        thick_mm: float,
+        enough_rad: float,
+        fine_rad: float,
+        *,
+        adds: bool = True,
+    ) -> Floats: ...

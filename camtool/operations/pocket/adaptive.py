@@ -1,0 +1,522 @@
+"""Clear a pocket so that the tool's engagement never exceeds a limit.
+
+    tool centre region ─disc at its pole, widened by a spiral─▶ cleared centres
+      ─grown by a step, kept in the region, opened by a disc─▶ fronts, one beyond the other
+      ─cut at concave corners, in an order in which each finds those before it cut─▶ strokes
+      ─joined within what is cleared by arcs and lines, all tangent─▶ paths
+
+The *cleared centres* V are the places of the tool's centre so far. The next front is the boundary
+of V grown by a step s, as far as it lies in the tool centre region, opened by a disc of radius ρ
+(all discs of that radius that fit in). So V is always a union of discs ρ, and has no outer corner
+sharper than ρ: at walls fronts end in arcs that are tangent to the wall.
+
+With a disc ρ of centres cleared, all within ρ + r of its centre is air. A tool of radius r whose
+centre is s beyond that disc has material only within the angle φ of the direction away from it,
+
+    cos φ = ((ρ + r)² − (ρ + s)² − r²) / (2 r (ρ + s)),
+
+so a front s beyond V engages at most φ, and s follows from the limit (`front_step`). First ρ is as
+large as the region allows, for wide steps; when nothing grows any more, ρ shrinks by RATIO, and
+fronts go on into narrower places and corners, down to the radius that leaves no more than the
+tolerance in a square corner.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Floats
+from camtool.geometry.curves import FunctionCurve
+from camtool.geometry.distance import points_to_segments
+from camtool.geometry.fit import fit_curve
+from camtool.geometry.measure import Frames, length, path_extents, point_at, sample, signed_areas
+from camtool.geometry.nesting import inside
+from camtool.geometry.offset import offset_shape
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
+from camtool.kernels.engagement import Cleared
+from camtool.planning.clearing import outside_parts, pole
+from camtool.planning.items import CutRun, Setting
+from camtool.planning.paths import MeasuredPath
+from camtool.planning.ramps import feeds_along, helix
+
+HELIX_SHARE = 0.5
+"""Default of the radius of the helix, over the tool's radius."""
+
+MIN_HELIX_MM = 1e-3
+MIN_ROOM_SHARE = 0.02
+"""No helix is made in regions with less room than this, and this part of the tool's radius."""
+
+CORNER_SHARE = 0.02
+"""The smallest opening disc, over the tool's radius: it leaves 0.41 of that in a square corner."""
+
+RATIO = 0.75
+CORNER_RATIO = 0.93
+"""Each opening disc is this part of the one before it; those smaller than the tool, of corners."""
+
+PLANNED_SHARE = 0.98
+"""Steps follow from this part of the limit, since strokes are smoothed."""
+
+ARC_PLACES = 33
+STEP_HALVINGS = 30
+"""Places of an arc at which its engagement is computed, and halvings of the step."""
+
+FIRST_SHARE = 0.9
+"""The first opening disc is this part of the largest that fits."""
+
+MAX_FRONTS = 20_000
+"""No more fronts are made in one region."""
+
+MIN_GROWTH_SHARE = 1e-4
+"""A front that adds less than this part of the opening disc, or the tool's, is none."""
+
+SPIRAL_SLOPES = 1.5
+"""The limit is lower in a spiral by so many times its slope: half circles slope unevenly."""
+
+SPECK_SHARE = 5e-3
+"""Pieces of fronts shorter than this part of the tool's radius are left out."""
+
+FIT_SHARE = 2e-4
+FIT_OPENINGS = 10.0
+"""Strokes are smoothed within this part of the tool's radius, and of so many opening radii where
+that is less; they keep so far from walls."""
+
+CORNER_TURN_RAD = 0.02
+"""Fronts are cut where they turn towards the stock by more."""
+
+SAGITTA_SHARE = 1e-3
+"""Chords of arcs, on which engagement is judged, are within this part of the tool's radius."""
+
+AIR_SHARE = 0.5
+"""A link may touch the stock with this part of the limit: at both ends it runs beside it."""
+
+LINK_SHARES = (0.9, 0.45, 0.2)
+"""Radii of links that are tried, over that of the discs that fit on the left of a stroke."""
+
+AIR_THICK_SHARE = 0.02
+"""Chips thinner than this part of the tool's radius do not count there."""
+
+PLACES_SHARE = 0.02
+"""Links are held against the walls at places no farther apart than this part of the radius, ..."""
+
+WALL_SHARE = 1e-4
+"""... and leave them by no more than this part of it."""
+
+TRIED_STROKES = 4
+"""So many strokes are tried before the tool comes up."""
+
+THICK_SHARE = 4e-3
+"""Chips thinner than this part of the tool's radius are no engagement."""
+
+
+def step_for(engagement_rad: float, opening_mm: float, radius_mm: float) -> float:
+    """Return the step mm at which a tool of this radius is engaged by the angle beside a cleared
+    disc of centres: the root of  (ρ + s)² + 2 r cos φ (ρ + s) = (ρ + r)² − r²."""
+    k = radius_mm * math.cos(engagement_rad)
+    return math.sqrt(k * k + opening_mm * (opening_mm + 2.0 * radius_mm)) - k - opening_mm
+
+
+def front_step(engagement_rad: float, opening_mm: float, radius_mm: float) -> float:
+    """Return the step mm of fronts that begin at a wall in an arc of the opening's radius.
+
+    That arc is the one of the front before, pushed on by the step s. At the angle α from where it
+    is pushed to, it leaves the cleared disc at the angle δ,  sin δ = s sin α / D,  where D is its
+    distance from the middle of that: the tool turns towards the stock by δ, which adds to φ.
+    """
+    angle = np.linspace(0.0, 0.5 * math.pi, ARC_PLACES)
+    low, high = 0.0, step_for(engagement_rad, opening_mm, radius_mm)
+    reach = opening_mm + radius_mm
+    for _ in range(STEP_HALVINGS):
+        step = 0.5 * (low + high)
+        far = np.hypot(step + opening_mm * np.cos(angle), opening_mm * np.sin(angle))
+        cosine = (reach**2 - far**2 - radius_mm**2) / (2.0 * radius_mm * far)
+        engaged = np.arccos(np.clip(cosine, -1.0, 1.0))
+        askew = np.arcsin(np.minimum(step * np.sin(angle) / far, 1.0))
+        fits = float((engaged + np.minimum(askew, engaged)).max()) <= engagement_rad
+        low, high = (step, high) if fits else (low, step)
+    return low
+
+
+class FrontStroke(Struct, frozen=True, eq=False):
+    """A piece of a front: `vertices` (n, 3) x, y, bulge of an open path, cut as it runs, with what
+    is cleared on its left; the number of its front; `opening_mm`, the radius of the discs that fit
+    on its left."""
+
+    vertices: Floats
+    front: int
+    opening_mm: float
+
+
+def spiral(
+    centre: Floats, first_mm: float, last_mm: float, tool_mm: float, limit: float
+) -> Floats:
+    """(n, 3) half circles CCW, once round a circle of centres about a place, and on to a wider one
+    and once round that; the turns are as far apart as the limit of engagement (rad) allows."""
+    radii = [first_mm, first_mm, first_mm]
+    while radii[-1] < last_mm - POSITION_EPS_MM:
+        # The spiral runs outwards by an angle, which adds to the engagement.
+        inner = radii[-2]
+        slope = step_for(limit, inner, tool_mm) / (2.0 * math.pi * inner)
+        step = 0.5 * step_for(PLANNED_SHARE * limit - SPIRAL_SLOPES * slope, inner, tool_mm)
+        radii.append(min(radii[-1] + step, last_mm))
+    radii += [last_mm, last_mm]
+    # Half circle i runs between radii i − 1 and i, on opposite sides of the centre.
+    sides = np.where(np.arange(len(radii)) % 2, -1.0, 1.0)
+    x = centre[0] + sides * np.array(radii)
+    return np.column_stack([x, np.full(len(radii), centre[1]), np.append(np.ones(len(x) - 1), 0)])
+
+
+def fronts(
+    region: Polylines, start: Floats, room_mm: float, tool_mm: float, limit: float, fine_mm: float
+) -> Iterator[FrontStroke]:
+    """Yield the strokes that clear a connected tool centre region after a disc of it."""
+    cleared = Polylines.of([_circle(start, room_mm)])
+    opening = FIRST_SHARE * room_mm
+    number = 0
+    while opening > fine_mm and number < MAX_FRONTS:
+        step = front_step(PLANNED_SHARE * limit, opening, tool_mm)
+        growth = MIN_GROWTH_SHARE * math.pi * min(opening, tool_mm) ** 2
+        inner = offset_shape(cleared, opening)
+        while number < MAX_FRONTS:
+            grown = offset_shape(inner, -(opening + step))
+            inner = _within(offset_shape(Polylines.joined([grown, region]), opening), grown)
+            wider = offset_shape(inner, -opening)
+            if signed_areas(wider).sum() - signed_areas(cleared).sum() < growth:
+                break
+            number += 1
+            before = offset_shape(cleared, -2.0 * POSITION_EPS_MM)
+            for path in outside_parts(wider, before):
+                for piece in _cut_at_corners(path, tool_mm):
+                    fit_mm = FIT_SHARE * min(tool_mm, FIT_OPENINGS * opening)
+                    yield FrontStroke(_smooth(piece, fit_mm), number, opening)
+            cleared = wider
+        opening *= RATIO if opening > tool_mm else CORNER_RATIO
+
+
+def _circle(centre: Floats, radius_mm: float) -> Polyline:
+    x, y = centre.tolist()
+    return Polyline(np.array([[x + radius_mm, y, 1.0], [x - radius_mm, y, 1.0]]), True)
+
+
+def _within(loops: Polylines, region: Polylines) -> Polylines:
+    """Return the loops that lie in a region (even-odd)."""
+    if len(loops) == 0:
+        return loops
+    starts = loops.vertices[loops.offsets[:-1], :2]
+    return loops.select(np.flatnonzero(inside(starts, Segments.of(region))))
+
+
+def _cut_at_corners(path: Polyline, tool_mm: float) -> list[Floats]:
+    """Return (n, 3) the pieces of a path between its corners, in its order; a closed one without
+    corners as one piece that ends where it begins."""
+    along = MeasuredPath.of(path)
+    corners = np.flatnonzero(np.abs(along.turns) > CORNER_TURN_RAD)
+    marks = along.reach[corners].tolist()
+    if not path.closed:
+        marks = [0.0, *marks, along.total_mm]
+    elif not marks:
+        return [along.piece(0.0, along.total_mm)]
+    else:
+        marks = [*marks, marks[0] + along.total_mm]
+    return [
+        along.piece(low, high)
+        for low, high in pairwise(marks)
+        if high - low > SPECK_SHARE * tool_mm
+    ]
+
+
+def _smooth(piece: Floats, fit_mm: float) -> Floats:
+    """(n, 3) the arcs and lines, as few as it needs, of an open path without corners."""
+    along = MeasuredPath.of(Polyline(piece))
+    curve = FunctionCurve(along.at, along.directions, np.array([0.0, along.total_mm]))
+    return fit_curve(curve, fit_mm).vertices
+
+
+def chords(vertices: Floats, sagitta_mm: float) -> Floats:
+    """(K, 4) x, y to x, y of an open path (n, 3), arcs as chords within a distance."""
+    path = Segments.of(Polyline(vertices))
+    radius = np.where(path.is_arc, path.radius, np.inf)
+    angle = 2.0 * np.arccos(1.0 - np.minimum(sagitta_mm / np.maximum(radius, 1e-9), 1.0))
+    sweep = np.where(path.is_arc, np.abs(path.sweep), 0.0)
+    count = np.maximum(np.ceil(sweep / np.maximum(angle, 1e-9)), 1.0).astype(np.int64)
+    row = np.repeat(np.arange(len(path)), count)
+    step = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    begin = point_at(path, row, step / count[row])
+    end = np.concatenate([begin[1:], path.end[-1:]])
+    return np.column_stack([begin, end])
+
+
+class Pose(Struct, frozen=True, eq=False):
+    """A place of the tool's centre (x, y) and its direction, rad."""
+
+    x: float
+    y: float
+    angle: float
+
+
+def ends_of(vertices: Floats) -> tuple[Pose, Pose]:
+    """The poses at the beginning and the end of an open path (n, 3)."""
+    frames = Frames.of(Segments.of(Polyline(vertices)))
+    first, last = (
+        frames.tangent_at(np.zeros(len(vertices) - 1))[0],
+        frames.tangent_at(np.ones(len(vertices) - 1))[-1],
+    )
+    return (
+        Pose(vertices[0, 0], vertices[0, 1], math.atan2(first[1], first[0])),
+        Pose(vertices[-1, 0], vertices[-1, 1], math.atan2(last[1], last[0])),
+    )
+
+
+def tangent_link(start: Pose, end: Pose, radius: float, turns: tuple[int, int]) -> Floats | None:
+    """(k, 3) an arc, a line and an arc, all tangent, from pose to pose; `turns`: 1 for a left turn
+    and −1 for a right one, at either end. None where circles that turn differently overlap."""
+    one, other = turns
+    c0 = np.array([start.x, start.y]) + radius * one * _left(start.angle)
+    c1 = np.array([end.x, end.y]) + radius * other * _left(end.angle)
+    gap = c1 - c0
+    distance = math.hypot(*gap)
+    if one == other:
+        heading = math.atan2(gap[1], gap[0]) if distance > POSITION_EPS_MM else start.angle
+    else:
+        if distance < 2.0 * radius:
+            return None
+        heading = math.atan2(gap[1], gap[0]) + one * math.asin(2.0 * radius / distance)
+    leave = c0 - radius * one * _left(heading)
+    arrive = c1 - radius * other * _left(heading)
+    rows = [
+        *_arc(np.array([start.x, start.y]), c0, (one * (heading - start.angle)) % math.tau, one),
+        np.array([*leave, 0.0]),
+        *_arc(arrive, c1, (other * (end.angle - heading)) % math.tau, other),
+        np.array([end.x, end.y, 0.0]),
+    ]
+    vertices = np.array(rows)
+    keep = np.append(np.hypot(*np.diff(vertices[:, :2], axis=0).T) > POSITION_EPS_MM, True)
+    vertices = vertices[keep]
+    vertices[0, :2] = start.x, start.y
+    return vertices if len(vertices) > 1 else None
+
+
+def _arc(begin: Floats, centre: Floats, sweep: float, turn: int) -> list[Floats]:
+    """The vertices (x, y, bulge) of an arc without its end, in parts of half a circle at most."""
+    if sweep > math.tau - 1e-6 or sweep < 1e-9:
+        return []
+    parts = max(1, math.ceil(sweep / math.pi))
+    arm = begin - centre
+    rows = []
+    for part in range(parts):
+        angle = turn * sweep * part / parts
+        c, s = math.cos(angle), math.sin(angle)
+        place = centre + np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+        rows.append(np.array([*place, turn * math.tan(0.25 * sweep / parts)]))
+    return rows
+
+
+def _left(angle: float) -> Floats:
+    return np.array([-math.sin(angle), math.cos(angle)])
+
+
+class Leg(Struct, frozen=True, eq=False):
+    """An open path (n, 3) of the tool's centre; `cuts` is False for links through air."""
+
+    vertices: Floats
+    cuts: bool = True
+
+
+class _Clearing:
+    """The strokes of one region in an order, and the legs that join them."""
+
+    def __init__(
+        self, region: Polylines, strokes: list[FrontStroke], tool_mm: float, limit: float
+    ):
+        self.strokes, self.tool_mm, self.limit = strokes, tool_mm, limit
+        boxes = path_extents(region)
+        extents = np.stack([boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)])
+        self.cleared = Cleared(extents, tool_mm, np.array([-np.inf, -np.inf, np.inf, np.inf]))
+        self.border = Segments.of(offset_shape(region, -WALL_SHARE * tool_mm))
+        self.poses = [ends_of(each.vertices) for each in strokes]
+
+    def moves(self, vertices: Floats, sagitta_share: float = SAGITTA_SHARE) -> Floats:
+        """(K, 9) the moves of an open path, as `camtool.kernels.engagement` wants them."""
+        ends = chords(vertices, sagitta_share * self.tool_mm)
+        radius, flat = np.full((len(ends), 1), self.tool_mm), np.zeros((len(ends), 4))
+        return np.concatenate([ends, radius, flat], axis=1)
+
+    def is_clear(self, vertices: Floats) -> bool:
+        """True if the tool hardly cuts along a path, and stays in the region."""
+        places = sample(Polyline(vertices), PLACES_SHARE * self.tool_mm)
+        if not inside(places, self.border).all():
+            return False
+        limit, thick = AIR_SHARE * self.limit, AIR_THICK_SHARE * self.tool_mm
+        moves = self.moves(vertices, AIR_THICK_SHARE)
+        middle = np.argsort(np.abs(np.arange(len(moves)) - 0.5 * len(moves)))
+        for rows in np.array_split(moves[middle], max(1, len(moves) // 8)):
+            every = np.ones(len(rows), dtype=np.bool_)
+            angles = self.cleared.judge(rows, every, thick, limit, math.inf, adds=False)
+            if angles.max() > limit:
+                return False
+        return True
+
+    def legs(self, first: Floats) -> Iterator[list[Leg]]:
+        """Yield the legs of each stay of the tool in the stock: the first begins with a path."""
+        self.cleared.add(self.moves(first))
+        legs, tool = [Leg(first)], ends_of(first)[1]
+        waits, followers = self.older_ones()
+        starts = np.array([[begin.x, begin.y] for begin, _ in self.poses])
+        ready = {number for number, count in enumerate(waits) if count == 0}
+        while ready:
+            numbers = np.array(sorted(ready))
+            away = np.hypot(starts[numbers, 0] - tool.x, starts[numbers, 1] - tool.y)
+            number, link = self.next_one(tool, numbers[np.argsort(away, kind="stable")].tolist())
+            stroke = self.strokes[number]
+            if link is None:
+                yield legs
+                legs = [Leg(self.lead(self.poses[number][0], stroke.opening_mm), cuts=False)]
+            elif len(link):
+                legs.append(Leg(link, cuts=False))
+            legs.append(Leg(stroke.vertices))
+            self.cleared.add(self.moves(stroke.vertices))
+            tool = self.poses[number][1]
+            ready.remove(number)
+            for follower in followers[number]:
+                waits[follower] -= 1
+                if waits[follower] == 0:
+                    ready.add(follower)
+        yield legs
+
+    def next_one(self, tool: Pose, numbers: list[int]) -> tuple[int, Floats | None]:
+        """The first of some strokes to which a link leads, and the link; the first of all, and
+        None, where none of the first few has one."""
+        for number in numbers[:TRIED_STROKES]:
+            link = self.link(tool, self.poses[number][0], self.strokes[number].opening_mm)
+            if link is not None:
+                return number, link
+        return numbers[0], None
+
+    def older_ones(self) -> tuple[list[int], list[list[int]]]:
+        """For each stroke, how many of older fronts lie so near that they matter, and for which
+        newer ones it matters itself."""
+        cell = 2.0 * self.tool_mm
+        places = [sample(Polyline(each.vertices), self.tool_mm) for each in self.strokes]
+        stroke = np.repeat(np.arange(len(places)), [len(each) for each in places])
+        front = np.array([each.front for each in self.strokes], dtype=np.int64)
+        column, row = np.floor(np.concatenate(places) / cell).astype(np.int64).T
+        wide = int(np.ptp(column)) + 3
+        key = (row - row.min()) * wide + column - column.min() + wide + 1
+        own = np.unique(np.column_stack([key, stroke]), axis=0)
+        shifts = [dy * wide + dx for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
+        near = np.unique(np.concatenate([own + np.array([shift, 0]) for shift in shifts]), axis=0)
+        first, last = (
+            np.searchsorted(own[:, 0], near[:, 0], side=side) for side in ("left", "right")
+        )
+        pairs = set[tuple[int, int]]()
+        for newer, low, high in zip(
+            near[:, 1].tolist(), first.tolist(), last.tolist(), strict=True
+        ):
+            others = own[low:high, 1]
+            pairs |= {(one, newer) for one in others[front[others] < front[newer]].tolist()}
+        waits, followers = [0] * len(self.strokes), [list[int]() for _ in self.strokes]
+        for one, other in sorted(pairs):
+            waits[other] += 1
+            followers[one].append(other)
+        return waits, followers
+
+    def link(self, start: Pose, end: Pose, opening_mm: float) -> Floats | None:
+        """(k, 3) a way from pose to pose through what is cleared, tangent at both; no vertices
+        where they are the same; None if none was found."""
+        turned = abs(math.remainder(end.angle - start.angle, math.tau))
+        if math.hypot(end.x - start.x, end.y - start.y) <= POSITION_EPS_MM and turned < 1e-3:
+            return np.empty((0, 3))
+        for share in LINK_SHARES:
+            links = [
+                link
+                for turns in ((1, 1), (1, -1), (-1, 1))
+                if (link := tangent_link(start, end, share * opening_mm, turns)) is not None
+            ]
+            for link in sorted(links, key=lambda link: length(Polyline(link))):
+                if self.is_clear(link):
+                    return link
+        return None
+
+    def lead(self, begin: Pose, opening_mm: float) -> Floats:
+        """(k, 3) a quarter circle from the left to where a stroke begins."""
+        radius = LINK_SHARES[0] * opening_mm
+        centre = np.array([begin.x, begin.y]) + radius * _left(begin.angle)
+        start = centre - radius * np.array([math.cos(begin.angle), math.sin(begin.angle)])
+        return np.array([[*start, math.tan(math.pi / 8.0)], [begin.x, begin.y, 0.0]])
+
+
+def adaptive_legs(
+    region: Polylines, helix_mm: float, tool_mm: float, limit: float
+) -> tuple[Floats, float, list[list[Leg]]]:
+    """Return where a helix goes down into a connected tool centre region (2,), its radius mm (as
+    asked for, or as there is room), and the legs of each stay of the tool in the stock: none where
+    there is no room."""
+    region = offset_shape(region, (FIT_SHARE + WALL_SHARE) * tool_mm)
+    if len(region) == 0:
+        return np.zeros(2), 0.0, []
+    centre = pole(region)
+    room = float(points_to_segments(centre[None, :], Segments.of(region)).min())
+    helix = min(helix_mm, room)
+    if helix < MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm:
+        return centre, helix, []
+    strokes = list(fronts(region, centre, room, tool_mm, limit, CORNER_SHARE * tool_mm))
+    begin = spiral(centre, helix, room, tool_mm, limit)
+    clearing = _Clearing(region, strokes, tool_mm, limit)
+    clearing.cleared.add(clearing.moves(np.array(_ring(centre, helix))))
+    return centre, helix, list(clearing.legs(begin))
+
+
+def _ring(centre: Floats, radius_mm: float) -> list[list[float]]:
+    x, y = centre.tolist()
+    return [[x + radius_mm, y, 1.0], [x - radius_mm, y, 1.0], [x + radius_mm, y, 0.0]]
+
+
+def adaptive_runs(region: Polylines, setting: Setting, name: str) -> list[CutRun]:
+    """Return the runs that clear one connected tool centre region at all levels, in order; none
+    where it is too narrow for a helix."""
+    operation = setting.operation
+    tool_mm = operation.tool.radius_mm
+    limit: float = operation.own_value("engagement")
+    entry_mm = operation.entry.radius_mm or HELIX_SHARE * tool_mm
+    backward = operation.direction == "conventional"
+    centre, helix_mm, stays = adaptive_legs(
+        _mirrored(region) if backward else region, min(entry_mm, tool_mm), tool_mm, limit
+    )
+    runs: list[CutRun] = []
+    if not stays:
+        return runs
+    for above, level in pairwise((0.0, *setting.levels_mm)):
+        for number, stay in enumerate(stays):
+            parts = [_at_level(leg, level, setting) for leg in stay]
+            if number == 0:
+                drop = (above - level) / math.tan(operation.entry.angle_rad)
+                down = helix(centre, helix_mm, centre + np.array([1.0, 0.0]), drop)
+                sloping = MeasuredPath.of(Polyline(down)).reach
+                z = above + (level - above) * sloping / sloping[-1]
+                vertices = np.insert(down, 2, z, axis=1)
+                parts.insert(0, (vertices, feeds_along(vertices, setting.feeds)))
+            vertices = np.concatenate([*(part[:-1] for part, _ in parts), parts[-1][0][-1:]])
+            if backward:
+                vertices = vertices * [-1.0, 1.0, 1.0, -1.0]
+            feeds = np.concatenate([feed for _, feed in parts])
+            runs.append(CutRun(vertices, feeds, setting.feeds.plunge_mm_min, name))
+    return runs
+
+
+def _mirrored(region: Polylines) -> Polylines:
+    """A region mirrored about X = 0, on the left of its paths again."""
+    paths = [Polyline(path.vertices * [-1.0, 1.0, -1.0], path.closed) for path in region]
+    return Polylines.of([reverse(path) for path in paths])
+
+
+def _at_level(leg: Leg, level: float, setting: Setting) -> tuple[Floats, Floats]:
+    """The vertices (n, 4) of a leg at a level, and the feeds (n − 1,) of its moves."""
+    feed = setting.feeds.cut_mm_min
+    if not leg.cuts:
+        feed = setting.operation.own_value("link_feed") or feed
+    vertices = np.insert(leg.vertices, 2, level, axis=1)
+    return vertices, np.full(len(vertices) - 1, feed)

@@ -1,0 +1,219 @@
+"""Adaptive pockets: the tool's engagement keeps to its limit, and all is cleared all the same."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import camtool
+from camtool.arrays import Floats
+from camtool.errors import OptionError
+from camtool.geometry.polylines import Polyline
+from camtool.operations.pocket import engagement
+from camtool.operations.pocket.adaptive import Pose, chords, ends_of, step_for, tangent_link
+from camtool.planning.items import CutRun
+from camtool.planning.job import Entry, Job, Operation, Tool
+from tests.oracles.contours import CIRCLE, SQUARE
+from tests.oracles.swept import complaints
+from tests.paths import mirrored, moved, scaled
+from tests.planning.pocket_cases import SHAPES, region_of, runs_of, work_of
+from tests.strategies import examples
+
+PLATE = [SQUARE, moved(scaled(CIRCLE, 0.1), 3.0, 3.0), moved(scaled(SQUARE, 0.1), 6.0, 5.0)]
+QUICK = {"square": [SQUARE], "plate": PLATE, "star": SHAPES["star"]}
+SHARE = 3e-3
+"""This part of the area may be left in sharp corners."""
+DIRECTIONS = 360
+EVERY = 23
+"""One of so many chords is looked at."""
+
+
+def adaptive(
+    paths: list[Polyline], diameter_mm: float, limit: float, **options: object
+) -> list[CutRun]:
+    own = (("strategy", "adaptive"), ("engagement_rad", limit))
+    entry = Entry("helix", angle_rad=math.radians(5.0))
+    return runs_of(work_of(paths, diameter_mm, own=own, entry=entry, **options))
+
+
+def greatest_engagement(runs: list[CutRun], radius: float, thick: float) -> float:
+    """Return the greatest engagement angle, rad, behind the entry: the front of the tool's circle
+    is looked at in many directions, and a point of it is air where it is nearer than the radius to
+    any place where the tool was before."""
+    ends = np.concatenate([chords_of(run) for run in runs])
+    level = ends[:, 4:].max(axis=1) < ends[:, 4:].min() + 1e-6
+    moves = ends[level][:, :4]
+    length = np.hypot(*(moves[:, 2:] - moves[:, :2]).T)
+    way = np.cumsum(length)
+    is_judged = (way > 2.0 * math.pi * radius) & (length > 1e-9)
+    angles = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS * math.pi - 0.5 * math.pi
+    greatest = 0.0
+    for number in np.flatnonzero(is_judged)[::EVERY].tolist():
+        start, end = moves[number, :2], moves[number, 2:]
+        heading = math.atan2(*(end - start)[::-1])
+        place = 0.5 * (start + end)
+        circle = place + radius * np.column_stack(
+            [np.cos(angles + heading), np.sin(angles + heading)]
+        )
+        near = distance(place[None, :], moves[:number])[:, 0] < 2.0 * radius
+        older = way[number] - way[:number] > 100.0 * thick
+        gap = np.full(DIRECTIONS, np.inf)
+        for rows, slack in ((near & older, thick), (near & ~older, 0.0)):
+            if rows.any():
+                gap = np.minimum(gap, distance(circle, moves[:number][rows]).min(axis=0) - slack)
+        greatest = max(greatest, float((gap > radius).mean()) * math.pi)
+    return greatest
+
+
+def chords_of(run: CutRun) -> Floats:
+    """(K, 6) x, y to x, y, and the heights of both ends, of short chords of a run."""
+    flat = run.vertices[:, [0, 1, 3]]
+    parts = []
+    for index in range(len(flat) - 1):
+        if np.hypot(*(flat[index + 1, :2] - flat[index, :2])) < 1e-9:
+            continue
+        piece = chords(np.array([flat[index], [*flat[index + 1, :2], 0.0]]), 1e-3)
+        z = run.vertices[index : index + 2, 2]
+        parts.append(np.column_stack([piece, np.full((len(piece), 2), z)]))
+    return np.concatenate(parts)
+
+
+def distance(points: Floats, moves: Floats) -> Floats:
+    """(M, P) distances of points (P, 2) from straight moves (M, 4)."""
+    start, along = moves[:, None, :2], (moves[:, 2:] - moves[:, :2])[:, None, :]
+    square = np.maximum((along**2).sum(axis=2), 1e-30)
+    part = np.clip(((points[None] - start) * along).sum(axis=2) / square, 0.0, 1.0)
+    return np.asarray(np.hypot(*np.moveaxis(points[None] - start - part[..., None] * along, 2, 0)))
+
+
+@pytest.mark.parametrize("shape", QUICK)
+def test_all_within_reach_is_cleared_and_nothing_else(shape: str) -> None:
+    limit = math.acos(1.0 - 2.0 * 0.2)
+    runs = adaptive(QUICK[shape], 1.3, limit)
+    assert complaints(runs, region_of(QUICK[shape]), 0.65, -1.0, share=SHARE) == []
+
+
+@pytest.mark.parametrize(("shape", "part"), [("square", 0.12), ("plate", 0.3)])
+def test_the_engagement_keeps_to_its_limit(shape: str, part: float) -> None:
+    limit = math.acos(1.0 - 2.0 * part)
+    runs = adaptive(QUICK[shape], 1.2, limit)
+    assert len([run for run in runs if run.vertices[0, 2] == 0.0]) == 1
+    engaged = greatest_engagement(runs, 0.6, 4e-3 * 0.6)
+    assert 0.7 * limit < engaged <= 1.02 * limit
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("diameter_mm", [0.7, 1.7])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape(shape: str, diameter_mm: float) -> None:
+    limit = math.acos(1.0 - 2.0 * 0.15)
+    runs = adaptive(SHAPES[shape], diameter_mm, limit)
+    assert complaints(runs, region_of(SHAPES[shape]), 0.5 * diameter_mm, -1.0, share=SHARE) == []
+
+
+def test_conventional_is_the_mirror_image_of_climb() -> None:
+    limit = math.acos(1.0 - 2.0 * 0.2)
+    climb = adaptive(PLATE, 1.6, limit)
+    turned = [mirrored(path) for path in PLATE]
+    conventional = adaptive(turned, 1.6, limit, direction="conventional")
+    total = [sum(length_of(run) for run in runs) for runs in (climb, conventional)]
+    assert total[0] == pytest.approx(total[1], rel=0.02)
+
+
+def length_of(run: CutRun) -> float:
+    rows = chords_of(run)
+    return float(np.hypot(*(rows[:, 2:4] - rows[:, :2]).T).sum())
+
+
+@examples(200, nightly=2_000)
+@given(st.floats(0.1, 1.5), st.floats(0.01, 50.0), st.floats(0.05, 10.0), st.floats(0.01, 0.99))
+def test_a_step_engages_by_the_limit(
+    limit: float, opening: float, radius: float, part: float
+) -> None:
+    """Behind a cleared disc of centres, the tool's circle at the step is out of what is cleared
+    exactly within the limit."""
+    step = step_for(limit, opening, radius)
+    assert 0.0 < step < 2.0 * radius
+    for share, is_air in ((1.0 + 1e-3 * part, True), (1.0 - 1e-3 * part, False)):
+        angle = limit * share
+        x = opening + step + radius * math.cos(angle)
+        y = radius * math.sin(angle)
+        assert (math.hypot(x, y) < opening + radius) == is_air
+
+
+@examples(200, nightly=2_000)
+@given(
+    st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3.1, 3.1)),
+    st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3.1, 3.1)),
+    st.floats(0.05, 3.0),
+    st.sampled_from([(1, 1), (1, -1), (-1, 1), (-1, -1)]),
+)
+def test_links_are_tangent_everywhere(
+    one: tuple[float, float, float],
+    other: tuple[float, float, float],
+    radius: float,
+    turns: tuple[int, int],
+) -> None:
+    start, end = Pose(*one), Pose(*other)
+    link = tangent_link(start, end, radius, turns)
+    if link is None:
+        return
+    first, last = ends_of(link)
+    assert (first.x, first.y) == (start.x, start.y)
+    assert (last.x, last.y) == (end.x, end.y)
+    poses = [start]
+    for row in range(len(link) - 1):
+        piece = np.array([link[row], [*link[row + 1, :2], 0.0]])
+        if np.hypot(*(piece[1, :2] - piece[0, :2])) < 1e-3:
+            continue
+        begin, finish = ends_of(piece)
+        assert abs(math.remainder(begin.angle - poses[-1].angle, math.tau)) < 1e-3
+        poses.append(finish)
+    assert abs(math.remainder(end.angle - poses[-1].angle, math.tau)) < 1e-3
+
+
+@pytest.mark.parametrize("value", ["0%", "100%", "51%", "-3%", "4deg", "91deg", "nan", "", "abc"])
+def test_limits_that_no_path_can_keep_are_refused(value: str) -> None:
+    with pytest.raises(OptionError):
+        engagement(value)
+
+
+def test_limits_are_parts_of_the_diameter_or_angles() -> None:
+    assert engagement("50%") == pytest.approx(0.5 * math.pi)
+    assert engagement(0.1) == pytest.approx(math.radians(36.8699), abs=1e-5)
+    assert engagement("40deg") == pytest.approx(math.radians(40.0))
+
+
+def test_a_limit_that_takes_for_ever_is_refused() -> None:
+    with pytest.raises(OptionError, match="fronts"):
+        adaptive([scaled(SQUARE, 50.0)], 0.2, math.radians(10.0))
+
+
+def test_the_limit_is_proved_on_the_predicted_slides(tmp_path: Path) -> None:
+    document = ezdxf.new(units=ezdxf.units.MM)
+    document.modelspace().add_lwpolyline([(0, 0), (7, 0), (7, 6), (0, 6)], close=True)
+    document.saveas(tmp_path / "part.dxf")
+    operation = Operation(
+        kind="pocket",
+        tool=Tool(3.0, number=1),
+        depth_mm=1.0,
+        spindle_rpm=9000.0,
+        plunge_feed_mm_min=60.0,
+        own=(("strategy", "adaptive"), ("engagement_rad", math.radians(50.0))),
+        entry=Entry("helix", angle_rad=math.radians(5.0)),
+    )
+    job = Job(operations=(operation,))
+    names = []
+    for backlash in (0.0, 0.4):
+        settings = {"axes.x.backlash_mm": backlash, "axes.y.backlash_mm": backlash}
+        target = camtool.load_target("grbl", settings=settings)
+        run = camtool.post(str(tmp_path / "part.dxf"), target, job)
+        names.append({finding.code.name for finding in run.findings})
+    assert "ENGAGEMENT_KEPT" in names[0]
+    assert "ENGAGEMENT_TOO_HIGH" in names[1]
