@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from camtool_postprocessors.flashcut.write import _Blocks
 from camtool_postprocessors.gcode.plain import PlainRows
-from camtool_postprocessors.gcode.write import BlockOrder, Events, Sent
+from camtool_postprocessors.gcode.write import (
+    BlockOrder,
+    Events,
+    LineNumbers,
+    Sent,
+    motion_words,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -75,7 +81,12 @@ def test_modal_blocks(rows: list[Row], strip: bool, numbered: bool, of_feed: int
         lines.append(f"N{k + 1} {block}" if numbered else block)
     commented = np.array([k for k, each in comments.items() for _ in each], dtype=np.int64)
     texts = [text for each in comments.values() for text in each]
-    written_text = order.text(sent, dialect, of_feed, commented, texts.__getitem__)
+    written_text = order.text(
+        motion_words(sent, dialect, of_feed),
+        commented,
+        texts.__getitem__,
+        numbers=LineNumbers() if numbered else None,
+    )
     assert written_text.decode().splitlines() == lines
     assert of_row.tolist() == their_rows
 
