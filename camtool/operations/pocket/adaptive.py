@@ -39,7 +39,7 @@ from camtool.geometry.nesting import inside
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.kernels.engagement import Cleared
-from camtool.planning.clearing import outside_parts, pole
+from camtool.planning.clearing import outside_parts, parts_of, pole
 from camtool.planning.items import CutRun, Setting
 from camtool.planning.paths import MeasuredPath
 from camtool.planning.ramps import feeds_along, helix
@@ -455,9 +455,6 @@ def adaptive_legs(
     """Return where a helix goes down into a connected tool centre region (2,), its radius mm (as
     asked for, or as there is room), and the legs of each stay of the tool in the stock: none where
     there is no room."""
-    region = offset_shape(region, (FIT_SHARE + WALL_SHARE) * tool_mm)
-    if len(region) == 0:
-        return np.zeros(2), 0.0, []
     centre = pole(region)
     room = float(points_to_segments(centre[None, :], Segments.of(region)).min())
     helix = min(helix_mm, room)
@@ -473,6 +470,14 @@ def adaptive_legs(
 def _ring(centre: Floats, radius_mm: float) -> list[list[float]]:
     x, y = centre.tolist()
     return [[x + radius_mm, y, 1.0], [x - radius_mm, y, 1.0], [x + radius_mm, y, 0.0]]
+
+
+def wide_parts(region: Polylines, tool_mm: float) -> list[Polylines]:
+    """Return the connected parts of a tool centre region that discs reach which have room for a
+    helix: necks that are narrower part it, and stay."""
+    opening = 1.01 * (MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm)
+    margin = (FIT_SHARE + WALL_SHARE) * tool_mm
+    return parts_of(offset_shape(offset_shape(region, margin + opening), -opening))
 
 
 def adaptive_runs(region: Polylines, setting: Setting, name: str) -> list[CutRun]:

@@ -38,7 +38,7 @@ from camtool.geometry.polylines import (
     Segments,
     reverse_lines,
 )
-from camtool.operations.pocket.adaptive import adaptive_runs
+from camtool.operations.pocket.adaptive import adaptive_runs, wide_parts
 from camtool.planning.clearing import (
     SLOT_TOLERANCE,
     ConnectedRegion,
@@ -172,9 +172,10 @@ def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
     changed_runs: dict[str, CutRun] = {}
     for part in _tool_regions(each.region, setting):
         if setting.operation.engagement_rad is not None:
-            runs = adaptive_runs(part, setting, each.name)
-            if runs:
-                groups.append(runs)
+            parts = wide_parts(part, setting.operation.tool.radius_mm)
+            runs_of_parts = [adaptive_runs(wide, setting, each.name) for wide in parts]
+            if runs_of_parts and all(runs_of_parts):
+                groups += runs_of_parts
                 continue
         connected, runs = ConnectedRegion(part), list[CutRun]()
         for path, region in clearing_paths(part, setting.operation):
