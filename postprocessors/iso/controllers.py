@@ -36,7 +36,7 @@ class KlipperController(SlideStart, frozen=True, tag_field="model", tag="klipper
     max_z_velocity_mm_s: Speed | None = None
     max_z_accel_mm_s2: Acceleration | None = None
     square_corner_velocity_mm_s: CornerSpeed = 5.0
-    minimum_cruise_ratio: Annotated[float, Meta(ge=0.0, lt=1.0)] = 0.5
+    minimum_cruise_ratio: Annotated[float, Meta(ge=0.0, le=0.999)] = 0.5
     arc_resolution_mm: ChordLength = 1.0
 
 

@@ -93,7 +93,7 @@ def test_only_what_helps_is_advised(
     assert f": {advice}" in finding.message
     axis = finding.where.split()[1].rstrip(",").lower()
     assert f"--set axes.{axis}.travel_mm=" in finding.message
-    assert "--machine" in finding.message
+    assert "in the machine file of made-up" in finding.message
 
 
 def test_a_stock_of_which_only_the_thickness_is_known_is_as_large_as_the_job_needs() -> None:

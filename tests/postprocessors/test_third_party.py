@@ -86,7 +86,13 @@ def test_its_controller_is_simulated(installed: Path, tmp_path: Path) -> None:
     assert own["interpolator"] == "steps"
     # The pen down by 40 steps and 1600 along X at 1600 Hz, up by 80 and back at 8000 Hz.
     assert own["time_s"] == pytest.approx(1640 / 1600 + 1680 / 8000)
-    assert own["steps"] == {"x": 3200, "y": 1600, "z": 120, "iterations": 3320}
+    assert own["steps"] == {
+        "x": 3200,
+        "y": 1600,
+        "z": 120,
+        "iterations": 3320,
+        "iterations_cutting": 1600,
+    }
     assert report("controller.down_hz=800")["time_s"] == pytest.approx(1640 / 800 + 1680 / 8000)
     exact = report("controller.model=path")
     assert exact["interpolator"] == "path"
