@@ -43,8 +43,12 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
-def pytest_configure() -> None:
-    """A shell's background jobs ignore SIGINT, and so would all processes that tests begin."""
+def pytest_runtest_setup() -> None:
+    """Let SIGINT interrupt again.
+
+    A shell's background jobs ignore it, and so does `main()` at its end, which some tests call in
+    this process: all processes that a later test begins would ignore it too.
+    """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
