@@ -16,7 +16,7 @@ from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.geometry.polylines import Polyline
 from camtool.operations.pocket import engagement
-from camtool.operations.pocket.adaptive import Pose, chords, ends_of, step_for, tangent_link
+from camtool.planning.adaptive import Pose, chords, ends_of, step_for, tangent_link
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
 from tests.oracles.contours import CIRCLE, SQUARE, closed

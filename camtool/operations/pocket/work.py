@@ -2,7 +2,7 @@
 
     closed paths ─nesting─▶ regions ─shrunk by tool and allowance─▶ tool centre regions
     ─contour or zigzag─▶ paths in the plane ─levels, entry─▶ runs
-    ─adaptive (`adaptive.py`)─▶ runs
+    ─adaptive (`camtool.planning.adaptive`)─▶ runs
 
 Closed contours count by nesting: what an odd number of them hold is cleared. Rings run so that
 the teeth go with the feed (climb): round walls CCW and round islands CW, as a spindle turning CW
@@ -38,7 +38,7 @@ from camtool.geometry.polylines import (
     Segments,
     reverse_lines,
 )
-from camtool.operations.pocket.adaptive import adaptive_runs, wide_parts
+from camtool.planning.adaptive import adaptive_runs, wide_parts
 from camtool.planning.clearing import (
     SLOT_TOLERANCE,
     ConnectedRegion,
