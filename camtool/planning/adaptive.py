@@ -1,6 +1,6 @@
 """Clear a pocket so that the tool's engagement never exceeds a limit.
 
-    tool centre region ─disc at its pole, widened by a spiral─▶ cleared centres
+    tool centre region ─what is air, or a disc at its pole, widened by a spiral─▶ cleared centres
       ─grown by a step, kept in the region, opened by a disc─▶ fronts, one beyond the other
       ─cut at concave corners, in an order in which each finds those before it cut─▶ strokes
       ─joined within what is cleared by arcs and lines, all tangent─▶ paths
@@ -9,6 +9,8 @@ The *cleared centres* V are the places of the tool's centre so far. The next fro
 of V grown by a step s, as far as it lies in the tool centre region, opened by a disc of radius ρ
 (all discs of that radius that fit in). So V is always a union of discs ρ, and has no outer corner
 sharper than ρ: at walls fronts end in arcs that are tangent to the wall.
+
+What is air at the beginning may lie beyond the tool centre region: there are discs, and no tool.
 
 With a disc ρ of centres cleared, all within ρ + r of its centre is air. A tool of radius r whose
 centre is s beyond that disc has material only within the angle φ of the direction away from it,
@@ -44,6 +46,8 @@ from camtool.planning.items import CutRun, Setting
 from camtool.planning.paths import MeasuredPath
 from camtool.planning.ramps import feeds_along, helix
 
+NO_AIR = Polylines.of([])
+
 HELIX_SHARE = 0.5
 """Default of the radius of the helix, over the tool's radius."""
 
@@ -67,6 +71,13 @@ STEP_HALVINGS = 30
 
 FIRST_SHARE = 0.9
 """The first opening disc is this part of the largest that fits."""
+
+UNION_MM = 2.0 * POSITION_EPS_MM
+"""Regions that are nearer to each other than twice this are one."""
+
+AIR_SLACK_SHARE = 1e-3
+"""What is air counts as wider by this part of the tool's radius: along walls that two operations
+have in common no stroke is left."""
 
 MAX_FRONTS = 20_000
 """No more fronts are made in one region."""
@@ -171,30 +182,43 @@ def spiral(
 
 
 def fronts(
-    region: Polylines, start: Floats, room_mm: float, tool_mm: float, limit: float, fine_mm: float
+    region: Polylines,
+    clear: Polylines,
+    openings_mm: tuple[float, float],
+    tool_mm: float,
+    limit: float,
 ) -> Iterator[FrontStroke]:
-    """Yield the strokes that clear a connected tool centre region after a disc of it."""
-    cleared = Polylines.of([_circle(start, room_mm)])
-    opening = FIRST_SHARE * room_mm
-    number = 0
-    while opening > fine_mm and number < MAX_FRONTS:
+    """Yield the strokes that clear a region of tool centres, after the part that is `clear`; with
+    discs that begin with the first of two radii, grow up to the second as what is cleared gets
+    wider, and shrink then."""
+    opening, widest = openings_mm
+    before = offset_shape(clear, -UNION_MM)
+    number, grows = 0, True
+    while opening > CORNER_SHARE * tool_mm and number < MAX_FRONTS:
         step = front_step(PLANNED_SHARE * limit, opening, tool_mm)
         growth = MIN_GROWTH_SHARE * math.pi * min(opening, tool_mm) ** 2
-        inner = offset_shape(cleared, opening)
+        inner = offset_shape(before, opening + UNION_MM)
+        next_mm = opening / RATIO
+        grows = grows and next_mm <= widest
         while number < MAX_FRONTS:
             grown = offset_shape(inner, -(opening + step))
             inner = _within(offset_shape(Polylines.joined([grown, region]), opening), grown)
             wider = offset_shape(inner, -opening)
-            if signed_areas(wider).sum() - signed_areas(cleared).sum() < growth:
+            after = offset_shape(Polylines.joined([wider, clear]), -UNION_MM)
+            if signed_areas(after).sum() - signed_areas(before).sum() < growth:
+                grows = False
                 break
             number += 1
-            before = offset_shape(cleared, -2.0 * POSITION_EPS_MM)
             for path in outside_parts(wider, before):
                 for piece in _cut_at_corners(path, tool_mm):
                     fit_mm = FIT_SHARE * min(tool_mm, FIT_OPENINGS * opening)
                     yield FrontStroke(_smooth(piece, fit_mm), number, opening)
-            cleared = wider
-        opening *= RATIO if opening > tool_mm else CORNER_RATIO
+            before = after
+            if grows and len(offset_shape(before, next_mm + UNION_MM)):
+                break
+        if not grows:
+            next_mm = opening * (RATIO if opening > tool_mm else CORNER_RATIO)
+        opening = next_mm
 
 
 def _circle(centre: Floats, radius_mm: float) -> Polyline:
@@ -329,15 +353,26 @@ class Leg(Struct, frozen=True, eq=False):
 class _Clearing:
     """The strokes of one region in an order, and the legs that join them."""
 
-    def __init__(
-        self, region: Polylines, strokes: list[FrontStroke], tool_mm: float, limit: float
-    ):
-        self.strokes, self.tool_mm, self.limit = strokes, tool_mm, limit
+    def __init__(self, region: Polylines, tool_mm: float, limit: float):
+        self.tool_mm, self.limit = tool_mm, limit
+        self.strokes: list[FrontStroke] = []
+        self.poses: list[tuple[Pose, Pose]] = []
         boxes = path_extents(region)
         extents = np.stack([boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)])
         self.cleared = Cleared(extents, tool_mm, np.array([-np.inf, -np.inf, np.inf, np.inf]))
         self.border = Segments.of(offset_shape(region, -WALL_SHARE * tool_mm))
-        self.poses = [ends_of(each.vertices) for each in strokes]
+
+    def take(self, strokes: list[FrontStroke]) -> None:
+        """Take the strokes that are to be put in order."""
+        self.strokes, self.poses = strokes, [ends_of(each.vertices) for each in strokes]
+
+    def add_air(self, clear: Polylines) -> None:
+        """Take it that the tool has been at all places of a region: once round its rings."""
+        while len(clear):
+            for ring in clear:
+                closed = np.concatenate([ring.vertices, ring.vertices[:1] * [1.0, 1.0, 0.0]])
+                self.cleared.add(self.moves(closed))
+            clear = offset_shape(clear, self.tool_mm)
 
     def moves(self, vertices: Floats, sagitta_share: float = SAGITTA_SHARE) -> Floats:
         """(K, 9) the moves of an open path, as `camtool.kernels.engagement` wants them."""
@@ -360,21 +395,27 @@ class _Clearing:
                 return False
         return True
 
-    def legs(self, first: Floats) -> Iterator[list[Leg]]:
-        """Yield the legs of each stay of the tool in the stock: the first begins with a path."""
-        self.cleared.add(self.moves(first))
-        legs, tool = [Leg(first)], ends_of(first)[1]
+    def legs(self, first: Floats | None) -> Iterator[list[Leg]]:
+        """Yield the legs of each stay of the tool in the stock: the first begins with a path, or
+        (None) as all others where the tool goes down through air."""
+        legs, tool = list[Leg](), None
+        if first is not None:
+            self.cleared.add(self.moves(first))
+            legs, tool = [Leg(first)], ends_of(first)[1]
         waits, followers = self.older_ones()
         starts = np.array([[begin.x, begin.y] for begin, _ in self.poses])
         ready = {number for number, count in enumerate(waits) if count == 0}
         while ready:
             numbers = np.array(sorted(ready))
-            away = np.hypot(starts[numbers, 0] - tool.x, starts[numbers, 1] - tool.y)
-            number, link = self.next_one(tool, numbers[np.argsort(away, kind="stable")].tolist())
+            if tool is not None:
+                away = np.hypot(starts[numbers, 0] - tool.x, starts[numbers, 1] - tool.y)
+                numbers = numbers[np.argsort(away, kind="stable")]
+            number, link = self.next_one(tool, numbers.tolist())
             stroke = self.strokes[number]
             if link is None:
-                yield legs
-                legs = [Leg(self.lead(self.poses[number][0], stroke.opening_mm), cuts=False)]
+                if legs:
+                    yield legs
+                legs = self.lead(self.poses[number][0], stroke.opening_mm)
             elif len(link):
                 legs.append(Leg(link, cuts=False))
             legs.append(Leg(stroke.vertices))
@@ -385,11 +426,14 @@ class _Clearing:
                 waits[follower] -= 1
                 if waits[follower] == 0:
                     ready.add(follower)
-        yield legs
+        if legs:
+            yield legs
 
-    def next_one(self, tool: Pose, numbers: list[int]) -> tuple[int, Floats | None]:
+    def next_one(self, tool: Pose | None, numbers: list[int]) -> tuple[int, Floats | None]:
         """The first of some strokes to which a link leads, and the link; the first of all, and
-        None, where none of the first few has one."""
+        None, where none of the first few has one, or the tool is not down yet."""
+        if tool is None:
+            return numbers[0], None
         for number in numbers[:TRIED_STROKES]:
             link = self.link(tool, self.poses[number][0], self.strokes[number].opening_mm)
             if link is not None:
@@ -399,6 +443,8 @@ class _Clearing:
     def older_ones(self) -> tuple[list[int], list[list[int]]]:
         """For each stroke, how many of older fronts lie so near that they matter, and for which
         newer ones it matters itself."""
+        if not self.strokes:
+            return [], []
         cell = 2.0 * self.tool_mm
         places = [sample(Polyline(each.vertices), self.tool_mm) for each in self.strokes]
         stroke = np.repeat(np.arange(len(places)), [len(each) for each in places])
@@ -441,30 +487,97 @@ class _Clearing:
                     return link
         return None
 
-    def lead(self, begin: Pose, opening_mm: float) -> Floats:
-        """(k, 3) a quarter circle from the left to where a stroke begins."""
-        radius = LINK_SHARES[0] * opening_mm
-        centre = np.array([begin.x, begin.y]) + radius * _left(begin.angle)
-        start = centre - radius * np.array([math.cos(begin.angle), math.sin(begin.angle)])
-        return np.array([[*start, math.tan(math.pi / 8.0)], [begin.x, begin.y, 0.0]])
+    def lead(self, begin: Pose, opening_mm: float) -> list[Leg]:
+        """Return the leg that leads from air to where a stroke begins: a quarter circle from the
+        left, or a line; none where neither is clear."""
+        place, ahead = np.array([begin.x, begin.y]), _left(begin.angle - 0.5 * math.pi)
+        for share in LINK_SHARES:
+            radius = share * min(opening_mm, self.tool_mm)
+            for aside, bulge in (
+                (_left(begin.angle), math.tan(math.pi / 8.0)),
+                (0.0 * ahead, 0.0),
+            ):
+                start = place + radius * (aside - ahead)
+                path = np.array([[*start, bulge], [*place, 0.0]])
+                if self.is_air(start) and self.is_clear(path):
+                    return [Leg(path, cuts=False)]
+        return []
+
+    def is_air(self, place: Floats) -> bool:
+        """True if the tool meets nothing at a place (2,)."""
+        near = place + WALL_SHARE * self.tool_mm * np.array([[1.0, 0.0], [-1.0, 0.0]])
+        moves = [self.moves(np.array([[*place, 0.0], [*end, 0.0]])) for end in near]
+        thick = THICK_SHARE * self.tool_mm
+        every = np.ones(2, dtype=np.bool_)
+        angles = self.cleared.judge(np.concatenate(moves), every, thick, 0.0, math.inf, adds=False)
+        return not angles.any()
+
+
+class AdaptiveStays(Struct, frozen=True, eq=False):
+    """The stays of the tool in the stock that clear a region of tool centres, each as legs. The
+    first begins with a helix about a place (2,) of a radius, mm; where there is none
+    (`helix_mm` 0), as all others do, at a place that is air."""
+
+    centre: Floats
+    helix_mm: float
+    stays: list[list[Leg]]
 
 
 def adaptive_legs(
-    region: Polylines, helix_mm: float, tool_mm: float, limit: float
-) -> tuple[Floats, float, list[list[Leg]]]:
-    """Return where a helix goes down into a connected tool centre region (2,), its radius mm (as
-    asked for, or as there is room), and the legs of each stay of the tool in the stock: none where
-    there is no room."""
+    region: Polylines, helix_mm: float, tool_mm: float, limit: float, air: Polylines = NO_AIR
+) -> AdaptiveStays:
+    """Return the stays that clear a connected tool centre region; none where it has no room, or
+    nothing is left to clear.
+
+    `air`: closed paths, with what is air already on their left, in the region and beyond it; they
+    may overlap. If the tool has room in that it goes down there, otherwise in a helix where the
+    region is widest, of this radius or as there is room.
+    """
+    clear = _places_in_air(air, tool_mm)
+    clearing = _Clearing(region, tool_mm, limit)
+    clearing.add_air(clear)
+    min_mm = MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm
+    first, helix = None, 0.0
+    centre, room = _widest(region)
+    if room < min_mm:
+        return AdaptiveStays(centre, helix, [])
+    widest = room
+    if _common(clear, region, min_mm):
+        parts = [part for part in parts_of(clear) if _common(part, region, min_mm)]
+        opening = FIRST_SHARE * max(_widest(part)[1] for part in parts)
+        widest = max(opening, room)
+    else:
+        opening, helix = FIRST_SHARE * room, min(helix_mm, room)
+        first = spiral(centre, helix, room, tool_mm, limit)
+        clearing.cleared.add(clearing.moves(np.array(_ring(centre, helix))))
+        clear = Polylines.joined([Polylines.of([_circle(centre, room)]), clear])
+    full_region = region
+    if len(air):
+        union = offset_shape(Polylines.joined([region, clear]), -UNION_MM)
+        full_region = offset_shape(union, UNION_MM)
+    strokes = fronts(full_region, clear, (opening, widest), tool_mm, limit)
+    clearing.take(list(strokes))
+    return AdaptiveStays(centre, helix, list(clearing.legs(first)))
+
+
+def _places_in_air(air: Polylines, tool_mm: float) -> Polylines:
+    """Return the places at which the tool is in air, as a region."""
+    if len(air) == 0:
+        return air
+    slack_mm = AIR_SLACK_SHARE * tool_mm
+    return offset_shape(offset_shape(air, -slack_mm), tool_mm)
+
+
+def _common(one: Polylines, other: Polylines, room_mm: float) -> Polylines:
+    """Return the common part of two regions, shrunk by a distance."""
+    both = offset_shape(Polylines.joined([one, other]), room_mm) if len(one) else one
+    return _within(_within(both, one), other)
+
+
+def _widest(region: Polylines) -> tuple[Floats, float]:
+    """Return the place (2,) of a connected region that has the most room, and how much, mm."""
     centre = pole(region)
-    room = float(points_to_segments(centre[None, :], Segments.of(region)).min())
-    helix = min(helix_mm, room)
-    if helix < MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm:
-        return centre, helix, []
-    strokes = list(fronts(region, centre, room, tool_mm, limit, CORNER_SHARE * tool_mm))
-    begin = spiral(centre, helix, room, tool_mm, limit)
-    clearing = _Clearing(region, strokes, tool_mm, limit)
-    clearing.cleared.add(clearing.moves(np.array(_ring(centre, helix))))
-    return centre, helix, list(clearing.legs(begin))
+    return centre, float(points_to_segments(centre[None, :], Segments.of(region)).min())
 
 
 def _ring(centre: Floats, radius_mm: float) -> list[list[float]]:
@@ -488,12 +601,11 @@ def adaptive_runs(region: Polylines, setting: Setting, name: str) -> list[CutRun
     limit: float = operation.own_value("engagement")
     entry_mm = operation.entry.radius_mm or HELIX_SHARE * tool_mm
     backward = operation.direction == "conventional"
-    centre, helix_mm, stays = adaptive_legs(
+    clearing = adaptive_legs(
         _mirrored(region) if backward else region, min(entry_mm, tool_mm), tool_mm, limit
     )
+    centre, helix_mm, stays = clearing.centre, clearing.helix_mm, clearing.stays
     runs: list[CutRun] = []
-    if not stays:
-        return runs
     for above, level in pairwise((0.0, *setting.levels_mm)):
         for number, stay in enumerate(stays):
             parts = [_at_level(leg, level, setting) for leg in stay]
