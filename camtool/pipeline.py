@@ -44,6 +44,7 @@ from camtool.toolpath.lower import (
     without_coolant,
 )
 from camtool.toolpath.moves import (
+    Kind,
     changes_between_cuts,
     feeds_below_top,
     toolpath_extents,
@@ -331,7 +332,7 @@ def _post_plan(
         options,
         compensation,
         written_from=written,
-        row_from=_row_from(program, decoded),
+        row_from=_row_from(program, decoded, written),
     )
     saved = sum(step.rapid_drawn_mm - step.rapid_mm for step in judged_plan.steps)
     rapid = rapid_length_mm(written)
@@ -544,7 +545,7 @@ def convert_program(
         wanted_path,
         options=VerifyOptions(source=file),
         written_from=wanted_path,
-        row_from=_row_from(program, reread),
+        row_from=_row_from(program, reread, wanted_path),
     )
     verification = _judge_program(case, program.data, progress)
     findings = _merge_findings(findings, verification.findings, left_out=repeated)
@@ -685,22 +686,22 @@ def _deepest_mm(step: Step) -> float:
 
 def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
     """The tools of the operations that cut something, in the order of first use."""
-    deepest: dict[Tool, float] = {}
+    deepest: dict[tuple[Tool, str], float] = {}
     for step in steps:
         if step.runs:
-            tool, depth = step.operation.tool, rounded(_deepest_mm(step))
-            deepest[tool] = max(depth, deepest.get(tool, 0.0))
+            key = step.operation.tool, step.operation.contract.tool_shape
+            deepest[key] = max(rounded(_deepest_mm(step)), deepest.get(key, 0.0))
     return tuple(
         PlannedTool(
             tool.number,
             tool.name,
-            tool_words(tool),
+            tool_words(tool, shape),
             depth,
             tool.cutting_length_mm,
             tool.stickout_mm,
             tool.holder_diameter_mm,
         )
-        for tool, depth in deepest.items()
+        for (tool, shape), depth in deepest.items()
     )
 
 
@@ -940,18 +941,35 @@ def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> 
     operations = written.operations
     if operations is None:
         return decoded
-    row = np.maximum.accumulate(_row_from(program, decoded).clip(min=0))
+    row = np.maximum.accumulate(_row_from(program, decoded, written).clip(min=0))
     begin = np.searchsorted(row, operations.begin).astype(operations.begin.dtype)
     return replace(decoded, operations=replace(operations, begin=begin))
 
 
-def _row_from(program: Program, decoded: Toolpath) -> Indices:
-    """(N,) the row of the toolpath from which each decoded row was written, −1 for none."""
+def _row_from(program: Program, decoded: Toolpath, written: Toolpath) -> Indices:
+    """(N,) the row of the toolpath from which each decoded row was written, −1 for none.
+
+    A cycle is one block, written from its first cut. Where the controller makes the same moves of
+    it as were planned, each is from its own row.
+    """
     import numpy as np
 
     last = len(program.row_of_block)
-    rows = np.append(program.row_of_block, np.int32(-1))
-    return np.asarray(rows[decoded.block.clip(max=last)])
+    rows = np.append(program.row_of_block, np.int32(-1))[decoded.block.clip(max=last)]
+    block = decoded.block.clip(min=0, max=last)
+    is_cycle = program.row_of_block >= 0
+    for moves, least in ((decoded.is_feed, 2), (decoded.kind == Kind.RAPID, 1)):
+        is_cycle &= np.bincount(block[moves], minlength=last + 1)[:last] >= least
+    cycles = np.flatnonzero(is_cycle)
+    order = np.argsort(block, kind="stable") if len(cycles) else np.arange(len(block))
+    lows, highs = (np.searchsorted(block[order], cycles, side=side) for side in ("left", "right"))
+    for cycle, low, high in zip(cycles, lows, highs, strict=True):
+        moves = order[low:high]
+        first = int(program.row_of_block[cycle]) - int(decoded.is_feed[moves].argmax())
+        planned = written.kind[max(first, 0) : first + len(moves)]
+        if first >= 0 and np.array_equal(decoded.kind[moves], planned):
+            rows[moves] = np.arange(first, first + len(moves), dtype=rows.dtype)
+    return np.asarray(rows)
 
 
 def _program_request(
@@ -978,7 +996,9 @@ def _program_request(
         wanted=wanted_path,
         unit_mm=max(units[:2]),
         unit_z_mm=units[2],
-        feed_named=_is_feed_named(job, machine, wanted_path, _row_from(program, written)),
+        feed_named=_is_feed_named(
+            job, machine, wanted_path, _row_from(program, written, wanted_path)
+        ),
         feed_unit_mm_min=machine.feed.unit_mm_min,
         safe_z_mm=safe_z_of(job, machine),
         safe_z_named=job.safe_z_mm is not None,

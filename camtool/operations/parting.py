@@ -15,6 +15,7 @@ PARTING = OperationKind(
     rank=22,
     takes="nothing",
     cuts="over",
+    tool_shape="blade",
     turns_work=True,
     cut_name="part",
     reason="it cuts the part off",

@@ -19,6 +19,7 @@ THREAD = OperationKind(
     rank=21,
     takes="nothing",
     cuts="over",
+    tool_shape="threading",
     turns_work=True,
     follows_spindle=True,
     cut_name="thread",

@@ -509,7 +509,7 @@ def _turns(job: Job, toolpath: Toolpath) -> tuple[tuple[int, Tool], ...]:
             return ()
         mounted = [first, *(numbers[number] for number in tool_numbers)]
         return tuple(zip([0, *changes.tolist()], mounted, strict=True))
-    tools = {tool_note(each.tool): each.tool for each in job.operations}
+    tools = {tool_note(each): each.tool for each in job.operations}
     notes = [note.tool for note in toolpath.operations.notes]
     if not all(note in tools for note in notes):
         return ()

@@ -79,7 +79,8 @@ class OperationKind:
     `rest` says what an operation with `rest` may clear after it: "corners", a "floor", or nothing.
     `path_error_mm`: its centre paths may be off the drawing's by this much.
 
-    The tool: `descent` is how it goes down: in "passes" of one depth each, in one "helix", in
+    The tool: `tool_shape` is a name of TOOL_SHAPES where the job's tool does not say its shape;
+    `descent` is how it goes down: in "passes" of one depth each, in one "helix", in
     "pecks", or along "slopes". `needs_v_bit`: it cuts with a V bit alone. `turns_work`: it cuts
     on a lathe, in the half section of the work, X along the axis and Y the radius, without any
     height; `follows_spindle`: with feeds that follow the turns of the spindle. `frees_nets`:
@@ -102,6 +103,7 @@ class OperationKind:
     leaves_walls: bool = False
     rest: str = ""
     path_error_mm: float = 0.0
+    tool_shape: str = ""
     descent: str = "passes"
     needs_v_bit: bool = False
     turns_work: bool = False

@@ -11,7 +11,7 @@ from msgspec import Struct
 from camtool.arrays import Floats
 from camtool.machine.model import Machine, Spindle
 from camtool.planning.items import CutRun, Runs, Setting
-from camtool.planning.job import Tool
+from camtool.planning.job import Operation, Tool
 from camtool.planning.paths import cuts
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
@@ -143,12 +143,13 @@ def _go_to_tool_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: fl
         builder.rapid(*place)
 
 
-def tool_note(tool: Tool) -> ToolNote:
-    """Return a tool as a program names it."""
+def tool_note(operation: Operation) -> ToolNote:
+    """Return the tool of an operation as a program names it."""
+    tool = operation.tool
     return ToolNote(
         tool.number,
         tool.name,
-        tool.kind,
+        operation.contract.tool_shape or tool.kind,
         tool.diameter_mm,
         tool.tip_angle_rad,
         tool.tip_diameter_mm,
@@ -158,11 +159,11 @@ def tool_note(tool: Tool) -> ToolNote:
 
 def _operation_note(setting: Setting) -> OperationNote:
     """Return the description of an operation for the comments of the program."""
-    operation, tool = setting.operation, setting.operation.tool
+    operation = setting.operation
     return OperationNote(
         kind=operation.kind,
         name=operation.name,
-        tool=tool_note(tool),
+        tool=tool_note(operation),
         feed_mm_min=setting.feeds.cut_mm_min,
         plunge_mm_min=setting.feeds.plunge_mm_min,
         depth_mm=-setting.levels_mm[-1],

@@ -32,9 +32,10 @@ def width_name(operation: Operation) -> str:
     return tool_name(operation.tool)
 
 
-def tool_words(tool: Tool) -> str:
-    """Describe all that is known of a tool's shape: `end mill 3.175 mm, 2 flutes, cuts 12 mm`."""
-    words = [f"{TOOL_SHAPES[tool.kind]} {tool.diameter_mm:g} mm"]
+def tool_words(tool: Tool, shape: str = "") -> str:
+    """Describe all that is known of a tool's shape: `end mill 3.175 mm, 2 flutes, cuts 12 mm`;
+    `shape`: its name in TOOL_SHAPES where that is not the tool's own kind."""
+    words = [f"{TOOL_SHAPES[shape or tool.kind]} {tool.diameter_mm:g} mm"]
     if not tool.diameter_mm:
         words = [TOOL_SHAPES[tool.kind] if tool.kind != "flat" else "point"]
     if tool.tip_angle_rad is not None:

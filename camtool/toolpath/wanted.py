@@ -51,8 +51,12 @@ TOOL_SHAPES = {
     "bull": "bull nose",
     "v": "V bit",
     "drill": "drill",
+    "insert": "turning insert with a nose of",
+    "threading": "threading insert",
+    "blade": "parting blade",
 }
-"""Names of the shapes of tools in jobs, for people; an unlisted shape is its own name."""
+"""Names of the shapes of tools in jobs and of those of lathes, for people; an unlisted shape is
+its own name."""
 
 
 class ToolNote(Struct, frozen=True):

@@ -811,11 +811,11 @@ def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
         passes = "" if each.passes is None else f" in {each.passes} pass"
         if each.passes is not None and each.passes > 1:
             passes += f"es of {each.deepest_pass_mm:.4g} at most"
-        cooled = COOLANT_WORDS[each.coolant]
-        yield (
-            f"{name}: {tool}, {speed}, feed {each.feed_mm_min:g} mm/min{chip}, plunge"
-            f" {each.plunge_mm_min:g} mm/min{preset}, {each.depth_mm:.4g} mm deep{passes}{cooled}"
-        )
+        plunge, depth = f", plunge {each.plunge_mm_min:g} mm/min", f", {each.depth_mm:.4g} mm deep"
+        if not each.depth_mm:  # on a lathe nothing goes down
+            plunge = depth = passes = ""
+        feed = f"feed {each.feed_mm_min:g} mm/min{chip}{plunge}{preset}"
+        yield f"{name}: {tool}, {speed}, {feed}{depth}{passes}{COOLANT_WORDS[each.coolant]}"
     if len(operations) > MAX_OPERATIONS:
         yield f"and {len(operations) - MAX_OPERATIONS} operations more"
 

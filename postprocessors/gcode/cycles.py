@@ -1,4 +1,4 @@
-"""Holes as drilling cycles: which rows of a toolpath are a hole, and the blocks that drill it.
+"""Holes and threads as cycles: which rows of a toolpath are one, and the blocks that cut it.
 
     across · (down to R, as a rapid) · to Z at the feed · (out and back, and on by a peck) ·
     (a dwell) · out to where it began
@@ -6,10 +6,14 @@
 becomes G81, with a dwell G82, by pecks G83, all with G98: out to where the first cycle began. A
 controller counts pecks from R, the plan from the stock: the bites of G83 are no deeper than those
 that were planned, and the first of them may be in the air.
+
+A thread whose passes are those of LinuxCNC's G76 becomes that. From the drive line, where the tool
+stands, the crest is I away, and the passes are J √1, J √2 … below it, up to the full depth K.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
@@ -24,6 +28,10 @@ from .format import NumberStyle, format_number
 
 CYCLE: Final = 100
 """Stands for the kind of a row that is written as a cycle: it is no motion of the program."""
+
+
+THREAD: Final = NumberStyle(6, strip=True)
+"""Pitches and depths of threads: a rounded depth would change the number of passes."""
 
 
 class CycleHole(Struct, frozen=True):
@@ -45,6 +53,57 @@ class CycleHole(Struct, frozen=True):
         """Numbers that a canned cycle repeats for all of its holes: height, bottom, peck,
         dwell."""
         return self.height, self.bottom, self.bite, self.dwell_s
+
+
+class CycleThread(Struct, frozen=True):
+    """Rows first:last + 1 of a toolpath that one block cuts; `cut` is the first at a feed."""
+
+    first: int
+    cut: int
+    last: int
+    block: str
+
+
+Cycle = CycleHole | CycleThread
+
+
+def threads_of(toolpath: Toolpath, unit_mm: float, style: NumberStyle) -> list[CycleThread]:
+    """The threads of a lathe's plan that G76 cuts with the same moves; lengths of the toolpath are
+    in a unit of so many mm, X along the axis and Y the radius."""
+    operations = toolpath.operations
+    if operations is None:
+        return []
+    ends = [*operations.begin[1:].tolist(), len(toolpath)]
+    threads = []
+    for note, low, high in zip(operations.notes, operations.begin.tolist(), ends, strict=True):
+        cuts = low + np.flatnonzero(toolpath.kind[low:high] == Kind.LINE)
+        if note.pitch_mm is None or len(cuts) < 3:  # of one pass G76 does not say the depth
+            continue
+        first, last = int(cuts[0]) - 2, int(cuts[-1]) + 2
+        if last >= high or last - first != 4 * len(cuts):
+            continue
+        drive = toolpath.starts_of(np.array([first]))[0]
+        bottoms, end = toolpath.end[cuts, 1], toolpath.end[last]
+        depth, count = drive[1] - bottoms[-1], len(cuts) - 1
+        full = (bottoms[0] - bottoms[-1]) / (1.0 - 1.0 / math.sqrt(count))
+        crest = depth - full
+        numbers = np.array([*range(1, count + 1), count])
+        rows = np.empty((len(cuts), 4, 2))
+        rows[:, :2, 0], rows[:, 2:, 0] = drive[0], end[0]
+        rows[:, 1:3, 1] = (drive[1] - crest - full * np.sqrt(numbers / count))[:, None]
+        rows[:, ::3, 1] = rows[:, 1:2, 1] + depth
+        places = np.concatenate([rows.reshape(-1, 2), [[end[0], drive[1]]]])
+        if full <= 0.0 or np.abs(places - toolpath.end[first : last + 1, :2]).max() > 1e-9:
+            continue
+        # Were the first pass rounded down, there would be one more before the full depth.
+        start = math.ceil(round(full, THREAD.decimals) / math.sqrt(count) * 10**THREAD.decimals)
+        pitch, peak, least, most = (
+            format_number(value, THREAD)
+            for value in (note.pitch_mm / unit_mm, crest, start / 10**THREAD.decimals, full)
+        )
+        block = f"G76 P{pitch} Z{format_number(end[0], style)} I-{peak} J{least} R2 K{most} H1"
+        threads.append(CycleThread(first, int(cuts[0]), last, block))
+    return threads
 
 
 def holes_of(toolpath: Toolpath) -> list[CycleHole]:
@@ -160,10 +219,10 @@ def _rounded_down(bite: float, style: NumberStyle) -> float:
     return max(float(np.floor(bite / unit + 1e-6)), 1.0) * unit
 
 
-def rows_kept(count: int, holes: Sequence[CycleHole]) -> Ints:
-    """Of so many rows those that are no part of a hole, and the first row at a feed of each."""
+def rows_kept(count: int, cycles: Sequence[Cycle]) -> Ints:
+    """Of so many rows those that are no part of a cycle, and the first row at a feed of each."""
     is_kept = np.ones(count, dtype=np.bool_)
-    for hole in holes:
-        is_kept[hole.first : hole.last + 1] = False
-        is_kept[hole.cut] = True
+    for cycle in cycles:
+        is_kept[cycle.first : cycle.last + 1] = False
+        is_kept[cycle.cut] = True
     return np.flatnonzero(is_kept)

@@ -34,7 +34,16 @@ from camtool.toolpath.words import WordColumn, texts_of
 from .arcs import ArcCounts, RowArcs, arcs_of
 from .checks import check, feed_units
 from .comments import comments, header
-from .cycles import CYCLE, CycleHole, cycle_blocks, holes_of, rows_kept
+from .cycles import (
+    CYCLE,
+    THREAD,
+    Cycle,
+    CycleHole,
+    cycle_blocks,
+    holes_of,
+    rows_kept,
+    threads_of,
+)
 from .dialect import UNITS, GcodeDialect, Unit, feed_decimals
 from .findings import ARC_MENDED, MOVE_COLLAPSED, VALUE_ROUNDED
 from .format import (
@@ -116,15 +125,20 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
     arcs = arcs_of(toolpath, dialect)
     events = events_of(toolpath, style.event)
     decimals = feed_decimals(machine) + unit.more_decimals
-    holes = holes_of(toolpath) if style.cycles else []
-    if holes:
+    cycles = list[Cycle]()
+    if style.cycles:
+        holes, number = (
+            holes_of(toolpath),
+            NumberStyle(dialect.decimals, strip=dialect.strip_zeros),
+        )
+        threads = threads_of(toolpath, unit.mm, number)
         feed_words = [f"F{word}" for word in _feed_texts(feeds, holes, decimals)]
-        number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
         blocks = {**events.blocks, **cycle_blocks(holes, feed_words, number)}
-        events = replace(events, blocks=blocks)
+        blocks |= {thread.cut: (thread.block,) for thread in threads}
+        events, cycles = replace(events, blocks=blocks), [*holes, *threads]
     unmoved = first_change(toolpath, events) if style.change_first else 0
     rows_sent = sent_rows(
-        toolpath, arcs, feeds, events.changes, holes, unmoved, raises=bool(style.axes[2])
+        toolpath, arcs, feeds, events.changes, cycles, unmoved, raises=bool(style.axes[2])
     )
     arc_counts = arcs.counts
     del arcs, feeds
@@ -385,15 +399,15 @@ def sent_rows(
     arcs: RowArcs,
     feeds: Ints,
     changes: Sequence[int] = (),
-    holes: Sequence[CycleHole] = (),
+    cycles: Sequence[Cycle] = (),
     unmoved: int = 0,
     *,
     raises: bool = True,
 ) -> Sent:
     """All rows with pieces in place of arcs, without moves that move nothing, and without motions
-    among the first `unmoved` rows. `changes`: the rows of tool changes that have a block; of
-    `holes`, which are written as cycles, there is one. `raises`: behind a change of tools the tool
-    is sent to its height once more."""
+    among the first `unmoved` rows. `changes`: the rows of tool changes that have a block; each of
+    `cycles` is one block. `raises`: behind a change of tools the tool is sent to its height once
+    more."""
     origins, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
     if arcs.pieces:
         piece_counts = np.ones(len(toolpath), dtype=np.int64)
@@ -412,11 +426,11 @@ def sent_rows(
                     (*piece.end, height),
                     piece.offset,
                 )
-    if holes:
-        rows = np.flatnonzero(np.isin(origins, rows_kept(len(toolpath), holes)))
+    if cycles:
+        rows = np.flatnonzero(np.isin(origins, rows_kept(len(toolpath), cycles)))
         origins, kind, end, offset = origins[rows], kind[rows], end[rows], offset[rows]
-        drilled = np.searchsorted(origins, [hole.cut for hole in holes])
-        kind[drilled], end[drilled] = CYCLE, arcs.end[[hole.last for hole in holes]]
+        begins = np.searchsorted(origins, [cycle.cut for cycle in cycles])
+        kind[begins], end[begins] = CYCLE, arcs.end[[cycle.last for cycle in cycles]]
     raised = np.zeros(len(origins), dtype=np.bool_)
     is_changed = (kind == Kind.TOOL_CHANGE) & np.isin(origins, changes)
     if raises and (raised_rows := _raised_again(kind, end, is_changed)):
@@ -505,9 +519,6 @@ def _first_after(home: Bools, motion: Bools) -> Bools:
     return is_first
 
 
-PITCH: Final = NumberStyle(6, strip=True)
-"""Pitches of threads, mm or inches for each turn."""
-
 G33: Final = 33
 """The motion that follows the spindle."""
 
@@ -546,7 +557,7 @@ def motion_words(
     units = np.zeros(len(motion), dtype=np.int64)
     if pitch is not None and pitch.any():
         mm = UNITS[dialect.units].mm
-        units = np.rint(pitch[rows_sent.row] / mm * 10**PITCH.decimals).astype(np.int64)
+        units = np.rint(pitch[rows_sent.row] / mm * 10**THREAD.decimals).astype(np.int64)
         follows = motion & (units > 0)
         codes = np.where(follows, G33, codes)
     turns[rows] = np.diff(codes[rows], prepend=-1) != 0
@@ -564,7 +575,7 @@ def motion_words(
             word_of(axis, rows_sent.offset[:, index], is_arc, number)
             for index, axis in enumerate(offsets)
         ),
-        *([word_of("K", units, follows, PITCH)] if follows.any() else []),
+        *([word_of("K", units, follows, THREAD)] if follows.any() else []),
         word_of("F", rows_sent.feed, feed, NumberStyle(feed_decimals, strip=True)),
     ]
 

@@ -20,7 +20,9 @@ from tests.drawings import drawing_of
 from tests.oracles.rs274 import interpreted, needs_rs274
 
 SAMPLES = Path(__file__).parents[2] / "samples"
-LATHE = load_target("linuxcnc", machine_file=SAMPLES / "machines" / "linuxcnc-lathe.toml")
+LATHE_FILE = SAMPLES / "machines" / "linuxcnc-lathe.toml"
+LATHE = load_target("linuxcnc", machine_file=LATHE_FILE)
+CYCLES = load_target("linuxcnc", machine_file=LATHE_FILE, settings=["dialect.canned_cycles=true"])
 
 JOB = """
 feed = 20
@@ -219,6 +221,43 @@ class TestScrew:
         assert "minor 0.5546 mm, flanks at 60°" in form.message
         assert form.measured == len(passes)
 
+    @pytest.mark.parametrize("units", ["mm", "in"])
+    def test_the_cycle_makes_the_same_moves(self, units: str) -> None:
+        """One block of G76 for all passes; in inches coordinates are rounded otherwise."""
+        job = camtool.read_job(SAMPLES / "screw.toml")
+        paths = []
+        for cycles in ("false", "true"):
+            settings = [f"dialect.canned_cycles={cycles}", f"dialect.units={units}"]
+            target = load_target("linuxcnc", machine_file=LATHE_FILE, settings=settings)
+            run = camtool.post(SAMPLES / "screw.dxf", target, job)
+            assert run.program is not None
+            assert run.decoded is not None
+            assert run.verification is not None
+            assert (b"G76" in run.program.data) == (cycles == "true")
+            assert (b"G33" in run.program.data) == (cycles == "false")
+            assert run.verification.report.error_um.total.max < 4.5
+            path = run.decoded
+            paths.append(path.end[(path.end != path.starts_of(np.arange(len(path)))).any(axis=1)])
+        np.testing.assert_allclose(*paths, atol=6e-4)
+
+    def test_a_thread_of_other_passes_is_no_cycle(self) -> None:
+        """G76 does not say the depth of a single pass."""
+        job = camtool.read_job(SAMPLES / "screw.toml")
+        thread = replace(job.operations[1], step_down_mm=0.2)
+        job = replace(job, operations=(job.operations[0], thread, job.operations[2]))
+        run = camtool.post(SAMPLES / "screw.dxf", CYCLES, job)
+        assert run.program is not None
+        assert run.program.data.count(b"G33") == 2
+        assert b"G76" not in run.program.data
+
+    def test_tools_are_called_what_they_are(self) -> None:
+        run = camtool.post(SAMPLES / "screw.dxf", LATHE, camtool.read_job(SAMPLES / "screw.toml"))
+        assert run.program is not None
+        text = run.program.data.decode()
+        assert "(tool 1 turning insert with a nose of 0.1 mm - 2000 rev/min)" in text
+        assert "(tool 2 threader: threading insert 1 mm 60 deg - 400 rev/min)" in text
+        assert "(tool 3 parting blade 0.4 mm - 2000 rev/min)" in text
+
     @pytest.mark.referee
     @pytest.mark.skipif(needs_rs274[1].args[0], reason="rs274 is missing")
     def test_linuxcnc_reads_it_so(self, tmp_path: Path) -> None:
@@ -228,6 +267,7 @@ class TestScrew:
         for run in (
             camtool.post(drawing, LATHE, job),
             camtool.post(SAMPLES / "screw.dxf", LATHE, camtool.read_job(SAMPLES / "screw.toml")),
+            camtool.post(SAMPLES / "screw.dxf", CYCLES, camtool.read_job(SAMPLES / "screw.toml")),
         ):
             assert run.program is not None
             assert run.decoded is not None
@@ -251,4 +291,4 @@ class TestScrew:
             )
             np.testing.assert_allclose(ours[:, :2], theirs, atol=1e-4)
             synchronised = [each for each in calls if each[0] == "START_SPEED_FEED_SYNC"]
-            assert len(synchronised) == text.count("G33")
+            assert len(synchronised) == text.count("G33") + 18 * text.count("G76")

@@ -34,6 +34,7 @@ TURN = OperationKind(
     },
     rank=20,
     cuts="along",
+    tool_shape="insert",
     turns_work=True,
     cut_name="section",
     reason="it is a half section, whose axis is Y 0",

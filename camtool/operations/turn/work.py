@@ -367,14 +367,12 @@ def thread(_: Chosen, setting: Setting) -> Work:
     places, feeds = [[start, clear]], list[float]()
     for number in [*range(1, count + 1), count]:
         bottom = radius - depth * math.sqrt(number / count)
-        for place, rate in (
-            ([start, bottom], RAPID),
-            ([end, bottom], feed),
-            ([end, clear], RAPID),
-            ([start, clear], RAPID),
-        ):
-            places.append(place)
-            feeds.append(rate)
+        # The tool retreats by the same distance from each pass, as in LinuxCNC's G76.
+        outside = bottom + clear - radius + depth
+        places += [[start, outside], [start, bottom], [end, bottom], [end, outside]]
+        feeds += [RAPID, RAPID, feed, RAPID]
+    places.append([end, clear])
+    feeds.append(RAPID)
     vertices = np.concatenate([np.array(places), np.zeros((len(places), 2))], axis=1)
     run = CutRun(vertices, np.array(feeds), setting.feeds.plunge_mm_min, "thread")
     angle = operation.tool.tip_angle_rad or 0.0
