@@ -23,6 +23,8 @@ from camtool.pictures.options import (
     check_width,
 )
 from camtool.pictures.page import (
+    LATHE_AXES,
+    PLANE_AXES,
     PageLayout,
     axes_around,
     colour_bar,
@@ -64,7 +66,7 @@ def draw(scene: Scene, options: PictureOptions = AS_USUAL) -> str:
         element("g", {"id": "plot"}, *_plot(content, view)),
         mat(view.box, *sizes),
         page.head,
-        axes_around(view, page.ticks),
+        axes_around(view, page.ticks, LATHE_AXES if scene.is_turned else PLANE_AXES),
         *_scales_and_legend(content, page),
     )
 

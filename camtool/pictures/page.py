@@ -392,10 +392,14 @@ def ground(view: View, ticks: Ticks) -> str:
     )
 
 
-def axes_around(view: View, ticks: Ticks) -> str:
-    """Frame, ticks and numbers, above the plot."""
+PLANE_AXES = "X (mm)", "Y (mm)"
+LATHE_AXES = "X, axis (mm)", "Y, radius (mm)"
+
+
+def axes_around(view: View, ticks: Ticks, names: tuple[str, str] = PLANE_AXES) -> str:
+    """Frame, ticks and numbers, above the plot, and the names of both axes."""
     box, marks, labels = view.box, PathData(), []
-    unit = text.width("X (mm)", TICK_CAP)
+    unit = text.width(names[0], TICK_CAP)
     base = box.bottom + TICK + LABEL_GAP + TICK_CAP
     for x in ticks.x:
         across = view.page(x, 0.0)[0]
@@ -410,8 +414,8 @@ def axes_around(view: View, ticks: Ticks) -> str:
         place = (box.left - TICK - LABEL_GAP, tick_y + TICK_CAP / 2.0)
         labels.append(text.label(ticks.text(y), place, TextStyle(TICK_CAP, QUIET, "end")))
     _minor(marks, view, ticks)
-    labels.append(text.label("X (mm)", (box.right, base), TextStyle(TICK_CAP, QUIET, "end")))
-    labels.append(text.label("Y (mm)", (box.left, box.top - NAME_LIFT), NUMBERS))
+    labels.append(text.label(names[0], (box.right, base), TextStyle(TICK_CAP, QUIET, "end")))
+    labels.append(text.label(names[1], (box.left, box.top - NAME_LIFT), NUMBERS))
     pen: Look = {"fill": "none", "stroke": FRAME, "stroke-width": 1.4}
     edge: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
     return element(

@@ -64,7 +64,8 @@ class Scene:
     toolpath from which on it cuts; `rounds` are full circles with their errors.
     `tabs` are the places of tabs, mm; `inspected` the dimensions with their verdicts. `playback`
     gives how the toolpath runs; only the viewer calls it. `cut` gives the moves that cut the
-    stock, and those that should; only views of the stock and the viewer call it.
+    stock, and those that should; only views of the stock and the viewer call it. `is_turned`: it
+    is cut on a lathe, and seen in its half section.
 
     With a trace the picture leaves out rapids and plunges, and feeds are pale. ValueError when the
     trace is incomplete or not finite.
@@ -95,6 +96,7 @@ class Scene:
     tabs: tuple[tuple[float, float], ...] = ()
     inspected: tuple[InspectedReport, ...] = ()
     cut: Callable[[], StockPair] | None = None
+    is_turned: bool = False
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm
@@ -271,6 +273,7 @@ def scene_of(
     turns_work = machine is not None and machine.spindle.turns == "work"
     return Scene(
         title=title,
+        is_turned=turns_work,
         drawing=_with_other_half(drawing) if drawing and turns_work else drawing,
         toolpath=toolpath,
         trace_points=trace.points if trace is not None else None,

@@ -200,6 +200,7 @@ def test_the_picture_shows_both_sides_of_the_axis() -> None:
     )
     assert scene.drawing is not None
     assert extents(scene.drawing.paths).ravel().tolist() == [-2.6, 0.0, -0.6, 0.6]
+    assert scene.is_turned
 
 
 class TestScrew:
