@@ -958,16 +958,16 @@ def _row_from(program: Program, decoded: Toolpath, written: Toolpath) -> Indices
     rows = np.append(program.row_of_block, np.int32(-1))[decoded.block.clip(max=last)]
     block = decoded.block.clip(min=0, max=last)
     is_cycle = program.row_of_block >= 0
-    for moves, least in ((decoded.is_feed, 2), (decoded.kind == Kind.RAPID, 1)):
-        is_cycle &= np.bincount(block[moves], minlength=last + 1)[:last] >= least
+    for moves, min_count in ((decoded.is_feed, 2), (decoded.kind == Kind.RAPID, 1)):
+        is_cycle &= np.bincount(block[moves], minlength=last + 1)[:last] >= min_count
     cycles = np.flatnonzero(is_cycle)
     order = np.argsort(block, kind="stable") if len(cycles) else np.arange(len(block))
     lows, highs = (np.searchsorted(block[order], cycles, side=side) for side in ("left", "right"))
     for cycle, low, high in zip(cycles, lows, highs, strict=True):
         moves = order[low:high]
         first = int(program.row_of_block[cycle]) - int(decoded.is_feed[moves].argmax())
-        planned = written.kind[max(first, 0) : first + len(moves)]
-        if first >= 0 and np.array_equal(decoded.kind[moves], planned):
+        planned_kinds = written.kind[max(first, 0) : first + len(moves)]
+        if first >= 0 and np.array_equal(decoded.kind[moves], planned_kinds):
             rows[moves] = np.arange(first, first + len(moves), dtype=rows.dtype)
     return np.asarray(rows)
 

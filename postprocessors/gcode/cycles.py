@@ -97,11 +97,12 @@ def threads_of(toolpath: Toolpath, unit_mm: float, style: NumberStyle) -> list[C
             continue
         # Were the first pass rounded down, there would be one more before the full depth.
         start = math.ceil(round(full, THREAD.decimals) / math.sqrt(count) * 10**THREAD.decimals)
-        pitch, peak, least, most = (
+        pitch_word, crest_word, first_word, full_word = (
             format_number(value, THREAD)
             for value in (note.pitch_mm / unit_mm, crest, start / 10**THREAD.decimals, full)
         )
-        block = f"G76 P{pitch} Z{format_number(end[0], style)} I-{peak} J{least} R2 K{most} H1"
+        block = f"G76 P{pitch_word} Z{format_number(end[0], style)} I-{crest_word} J{first_word}"
+        block += f" R2 K{full_word} H1"
         threads.append(CycleThread(first, int(cuts[0]), last, block))
     return threads
 
