@@ -12,6 +12,7 @@ own (`camtool.planning.kinds`).
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -230,6 +231,25 @@ def fraction(value: object) -> float:
     """0.4 or "40%"."""
     text = number_text(value).strip()
     return number(text[:-1]) / 100.0 if text.endswith("%") else number(text)
+
+
+def engagement_angle(value: object) -> float:
+    """Read an engagement, rad: an angle with its unit, or the part of the diameter that is cut
+    beside a straight wall: a part a is the angle acos(1 − 2 a).
+
+    >>> [round(math.degrees(engagement_angle(text))) for text in ("50%", "60deg")]
+    [90, 60]
+    """
+    text = str(value).strip()
+    if isinstance(value, str) and text.endswith(("deg", "°", "rad")):
+        return parse_angle(text)
+    part = fraction(value)
+    if not 0.0 <= part <= 1.0:
+        raise OptionError(
+            f"{text!r} is no part of a diameter",
+            mend='give one such as "15%", or an angle such as "60deg"',
+        )
+    return math.acos(1.0 - 2.0 * part)
 
 
 def whole_number(value: object) -> int:

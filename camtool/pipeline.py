@@ -35,6 +35,7 @@ from camtool.run import Run
 from camtool.simulation.motion import ALL
 from camtool.simulation.rows import block_of
 from camtool.stock.findings import STOCK_NOT_JUDGED_TOOLS
+from camtool.stock.slides import slide_moves
 from camtool.toolpath.findings import SURFACE_FOLLOWED_NOT, SURFACE_FOLLOWED_WITHIN
 from camtool.toolpath.lower import (
     at_feed,
@@ -62,6 +63,7 @@ from camtool.verification.case import (
     tool_mm,
 )
 from camtool.verification.cuts import is_flat, rapid_length_mm
+from camtool.verification.engagement import ProgramSlides, judge_engagement
 from camtool.verification.motion_findings import program_findings
 from camtool.verification.report import (
     BaselineReport,
@@ -304,7 +306,8 @@ def _post_plan(
     if judged_plan is None and turns_work:
         return replace(run, program=program, decoded=decoded, findings=findings)
     if judged_plan is None:
-        stock_findings = _stock_findings(Case(decoded, target), None, job, before=posting.before)
+        slides = ProgramSlides(Case(decoded, target), job)
+        stock_findings = _stock_findings(slides, None, before=posting.before)
         findings = _merge_findings(findings, stock_findings)
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
@@ -356,22 +359,23 @@ def _post_plan(
     )
     del judged_plan, full_plan  # the paths of the stages are not needed any more
     verification = _judge_program(case, program.data, progress)
+    slides = ProgramSlides(case, job)
+    engaged = judge_engagement(slides, request, posting.gates)
     if turns_work:
         from camtool.verification.section import section_findings
 
         sections = tuple(section_findings(decoded, target, steps, case.simulation))
-        findings = _merge_findings(findings, sections)
+        in_stock = (*sections, *_stock_gates(case, None, job, posting.gates))
     else:
-        findings = _merge_findings(
-            findings,
-            _stock_findings(case, request, job, findings, before=posting.before),
-            _stock_gates(case, request, job, posting.gates),
-        )
+        in_stock = _stock_findings(slides, request, findings, before=posting.before)
+        in_stock = (*in_stock, *_stock_gates(case, request, job, posting.gates))
+    findings = _merge_findings(findings, in_stock, engaged.findings)
     del steps
     figures = _with_times(figures, written, case, verification)
     gate_findings = _gate_findings(verification, posting.gates, findings)
     findings = _merge_findings(findings, verification.findings, gate_findings, left_out=repeated)
     verification = verification.with_planning(figures, _before_figures(plain_result))
+    verification = verification.with_engagement(engaged.reports(decoded, request, in_stock))
     return replace(
         run,
         program=program,
@@ -439,8 +443,12 @@ def verify_program(
     gate_findings = _gate_findings(verification, judging.gates)
     gate_findings = (*_stock_gates(case, asked_of_stock, job, judging.gates), *gate_findings)
     planning = case.wanted.findings if case.wanted is not None else ()
-    in_stock = _stock_findings(case, asked_of_stock, job or Job(), planning, before=before)
-    gate_findings = (*in_stock, *gate_findings)
+    slides = ProgramSlides(case, job)
+    in_stock = _stock_findings(slides, asked_of_stock, planning, before=before)
+    engaged = judge_engagement(slides, asked_of_stock, judging.gates)
+    gate_findings = (*in_stock, *engaged.findings, *gate_findings)
+    reports = engaged.reports(case.decoded, asked_of_stock, in_stock)
+    verification = verification.with_engagement(reports)
     if gate_findings:
         verification = verification.with_findings((*verification.findings, *gate_findings))
     return replace(
@@ -590,7 +598,7 @@ def lint_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
     assert run.decoded is not None
     case = Case(run.decoded, target)
     findings = _merge_findings(
-        run.findings, program_findings(case), _stock_findings(case, None, Job())
+        run.findings, program_findings(case), _stock_findings(ProgramSlides(case, None), None)
     )
     return replace(run, findings=findings)
 
@@ -857,9 +865,8 @@ NETS_THIN_MM = 2e-3
 
 
 def _stock_findings(
-    case: Case,
+    slides: ProgramSlides,
     request: StockRequest | None,
-    job: Job,
     planning: tuple[Finding, ...] = (),
     *,
     before: StockBefore | None = None,
@@ -869,12 +876,12 @@ def _stock_findings(
     width, or nothing is asked for (`request` None), only rapids are looked at."""
     from camtool.stock.moves import stock_moves_of_toolpath
     from camtool.stock.rapids import rapid_findings
-    from camtool.stock.slides import slide_moves, tools_of_rows
 
+    case, job = slides.case, slides.job or Job()
     decoded, moves, tools = case.decoded, None, None
     findings_found: list[Finding] = []
     try:
-        tools = tools_of_rows(decoded, job)
+        tools = slides.tools
         moves = stock_moves_of_toolpath(decoded, tools.index, tools.cutters)
     except OptionError as error:
         shapes = {operation.tool for operation in job.operations if operation.tool.diameter_mm}
@@ -889,19 +896,10 @@ def _stock_findings(
     from camtool.stock.checks import net_findings, stock_findings
 
     if request.copper:
-        slides = slide_moves(decoded, case.target, tools, case.simulation, thin_mm=NETS_THIN_MM)
-        findings_found += net_findings(slides, request)
-    limited = any(operation.engagement_rad is not None for operation in request.operations)
-    if limited or case.compensated is not None:
-        slides = slide_moves(decoded, case.target, tools, case.simulation)
-        if limited and decoded.operations is not None:
-            from camtool.stock.engagement import engagement_findings
-
-            box = None if request.stock is None else request.stock.box_mm
-            begin = decoded.operations.begin
-            findings_found += engagement_findings(slides, decoded, begin, request.operations, box)
-        if case.compensated is not None:
-            moves = slides
+        fine = slide_moves(decoded, case.target, tools, case.simulation, thin_mm=NETS_THIN_MM)
+        findings_found += net_findings(fine, request)
+    if case.compensated is not None:
+        moves = slides.moves
     return (*findings_found, *stock_findings(decoded, moves, request, case.depth_mm, planning))
 
 

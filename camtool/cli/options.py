@@ -14,6 +14,7 @@ pictures are in `picture_options`.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
@@ -32,7 +33,7 @@ from camtool.importers.read import content, file_bytes, read_bytes
 from camtool.jobs.build import JobTables, build_job, read_job_file, tables_of_flags
 from camtool.jobs.keys import FLAGS, flag_name
 from camtool.jobs.tools import Shop
-from camtool.keys import Given, Key
+from camtool.keys import Given, Key, engagement_angle
 from camtool.project import project_of
 from camtool.records import replace
 from camtool.tables import read_table
@@ -135,6 +136,17 @@ def with_flags(
 # Values of flags, as callbacks of click: text in, a number out, a usage error otherwise.
 
 
+def engagement_limit(text: str) -> float:
+    """Read a limit of engagement, rad; OptionError for one that every cut exceeds, or none."""
+    angle_rad = engagement_angle(text)
+    if not 0.0 < angle_rad <= math.pi:
+        raise OptionError(
+            f"an engagement of {math.degrees(angle_rad):.3g}° is not above 0° and up to 180°",
+            mend='give a part of the diameter such as "15%", or an angle such as "60deg"',
+        )
+    return angle_rad
+
+
 def _number_by(parse: Callable[[str], float]) -> Callable[..., float | None]:
     def value(ctx: click.Context, param: click.Parameter, text: str | None) -> float | None:
         try:
@@ -153,6 +165,10 @@ feed = _number_by(parse_feed)
 
 duration = _number_by(parse_time)
 """`90min`, `1h`, `200ms` or a bare number (s) as s."""
+
+
+_engagement = _number_by(engagement_limit)
+"""`15%` or `0.15` of the diameter, or `60deg`, as rad."""
 
 
 # The machine.
@@ -264,13 +280,14 @@ _LIMITS = "Limits (exit code 1 beyond them)"
 @dataclass(frozen=True)
 class GateFlags:
     """`--max-error` (mm), `--max-reversals`, `--max-time` (s), `--max-gouge` and `--max-leftover`
-    (mm)."""
+    (mm), `--max-engagement` (rad)."""
 
     max_error: float | None
     max_reversals: int | None
     max_time: float | None
     max_gouge: float | None = None
     max_leftover: float | None = None
+    max_engagement: float | None = None
 
     @property
     def given(self) -> bool:
@@ -283,9 +300,7 @@ class GateFlags:
             return None
         from camtool.verification.report import Gates
 
-        return Gates(
-            self.max_error, self.max_reversals, self.max_time, self.max_gouge, self.max_leftover
-        )
+        return Gates(*(getattr(self, each.name) for each in fields(self)))
 
 
 def gate_options(command: Command) -> Command:
@@ -329,6 +344,14 @@ def gate_options(command: Command) -> Command:
                 callback=length,
                 metavar="LENGTH",
                 help="Largest proved height of material that is left.",
+            ),
+            option(
+                _LIMITS,
+                "--max-engagement",
+                callback=_engagement,
+                metavar="PART|ANGLE",
+                help="Largest proved engagement of a tool outside of entries, such as 15% or "
+                "60deg.",
             ),
         ],
     )

@@ -23,4 +23,6 @@ class Cleared:
         fine_rad: float,
         *,
         adds: bool = True,
+        coarse_rad: float = ...,
+        known_rad: float = ...,
     ) -> Floats: ...

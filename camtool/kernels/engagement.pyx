@@ -92,24 +92,33 @@ cdef class Cleared:
 
     def judge(
         self, moves: Floats, cuts: Bools, thick_mm: float, enough_rad: float, fine_rad: float, *,
-        adds: bool = True,
+        adds: bool = True, coarse_rad: float = float("inf"), known_rad: float = float("inf"),
     ) -> Floats:
         """Return a bound of the greatest engagement angle (K,) rad of moves (K, 9) in their order,
         0 for those that do not cut; each that cuts is added behind its own turn (if `adds`).
 
-        Chips thinner than `thick_mm` do not count. A bound up to `enough_rad` is not refined;
-        others are within `fine_rad` of an angle that there is, or of one of chips half as
-        thick; where `fine_rad` is infinite, the first angle above is returned."""
+        Chips thinner than `thick_mm` do not count. Bounds above `enough_rad` are within `fine_rad`
+        of an angle that there is, or of one of chips half as thick; where that is infinite, the
+        first angle above is returned. Bounds up to `enough_rad` are not refined, unless
+        `known_rad` is finite: then they are within `coarse_rad`, and where that is 0 or more only
+        the greatest is looked for: bounds up to it, or up to those of moves before, are not
+        refined."""
         cdef Int i
         cdef double[:, ::1] rows = np.ascontiguousarray(moves)
         cdef unsigned char[::1] is_cut = np.ascontiguousarray(cuts).view(np.uint8)
         result = np.zeros(len(moves))
         cdef double[::1] bound = result
         cdef double thick = thick_mm, enough = enough_rad, fine = fine_rad
+        cdef double coarse = coarse_rad, greatest = known_rad
         for i in range(rows.shape[0]):
             if is_cut[i]:
                 _go_to(self, &rows[i, 0])
-                bound[i] = _greatest(self, &rows[i, 0], thick, enough, fine)
+                bound[i] = _greatest(
+                    self, &rows[i, 0], thick, enough, fine, coarse,
+                    greatest if greatest < INFINITY else enough,
+                )
+                if greatest >= 0.0:
+                    greatest = max(greatest, bound[i])
                 if adds:
                     _add(self, &rows[i, 0])
         return result
@@ -175,11 +184,12 @@ cdef double _distance(double x, double y, double* move) noexcept nogil:
 
 
 cdef double _greatest(
-    Cleared self, double* move, double thick, double enough, double fine
+    Cleared self, double* move, double thick, double enough, double fine, double coarse,
+    double greatest,
 ) noexcept nogil:
-    """A bound of the engagement over all of a move."""
+    """A bound of the engagement over all of a move; one up to `greatest` is not refined."""
     cdef double length = math.hypot(move[BX] - move[AX], move[BY] - move[AY])
-    cdef double best = 0.0, bound, value, low, high, half
+    cdef double best = 0.0, bound, value, low, high, half, slack
     cdef double lows[WAITING]
     cdef double highs[WAITING]
     cdef int waiting = 1
@@ -193,11 +203,12 @@ cdef double _greatest(
         bound = _open_angle(self, move, length, low, high, thick - half, thick)
         if bound <= best:
             continue
-        if bound <= enough or half <= 0.5 * thick or waiting + 2 > WAITING:
+        if bound <= greatest or half <= 0.5 * thick or waiting + 2 > WAITING:
             best = bound
             continue
         value = _open_angle(self, move, length, low, high, thick, thick)
-        if bound - value <= fine < INFINITY:
+        slack = coarse if bound <= enough else fine
+        if bound - value <= slack < INFINITY:
             best = bound
             continue
         if value > enough and fine == INFINITY:

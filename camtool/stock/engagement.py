@@ -1,15 +1,18 @@
-"""The engagement of tools along the moves of the slides, held against what an operation promises.
+"""The engagement of tools along the moves of the slides, held against limits.
 
-An adaptive pocket promises that its tool is never engaged by more than an angle. Whether that
-holds is judged on the predicted slides, move by move, in the order of cutting
-(`camtool.kernels.engagement`): each move against all that earlier ones have cleared at its depth.
-Where the tool goes down through the stock it is engaged all round; that is its entry, up to a
-length of its circumference beyond it, and does not count.
+An adaptive pocket promises that its tool is never engaged by more than an angle, and a user may
+limit that of every operation. Whether a limit holds is judged on the predicted slides, move by
+move, in the order of cutting (`camtool.kernels.engagement`): each move against all that earlier
+ones have cleared at its depth. Where the tool goes down through the stock it is engaged all round;
+that is its entry, up to a length of its circumference beyond it, and does not count.
+
+Only tools that are as wide at their tip as above are judged. Others (V bits, ball and bull noses,
+drills) clear nothing here, so that the bounds of the tools behind them hold all the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from msgspec import Struct
@@ -17,9 +20,12 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding
 from camtool.kernels.engagement import Cleared
-from camtool.planning.job import Operation
-from camtool.planning.naming import operation_name
-from camtool.stock.findings import ENGAGEMENT_KEPT, ENGAGEMENT_TOO_HIGH, place_words
+from camtool.stock.findings import (
+    ENGAGEMENT_KEPT,
+    ENGAGEMENT_TOO_HIGH,
+    STOCK_NOT_JUDGED_ENGAGEMENT,
+    place_words,
+)
 from camtool.stock.moves import StockMoves
 from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
 
@@ -42,24 +48,53 @@ MAX_ASKEW_RAD = 0.3
 """Slides that run beside their path by steps head no farther than this to either side of it."""
 
 FINE_RAD = np.radians(0.1)
-"""Bounds of engagements above the limit are told to this angle."""
+"""Bounds of engagements above the limit are told to this angle, ..."""
+
+COARSE_RAD = np.radians(1.0)
+"""... and the greatest of an operation that keeps it to this one, as are those of moves in
+pictures."""
+
+
+CHANGING_WIDTH = "it cuts with a tool whose width changes with its height"
+NO_WIDTH = "it cuts with a tool of no width"
 
 
 class Engagement(Struct, frozen=True, eq=False):
-    """A bound of the engagement (M,) rad of each of M moves; NaN for entries and for moves that
-    do not cut."""
+    """A bound of the engagement (M,) rad of each of M moves; 0 for those that cut nothing, NaN for
+    moves above the stock. `is_entry` (M,): moves of entries, which do not count; `is_known` (M,):
+    the move is not one along the stock of a tool whose width changes with its height."""
 
     bound_rad: Floats
+    is_entry: Bools
+    is_known: Bools
     moves: StockMoves
 
-    def greatest(self, chosen: Bools | Ints) -> tuple[float, Floats]:
-        """Return the greatest bound of some moves, rad, and the place (2,) where that one begins;
-        0 where none of them cuts."""
-        bound = np.nan_to_num(self.bound_rad[chosen])
-        if not len(bound):
-            return 0.0, np.zeros(2)
+    def greatest(self, chosen: Bools) -> tuple[float, int | None]:
+        """Return the greatest bound of some moves outside of entries, rad, and which one has it;
+        0 and None where none of them cuts."""
+        bound = np.where(chosen & ~self.is_entry, np.nan_to_num(self.bound_rad), 0.0)
+        if not bound.any():
+            return 0.0, None
         worst = int(bound.argmax())
-        return float(bound[worst]), self.moves.start[chosen][worst, :2]
+        return float(bound[worst]), worst
+
+
+class OperationEngagement(Struct, frozen=True):
+    """The greatest engagement of an operation outside of entries, rad (None: it was not judged, by
+    `reason`), the place of that (x, y) mm and the row of the program; the limit that the operation
+    itself has, None for none. The `name` is "" where the operations of a program are not known."""
+
+    name: str
+    greatest_rad: float | None
+    at_mm: tuple[float, float] | None = None
+    row: int | None = None
+    limit_rad: float | None = None
+    reason: str = ""
+
+    @property
+    def words(self) -> str:
+        """The operation in a sentence."""
+        return f"operation {self.name!r}" if self.name else "the program"
 
 
 def _askew(moves: StockMoves, decoded: Toolpath) -> Floats:
@@ -85,67 +120,111 @@ def _askew(moves: StockMoves, decoded: Toolpath) -> Floats:
 def engagement_of(
     moves: StockMoves,
     decoded: Toolpath,
-    enough_rad: Floats,
     box_mm: tuple[float, float, float, float] | None,
+    limits: tuple[Ints, Floats] | None = None,
 ) -> Engagement:
-    """Bound the engagement of all moves that a decoded program makes; `enough_rad` (M,): up to
-    there a bound is not refined; `box_mm`: the stock in the plane, None: it goes on for ever."""
+    """Bound the engagement of all moves that a decoded program makes, each within COARSE_RAD of an
+    angle that there is; `box_mm`: the stock in the plane, None: it goes on for ever.
+
+    `limits`: the operation of each move (M,), ascending, and the limit of each operation (K,) rad.
+    Then only the greatest bound of an operation is as near as that, or within FINE_RAD where it is
+    above the limit; all others are no more than bounds."""
+    number, limit = (np.zeros(len(moves), np.int64), np.zeros(1)) if limits is None else limits
     radius = moves.table[moves.tool, 0]
+    is_straight = moves.table[moves.tool, 1] == radius
+    length = np.hypot(*(moves.end - moves.start)[:, :2].T)
     low = np.minimum(moves.start[:, 2], moves.end[:, 2])
     high = np.maximum(moves.start[:, 2], moves.end[:, 2]) - LEVEL_MM
     rows = np.column_stack(
         [moves.start[:, :2], moves.end[:, :2], radius, low, high, _askew(moves, decoded)]
     )
-    cuts = (low < STOCK_TOP_MM - LEVEL_MM) & (radius > 0.0)
+    is_low = low < STOCK_TOP_MM - LEVEL_MM
+    cuts = is_low & is_straight & (radius > 0.0)
+    is_known = ~is_low | (is_straight & (radius > 0.0)) | (length == 0.0)
     result = np.full(len(moves), np.nan)
     if not cuts.any():
-        return Engagement(result, moves)
+        return Engagement(result, np.zeros(len(moves), dtype=np.bool_), is_known, moves)
     ends = np.concatenate([moves.start[cuts, :2], moves.end[cuts, :2]])
     reach = float(radius[cuts].max())
     thick = max(THICK_SHARE * float(radius[cuts].min()), THICK_BESIDE * moves.beside_mm)
     extents = np.stack([ends.min(axis=0), ends.max(axis=0)])
     cleared = Cleared(extents, reach, np.array(box_mm or (-np.inf, -np.inf, np.inf, np.inf)))
+    down = moves.end[:, 2] < moves.start[:, 2] - LEVEL_MM * length
+    may_enter = _behind(down, length, radius)
     every = np.flatnonzero(cuts)
-    new = np.flatnonzero(np.diff(enough_rad[every])) + 1
+    greatest = np.zeros(len(limit))
+    new = np.flatnonzero(np.diff(2 * number[every] + may_enter[every])) + 1
     for part in np.split(every, new):
-        is_cut = np.ones(len(part), dtype=np.bool_)
-        result[part] = cleared.judge(rows[part], is_cut, thick, enough_rad[part[0]], FINE_RAD)
-    result[_entries(moves, result, radius)] = np.nan
-    return Engagement(result, moves)
+        own = number[part[0]]
+        counts = limits is not None and not may_enter[part[0]]
+        result[part] = cleared.judge(
+            rows[part],
+            np.ones(len(part), dtype=np.bool_),
+            thick,
+            limit[own],
+            COARSE_RAD if limits is None else FINE_RAD,
+            coarse_rad=COARSE_RAD,
+            known_rad=greatest[own] if counts else -1.0,
+        )
+        if counts:
+            greatest[own] = max(greatest[own], result[part].max())
+    is_entry = _behind(down & (np.nan_to_num(result) > 0.0), length, radius)
+    return Engagement(result, is_entry, is_known, moves)
 
 
-def _entries(moves: StockMoves, bound: Floats, radius: Floats) -> Bools:
-    """Mask (M,) of the moves that go down through the stock, and of those behind them up to the
-    length of an entry."""
-    length = np.hypot(*(moves.end - moves.start)[:, :2].T)
-    down = (moves.end[:, 2] < moves.start[:, 2] - LEVEL_MM * length) & (np.nan_to_num(bound) > 0.0)
+def _behind(down: Bools, length: Floats, radius: Floats) -> Bools:
+    """Mask (M,) of the moves that go down, and of those behind them up to the length of an
+    entry."""
     travelled = np.concatenate([[0.0], np.cumsum(length)])
     last = np.maximum.accumulate(np.where(down, travelled[1:], -np.inf))
     return np.asarray(travelled[:-1] - last <= ENTRY_TURNS * 2.0 * np.pi * radius)
 
 
-def engagement_findings(
+def engagement_by_operation(
     slides: StockMoves,
     decoded: Toolpath,
-    begin: Ints,
-    operations: tuple[Operation, ...],
+    parts: Sequence[tuple[int, str, float | None]],
     box_mm: tuple[float, float, float, float] | None,
-) -> Iterator[Finding]:
-    """Yield ENGAGEMENT_TOO_HIGH for each operation that promises a limit and does not keep it, and
-    ENGAGEMENT_KEPT for each that does; `begin` (K,): the first row of each operation."""
+    gate_rad: float | None = None,
+) -> tuple[OperationEngagement, ...]:
+    """Return the greatest engagement of each operation; `parts`: the first row, the name and the
+    own limit (rad) of each in their order; `gate_rad`: a limit for all of them."""
+    begin = [row for row, _, _ in parts]
     number = (np.searchsorted(begin, slides.row, side="right") - 1).clip(min=0)
-    limits = np.array([operation.engagement_rad or np.pi for operation in operations])
-    engagement = engagement_of(slides, decoded, TOLERATED_SHARE * limits[number], box_mm)
-    for index, operation in enumerate(operations):
-        if operation.engagement_rad is None:
+    gate = np.pi if gate_rad is None else gate_rad
+    limits = [gate if own is None else min(gate, TOLERATED_SHARE * own) for _, _, own in parts]
+    engagement = engagement_of(slides, decoded, box_mm, (number, np.array(limits)))
+    rows = []
+    for k, (_, name, own) in enumerate(parts):
+        chosen = np.asarray(number == k)
+        if not engagement.is_known[chosen].all():
+            blind = slides.table[slides.tool[chosen & ~engagement.is_known], 0]
+            words = CHANGING_WIDTH if blind.all() else NO_WIDTH
+            rows.append(OperationEngagement(name, None, limit_rad=own, reason=words))
             continue
-        greatest, place = engagement.greatest(np.flatnonzero(number == index))
-        sentence = (
-            ENGAGEMENT_KEPT if greatest <= TOLERATED_SHARE * limits[index] else ENGAGEMENT_TOO_HIGH
-        )
+        greatest, move = engagement.greatest(chosen)
+        if move is None:
+            rows.append(OperationEngagement(name, greatest, limit_rad=own))
+            continue
+        x, y = slides.start[move, :2].tolist()
+        rows.append(OperationEngagement(name, greatest, (x, y), int(slides.row[move]), own))
+    return tuple(rows)
+
+
+def engagement_findings(rows: tuple[OperationEngagement, ...]) -> Iterator[Finding]:
+    """Yield ENGAGEMENT_TOO_HIGH for each operation that promises a limit and does not keep it,
+    ENGAGEMENT_KEPT for each that does, and STOCK_NOT_JUDGED for those that are not judged."""
+    for each in rows:
+        if each.limit_rad is None:
+            continue
+        if each.greatest_rad is None:
+            yield STOCK_NOT_JUDGED_ENGAGEMENT(operation=each.words, reason=each.reason)
+            continue
+        is_kept = each.greatest_rad <= TOLERATED_SHARE * each.limit_rad
+        sentence = ENGAGEMENT_KEPT if is_kept else ENGAGEMENT_TOO_HIGH
         yield sentence(
-            where=place_words(place.tolist()),
-            measured=float(np.degrees(greatest)),
-            limit=float(np.degrees(limits[index])),
-            operation=operation_name(operation),
+            where="" if each.at_mm is None else place_words(each.at_mm),
+            measured=float(np.degrees(each.greatest_rad)),
+            limit=float(np.degrees(each.limit_rad)),
+            operation=each.words,
         )

@@ -240,6 +240,9 @@ STOCK_NOT_JUDGED_NARROW = Sentence(
     "those within cuts of {limit:.3g} mm or more are found",
     "mm",
 )
+STOCK_NOT_JUDGED_ENGAGEMENT = Sentence(
+    StockCode.STOCK_NOT_JUDGED, "{operation}: the engagement of its tool is not judged: {reason}"
+)
 TOOL_NOT_KNOWN = Sentence(StockCode.TOOL_NOT_KNOWN, "not known, and not judged: {bodies}")
 FACES_MEET = Sentence(
     StockCode.FACES_MEET,

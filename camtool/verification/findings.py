@@ -52,8 +52,8 @@ class VerificationCode(Code):
         408,
         ERROR,
         "the part would come out worse, turn back more often or take longer than "
-        "`--max-error`, `--max-gouge`, `--max-leftover`, `--max-reversals` or `--max-time` allow, "
-        "or it is not proved that it keeps to one of the limits of the stock",
+        "`--max-error`, `--max-gouge`, `--max-leftover`, `--max-engagement`, `--max-reversals` or "
+        "`--max-time` allow, or it is not proved that it keeps to one of the limits of the stock",
         "another machine setting, fewer reversals ([reversals.md](reversals.md)), or a wider "
         "limit",
     )
@@ -397,6 +397,16 @@ ABOVE_GATE_NO_STOCK = Sentence(
     VerificationCode.ABOVE_GATE,
     "no {what} is known without a drawing, a job and its tools, so the limit is not met",
     "um",
+)
+ABOVE_GATE_ENGAGEMENT = Sentence(
+    VerificationCode.ABOVE_GATE,
+    "{operation}: the tool is engaged by {measured:.2f} degrees {place}; {limit:.2f} are allowed",
+    "°",
+)
+ABOVE_GATE_NO_ENGAGEMENT = Sentence(
+    VerificationCode.ABOVE_GATE,
+    "the engagement is not known, so the limit is not met: {reason}",
+    "°",
 )
 ABOVE_GATE_REVERSALS = Sentence(
     VerificationCode.ABOVE_GATE,

@@ -31,7 +31,9 @@ from camtool.toolpath.findings import ProgramCode
 from camtool.units import UM_PER_MM
 from camtool.verification.findings import (
     ABOVE_GATE,
+    ABOVE_GATE_ENGAGEMENT,
     ABOVE_GATE_GOUGED,
+    ABOVE_GATE_NO_ENGAGEMENT,
     ABOVE_GATE_NO_STOCK,
     ABOVE_GATE_NOT_PROVED,
     ABOVE_GATE_REVERSALS,
@@ -41,6 +43,7 @@ from camtool.verification.findings import (
 )
 
 if TYPE_CHECKING:
+    from camtool.stock.engagement import OperationEngagement
     from camtool.stock.heights import Bracket
 
 DECIMALS = 6
@@ -439,13 +442,30 @@ class BaselineReport(msgspec.Struct, frozen=True):
     time_s: float | None = None
 
 
+class EngagementReport(msgspec.Struct, frozen=True):
+    """A bound of the greatest engagement angle of an operation on the predicted slides, outside of
+    entries, within 1° of an angle that there is, and where it is: the place, and the block from 1.
+    Null where it is not judged, or nothing is cut. `operation` is "" where
+    only the program is known. `limit_deg`: the limit that the operation has,
+    null for none; `left_mm`: of an operation with a limit the greatest height of material that the
+    program leaves (`MATERIAL_LEFT`), 0 if none was found, null where that is not judged."""
+
+    operation: str
+    greatest_deg: float | None
+    at_mm: tuple[float, float] | None = None
+    block: int | None = None
+    limit_deg: float | None = None
+    left_mm: float | None = None
+
+
 # The report.
 
 
 class Report(msgspec.Struct, frozen=True):
     """The results of a verification. `blocks` and `bytes` are None without a program. `against`:
     "drawing" where errors are distances from the drawing, "program" where there is no drawing and
-    they are distances from the moves of the program, or of the program it was converted from."""
+    they are distances from the moves of the program, or of the program it was converted from.
+    `engagement`: None where it is not judged."""
 
     target: str
     source: str
@@ -477,6 +497,7 @@ class Report(msgspec.Struct, frozen=True):
     against: str = "program"
     found: FoundReport | None = None
     inspection: tuple[InspectedReport, ...] = ()
+    engagement: tuple[EngagementReport, ...] | None = None
 
     def to_json(self) -> str:
         """Return indented JSON with keys in the order of the record, and a newline at the end."""
@@ -557,13 +578,14 @@ def rounded(value: float) -> float:
 @dataclass(frozen=True)
 class Gates:
     """The largest allowed total error (mm), number of reversals of X and Y while cutting, time
-    (s), and gouge and leftover of the stock (mm); None: no limit."""
+    (s), gouge and leftover of the stock (mm), and engagement of tools (rad); None: no limit."""
 
     error_mm: float | None = None
     reversals: int | None = None
     time_s: float | None = None
     gouge_mm: float | None = None
     leftover_mm: float | None = None
+    engagement_rad: float | None = None
 
 
 def gate_findings(
@@ -615,6 +637,26 @@ def stock_gate_findings(
         proved = "nothing" if high_um is None else f"only {high_um:.2f} µm"
         yield ABOVE_GATE_NOT_PROVED(
             where=flag, measured=high_um, limit=limit_um, what=subject, proved=proved
+        )
+
+
+def engagement_gate_findings(
+    limit_rad: float, rows: Sequence[OperationEngagement], reason: str = ""
+) -> Iterator[Finding]:
+    """Yield ABOVE_GATE where the greatest engagement of all operations exceeds its limit, and for
+    each that is not judged; `reason`: why none is."""
+    limit, flag = math.degrees(limit_rad), "--max-engagement"
+    unknown = [f"{each.words}: {each.reason}" for each in rows if each.greatest_rad is None]
+    for words in [reason] if reason else unknown:
+        yield ABOVE_GATE_NO_ENGAGEMENT(where=flag, limit=limit, reason=words)
+    worst = max(rows, key=lambda each: each.greatest_rad or 0.0, default=None)
+    if worst is not None and worst.at_mm is not None and (worst.greatest_rad or 0.0) > limit_rad:
+        yield ABOVE_GATE_ENGAGEMENT(
+            where=flag,
+            measured=math.degrees(worst.greatest_rad or 0.0),
+            limit=limit,
+            operation=worst.words,
+            place=f"at X {worst.at_mm[0]:.3f} Y {worst.at_mm[1]:.3f}",
         )
 
 
@@ -713,6 +755,7 @@ def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
         yield "ends", f"{report.unreached.moves} moves end elsewhere, up to {distance:.2f} µm away"
     if report.shape is not None:
         yield "shape", _shape_words(report.shape)
+    yield from (("engaged", _engagement_words(each)) for each in report.engagement or ())
     yield from (("dimension", inspected_words(each)) for each in report.inspection)
     bounds = {
         (one.input, one.within): None for each in report.inspection for one in each.not_known
@@ -720,6 +763,21 @@ def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
     yield from (
         ("not known", f"{name}: if {condition}") for name, condition in bounds if condition
     )
+
+
+def _engagement_words(item: EngagementReport) -> str:
+    """Return the greatest engagement of an operation beside its limit."""
+    if item.greatest_deg is None:
+        return f"{item.operation or 'program'}: not judged"
+    words = f"{item.operation or 'program'}: {item.greatest_deg:.2f}° at most"
+    if item.at_mm is not None:
+        words += f", near {_point_words(item.at_mm)}"
+    if item.limit_deg is not None:
+        words += f"; limit {item.limit_deg:.2f}°"
+    if item.left_mm is not None:
+        height = f"{item.left_mm:.4g} mm of material is left"
+        words += f"; {height if item.left_mm else 'nothing is left that the tool reaches'}"
+    return words
 
 
 def inspected_words(item: InspectedReport) -> str:

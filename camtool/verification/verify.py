@@ -50,6 +50,7 @@ from camtool.verification.matching import Goal, match_through_compensation, own_
 from camtool.verification.motion_findings import motion_findings
 from camtool.verification.report import (
     BaselineReport,
+    EngagementReport,
     Planned,
     Report,
     finding_reports,
@@ -97,6 +98,10 @@ class Verification:
         """Return the verification with the figures of planning in its report."""
         report = replace(self.report, planned=plan, before=before)
         return replace(self, report=report)
+
+    def with_engagement(self, rows: tuple[EngagementReport, ...] | None) -> Verification:
+        """Return the verification with the engagement of each operation in its report."""
+        return replace(self, report=replace(self.report, engagement=rows))
 
 
 def verify(case: Case, progress: Progress | None = None) -> Verification:

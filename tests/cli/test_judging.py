@@ -250,3 +250,16 @@ def test_no_figure_depends_on_a_picture(
         reports.append(json.loads((tmp_path / "a.json").read_text(encoding="utf-8")))
     assert reports[0]["shape"] is not None
     assert reports[0] == reports[1] == reports[2]
+
+
+def test_engagement_is_limited_by_a_part_or_an_angle(camtool: Run, tmp_path: Path) -> None:
+    """A slot engages the tool by half of its circle."""
+    lines = ("G21 G90", "G0 Z5", "M3 S9000", "G1 Z-1 F100", "G1 X40 F600", "G0 Z5", "M5", "M2")
+    (tmp_path / "part.nc").write_text("\n".join(lines) + "\n")
+    flags = ["verify", "part.nc", "-t", "grbl", "--tool-diameter", "5", "--json", "part.json"]
+    for limit, code in (("100%", 0), ("179deg", 1), ("0.5", 1)):
+        assert camtool(*flags, "--max-engagement", limit).returncode == code
+        (row,) = json.loads((tmp_path / "part.json").read_text())["engagement"]
+        assert row["greatest_deg"] == pytest.approx(180.0)
+    assert camtool(*flags).returncode == 0
+    assert json.loads((tmp_path / "part.json").read_text())["engagement"] is None

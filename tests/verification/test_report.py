@@ -68,7 +68,7 @@ WANTED_KEYS = {
 ADDED_KEYS = {
     "": "contours time_split_s interpolator camtool_version planned before contour_errors "
     "bidirectional unreached shape worst assumptions asked against found "
-    "inspection",
+    "inspection engagement",
     "error_um": "depth_max",
     "error_um.total": "mean",
     "reversals": "cutting air",

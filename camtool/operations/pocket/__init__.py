@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 from camtool.errors import OptionError
-from camtool.keys import FEED, Key, Value, fraction, one_of, plain
+from camtool.keys import FEED, Key, Value, engagement_angle, one_of, plain
 from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, OperationKind
-from camtool.units import parse_angle
 
 STRATEGIES = ("passes", "adaptive")
 
@@ -17,14 +16,8 @@ MAX_ENGAGEMENT_RAD = math.radians(90.0)
 
 
 def engagement(value: object) -> float:
-    """Read a limit of engagement, rad: an angle with its unit, or the part of the diameter that
-    is cut beside a straight wall: a part a is the angle acos(1 − 2 a)."""
-    text = str(value).strip()
-    angle_rad = (
-        parse_angle(text)
-        if isinstance(value, str) and text.endswith(("deg", "°", "rad"))
-        else math.acos(1.0 - 2.0 * min(max(fraction(value), 0.0), 1.0))
-    )
+    """Read the limit of engagement of an adaptive pocket, rad."""
+    angle_rad = engagement_angle(value)
     if not MIN_ENGAGEMENT_RAD <= angle_rad <= MAX_ENGAGEMENT_RAD:
         raise OptionError(
             f"an engagement of {math.degrees(angle_rad):.3g}° is not within 5° and 90° (0.2 % and"

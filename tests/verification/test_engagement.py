@@ -1,0 +1,176 @@
+"""The gate of engagement: an angle that is known by geometry, at both sides of the limit."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import camtool
+from camtool.cli.options import engagement_limit
+from camtool.errors import OptionError
+from camtool.planning.job import Job, Operation, Stock, Tool
+from camtool.run import Run
+from camtool.stock.engagement import THICK_SHARE
+from tests.strategies import examples
+
+RADIUS_MM = 2.5
+NEAR_DEG = 1.0
+"""Figures of operations are as near as this to an angle that there is."""
+
+
+def side_cut(
+    wide_mm: float,
+    *,
+    tool: Tool | None = None,
+    target: str = "grbl",
+    limit_deg: float | None = None,
+) -> Run:
+    """A straight cut along the lower edge of a block, so that the tool takes `wide_mm` of it; it
+    goes down beside the block."""
+    y = wide_mm - RADIUS_MM
+    program = (
+        f"G21 G90\nG0 Z5\nM3 S9000\nG0 X-9 Y{y:.4f}\nG1 Z-1 F100\nG1 X49 F600\nG0 Z5\nM5\nM2\n"
+    )
+    job = Job(
+        operations=(Operation(kind="profile", tool=tool or Tool(2.0 * RADIUS_MM)),),
+        stock=Stock(2.0, (0.0, 0.0), (40.0, 20.0)),
+    )
+    limit = None if limit_deg is None else math.radians(limit_deg)
+    judging = camtool.Judging(gates=camtool.Gates(engagement_rad=limit))
+    return camtool.verify(program.encode(), target, job=job, judging=judging)
+
+
+def angle_deg(wide_mm: float) -> float:
+    """The engagement of a straight cut of this width, by the circle alone."""
+    return math.degrees(math.acos(1.0 - min(wide_mm, 2.0 * RADIUS_MM) / RADIUS_MM))
+
+
+def messages(run: Run) -> list[str]:
+    return [each.message for each in run.findings if each.code.name == "ABOVE_GATE"]
+
+
+@pytest.mark.parametrize(("wide_mm", "known_deg"), [(2.5, 90.0), (1.25, 60.0), (5.2, 180.0)])
+def test_a_straight_cut_has_the_angle_of_its_width(wide_mm: float, known_deg: float) -> None:
+    run = side_cut(wide_mm, limit_deg=known_deg + 0.2 if known_deg < 180.0 else 180.0)
+    assert run.report is not None
+    assert run.report.engagement is not None
+    (row,) = run.report.engagement
+    assert row.greatest_deg == pytest.approx(known_deg, abs=NEAR_DEG)
+    assert (row.operation, row.limit_deg, row.left_mm, row.block) == ("", None, None, 6)
+    assert messages(run) == []
+
+
+@examples(30, 2_000)
+@given(st.floats(0.3, 4.7), st.sampled_from([1.5, -1.5]))
+def test_the_limit_is_kept_below_it_and_not_above(wide_mm: float, away_deg: float) -> None:
+    """Chips thinner than a share of the radius do not count."""
+    low = angle_deg(wide_mm - 2.0 * THICK_SHARE * RADIUS_MM)
+    limit = low - 1.5 if away_deg < 0.0 else angle_deg(wide_mm) + 1.5
+    run = side_cut(wide_mm, limit_deg=limit)
+    assert run.report is not None
+    assert run.report.engagement is not None
+    found = run.report.engagement[0].greatest_deg
+    assert found is not None
+    assert low - 1e-6 <= found <= angle_deg(wide_mm) + NEAR_DEG
+    if away_deg > 0.0:
+        assert messages(run) == []
+    else:
+        (finding,) = (each for each in run.findings if each.code.name == "ABOVE_GATE")
+        assert finding.where == "--max-engagement"
+        assert finding.limit == pytest.approx(limit)
+        assert finding.measured == pytest.approx(found, abs=1e-5)
+        place = re.search(r"at X -9.000 Y (-?[0-9.]+);", finding.message)
+        assert place is not None
+        assert float(place[1]) == pytest.approx(wide_mm - RADIUS_MM, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("tool", "reason"),
+    [
+        (Tool(0.0), "the shape of a tool is not known"),
+        (Tool(5.0, "ball"), "width changes with its height"),
+        (Tool(5.0, "v", math.radians(60.0)), "width changes with its height"),
+    ],
+)
+def test_what_cannot_be_judged_does_not_meet_the_limit(tool: Tool, reason: str) -> None:
+    run = side_cut(1.0, tool=tool, limit_deg=180.0)
+    assert [reason in each for each in messages(run)] == [True]
+    assert run.failed
+
+
+def test_nothing_is_judged_unless_somebody_asks() -> None:
+    run = side_cut(2.5)
+    assert run.report is not None
+    assert run.report.engagement is None
+
+
+def test_an_own_limit_and_the_gate_are_judged_by_one_run_of_the_slides(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from camtool.stock import engagement
+    from camtool.verification import engagement as slides
+
+    counts = {"slides": 0, "bounds": 0}
+    moves_of, bounds_of = slides.slide_moves, engagement.engagement_of
+
+    def counted_moves(*args: object, **options: object) -> object:
+        counts["slides"] += 1
+        return moves_of(*args, **options)  # type: ignore[arg-type]
+
+    def counted_bounds(*args: object) -> object:
+        counts["bounds"] += 1
+        return bounds_of(*args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(slides, "slide_moves", counted_moves)
+    monkeypatch.setattr(engagement, "engagement_of", counted_bounds)
+    operation = Operation(
+        kind="pocket",
+        tool=Tool(3.0, number=1),
+        depth_mm=1.0,
+        spindle_rpm=9000.0,
+        own=(("strategy", "adaptive"), ("engagement_rad", math.radians(60.0))),
+    )
+    drawing = tmp_path / "part.svg"
+    drawing.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="8mm" viewBox="0 0 9 8">'
+        '<rect x="0" y="0" width="9" height="8"/></svg>'
+    )
+    greatest = []
+    for limit_deg in (61.3, 30.0):
+        gates = camtool.Gates(engagement_rad=math.radians(limit_deg))
+        run = camtool.post(str(drawing), "grbl", Job((operation,)), gates=gates)
+        assert run.report is not None
+        assert run.report.engagement is not None
+        (row,) = run.report.engagement
+        assert (row.operation, row.left_mm) == ("pocket", 0.0)
+        assert row.limit_deg == pytest.approx(60.0)
+        greatest.append(row.greatest_deg or 0.0)
+        assert len(messages(run)) == (limit_deg == 30.0)
+        assert "ENGAGEMENT_KEPT" in {each.code.name for each in run.findings}
+        assert counts == {"slides": 1, "bounds": 1}
+        counts.update(slides=0, bounds=0)
+        text = run.report.to_text()
+        assert "limit 60.00°; nothing is left that the tool reaches" in text
+    assert greatest[0] == pytest.approx(greatest[1], abs=NEAR_DEG)
+
+
+def test_a_lathe_has_no_engagement() -> None:
+    samples = Path(__file__).parents[2] / "samples"
+    job = camtool.read_job(samples / "screw.toml")
+    gates = camtool.Gates(engagement_rad=1.0, gouge_mm=0.1)
+    lathe = camtool.load_target("linuxcnc", machine=samples / "machines/linuxcnc-lathe.toml")
+    run = camtool.post(str(samples / "screw.dxf"), lathe, job, gates=gates)
+    told = messages(run)
+    assert any("the work turns" in each for each in told)
+    assert any("no gouge is known" in each for each in told)
+
+
+@pytest.mark.parametrize("text", ["0%", "0deg", "181deg", "101%", "-1%", "nan", "nan deg", "x"])
+def test_limits_that_say_nothing_are_refused(text: str) -> None:
+    with pytest.raises(OptionError):
+        engagement_limit(text)
