@@ -26,7 +26,7 @@ tolerance in a square corner.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -43,6 +43,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 from camtool.kernels.engagement import Cleared
 from camtool.planning.clearing import outside_parts, parts_of, pole
 from camtool.planning.items import CutRun, Setting
+from camtool.planning.job import Operation
 from camtool.planning.paths import MeasuredPath
 from camtool.planning.ramps import feeds_along, helix
 
@@ -560,6 +561,20 @@ def adaptive_legs(
     return AdaptiveStays(centre, helix, list(clearing.legs(first)))
 
 
+def rest_stays(
+    region: Polylines, clear: Polylines, legs: Sequence[Leg], tool_mm: float, limit: float
+) -> list[list[Leg]]:
+    """Return the stays that clear the rest of a connected tool centre region, of which a part is
+    `clear`, after these legs; the first begins with the last of them."""
+    clearing = _Clearing(region, tool_mm, limit)
+    for leg in legs[:-1]:
+        clearing.cleared.add(clearing.moves(leg.vertices))
+    room = _widest(region)[1]
+    opening = FIRST_SHARE * max(_widest(part)[1] for part in parts_of(clear))
+    clearing.take(list(fronts(region, clear, (opening, max(opening, room)), tool_mm, limit)))
+    return list(clearing.legs(legs[-1].vertices))
+
+
 def _places_in_air(air: Polylines, tool_mm: float) -> Polylines:
     """Return the places at which the tool is in air, as a region."""
     if len(air) == 0:
@@ -597,35 +612,52 @@ def adaptive_runs(region: Polylines, setting: Setting, name: str) -> list[CutRun
     """Return the runs that clear one connected tool centre region at all levels, in order; none
     where it is too narrow for a helix."""
     operation = setting.operation
-    tool_mm = operation.tool.radius_mm
+    region = mirrored(region) if operation.direction == "conventional" else region
     limit: float = operation.own_value("engagement")
-    entry_mm = operation.entry.radius_mm or HELIX_SHARE * tool_mm
-    backward = operation.direction == "conventional"
-    clearing = adaptive_legs(
-        _mirrored(region) if backward else region, min(entry_mm, tool_mm), tool_mm, limit
-    )
-    centre, helix_mm, stays = clearing.centre, clearing.helix_mm, clearing.stays
+    tool_mm = operation.tool.radius_mm
+    return runs_of([adaptive_legs(region, entry_mm(operation), tool_mm, limit)], setting, name)
+
+
+def entry_mm(operation: Operation) -> float:
+    """Return the radius of the helix in which an operation goes down where there is room, mm."""
+    tool_mm = operation.tool.radius_mm
+    return min(operation.entry.radius_mm or HELIX_SHARE * tool_mm, tool_mm)
+
+
+def runs_of(clearings: Sequence[AdaptiveStays], setting: Setting, name: str) -> list[CutRun]:
+    """Return the runs that make all stays at all levels, in order; where the operation is cut
+    conventionally they are mirrored about X = 0, as the regions were for which they were made."""
+    backward = setting.operation.direction == "conventional"
     runs: list[CutRun] = []
-    for above, level in pairwise((0.0, *setting.levels_mm)):
-        for number, stay in enumerate(stays):
-            parts = [_at_level(leg, level, setting) for leg in stay]
-            if number == 0:
-                drop = (above - level) / math.tan(operation.entry.angle_rad)
-                down = helix(centre, helix_mm, centre + np.array([1.0, 0.0]), drop)
-                sloping = MeasuredPath.of(Polyline(down)).reach
-                z = above + (level - above) * sloping / sloping[-1]
-                vertices = np.insert(down, 2, z, axis=1)
-                parts.insert(0, (vertices, feeds_along(vertices, setting.feeds)))
-            vertices = np.concatenate([*(part[:-1] for part, _ in parts), parts[-1][0][-1:]])
-            if backward:
-                vertices = vertices * [-1.0, 1.0, 1.0, -1.0]
-            feeds = np.concatenate([feed for _, feed in parts])
-            runs.append(CutRun(vertices, feeds, setting.feeds.plunge_mm_min, name))
+    for heights in pairwise((0.0, *setting.levels_mm)):
+        for each in clearings:
+            for number, stay in enumerate(each.stays):
+                parts = [_at_level(leg, heights[1], setting) for leg in stay]
+                if number == 0 and each.helix_mm:
+                    parts.insert(0, _down(each, heights, setting))
+                vertices = np.concatenate([*(part[:-1] for part, _ in parts), parts[-1][0][-1:]])
+                if backward:
+                    vertices = vertices * [-1.0, 1.0, 1.0, -1.0]
+                feeds = np.concatenate([feed for _, feed in parts])
+                runs.append(CutRun(vertices, feeds, setting.feeds.plunge_mm_min, name))
     return runs
 
 
-def _mirrored(region: Polylines) -> Polylines:
-    """A region mirrored about X = 0, on the left of its paths again."""
+def _down(
+    clearing: AdaptiveStays, heights: tuple[float, float], setting: Setting
+) -> tuple[Floats, Floats]:
+    """Return the vertices (n, 4) of the helix from one height to another, and its feeds."""
+    above, level = heights
+    drop = (above - level) / math.tan(setting.operation.entry.angle_rad)
+    begin = clearing.centre + np.array([1.0, 0.0])
+    down = helix(clearing.centre, clearing.helix_mm, begin, drop)
+    sloping = MeasuredPath.of(Polyline(down)).reach
+    vertices = np.insert(down, 2, above + (level - above) * sloping / sloping[-1], axis=1)
+    return vertices, feeds_along(vertices, setting.feeds)
+
+
+def mirrored(region: Polylines) -> Polylines:
+    """Return a region mirrored about X = 0, on the left of its paths again."""
     paths = [Polyline(path.vertices * [-1.0, 1.0, -1.0], path.closed) for path in region]
     return Polylines.of([reverse(path) for path in paths])
 
