@@ -95,7 +95,8 @@ cdef class Cleared:
         adds: bool = True, coarse_rad: float = float("inf"), known_rad: float = float("inf"),
     ) -> Floats:
         """Return a bound of the greatest engagement angle (K,) rad of moves (K, 9) in their order,
-        0 for those that do not cut; each that cuts is added behind its own turn (if `adds`).
+        0 for those that do not cut, and for those straight down the part of the whole circle; each
+        that cuts is added behind its own turn (if `adds`).
 
         Chips thinner than `thick_mm` do not count. Bounds above `enough_rad` are within `fine_rad`
         of an angle that there is, or of one of chips half as thick; where that is infinite, the
@@ -194,7 +195,7 @@ cdef double _greatest(
     cdef double highs[WAITING]
     cdef int waiting = 1
     if length == 0.0:
-        return 0.0
+        return _all_round(self, move, thick)
     lows[0], highs[0] = 0.0, length
     while waiting:
         waiting -= 1
@@ -217,6 +218,20 @@ cdef double _greatest(
         lows[waiting + 1], highs[waiting + 1] = low + half, high
         waiting += 2
     return best
+
+
+cdef double _all_round(Cleared self, double* move, double thick) noexcept nogil:
+    """The angle of the whole circle of a tool that goes straight down or up in which it cuts."""
+    cdef double aside[COLUMNS]
+    cdef double angle = 0.0
+    cdef int k, side
+    for side in range(-1, 2, 2):
+        for k in range(COLUMNS):
+            aside[k] = move[k]
+        aside[BX], aside[BY] = move[AX] + side, move[AY]
+        aside[ASKEW] = aside[ASKEW_END] = 0.0
+        angle += _open_angle(self, aside, 1.0, 0.0, 0.0, thick, thick)
+    return angle
 
 
 cdef double _open_angle(

@@ -25,6 +25,7 @@ from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.page import (
     HEAD_GAP,
     LEGEND_DROP,
+    MapScale,
     PageLayout,
     colour_bar,
     colour_bar_width,
@@ -33,6 +34,7 @@ from camtool.pictures.page import (
     legend_below,
     legend_rows,
     scale_bar,
+    scale_of,
     sheet,
     table_of,
     ticks_of,
@@ -91,13 +93,13 @@ def draw_beside(scenes: Sequence[Scene], options: PictureOptions = AS_USUAL) -> 
     plots = grid.around([own_view.box for own_view in views])
     table, bar_y = table_of(_entries(contents, view), view, plots)
     legend_y = plots.bottom + LEGEND_DROP
-    top_um = _top_um(contents)
+    scale = _scale(contents)
     return sheet(
         _title(scenes),
         (grid.page, foot_of(table, legend_y)),
         options,
         *grid.place_panels(panels),
-        "" if top_um is None else colour_bar(top_um, plots),
+        "" if scale is None else colour_bar(scale, plots),
         legend_rows(table, plots.left, legend_y),
         scale_bar(view, plots.right, bar_y),
     )
@@ -108,7 +110,7 @@ def _views(contents: Sequence[Content], options: PictureOptions) -> tuple[PanelG
 
     The fit runs twice, since the width of the colour bar follows from the height of the plots.
     """
-    window, top_um = contents[0].window, _top_um(contents)
+    window, scale = contents[0].window, _scale(contents)
     across, height = (window[:, 1] - window[:, 0]).tolist()
     columns = columns_of(len(contents), wide=height < WIDE * across)
     page = page_units(columns, options)
@@ -119,9 +121,15 @@ def _views(contents: Sequence[Content], options: PictureOptions) -> tuple[PanelG
         grid = grid_of(heads, columns, page, bar)
         views = [fitted(window, top + HEAD_GAP, grid.width, shapes)[0] for top in grid.downs]
         grid = grid.with_bodies(HEAD_GAP + views[0].box.height + NUMBERS_FOOT)
-        if top_um is not None:
-            bar = colour_bar_width(top_um, grid.around([view.box for view in views]).height)
+        if scale is not None:
+            bar = colour_bar_width(scale, grid.around([view.box for view in views]).height)
     return grid, views
+
+
+def _scale(contents: Sequence[Content]) -> MapScale | None:
+    """The scale of the colours of all; None where none has a map."""
+    scales = [scale for scale in map(scale_of, contents) if scale is not None]
+    return max(scales, key=lambda scale: scale.top, default=None)
 
 
 def _top_um(contents: Sequence[Content]) -> float | None:

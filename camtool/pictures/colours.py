@@ -34,6 +34,7 @@ STOCK = "#9a7b4f"
 GAP = "#d5311e"
 SWEPT = "#d6e6f6"
 REVERSAL = "#8a2be2"
+ENTRY = "#009e73"
 
 VERDICTS = {"in": "#009e73", "undecided": "#e69f00", "out": GAP, "predicted": RAPID}
 """The colours of inspected dimensions."""
@@ -101,6 +102,22 @@ def sequential(fraction: float, *, dark: bool = False) -> str:
 def bin_colours(*, dark: bool = False) -> tuple[str, ...]:
     """The colour of each of the `BINS` steps of the map, taken at its middle."""
     return tuple(sequential((index + 0.5) / BINS, dark=dark) for index in range(BINS))
+
+
+UNKNOWN, AIR, CUT_ENTRY = -3, -2, -1
+"""Steps of moves whose engagement is not judged, that cut nothing, and that are entries."""
+
+ENGAGED_NAMES = {AIR: "cuts nothing", UNKNOWN: "engagement not known", CUT_ENTRY: "entry"}
+"""The names of these in legends."""
+
+ENGAGED_STYLES = {
+    AIR: (RAPID, 0.4),
+    UNKNOWN: (FEED_PALE, 0.6),
+    CUT_ENTRY: (ENTRY, 1.0),
+    **{step: (colour, 1.0) for step, colour in enumerate(bin_colours())},
+}
+"""Colour and share of the pen of moves by the step of their engagement, the lowest first: the most
+engaged lie on top."""
 
 
 def on_dark(colour: str) -> str:

@@ -24,6 +24,7 @@ from camtool.pictures.chains import (
     tapers,
 )
 from camtool.pictures.colours import DRAWING, LAYER_COLOURS
+from camtool.pictures.engaged import EngagementTrace, engagement_trace
 from camtool.pictures.options import AS_USUAL, PictureOptions
 from camtool.pictures.scene import Scene
 from camtool.pictures.trace import ErrorTrace, exaggerated, trace_of
@@ -68,9 +69,9 @@ class Places(Struct, frozen=True, eq=False):
 class Content(Struct, frozen=True, eq=False, dict=True):
     """`outlines` are the paths of the drawing, in `groups` by its layers; `moves` those of the
     toolpath, empty without one; `places` belong to the drawing; `trace` is the predicted path
-    where it is shown. `window` (2, 2) mm is the part of the plane that is shown, `crop_mm` the
-    part that was asked for; `shown` are the names of layers, None: the usual ones; `times` is the
-    factor of the errors that are drawn."""
+    where it is shown, and `engaged` the moves by engagement. `window` (2, 2) mm is the part of the
+    plane that is shown, `crop_mm` the part that was asked for; `shown` are the names of layers,
+    None: the usual ones; `times` is the factor of the errors that are drawn."""
 
     scene: Scene
     groups: tuple[Group, ...]
@@ -78,6 +79,7 @@ class Content(Struct, frozen=True, eq=False, dict=True):
     moves: MoveChains
     places: Places
     trace: ErrorTrace | None
+    engaged: EngagementTrace | None
     window: Floats
     shown: frozenset[str] | None
     crop_mm: tuple[float, float, float, float] | None
@@ -199,6 +201,7 @@ def content_of(scene: Scene, options: PictureOptions = AS_USUAL) -> Content:
         groups = _groups(scene.drawing, outlines, is_alone=is_alone)
         places = _places(scene.drawing)
     shown = options.layers
+    with_path = shown is None or "path" in shown
     # Layers that are not shown do not change the window.
     widest = max((tool.diameter_mm for _, tool in scene.turns), default=None)
     tool_mm = (scene.tool_mm or widest) if shown is None or "swept" in shown else None
@@ -209,7 +212,8 @@ def content_of(scene: Scene, options: PictureOptions = AS_USUAL) -> Content:
         outlines=outlines,
         moves=moves,
         places=places,
-        trace=trace if shown is None or "path" in shown else None,
+        trace=trace if with_path else None,
+        engaged=engagement_trace(scene) if shown and "engagement" in shown else None,
         window=(
             _window(outlines, places.points, moves, trace, tool_mm, stock)
             if options.crop_mm is None

@@ -33,6 +33,7 @@ from camtool.pictures.page import (
     mat,
     page_of,
     scale_bar,
+    scale_of,
     sheet,
 )
 from camtool.pictures.plot import Plot
@@ -111,8 +112,9 @@ def _plot(content: Content, view: View) -> list[str]:
 def _scales_and_legend(content: Content, page: PageLayout) -> list[str]:
     """Colour bar, legend and scale bar."""
     box, parts = page.view.box, []
-    if content.trace is not None:
-        parts.append(colour_bar(content.trace.top_um, box))
+    scale = scale_of(content)
+    if scale is not None:
+        parts.append(colour_bar(scale, box))
     parts.append(legend_rows(page.rows, box.left, page.legend_y))
     parts.append(scale_bar(page.view, box.right, page.bar_y))
     return parts

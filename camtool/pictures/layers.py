@@ -19,6 +19,8 @@ from camtool.patterns import guess
 from camtool.pictures.colours import (
     BINS,
     DRAWING,
+    ENGAGED_NAMES,
+    ENGAGED_STYLES,
     FEED,
     FEED_PALE,
     GAP,
@@ -384,6 +386,20 @@ def _path_legend(content: Content, view: View) -> Iterator[LegendEntry]:
     yield LegendEntry(map_swatch(4.0), f"predicted path, {scale}")
 
 
+def _engagement(content: Content, plot: Plot) -> str:
+    return plot.engagement(content.engaged, TRACE_PEN) if content.engaged is not None else ""
+
+
+def _engagement_legend(content: Content, view: View) -> Iterator[LegendEntry]:
+    steps = set() if content.engaged is None else set(content.engaged.step.tolist())
+    if any(step >= 0 for step in steps):
+        yield LegendEntry(map_swatch(4.0), "engagement of the tool")
+    for step, name in ENGAGED_NAMES.items():
+        if step in steps:
+            colour, share = ENGAGED_STYLES[step]
+            yield LegendEntry(line_swatch(colour, share * 4.0), name)
+
+
 def _worst_legend(content: Content, view: View) -> Iterator[LegendEntry]:
     if any(view.shows(*place) for place in content.worst.tolist()):
         yield LegendEntry(dot_swatch(WORST_MARK), "largest errors, by rank")
@@ -575,6 +591,18 @@ LAYERS = (
         height=6,
         place=1,
         needs="path",
+    ),
+    Layer(
+        "engagement",
+        holds=lambda content: content.engaged is not None,
+        draw=_engagement,
+        legend=_engagement_legend,
+        in_mm=True,
+        height=6,
+        place=1,
+        usual=False,
+        under_path=False,
+        hint="; --tool-diameter or --job says how wide the tool is",
     ),
     Layer(
         "worst",

@@ -25,6 +25,7 @@ from camtool.pictures.colours import (
     darkened,
 )
 from camtool.pictures.content import Content
+from camtool.pictures.engaged import TOP_DEG
 from camtool.pictures.layers import SWATCH, LegendEntry, legend_of
 from camtool.pictures.options import MIN_PX, SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.svg import Look, PathData, element, number, one_line, title
@@ -77,8 +78,8 @@ def page_of(content: Content, width: float = PAGE) -> PageLayout:
     shapes = (WIDEST, TALLEST) if content.crop_mm is None else CROP_SHAPES
 
     def bar(view: View) -> float:
-        trace = content.trace
-        return 0.0 if trace is None else colour_bar_width(trace.top_um, view.box.height)
+        scale = scale_of(content)
+        return 0.0 if scale is None else colour_bar_width(scale, view.box.height)
 
     view, ticks = fitted(content.window, top, width, shapes, bar)
     table, bar_y = table_of(legend_of(content, view), view, view.box)
@@ -167,7 +168,25 @@ MIN_BAR_SPACING = 85.0
 CLEAR_OF_TOP = 2.3
 """Round numbers are left out nearer than this many heights of a letter to the largest error."""
 
-BAR_TITLE = "error (µm)"
+
+class MapScale(Struct, frozen=True):
+    """The end of the colour map, which begins at 0, and its name; `step` is the distance of its
+    numbers, None: round ones, and the end."""
+
+    top: float
+    title: str = "error (µm)"
+    step: float | None = None
+    id: str = "error-scale"
+
+
+ENGAGEMENT_SCALE = MapScale(TOP_DEG, "engaged (°)", 30.0, "engagement-scale")
+
+
+def scale_of(content: Content) -> MapScale | None:
+    """The scale of the colours of a picture; None where nothing is coloured by a map."""
+    if content.trace is not None:
+        return MapScale(content.trace.top_um)
+    return None if content.engaged is None else ENGAGEMENT_SCALE
 
 
 def _name(entry: LegendEntry) -> str:
@@ -272,8 +291,11 @@ def legend_below(entries: Sequence[LegendEntry], top: float, width: float) -> tu
     return legend_rows(table, MARGIN, legend_y), foot_of(table, legend_y)
 
 
-def colour_bar_labels(top_um: float, height: float) -> list[tuple[float, str]]:
-    """(value µm, text) along the colour bar: round numbers, and the largest error at the top."""
+def colour_bar_labels(scale: MapScale, height: float) -> list[tuple[float, str]]:
+    """(value, text) along the colour bar: round numbers, and the largest error at the top."""
+    top_um = scale.top
+    if scale.step is not None:
+        return [(value, number(value)) for value in multiples(0.0, top_um, scale.step)]
     step = round_step(top_um * MIN_BAR_SPACING / height)
     room = top_um * CLEAR_OF_TOP * TICK_CAP / height
     labels = [
@@ -284,14 +306,14 @@ def colour_bar_labels(top_um: float, height: float) -> list[tuple[float, str]]:
     return [*labels, (top_um, number(top_um, max(2, 2 - math.floor(math.log10(top_um)))))]
 
 
-def colour_bar_width(top_um: float, height: float) -> float:
+def colour_bar_width(scale: MapScale, height: float) -> float:
     """Width that the colour bar needs right of the plot."""
-    widest = max(text.width(name, TICK_CAP) for _, name in colour_bar_labels(top_um, height))
-    header = text.width(BAR_TITLE, TICK_CAP)
+    widest = max(text.width(name, TICK_CAP) for _, name in colour_bar_labels(scale, height))
+    header = text.width(scale.title, TICK_CAP)
     return BAR_GAP + max(BAR_WIDTH + 12.0 + widest, header)
 
 
-def colour_bar(top_um: float, box: PageBox) -> str:
+def colour_bar(scale: MapScale, box: PageBox) -> str:
     """The colour map with its numbers, right of the plot and as high."""
     left = box.right + BAR_GAP
     step = box.height / BINS
@@ -314,16 +336,16 @@ def colour_bar(top_um: float, box: PageBox) -> str:
     edge: Look = {"x": left, "y": box.top, "width": BAR_WIDTH, "height": box.height}
     parts.append(element("rect", {**edge, "fill": "none", "stroke": FRAME, "stroke-width": 1.4}))
     ticks = PathData()
-    for value, name in colour_bar_labels(top_um, box.height):
-        y = box.bottom - value / top_um * box.height
+    for value, name in colour_bar_labels(scale, box.height):
+        y = box.bottom - value / scale.top * box.height
         ticks.move(left + BAR_WIDTH, y)
         ticks.line(left + BAR_WIDTH + 5.0, y)
         place = (left + BAR_WIDTH + 12.0, y + TICK_CAP / 2.0)
         parts.append(text.label(name, place, TextStyle(TICK_CAP, QUIET)))
     line: Look = {"d": str(ticks), "fill": "none", "stroke": FRAME, "stroke-width": 1.4}
     parts.append(element("path", line))
-    parts.append(text.label(BAR_TITLE, (left, box.top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))
-    return element("g", {"id": "error-scale"}, *parts)
+    parts.append(text.label(scale.title, (left, box.top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))
+    return element("g", {"id": scale.id}, *parts)
 
 
 # Grid, ticks with their numbers in mm, scale bar.

@@ -15,6 +15,7 @@ from camtool.pictures import text
 from camtool.pictures.chains import Chain, path_data
 from camtool.pictures.colours import BODY, FEED, PLOT
 from camtool.pictures.content import Place
+from camtool.pictures.engaged import EngagementTrace, engagement_layer
 from camtool.pictures.svg import Look, PathData, element, number
 from camtool.pictures.text import TextStyle
 from camtool.pictures.trace import ErrorTrace, trace_layer
@@ -117,6 +118,10 @@ class Plot(Struct, frozen=True):
     def trace(self, trace: ErrorTrace, width: float) -> str:
         """The path of the slides, coloured by its error."""
         return trace_layer(trace, self.view, width)
+
+    def engagement(self, trace: EngagementTrace, width: float) -> str:
+        """The moves of the slides, coloured by engagement."""
+        return engagement_layer(trace, self.view, width)
 
     # Marks, in units of the page.
 

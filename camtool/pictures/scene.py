@@ -9,14 +9,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.errors import OptionError
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.planning.job import Job, Tool
     from camtool.stock.before import StockBefore
+    from camtool.stock.engagement import Engagement
     from camtool.stock.moves import StockMoves
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.program import Listing
@@ -97,6 +100,19 @@ class Scene:
     inspected: tuple[InspectedReport, ...] = ()
     cut: Callable[[], StockPair] | None = None
     is_turned: bool = False
+
+    @cached_property
+    def engagement(self) -> Engagement | None:
+        """The engagement of the tools along the moves that cut the stock, computed once; None
+        without moves, and where the tools are not known."""
+        from camtool.stock.engagement import engagement_of
+
+        if self.cut is None or self.toolpath is None:
+            return None
+        with suppress(OptionError):
+            pair = self.cut()
+            return engagement_of(pair.moves, self.toolpath, pair.box_mm if pair.known else None)
+        return None
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm

@@ -107,10 +107,15 @@ def _kept_rows(trace: ErrorTrace, apart_mm: float) -> Ints:
     return np.array(kept_rows, dtype=np.int64)
 
 
+def decimals_in(window_mm: float) -> int:
+    """Return the number of decimals of coordinates in a window of this width."""
+    return max(0, math.ceil(-math.log10(FINEST_SHARE * window_mm)))
+
+
 def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
     """The coloured path, in mm."""
     (low, high), colours = view.x_range, bin_colours()
-    decimals = max(0, math.ceil(-math.log10(FINEST_SHARE * (high - low))))
+    decimals = decimals_in(high - low)
     paths = []
     for colour, runs in zip(colours, lines_by_step(trace, high - low), strict=True):
         data = PathData(decimals)

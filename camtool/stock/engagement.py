@@ -41,6 +41,9 @@ LEVEL_MM = 0.02
 ENTRY_TURNS = 1.0
 """An entry ends when the tool has gone so many times its circumference from where it went down."""
 
+ENDED_MM = 1e-9
+"""Entries of which less remains have ended."""
+
 TOLERATED_SHARE = 1.02
 """Engagements up to this part of the limit keep it."""
 
@@ -129,7 +132,10 @@ def engagement_of(
     `limits`: the operation of each move (M,), ascending, and the limit of each operation (K,) rad.
     Then only the greatest bound of an operation is as near as that, or within FINE_RAD where it is
     above the limit; all others are no more than bounds."""
-    number, limit = (np.zeros(len(moves), np.int64), np.zeros(1)) if limits is None else limits
+    moves, index = _parted(moves)
+    number, limit = (np.zeros(len(moves), np.int64), np.zeros(1))
+    if limits is not None:
+        number, limit = limits[0][index], limits[1]
     radius = moves.table[moves.tool, 0]
     is_straight = moves.table[moves.tool, 1] == radius
     length = np.hypot(*(moves.end - moves.start)[:, :2].T)
@@ -172,12 +178,35 @@ def engagement_of(
     return Engagement(result, is_entry, is_known, moves)
 
 
+def _parted(moves: StockMoves) -> tuple[StockMoves, Ints]:
+    """Return the moves, those that an entry ends in as two of them, and of which each is a
+    part."""
+    travel = moves.end - moves.start
+    length = np.hypot(*travel[:, :2].T)
+    down = travel[:, 2] < -LEVEL_MM * length
+    remaining = _entry_remaining(down, length, moves.table[moves.tool, 0])
+    share = np.divide(remaining, length, out=np.zeros_like(length), where=length > 0.0)
+    is_parted = ~down & (share > 0.0) & (share < 1.0)
+    index = np.repeat(np.arange(len(moves)), 1 + is_parted)
+    parts = moves.select(index)
+    second = np.flatnonzero(np.diff(index, prepend=-1) == 0)
+    parts.start[second] += share[is_parted, None] * travel[is_parted]
+    parts.end[second - 1] = parts.start[second]
+    return parts, index
+
+
+def _entry_remaining(down: Bools, length: Floats, radius: Floats) -> Floats:
+    """(M,) the length of an entry that remains where each move begins, after the last of those
+    that go down; at or below 0 where it has ended."""
+    travelled = np.concatenate([[0.0], np.cumsum(length)])
+    last = np.maximum.accumulate(np.where(down, travelled[1:], -np.inf))
+    return np.asarray(last + ENTRY_TURNS * 2.0 * np.pi * radius - travelled[:-1])
+
+
 def _behind(down: Bools, length: Floats, radius: Floats) -> Bools:
     """Mask (M,) of the moves that go down, and of those behind them up to the length of an
     entry."""
-    travelled = np.concatenate([[0.0], np.cumsum(length)])
-    last = np.maximum.accumulate(np.where(down, travelled[1:], -np.inf))
-    return np.asarray(travelled[:-1] - last <= ENTRY_TURNS * 2.0 * np.pi * radius)
+    return np.asarray(_entry_remaining(down, length, radius) > ENDED_MM)
 
 
 def engagement_by_operation(
@@ -194,11 +223,13 @@ def engagement_by_operation(
     gate = np.pi if gate_rad is None else gate_rad
     limits = [gate if own is None else min(gate, TOLERATED_SHARE * own) for _, _, own in parts]
     engagement = engagement_of(slides, decoded, box_mm, (number, np.array(limits)))
+    moves = engagement.moves
+    number = (np.searchsorted(begin, moves.row, side="right") - 1).clip(min=0)
     rows = []
     for k, (_, name, own) in enumerate(parts):
         chosen = np.asarray(number == k)
         if not engagement.is_known[chosen].all():
-            blind = slides.table[slides.tool[chosen & ~engagement.is_known], 0]
+            blind = moves.table[moves.tool[chosen & ~engagement.is_known], 0]
             words = CHANGING_WIDTH if blind.all() else NO_WIDTH
             rows.append(OperationEngagement(name, None, limit_rad=own, reason=words))
             continue
@@ -206,8 +237,8 @@ def engagement_by_operation(
         if move is None:
             rows.append(OperationEngagement(name, greatest, limit_rad=own))
             continue
-        x, y = slides.start[move, :2].tolist()
-        rows.append(OperationEngagement(name, greatest, (x, y), int(slides.row[move]), own))
+        x, y = moves.start[move, :2].tolist()
+        rows.append(OperationEngagement(name, greatest, (x, y), int(moves.row[move]), own))
     return tuple(rows)
 
 

@@ -94,3 +94,32 @@ def test_moves_that_do_not_cut_clear_nothing() -> None:
     rows = np.array([[0.0, 0.0, 5.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]] * 2)
     bound = cleared.judge(rows, np.array([False, True]), 1e-3, 0.0, 1e-3)
     assert bound.tolist() == [0.0, pytest.approx(math.pi)]
+
+
+@examples(60, nightly=2_000)
+@given(programs(), st.floats(0.3, 3.0))
+def test_the_greatest_alone_is_as_near_as_the_coarse_bounds(moves: Floats, enough: float) -> None:
+    """Bounds that are looked for only where they may be the greatest miss it by no more than the
+    coarse angle below the limit, and by no more than the fine one above it."""
+    every, coarse, fine = np.ones(len(moves), dtype=np.bool_), 0.05, 0.005
+
+    def greatest(enough_rad: float, fine_rad: float, **options: float) -> float:
+        box = np.array([-np.inf, -np.inf, WALL, np.inf])
+        cleared = Cleared(np.array([[0.0, 0.0], [10.0, 10.0]]), 1.0, box)
+        return float(cleared.judge(moves, every, THICK, enough_rad, fine_rad, **options).max())
+
+    near = greatest(0.0, fine)
+    found = greatest(enough, fine, coarse_rad=coarse, known_rad=0.0)
+    assert near - fine - 1e-9 <= found <= near + (coarse if found <= enough else fine) + 1e-9
+    assert greatest(0.0, coarse, coarse_rad=coarse, known_rad=-1.0) <= near + coarse + 1e-9
+
+
+@pytest.mark.parametrize(("gap", "share"), [(0.0, 0.0), (1.0, 2.0 / 3.0), (2.5, 1.0)])
+def test_straight_down_the_part_of_the_whole_circle_counts(gap: float, share: float) -> None:
+    """Beside a disc of its own size the lens takes a third of a circle's rim at one radius."""
+    cleared = Cleared(np.array([[0.0, 0.0], [9.0, 9.0]]), 1.0, np.full(4, np.inf) * [-1, -1, 1, 1])
+    disc = [5.0, 5.0, 5.0, 5.0, 1.0, -1.0, -1.0, 0.0, 0.0]
+    cleared.add(np.array([disc, [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]]))
+    down = np.array([[5.0 + gap, 5.0, 5.0 + gap, 5.0, 1.0, -1.0, 1.0, 0.0, 0.0]])
+    bound = cleared.judge(down, np.ones(1, dtype=np.bool_), 1e-6, 0.0, 1e-3)
+    assert bound[0] == pytest.approx(share * math.tau, abs=1e-2)

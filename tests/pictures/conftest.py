@@ -1,13 +1,16 @@
 """Scenes that the tests of this folder draw."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from camtool.geometry.drawing import Drawing, Gap, Units
 from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.pictures.scene import Scene, scene_of_drawing
+from camtool.pictures.scene import Scene, StockPair, scene_of_drawing, stock_pair
+from camtool.stock.cutters import CutterProfile
+from camtool.stock.moves import stock_moves_of_toolpath
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 
@@ -53,6 +56,13 @@ def followed(drawing: Drawing) -> Toolpath:
                 builder.arc(x, y, centre=(cx, cy), ccw=bool(segments.bulge[row] > 0), feed=10.0)
         builder.rapid(z=0.5)
     return builder.rapid(0.0, 0.0).finish()
+
+
+def cut_by(toolpath: Toolpath, tool_mm: float) -> Callable[[], StockPair]:
+    """The stock that a toolpath cuts with a flat tool."""
+    tools = np.zeros(len(toolpath), dtype=np.int64)
+    cutter = CutterProfile(0.5 * tool_mm, 0.5 * tool_mm)
+    return lambda: stock_pair(stock_moves_of_toolpath(toolpath, tools, (cutter,)), None, None)
 
 
 def ring_trace(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -27,6 +27,7 @@ from tests.oracles import literal_reversals, svg_page
 from tests.pictures.conftest import (
     SCENES,
     circle,
+    cut_by,
     drawing_of,
     followed,
     plate,
@@ -37,6 +38,7 @@ LAYERS = layer_names()
 MILLED = replace(
     scene_of_toolpath(followed(plate()), title="", drawing=plate()),
     tool_mm=0.5,
+    cut=cut_by(followed(plate()), 0.5),
     stock_mm=(-1.0, -1.0, 6.0, 4.0),
     pins=((2.5, -0.5), (2.5, 3.7)),
     flips=(((2.5, -1.2), (2.5, 4.2)),),
@@ -72,6 +74,7 @@ GROUPS = {
     "order": ("order",),
     "arrows": ("arrows",),
     "reversals": ("reversals",),
+    "engagement": ("engagement", "engagement-scale"),
     "tabs": ("tabs",),
     "dimensions": tuple(f"dimensions-{verdict}" for verdict in VERDICTS),
     "sizes": ("sizes", *(f"ends-{verdict}" for verdict in VERDICTS)),
@@ -113,7 +116,7 @@ def test_layers_do_not_move_the_picture() -> None:
 
 
 def test_names_of_layers_are_checked() -> None:
-    assert chosen([], []) == usual_layers() == set(LAYERS) - {"reversals"}
+    assert chosen([], []) == usual_layers() == set(LAYERS) - {"reversals", "engagement"}
     assert chosen(["feeds", "order"], ["order"]) == {"feeds"}
     with pytest.raises(OptionError) as found:
         chosen(["reversal"], [])

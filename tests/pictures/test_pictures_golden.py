@@ -16,7 +16,7 @@ from camtool.pictures.overlay import Overlay, draw_overlay
 from camtool.pictures.scene import Round, Scene
 from camtool.records import replace
 from tests.oracles.png import decode
-from tests.pictures.conftest import SCENES, circle, followed, plate
+from tests.pictures.conftest import SCENES, circle, cut_by, followed, plate
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 PNG_PX = 240
@@ -32,6 +32,7 @@ DRESSED = replace(
     worst=((4.5, 2.5), (2.5, 4.5)),
 )
 MENDED = replace(DRESSED, title="the same, bent", trace_error_mm=0.4 * DRESSED.trace_error_mm)
+ENGAGED = replace(SCENES["toolpath"], cut=cut_by(followed(plate()), 0.5))
 MILLED = replace(SCENES["toolpath"], tool_mm=0.5)
 
 
@@ -72,6 +73,8 @@ PICTURES = {
     **{name: one(SCENES[name]) for name in ("drawing", "toolpath", "result", "line", "ramp")},
     "dark": one(DRESSED, dark=True, size_px=400, exaggerate=10.0),
     "layers": one(MILLED, layers=frozenset(layer_names()), crop_mm=(0.0, 0.0, 3.0, 3.0)),
+    "engagement": one(ENGAGED, layers=frozenset({"drawing", "engagement"})),
+    "engagement-dark": one(ENGAGED, layers=frozenset({"engagement", "rapids"}), dark=True),
     "overlay": lambda: draw_overlay(compared()),
     "polar": one(LOBED, polar=1),
     "polar-both": one(BALLBAR, polar=2, dark=True),

@@ -75,7 +75,7 @@ SCRIPTS = ("data.js", "paint.js", "stage.js", "solid.js", "depth.js", "panel.js"
 
 SCRIPTED = frozenset(
     ("drawing", "swept", "travel", "rapids", "feeds", "plunges", "starts", "order", "arrows")
-) | {"path", "worst", "zero", "doubts"}
+) | {"path", "engagement", "worst", "zero", "doubts"}
 """The layers for which the script has functions of its own, since they change with time, zoom or
 other switches. It draws all others by their parts."""
 
