@@ -104,22 +104,6 @@ def bin_colours(*, dark: bool = False) -> tuple[str, ...]:
     return tuple(sequential((index + 0.5) / BINS, dark=dark) for index in range(BINS))
 
 
-UNKNOWN, AIR, CUT_ENTRY = -3, -2, -1
-"""Steps of moves whose engagement is not judged, that cut nothing, and that are entries."""
-
-ENGAGED_NAMES = {AIR: "cuts nothing", UNKNOWN: "engagement not known", CUT_ENTRY: "entry"}
-"""The names of these in legends."""
-
-ENGAGED_STYLES = {
-    AIR: (RAPID, 0.4),
-    UNKNOWN: (FEED_PALE, 0.6),
-    CUT_ENTRY: (ENTRY, 1.0),
-    **{step: (colour, 1.0) for step, colour in enumerate(bin_colours())},
-}
-"""Colour and share of the pen of moves by the step of their engagement, the lowest first: the most
-engaged lie on top."""
-
-
 def on_dark(colour: str) -> str:
     """The colour of the dark palette for one of the light palette; KeyError for any other."""
     return _DARK[colour]
@@ -134,3 +118,19 @@ def darkened(svg: str) -> str:
 def channels(colour: str) -> tuple[int, int, int]:
     """Red, green and blue of "#rrggbb", 0 … 255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+UNKNOWN, AIR, CUT_ENTRY = -3, -2, -1
+"""Steps of moves whose engagement is not judged, that cut nothing, and that are entries."""
+
+ENGAGED_NAMES = {AIR: "cuts nothing", UNKNOWN: "engagement not known", CUT_ENTRY: "entry"}
+"""The names of these in legends."""
+
+ENGAGED_STYLES = {
+    AIR: (RAPID, 0.4),
+    UNKNOWN: (FEED_PALE, 0.6),
+    CUT_ENTRY: (ENTRY, 1.0),
+    **{step: (colour, 1.0) for step, colour in enumerate(bin_colours())},
+}
+"""Colour and share of the pen of moves by the step of their engagement, the lowest first: the most
+engaged lie on top."""
