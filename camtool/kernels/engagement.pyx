@@ -13,7 +13,7 @@ advance.)
 From that comes a bound for a stretch of the move: wherever the tool is in a stretch of half length
 h, its edge is within h of where it would be in the middle. What is engaged there is also engaged
 in the middle, with all cleared places taken narrower by h. A stretch whose bound is too high is
-halved, until h is half of `thick`. Compiled.
+halved, until h is a sixteenth of `thick`. Compiled.
 """
 
 from __future__ import annotations
@@ -40,6 +40,8 @@ cdef double PI = math.pi
 cdef double INFINITY = float("inf")
 # The last of the tool's way is so many times `thick`.
 cdef double RECENT = 100.0
+# A stretch of so many times `thick` is not halved.
+cdef double FINEST = 1.0 / 16.0
 # Angles smaller than this are no engagement, rad: rounding of sines at a tangent.
 cdef double NO_ANGLE = 1e-7
 # Cuts as deep as this tool or deeper, up to this, have cleared what it meets, mm.
@@ -99,8 +101,8 @@ cdef class Cleared:
         that cuts is added behind its own turn (if `adds`).
 
         Chips thinner than `thick_mm` do not count. Bounds above `enough_rad` are within `fine_rad`
-        of an angle that there is, or of one of chips half as thick; where that is infinite, the
-        first angle above is returned. Bounds up to `enough_rad` are not refined, unless
+        of an angle that there is, or of one of chips thinner by a sixteenth; where that is infinite,
+        the first angle above is returned. Bounds up to `enough_rad` are not refined, unless
         `known_rad` is finite: then they are within `coarse_rad`, and where that is 0 or more only
         the greatest is looked for: bounds up to it, or up to those of moves before, are not
         refined."""
@@ -204,7 +206,7 @@ cdef double _greatest(
         bound = _open_angle(self, move, length, low, high, thick - half, thick)
         if bound <= best:
             continue
-        if bound <= greatest or half <= 0.5 * thick or waiting + 2 > WAITING:
+        if bound <= greatest or half <= FINEST * thick or waiting + 2 > WAITING:
             best = bound
             continue
         value = _open_angle(self, move, length, low, high, thick, thick)

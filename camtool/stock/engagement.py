@@ -30,10 +30,13 @@ from camtool.stock.moves import StockMoves
 from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
 
 THICK_SHARE = 4e-3
-"""Chips thinner than this part of the tool's radius are no engagement, ..."""
+THICK_OF_STEP = 0.2
+"""Chips thinner than the first part of the tool's radius are no engagement, or than the second
+part of the step beside a straight wall where that is less, ..."""
 
 THICK_BESIDE = 2.0
-"""... nor those thinner than so many times the distance of the slides from these moves."""
+"""... but those thinner than so many times the distance of the slides from these moves never are:
+they cannot be told from the steps of the axes."""
 
 LEVEL_MM = 0.02
 """Cuts no more than this above a move have cleared its depth."""
@@ -152,7 +155,7 @@ def engagement_of(
         return Engagement(result, np.zeros(len(moves), dtype=np.bool_), is_known, moves)
     ends = np.concatenate([moves.start[cuts, :2], moves.end[cuts, :2]])
     reach = float(radius[cuts].max())
-    thick = max(THICK_SHARE * float(radius[cuts].min()), THICK_BESIDE * moves.beside_mm)
+    narrow_mm = float(radius[cuts].min())
     extents = np.stack([ends.min(axis=0), ends.max(axis=0)])
     cleared = Cleared(extents, reach, np.array(box_mm or (-np.inf, -np.inf, np.inf, np.inf)))
     down = moves.end[:, 2] < moves.start[:, 2] - LEVEL_MM * length
@@ -166,7 +169,7 @@ def engagement_of(
         result[part] = cleared.judge(
             rows[part],
             np.ones(len(part), dtype=np.bool_),
-            thick,
+            max(_thick_share(limit[own]) * narrow_mm, THICK_BESIDE * moves.beside_mm),
             limit[own],
             COARSE_RAD if limits is None else FINE_RAD,
             coarse_rad=COARSE_RAD,
@@ -201,6 +204,12 @@ def _entry_remaining(down: Bools, length: Floats, radius: Floats) -> Floats:
     travelled = np.concatenate([[0.0], np.cumsum(length)])
     last = np.maximum.accumulate(np.where(down, travelled[1:], -np.inf))
     return np.asarray(last + ENTRY_TURNS * 2.0 * np.pi * radius - travelled[:-1])
+
+
+def _thick_share(limit_rad: float) -> float:
+    """Return the thickness up to which chips do not count, over the tool's radius; 0: no limit."""
+    step = 1.0 - float(np.cos(limit_rad))
+    return min(THICK_SHARE, THICK_OF_STEP * step) if limit_rad else THICK_SHARE
 
 
 def _behind(down: Bools, length: Floats, radius: Floats) -> Bools:

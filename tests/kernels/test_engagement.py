@@ -89,6 +89,19 @@ def test_beside_a_straight_cut_the_angle_is_that_of_its_width(share: float) -> N
     assert bound[0] == pytest.approx(math.acos(1.0 - width), abs=4e-3)
 
 
+def test_chips_almost_as_thick_as_what_does_not_count_are_not_taken_for_thick_ones() -> None:
+    """Beside a slot, 0.03 wide, with chips of 0.02 that do not count: as a cut 0.01 wide."""
+    rows = np.zeros((2, 9))
+    rows[:, :4] = [[0.0, 0.0, 20.0, 0.0], [15.0, 0.03, 5.0, 0.03]]
+    rows[:, 4] = 1.0
+    cleared = Cleared(
+        np.array([[0.0, 0.0], [20.0, 2.0]]), 1.0, np.full(4, np.inf) * [-1, -1, 1, 1]
+    )
+    cleared.add(rows[:1])
+    bound = cleared.judge(rows[1:], np.ones(1, dtype=np.bool_), 0.02, 0.0, 1e-3)
+    assert math.acos(1.0 - 0.01) <= bound[0] <= math.acos(1.0 - 0.01 - 0.02 / 16.0) + 1e-3
+
+
 def test_moves_that_do_not_cut_clear_nothing() -> None:
     cleared = Cleared(np.zeros((2, 2)), 1.0, np.full(4, np.inf) * [-1, -1, 1, 1])
     rows = np.array([[0.0, 0.0, 5.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]] * 2)

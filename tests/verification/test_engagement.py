@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,7 +16,9 @@ from camtool.cli.options import engagement_limit
 from camtool.errors import OptionError
 from camtool.planning.job import Job, Operation, Stock, Tool
 from camtool.run import Run
-from camtool.stock.engagement import THICK_SHARE
+from camtool.stock.cutters import CutterProfile
+from camtool.stock.engagement import THICK_SHARE, engagement_of
+from camtool.stock.slides import ToolsOfRows, slide_moves
 from tests.strategies import examples
 
 RADIUS_MM = 2.5
@@ -87,6 +90,20 @@ def test_the_limit_is_kept_below_it_and_not_above(wide_mm: float, away_deg: floa
         place = re.search(r"at X -9.000 Y (-?[0-9.]+);", finding.message)
         assert place is not None
         assert float(place[1]) == pytest.approx(wide_mm - RADIUS_MM, abs=0.005)
+
+
+def test_chips_that_do_not_count_are_thinner_than_the_step_of_a_small_limit() -> None:
+    """A cut that is engaged by 7° does not pass as one of 5°: its chip, 0.75 % of the radius, is
+    less than twice as thick as what does not count at large limits."""
+    target = camtool.load_target("linuxcnc")
+    program = b"G21 G90 G61\nG0 Z5\nG0 X-40 Y-24.8137\nG1 Z-1 F100\nG1 X49 F600\nG0 Z5\nM2\n"
+    decoded = target.target.read_in(program, target.machine, None)
+    tools = ToolsOfRows((CutterProfile(25.0, 25.0),), np.zeros(len(decoded), dtype=np.int64))
+    slides = slide_moves(decoded, target, tools)
+    limit, number = np.array([math.radians(5.0)]), np.zeros(len(slides), dtype=np.int64)
+    engagement = engagement_of(slides, decoded, (0.0, 0.0, 40.0, 20.0), (number, limit))
+    greatest, _ = engagement.greatest(number == 0)
+    assert math.radians(6.0) < greatest <= math.radians(7.05)
 
 
 @pytest.mark.parametrize(

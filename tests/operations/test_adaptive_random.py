@@ -1,0 +1,230 @@
+"""Random adaptive pockets against the slow oracle of engagement.
+
+Polygons with arcs, islands, necks, thin walls, stars, spirals, combs and slots, with random tools
+and limits of 5° to 90°.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from camtool.geometry.polylines import Polyline
+from camtool.planning.items import CutRun
+from camtool.planning.job import Entry
+from tests.operations.test_adaptive import adaptive
+from tests.oracles.contours import SQUARE, closed, comb, gear, spiral, star
+from tests.oracles.engagement import (
+    CHORD_SHARE,
+    Place,
+    Stay,
+    Stock,
+    chords_of,
+    engagements,
+    stays_of,
+)
+from tests.oracles.swept import area_of, gouges
+from tests.paths import moved, scaled
+from tests.planning.pocket_cases import cross, region_of, runs_of, shapes, work_of
+from tests.strategies import examples
+
+TOLERATED = 1.02
+THICK_SHARE = 4e-3
+"""As the documentation says; ..."""
+
+THICK_OF_STEP = 0.2
+"""... but no more than this part of the step beside a straight wall, which is less below 12°."""
+
+FINE_SHARE = 0.02
+"""Discs of this part of the tool's radius that fit in the tool centre region are cleared."""
+
+DEEP_SHARE = 0.01
+"""Uncut strips up to twice this part of the tool's radius wide are the scallop."""
+
+DOWN_RAD = 0.02
+"""Where the tool comes down without a helix, less than this part of its disc is stock."""
+
+
+class Case(NamedTuple):
+    """A pocket, its tool and its limit."""
+
+    paths: list[Polyline]
+    radius_mm: float
+    limit: float
+
+
+@st.composite
+def necks(draw: st.DrawFn) -> list[Polyline]:
+    """Two chambers and a neck between them, about as wide as a tool of 2 mm."""
+    wide = 2.0 * draw(st.sampled_from([0.99, 1.05, 1.2, 1.6]))
+    long = draw(st.floats(0.2, 6.0))
+    sizes = [draw(st.floats(3.6, 7.0)) for _ in range(4)]
+    a, b, c, d = sizes
+    y = draw(st.floats(0.1, min(b, d) - wide - 0.1))
+    return [
+        closed(
+            *((0, 0), (a, 0), (a, y), (a + long, y), (a + long, 0), (a + long + c, 0)),
+            *((a + long + c, d), (a + long, d), (a + long, y + wide), (a, y + wide), (a, b)),
+            (0, b),
+        )
+    ]
+
+
+@st.composite
+def near_islands(draw: st.DrawFn) -> list[Polyline]:
+    """A square with a square island that leaves about the width of a tool of 2 mm to a wall, or to
+    a second island."""
+    gap = 2.0 * draw(st.sampled_from([0.9, 0.99, 1.05, 1.1, 1.5]))
+    size = draw(st.floats(0.5, 3.0))
+    outer = scaled(closed((0, 0), (1, 0), (1, 1), (0, 1)), 12.0)
+    island = scaled(closed((0, 0), (1, 0), (1, 1), (0, 1)), size)
+    paths = [outer, moved(island, gap, draw(st.floats(2.0, 6.0)))]
+    if draw(st.booleans()):
+        paths.append(moved(island, gap + size + gap, paths[1].vertices[0, 1]))
+    return paths
+
+
+@st.composite
+def cases(draw: st.DrawFn, strokes: float) -> Case:
+    """A pocket whose strokes are about so many tool radii long."""
+    kind = draw(st.sampled_from(["any", "any", "star", "gear", "spiral", "comb", "slot"]))
+    fitting = st.floats(0.15, 0.97)
+    if kind == "any":
+        paths = draw(shapes())
+        assume(not cross(paths))
+    elif kind == "star":
+        paths = [star(draw(st.integers(3, 9)), draw(st.floats(3.0, 9.0)), 10.0)]
+    elif kind == "gear":
+        teeth = draw(st.integers(3, 12))
+        paths = [gear(teeth, draw(st.floats(4.0, 9.0)), 10.0), scaled(gear(teeth, 6, 10), 0.2)]
+    elif kind == "spiral":
+        paths = [spiral(draw(st.integers(1, 2)))]
+    elif kind == "comb":
+        paths = [comb(draw(st.integers(2, 4)))]
+    else:
+        long, bend = draw(st.floats(1.0, 20.0)), draw(st.sampled_from([0.0, 0.2, 1.0]))
+        paths = [closed((0, 0), (long, 0, bend), (long, 2), (0, 2, bend))]
+        fitting = st.sampled_from([0.5, 0.9, 0.97, 0.985, 0.999, 0.9999])
+    return draw(with_tool(paths, fitting, strokes))
+
+
+@st.composite
+def narrow_cases(draw: st.DrawFn) -> Case:
+    """A pocket with a place about as wide as the tool."""
+    paths = draw(st.one_of(necks(), near_islands()))
+    limit = math.radians(draw(st.floats(35.0, 90.0)))
+    return Case(paths, 1.0, limit)
+
+
+@st.composite
+def with_tool(
+    draw: st.DrawFn, paths: list[Polyline], fitting: st.SearchStrategy[float], strokes: float
+) -> Case:
+    """The paths with a tool and a limit: `fitting`, parts of the widest disc that fits."""
+    area = area_of(region_of(paths))
+    most = shapely.maximum_inscribed_circle(area).length
+    radius = most * draw(fitting)
+    centres = shapely.buffer(area, -radius).area
+    step = centres / (strokes * radius**2)
+    assume(step < 0.9)
+    least = max(math.radians(5.0), math.acos(1.0 - step))
+    return Case(paths, radius, draw(st.floats(least, 0.5 * math.pi)))
+
+
+def too_high(
+    case: Case, stock: Stock, runs: list[CutRun], every: float, phase: float
+) -> list[str]:
+    """Return the places where the engagement is above its limit; and those where the tool comes
+    down into stock, but for helices."""
+    radius = case.radius_mm
+    lines = [chords_of(run.vertices, CHORD_SHARE * radius) for run in runs]
+    stays = stays_of(lines, -1.0)
+    is_helix = [len(stay.down) > 0 and stay.down[0, 2] == 0.0 for stay in stays]
+    words = []
+    for place in engagements(stock, stays, every * radius, phase):
+        if is_helix[place.stay] and place.travelled_mm <= math.tau * radius:
+            continue
+        limit = DOWN_RAD if math.isnan(place.heading) else TOLERATED * case.limit
+        if place.angle > limit:
+            words.append(_words(place, case.limit))
+    return words
+
+
+def _words(place: Place, limit: float) -> str:
+    what = "comes down into stock of" if math.isnan(place.heading) else "is engaged by"
+    angle, most = math.degrees(place.angle), math.degrees(limit)
+    return f"X{place.x:.4f} Y{place.y:.4f} (stay {place.stay}): {what} {angle:.2f}° of {most:.2f}°"
+
+
+def uncut(case: Case, stock: Stock) -> list[str]:
+    """Return the places that stay uncut beyond the scallop."""
+    radius, fine = case.radius_mm, FINE_SHARE * case.radius_mm
+    area = area_of(region_of(case.paths))
+    centres = shapely.buffer(area, -radius - fine, quad_segs=200)
+    reached = shapely.buffer(centres, fine + radius, quad_segs=200)
+    deep = shapely.buffer(stock.remaining(reached), -DEEP_SHARE * radius)
+    return [
+        f"{part.area:.3g} mm² about {shapely.get_coordinates(part.centroid)[0].round(4).tolist()}"
+        for part in shapely.get_parts(deep)
+        if not part.is_empty
+    ]
+
+
+def faults(case: Case, every: float, phase: float) -> list[str]:
+    """Return the faults of an adaptive pocket, looked at at places `every` tool radii apart."""
+    return faults_of(adaptive(case.paths, 2.0 * case.radius_mm, case.limit), case, every, phase)
+
+
+def faults_of(runs: list[CutRun], case: Case, every: float, phase: float) -> list[str]:
+    step = 1.0 - math.cos(case.limit)
+    stock = Stock(case.radius_mm, case.radius_mm * min(THICK_SHARE, THICK_OF_STEP * step))
+    return [
+        *gouges(runs, region_of(case.paths), case.radius_mm),
+        *too_high(case, stock, runs, every, phase),
+        *uncut(case, stock),
+    ]
+
+
+@examples(3, nightly=40)
+@given(cases(40.0), st.floats(0.0, 1.0))
+def test_random_pockets_are_cleared_within_their_limit(case: Case, phase: float) -> None:
+    assert faults(case, 0.3, phase) == []
+
+
+@pytest.mark.slow
+@examples(60, nightly=1_000)
+@given(st.one_of(cases(250.0), narrow_cases()), st.floats(0.0, 1.0))
+def test_many_random_pockets_are_cleared_within_their_limit(case: Case, phase: float) -> None:
+    assert faults(case, 0.15, phase) == []
+
+
+def test_rings_are_seen_to_exceed_a_limit_and_to_slot() -> None:
+    """The oracle can complain: rings cut with half of the tool in the first one."""
+    case = Case([SQUARE], 1.5, math.radians(60.0))
+    runs = runs_of(work_of(case.paths, 3.0, entry=Entry("helix", angle_rad=math.radians(5.0))))
+    complaints = faults_of(runs, case, 0.2, 0.5)
+    assert any("is engaged by" in words for words in complaints)
+    missing = faults_of(runs[:1][:0], case, 0.2, 0.5)
+    assert any("mm² about" in words for words in missing)
+
+
+@pytest.mark.parametrize("degrees", [5.0, 20.0, 45.0, 90.0, 120.0])
+def test_the_oracle_finds_the_angle_of_a_straight_cut(degrees: float) -> None:
+    """A cut of the width s beside a slot is engaged by acos(1 − s/r); chips thinner than `thick`
+    do not count, so there it is acos(1 − (s − thick)/r)."""
+    step = 1.0 - math.cos(math.radians(degrees))
+    none = np.empty((0, 3))
+    stays = [Stay(np.array([[0.0, y], [20.0, y]]), none) for y in (0.0, step)]
+    for thick in (0.0, 0.2 * step):
+        places = list(engagements(Stock(1.0, thick), stays, 1.7, 0.9))
+        first = [place.angle for place in places if place.stay == 0 and place.travelled_mm > 0.0]
+        assert first == pytest.approx([math.pi] * len(first), abs=2e-3)
+        beside = [place.angle for place in places if place.stay == 1 and place.travelled_mm > 1.0]
+        angle = math.acos(1.0 - step + thick)
+        assert beside == pytest.approx([angle] * len(beside), abs=3e-3)
