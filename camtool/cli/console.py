@@ -13,7 +13,7 @@ import click
 
 from camtool.cli.home import BAUD
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import MachineFlags, talk_options
+from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 
 if TYPE_CHECKING:
     from camtool.cli.wishes import UserRequests
@@ -43,7 +43,7 @@ WAKES_S = 10.0
 """A boot loader takes no longer, s."""
 
 
-@click.command(short_help="Type to a controller.")
+@click.command(cls=SectionedCommand, short_help="Type to a controller.")
 @click.argument("target", metavar="TARGET")
 @click.argument("port", metavar="PORT")
 @click.option("--machine", metavar="NAME", help="Your own machine, by name or TOML file.")

@@ -9,7 +9,7 @@ import click
 
 from camtool.cli.files import write_all
 from camtool.cli.messages import say
-from camtool.cli.options import talk_options
+from camtool.cli.options import SectionedCommand, talk_options
 from camtool.errors import OptionError
 from camtool.pictures.drawing import drawing_page
 from camtool.units import parse_length
@@ -30,7 +30,7 @@ def _length(text: str, name: str, low: float, high: float) -> float:
     return length
 
 
-@click.command(short_help="A page to draw a figure on.")
+@click.command(cls=SectionedCommand, short_help="A page to draw a figure on.")
 @click.option(
     "-o",
     "--output",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.messages import say
-from camtool.cli.options import MachineFlags, machine_options, talk_options
+from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 from camtool.errors import MachineError, OptionError
 from camtool.target.wire import Conversation, Place, WireState, place_words
 from camtool.units import parse_feed, parse_length
@@ -22,7 +22,7 @@ UNLOCK = click.option("--unlock", is_flag=True, help="Unlock a controller that i
 BAUD = click.option("--baud", type=click.IntRange(min=1), help="Rate, where not its own.")
 
 
-@click.command(short_help="Home a machine.")
+@click.command(cls=SectionedCommand, short_help="Home a machine.")
 @machine_options
 @PORT
 @BAUD

@@ -14,7 +14,7 @@ import click
 
 from camtool.cli.files import STDOUT, check_new, check_places, display_name, read_bytes, write_all
 from camtool.cli.messages import say
-from camtool.cli.options import decorate, talk_options
+from camtool.cli.options import SectionedCommand, decorate, talk_options
 from camtool.cli.settings import asked_settings
 from camtool.errors import MachineError, OptionError
 from camtool.project import FILE, MACHINES, NAME, names_machine, text_naming_machine, user_folder
@@ -123,7 +123,7 @@ def _axis_flags(command: Callable[..., None]) -> Callable[..., None]:
     return decorate(command, options)
 
 
-@click.command(short_help="A machine file of your own.")
+@click.command(cls=SectionedCommand, short_help="A machine file of your own.")
 @click.argument("name", required=False)
 @click.option("--target", "-t", metavar="NAME", help="The controller; see camtool targets.")
 @click.option(

@@ -5,13 +5,15 @@ from __future__ import annotations
 import click
 
 from camtool.cli.home import BAUD, PORT, UNLOCK, act, axes_of
-from camtool.cli.options import MachineFlags, machine_options, talk_options
+from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 from camtool.errors import OptionError
 from camtool.target.wire import Place
 
 
 @click.command(
-    short_help="Move a machine by so much.", context_settings={"ignore_unknown_options": True}
+    cls=SectionedCommand,
+    short_help="Move a machine by so much.",
+    context_settings={"ignore_unknown_options": True},
 )
 @click.argument("axes", nargs=-1, required=True, metavar="X1.5 Y-2mm F200")
 @machine_options

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
@@ -67,7 +68,19 @@ class SectionOption(click.Option):
 
 
 class SectionedCommand(click.Command):
-    """A command whose help shows the options by section, in the order of the first of each."""
+    """A command whose help shows the options by section, in the order of the first of each. An
+    option with a value is given once, unless it collects several."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the arguments; refuse an option that is given twice, of which click keeps the
+        last."""
+        order = self.make_parser(ctx).parse_args(list(args))[2]
+        for param, count in Counter(order).items():
+            several = param.multiple or not isinstance(param, click.Option) or param.is_flag
+            if count > 1 and not several and not ctx.resilient_parsing:
+                reason = f"{max(param.opts, key=len)} is given {count} times, but takes one value"
+                raise click.UsageError(reason, ctx)
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options into the help."""

@@ -13,13 +13,19 @@ import click
 
 from camtool.cli.home import BAUD
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import MachineFlags, length, machine_options, talk_options
+from camtool.cli.options import (
+    MachineFlags,
+    SectionedCommand,
+    length,
+    machine_options,
+    talk_options,
+)
 
 if TYPE_CHECKING:
     from camtool.sending.twin import PseudoTerminal
 
 
-@click.command(short_help="A page that moves the machine.")
+@click.command(cls=SectionedCommand, short_help="A page that moves the machine.")
 @click.argument("program", metavar="[PROGRAM]", required=False)
 @machine_options
 @click.option("--port", metavar="PORT", help="Such as /dev/ttyUSB0  [a virtual machine]")

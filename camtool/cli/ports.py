@@ -10,7 +10,7 @@ import click
 import msgspec
 
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import talk_options
+from camtool.cli.options import SectionedCommand, talk_options
 from camtool.errors import InputError, OptionError
 from camtool.plain import one_line
 from camtool.sending.asking import Answer, ask, questions
@@ -19,7 +19,7 @@ from camtool.target.registry import each_target, find_target, own_names
 from camtool.target.wire import Wire
 
 
-@click.command(short_help="List the serial ports.")
+@click.command(cls=SectionedCommand, short_help="List the serial ports.")
 @click.argument("names", nargs=-1, metavar="[PORT...]")
 @click.option("--ask", is_flag=True, help="Ask what stands behind each; nothing moves by it.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, on stdout.")

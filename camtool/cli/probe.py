@@ -16,7 +16,14 @@ from camtool.cli.files import display_name, read_bytes, refuse_same, write_all
 from camtool.cli.home import BAUD, PORT, UNLOCK, carried
 from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import MachineFlags, feed, length, machine_options, talk_options
+from camtool.cli.options import (
+    MachineFlags,
+    SectionedCommand,
+    feed,
+    length,
+    machine_options,
+    talk_options,
+)
 from camtool.errors import OptionError, OutputError
 from camtool.geometry.polylines import Segments
 from camtool.importers.read import read_drawing
@@ -43,7 +50,7 @@ JOURNAL = click.option(
 )
 
 
-@click.command(short_help="Measure the top of the blank.")
+@click.command(cls=SectionedCommand, short_help="Measure the top of the blank.")
 @click.argument("program", metavar="PROGRAM")
 @machine_options
 @PORT

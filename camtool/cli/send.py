@@ -17,7 +17,7 @@ from camtool.cli.files import display_name, read_bytes, refuse_same, write_all
 from camtool.cli.home import UNLOCK
 from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import say, say_findings, show_facts, show_text
-from camtool.cli.options import MachineFlags, machine_options, talk_options
+from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
 from camtool.sending.journal import read_journal
@@ -38,7 +38,7 @@ NAME_WIDTH = 11
 """Columns before the words of a dry run."""
 
 
-@click.command(short_help="Send a program to its machine.")
+@click.command(cls=SectionedCommand, short_help="Send a program to its machine.")
 @click.argument("program", metavar="PROGRAM")
 @machine_options
 @click.option("--port", metavar="PORT", help="Such as /dev/ttyUSB0, COM3, socket://host:5007.")

@@ -10,7 +10,7 @@ import click
 from camtool.cli.files import display_name, read_bytes, refuse_same, write_all
 from camtool.cli.home import BAUD, carried
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import MachineFlags, machine_options, talk_options
+from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 from camtool.cli.probe import asked_to_begin
 from camtool.errors import InputError, MachineError, OptionError
 from camtool.plain import one_line
@@ -21,7 +21,9 @@ from camtool.target.wire import NoWire
 WORDS = ("read", "compare", "backup", "restore")
 
 
-@click.command(short_help="A controller's own settings: read, compare, restore.")
+@click.command(
+    cls=SectionedCommand, short_help="A controller's own settings: read, compare, restore."
+)
 @click.argument("what", type=click.Choice(WORDS), metavar="WHAT")
 @click.argument("file", required=False, metavar="[FILE]")
 @machine_options

@@ -13,7 +13,7 @@ import click
 
 from camtool.cli.files import STDOUT, check_new, check_places, read_bytes, write_all
 from camtool.cli.messages import in_colour, say, show_text
-from camtool.cli.options import MachineFlags, talk_options
+from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.errors import CamtoolError, OptionError, ProgramError
 from camtool.plain import one_line, to_json
 from camtool.project import project_of
@@ -63,7 +63,7 @@ def targets(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -
         _list(as_json)
 
 
-@click.command(short_help="Everything about one machine.")
+@click.command(cls=SectionedCommand, short_help="Everything about one machine.")
 @click.option("--machine", metavar="NAME", help="Your own machine, by its name or TOML file.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change one value.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
@@ -81,7 +81,7 @@ def show(
     _show(str(context.info_name), machine, settings, as_json)
 
 
-@targets.command(short_help="Begin a machine file.")
+@targets.command(cls=SectionedCommand, short_help="Begin a machine file.")
 @click.argument("name")
 @click.option("--extends", metavar="TARGET", help="The machine that it is like.")
 @click.option(

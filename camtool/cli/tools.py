@@ -10,7 +10,7 @@ import click
 
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import talk_options
+from camtool.cli.options import SectionedCommand, talk_options
 from camtool.errors import OptionError
 from camtool.jobs.keys import PRESET, TOOL
 from camtool.jobs.tools import read_library, tool_of
@@ -69,7 +69,7 @@ def tools(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> 
         say("no tools yet; camtool tools new begins a library of them", quiet=quiet)
 
 
-@click.command(short_help="Everything about one tool.")
+@click.command(cls=SectionedCommand, short_help="Everything about one tool.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
 @talk_options
 @click.pass_context
@@ -90,7 +90,7 @@ def show(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> N
     say(str(file), quiet=quiet)
 
 
-@tools.command(short_help="Begin a library of tools.")
+@tools.command(cls=SectionedCommand, short_help="Begin a library of tools.")
 @click.option("--project", is_flag=True, help="Keep it here, for this folder alone.")
 @click.option("-o", "--output", metavar="FILE", help="Only write this file; - is stdout.")
 @talk_options

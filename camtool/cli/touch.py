@@ -10,7 +10,14 @@ import click
 
 from camtool.cli.home import BAUD, PORT, UNLOCK, axes_of, carried
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import MachineFlags, feed, length, machine_options, talk_options
+from camtool.cli.options import (
+    MachineFlags,
+    SectionedCommand,
+    feed,
+    length,
+    machine_options,
+    talk_options,
+)
 from camtool.cli.probe import JOURNAL, asked_to_begin, check_sizes, journaled
 from camtool.errors import OptionError
 from camtool.sending.prepare import manner_of, wire_of
@@ -43,7 +50,7 @@ LABELS = {
 """Words for what is measured."""
 
 
-@click.command(short_help="Touch off an edge, a corner, a bore or a plate.")
+@click.command(cls=SectionedCommand, short_help="Touch off an edge, a corner, a bore or a plate.")
 @click.argument("what", type=click.Choice(list(AXES_OF)), metavar="WHAT")
 @click.argument("axes", nargs=-1, metavar="[X0 Y0 Z0]")
 @machine_options

@@ -11,7 +11,7 @@ import click
 
 from camtool.cli.files import check_new
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import MachineFlags, talk_options
+from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.errors import OptionError, OutputError
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def parse_address(text: str) -> tuple[str, int]:
     return host.strip("[]") or LOOPBACK, int(port)
 
 
-@click.command(short_help="A virtual machine at a port.")
+@click.command(cls=SectionedCommand, short_help="A virtual machine at a port.")
 @click.argument("target", metavar="TARGET")
 @click.option("--machine", metavar="NAME", help="Your own machine, by name or TOML file.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Of the machine.")

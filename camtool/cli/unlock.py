@@ -5,10 +5,10 @@ from __future__ import annotations
 import click
 
 from camtool.cli.home import BAUD, PORT, act
-from camtool.cli.options import MachineFlags, machine_options, talk_options
+from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
 
 
-@click.command(short_help="Unlock a controller.")
+@click.command(cls=SectionedCommand, short_help="Unlock a controller.")
 @machine_options
 @PORT
 @BAUD

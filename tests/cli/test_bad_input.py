@@ -189,3 +189,15 @@ def test_what_would_be_too_long_is_refused_before_it_is_written(
             in done.stderr.decode()
         )
         assert (tmp_path / "a.gc").read_text() == "old"
+
+
+@pytest.mark.parametrize("command", ["post", "touch"])
+def test_an_option_given_twice_is_refused(camtool: Run, command: str) -> None:
+    done = camtool(command, "a.csv", "--feed", "100", "--feed", "200")
+    assert done.returncode == 2
+    assert b"--feed is given 2 times, but takes one value" in done.stderr
+
+
+def test_options_that_collect_and_switches_may_stand_twice(camtool: Run, samples: Path) -> None:
+    layers = ("--layer", "CUT", "--layer", "ENGRAVE")
+    assert camtool("check", samples / "logo.dxf", *layers, "-q", "-q").returncode == 0
