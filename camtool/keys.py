@@ -76,9 +76,9 @@ class Key:
     only: tuple[str, tuple[str, ...]] | None = None
     default: Any = None
 
-    def read(self, given: Given) -> Any:
+    def read(self, raw: Given) -> Any:
         """The field's value."""
-        return self.value.read(given)
+        return self.value.read(raw)
 
 
 @dataclass(frozen=True)
@@ -114,13 +114,13 @@ def table_of(values: object, known_keys: Iterable[str], table_place: str, file: 
             where=table_place,
             mend=f"known keys: {_listed(known_keys)}",
         )
-    given = {}
+    entries = {}
     for name, value in values.items():
         place = f"{table_place}, key {name}" if table_place else f"key {name}"
-        given[name] = Given(value, place, file)
+        entries[name] = Given(value, place, file)
         if name not in known_keys:
-            raise given[name].refused("unknown key", meant(name, known_keys))
-    return Table(given, table_place, file)
+            raise entries[name].refused("unknown key", meant(name, known_keys))
+    return Table(entries, table_place, file)
 
 
 def record_of(
@@ -134,15 +134,15 @@ def record_of(
     `base`: fields without which the record cannot be made.
     """
     fields: dict[str, Any] = {}
-    for name, given in table.given.items():
+    for name, raw in table.given.items():
         key = keys[name]
-        fields[key.field] = key.read(given)
+        fields[key.field] = key.read(raw)
         try:
             make(**{**(base or {}), key.field: fields[key.field]})
         except OptionError as error:
             # An error with a place of its own says what contradicts what: that is for the whole.
             if error.where is None:
-                raise given.refused(error.message, error.mend) from error
+                raise raw.refused(error.message, error.mend) from error
     try:
         return make(**fields)
     except OptionError as error:
@@ -169,10 +169,10 @@ def why_idle(keys: Mapping[str, Key], name: str, record: object) -> OptionError 
 
 def refuse_idle(keys: Mapping[str, Key], table: Table, record: object) -> None:
     """Refuse a key that has no effect in the record made of its table."""
-    for name, given in table.given.items():
+    for name, raw in table.given.items():
         error = why_idle(keys, name, record)
         if error is not None:
-            raise given.refused(error.message, error.mend)
+            raise raw.refused(error.message, error.mend)
 
 
 def meant(name: str, known_names: Iterable[str]) -> str:
@@ -191,9 +191,9 @@ def _listed(names: Iterable[str]) -> str:
 def plain(convert: Callable[[object], Any]) -> Callable[[Given], Any]:
     """A reader that converts the bare value; errors get the place of the value."""
 
-    def read(given: Given) -> Any:
-        with given.blamed():
-            return convert(given.value)
+    def read(raw: Given) -> Any:
+        with raw.blamed():
+            return convert(raw.value)
 
     return read
 

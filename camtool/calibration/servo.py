@@ -230,11 +230,11 @@ def identify(responses: Sequence[MeasuredResponse], tick_s: float) -> Identifica
         best, jacobian, residuals = _fit(responses, tick_s, start)
     freedom = len(residuals) - len(best)
     covariance = np.linalg.pinv(jacobian.T @ jacobian) * float(residuals @ residuals) / freedom
-    known = dict(zip(PARAMETERS, np.sqrt(np.diag(covariance)).tolist(), strict=False))
+    deviations = dict(zip(PARAMETERS, np.sqrt(np.diag(covariance)).tolist(), strict=False))
     gain, tau, dead, *rest = best.tolist()
     return Identification(
         motor=MotorModel(gain, tau, rest[0] if rest else 0.0, dead),
-        uncertainty={name: known.get(name) for name in PARAMETERS},
+        uncertainty={name: deviations.get(name) for name in PARAMETERS},
         residual=float(np.sqrt(np.mean(residuals**2))),
         samples=len(residuals),
         notes=tuple(notes),
@@ -400,8 +400,8 @@ def simulate_step(
         drive = float(math.floor(drive)) if loop.is_whole else drive
         drives[tick] = drive
         begin = place
-        for since, until, held in _held_drives(drives, tick, motor.dead_time_s, loop.tick_s):
-            for start, end, first, aim in _pieces(motor, held, since, until, at):
+        for since, until, level in _held_drives(drives, tick, motor.dead_time_s, loop.tick_s):
+            for start, end, first, aim in _pieces(motor, level, since, until, at):
                 duration = end - start
                 fade = -math.expm1(-duration / motor.time_constant_s)
                 place += (

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from camtool.calibration import servo as bench
+from camtool.calibration.servo import respond, simulate_step
 from camtool.cli.files import (
     STDOUT,
     check_new,
@@ -85,8 +87,6 @@ def identify(
 
     Two drives, or a motor that coasts to rest at the end, determine the friction.
     """
-    from camtool.calibration import servo as bench
-
     check_places([*responses, *machine.files()], [output, report])
     if output is not None and output != STDOUT:
         check_new(output)
@@ -161,8 +161,6 @@ def design(
 ) -> None:
     """Compute Ki, Kp and the digital Kid, Kpd for the motors of the machine, and what the rounding
     of stored gains and the sampling make of settling time, damping and overshoot."""
-    from camtool.calibration import servo as bench
-
     check_places(machine.files(), [output, report])
     if output is not None and output != STDOUT:
         check_new(output)
@@ -286,8 +284,6 @@ def _answer(
     """Return speed and reference (rpm) and drive (percent) of an axis, tick by tick, that answers
     a step of its drive (percent) or of its speed (rpm)."""
     import numpy as np
-
-    from camtool.calibration.servo import respond, simulate_step
 
     index = AXES.index(axis)
     motor, ticks = loop.motors[index], round(STEP_S / loop.tick_s)
@@ -458,8 +454,8 @@ def _machine_file(
     return "\n".join([head, "", *toml_lines({**table, "controller": controller}), ""]).encode()
 
 
-def _motor_lines(axis: str, found: Identification, before: MotorModel) -> Iterator[str]:
-    motor = found.motor
+def _motor_lines(axis: str, result: Identification, before: MotorModel) -> Iterator[str]:
+    motor = result.motor
     rows = [
         ("gain", before.gain, motor.gain, "counts in a tick per %", "gain"),
         ("time constant", before.time_constant_s, motor.time_constant_s, "s", "time_constant_s"),
@@ -468,24 +464,24 @@ def _motor_lines(axis: str, found: Identification, before: MotorModel) -> Iterat
     ]
     yield f"axis {axis}          before  identified  ± standard uncertainty"
     for name, old, new, unit, key in rows:
-        sigma = found.uncertainty[key]
+        sigma = result.uncertainty[key]
         sigma_words = "not determined" if sigma is None else f"± {sigma:.2g} {unit}"
         yield f"{name:<14}{old:>9.4g}{new:>12.5g}  {sigma_words}"
-    yield f"{found.samples} samples, residuals {found.residual:.3g} rms"
+    yield f"{result.samples} samples, residuals {result.residual:.3g} rms"
 
 
-def _motor_data(axis: str, found: Identification) -> dict[str, Any]:
-    motor = found.motor
+def _motor_data(axis: str, result: Identification) -> dict[str, Any]:
+    motor = result.motor
     return {
         "axis": axis,
         "gain": motor.gain,
         "time_constant_s": motor.time_constant_s,
         "dead_time_s": motor.dead_time_s,
         "friction_percent": motor.friction_percent,
-        "uncertainty": found.uncertainty,
-        "residual_rms": found.residual,
-        "samples": found.samples,
-        "notes": list(found.notes),
+        "uncertainty": result.uncertainty,
+        "residual_rms": result.residual,
+        "samples": result.samples,
+        "notes": list(result.notes),
     }
 
 

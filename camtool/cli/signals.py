@@ -96,26 +96,26 @@ def signals(
 
     target = machine.load()
     progress().begin("reading the program")
-    found = Signals.of(read_bytes(program), target, display_name(PurePath(program).name))
+    record = Signals.of(read_bytes(program), target, display_name(PurePath(program).name))
     progress().begin("running the controller")
     if outputs:
         write_all(
-            {name: found.content(name, start or 0.0, span, names, options) for name in outputs}
+            {name: record.content(name, start or 0.0, span, names, options) for name in outputs}
         )
         say(f"written: {', '.join(outputs)}", quiet=quiet)
     elif not quiet:
-        show_text(_text(found))
+        show_text(_text(record))
     if verbose:
-        for note in found.board.notes:
+        for note in record.board.notes:
             say(f"note: {note}", quiet=quiet)
     return 0
 
 
-def _text(found: Signals) -> str:
+def _text(record: Signals) -> str:
     """Return the counts of a whole run for people."""
-    counts = found.count()
+    counts = record.count()
     lines = []
-    for k, motor in enumerate(found.board.motors):
+    for k, motor in enumerate(record.board.motors):
         words = f"{motor.name}: {counts.steps[k]:,} steps"
         if counts.added[k]:
             words += f", {counts.added[k]:,} more at reversals"

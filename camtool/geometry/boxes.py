@@ -239,8 +239,8 @@ def nearest_pairs(
     octave = np.frexp(reach)[1]
     for each in np.unique(octave):
         rows = np.flatnonzero(octave == each)
-        point, move, apart = near.pairs(moves, places[rows], (float(reach[rows].max()), np.inf))
-        is_near = apart <= reach[rows[point]]
+        point, move, gap = near.pairs(moves, places[rows], (float(reach[rows].max()), np.inf))
+        is_near = gap <= reach[rows[point]]
         pairs.append(np.stack([rows[point[is_near]], move[is_near]]))
     point, move = np.concatenate(pairs, axis=1)
     return distance, point, move

@@ -127,9 +127,9 @@ def _presets(presets: Mapping[str, Table]) -> Values:
     return {material: _raw(each) for material, each in presets.items()}
 
 
-def _relative(given: Given, old_folder: Path, folder: Path) -> str:
+def _relative(raw: Given, old_folder: Path, folder: Path) -> str:
     """The name of a file from the new folder: a file names it from its own, a flag from here."""
-    named = old_folder / str(given.value) if given.file is not None else Path(str(given.value))
+    named = old_folder / str(raw.value) if raw.file is not None else Path(str(raw.value))
     return Path(os.path.relpath(named.absolute(), folder.absolute())).as_posix()
 
 

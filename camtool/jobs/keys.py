@@ -183,31 +183,31 @@ def places(value: object) -> tuple[tuple[float, float], ...]:
     return tuple(_pair(each, length, '["10mm", "5mm"]') for each in value)
 
 
-def kind(given: Given) -> str:
+def kind(raw: Given) -> str:
     """The name of an installed kind of operation."""
-    if given.value in broken_kinds():
-        with given.blamed():
-            kind_named(given.value)
-    name: str = word(tuple(installed_kinds()))(given)
+    if raw.value in broken_kinds():
+        with raw.blamed():
+            kind_named(raw.value)
+    name: str = word(tuple(installed_kinds()))(raw)
     return name
 
 
-def entry(given: Given) -> Entry:
+def entry(raw: Given) -> Entry:
     """A table, or "ramp", "ramp:3deg", "helix:3deg:1mm"."""
-    return _record(Entry, ENTRY, _parts(given, ENTRY, ("kind", "angle", "radius")))
+    return _record(Entry, ENTRY, _parts(raw, ENTRY, ("kind", "angle", "radius")))
 
 
-def lead(given: Given) -> Lead:
+def lead(raw: Given) -> Lead:
     """A table, or "none", "line:1mm", "arc:1mm"."""
-    return _record(Lead, LEAD, _parts(given, LEAD, ("kind", "length")))
+    return _record(Lead, LEAD, _parts(raw, LEAD, ("kind", "length")))
 
 
-def tabs(given: Given) -> Tabs:
+def tabs(raw: Given) -> Tabs:
     """A table, or how many ("4") or how far apart ("20mm"), then ":width:height"."""
-    value = given.value
+    value = raw.value
     is_count = type(value) is int or (isinstance(value, str) and _COUNT.match(value))
     first = "count" if is_count else "spacing"
-    table = _parts(given, TABS, (first, "width", "height"))
+    table = _parts(raw, TABS, (first, "width", "height"))
     base: dict[str, Any] = {"count": 1}
     if "spacing" in table.given:
         base = {"spacing_mm": 1.0}
@@ -222,31 +222,30 @@ def _record(make: Callable[..., _T], keys: Mapping[str, Key], table: Table) -> _
     return record
 
 
-def _part_of(given: Given, known_keys: Iterable[str]) -> Table:
+def _part_of(raw: Given, known_keys: Iterable[str]) -> Table:
     """A table that is the value of a key, such as `entry = {kind = "ramp"}`."""
     parts = {}
-    for name, value in given.value.items():
-        parts[name] = Given(value, f"{given.where}.{name}", given.file)
+    for name, value in raw.value.items():
+        parts[name] = Given(value, f"{raw.where}.{name}", raw.file)
         if name not in known_keys:
             raise parts[name].refused("unknown key", meant(name, known_keys))
-    return Table(parts, given.where, given.file)
+    return Table(parts, raw.where, raw.file)
 
 
-def _parts(given: Given, keys: Mapping[str, Key], names: Sequence[str]) -> Table:
+def _parts(raw: Given, keys: Mapping[str, Key], names: Sequence[str]) -> Table:
     """The keys of a table that is a value, or of a text "a:b:c" that gives `names` in order."""
-    if isinstance(given.value, dict):
-        return _part_of(given, keys)
-    with given.blamed():
-        texts = number_text(given.value).split(":")
+    if isinstance(raw.value, dict):
+        return _part_of(raw, keys)
+    with raw.blamed():
+        texts = number_text(raw.value).split(":")
         if len(texts) > len(names):
             raise OptionError(
-                f"{given.value!r} has too many parts", mend=f"write it like {':'.join(names)}"
+                f"{raw.value!r} has too many parts", mend=f"write it like {':'.join(names)}"
             )
     parts = {
-        name: Given(part, given.where, given.file)
-        for name, part in zip(names, texts, strict=False)
+        name: Given(part, raw.where, raw.file) for name, part in zip(names, texts, strict=False)
     }
-    return Table(parts, given.where, given.file)
+    return Table(parts, raw.where, raw.file)
 
 
 def _word_or_place(value: object, words: Sequence[str]) -> str | tuple[float, float]:

@@ -237,27 +237,27 @@ class Tools(Struct, frozen=True, dict=True):
                 "name a tool of a library (camtool tools), or leave the material out",
             )
 
-    def _chosen(self, given: Given) -> tuple[str, Described]:
+    def _chosen(self, raw: Given) -> tuple[str, Described]:
         """The tool that a name or a number says, and its name."""
-        value = given.value
+        value = raw.value
         if isinstance(value, str) and value in self.named:
             return value, self._completed(self.named[value])
         if isinstance(value, str) and _TOOL_NUMBER.fullmatch(value.strip()):
             value = int(value)
         if type(value) is int:
-            return self._numbered(value, given)
+            return self._numbered(value, raw)
         if not isinstance(value, str):
-            raise given.refused(f"{value!r} is no tool", "give its name in quotes, or its number")
+            raise raw.refused(f"{value!r} is no tool", "give its name in quotes, or its number")
         every_tool = self._every
         if value in every_tool:
             return value, self._completed(every_tool[value])
-        raise given.refused(
+        raise raw.refused(
             f"there is no tool {value!r}",
             guess(value, every_tool)
             + (f"known: {', '.join(every_tool)}" if every_tool else f"write [tools.{value}]"),
         )
 
-    def _numbered(self, number: int, given: Given) -> tuple[str, Described]:
+    def _numbered(self, number: int, raw: Given) -> tuple[str, Described]:
         for tools in (self.named, self._every):
             for name, described in tools.items():
                 if _number_of(described.keys) == number:
@@ -265,7 +265,7 @@ class Tools(Struct, frozen=True, dict=True):
             if number in self.table:
                 return self.table[number].remark, Described(self._of_table(number))
         numbers = [str(each) for each in self.table]
-        raise given.refused(
+        raise raw.refused(
             f"there is no tool {number}",
             f"{self.table_file} has: {', '.join(numbers) or 'none'}"
             if self.table_file

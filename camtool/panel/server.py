@@ -393,10 +393,10 @@ class PanelServer:
         """Do what a page wants, if it may."""
         session = self.session
         try:
-            wanted = _DECODER.decode(text)
-            if isinstance(wanted, StopRequest):
+            request = _DECODER.decode(text)
+            if isinstance(request, StopRequest):
                 session.stop()
-            elif isinstance(wanted, TakeRequest):
+            elif isinstance(request, TakeRequest):
                 if self._commander is not client:
                     session.release()
                 self._commander = client
@@ -404,53 +404,53 @@ class PanelServer:
             elif client is not self._commander:
                 session.tell("this page only watches: take the command first", bad=True)
             else:
-                self._do(wanted)
+                self._do(request)
         except msgspec.DecodeError as error:
             session.tell(f"a request that is none ({error})", bad=True)
         except CamtoolError as error:
             session.tell(str(error), bad=True)
 
-    def _do(self, wanted: Any) -> None:
+    def _do(self, request: Any) -> None:
         session = self.session
-        match wanted:
+        match request:
             case KeepRequest():
                 session.keep()
             case ReleaseRequest():
                 session.release()
             case JogRequest():
-                self._jog(wanted)
+                self._jog(request)
             case GoRequest():
-                axes = {axis: getattr(wanted, axis) for axis in AXES}
+                axes = {axis: getattr(request, axis) for axis in AXES}
                 places = {axis: place for axis, place in axes.items() if place is not None}
-                feed = self._feed(wanted.feed, AXES if wanted.machine else places)
-                if wanted.machine:
+                feed = self._feed(request.feed, AXES if request.machine else places)
+                if request.machine:
                     session.go_home(feed)
                 else:
                     session.go(places, feed)
             case TouchRequest():
-                session.touch(wanted.what, _cycle_of(wanted))
+                session.touch(request.what, _cycle_of(request))
             case LeaveRequest():
                 session.leave_stop()
             case LoadRequest():
-                self._work = asyncio.create_task(asyncio.to_thread(self._load, wanted.name))
+                self._work = asyncio.create_task(asyncio.to_thread(self._load, request.name))
             case ZeroRequest():
-                session.order("zero", {axis: 0.0 for axis in AXES if axis in wanted.axes})
+                session.order("zero", {axis: 0.0 for axis in AXES if axis in request.axes})
             case OrderRequest():
-                action: HandAction = wanted.action
+                action: HandAction = request.action
                 session.order(action, {})
             case LineRequest():
-                session.say(wanted.text)
+                session.say(request.text)
             case ChangeRequest():
-                session.override(wanted.name, wanted.percent)
+                session.override(request.name, request.percent)
             case HoldRequest():
                 session.request(Request.PAUSE)
             case GoOnRequest():
-                session.request(Request.STEP if wanted.single else Request.RESUME)
+                session.request(Request.STEP if request.single else Request.RESUME)
             case ConnectRequest():
                 session.reopen()
             case StartRequest():
                 # It may have to be judged again, and the page goes on meanwhile.
-                self._work = asyncio.create_task(asyncio.to_thread(self._start, wanted))
+                self._work = asyncio.create_task(asyncio.to_thread(self._start, request))
 
     def _programs(self) -> list[Path]:
         """List the programs of the folder."""
@@ -493,16 +493,16 @@ class PanelServer:
             raise OptionError("a jog needs a feed above 0", mend="give one")
         return feed
 
-    def _jog(self, wanted: JogRequest) -> None:
+    def _jog(self, request: JogRequest) -> None:
         """Jog, at no more than the axes can do."""
-        values = {axis: getattr(wanted, axis) for axis in AXES if getattr(wanted, axis)}
-        values["feed"] = self._feed(wanted.feed, values)
-        if wanted.held:
+        values = {axis: getattr(request, axis) for axis in AXES if getattr(request, axis)}
+        values["feed"] = self._feed(request.feed, values)
+        if request.held:
             self.session.hold(values)
         else:
             self.session.order("jog", values)
 
-    def _start(self, wanted: StartRequest) -> None:
+    def _start(self, request: StartRequest) -> None:
         """Send the program."""
         if self.program is None:
             self.session.tell("no program was given: camtool panel PROGRAM", bad=True)
@@ -512,12 +512,12 @@ class PanelServer:
             return
         try:
             one, options = self.program.prepared(
-                single=wanted.single,
-                first=wanted.first - 1,
-                resumes=wanted.resumes,
-                tool_at=wanted.tool_at,
-                more=wanted.more,
-                despite_errors=wanted.despite_errors,
+                single=request.single,
+                first=request.first - 1,
+                resumes=request.resumes,
+                tool_at=request.tool_at,
+                more=request.more,
+                despite_errors=request.despite_errors,
                 speed=self.session.speed,
             )
             self.session.run_program(one, options)
@@ -525,38 +525,44 @@ class PanelServer:
             self.session.tell(str(error), bad=True)
 
 
-def _cycle_of(wanted: TouchRequest) -> Callable[[Place], probing.Measured]:
+def _cycle_of(request: TouchRequest) -> Callable[[Place], probing.Measured]:
     """Return the cycle of touches; OptionError for numbers and directions that make none."""
-    sizes = wanted.reach, wanted.feed, wanted.along, wanted.thickness + 1.0, wanted.diameter + 1.0
-    pairs = re.findall(r"([xy])([+-])", wanted.towards)
+    sizes = (
+        request.reach,
+        request.feed,
+        request.along,
+        request.thickness + 1.0,
+        request.diameter + 1.0,
+    )
+    pairs = re.findall(r"([xy])([+-])", request.towards)
     axes: list[Any] = [axis for axis, _ in pairs]
     senses = [1 if sense == "+" else -1 for _, sense in pairs]
-    count = {"edge": 1, "skew": 1, "corner": 2}.get(wanted.what, 0)
+    count = {"edge": 1, "skew": 1, "corner": 2}.get(request.what, 0)
     if not all(0.0 < size < MAX_PROBE_MM for size in sizes):
         raise OptionError("a length or feed of the probe is out of range", mend="give it above 0")
     if count and (len(set(axes)), len(axes)) != (count, count):
         mend = "choose one of X and Y, or both for a corner"
-        raise OptionError(f"{wanted.towards!r} is no way towards a {wanted.what}", mend=mend)
+        raise OptionError(f"{request.towards!r} is no way towards a {request.what}", mend=mend)
     how = probing.Touch(
-        reach_mm=wanted.reach,
-        fast=wanted.feed,
-        slow=0.25 * wanted.feed,
-        radius_mm=0.5 * wanted.diameter,
-        sets_zero=wanted.what != "skew",
+        reach_mm=request.reach,
+        fast=request.feed,
+        slow=0.25 * request.feed,
+        radius_mm=0.5 * request.diameter,
+        sets_zero=request.what != "skew",
     )
 
     def measure(start: Place) -> probing.Measured:
-        match wanted.what:
+        match request.what:
             case "plate":
-                return probing.plate(start, how, wanted.thickness)
+                return probing.plate(start, how, request.thickness)
             case "bore":
                 return probing.bore(start, how)
             case "edge":
                 return probing.edge(start, axes[0], senses[0], how)
             case "skew":
-                return probing.skew(start, axes[0], senses[0], how, wanted.along)
+                return probing.skew(start, axes[0], senses[0], how, request.along)
         by_axis = dict(zip(axes, senses, strict=True))
-        return probing.corner(start, (by_axis["x"], by_axis["y"]), how, wanted.along)
+        return probing.corner(start, (by_axis["x"], by_axis["y"]), how, request.along)
 
     return measure
 

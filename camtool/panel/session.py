@@ -22,8 +22,8 @@ from camtool.errors import CamtoolError, MachineError
 from camtool.panel.program import BlockFacts, Course
 from camtool.sending.carry import SendOptions, carry_program, program_conversation
 from camtool.sending.drive import Driver, LineToController, Order, Request
-from camtool.sending.line import Port
-from camtool.sending.prepare import Consignment, manner_of, wire_of
+from camtool.sending.line import Port, manner_of, wire_of
+from camtool.sending.prepare import Consignment
 from camtool.target.wire import (
     LATE_S,
     NEAR_MM,
@@ -486,8 +486,8 @@ class Session:
     def _wish(self) -> Request | Order | None:
         if self._closing.is_set() and self.state.state != WireState.STOPPING.value:
             return _close
-        held = self._held_until
-        if held is not None and time.monotonic() > held:
+        release_s = self._held_until
+        if release_s is not None and time.monotonic() > release_s:
             self.release()
             self.tell("let go: the page has not confirmed the key")
         with suppress(queue.Empty):

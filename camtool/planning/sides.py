@@ -352,9 +352,9 @@ def regions_of(nesting: Nesting, rim: Bools) -> Iterator[Bools]:
     """Yield masks of closed contours that bound one region together: those on whose waste side the
     nesting agrees with `rim` (whether each is the edge of a part), those on which it says the
     contrary because of contours that were not chosen, and what is left by depth and side."""
-    left = np.ones(len(rim), dtype=np.bool_)
+    is_open = np.ones(len(rim), dtype=np.bool_)
     for even in (True, False):
-        region = left.copy()
+        region = is_open.copy()
         while region.any():
             rows = np.flatnonzero(region)
             depth = nesting.among(rows).levels.depth
@@ -363,11 +363,11 @@ def regions_of(nesting: Nesting, rim: Bools) -> Iterator[Bools]:
                 yield region
                 break
             region[rows[wrong]] = False
-        left &= ~region
+        is_open &= ~region
     depth = nesting.levels.depth
-    for level in np.unique(depth[left]).tolist():
+    for level in np.unique(depth[is_open]).tolist():
         for is_rim in (True, False):
-            region = left & (depth == level) & (rim == is_rim)
+            region = is_open & (depth == level) & (rim == is_rim)
             if region.any():
                 yield region
 

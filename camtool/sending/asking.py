@@ -35,9 +35,9 @@ def questions(port: str, wires: Iterable[Wire]) -> Iterator[tuple[Wire, Port]]:
     """Yield the wires that may be asked at a port, and the port with their settings: of a serial
     port those whose rate is known, of a socket all."""
     for wire in wires:
-        asked = Port(port, wire.baud, wire.frame)
+        settings = Port(port, wire.baud, wire.frame)
         if wire.question and (wire.baud is not None or "://" in port):
-            yield wire, asked
+            yield wire, settings
 
 
 def ask(port: Port, wire: Wire) -> Answer:

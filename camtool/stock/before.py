@@ -52,9 +52,9 @@ class SetupCut(Struct, frozen=True, eq=False):
         """Return the heights (NY, NX) mm that the cuts leave in the cells of a map, as they are
         seen from its own face."""
         start, end = map(self.turn.back.points, (self.moves.start, self.moves.end))
-        found = replace(drawn, heights=np.zeros_like(drawn.heights), owner=None)
-        add_moves(found, replace(self.moves, start=start, end=end))
-        return found.heights
+        cut = replace(drawn, heights=np.zeros_like(drawn.heights), owner=None)
+        add_moves(cut, replace(self.moves, start=start, end=end))
+        return cut.heights
 
 
 class StockBefore(Struct, frozen=True, eq=False):
@@ -111,10 +111,10 @@ class StockBefore(Struct, frozen=True, eq=False):
         heights = np.where(drawn.heights <= -self.thickness_mm + THROUGH_SLACK_MM, -np.inf, 0.0)
         for each in self.below:
             heights = np.minimum(heights, each.heights_in(drawn))
-        left, bottom = drawn.corner_mm
+        low_x, bottom = drawn.corner_mm
         top = bottom + len(heights) * drawn.cell_mm
         heights = heights.clip(-self.thickness_mm)[::-1].astype(np.float32)
-        return replace(drawn, heights=heights, corner_mm=(left, -top), owner=None)
+        return replace(drawn, heights=heights, corner_mm=(low_x, -top), owner=None)
 
     def deepest_below(self, point: Floats) -> str:
         """Return the name of the set-up that has cut deepest from below over a point (2,)."""

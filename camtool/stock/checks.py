@@ -530,14 +530,17 @@ class _Checks:
         if stock is None or not self.before.below:
             return
         box = stock.box_mm or cut_box(self.moves)
-        least = least_remaining(self.tree, self.before, box)
-        if not math.isfinite(least.low):
+        thickness = least_remaining(self.tree, self.before, box)
+        if not math.isfinite(thickness.low):
             return
-        place, other = place_words(least.at_mm), self.before.deepest_below(np.array(least.at_mm))
-        if least.low > MEETING_MM:
-            yield FACES_MEET(where=place, measured=least.low, other=other)
+        place, other = (
+            place_words(thickness.at_mm),
+            self.before.deepest_below(np.array(thickness.at_mm)),
+        )
+        if thickness.low > MEETING_MM:
+            yield FACES_MEET(where=place, measured=thickness.low, other=other)
         else:
-            yield FLOOR_LEFT(where=place, measured=max(-least.low, 0.0), other=other)
+            yield FLOOR_LEFT(where=place, measured=max(-thickness.low, 0.0), other=other)
 
     def _is_part(self, piece: LoosePiece) -> bool:
         """True if more than half of a piece has the outline of a part as its innermost contour."""

@@ -198,8 +198,8 @@ def integral(
         rows = np.sort(order[~is_small][-room:])
         parts = _quarters(squares[rows], quarter_means, extremes, box)
         squares, low, high = (
-            np.concatenate([np.delete(kept, rows, axis=0), part])
-            for kept, part in zip((squares, low, high), parts, strict=True)
+            np.concatenate([np.delete(values, rows, axis=0), part])
+            for values, part in zip((squares, low, high), parts, strict=True)
         )
     x, y = squares[int(np.argmax(high)), :2].tolist()
     return Bracket(total[0], total[1], (x, y), len(squares))
@@ -220,10 +220,10 @@ def _quarters(
     is_full = size >= 4.0 * quarters[:, 2] ** 2 * (1.0 - 1e-9)
     is_full &= quarter_means is not None
     is_whole = is_full.reshape(-1, 4).all(axis=1)
-    whole, part = np.repeat(is_whole, 4), np.repeat(~is_whole, 4) & (size > 0.0)
+    is_whole_quarter, part = np.repeat(is_whole, 4), np.repeat(~is_whole, 4) & (size > 0.0)
     bounds = np.zeros((2, len(quarters)))
     if quarter_means is not None:
-        bounds[:, whole] = quarter_means(squares[is_whole])
+        bounds[:, is_whole_quarter] = quarter_means(squares[is_whole])
     bounds[:, part] = extremes(quarters[part])
     return quarters, size * bounds[0], size * bounds[1]
 

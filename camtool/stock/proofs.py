@@ -267,20 +267,20 @@ class Gouges:
 
     def tried(self, distance_mm: float) -> Trial:
         """Try whether nothing is cut below the solid by more than a distance."""
-        chords, left = self.chords, list[_Chords]()
+        chords, waiting = self.chords, list[_Chords]()
         while len(chords):
             chords = chords.select(~self._are_fine(chords, distance_mm))
             if not len(chords):
                 break
             doubtful = ~self._are_fine(chords.points, distance_mm)
             if doubtful.any():
-                found = self._worst(chords.select(doubtful), distance_mm)
-                if found.excess_mm > distance_mm:
-                    return found
+                trial = self._worst(chords.select(doubtful), distance_mm)
+                if trial.excess_mm > distance_mm:
+                    return trial
             short = doubtful | (chords.length <= SHORT_SHARE * distance_mm)
-            left.append(chords.select(short))
+            waiting.append(chords.select(short))
             chords = chords.select(~short).halves
-        rest = [each for each in left if len(each)]
+        rest = [each for each in waiting if len(each)]
         return self._searched(rest, distance_mm) if rest else Trial(True)
 
     def _are_fine(self, chords: _Chords, distance_mm: float) -> Bools:
@@ -288,8 +288,8 @@ class Gouges:
         of the stock."""
         wide = np.abs(chords.half) + self.table[chords.tool, :1]
         low, high = np.array(self.stock.box_mm).reshape(2, 2)
-        beyond = (chords.middle + wide < low) | (chords.middle - wide > high)
-        fine: Bools = np.asarray(beyond.any(axis=1))
+        is_outside = (chords.middle + wide < low) | (chords.middle - wide > high)
+        fine: Bools = np.asarray(is_outside.any(axis=1))
         for layer in self.solid.may:
             rows = np.flatnonzero(~fine)
             if not len(rows):
@@ -308,9 +308,11 @@ class Gouges:
         ways += [np.tile([math.cos(each), math.sin(each)], (len(points), 1)) for each in turn]
         for layer in self.solid.may:
             if len(layer.lines):
-                way = layer.tangents(points.middle, np.full(len(points), EPS_MM))[:, 0]
-                ways += [way[:, [SLOPE_X, SLOPE_Y]], -way[:, [SLOPE_X, SLOPE_Y]]]
-        at = np.concatenate([points.middle + (1.0 - EPS_MM) * wide[:, None] * way for way in ways])
+                direction = layer.tangents(points.middle, np.full(len(points), EPS_MM))[:, 0]
+                ways += [direction[:, [SLOPE_X, SLOPE_Y]], -direction[:, [SLOPE_X, SLOPE_Y]]]
+        at = np.concatenate(
+            [points.middle + (1.0 - EPS_MM) * wide[:, None] * direction for direction in ways]
+        )
         return _greatest(at, self._excess(at, distance_mm), self.stock.box_mm)
 
     def _excess(self, at: Floats, distance_mm: float) -> Floats:
@@ -343,7 +345,7 @@ class Gouges:
         low, high = np.maximum(low, box[:2]), np.minimum(high, box[2:])
         if (low >= high).any():
             return Trial(True)
-        found = greatest_value(
+        bracket = greatest_value(
             lambda at: self._excess(at, distance_mm),
             self._judged(stock_tree(some), distance_mm).gouge[1],
             (*low.tolist(), *high.tolist()),
@@ -352,14 +354,14 @@ class Gouges:
             max_squares=self.max_squares,
             enough_value=distance_mm,
         )
-        return _outcome(found, distance_mm)
+        return _outcome(bracket, distance_mm)
 
 
-def _outcome(found: Bracket, distance_mm: float) -> Trial:
+def _outcome(bracket: Bracket, distance_mm: float) -> Trial:
     """Return the outcome of a search whose floor was the distance."""
-    if found.low > distance_mm:
-        return Trial(False, found.low, found.at_mm)
-    return Trial(found.high <= distance_mm + 2.0 * EPS_MM)
+    if bracket.low > distance_mm:
+        return Trial(False, bracket.low, bracket.at_mm)
+    return Trial(bracket.high <= distance_mm + 2.0 * EPS_MM)
 
 
 def _greatest(at: Floats, excess: Floats, box: Box) -> Trial:
@@ -382,8 +384,8 @@ def _width(deep: Floats, radius: Floats, flat: Floats, corner: Floats, rise: Flo
 
 def _allows(layer: WantedLayer, chords: _Chords, table: Floats, distance_mm: float) -> Bools:
     """True (K,) for chords along which a layer allows all that is cut, to within a distance."""
-    least, most = layer.along(chords.middle, chords.half)
-    s, deep = least + distance_mm, STOCK_TOP_MM - chords.z
+    nearest, farthest = layer.along(chords.middle, chords.half)
+    s, deep = nearest + distance_mm, STOCK_TOP_MM - chords.z
     radius, flat, corner, rise = (column[:, None] for column in table[chords.tool].T)
     # What cuts less than the distance below the top is fine. The width there is a concave function
     # of the depth: below its tangents.
@@ -394,7 +396,7 @@ def _allows(layer: WantedLayer, chords: _Chords, table: Floats, distance_mm: flo
     bends = np.minimum(flat + corner * (layer.rise / math.hypot(1.0, layer.rise)), wide)
     fine: Bools = np.asarray(deepest[:, 0] <= 0.0)
     for reach in (np.broadcast_to(wide, deep.shape), np.where(rise > 0.0, cone, wide)):
-        good = (s - reach >= -EPS_MM) & (most + reach <= layer.reach_mm + distance_mm)
+        good = (s - reach >= -EPS_MM) & (farthest + reach <= layer.reach_mm + distance_mm)
         for x in (0.0, flat, bends, reach):
             out = np.maximum(x - flat, 0.0)
             nose = corner - np.sqrt(np.maximum(corner**2 - np.minimum(out, corner) ** 2, 0.0))
@@ -470,8 +472,8 @@ class Leftovers:
         if layer.rise:
             kinks.append(layer.shift_mm - (layer.depth_mm - layer.base_mm) / layer.rise)
         x = np.clip(np.array(kinks), 0.0, layer.shift_mm)
-        asked = np.minimum(layer.base_mm + layer.rise * (layer.shift_mm - x), layer.depth_mm)
-        level = distance_mm - float((asked + cutter.heights(x - EPS_MM)).max())
+        depth = np.minimum(layer.base_mm + layer.rise * (layer.shift_mm - x), layer.depth_mm)
+        level = distance_mm - float((depth + cutter.heights(x - EPS_MM)).max())
         begin, end = layer.chords(sagitta)
         rest = [np.empty((0, 2, 2))]
         while len(begin):
@@ -482,9 +484,9 @@ class Leftovers:
             middle = 0.5 * (begin + end)
             missed = tree.heights(middle)[0] > level + EPS_MM
             if missed.any():
-                found = self._beside(layer, middle[missed][:MAX_DOUBTFUL], distance_mm)
-                if found.excess_mm > distance_mm:
-                    return found
+                worst = self._beside(layer, middle[missed][:MAX_DOUBTFUL], distance_mm)
+                if worst.excess_mm > distance_mm:
+                    return worst
             short = np.hypot(*(end - begin).T) <= SHORT_SHARE * distance_mm
             rest.append(corners[rows][short])
             begin, middle, end = begin[~short], middle[~short], end[~short]
@@ -502,7 +504,7 @@ class Leftovers:
         wide = max(layer.shift_mm - distance_mm, 0.0) * (1.0 - EPS_MM)
         ring = wide * np.column_stack([np.cos(turn), np.sin(turn)])
         at = np.concatenate(
-            [middle, *(middle + share * way for way in ring for share in (0.5, 1))]
+            [middle, *(middle + share * direction for direction in ring for share in (0.5, 1))]
         )
         return _greatest(at, self._excess(at, distance_mm, layer), self.stock.box_mm)
 
@@ -510,7 +512,7 @@ class Leftovers:
         """Search the squares of a layer."""
         if box is None:
             return Trial(True)
-        found = greatest_value(
+        bracket = greatest_value(
             lambda at: self._excess(at, distance_mm, layer),
             lambda squares: self._upper(layer, squares, distance_mm),
             box,
@@ -519,7 +521,7 @@ class Leftovers:
             max_squares=self.max_squares,
             enough_value=distance_mm,
         )
-        return _outcome(found, distance_mm)
+        return _outcome(bracket, distance_mm)
 
     def _upper(self, layer: WantedLayer, squares: Floats, distance_mm: float) -> Floats:
         """Return upper bounds (K,) of the excess over squares (K, 3)."""
@@ -527,11 +529,13 @@ class Leftovers:
         for row, corners, values in _pieces(layer, squares, distance_mm):
             high = self.stock.tree.greatest_over(corners, values, enough=distance_mm)
             # Where the linear depth is more than the layer's, the latter counts.
-            left = np.flatnonzero((high > distance_mm) & (values.max(axis=1) > layer.depth_mm))
-            if len(left):
-                full = np.full_like(values[left], layer.depth_mm)
-                most = self.stock.tree.greatest_over(corners[left], full, enough=distance_mm)
-                high[left] = np.minimum(high[left], most)
+            doubtful = np.flatnonzero((high > distance_mm) & (values.max(axis=1) > layer.depth_mm))
+            if len(doubtful):
+                full = np.full_like(values[doubtful], layer.depth_mm)
+                high_of_layer = self.stock.tree.greatest_over(
+                    corners[doubtful], full, enough=distance_mm
+                )
+                high[doubtful] = np.minimum(high[doubtful], high_of_layer)
             np.maximum.at(bound, row, high)
         if self.before is WHOLE:
             return bound
@@ -550,13 +554,13 @@ def _pieces(
     near = layer.tangents(squares[:, :2], reach)
     s = layer.inwards(squares[:, :2])
     asks = (s + reach >= distance_mm) & (s - reach <= layer.reach_mm - distance_mm)
-    apart, other = near[:, 0, APART], near[:, 1, APART]
+    nearest, other = near[:, 0, APART], near[:, 1, APART]
     is_in = s - layer.shift_mm > 0.0
     if layer.side == ABOUT:
         flat, crossed = asks, np.zeros_like(asks)
     else:
-        flat = asks & (apart < reach) & (other <= reach)
-        crossed = asks & (apart < reach) & (other > reach)
+        flat = asks & (nearest < reach) & (other <= reach)
+        crossed = asks & (nearest < reach) & (other > reach)
         more = np.where(is_in, near[:, 0, MORE], near[:, 0, MORE_BEYOND])
         flat |= crossed & ~np.isfinite(more)
         crossed &= np.isfinite(more)
@@ -566,57 +570,59 @@ def _pieces(
         """Depth that must be reached, not more than linear, where s is `away` at most."""
         return np.asarray(layer.base_mm + layer.rise * (away - distance_mm))
 
-    whole = squares[:, 2, None, None] * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    whole = np.repeat(whole, 2, axis=1)
+    square = squares[:, 2, None, None] * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    square = np.repeat(square, 2, axis=1)
     rows = np.flatnonzero(flat | (inner & ~np.isfinite(near[:, 0, MORE])))
     top = np.repeat((s + reach)[rows, None], 8, axis=1)
-    yield rows, squares[rows, None, :2] + whole[rows], depths(top)
+    yield rows, squares[rows, None, :2] + square[rows], depths(top)
     rows = np.flatnonzero(crossed)
-    way = near[rows, 0][:, [SLOPE_X, SLOPE_Y]] * np.where(is_in[rows], 1.0, -1.0)[:, None]
-    most = s[rows] + more[rows] if len(rows) else s[rows]
-    part = _clipped(half[rows], way, distance_mm - most)
-    values = depths(most[:, None] + (part * way[:, None]).sum(axis=2))
+    direction = near[rows, 0][:, [SLOPE_X, SLOPE_Y]] * np.where(is_in[rows], 1.0, -1.0)[:, None]
+    bound = s[rows] + more[rows] if len(rows) else s[rows]
+    part = _clipped(half[rows], direction, distance_mm - bound)
+    values = depths(bound[:, None] + (part * direction[:, None]).sum(axis=2))
     yield rows, squares[rows, None, :2] + part, values
     # Off the walls the nearer of two curves counts, each in its part of the square.
-    two = inner & (other < apart + 2.0 * reach) & (layer.rise > 0.0)
-    for mine, theirs in ((0, 1), (1, 0)):
-        rows = np.flatnonzero(two if mine else inner)
-        one, far = near[rows, mine], near[rows, theirs]
-        way = one[:, [SLOPE_X, SLOPE_Y]]
-        most = layer.shift_mm + one[:, APART] + one[:, MORE]
+    two = inner & (other < nearest + 2.0 * reach) & (layer.rise > 0.0)
+    for own, rival in ((0, 1), (1, 0)):
+        rows = np.flatnonzero(two if own else inner)
+        one, far = near[rows, own], near[rows, rival]
+        direction = one[:, [SLOPE_X, SLOPE_Y]]
+        bound = layer.shift_mm + one[:, APART] + one[:, MORE]
         both, alone = np.flatnonzero(two[rows]), np.flatnonzero(~two[rows])
-        part = whole[rows]
+        part = square[rows]
         part[both] = _clipped(
             half[rows[both]],
-            far[both][:, [SLOPE_X, SLOPE_Y]] - way[both],
+            far[both][:, [SLOPE_X, SLOPE_Y]] - direction[both],
             (one[both, APART] + one[both, MORE]) - (far[both, APART] + far[both, MORE]),
         )
         if math.isfinite(layer.reach_mm) and layer.rise:
             # Less what lies beyond the reach of the layer.
-            least = s[rows[alone]] - np.minimum(one[alone, MORE_BEYOND], 2.0 * reach[rows[alone]])
-            part[alone] = _clipped(
-                half[rows[alone]], -way[alone], least - (layer.reach_mm - distance_mm)
+            nearest_s = s[rows[alone]] - np.minimum(
+                one[alone, MORE_BEYOND], 2.0 * reach[rows[alone]]
             )
-        values = depths(most[:, None] + (part * way[:, None]).sum(axis=2))
+            part[alone] = _clipped(
+                half[rows[alone]], -direction[alone], nearest_s - (layer.reach_mm - distance_mm)
+            )
+        values = depths(bound[:, None] + (part * direction[:, None]).sum(axis=2))
         yield rows, squares[rows, None, :2] + part, values
 
 
-def _clipped(half: Floats, way: Floats, least: Floats) -> Floats:
+def _clipped(half: Floats, direction: Floats, limit: Floats) -> Floats:
     """Return the corners (K, 8, 2) of the parts of squares about 0, with half a side (K,), that
-    lie no less than `least` (K,) along a way (K, 2); some stand for several. Where nothing is left
-    all are the corner that is nearest to it."""
+    lie no less than `limit` (K,) along a `direction` (K, 2); some stand for several. Where nothing
+    remains all are the corner that is nearest to it."""
     corners = half[:, None, None] * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    off = (corners * way[:, None]).sum(axis=2) - least[:, None]
-    found = np.repeat(corners, 2, axis=1)
+    off = (corners * direction[:, None]).sum(axis=2) - limit[:, None]
+    clipped = np.repeat(corners, 2, axis=1)
     best = off.argmax(axis=1)
     every = np.arange(len(half))
     for k in range(4):
-        beyond = off[:, k] < 0.0
+        is_outside = off[:, k] < 0.0
         for slot, side in ((0, (k + 3) % 4), (1, (k + 1) % 4)):
-            kept = off[:, side] >= 0.0
-            span = np.where(kept, off[:, side] - off[:, k], 1.0)
-            share = np.where(kept, -off[:, k] / np.where(span > 0.0, span, 1.0), 0.0)
+            is_inside = off[:, side] >= 0.0
+            span = np.where(is_inside, off[:, side] - off[:, k], 1.0)
+            share = np.where(is_inside, -off[:, k] / np.where(span > 0.0, span, 1.0), 0.0)
             cross = corners[:, k] + share[:, None] * (corners[:, side] - corners[:, k])
-            cross = np.where(kept[:, None], cross, corners[every, best])
-            found[:, 2 * k + slot] = np.where(beyond[:, None], cross, corners[:, k])
-    return found
+            cross = np.where(is_inside[:, None], cross, corners[every, best])
+            clipped[:, 2 * k + slot] = np.where(is_outside[:, None], cross, corners[:, k])
+    return clipped

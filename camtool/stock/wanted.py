@@ -142,11 +142,11 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
             return far, far
         middle, half = np.ascontiguousarray(middle), np.ascontiguousarray(half)
         bounds = chord_distances(middle, half, self.curves.rows, self.curves.tree)
-        least, most = bounds[:, :2], bounds[:, 2:]
+        low, high = bounds[:, :2], bounds[:, 2:]
         is_inwards = self._are_inwards(middle)[:, None]
         return (
-            self.shift_mm + np.where(is_inwards, least, -most),
-            self.shift_mm + np.where(is_inwards, most, -least),
+            self.shift_mm + np.where(is_inwards, low, -high),
+            self.shift_mm + np.where(is_inwards, high, -low),
         )
 
     def tangents(self, points: Floats, reach: Floats) -> Floats:
@@ -442,11 +442,11 @@ class _Layers:
                 for level in np.unique(depth).tolist()
                 for is_rim in (True, False)
             ]
-        for mine in groups:
-            if mine.any():
-                outermost = nesting.among(np.flatnonzero(mine)).levels.depth == 0
-                side = OUTSIDE if rim[mine][outermost].any() else INSIDE
-                yield chosen.lines.select(closed[mine].tolist()), side
+        for group in groups:
+            if group.any():
+                outermost = nesting.among(np.flatnonzero(group)).levels.depth == 0
+                side = OUTSIDE if rim[group][outermost].any() else INSIDE
+                yield chosen.lines.select(closed[group].tolist()), side
 
     def _centre_paths(self) -> Polylines:
         """The paths of the tool's centre beside the walls."""

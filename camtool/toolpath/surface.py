@@ -189,13 +189,13 @@ def follow(toolpath: Toolpath, surface: Surface, tolerance_mm: float) -> Toolpat
 
 def _refuse_beside(toolpath: Toolpath, surface: Surface, cuts: Ints) -> None:
     """Raise PostError for a cut that ends beside the surface."""
-    beside = cuts[~surface.covers(toolpath.end[cuts, :2])]
-    if len(beside):
-        x, y, _ = toolpath.end[int(beside[0])].tolist()
+    uncovered = cuts[~surface.covers(toolpath.end[cuts, :2])]
+    if len(uncovered):
+        x, y, _ = toolpath.end[int(uncovered[0])].tolist()
         raise PostError(
             f"cuts at X{x:.3f} Y{y:.3f}, and the surface is known from X{surface.x[0]:g} "
             f"Y{surface.y[0]:g} to X{surface.x[-1]:g} Y{surface.y[-1]:g}",
-            where=toolpath.place(int(beside[0])),
+            where=toolpath.place(int(uncovered[0])),
             mend="probe a larger area",
         )
 
@@ -251,10 +251,10 @@ def _crossings(
 ) -> Floats:
     """Return the shares of a move, within (0, 1), at which it crosses lines of the grid."""
     if centre is None:
-        way = float(end[axis] - start[axis])
-        if way == 0.0:
+        change = float(end[axis] - start[axis])
+        if change == 0.0:
             return np.empty(0)
-        shares = (nodes - start[axis]) / way
+        shares = (nodes - start[axis]) / change
     else:
         arm = start[:2] - centre
         radius = math.hypot(*arm)

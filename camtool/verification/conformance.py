@@ -204,7 +204,7 @@ class PlaceComparison(Struct, frozen=True, eq=False):
 def compare_places(
     decoded: Side,
     other: Side,
-    wanted: Side,
+    goal: Side,
     matching: MatchingMoves,
     request: ProgramRequest,
     sample_mm: float,
@@ -214,8 +214,8 @@ def compare_places(
     holes = compare_holes(decoded, other, limits)
     from_decoded = near_pairs(decoded.cuts, ~matching.in_written, other.moves, limits, sample_mm)
     from_written = near_pairs(other.cuts, ~matching.in_decoded, decoded.moves, limits, sample_mm)
-    _near_wanted(from_decoded, wanted.moves, limits)
-    _written_from_cut(from_written, wanted.moves, decoded.moves, limits)
+    _near_wanted(from_decoded, goal.moves, limits)
+    _written_from_cut(from_written, goal.moves, decoded.moves, limits)
     trips = encloses_area(other.cuts, limits[0])
     written = other.moves.contour_of(from_decoded.move)
     turns = reversed_samples(from_decoded, trips[written], limits)
@@ -225,7 +225,7 @@ def compare_places(
         *_missing_findings(from_written, holes.undrilled, limits),
         *_extra_findings(from_decoded, holes.drilled, limits),
         *holes.findings,
-        *_plunge_findings(decoded, (other, wanted), matching, limits),
+        *_plunge_findings(decoded, (other, goal), matching, limits),
         *_repeated_cuts(decoded, other, matching, limits),
         *(
             reversal_findings(from_decoded, turns)

@@ -188,17 +188,15 @@ def cover(
     return Coverage(match, rounding, findings)
 
 
-def _contours_from(
-    cuts: CutMoves, wanted: CutMoves, row_from: Indices | None
-) -> tuple[Ints, Ints]:
+def _contours_from(cuts: CutMoves, goal: CutMoves, row_from: Indices | None) -> tuple[Ints, Ints]:
     """Return (C,) the wanted contour from which all rows of each decoded contour were written, and
     (W,) the only decoded contour with rows of each wanted contour; ANY_CONTOUR where there is
     none."""
     of_decoded = np.full(cuts.contour_count, ANY_CONTOUR, dtype=np.int64)
-    of_wanted = np.full(wanted.contour_count, ANY_CONTOUR, dtype=np.int64)
+    of_wanted = np.full(goal.contour_count, ANY_CONTOUR, dtype=np.int64)
     if row_from is not None and len(of_wanted):
         rows = cuts.rows
-        wanted_contour = np.where(row_from[rows] >= 0, wanted.contour[row_from[rows]], ANY_CONTOUR)
+        wanted_contour = np.where(row_from[rows] >= 0, goal.contour[row_from[rows]], ANY_CONTOUR)
         pair_base = (
             len(of_wanted) + 1
         )  # contours follow one another: pairs as numbers are mostly in order
@@ -253,18 +251,16 @@ def _judged_together(cuts: CutMoves, own_contour: Ints, alike_rows: Ints) -> Ind
     return np.where(np.append(is_separate, False)[cuts.contour], rows, cuts.contour)
 
 
-def _rows_copied(wanted: CutMoves, alike_rows: Ints, row_from: Indices | None) -> Bools:
+def _rows_copied(goal: CutMoves, alike_rows: Ints, row_from: Indices | None) -> Bools:
     """Return (N,) true for the wanted rows from which one was written that lies `alike_rows`
     them."""
-    has_copy = np.zeros(len(wanted.contour), dtype=np.bool_)
+    has_copy = np.zeros(len(goal.contour), dtype=np.bool_)
     if row_from is not None:
         has_copy[row_from[alike_rows]] = True
     return has_copy
 
 
-def _rows_alike(
-    cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Indices | None
-) -> Ints:
+def _rows_alike(cuts: CutMoves, goal: CutMoves, limits: Limits, row_from: Indices | None) -> Ints:
     """Return the rows that cut along a line or an arc, and alone were written from a move of the
     same kind beside which they lie: each point of them lies within the limits of it.
 
@@ -276,7 +272,7 @@ def _rows_alike(
     if row_from is None:
         return np.empty(0, dtype=np.int64)
     limit_mm, depth_mm = limits
-    rows, decoded, sources = cuts.rows[row_from[cuts.rows] >= 0], cuts.toolpath, wanted.toolpath
+    rows, decoded, sources = cuts.rows[row_from[cuts.rows] >= 0], cuts.toolpath, goal.toolpath
     is_unique = np.bincount(row_from[rows], minlength=len(sources)) == 1
     is_near = np.empty(len(rows), dtype=np.bool_)
     for low in range(0, len(rows), ROWS_AT_ONCE):
@@ -509,15 +505,15 @@ class HoleComparison(Struct, frozen=True, eq=False):
     findings: tuple[Finding, ...]
 
 
-def compare_holes(decoded: Side, wanted: Side, limits: Limits) -> HoleComparison:
+def compare_holes(decoded: Side, goal: Side, limits: Limits) -> HoleComparison:
     """Compare the holes of a program with the wanted ones and with small contours:
     CONTOUR_MISSING for wanted holes that the program does not drill, EXTRA_CUT for holes that are
     not wanted."""
-    drilled, wanted_stand = contours_drilled(decoded.cuts, wanted.holes, limits)
-    undrilled, decoded_stand = contours_drilled(wanted.cuts, decoded.holes, limits)
+    drilled, wanted_stand = contours_drilled(decoded.cuts, goal.holes, limits)
+    undrilled, decoded_stand = contours_drilled(goal.cuts, decoded.holes, limits)
     findings = (
-        *_unpaired_findings(wanted.holes, decoded.holes, limits, wanted_stand, _MISSING_HOLES),
-        *_unpaired_findings(decoded.holes, wanted.holes, limits, decoded_stand, _EXTRA_HOLES),
+        *_unpaired_findings(goal.holes, decoded.holes, limits, wanted_stand, _MISSING_HOLES),
+        *_unpaired_findings(decoded.holes, goal.holes, limits, decoded_stand, _EXTRA_HOLES),
     )
     return HoleComparison(drilled, undrilled, findings)
 

@@ -182,9 +182,9 @@ def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
     """Return the edges that the contours of the wanted moves cut, of which `centre` (C, 2, 2) are
     the boxes, and `slide` (C, 2, 2) those of the slides; these are the edges where none is
     known."""
-    wanted, drawn = goal.cuts, goal.cuts.toolpath.drawn
+    cuts, drawn = goal.cuts, goal.cuts.toolpath.drawn
     count = len(centre)
-    edge = _edge_of(wanted)
+    edge = _edge_of(cuts)
     nominal, predicted, rough = centre.copy(), slide.copy(), np.zeros(count)
     own_boxes = centre.copy()
     followed, cleared = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
@@ -210,13 +210,13 @@ def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
     )
 
 
-def _edge_of(wanted: CutMoves) -> Ints:
+def _edge_of(cuts: CutMoves) -> Ints:
     """Return (C,) the edge of each contour: an index, UNKNOWN_EDGE or NO_EDGE."""
-    drawn, rows = wanted.toolpath.drawn, wanted.rows
+    drawn, rows = cuts.toolpath.drawn, cuts.rows
     if drawn is None:
-        return np.full(wanted.contour_count, UNKNOWN_EDGE)
-    edge = np.full(wanted.contour_count, NO_EDGE)
-    np.maximum.at(edge, wanted.contour[rows], drawn.edge[rows])
+        return np.full(cuts.contour_count, UNKNOWN_EDGE)
+    edge = np.full(cuts.contour_count, NO_EDGE)
+    np.maximum.at(edge, cuts.contour[rows], drawn.edge[rows])
     return edge
 
 
@@ -270,8 +270,8 @@ def _is_looped(goal: LoopedCuts) -> Bools:
 def _wanted_rows(goal: LoopedCuts) -> Bools:
     """Return (W,) the wanted rows that determine sizes: those of loops, and of contours without
     one."""
-    wanted, looped = goal.cuts, np.append(_is_looped(goal), False)[goal.cuts.contour]
-    return np.asarray(wanted.is_cut & (is_in_loop(wanted, goal.loops) | ~looped))
+    cuts, looped = goal.cuts, np.append(_is_looped(goal), False)[goal.cuts.contour]
+    return np.asarray(cuts.is_cut & (is_in_loop(cuts, goal.loops) | ~looped))
 
 
 def _sized_rows(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:

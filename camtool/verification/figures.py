@@ -99,11 +99,15 @@ class Figure:
         if not self.count:
             return math.nan
         rank = math.ceil(PERCENTILE * self.count)
-        known = np.cumsum(self._histogram)
+        cumulative = np.cumsum(self._histogram)
         few = self._pieces[:: len(self._pieces) // PIECES_GUESSED + 1]
         more = float(self._pieces[:, COUNT].sum()) / max(float(few[:, COUNT].sum()), 1.0)
-        guess = bisect_left(range(BINS), rank, key=lambda k: int(known[k] + more * _below(few, k)))
-        bin_index = _first_at_least(rank, guess, lambda k: int(known[k]) + _below(self._pieces, k))
+        guess = bisect_left(
+            range(BINS), rank, key=lambda k: int(cumulative[k] + more * _below(few, k))
+        )
+        bin_index = _first_at_least(
+            rank, guess, lambda k: int(cumulative[k]) + _below(self._pieces, k)
+        )
         if bin_index == 0:
             return 0.0
         return min(0.5 * (_edge(bin_index) + _edge(bin_index + 1)), self._max)
@@ -120,15 +124,15 @@ def _edge(bin_index: int) -> float:
     return float(np.left_shift(bits, SHIFT).view(np.float64)[0])
 
 
-def _first_at_least(wanted: int, guess: int, count: Callable[[int], int]) -> int:
+def _first_at_least(count_wanted: int, guess: int, count: Callable[[int], int]) -> int:
     """Return the first bin up to which there are so many, searched from a good guess on."""
     low, high, step = -1, guess, 1
-    while high < BINS - 1 and count(high) < wanted:
+    while high < BINS - 1 and count(high) < count_wanted:
         low, high, step = high, min(high + step, BINS - 1), 2 * step
     step = 1
     while high - low > 1:
         middle = high - step if high - step > low else (low + high) // 2
-        if count(middle) >= wanted:
+        if count(middle) >= count_wanted:
             high, step = middle, 2 * step
         else:
             low = middle

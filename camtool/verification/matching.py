@@ -64,10 +64,10 @@ class Goal(Struct, frozen=True, eq=False, dict=True):
     def off_mm(self) -> Floats:
         """(W,) mm: the largest distance of the drawing from each wanted row, one 0, seen as many,
         where none is known."""
-        wanted = self.moves.cuts.toolpath
-        if wanted.drawn is None or not wanted.drawn.off_mm.any():
-            return np.broadcast_to(0.0, len(wanted))
-        return wanted.drawn.off_mm[:, 0]
+        toolpath = self.moves.cuts.toolpath
+        if toolpath.drawn is None or not toolpath.drawn.off_mm.any():
+            return np.broadcast_to(0.0, len(toolpath))
+        return toolpath.drawn.off_mm[:, 0]
 
 
 def own_match(cuts: CutMoves, circles: list[FullCircle]) -> Match:

@@ -782,11 +782,11 @@ class _Follower(Struct, frozen=True, eq=False):
             parts.append((trial, number))
         followed = self._join_trials(parts)
         drilled = self._drilled_circles(followed)
-        wanted, offsets = self.cuts.toolpath, np.empty(0)
-        rows = np.zeros(len(wanted), dtype=np.bool_)
+        cuts_toolpath, offsets = self.cuts.toolpath, np.empty(0)
+        rows = np.zeros(len(cuts_toolpath), dtype=np.bool_)
         if followed is not None:
             follow = _RowTracks.of(self.cuts, followed, self.path)
-            wanted, offsets, rows = (
+            cuts_toolpath, offsets, rows = (
                 _with_tracks(self, followed, follow),
                 follow.offsets,
                 follow.rows,
@@ -814,7 +814,7 @@ class _Follower(Struct, frozen=True, eq=False):
         )
         widths = {each.diameter_mm for each in tools}
         width = widths.pop() if len(widths) == 1 else None
-        return Registration(shift, wanted, tuple(findings), report, width or None)
+        return Registration(shift, cuts_toolpath, tuple(findings), report, width or None)
 
     def _row_lengths(self) -> Floats:
         """Return (N,) mm: the length of the segments of each row."""

@@ -111,12 +111,12 @@ class Cutter(Struct, frozen=True):
     def radius_mm(self, z: Floats) -> Floats:
         """Return (J,) mm: the radius of the cut at the surface, with the tip at the heights `z`
         (J,); at the surface itself that of the tip, with which a cut ends there."""
-        most = 0.5 * self.diameter_mm
+        half_diameter = 0.5 * self.diameter_mm
         if self.nose is None:
-            return np.full(len(z), most)
+            return np.full(len(z), half_diameter)
         heights, which = np.unique(np.minimum(z, 0.0), return_inverse=True)
         wide = np.array([self.nose.radius_at(-height) for height in heights.tolist()])
-        return np.where(z <= 0.0, np.minimum(wide[which], most), 0.0)
+        return np.where(z <= 0.0, np.minimum(wide[which], half_diameter), 0.0)
 
     @property
     def quarter(self) -> int:
@@ -147,8 +147,8 @@ def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
         return None
     points = 2 * len(decoded.toolpath)
     if arcs.any():
-        least = float(decoded.segments.radius[arcs].min())
-        chord = math.sqrt(8.0 * least * cutter.tolerance_mm)
+        min_radius = float(decoded.segments.radius[arcs].min())
+        chord = math.sqrt(8.0 * min_radius * cutter.tolerance_mm)
         length = float(row_lengths(decoded.toolpath).sum())
         points += math.ceil(4.0 * length / chord)
     return points if points <= MAX_POINTS and not _cross_too_often(decoded.segments) else None
@@ -187,55 +187,55 @@ class WantedShape(Struct, frozen=True, eq=False):
 
 
 def wanted_shape(
-    cuts: CutMoves, cutter: Cutter, kept: Sequence[ProtectedRegion] = ()
+    cuts: CutMoves, cutter: Cutter, protected: Sequence[ProtectedRegion] = ()
 ) -> WantedShape | None:
-    """Return the region that the tool covers along the wanted moves; with `kept`, along its runs,
-    without what must stay. None when nothing is cut."""
+    """Return the region that the tool covers along the wanted moves; with `protected`, along its
+    runs, without what must stay. None when nothing is cut."""
     import shapely
 
-    if not kept:
+    if not protected:
         region = _swept_by(cuts.segments, cuts.ends_z, cutter)
         return None if region is None else WantedShape(cutter, region, 0.0, (0.0, 0.0))
-    left, taken = [], []
-    for each in kept:
+    remains, losses = [], []
+    for each in protected:
         region = _swept_by(*_cutting_moves(each, cutter), cutter)
         if region is None:
             continue
         solid = _protected_area(each, region, cutter.tolerance_mm)
         into = shapely.intersection(region, solid)
-        left.append(region if into.is_empty else shapely.difference(region, solid))
-        taken.append(into)
-    if not left:
+        remains.append(region if into.is_empty else shapely.difference(region, solid))
+        losses.append(into)
+    if not remains:
         return None
-    wanted = left[0] if len(left) == 1 else shapely.union_all(left)
+    region_wanted = remains[0] if len(remains) == 1 else shapely.union_all(remains)
     # What must stay for one operation may be removed by another.
-    _, depth, at = _area_outside(shapely.union_all(taken), wanted, cutter.tolerance_mm)
-    return WantedShape(cutter, wanted, depth, at)
+    _, depth, at = _area_outside(shapely.union_all(losses), region_wanted, cutter.tolerance_mm)
+    return WantedShape(cutter, region_wanted, depth, at)
 
 
 def overcut_findings(
-    wanted: WantedShape | None, planned: Collection[Code | TargetCode]
+    shape: WantedShape | None, planned: Collection[Code | TargetCode]
 ) -> Iterator[Finding]:
     """Yield OVERCUT for a plan that cuts into what must stay, unless GOUGE is among the codes of
     its findings already."""
-    if wanted is None or wanted.beyond_mm <= OVERCUT_MM or ProgramCode.GOUGE in planned:
+    if shape is None or shape.beyond_mm <= OVERCUT_MM or ProgramCode.GOUGE in planned:
         return
-    x, y = wanted.at_mm
-    yield OVERCUT(where=f"near ({x:.3f}, {y:.3f}) mm", measured=wanted.beyond_mm, limit=OVERCUT_MM)
+    x, y = shape.at_mm
+    yield OVERCUT(where=f"near ({x:.3f}, {y:.3f}) mm", measured=shape.beyond_mm, limit=OVERCUT_MM)
 
 
 def machined_shape(
-    trace: SlideTrace, motion: CommandedMotion, wanted: WantedShape
+    trace: SlideTrace, motion: CommandedMotion, goal: WantedShape
 ) -> MachinedShape | None:
     """Compare what the tool covers along the trace of a motion with what it should cover; None
     when nothing is cut."""
-    cutter, tolerance = wanted.cutter, wanted.cutter.tolerance_mm
+    cutter, tolerance = goal.cutter, goal.cutter.tolerance_mm
     runs = _runs(trace) if cutter.nose is None else _rows_with_heights(trace, motion)
-    made = _swept_by_runs(runs, cutter)
-    if made is None:
+    swept = _swept_by_runs(runs, cutter)
+    if swept is None:
         return None
-    over_mm2, over_mm, _ = _area_outside(made, wanted.region, tolerance)
-    under_mm2, under_mm, _ = _area_outside(wanted.region, made, tolerance)
+    over_mm2, over_mm, _ = _area_outside(swept, goal.region, tolerance)
+    under_mm2, under_mm, _ = _area_outside(goal.region, swept, tolerance)
     return MachinedShape(cutter.diameter_mm, over_mm2, over_mm, under_mm2, under_mm, tolerance)
 
 
@@ -371,11 +371,11 @@ def _runs(trace: SlideTrace) -> list[tuple[Floats, Floats]]:
     which = np.flatnonzero(trace.cutting)
     if not len(which):
         return []
-    found = []
+    runs = []
     for run in np.split(which, np.flatnonzero(np.diff(which) > 1) + 1):
         points = trace.points[max(int(run[0]) - 1, 0) : int(run[-1]) + 1]
-        found.append((points, np.zeros(len(points))))
-    return found
+        runs.append((points, np.zeros(len(points))))
+    return runs
 
 
 def _rows_with_heights(trace: SlideTrace, motion: CommandedMotion) -> list[tuple[Floats, Floats]]:
@@ -391,22 +391,22 @@ def _rows_with_heights(trace: SlideTrace, motion: CommandedMotion) -> list[tuple
         return []
     of_sample, slides, height = motion.slides()
     first = np.searchsorted(of_sample, np.arange(len(motion.toolpath) + 1))
-    found = []
+    runs = []
     for run in np.split(which, np.flatnonzero(np.diff(trace.row[which]) != 0) + 1):
         points = trace.points[max(int(run[0]) - 1, 0) : int(run[-1]) + 1]
         row = int(trace.row[run[0]])
-        mine = slice(first[row], first[row + 1])
-        heights = np.append(motion.toolpath.starts_of(np.array([row]))[0, 2], height[mine])
+        samples = slice(first[row], first[row + 1])
+        heights = np.append(motion.toolpath.starts_of(np.array([row]))[0, 2], height[samples])
         # The slides stand where the row before left them, which the trace has as its first point.
         begin = slides[first[row] - 1] if first[row] else points[0]
-        way, gone = _lengths(np.concatenate([begin[None], slides[mine]])), _lengths(points)
-        scale = gone[-1] / way[-1] if way[-1] > 0.0 else 0.0
-        places = np.column_stack([np.interp(way * scale, gone, axis) for axis in points.T])
-        waits = np.diff(way) <= 0.0
+        slid, gone = _lengths(np.concatenate([begin[None], slides[samples]])), _lengths(points)
+        scale = gone[-1] / slid[-1] if slid[-1] > 0.0 else 0.0
+        places = np.column_stack([np.interp(slid * scale, gone, axis) for axis in points.T])
+        waits = np.diff(slid) <= 0.0
         ends = np.flatnonzero(np.diff(waits)) + 1
         for low, high in pairwise([0, *ends.tolist(), len(waits)]):
-            found.append((places[low : high + 1], heights[low : high + 1]))
-    return found
+            runs.append((places[low : high + 1], heights[low : high + 1]))
+    return runs
 
 
 def _lengths(points: Floats) -> Floats:
@@ -433,10 +433,10 @@ def _swept_by_runs(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> Any
         return _swept_hulls(_Lines(flat[:, :2], flat[:, 2], line), cutter)
     flat[:, 2] = 0.0  # not the height: the bulge
     is_open = np.zeros(len(count), dtype=np.bool_)
-    kept, _ = without_repeats(flat, np.bincount(line, minlength=len(count)), is_open)
-    kept &= np.bincount(line[kept], minlength=len(count))[line] > 1
-    offsets = np.append(0, np.cumsum(np.unique(line[kept], return_counts=True)[1]))
-    return _swept_band(Polylines(flat[kept], offsets, is_open[: len(offsets) - 1]), cutter)
+    is_distinct, _ = without_repeats(flat, np.bincount(line, minlength=len(count)), is_open)
+    is_distinct &= np.bincount(line[is_distinct], minlength=len(count))[line] > 1
+    offsets = np.append(0, np.cumsum(np.unique(line[is_distinct], return_counts=True)[1]))
+    return _swept_band(Polylines(flat[is_distinct], offsets, is_open[: len(offsets) - 1]), cutter)
 
 
 def _joined(segments: Segments) -> Polylines:
@@ -458,10 +458,10 @@ def _joined(segments: Segments) -> Polylines:
     )
 
 
-def _cutting_moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:
+def _cutting_moves(protected: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:
     """Return the cutting moves of the runs, and the heights (K, 2) of their ends. Of equal moves
     at several heights one is enough, unless the tool is narrower at its tip."""
-    rows = [np.hstack([run[:-1], run[1:]]) for run in kept.runs]
+    rows = [np.hstack([run[:-1], run[1:]]) for run in protected.runs]
     moves = np.concatenate([np.empty((0, 8)), *rows])
     lowest = np.minimum(moves[:, 2], moves[:, 6])
     far = np.hypot(moves[:, 4] - moves[:, 0], moves[:, 5] - moves[:, 1]) > POSITION_EPS_MM
@@ -472,7 +472,7 @@ def _cutting_moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Flo
     return Segments.between(moves[:, :2], moves[:, 4:6], moves[:, 3]), moves[:, [2, 6]]
 
 
-def _protected_area(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
+def _protected_area(protected: ProtectedRegion, swept: Any, tolerance: float) -> Any:
     """Return the region that must stay around a swept one: smaller than drawn by the depth that
     shall be cut into it, and by `KEPT_SLACK_MM`."""
     import shapely
@@ -480,8 +480,10 @@ def _protected_area(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
     low_x, low_y, high_x, high_y = shapely.bounds(swept).tolist()
     wide = (high_x - low_x) + (high_y - low_y)
     box = shapely.box(low_x - wide, low_y - wide, high_x + wide, high_y + wide)
-    region = box if kept.beyond else shapely.Polygon()
-    for stays, lines in groupby(zip(kept.stays.tolist(), kept.lines, strict=True), itemgetter(0)):
+    region = box if protected.beyond else shapely.Polygon()
+    for stays, lines in groupby(
+        zip(protected.stays.tolist(), protected.lines, strict=True), itemgetter(0)
+    ):
         areas = []
         for _, path in lines:
             segments = Segments.of(path)
@@ -489,7 +491,7 @@ def _protected_area(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
             areas.append(shapely.make_valid(shapely.Polygon(ring.points)))
         area = shapely.union_all(areas)
         region = shapely.union(region, area) if stays else shapely.difference(region, area)
-    return shapely.buffer(region, -kept.into_mm - KEPT_SLACK_MM)
+    return shapely.buffer(region, -protected.into_mm - KEPT_SLACK_MM)
 
 
 def _chord_lines(segments: Segments, ends_z: Floats, tolerance: float) -> _Lines:

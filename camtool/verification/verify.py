@@ -32,6 +32,7 @@ from camtool.units import UM_PER_MM
 from camtool.verification import report as record
 from camtool.verification.case import SAMPLE_MM, TRACE_POINTS, Case, VerifyOptions
 from camtool.verification.circles import NO_FIGURES, full_circles
+from camtool.verification.conformance import conformance_of
 from camtool.verification.coverage import Coverage, Side, cover, direction_findings
 from camtool.verification.cuts import CutMoves, is_flat, loops, row_lengths
 from camtool.verification.dimensions import (
@@ -228,7 +229,6 @@ def _direction_findings(
 def _conformance(case: Case, *, flat_cuts: bool) -> Conformance | None:
     if case.asked is None:
         return None
-    from camtool.verification.conformance import conformance_of
 
     return conformance_of(case.decoded, case.asked, flat_cuts=flat_cuts, sample_mm=SAMPLE_MM)
 
@@ -462,12 +462,12 @@ class ReportBuilder(Struct, frozen=True, eq=False):
             limit_um=rounded(request.limits_mm[0] * UM_PER_MM),
         )
 
-    def _shape(self, trace: SlideTrace, wanted: WantedShape | None) -> record.ShapeReport | None:
-        if wanted is None:
+    def _shape(self, trace: SlideTrace, goal: WantedShape | None) -> record.ShapeReport | None:
+        if goal is None:
             return None
         case = self.case
         motion = CommandedMotion(case.decoded, case.machine, case.options.effects)
-        shape = machined_shape(trace, motion, wanted)
+        shape = machined_shape(trace, motion, goal)
         if shape is None:
             return None
         return record.ShapeReport(

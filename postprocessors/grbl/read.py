@@ -179,7 +179,7 @@ _DROPPED: Final = str.maketrans("", "", " \t/")
 
 def _columns(raw: str) -> list[int]:
     """Return the columns, from 0, of the characters of a line that grbl keeps."""
-    blanked = COMMENT.sub(lambda found: " " * len(found[0]), raw)
+    blanked = COMMENT.sub(lambda match: " " * len(match[0]), raw)
     return [k for k, sign in enumerate(blanked) if sign not in " \t/"]
 
 

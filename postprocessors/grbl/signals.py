@@ -155,8 +155,8 @@ def _steps_of(blocks: Blocks, stretch: _Stretch, end: int) -> Pulses:
     starts = np.concatenate([[0], stretch.ends[:-1]])
     events, parts = blocks.events[block].astype(np.int64), [Pulses.none(3)]
     for axis in range(3):
-        way = blocks.way[block, axis].astype(np.int64)
-        size = np.abs(way)
+        steps = blocks.way[block, axis].astype(np.int64)
+        size = np.abs(steps)
         done = (4 * events + size * low - 1) // (8 * events)
         count = (4 * events + size * (ends - bases) - 1) // (8 * events) - done
         index = np.repeat(np.arange(len(block)), count)
@@ -167,7 +167,7 @@ def _steps_of(blocks: Blocks, stretch: _Stretch, end: int) -> Pulses:
         ticks = -(-(eighth - starts[segment]) // stretch.tick[segment])
         at = stretch.begin[segment] + ticks * stretch.cycles[segment]
         moves = np.zeros((len(index), 3), dtype=np.int64)
-        moves[:, axis] = np.sign(way[index])
+        moves[:, axis] = np.sign(steps[index])
         row = blocks.row[block[index]].astype(np.int64)
         parts.append(Pulses(at / CLOCK_HZ, moves, row, np.zeros(len(index), np.bool_), 0.0))
     return in_order(parts, end / CLOCK_HZ)

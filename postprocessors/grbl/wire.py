@@ -1035,7 +1035,7 @@ def override_step(name: Override, percent: int, before: int) -> bytes:
 def override_aim(name: Override, percent: int) -> int:
     """Return the override, %, that grbl can have and that is the nearest one."""
     if name == "rapid":
-        return min(RAPIDS, key=lambda known: abs(known - percent))
+        return min(RAPIDS, key=lambda percentage: abs(percentage - percent))
     low, high = OVERRIDE_RANGE
     return min(max(percent, low), high)
 
@@ -1281,8 +1281,8 @@ class GrblHand(GrblConversation, Hand):
         senses = {axis: self._held[axis] for axis in "xyz" if self._held.get(axis)}
         norm = sum(sense * sense for sense in senses.values()) ** 0.5
         rates = [axis.acceleration_mm_s2 for axis in self._machine.axes]
-        known = [rate for rate in rates if rate is not None]
-        stops_s = speed / (2.0 * min(known)) if known else 0.5
+        accelerations = [rate for rate in rates if rate is not None]
+        stops_s = speed / (2.0 * min(accelerations)) if accelerations else 0.5
         # A line that finds the planner full waits with its end already computed, and grbl goes
         # there although the jog was cancelled meanwhile (motion_control.c, mc_line): it must
         # never be full. Speeding up holds back as much as braking takes.
@@ -1310,8 +1310,8 @@ class GrblHand(GrblConversation, Hand):
         self._lengthen(now)
 
     def _line(self, line: str, now: float) -> None:
-        known = _STATUS.fullmatch(line) or line == "ok" or line.startswith(("Grbl ", "ALARM:"))
-        if self._typed and self._phase != "greeting" and not known:
+        is_known = _STATUS.fullmatch(line) or line == "ok" or line.startswith(("Grbl ", "ALARM:"))
+        if self._typed and self._phase != "greeting" and not is_known:
             self._answered = now
             meaning = GrblTerminal().meaning(line)
             self._tell(f"{line}    {meaning}" if meaning else line)

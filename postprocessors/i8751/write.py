@@ -99,8 +99,8 @@ def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
     dialect = machine.dialect
     check_toolpath(toolpath, machine, dialect)
     records = records_of(toolpath, machine, dialect)
-    said = ((0, words) for words in toolpath.setup)
-    records = replace(records, messages=(*said, *records.messages))
+    setup_messages = ((0, words) for words in toolpath.setup)
+    records = replace(records, messages=(*setup_messages, *records.messages))
     extension = TEXT_EXTENSION
     if dialect.format == "listing":
         refuse_too_long(len(records) + len(records.messages) + 2, "line")  # its head, and END

@@ -61,7 +61,7 @@ class Scanner:
             if isinstance(inner, float):
                 return -inner
             function = inner
-            return lambda given: -function(given)
+            return lambda parameters: -function(parameters)
         if "a" <= sign <= "z":
             return self._function()
         return self.number()
@@ -83,7 +83,7 @@ class Scanner:
         if isinstance(value, float):
             return whole_number(value, begin)
         function = value
-        return lambda given: whole_number(function(given), begin)
+        return lambda parameters: whole_number(function(parameters), begin)
 
     def expression(self) -> Value:
         """[value operator value …]"""
@@ -99,7 +99,7 @@ class Scanner:
         if isinstance(result, float):
             return finite(result, begin)
         function = result
-        return lambda given: finite(function(given), begin)
+        return lambda parameters: finite(function(parameters), begin)
 
     def _ranked(self, left_value: Value, rank: int) -> Value:
         """Evaluate operators of this precedence and above, up to the closing bracket."""
@@ -126,13 +126,15 @@ class Scanner:
         self.at += 1
         if self.text[self.at : self.at + 1] == "<":
             name = self.name()
-            return lambda given: given.value_of_name(name, begin)
+            return lambda parameters: parameters.value_of_name(name, begin)
         index = self.whole_number()
         if isinstance(index, int):
             fixed = check_index(index, begin)
-            return lambda given: given.value_of_number(fixed, begin)
+            return lambda parameters: parameters.value_of_number(fixed, begin)
         computed = index
-        return lambda given: given.value_of_number(check_index(computed(given), begin), begin)
+        return lambda parameters: parameters.value_of_number(
+            check_index(computed(parameters), begin), begin
+        )
 
     def name(self) -> str:
         """Read the name between < and >."""
@@ -172,11 +174,11 @@ class Scanner:
         self.at += 1
         if self.text[self.at : self.at + 1] == "<":
             name = self.name()
-            result: Value = lambda given: given.has(name, begin)  # noqa: E731 - it is a value
+            result: Value = lambda parameters: parameters.has(name, begin)  # noqa: E731 - it is a value
         else:
             index = self.whole_number()
-            computed = index if callable(index) else lambda given, fixed=index: fixed
-            result = lambda given: float(1 <= computed(given) < MAX_PARAMETERS)  # noqa: E731
+            computed = index if callable(index) else lambda parameters, fixed=index: fixed
+            result = lambda parameters: float(1 <= computed(parameters) < MAX_PARAMETERS)  # noqa: E731
         if self.text[self.at : self.at + 1] != "]":
             raise LineFault("exists wants a closing bracket behind its parameter", self.at)
         self.at += 1
@@ -221,20 +223,20 @@ def _apply_operator(operator: Binary, left_value: Value, right: Value, column: i
         if isinstance(right, float):
             return operator(left_value, right, column)
         one, second = left_value, right
-        return lambda given: operator(one, second(given), column)
+        return lambda parameters: operator(one, second(parameters), column)
     first = left_value
     if isinstance(right, float):
         constant = right
-        return lambda given: operator(first(given), constant, column)
+        return lambda parameters: operator(first(parameters), constant, column)
     other = right
-    return lambda given: operator(first(given), other(given), column)
+    return lambda parameters: operator(first(parameters), other(parameters), column)
 
 
 def _apply_function(function: Callable[[float, int], float], inner: Value, column: int) -> Value:
     if isinstance(inner, float):
         return finite(function(inner, column), column)
     argument = inner
-    return lambda given: finite(function(argument(given), column), column)
+    return lambda parameters: finite(function(argument(parameters), column), column)
 
 
 def _divide(dividend: float, right: float, column: int) -> float:

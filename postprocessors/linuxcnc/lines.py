@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any, Final
 from msgspec import Struct
 
 from ..gcode.faults import LineFault
+from .expressions import Scanner, check_index, whole_number
+from .parameters import READ_ONLY
 
 if TYPE_CHECKING:
     from .expressions import Value
@@ -262,7 +264,6 @@ def _parse_value(text: str, position: int, letter: str) -> tuple[Value, int]:
         raise LineFault(f"no number after {letter.upper()}", position - 1)
     if letter == "$" and sign.isalpha():
         raise LineFault(_MESSAGES["$"], position - 1)
-    from .expressions import Scanner
 
     scanner = Scanner(text, position)
     try:
@@ -275,9 +276,6 @@ def _parse_value(text: str, position: int, letter: str) -> tuple[Value, int]:
 
 def _parse_setting(text: str, position: int) -> tuple[Item, int]:
     """Parse #index=value or #<name>=value, and return it with its end."""
-    from .expressions import Scanner, check_index
-    from .parameters import READ_ONLY
-
     scanner = Scanner(text, position + 1)
 
     def settable(index: int) -> int:
@@ -293,10 +291,10 @@ def _parse_setting(text: str, position: int) -> tuple[Item, int]:
         index = scanner.whole_number()
         if isinstance(index, int):
             fixed = settable(index)
-            name = lambda given: fixed  # noqa: E731 - it is a value
+            name = lambda parameters: fixed  # noqa: E731 - it is a value
         else:
             computed = index
-            name = lambda given: settable(computed(given))  # noqa: E731
+            name = lambda parameters: settable(computed(parameters))  # noqa: E731
     if text[scanner.at : scanner.at + 1] != "=":
         raise LineFault("a parameter without =: only a word's number may be one", scanner.at)
     scanner.at += 1
@@ -369,6 +367,5 @@ def m_code(value: float, column: int) -> int:
 def _whole_number(value: float, column: int) -> int:
     if value == value // 1:
         return int(value)
-    from .expressions import whole_number
 
     return whole_number(value, column)

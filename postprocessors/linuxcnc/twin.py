@@ -313,7 +313,7 @@ class LinuxcncTwin(Twin):
         # Axes that the line does not name stay where they are.
         x, y, z = (self.slides.commanded_mm - self._zero).tolist()
         stands = f"G21 G90 G0 X{x:.9f} Y{y:.9f} Z{z:.9f}\n"
-        path = self._decoded(f"{stands}{value}\nM2\n".encode(), here=True)
+        path = self._decoded(f"{stands}{value}\nM2\n".encode(), keeps_empty=True)
         if path is not None:
             motion = LinuxcncModel().run(path, self._machine, COMMANDED)
             self.slides.begin(travel_of(motion).shifted(self._zero), self.now, -1)
@@ -354,14 +354,14 @@ class LinuxcncTwin(Twin):
         self._file = name
         return True
 
-    def _decoded(self, data: bytes, *, here: bool = False) -> Toolpath | None:
+    def _decoded(self, data: bytes, *, keeps_empty: bool = False) -> Toolpath | None:
         try:
             path = read_program(data, self._machine, None)
         except CamtoolError as error:
             self._error = str(error)
             return None
         start = self.slides.commanded_mm - self._zero
-        return replace(path, start=start) if here or len(path) else path
+        return replace(path, start=start) if keeps_empty or len(path) else path
 
     def _run_program(self, value: str, *, steps: bool = False) -> bool:
         """From its beginning; a line to run from is not modelled."""

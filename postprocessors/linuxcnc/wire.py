@@ -121,7 +121,7 @@ class LinuxcncWire(Wire):
             named = [k for k in group if any(_CHANGES.findall(lines[k]))]
             for k in named[-1:]:
                 lines[k] = _CHANGES.sub(
-                    lambda found: f"M0 {found[0]}" if found[1] else found[0], lines[k]
+                    lambda match: f"M0 {match[0]}" if match[1] else match[0], lines[k]
                 )
         return "".join(lines).encode("latin-1")
 

@@ -26,14 +26,14 @@ CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILI
 MAX_QUESTIONS = 1
 MAX_SHARED_CLASS_NAMES = 0
 MAX_SUPERLATIVES = 0
-MAX_RIDDLES = 272
+MAX_RIDDLES = 125
 
 RIDDLE = re.compile(
     r"_*(?:found|made|way|most|asked|kept|held|said|apart|whole|mine|theirs|taken|known|about|on|left"
     r"|told|wanted|given|here|there|those|many|much|least|beside|beyond)_*"
 )
-"""Prepositions, participles and pronouns that do not say what a value is; the side `left` of a box
-does."""
+"""Prepositions, participles and pronouns that do not say what a value is; `left` beside `right` is
+a side, and does."""
 
 
 @functools.cache
@@ -87,9 +87,17 @@ def riddles(path: str, source: str) -> list[str]:
         for node in ast.walk(function):
             match node:
                 case ast.arg(arg=name) | ast.Name(id=name, ctx=ast.Store()):
-                    if RIDDLE.fullmatch(name):
-                        names.add(f"{path}: {function.name}: {name}")
-    return sorted(names)
+                    names.add((function.name, name))
+    return listed_riddles(path, names)
+
+
+def listed_riddles(path: str, names: set[tuple[str, str]]) -> list[str]:
+    """Return the riddles among (function, name) pairs as lines."""
+    return sorted(
+        f"{path}: {function}: {name}"
+        for function, name in names
+        if RIDDLE.fullmatch(name) and not (name == "left" and (function, "right") in names)
+    )
 
 
 def cython_riddles(path: str, source: str) -> list[str]:
@@ -98,10 +106,10 @@ def cython_riddles(path: str, source: str) -> list[str]:
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if header := CYTHON_FUNCTION.match(token.line):
             function = header[1]
-        if token.type == tokenize.NAME and before != "." and RIDDLE.fullmatch(token.string):
-            names.add(f"{path}: {function}: {token.string}")
+        if token.type == tokenize.NAME and before != ".":
+            names.add((function, token.string))
         before = token.string
-    return sorted(names)
+    return listed_riddles(path, names)
 
 
 def shared_class_names(texts: dict[str, str]) -> list[str]:
@@ -147,5 +155,6 @@ def test_the_rules_can_be_broken() -> None:
     assert riddles("a.py", text) == ["a.py: f: found", "a.py: f: left", "a.py: f: way"]
     text = "cdef int f(int way) noexcept:\n    cdef int k = a.way\n    return way\n"
     assert riddles("a.pyx", text) == ["a.pyx: f: way"]
+    assert riddles("a.py", "def f(box):\n    left, right = box\n") == []
     same = "class A:\n    pass\n\n\nclass _B:\n    pass\n"
     assert shared_class_names({"a.py": same, "b.py": same}) == ["A"]

@@ -72,8 +72,8 @@ def post(options: Namespace, output: str, *more: str) -> tuple[bytes, list[str]]
                 f"{COMMAND[0]} cannot be run ({error.strerror}); install camtool, then run "
                 "camtool inkscape"
             ) from error
-        said = done.stderr.decode("utf-8", "replace").replace(str(drawing), drawing.name)
-    lines = said.splitlines()
+        text = done.stderr.decode("utf-8", "replace").replace(str(drawing), drawing.name)
+    lines = text.splitlines()
     messages = [line.removeprefix(PREFIX) for line in lines if line.startswith(PREFIX)]
     if done.returncode:
         usage = [line for line in lines if line.startswith("Error: ")]
