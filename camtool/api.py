@@ -20,16 +20,21 @@ import numpy as np
 from camtool.bounds import program_bytes
 from camtool.calibration.calibrate import Calibration, to_text
 from camtool.calibration.calibrate import calibrate as calibrated
+from camtool.calibration.machine_file import machine_file
 from camtool.calibration.measurements import Measurements, read_measurements
 from camtool.comparison import Comparison, ProgramVariant, compare_program, variants_of
 from camtool.errors import CamtoolError, OptionError
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.facts import facts_of
 from camtool.geometry.nesting import Nesting, oriented
+from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polylines
 from camtool.importers.options import Reading, ReadOptions, options_of
 from camtool.importers.read import content, read_bytes
+from camtool.jobs.build import JobTables, job_of_file, read_job_file
+from camtool.jobs.drawing import chosen_for_job, refuse_unmatched
 from camtool.jobs.keys import field_value
+from camtool.jobs.tools import Shop
 from camtool.libraries.read import is_path, path_of, read_objects
 from camtool.pictures.options import PictureOptions
 from camtool.pictures.picture import Picture
@@ -170,9 +175,6 @@ def read_job(
     the job may name, the nearest first. Raises OptionError, which names
     file, table, key and the correction. Source: docs/jobs.md.
     """
-    from camtool.jobs.build import job_of_file
-    from camtool.jobs.drawing import refuse_unmatched
-
     job = job_of_file(Path(file), _patterns(operations), tuple(map(Path, libraries)))
     if isinstance(drawing, Drawing):
         refuse_unmatched(drawing, job)
@@ -183,8 +185,6 @@ def read_job(
 
 def as_drawing(drawing: Drawable, target: str | LoadedTarget | None, job: Job) -> Drawing:
     """The drawing, or that of its file or objects, on the layers of the job's operations."""
-    from camtool.jobs.drawing import chosen_for_job
-
     if isinstance(drawing, Drawing):
         return drawing
     options = options_of({"text": job.text} if job.text else {}, _machine_of(target))
@@ -239,8 +239,6 @@ def offset(
     is cut off. Open contours and marks are left out. Raises OptionError for joins that do not
     exist, and where nothing is left. Source: camtool/geometry/offset.py.
     """
-    from camtool.geometry.offset import offset_shape
-
     read = as_drawing(drawing, None, Job())
     layers = np.array(read.layers, dtype=object)
     parts: list[Polylines] = []
@@ -438,9 +436,7 @@ def meet(
     from camtool.inspection.meet import meet as met
     from camtool.inspection.tolerances import dimensions_of
     from camtool.inspection.verdicts import Tolerances
-    from camtool.jobs.build import JobTables, read_job_file
     from camtool.jobs.changes import job_of_tables, merged_tables
-    from camtool.jobs.tools import Shop
 
     loaded_target, place = as_target(target), Path("job.toml" if job is None else job)
     file = JobTables() if job is None else read_job_file(place)
@@ -575,8 +571,6 @@ class Calibrated(Calibration):
     def machine_file(self) -> str:
         """TOML text for `load_target(..., machine=FILE)`: the estimates replace earlier values,
         each with its uncertainty and source in a comment."""
-        from camtool.calibration.machine_file import machine_file
-
         return machine_file(self, self.measurements, self.machine, dict(self.extends))
 
     def __str__(self) -> str:

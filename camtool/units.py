@@ -124,3 +124,13 @@ def _split(text: str, name: str) -> tuple[float, str]:
     if not math.isfinite(value):
         raise OptionError(f"{name} {text!r} is not finite")
     return value, match[3] or ""
+
+
+def clock(seconds: float) -> str:
+    """Return seconds as h:mm:ss, rounded to the second.
+
+    >>> clock(3725.4)
+    '1:02:05'
+    """
+    total = round(seconds)
+    return f"{total // 3600}:{total // 60 % 60:02d}:{total % 60:02d}"

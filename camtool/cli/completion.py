@@ -27,6 +27,7 @@ from camtool.cli import COMPLETE
 from camtool.cli.targets import flat_lines, target_items
 from camtool.errors import CamtoolError
 from camtool.pictures.layers import layer_names
+from camtool.target.registry import load_target
 
 MAX_SCANNED_BYTES = 20_000_000
 """Layers of larger drawings are not looked for: the answer would take longer than typing."""
@@ -313,8 +314,6 @@ def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """Return the keys of the machine that the line names before."""
     import msgspec
 
-    from camtool.target.registry import load_target
-
     target = ctx.params.get("target")
     if isinstance(target, str):
         values: dict[str, Any] = msgspec.to_builtins(load_target(target).machine)
@@ -325,8 +324,6 @@ def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 def _interpolators(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """Return the interpolators of the controller of the target that the line names before."""
-    from camtool.target.registry import load_target
-
     target = ctx.params.get("target")
     if isinstance(target, str):
         for name in load_target(target).interpolators:

@@ -14,6 +14,8 @@ import click
 from camtool.cli.home import BAUD
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
+from camtool.cli.wishes import Messages, UserRequests, takes_more
+from camtool.sending.line import opened_line, port_of, wire_of
 
 if TYPE_CHECKING:
     from camtool.cli.wishes import UserRequests
@@ -80,9 +82,6 @@ def console(
     echo '$$' | camtool console grbl /dev/ttyUSB0
     camtool console linuxcnc socket://localhost:5007
     """
-    from camtool.sending.line import opened_line
-    from camtool.sending.prepare import port_of, wire_of
-
     loaded_target = MachineFlags.of(target if machine is None else None, machine, settings).load()
     wire = wire_of(loaded_target)
     terminal = wire.terminal(loaded_target.machine)
@@ -95,7 +94,6 @@ class _Talk:
 
     def __init__(self, terminal: Terminal, line: OpenPort, wait_s: float, *, quiet: bool) -> None:
         self._terminal, self._line, self._wait_s = terminal, line, wait_s
-        from camtool.cli.wishes import Messages
 
         self._at_terminal = sys.stdin.isatty()
         self._lines: queue.Queue[str | None] = queue.Queue()
@@ -113,8 +111,6 @@ class _Talk:
     def run(self) -> int:
         """Run the dialogue until one side ends it; return the exit code. Any exception stops the
         machine first."""
-        from camtool.cli.wishes import UserRequests
-
         if self._at_terminal:
             self._say(f"{self._terminal.about}; Ctrl-D ends")
         wishes = UserRequests(one_s=0.0)
@@ -252,8 +248,6 @@ class _Talk:
     def _show(self, lines: list[str], *, wait: bool = False) -> None:
         """Show lines on stdout. A full pipe does not delay the dialogue, unless it is waited
         for."""
-        from camtool.cli.wishes import takes_more
-
         self._unshown += lines
         while self._shows and self._unshown and (wait or takes_more(sys.stdout)):
             try:

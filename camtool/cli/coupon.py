@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
+from camtool.calibration import coupons
+from camtool.calibration.coupons import sheet, skeleton
 from camtool.cli.files import STDOUT, check_new, check_ours, check_places, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say
@@ -89,9 +91,6 @@ def coupon(
 
     Cut them: camtool post coupon.dxf --kind engrave --start longest-line --gap 0.
     """
-    from camtool.calibration import coupons
-    from camtool.calibration.coupons import sheet, skeleton
-
     named, output = output is not None, output or "coupon.dxf"
     if output != STDOUT and PurePath(output).suffix.lower() not in DRAWINGS:
         raise click.UsageError(f"-o {output!r} ends in neither .dxf nor .svg")

@@ -16,6 +16,7 @@ from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.cli.picture_options import PictureFlags
 from camtool.cli.post import Posting, RequestedOutputs, finish, posting_options
 from camtool.records import replace
+from camtool.target.registry import filter_target
 
 BEGUN, READ, MADE, DONE = 1, 20, 95, 100
 """Percentages of the progress bar: begun, read, made and judged, written."""
@@ -38,8 +39,6 @@ def filter(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
     one. The target is linuxcnc unless --target or --machine names another one.
     """
     if posting.machine.by_default or posting.machine.name() is None:
-        from camtool.target.registry import filter_target
-
         machine = MachineFlags(filter_target(), None, posting.machine.settings)
         posting = replace(posting, machine=machine)
     _progress(BEGUN)

@@ -10,7 +10,10 @@ import click
 
 from camtool.cli.messages import say
 from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
+from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
 from camtool.errors import MachineError, OptionError
+from camtool.sending.drive import Driver, Order, Request
+from camtool.sending.line import manner_of, opened_line, port_of, wire_of
 from camtool.target.wire import Conversation, Place, WireState, place_words
 from camtool.units import parse_feed, parse_length
 
@@ -48,8 +51,6 @@ def act(
     at_mm: Place | None = None,
 ) -> int:
     """Hold the conversation of one command; return the exit code."""
-    from camtool.sending.prepare import manner_of, wire_of
-
     target = machine.load()
     wire = wire_of(target)
     if at_mm is not None and not wire.jogs_from_place:
@@ -84,11 +85,6 @@ def carried(
 ) -> str:
     """Hold a conversation to its end; return why it has failed, "" if it has not. Ctrl-C, q and
     any exception stop the machine. `is_agreed`: it goes on where it waits for the user."""
-    from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
-    from camtool.sending.drive import Driver, Order, Request
-    from camtool.sending.line import opened_line
-    from camtool.sending.prepare import port_of, wire_of
-
     opened = opened_line(port_of(port, baud, wire_of(target), target))
     with opened as line, keys_of_terminal() as key:
         wishes = UserRequests(key, {"q": Request.STOP})

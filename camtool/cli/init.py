@@ -19,6 +19,17 @@ from camtool.cli.settings import asked_settings
 from camtool.errors import MachineError, OptionError
 from camtool.project import FILE, MACHINES, NAME, names_machine, text_naming_machine, user_folder
 from camtool.tables import parse_table
+from camtool.target.contract import ControllerSetting
+from camtool.target.registry import (
+    each_target,
+    find_target,
+    list_target,
+    load_target,
+    loaded_target,
+    own_names,
+    target_names,
+)
+from camtool.target.template import machine_template
 from camtool.units import parse_feed, parse_length
 
 if TYPE_CHECKING:
@@ -65,8 +76,6 @@ AXES: dict[str, tuple[str, Callable[[str], float], str]] = {
 
 def axis_settings(flag: str, text: str) -> list[ControllerSetting]:
     """Parse `300x180x45`, or one value for X, Y and Z. OptionError for other text."""
-    from camtool.target.contract import ControllerSetting
-
     key, parse, _ = AXES[flag]
     values = [parse(part) for part in re.split(r"[x×]", text)]
     if len(values) not in (1, 3) or min(values) < 0.0:
@@ -83,8 +92,6 @@ def axis_settings(flag: str, text: str) -> list[ControllerSetting]:
 
 def spindle_setting(text: str) -> ControllerSetting:
     """Parse `10000`, `hand` or `none`."""
-    from camtool.target.contract import ControllerSetting
-
     origin, place = FLAG.format("spindle"), f"--spindle {text}"
     if text in ("hand", "none"):
         return ControllerSetting("spindle.switched", text, origin, place)
@@ -94,9 +101,6 @@ def spindle_setting(text: str) -> ControllerSetting:
 def proposals(target: str, *, switches: bool) -> list[ControllerSetting]:
     """Return default settings for milling machines that their target leaves open; `switches`: True
     if the program switches the spindle."""
-    from camtool.target.contract import ControllerSetting
-    from camtool.target.registry import find_target
-
     if not find_target(target)[0].starts_spindle:
         return []
     return [
@@ -279,14 +283,6 @@ def _controller_settings(
 ) -> tuple[str, Sequence[ControllerSetting]]:
     """Return the name of the target, and the settings of the machine that its controller
     reports."""
-    from camtool.target.registry import (
-        each_target,
-        find_target,
-        load_target,
-        own_names,
-        target_names,
-    )
-
     if port is not None:
         if target is None:
             raise click.UsageError("--port needs --target: which controller is there?")
@@ -329,9 +325,6 @@ def machine_text(
 ) -> str:
     """Return the text of the machine file. MachineError, which names the source of the value, for
     a value out of range."""
-    from camtool.target.registry import list_target, loaded_target
-    from camtool.target.template import machine_template
-
     base = list_target(target)
     text = machine_template(name, target, base.text, base.needs, given_settings)
     try:

@@ -20,6 +20,8 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
+from camtool.cli.wishes import UserRequests
+from camtool.sending.line import Port, opened_line, port_of, wire_of
 
 if TYPE_CHECKING:
     from camtool.sending.twin import PseudoTerminal
@@ -63,12 +65,9 @@ def panel(
     --port it moves a virtual machine. Ctrl-C stops the machine and ends the panel; a browser that
     is closed ends neither.
     """
-    from camtool.cli.wishes import UserRequests
     from camtool.panel.program import LoadedProgram
     from camtool.panel.server import PanelServer
     from camtool.panel.session import Session
-    from camtool.sending.line import Port, opened_line
-    from camtool.sending.prepare import port_of, wire_of
 
     target = machine.load()
     wire = wire_of(target)

@@ -36,6 +36,7 @@ from camtool.errors import CamtoolError
 from camtool.findings import Finding
 from camtool.pictures.options import points_for
 from camtool.records import replace
+from camtool.target.registry import each_target, list_target
 
 if TYPE_CHECKING:
     from camtool.pictures.scene import Scene
@@ -210,8 +211,6 @@ class SceneSource:
 def _refuse_program(source: str) -> None:
     """Raise CamtoolError when the extension of the file is that of a program and no target is
     given."""
-    from camtool.target.registry import each_target, list_target
-
     for name, listed in each_target(list_target):
         if Path(source).suffix.lower() == listed.target.extension:
             raise CamtoolError(

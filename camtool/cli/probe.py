@@ -29,7 +29,7 @@ from camtool.geometry.polylines import Segments
 from camtool.importers.read import read_drawing
 from camtool.jobs.build import job_of_file
 from camtool.pipeline import read_program
-from camtool.sending.prepare import manner_of, wire_of
+from camtool.sending.line import manner_of, wire_of
 from camtool.toolpath.probing import (
     Box,
     ProbeAnswer,

@@ -18,9 +18,20 @@ from camtool.cli.home import UNLOCK
 from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import say, say_findings, show_facts, show_text
 from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
+from camtool.cli.wishes import (
+    AtStop,
+    Messages,
+    UserRequests,
+    keys_of_terminal,
+    override_orders,
+    takes_more,
+)
 from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
-from camtool.sending.journal import read_journal
+from camtool.sending.drive import Order, Request
+from camtool.sending.journal import digest, read_journal
+from camtool.sending.line import opened_line, port_of, wire_of
+from camtool.units import clock
 
 if TYPE_CHECKING:
     from camtool.cli.wishes import AtStop
@@ -98,7 +109,7 @@ def send(
     terminal: p pauses, r goes on, s does a single block, q stops; + and - change the feed, ] and [
     the spindle by 10 %, = brings back 100 %. Exit code 1 when the program was not finished.
     """
-    from camtool.sending.prepare import consignment, lines_of, port_of, wire_of
+    from camtool.sending.prepare import consignment, lines_of
 
     if first is not None and resume:
         raise click.UsageError("--from and --resume are two beginnings; give one of them")
@@ -153,7 +164,6 @@ def send(
         raise OptionError("a real machine has only its own speed", where="--speed")
     if not yes and not _confirm():
         return 1
-    from camtool.cli.wishes import AtStop
 
     answer = None if at_stop in (None, "wait") else AtStop(at_stop or "")
     job = _Sending(program, one, target, line, place, live, resume, as_json, quiet, answer)
@@ -162,8 +172,6 @@ def send(
 
 def _find_unfinished(place: Path, data: bytes) -> JournalState | None:
     """Return the state in the journal of this program, None if there is none or it is finished."""
-    from camtool.sending.prepare import digest
-
     with suppress(InputError):
         state = read_journal(place)
         if state.sha256 == digest(data) and not state.finished:
@@ -200,8 +208,6 @@ def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
     Raises InputError for the journal of another program or another machine file, and OptionError
     if the program was finished.
     """
-    from camtool.sending.prepare import digest
-
     state = read_journal(place)
     if state.sha256 != digest(data):
         raise InputError(
@@ -273,15 +279,7 @@ class _Sending:
 
     def run(self, *, single: bool, home: bool, unlock: bool, speed: float, yes: bool) -> int:
         """Send the program; return the exit code."""
-        from camtool.cli.wishes import (
-            Messages,
-            UserRequests,
-            keys_of_terminal,
-            override_orders,
-        )
         from camtool.sending.carry import SendOptions, carry_program, program_conversation
-        from camtool.sending.drive import Order, Request
-        from camtool.sending.line import opened_line
         from camtool.sending.live import LivePage
 
         one = self.one
@@ -358,9 +356,6 @@ class _Sending:
 
     def _watch(self, conversation: Conversation) -> None:
         """Show the state of the conversation when it has changed."""
-        from camtool.cli.wishes import takes_more
-        from camtool.verification.report import clock
-
         block = (
             self.one.block_of(self.one.packets[conversation.acknowledged - 1].block)
             if (conversation.acknowledged)
@@ -398,8 +393,6 @@ class _Sending:
     def _show_page(self, conversation: Conversation, left_s: float) -> None:
         """Update the live page, once a second and when the state changes. A page that cannot be
         written is given up: the machine is not stopped for it."""
-        from camtool.verification.report import clock
-
         state, time_s = conversation.state.value, time.monotonic()
         if self._page is None:
             return

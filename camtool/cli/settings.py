@@ -14,7 +14,7 @@ from camtool.cli.options import MachineFlags, SectionedCommand, machine_options,
 from camtool.cli.probe import asked_to_begin
 from camtool.errors import InputError, MachineError, OptionError
 from camtool.plain import one_line
-from camtool.sending.prepare import manner_of, wire_of
+from camtool.sending.line import manner_of, wire_of
 from camtool.target.registry import LoadedTarget
 from camtool.target.wire import NoWire
 

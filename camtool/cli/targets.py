@@ -19,6 +19,9 @@ from camtool.plain import one_line, to_json
 from camtool.project import project_of
 from camtool.tables import parse_table
 from camtool.target.contract import ControllerSetting
+from camtool.target.loader import extended_by
+from camtool.target.registry import each_target, find_target, list_target, loaded_target, own_names
+from camtool.target.template import machine_template
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -109,9 +112,6 @@ def new(
     it, and what it leaves open is asked; --extends alone asks for the dialect where TARGET is one
     whose dialect a file describes.
     """
-    from camtool.target.registry import find_target, list_target
-    from camtool.target.template import machine_template
-
     data = b"" if from_program is None else read_bytes(from_program) or b"\n"
     if extends is None:
         if from_program is None:
@@ -152,8 +152,6 @@ def new(
 
 def _described_by_files() -> str:
     """Return the target whose dialect machine files describe."""
-    from camtool.target.registry import each_target, find_target, own_names
-
     found_targets = each_target(find_target, names=own_names())
     return next(name for name, (each, _) in found_targets if each.dialect_from(b"") is not None)
 
@@ -201,8 +199,6 @@ def setting_of(text: str) -> ControllerSetting:
 def loaded_machine(text: str, file: str, extends: str) -> LoadedTarget:
     """Return the target of the text of a machine file; MachineError where it contradicts
     itself."""
-    from camtool.target.registry import loaded_target
-
     return loaded_target(extends, (parse_table(text), file))
 
 
@@ -229,8 +225,6 @@ def target_items(incomplete: str) -> Iterator[CompletionItem]:
     """Return the machines, each with its title."""
     from click.shell_completion import CompletionItem
 
-    from camtool.target.registry import each_target, list_target
-
     for name, listed in each_target(list_target, prefix=incomplete):
         yield CompletionItem(name, help=listed.target.title)
     for row in _own_machines([]):
@@ -239,8 +233,6 @@ def target_items(incomplete: str) -> Iterator[CompletionItem]:
 
 
 def _list(as_json: bool) -> None:
-    from camtool.target.registry import each_target, list_target
-
     rows: list[dict[str, Any]] = []
     broken: list[CamtoolError] = []
     for name, listed in each_target(list_target, broken=broken):
@@ -281,8 +273,6 @@ def _list(as_json: bool) -> None:
 
 def _own_machines(broken: list[CamtoolError]) -> Iterator[dict[str, Any]]:
     """Return the user's machines as rows; errors are appended to `broken`."""
-    from camtool.target.loader import extended_by
-
     try:
         project = project_of(Path.cwd())
         default = project.machine

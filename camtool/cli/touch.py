@@ -20,7 +20,7 @@ from camtool.cli.options import (
 )
 from camtool.cli.probe import JOURNAL, asked_to_begin, check_sizes, journaled
 from camtool.errors import OptionError
-from camtool.sending.prepare import manner_of, wire_of
+from camtool.sending.line import manner_of, wire_of
 from camtool.toolpath import probing
 from camtool.toolpath.probing import Axis, Measured, Place, ProbeScript, Touch
 

@@ -13,6 +13,8 @@ from camtool.cli.files import check_new
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.errors import OptionError, OutputError
+from camtool.sending.faults import Faults, WiredTwin
+from camtool.sending.twin import Clock, PseudoTerminal, TcpPort, TwinPort, serve
 
 if TYPE_CHECKING:
     from camtool.target.twin import Twin, TwinTrace
@@ -93,9 +95,6 @@ def twin(
     camtool twin grbl --tcp 5007 --speed max
     camtool twin pic-mmh --assume echo=character --fault drop=0.001 --trace slides.csv
     """
-    from camtool.sending.faults import Faults, WiredTwin
-    from camtool.sending.twin import Clock, PseudoTerminal, TcpPort, TwinPort, serve
-
     name = target if machine is None else None
     loaded_target = MachineFlags.of(name, machine, settings).load()
     virtual = loaded_target.twin(assume)

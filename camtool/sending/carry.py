@@ -17,8 +17,8 @@ from camtool.errors import OutputError
 from camtool.records import replace
 from camtool.sending.drive import Driver, LineToController, Wish, counts_of
 from camtool.sending.journal import Journal
-from camtool.sending.line import Port
-from camtool.sending.prepare import Consignment, manner_of
+from camtool.sending.line import Port, manner_of
+from camtool.sending.prepare import Consignment
 from camtool.target.wire import LATE_S, Conversation, WireState
 
 if TYPE_CHECKING:

@@ -15,6 +15,7 @@ something of the new one is sent.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import time
@@ -207,3 +208,8 @@ def _head(row: bytes) -> _Head | None:
     if head.journal != VERSION:
         raise InputError("is a journal of another camtool")
     return head
+
+
+def digest(data: bytes) -> str:
+    """Return the SHA-256 of the data, hexadecimal."""
+    return hashlib.sha256(data).hexdigest()

@@ -14,13 +14,16 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from msgspec import Struct
 
-from camtool.errors import InputError
+from camtool.errors import InputError, MachineError, OptionError
 from camtool.lock import held
-from camtool.target.wire import port_fault
+from camtool.target.wire import Manner, NoWire, Wire, port_fault
+
+if TYPE_CHECKING:
+    from camtool.target.registry import LoadedTarget
 
 WRITE_S: Final = 10.0
 """Time limit of a write, after which the port counts as stuck."""
@@ -164,3 +167,36 @@ def list_serial_ports() -> list[SerialPort]:
 
 def _known_text(text: str | None) -> str:
     return "" if text in (None, "n/a") else str(text)
+
+
+def wire_of(target: LoadedTarget) -> Wire:
+    """Return the wire of a machine; MachineError with the reason and an alternative if it has
+    none."""
+    wire = target.target.wire()
+    if isinstance(wire, NoWire):
+        name = target.machine.target.name
+        raise MachineError(f"camtool does not drive {name}: {wire.why}", mend=wire.mend)
+    return wire
+
+
+def manner_of(target: LoadedTarget, **choices: Any) -> Manner:
+    """Return the settings of a conversation; MachineError for those that the controller has no
+    command for."""
+    if choices.get("unlock") and not wire_of(target).unlocks:
+        raise MachineError(
+            f"{target.machine.target.name} has no command to unlock over its line",
+            where="--unlock",
+            mend="leave it out",
+        )
+    return Manner(**choices)
+
+
+def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Port:
+    """Return the port of that name with the given rate, or else that of the wire or of the machine
+    file; OptionError if the port needs a rate and none is known."""
+    link = target.machine.link
+    rate = baud or wire.baud or (round(link.baud) if link.baud else None)
+    port = Port(name, rate, wire.frame)
+    if rate is None and not port.is_virtual:
+        raise OptionError("the rate of the port is not known", where="--baud", mend="give it")
+    return port

@@ -6,7 +6,6 @@ This module opens no port and reads no file.
 
 from __future__ import annotations
 
-import hashlib
 import math
 import re
 from collections.abc import Sequence
@@ -22,14 +21,12 @@ from camtool.errors import MachineError, OptionError, PostError, ProgramError
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.pipeline import Judging, read_program, verify_program
 from camtool.records import replace
-from camtool.sending.journal import JournalState
-from camtool.sending.line import Port
+from camtool.sending.journal import JournalState, digest
+from camtool.sending.line import wire_of
 from camtool.simulation.motion import Ledger, Options, still_ledger
 from camtool.target.wire import (
     Conversation,
     Forecast,
-    Manner,
-    NoWire,
     Packet,
     Place,
     ResumePoint,
@@ -39,7 +36,7 @@ from camtool.target.wire import (
 )
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import COLUMNS, Kind, PolarArcs, Toolpath, toolpath_extents
-from camtool.verification.report import clock
+from camtool.units import clock
 
 if TYPE_CHECKING:
     from camtool.progress import Progress
@@ -136,44 +133,6 @@ class Consignment(Struct, frozen=True, eq=False):
         return (
             sent_block if self.rest is None or sent_block < 0 else int(self.rest.done[sent_block])
         )
-
-
-def digest(data: bytes) -> str:
-    """Return the SHA-256 of the data, hexadecimal."""
-    return hashlib.sha256(data).hexdigest()
-
-
-def wire_of(target: LoadedTarget) -> Wire:
-    """Return the wire of a machine; MachineError with the reason and an alternative if it has
-    none."""
-    wire = target.target.wire()
-    if isinstance(wire, NoWire):
-        name = target.machine.target.name
-        raise MachineError(f"camtool does not drive {name}: {wire.why}", mend=wire.mend)
-    return wire
-
-
-def manner_of(target: LoadedTarget, **choices: Any) -> Manner:
-    """Return the settings of a conversation; MachineError for those that the controller has no
-    command for."""
-    if choices.get("unlock") and not wire_of(target).unlocks:
-        raise MachineError(
-            f"{target.machine.target.name} has no command to unlock over its line",
-            where="--unlock",
-            mend="leave it out",
-        )
-    return Manner(**choices)
-
-
-def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Port:
-    """Return the port of that name with the given rate, or else that of the wire or of the machine
-    file; OptionError if the port needs a rate and none is known."""
-    link = target.machine.link
-    rate = baud or wire.baud or (round(link.baud) if link.baud else None)
-    port = Port(name, rate, wire.frame)
-    if rate is None and not port.is_virtual:
-        raise OptionError("the rate of the port is not known", where="--baud", mend="give it")
-    return port
 
 
 def check_settings(data: bytes, target: LoadedTarget, file: str) -> None:

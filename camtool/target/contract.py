@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import msgspec
 from msgspec import Struct
@@ -39,8 +39,12 @@ class NoDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The `[dialect]` of a target without options of its own."""
 
 
-class NoTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The settings of a virtual controller whose wire is known completely."""
+class TwinKind(NamedTuple):
+    """The virtual controllers of a target: the record of what the sources of its wire leave open,
+    whose defaults are ours, and the class that is made with a machine and this record."""
+
+    settings: type[Struct]
+    make: Callable[[Any, Any], Twin]
 
 
 NEAR_RATIO = 1e-6
@@ -230,11 +234,7 @@ class Target(ABC):
         cannot be."""
         return None
 
-    def twin_settings(self) -> type[msgspec.Struct]:
-        """Return the record of what the sources of its wire leave open; its defaults are ours."""
-        return NoTwinSettings
-
-    def twin(self, machine: Machine[Any, Any], settings: Any) -> Twin:
-        """Return the virtual controller, set up as `twin_settings` say; MachineError, which
-        says why, for a target that has none."""
+    def twin_kind(self) -> TwinKind:
+        """Return the virtual controllers of the target; MachineError, which says why, for one that
+        has none."""
         raise MachineError(f"{self.name} has no virtual controller: {self.no_twin}")

@@ -144,25 +144,26 @@ class LoadedTarget:
         """The virtual controller of this machine, with `key=value` of what its sources leave open.
         MachineError where there is none, OptionError, which lists what can be chosen, for a choice
         that there is not."""
-        if isinstance(self.machine.controller, PathController):
+        has_twin = type(self.target).twin_kind is not Target.twin_kind
+        if has_twin and isinstance(self.machine.controller, PathController):
             raise MachineError(
                 "a virtual controller needs the model of the real one",
                 where="table [controller], key model",
                 mend=f'leave model = "path" out: its own is {self.target.name}',
             )
-        record = self.target.twin_settings()
+        kind = self.target.twin_kind()
         given_choices = dict(choice.partition("=")[::2] for choice in choices)
         try:
-            choices_made = msgspec.convert(given_choices, record, strict=False)
+            choices_made = msgspec.convert(given_choices, kind.settings, strict=False)
         except msgspec.ValidationError as error:
-            listed = "; ".join(f"{name}={value}" for name, value in choices_of(record))
+            listed = "; ".join(f"{name}={value}" for name, value in choices_of(kind.settings))
             raise OptionError(
                 f"{', '.join(choices)}: {error}",
                 mend=f"there are (the first is ours): {listed}"
                 if listed
                 else "there is no choice",
             ) from None
-        return self.target.twin(self.machine, choices_made)
+        return kind.make(self.machine, choices_made)
 
     def with_settings(self, settings: Sequence[str]) -> LoadedTarget:
         """The target with further `key.key=value` settings; MachineError names a wrong one."""

@@ -10,7 +10,8 @@ import numpy as np
 from camtool.arrays import Bools, Floats
 from camtool.plain import to_json as json_text
 from camtool.simulation.motion import Chunk
-from camtool.verification.report import Report, clock
+from camtool.units import clock
+from camtool.verification.report import Report
 from camtool.verification.verify import Verification
 
 

@@ -28,7 +28,7 @@ from camtool.plain import one_line, to_json
 from camtool.planning.naming import range_words
 from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
-from camtool.units import UM_PER_MM
+from camtool.units import UM_PER_MM, clock
 from camtool.verification.findings import (
     ABOVE_GATE,
     ABOVE_GATE_ENGAGEMENT,
@@ -672,16 +672,6 @@ def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
 MAX_OPERATIONS = 24
 
 COOLANT_WORDS = {"off": "", "mist": ", mist", "flood": ", flood", "both": ", mist and flood"}
-
-
-def clock(seconds: float) -> str:
-    """Return seconds as h:mm:ss, rounded to the second.
-
-    >>> clock(3725.4)
-    '1:02:05'
-    """
-    total = round(seconds)
-    return f"{total // 3600}:{total // 60 % 60:02d}:{total % 60:02d}"
 
 
 def duration(seconds: float) -> str:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import ControllerSetting, Target
+from camtool.target.contract import ControllerSetting, Target, TwinKind
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
 from ..gcode.meanings import MEANINGS
@@ -14,13 +14,12 @@ from .dialect import GrblController, GrblDialect, GrblMachine
 from .findings import CODES
 
 if TYPE_CHECKING:
-    from camtool.machine.model import Axis, Machine
+    from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import GrblModel
     from .signals import GrblSignals
-    from .twin import GrblTwin, GrblTwinSettings
     from .wire import GrblWire
 
 
@@ -101,19 +100,11 @@ class Grbl(Target):
 
         return listing(data)
 
-    def twin_settings(self) -> type[GrblTwinSettings]:
-        """Return the record that sets up a virtual grbl."""
-        from .twin import GrblTwinSettings
-
-        return GrblTwinSettings
-
-    def twin(
-        self, machine: Machine[GrblController, GrblDialect], settings: GrblTwinSettings
-    ) -> GrblTwin:
+    def twin_kind(self) -> TwinKind:
         """The virtual controller; docs/wires/grbl.md."""
-        from .twin import GrblTwin
+        from .twin import GrblTwin, GrblTwinSettings
 
-        return GrblTwin(machine, settings)
+        return TwinKind(GrblTwinSettings, GrblTwin)
 
 
 POST = Grbl()

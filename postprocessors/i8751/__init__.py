@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target
+from camtool.target.contract import Target, TwinKind
 
 from .dialect import I8751Controller, I8751Dialect, I8751Link, I8751Machine, check
 
 if TYPE_CHECKING:
-    from camtool.machine.model import Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import I8751Model
     from .signals import I8751Signals
-    from .twin import I8751Twin, I8751TwinSettings
     from .wire import I8751Wire
 
 
@@ -70,19 +68,11 @@ class I8751(Target):
 
         return I8751Wire()
 
-    def twin_settings(self) -> type[I8751TwinSettings]:
-        """Return the class of settings for what the thesis leaves open of the serial protocol."""
-        from .twin import I8751TwinSettings
-
-        return I8751TwinSettings
-
-    def twin(
-        self, machine: Machine[I8751Controller, I8751Dialect], settings: I8751TwinSettings
-    ) -> I8751Twin:
+    def twin_kind(self) -> TwinKind:
         """The virtual controller; docs/wires/i8751.md."""
-        from .twin import I8751Twin
+        from .twin import I8751Twin, I8751TwinSettings
 
-        return I8751Twin(machine, settings)
+        return TwinKind(I8751TwinSettings, I8751Twin)
 
     def line_bytes(self, data: bytes, machine: I8751Machine) -> int:
         """The bytes of the packets, whatever the form of the file."""

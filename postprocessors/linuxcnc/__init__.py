@@ -6,7 +6,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import ControllerSetting, Target
+from camtool.target.contract import ControllerSetting, Target, TwinKind
 from camtool.target.signals import NoSignals
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
@@ -17,12 +17,11 @@ from .findings import CODES
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from camtool.machine.model import Axis, Machine
+    from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import LinuxcncModel
-    from .twin import LinuxcncTwin, LinuxcncTwinSettings
     from .wire import LinuxcncWire
 
 
@@ -85,19 +84,11 @@ class Linuxcnc(Target):
 
         return LinuxcncWire()
 
-    def twin_settings(self) -> type[LinuxcncTwinSettings]:
-        """Return the record that sets up a virtual LinuxCNC."""
-        from .twin import LinuxcncTwinSettings
-
-        return LinuxcncTwinSettings
-
-    def twin(
-        self, machine: Machine[LinuxcncController, LinuxcncDialect], settings: LinuxcncTwinSettings
-    ) -> LinuxcncTwin:
+    def twin_kind(self) -> TwinKind:
         """The virtual controller; docs/wires/linuxcnc.md."""
-        from .twin import LinuxcncTwin
+        from .twin import LinuxcncTwin, LinuxcncTwinSettings
 
-        return LinuxcncTwin(machine, settings)
+        return TwinKind(LinuxcncTwinSettings, LinuxcncTwin)
 
     def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""

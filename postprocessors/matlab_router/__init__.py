@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from camtool.target.contract import Target
+from camtool.target.contract import Target, TwinKind
 from camtool.target.signals import NoSignals
 
 from .dialect import (
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import MatlabRouterModel
-    from .twin import MatlabRouterTwin, MatlabRouterTwinSettings
     from .wire import MatlabRouterWire
 
 
@@ -106,21 +105,11 @@ class MatlabRouter(Target):
 
         return rest_of(data, machine, first)
 
-    def twin_settings(self) -> type[MatlabRouterTwinSettings]:
-        """Return the record of what its thesis leaves open of the wire."""
-        from .twin import MatlabRouterTwinSettings
-
-        return MatlabRouterTwinSettings
-
-    def twin(
-        self,
-        machine: Machine[MatlabRouterController, MatlabRouterDialect],
-        settings: MatlabRouterTwinSettings,
-    ) -> MatlabRouterTwin:
+    def twin_kind(self) -> TwinKind:
         """The virtual controller; docs/wires/matlab-router.md."""
-        from .twin import MatlabRouterTwin
+        from .twin import MatlabRouterTwin, MatlabRouterTwinSettings
 
-        return MatlabRouterTwin(machine, settings)
+        return TwinKind(MatlabRouterTwinSettings, MatlabRouterTwin)
 
     def listing(self, data: bytes, machine: MatlabRouterMachine) -> Listing:
         """The columns of the arrays that each block is."""

@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, get_args
 
-from camtool.target.contract import Target
+from camtool.target.contract import Target, TwinKind
 
 from .dialect import Interpolator, PicMmhController, PicMmhDialect, PicMmhLink, PicMmhMachine
 
 if TYPE_CHECKING:
-    from camtool.machine.model import Axis, Machine
+    from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import PicMmhModel
     from .signals import PicMmhSignals
-    from .twin import PicMmhTwin, PicMmhTwinSettings
     from .wire import PicMmhWire
 
 MEANINGS: Final[Mapping[str, str]] = {"G90": "positions are absolute"}
@@ -86,19 +85,11 @@ class PicMmh(Target):
             line += block.count("\n")
         return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks), lines=tuple(lines))
 
-    def twin_settings(self) -> type[PicMmhTwinSettings]:
-        """Return the record of what its thesis leaves open of the wire."""
-        from .twin import PicMmhTwinSettings
-
-        return PicMmhTwinSettings
-
-    def twin(
-        self, machine: Machine[PicMmhController, PicMmhDialect], settings: PicMmhTwinSettings
-    ) -> PicMmhTwin:
+    def twin_kind(self) -> TwinKind:
         """The virtual controller; docs/wires/pic-mmh.md."""
-        from .twin import PicMmhTwin
+        from .twin import PicMmhTwin, PicMmhTwinSettings
 
-        return PicMmhTwin(machine, settings)
+        return TwinKind(PicMmhTwinSettings, PicMmhTwin)
 
 
 POST = PicMmh()

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target
+from camtool.target.contract import Target, TwinKind
 
 from ..gcode.meanings import MEANINGS
 from .dialect import ValcncController, ValcncDialect, ValcncLink, ValcncMachine, check, scales_of
 
 if TYPE_CHECKING:
-    from camtool.machine.model import Axis, Machine
+    from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import ValcncModel
     from .signals import ValcncSignals
-    from .twin import ValcncTwin, ValcncTwinSettings
     from .wire import ValcncWire
 
 
@@ -72,19 +71,11 @@ class Valcnc(Target):
 
         return ValcncWire()
 
-    def twin_settings(self) -> type[ValcncTwinSettings]:
-        """Return the record of what its thesis leaves open of the wire."""
-        from .twin import ValcncTwinSettings
-
-        return ValcncTwinSettings
-
-    def twin(
-        self, machine: Machine[ValcncController, ValcncDialect], settings: ValcncTwinSettings
-    ) -> ValcncTwin:
+    def twin_kind(self) -> TwinKind:
         """The virtual controller; docs/wires/valcnc.md."""
-        from .twin import ValcncTwin
+        from .twin import ValcncTwin, ValcncTwinSettings
 
-        return ValcncTwin(machine, settings)
+        return TwinKind(ValcncTwinSettings, ValcncTwin)
 
     def listing(self, data: bytes, machine: ValcncMachine) -> Listing:
         """Return the texts of the lines that are blocks, for pages that show them."""

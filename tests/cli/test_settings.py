@@ -136,7 +136,7 @@ def test_a_setting_that_is_refused_says_what_was_written(tmp_path: Path) -> None
             return
             yield
 
-    twin = Refusing(loaded.machine, loaded.target.twin_settings()())
+    twin = Refusing(loaded.machine, loaded.target.twin_kind().settings())
     code, said = restored(twin, tmp_path)
     assert code == 1, said
     assert "error:3 to $111=700" in said

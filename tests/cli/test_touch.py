@@ -267,7 +267,7 @@ class Deaf(GrblTwin):
 )
 def test_a_report_that_is_lost_or_garbled_sets_no_zero(report: str, why: str) -> None:
     loaded = load_target("grbl")
-    settings = loaded.target.twin_settings()(probe_mm=-3.0)
+    settings = loaded.target.twin_kind().settings(probe_mm=-3.0)
     twin = Deaf(loaded.machine, settings)
     twin.report = report
     with hosted(twin, SPEED) as port:

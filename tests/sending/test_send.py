@@ -25,8 +25,8 @@ from serial import SerialException
 from camtool.cli.life_signs import LifeSigns
 from camtool.errors import InputError, OptionError
 from camtool.progress import Progress
-from camtool.sending.journal import Journal, read_journal
-from camtool.sending.prepare import consignment, digest, rest_of
+from camtool.sending.journal import Journal, digest, read_journal
+from camtool.sending.prepare import consignment, rest_of
 from camtool.target.registry import load_target
 from camtool.target.wire import port_fault
 from tests.postprocessors.grbl.test_wire import PROGRAM, Small

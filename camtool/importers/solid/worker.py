@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from camtool.errors import CamtoolError, DrawingError, GeometryError
-from camtool.importers.solid.bodies import Body, is_missing
+from camtool.importers.solid.bodies import Body, is_missing, load_brep, load_step, run_script
 from camtool.importers.solid.outline import Outlines, outlines
 
 _DAMAGED = "cannot be read: its structure is damaged"
@@ -93,10 +93,7 @@ def _is_of_kernel(error: Exception) -> bool:
 
 def _bodies(request: dict[str, Any]) -> list[Body]:
     if request["kind"] == "script":
-        from camtool.importers.solid.bodies import run_script
-
         return run_script(Path(request["source"]).read_bytes(), request["file"])
-    from camtool.importers.solid.bodies import load_brep, load_step
 
     load = load_step if request["kind"] == "step" else load_brep
     bodies = load(request["source"])
