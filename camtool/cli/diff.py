@@ -86,7 +86,7 @@ def diff(
         raise click.UsageError("--max-difference must be above 0")
 
     from camtool.cli.difference import (
-        Side,
+        ComparedSide,
         difference_facts,
         difference_page,
         difference_picture,
@@ -96,8 +96,8 @@ def diff(
 
     other = MachineFlags.of(other_target, other_machine, ()) if is_other else machine
     sides = [
-        Side(first, machine, job, drawing),
-        Side(
+        ComparedSide(first, machine, job, drawing),
+        ComparedSide(
             first if second is None else second,
             other,
             job if other_job is None else replace(job, file=other_job),

@@ -22,7 +22,7 @@ from camtool.target.registry import LoadedTarget
 from camtool.units import UM_PER_MM
 
 
-class Side:
+class ComparedSide:
     """A side of the comparison: a file, its machine and its job."""
 
     def __init__(

@@ -139,3 +139,15 @@ def test_what_a_plug_in_raises_is_its_own_fault(monkeypatch: pytest.MonkeyPatch)
     assert not hasattr(post, "listing")
     again = pickle.loads(pickle.dumps(registry.Guarded(len, "builtins:len")))
     assert again.__self__ is not None
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("haas", "only its language is described"), ("klipper", "only its language is described")],
+)
+def test_a_target_without_a_virtual_controller_says_why(name: str, reason: str) -> None:
+    with pytest.raises(MachineError, match=reason):
+        load_target(name).twin()
+    path_alone = load_target("grbl").with_settings(["controller.model=path"])
+    with pytest.raises(MachineError, match="its own is grbl"):
+        path_alone.twin()
