@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from contextvars import ContextVar
 from dataclasses import dataclass
+
+STEPS = 100
+"""Steps in which the share of a long part of a stage is told, rounded down: only all is 100 %."""
 
 
 @dataclass
 class Progress:
     """The stage of a run, in words that follow "camtool:", and its `done` parts out of `count`
-    (0 if unknown). It has one writer and many readers, in other threads."""
+    (0 if unknown). It has one writer and many readers, in other threads. Work deep inside a stage
+    tells of it by `tell_share`."""
 
     stage: str = ""
     done: int = 0
@@ -16,6 +21,7 @@ class Progress:
 
     def begin(self, stage: str, count: int = 0) -> None:
         """Begin the next stage."""
+        _CURRENT.set(self)
         self.count = 0  # first, since another thread may read it at any time
         self.stage, self.done = stage, 0
         self.count = count
@@ -25,3 +31,28 @@ class Progress:
         """Share of the stage that is done, 0 to 1; None if unknown."""
         count = self.count
         return min(self.done / count, 1.0) if count else None
+
+    @property
+    def outer_stage(self) -> str:
+        """The stage without the part of it that is told."""
+        return self.stage.split(" – ", 1)[0]
+
+
+_CURRENT: ContextVar[Progress | None] = ContextVar("progress", default=None)
+"""The progress of which a stage began last in this thread."""
+
+
+def tell_share(part: str, share: float | None) -> None:
+    """Tell that a part of the present stage, in words, is done by a share, 0 to 1; None: it has
+    ended. Nobody need listen."""
+    progress = _CURRENT.get()
+    if progress is None:
+        return
+    stage = progress.outer_stage
+    if share is None:
+        progress.begin(stage)
+        return
+    words = f"{stage} – {part}" if stage else part
+    if progress.stage != words:
+        progress.begin(words, STEPS)
+    progress.done = int(share * STEPS)

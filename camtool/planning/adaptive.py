@@ -46,6 +46,7 @@ from camtool.planning.items import CutRun, Setting
 from camtool.planning.job import Operation
 from camtool.planning.paths import MeasuredPath
 from camtool.planning.ramps import feeds_along, helix
+from camtool.progress import tell_share
 
 NO_AIR = Polylines.of([])
 
@@ -195,6 +196,7 @@ def fronts(
     opening, widest = openings_mm
     before = offset_shape(clear, -UNION_MM)
     number, grows = 0, True
+    first_mm2, last_mm2 = (float(signed_areas(each).sum()) for each in (before, region))
     while opening > CORNER_SHARE * tool_mm and number < MAX_FRONTS:
         step = front_step(PLANNED_SHARE * limit, opening, tool_mm)
         growth = MIN_GROWTH_SHARE * math.pi * min(opening, tool_mm) ** 2
@@ -215,6 +217,8 @@ def fronts(
                     fit_mm = FIT_SHARE * min(tool_mm, FIT_OPENINGS * opening)
                     yield FrontStroke(_smooth(piece, fit_mm), number, opening)
             before = after
+            cleared_mm2 = float(signed_areas(before).sum()) - first_mm2
+            tell_share("fronts", cleared_mm2 / max(last_mm2 - first_mm2, cleared_mm2))
             if grows and len(offset_shape(before, next_mm + UNION_MM)):
                 break
         if not grows:
@@ -405,7 +409,8 @@ class _Clearing:
             legs, tool = [Leg(first)], ends_of(first)[1]
         waits, followers = self.older_ones()
         starts = np.array([[begin.x, begin.y] for begin, _ in self.poses])
-        ready = {number for number, count in enumerate(waits) if count == 0}
+        ready = {number for number, older in enumerate(waits) if older == 0}
+        count = 0
         while ready:
             numbers = np.array(sorted(ready))
             if tool is not None:
@@ -423,10 +428,13 @@ class _Clearing:
             self.cleared.add(self.moves(stroke.vertices))
             tool = self.poses[number][1]
             ready.remove(number)
+            count += 1
+            tell_share("links", count / len(self.strokes))
             for follower in followers[number]:
                 waits[follower] -= 1
                 if waits[follower] == 0:
                     ready.add(follower)
+        tell_share("links", None)
         if legs:
             yield legs
 

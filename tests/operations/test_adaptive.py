@@ -19,6 +19,7 @@ from camtool.operations.pocket import engagement
 from camtool.planning.adaptive import Pose, chords, ends_of, step_for, tangent_link
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
+from camtool.progress import Progress
 from tests.oracles.contours import CIRCLE, SQUARE, closed
 from tests.oracles.swept import complaints
 from tests.paths import mirrored, moved, scaled
@@ -229,3 +230,28 @@ def test_the_limit_is_proved_on_the_predicted_slides(tmp_path: Path) -> None:
         names.append({finding.code.name for finding in run.findings})
     assert "ENGAGEMENT_KEPT" in names[0]
     assert "ENGAGEMENT_TOO_HIGH" in names[1]
+
+
+def test_planning_tells_which_share_is_cleared_and_linked() -> None:
+    """Both parts of the stage grow, and end at all; then the stage is that of before."""
+    told: list[tuple[str, float]] = []
+
+    class Told(Progress):
+        def __setattr__(self, name: str, value: object) -> None:
+            super().__setattr__(name, value)
+            if name == "done" and self.share:
+                told.append((self.stage, self.share))
+
+    progress = Told()
+    progress.begin("planning")
+    adaptive(QUICK["square"], 1.3, math.acos(1.0 - 2.0 * 0.2))
+    assert list(dict.fromkeys(stage for stage, _ in told)) == [
+        "planning – fronts",
+        "planning – links",
+    ]
+    for part in ("fronts", "links"):
+        shares = [share for stage, share in told if stage.endswith(part)]
+        assert shares == sorted(shares)
+        assert len(set(shares)) > 5
+        assert 0.97 <= shares[-1] <= 1.0
+    assert (progress.stage, progress.share) == ("planning", None)
