@@ -1,8 +1,10 @@
 """LinuxCNC's own interpreter as the referee: what `rs274 -g` makes of a program must be what our
 readers make of it, and what our writers were given. Skipped where LinuxCNC is not installed."""
 
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given
 
@@ -14,7 +16,8 @@ from camtool.planning.plan import plan
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.oracles.rs274 import compare, interpreted, motions, needs_rs274, run_rs274
+from tests.operations import adaptive_programs
+from tests.oracles.rs274 import NO_LENGTHS, compare, interpreted, motions, needs_rs274, run_rs274
 from tests.postprocessors.gcode.parts import part, toolpaths
 from tests.strategies import examples
 
@@ -65,6 +68,19 @@ def test_the_logo(name: str, tmp_path: Path) -> None:
     drawing = read_drawing(Path(__file__).parents[3] / "samples" / "logo.dxf")
     program = target.target.write(plan(drawing, job_of(), target.machine), target.machine)
     compare(target.target.read(program.data, target.machine), program.data, tmp_path)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("shape", adaptive_programs.SHAPES)
+def test_adaptive_pockets(shape: str, name: str, tmp_path: Path) -> None:
+    """Hundreds of short arcs: none is refused, and all end where they should."""
+    paths = adaptive_programs.SHAPES[shape]
+    run = adaptive_programs.posted(paths, 1.7, math.radians(65.0), name, tmp_path)
+    assert sum(run.decoded.is_arc) > 300
+    compare(run.decoded, run.data, tmp_path)
+    ends = motions(interpreted(run.data, tmp_path, table=NO_LENGTHS))[:, 1:4]
+    wanted = run.wanted.end[run.wanted.is_motion]
+    np.testing.assert_allclose(ends[-1], wanted[-1], atol=2e-3)
 
 
 @pytest.mark.parametrize("name", TARGETS)

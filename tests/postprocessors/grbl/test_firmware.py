@@ -9,6 +9,7 @@ before the first one of a program (its start is where its first frame says).
 
 from __future__ import annotations
 
+import math
 import random
 import re
 import shutil
@@ -25,6 +26,7 @@ from camtool.errors import ProgramError
 from camtool.simulation.motion import IDEAL, Options
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from tests.operations import adaptive_programs
 from tests.oracles.grbl_firmware import Ran, Sent, built, factory, played, run, source
 from tests.oracles.motion_rows import rows_of
 from tests.targets import simulate
@@ -185,6 +187,17 @@ def test_steps_and_times(firmware: Callable[..., Ran], seed: int) -> None:
     found = np.rint(places / [1 / steps, 0.004, 0.004]).astype(np.int64)
     np.testing.assert_array_equal(found, plain.steps)
     assert abs(seconds - smooth.seconds) <= max(TIME_S, TIME_PART * smooth.seconds), text
+
+
+@pytest.mark.parametrize("shape", adaptive_programs.SHAPES)
+def test_adaptive_pockets(firmware: Callable[..., Ran], shape: str, tmp_path: Path) -> None:
+    """Every block is taken, and all steps are those of the model."""
+    paths = adaptive_programs.SHAPES[shape]
+    data = adaptive_programs.posted(paths, 1.7, math.radians(65.0), "grbl", tmp_path).data
+    ran = firmware(data.decode(), {"$1": 25.0})
+    assert not any(ran.errors)
+    places, _ = model(data.decode())
+    np.testing.assert_array_equal(np.rint(places / 0.004).astype(np.int64), ran.steps)
 
 
 PIECE_BYTES, PIECE_S = 60, 0.02
