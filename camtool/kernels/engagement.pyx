@@ -223,7 +223,8 @@ cdef double _greatest(
 
 
 cdef double _all_round(Cleared self, double* move, double thick) noexcept nogil:
-    """The angle of the whole circle of a tool that goes straight down or up in which it cuts."""
+    """The angle of the whole circle of a tool that goes straight down in which it cuts. What the
+    tool has cleared on the last of its way counts as wider too: it may go down where it was."""
     cdef double aside[COLUMNS]
     cdef double angle = 0.0
     cdef int k, side
@@ -232,7 +233,7 @@ cdef double _all_round(Cleared self, double* move, double thick) noexcept nogil:
             aside[k] = move[k]
         aside[BX], aside[BY] = move[AX] + side, move[AY]
         aside[ASKEW] = aside[ASKEW_END] = 0.0
-        angle += _open_angle(self, aside, 1.0, 0.0, 0.0, thick, thick)
+        angle += _open_angle(self, aside, 1.0, 0.0, 0.0, 2.0 * thick, thick)
     return angle
 
 

@@ -105,13 +105,10 @@ class Scene:
     def engagement(self) -> Engagement | None:
         """The engagement of the tools along the moves that cut the stock, computed once; None
         without moves, and where the tools are not known."""
-        from camtool.stock.engagement import engagement_of
-
         if self.cut is None or self.toolpath is None:
             return None
         with suppress(OptionError):
-            pair = self.cut()
-            return engagement_of(pair.moves, self.toolpath, pair.box_mm if pair.known else None)
+            return self.cut().engagement(self.toolpath)
         return None
 
     def __post_init__(self) -> None:
@@ -179,6 +176,12 @@ class StockPair(Struct, frozen=True, eq=False):
     against: str = "wanted"
     bands: Callable[[float], Callable[[Floats], Floats]] | None = None
     before: StockBefore | None = None
+
+    def engagement(self, toolpath: Toolpath) -> Engagement:
+        """The engagement of the tools along the moves, which are those of a toolpath."""
+        from camtool.stock.engagement import engagement_of
+
+        return engagement_of(self.moves, toolpath, self.box_mm if self.known else None)
 
 
 class TableLine(Struct, frozen=True):

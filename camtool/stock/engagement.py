@@ -148,7 +148,9 @@ def engagement_of(
         [moves.start[:, :2], moves.end[:, :2], radius, low, high, _askew(moves, decoded)]
     )
     is_low = low < STOCK_TOP_MM - LEVEL_MM
-    cuts = is_low & is_straight & (radius > 0.0)
+    down = moves.end[:, 2] < moves.start[:, 2] - LEVEL_MM * length
+    # Straight up a tool is where it was.
+    cuts = is_low & is_straight & (radius > 0.0) & (down | (length > 0.0))
     is_known = ~is_low | (is_straight & (radius > 0.0)) | (length == 0.0)
     result = np.full(len(moves), np.nan)
     if not cuts.any():
@@ -158,7 +160,6 @@ def engagement_of(
     narrow_mm = float(radius[cuts].min())
     extents = np.stack([ends.min(axis=0), ends.max(axis=0)])
     cleared = Cleared(extents, reach, np.array(box_mm or (-np.inf, -np.inf, np.inf, np.inf)))
-    down = moves.end[:, 2] < moves.start[:, 2] - LEVEL_MM * length
     may_enter = _behind(down, length, radius)
     every = np.flatnonzero(cuts)
     greatest = np.zeros(len(limit))

@@ -9,6 +9,7 @@ from itertools import groupby
 import numpy as np
 import pytest
 
+from camtool.arrays import Floats
 from camtool.pictures.beside import draw_beside
 from camtool.pictures.colours import AIR, BINS, CUT_ENTRY, ENTRY, RAPID, UNKNOWN, bin_colours
 from camtool.pictures.content import content_of
@@ -17,11 +18,14 @@ from camtool.pictures.engaged import engagement_trace
 from camtool.pictures.layers import layers_in
 from camtool.pictures.options import PictureOptions
 from camtool.pictures.scene import Scene, stock_pair
+from camtool.pictures.viewer.columns import ENTRY_DEG
+from camtool.pictures.viewer.page import viewer_page
 from camtool.records import replace
 from camtool.stock.cutters import CutterProfile
 from camtool.stock.moves import stock_moves_of_toolpath
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles import svg_page
+from tests.oracles.page_paths import viewer_column
 
 RADIUS_MM = 2.0
 ENGAGED = PictureOptions(layers=frozenset({"engagement"}))
@@ -48,6 +52,11 @@ def steps_along(picture: Scene) -> list[int]:
     trace = engagement_trace(picture)
     assert trace is not None
     return [step for step, _ in groupby(trace.step.tolist())]
+
+
+def angles_of(picture: Scene) -> Floats:
+    """The column of the viewer's page, degrees."""
+    return viewer_column(viewer_page(picture).decode(), "move_engaged")
 
 
 def step_of(angle_deg: float) -> float:
@@ -123,3 +132,21 @@ def test_without_a_tool_there_is_no_such_layer() -> None:
     bare = replace(scene(10.0), cut=None)
     assert "engagement" not in layers_in(content_of(bare, ENGAGED))
     assert "engagement" in layers_in(content_of(scene(10.0), ENGAGED))
+
+
+def test_the_viewer_has_the_greatest_of_each_move() -> None:
+    """A slot, half a diameter beside it, the same again, and a plunge with less than an entry."""
+    picture = scene(10.0, 12.0, 12.0)
+    assert picture.toolpath is not None
+    angles = angles_of(picture)
+    level = np.flatnonzero(picture.toolpath.is_feed & (picture.toolpath.end[:, 0] == 49.0))
+    assert angles[level[:2]].tolist() == [
+        pytest.approx(180.0, abs=1.0),
+        pytest.approx(90.0, abs=1.0),
+    ]
+    assert np.isnan(np.delete(angles, level[:2])).all()
+    short = scene(20.0, ends_mm=(10.0, 20.0))
+    entries = angles_of(short)
+    assert entries[~np.isnan(entries)].tolist() == [ENTRY_DEG, ENTRY_DEG]
+    ball = CutterProfile(RADIUS_MM, 0.0, corner_mm=RADIUS_MM)
+    assert not len(angles_of(scene(10.0, cutter=ball)))

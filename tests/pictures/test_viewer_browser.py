@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from camtool.records import replace
-from tests.pictures.conftest import SCENES
+from tests.pictures.conftest import SCENES, cut_by, followed, plate
 from tests.pictures.viewer_browser import NEEDS_BROWSER, browser, find_move, paper, shown
 from tests.pictures.viewer_pages import HOSTILE, MANY, busy, large_text
 
@@ -178,3 +178,20 @@ def test_many_moves_are_painted_after_each_deed(shown: Any, count: int) -> None:
             "(before) => Number(document.body.dataset.painted) > before", arg=painted
         )
     assert "G01X" in view.text("#now")
+
+
+def test_moves_are_coloured_by_engagement(shown: Any) -> None:
+    """A page whose tool is known offers it; the cursor reads it."""
+    path = followed(plate())
+    view = shown(replace(busy(SCENES["toolpath"]), cut=cut_by(path, 0.5)))
+    before = view.page.screenshot()
+    view.page.select_option("#colour-by", "engagement")
+    view.settled()
+    assert view.page.screenshot() != before
+    assert (view.text("#scale-low"), view.text("#scale-high")) == ("0°", "180°")
+    assert "entries" in view.text("#engagement")
+    view.press("Home", *["ArrowRight"] * 4)
+    assert "engaged\n" in view.text("#now")
+    assert view.complaints == []
+    plain = shown(busy(SCENES["toolpath"]))
+    assert plain.page.locator("#colour-by option[value=engagement]").count() == 0

@@ -192,3 +192,19 @@ def test_a_lathe_has_no_engagement() -> None:
 def test_limits_that_say_nothing_are_refused(text: str) -> None:
     with pytest.raises(OptionError):
         engagement_limit(text)
+
+
+def test_a_tool_that_comes_up_or_goes_down_where_it_was_is_not_engaged() -> None:
+    """Half of the diameter along an edge, up and down again in the cut, and on."""
+    lines = ["G21 G90", "G0 Z5", "M3 S9000", "G0 X-9 Y0", "G1 Z-1 F100", "G1 X20 F600", "G0 Z5"]
+    lines += ["G1 Z-1 F100", "G1 X30 F600", "G0 Z5", "M5", "M2"]
+    job = Job(
+        operations=(Operation(kind="profile", tool=Tool(2.0 * RADIUS_MM)),),
+        stock=Stock(2.0, (0.0, 0.0), (40.0, 20.0)),
+    )
+    judging = camtool.Judging(gates=camtool.Gates(engagement_rad=math.radians(91.0)))
+    run = camtool.verify("\n".join(lines).encode() + b"\n", "grbl", job=job, judging=judging)
+    assert messages(run) == []
+    assert run.report is not None
+    assert run.report.engagement is not None
+    assert run.report.engagement[0].greatest_deg == pytest.approx(90.0, abs=NEAR_DEG)

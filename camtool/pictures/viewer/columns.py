@@ -23,6 +23,7 @@ from camtool.pictures.layers import LineGroup, Part
 from camtool.pictures.scene import Playback, Scene, StockPair
 from camtool.pictures.trace import ErrorTrace, bins_of, nearest_points
 from camtool.stock.before import WHOLE
+from camtool.stock.engagement import COARSE_RAD
 from camtool.stock.heightmap import HeightMap, add_moves
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
@@ -150,6 +151,30 @@ def slide_columns(pair: StockPair | None, rows: int, cell_mm: float) -> Columns:
     counts = np.rint(places / SLIDE_UNIT_MM).astype(np.int64)
     of_rows = np.bincount(moves.row[kept_rows], minlength=rows)
     return {"slide_at": CountColumn(counts, SLIDE_UNIT_MM, 3), "slide_count": of_rows.astype(INT)}
+
+
+MAX_ENGAGED = 20_000
+"""Of programs with more moves of tips than this the engagement is not shown: it would take longer
+than all else."""
+
+ENTRY_DEG = -1.0
+
+
+def engagement_columns(pair: StockPair | None, toolpath: Toolpath | None) -> Columns:
+    """The greatest engagement of the tool in each of N rows outside of entries, degrees: ENTRY_DEG
+    for rows of entries alone, NaN where nothing is cut; empty where no tool is known."""
+    result = np.full(0 if toolpath is None else len(toolpath), np.nan)
+    if pair is None or toolpath is None or not len(pair.moves) or len(pair.moves) > MAX_ENGAGED:
+        return {"move_engaged": result[:0].astype(FLOAT)}
+    judged = pair.engagement(toolpath)
+    cuts = judged.is_known & (np.nan_to_num(judged.bound_rad) > COARSE_RAD)
+    if not cuts.any():
+        return {"move_engaged": result[:0].astype(FLOAT)}
+    result[judged.moves.row[cuts & judged.is_entry]] = ENTRY_DEG
+    counts = np.flatnonzero(cuts & ~judged.is_entry)
+    angles = np.degrees(judged.bound_rad[counts]).clip(max=180.0)
+    np.fmax.at(result, judged.moves.row[counts], np.round(angles, 1))
+    return {"move_engaged": result.astype(FLOAT)}
 
 
 Named = dict[str, tuple[str, int, int] | tuple[str, int, int, float]]

@@ -176,7 +176,7 @@ void main() {
       tone = texelFetch(map, ivec2(texelFetch(bins, lowest, 0).r, 0), 0).rgb;
     } else if (colouring == 3) tone = beside(node, tone);
     else if (colouring == 2) {
-      float part = (span.y - at.z) / max(span.y - span.x, 1e-6), count = float(textureSize(map, 0).x - 1);
+      float part = (span.y - at.z) / max(span.y - span.x, 1e-6), count = float(textureSize(map, 0).x - ${ENTRY + 1});
       tone = texelFetch(map, ivec2(clamp(part, 0.0, 0.9999) * count, 0), 0).rgb;
     } else tone *= 1.0 - 0.22 * clamp(at.z / bottom, 0.0, 1.0);
   }
@@ -438,7 +438,8 @@ class Depth {
       for (let at = 2 * first[row]; at < 2 * first[row + 1]; at++) tints.set(tones[of[row]], 4 * at);
     }
     this.fill(this.lines.tints, tints);
-    const map = [...layers.mapColours(), colours.pale].flatMap((colour) => [...rgb(colour).map((part) => 255 * part), 255]);
+    const beyond = [...Array(ENTRY).fill(colours.pale), colours.entry];
+    const map = [...layers.mapColours(), ...beyond].flatMap((colour) => [...rgb(colour).map((part) => 255 * part), 255]);
     gl.activeTexture(gl.TEXTURE2);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, map.length / 4, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(map));
     solid.dirty = [0, solid.ny - 1];
@@ -450,9 +451,9 @@ class Depth {
     if (to < from) return;
     gl.activeTexture(gl.TEXTURE0);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, from, nx, to - from + 1, gl.RED, gl.FLOAT, heights, from * nx);
-    if (layers.by === "error") {
-      const { error } = layers.binOf, none = layers.mapColours().length, { bins } = this;
-      for (let k = from * nx; k < (to + 1) * nx; k++) bins[k] = by[k] < 0 ? none : error[by[k]];
+    if (layers.by === "error" || layers.by === "engagement") {
+      const steps = layers.binOf[layers.by], none = layers.mapColours().length, { bins } = this;
+      for (let k = from * nx; k < (to + 1) * nx; k++) bins[k] = by[k] < 0 ? none : steps[by[k]];
       gl.activeTexture(gl.TEXTURE1);
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, from, nx, to - from + 1, gl.RED_INTEGER, gl.UNSIGNED_BYTE, bins, from * nx);
     }
@@ -554,7 +555,7 @@ class Depth {
   /** The mesh, the sides of the stock, its bottom and the cut face of the section. */
   paintSolid(colours) {
     const { gl, solid, tiles, surface, curtain, layers } = this, plane = this.planeNow();
-    const colouring = { kind: 0, error: 1, height: 2, beside: 3 }[layers.by];
+    const colouring = { kind: 0, error: 1, engagement: 1, height: 2, beside: 3 }[layers.by];
     const styled = (kind, at, face) => {
       gl.uniform4f(at.grid, solid.left, solid.low, solid.dx, solid.dy);
       gl.uniform1f(at.bottom, this.bottom);

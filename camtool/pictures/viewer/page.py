@@ -57,6 +57,7 @@ from camtool.pictures.viewer.columns import (
     Traced,
     columns_of,
     drawing_layers,
+    engagement_columns,
     height_columns,
     packed,
     part_columns,
@@ -94,7 +95,7 @@ def viewer_page(scene: Scene, live: str = "") -> bytes:
     rows, columns = _rows(content)
     pair = None if run is None else _stock_of(scene)
     stock = None if pair is None else _box_of(pair)
-    columns |= height_columns(pair, stock)
+    columns |= {**height_columns(pair, stock), **engagement_columns(pair, scene.toolpath)}
     if scene.toolpath is not None and stock is not None:
         cell_mm = (stock.box[2] - stock.box[0]) / (stock.grid[0] - 1)
         columns |= slide_columns(pair, len(scene.toolpath), cell_mm)

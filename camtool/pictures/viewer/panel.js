@@ -30,6 +30,8 @@ function moveFacts(head, columns, run, row) {
   facts.push(["time", `${clock(run.begins(row))}, lasts ${Number((run.ends[row] - run.begins(row)).toPrecision(4))} s`]);
   const error = columns.move_error[row];
   if (error === error) facts.push(["error", `${error.toFixed(2)} µm at most`]);
+  const angle = columns.move_engaged[row];
+  if (angle === angle && angle !== undefined) facts.push(["engaged", angle < 0 ? "entry" : `${angle.toFixed(1)}° at most`]);
   return facts;
 }
 
@@ -114,6 +116,7 @@ class LayerPanel {
     const known = columns.move_error.some((um) => um >= 0);
     if (known) choice.append(element("option", "error", { value: "error" }));
     if (heights[1] > heights[0]) choice.append(element("option", "height", { value: "height" }));
+    if (columns.move_engaged.length) choice.append(element("option", "engagement", { value: "engagement" }));
     if (columns.goal_height.length) choice.append(element("option", "gouged and left", { value: "beside" }));
     choice.addEventListener("change", () => {
       this.layers.by = choice.value;
@@ -156,17 +159,21 @@ class LayerPanel {
     const { layers } = this, { by, heights, columns } = layers, place = find("scale");
     place.hidden = by === "kind" && !columns.trace_row.length;
     find("beside").hidden = by !== "beside";
+    find("engagement").hidden = by !== "engagement";
     if (place.hidden) return;
-    const bar = find("scale-bar"), height = by === "height";
+    const bar = find("scale-bar");
     bar.width = layers.mapColours().length;
     const ctx = bar.getContext("2d");
     layers.mapColours().forEach((colour, index) => {
       ctx.fillStyle = colour;
       ctx.fillRect(index, 0, 1, bar.height);
     });
-    find("scale-low").textContent = height ? `Z ${heights[1].toFixed(3)} mm` : "0 µm";
-    find("scale-high").textContent = height
-      ? `${heights[0].toFixed(3)} mm` : `${Number(layers.head.top_um.toPrecision(4))} µm`;
+    const ends = {
+      height: [`Z ${heights[1].toFixed(3)} mm`, `${heights[0].toFixed(3)} mm`],
+      engagement: ["0°", `${HALF_CIRCLE}°`],
+    };
+    [find("scale-low").textContent, find("scale-high").textContent] = ends[by]
+      || ["0 µm", `${Number(layers.head.top_um.toPrecision(4))} µm`];
   }
 }
 

@@ -59,9 +59,12 @@ function clock(seconds) {
 // The layers: which are on, how moves are coloured, and the styles in which all are drawn.
 
 const SORTS = ["rapid", "feed", "plunge"];
+/** Style of entries, counted from the end of the map, and the greatest engagement, degrees. */
+const ENTRY = 3;
+const HALF_CIRCLE = 180;
 const COLOURS = [
   "paper", "ink", "quiet", "grid", "drawing", "feed", "rapid", "plunge", "pale", "tool", "pick",
-  "swept", "travel", "wanted", "stock", "cut", "section",
+  "swept", "travel", "wanted", "stock", "cut", "section", "entry",
 ];
 
 /** The page's colours of now: light or dark as the system prefers, light on paper. */
@@ -148,9 +151,10 @@ class Layers {
     return Math.min(count - 1, Math.floor((um / this.head.top_um) * count));
   }
 
-  /** The step of the map of each move, by error and by height; one beyond the last where unknown. */
+  /** The step of the map of each move, by error, height and engagement; one beyond the last where
+   * unknown, and where nothing is cut, ENTRY beyond it in entries. */
   bins() {
-    const { move_error: errors, move_kind: kinds, move_end: ends } = this.columns;
+    const { move_error: errors, move_kind: kinds, move_end: ends, move_engaged: angles } = this.columns;
     const count = this.head.map.light.length, rows = kinds.length;
     const error = new Uint8Array(rows), height = new Uint8Array(rows);
     let low = Infinity, high = -Infinity;
@@ -164,7 +168,11 @@ class Layers {
       const share = high > low ? (high - ends[3 * row + 2]) / (high - low) : 0;
       height[row] = Math.min(count - 1, Math.floor(share * count));
     }
-    return { error, height };
+    const engagement = Uint8Array.from(angles, (angle) => {
+      if (angle < 0) return count + ENTRY;
+      return angle >= 0 ? Math.min(count - 1, Math.floor((angle / HALF_CIRCLE) * count)) : count;
+    });
+    return { error, height, engagement };
   }
 
   /** Whether moves have the colours of their kinds. */
@@ -188,7 +196,8 @@ class Layers {
     }
     const map = this.mapColours().map((colour) => drawn("feed", { colour, width: 2 }));
     const unknown = drawn("feed", { colour: colours.pale, width: 1 });
-    return { of: this.styleByMap(map.length), styles: [...map, unknown, rapid, plunge] };
+    const entry = drawn("feed", { colour: colours.entry, width: 2 });
+    return { of: this.styleByMap(map.length), styles: [...map, unknown, rapid, plunge, entry] };
   }
 
   styleByMap(count) {
