@@ -41,6 +41,13 @@ they cannot be told from the steps of the axes."""
 LEVEL_MM = 0.02
 """Cuts no more than this above a move have cleared its depth."""
 
+TOUCH_MM = 1e-3
+"""Moves that go no deeper than this cut nothing."""
+
+STEEP_SHARE = 1e-3
+"""Moves whose way in the plane is no more than this part of their height run straight up or
+down."""
+
 ENTRY_TURNS = 1.0
 """An entry ends when the tool has gone so many times its circumference from where it went down."""
 
@@ -147,11 +154,12 @@ def engagement_of(
     rows = np.column_stack(
         [moves.start[:, :2], moves.end[:, :2], radius, low, high, _askew(moves, decoded)]
     )
-    is_low = low < STOCK_TOP_MM - LEVEL_MM
+    is_low = low < STOCK_TOP_MM - TOUCH_MM
+    is_upright = length <= STEEP_SHARE * np.abs(moves.end[:, 2] - moves.start[:, 2])
     down = moves.end[:, 2] < moves.start[:, 2] - LEVEL_MM * length
     # Straight up a tool is where it was.
-    cuts = is_low & is_straight & (radius > 0.0) & (down | (length > 0.0))
-    is_known = ~is_low | (is_straight & (radius > 0.0)) | (length == 0.0)
+    cuts = is_low & is_straight & (radius > 0.0) & (down | ~is_upright)
+    is_known = ~is_low | (is_straight & (radius > 0.0)) | is_upright
     result = np.full(len(moves), np.nan)
     if not cuts.any():
         return Engagement(result, np.zeros(len(moves), dtype=np.bool_), is_known, moves)

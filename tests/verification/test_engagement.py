@@ -30,22 +30,21 @@ def side_cut(
     wide_mm: float,
     *,
     tool: Tool | None = None,
-    target: str = "grbl",
+    depth_mm: float = 1.0,
     limit_deg: float | None = None,
 ) -> Run:
     """A straight cut along the lower edge of a block, so that the tool takes `wide_mm` of it; it
     goes down beside the block."""
     y = wide_mm - RADIUS_MM
-    program = (
-        f"G21 G90\nG0 Z5\nM3 S9000\nG0 X-9 Y{y:.4f}\nG1 Z-1 F100\nG1 X49 F600\nG0 Z5\nM5\nM2\n"
-    )
+    lines = ["G21 G90", "G0 Z5", "M3 S9000", f"G0 X-9 Y{y:.4f}", f"G1 Z{-depth_mm} F100"]
+    program = "\n".join([*lines, "G1 X49 F600", "G0 Z5", "M5", "M2", ""])
     job = Job(
         operations=(Operation(kind="profile", tool=tool or Tool(2.0 * RADIUS_MM)),),
         stock=Stock(2.0, (0.0, 0.0), (40.0, 20.0)),
     )
     limit = None if limit_deg is None else math.radians(limit_deg)
     judging = camtool.Judging(gates=camtool.Gates(engagement_rad=limit))
-    return camtool.verify(program.encode(), target, job=job, judging=judging)
+    return camtool.verify(program.encode(), "grbl", job=job, judging=judging)
 
 
 def angle_deg(wide_mm: float) -> float:
@@ -208,3 +207,18 @@ def test_a_tool_that_comes_up_or_goes_down_where_it_was_is_not_engaged() -> None
     assert run.report is not None
     assert run.report.engagement is not None
     assert run.report.engagement[0].greatest_deg == pytest.approx(90.0, abs=NEAR_DEG)
+
+
+def test_shallow_cuts_are_judged() -> None:
+    run = side_cut(2.5, depth_mm=0.008, limit_deg=60.0)
+    assert len(messages(run)) == 1
+
+
+def test_holes_are_drilled_without_an_engagement() -> None:
+    """A controller that rounds corners leaves the hole a little aslant."""
+    lines = ["G21 G90 G64 P0.05", "G0 Z5", "M3 S9000", "G0 X9 Y9", "G1 Z-6 F100", "G0 Z5"]
+    lines += ["G0 X9 Y30", "M5", "M2"]
+    job = Job(operations=(Operation(kind="drill", tool=Tool(3.0, "drill", math.radians(118.0))),))
+    judging = camtool.Judging(gates=camtool.Gates(engagement_rad=0.2))
+    program = "\n".join(lines).encode() + b"\n"
+    assert messages(camtool.verify(program, "linuxcnc", job=job, judging=judging)) == []
