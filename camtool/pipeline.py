@@ -35,6 +35,7 @@ from camtool.run import Run
 from camtool.simulation.motion import ALL
 from camtool.simulation.rows import block_of
 from camtool.stock.findings import STOCK_NOT_JUDGED_TOOLS
+from camtool.stock.moves import stock_moves_of_toolpath
 from camtool.stock.slides import slide_moves
 from camtool.toolpath.findings import SURFACE_FOLLOWED_NOT, SURFACE_FOLLOWED_WITHIN
 from camtool.toolpath.lower import (
@@ -874,7 +875,6 @@ def _stock_findings(
     """Return the findings of a program in its stock: of the path that its controller decodes, or
     of the slides where that is bent against the mechanics. Where tools are not known, or cut no
     width, or nothing is asked for (`request` None), only rapids are looked at."""
-    from camtool.stock.moves import stock_moves_of_toolpath
     from camtool.stock.rapids import rapid_findings
 
     case, job = slides.case, slides.job or Job()

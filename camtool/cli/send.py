@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from camtool.sending.live import LivePage
     from camtool.sending.prepare import Consignment
     from camtool.target.registry import LoadedTarget
-    from camtool.target.wire import Conversation, ToolAt, Wire
+    from camtool.target.wire import Conversation, ToolAt
 
 MAX_NAMED = 5
 """So many blocks that stop are named."""
@@ -109,7 +109,7 @@ def send(
     terminal: p pauses, r goes on, s does a single block, q stops; + and - change the feed, ] and [
     the spindle by 10 %, = brings back 100 %. Exit code 1 when the program was not finished.
     """
-    from camtool.sending.prepare import consignment, lines_of
+    from camtool.sending.prepare import consignment, lines_of, tool_at_of
 
     if first is not None and resume:
         raise click.UsageError("--from and --resume are two beginnings; give one of them")
@@ -129,7 +129,8 @@ def send(
             )
         state = None
     elif state is not None:
-        tool_at = _tool_at(wire_of(target), state, tool_at, target)
+        answer = tool_at_of(wire_of(target), state, tool_at, target.machine.target.name)
+        tool_at = _confirmed_place(*answer)
     elif tool_at:
         raise OptionError(
             "no journal says where this program was left",
@@ -179,17 +180,15 @@ def _find_unfinished(place: Path, data: bytes) -> JournalState | None:
     return None
 
 
-def _tool_at(wire: Wire, state: JournalState, tool_said: ToolAt, target: LoadedTarget) -> ToolAt:
-    """Return where the tool is; ask the user if the machine does not say it."""
-    from camtool.sending.prepare import tool_at_of
-
-    tool_at, is_asked = tool_at_of(wire, state, tool_said, target.machine.target.name)
-    if not is_asked:
+def _confirmed_place(tool_at: ToolAt, question: str) -> ToolAt:
+    """Return where the tool is, once the user has agreed to the question, "" for none;
+    OptionError if nobody agrees."""
+    if not question:
         return tool_at
     if sys.stdin.isatty():
         with signs_of_command().hidden():
             agreed = click.confirm(
-                f"{is_asked[0].upper()}{is_asked[1:]}?", err=True, default=False
+                f"{question[0].upper()}{question[1:]}?", err=True, default=False
             )
         if agreed:
             return tool_at
@@ -199,7 +198,7 @@ def _tool_at(wire: Wire, state: JournalState, tool_said: ToolAt, target: LoadedT
             "give --tool-at journal if it has stayed there; else bring it to part zero, and give "
             "--tool-at zero"
         )
-    raise OptionError(is_asked.partition(": ")[0], where="--resume", mend=mend)
+    raise OptionError(question.partition(": ")[0], where="--resume", mend=mend)
 
 
 def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:

@@ -22,8 +22,13 @@ from camtool.cli.options import (
 )
 from camtool.findings import Finding, Severity
 from camtool.importers.findings import DrawingCode
+from camtool.inspection.dimensions import ZONES
+from camtool.inspection.limits import deviation_words
+from camtool.inspection.proposal import propose_file
+from camtool.inspection.tolerances import dimensions_of, read_tolerances, unbound_findings
 from camtool.plain import one_line, to_json
 from camtool.project import project_of
+from camtool.verification.report import finding_reports
 
 if TYPE_CHECKING:
     from camtool.inspection.dimensions import Dimension
@@ -65,8 +70,6 @@ def new(
     then its circles, slots and the overall sizes of its outlines, to which you give limits. With
     --job the depths of its pockets, grooves and blind holes, and what is left under its floors.
     """
-    from camtool.inspection.proposal import propose_file
-
     output = output or FILE
     flags = JobFlags(job_file, project=project_of(Path.cwd()))
     check_places([source, *flags.files(), *machine.files()], [output])
@@ -114,9 +117,6 @@ def show(
     """Check the tolerances FILE, and say nominal size and limits of each of its dimensions, with
     --against also those that the drawing says itself."""
     import msgspec
-
-    from camtool.inspection.tolerances import dimensions_of, read_tolerances, unbound_findings
-    from camtool.verification.report import finding_reports
 
     check_places([file, against], [report])
     _, dimensions = read_tolerances(Path(file))
@@ -174,9 +174,6 @@ def _lines(dimensions: Sequence[Dimension]) -> Iterator[str]:
 
 
 def _cells(each: Dimension) -> tuple[str, ...]:
-    from camtool.inspection.dimensions import ZONES
-    from camtool.inspection.limits import deviation_words
-
     nominal = "as drawn" if each.nominal_mm is None else f"{round(each.nominal_mm, 6):.6g} mm"
     limits, sizes = each.words or each.general or "no limits", ""
     zone = limits if each.limits is None else each.limits.said

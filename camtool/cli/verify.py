@@ -47,6 +47,7 @@ from camtool.cli.plot_options import PlotFlags, plot_options
 from camtool.cli.report import ReportOutputs, report_option
 from camtool.jobs.keys import PLACE
 from camtool.pictures.options import points_for
+from camtool.plain import to_json
 from camtool.records import replace
 
 if TYPE_CHECKING:
@@ -302,7 +303,6 @@ def _compare(
 ) -> int:
     """Show the table of all variants and write their picture; return the exit code."""
     from camtool.comparison import compare_program
-    from camtool.verification.contrast import to_json
 
     comparison = compare_program(
         read_bytes(file),
@@ -320,7 +320,7 @@ def _compare(
             comparison.scene(), wishes.outputs.preview, wishes.looks.options()
         )
     if wishes.outputs.report is not None:
-        files[wishes.outputs.report] = to_json(comparison.rows).encode()
+        files[wishes.outputs.report] = to_json(list(comparison.rows)).encode()
     write_all(files)
     if wishes.outputs.report != STDOUT and not wishes.quiet:
         show_compared(str(comparison), comparison.rows)

@@ -334,14 +334,14 @@ cdef Int _count_window(
     Int count, Int size, Int phase, Int events, double along, double across,
     double level, double limit
 ) noexcept nogil:
-    cdef Int below, beyond
+    cdef Int below, above
     if _is_straight(count, size, phase, events, along, across, max(math.fabs(level), limit)):
         return _count_straight(count, along, level, limit)
     if across < 0.0:
         along, across, level = -along, -across, -level
     below = _count(count, size, phase, events, along, across, limit - level)
-    beyond = _count(count, size, phase, events, along, across, -limit - level)
-    return below - beyond
+    above = _count(count, size, phase, events, along, across, -limit - level)
+    return below - above
 
 
 cdef Int _count_straight(

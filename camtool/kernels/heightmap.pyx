@@ -75,14 +75,14 @@ cpdef void cut_heights(
     """
     cdef double x0, y0, cell, low_y, high_y
     cdef Int k, ny, nx
-    cdef bint wanted, cuts, following_cuts
+    cdef bint keeps_owners, cuts, following_cuts
     cdef double[ROWS + 2] table
     cdef Cutter cutter, following_cutter
     cdef Move move, following
     cdef Row row
     x0, y0, cell = origin
     ny, nx = heights.shape[0], heights.shape[1]
-    wanted = owner.shape[0] > 0
+    keeps_owners = owner.shape[0] > 0
     row.owner = NULL
     row.x0, row.cell = x0, cell
     cuts = _take(&move, &cutter, starts, ends, tool, cutters, 0)
@@ -104,7 +104,7 @@ cpdef void cut_heights(
             high = _index(math.floor((high_y + cutter.reach - y0) / cell) + 1.0, ny)
             for j in range(low, high):
                 row.height = &heights[j, 0]
-                if wanted:
+                if keeps_owners:
                     row.owner = &owner[j, 0]
                 if move.slope == 0.0:
                     _cut_level(&row, nx, &cutter, &move, &following, y0 + j * cell)
@@ -161,17 +161,17 @@ cdef bint _reaches(Cutter* cutter, double[:, ::1] cutters, Int tool, double z) n
 
 cdef double _behind(Cutter* cutter, double slope) noexcept:
     """Cells whose foot lies before this place on a joined move are cut deepest at its start."""
-    cdef double most = cutter.radius
+    cdef double offset = cutter.radius
     if slope >= 0.0:
         return 0.0
     if cutter.corner > 0.0:
-        most = cutter.flat - slope / math.sqrt(1.0 + slope * slope) * cutter.corner
+        offset = cutter.flat - slope / math.sqrt(1.0 + slope * slope) * cutter.corner
     elif -slope < cutter.rise:
-        most = max(
+        offset = max(
             cutter.flat,
             -slope / math.sqrt(cutter.rise * cutter.rise - slope * slope) * cutter.radius,
         )
-    return -min(most, cutter.radius)
+    return -min(offset, cutter.radius)
 
 
 cdef inline Int _index(double place, Int count) noexcept:
@@ -485,7 +485,7 @@ cdef double _bull(
 ) noexcept:
     """The u at which a bull nose rises as steeply as the move: w u = steep · d · q, with
     d² = a² + u², w = d − flat and q² = corner² − w². `near`: where to begin."""
-    cdef double low, high, u, d, w, q, off, rate, wanted
+    cdef double low, high, u, d, w, q, off, rate, estimate
     cdef int k
     low = math.sqrt(max(flat * flat - square, 0.0))
     high = max(rim, low)
@@ -500,12 +500,12 @@ cdef double _bull(
         else:
             high = u
         rate = w + u * u / d - steep * u * (q / d - w / q)
-        wanted = u - off / rate
-        if not low < wanted < high:  # NaN as well
-            wanted = 0.5 * (low + high)
-        if abs(wanted - u) <= NEAR_SHARE * corner:
-            return wanted
-        u = wanted
+        estimate = u - off / rate
+        if not low < estimate < high:  # NaN as well
+            estimate = 0.5 * (low + high)
+        if abs(estimate - u) <= NEAR_SHARE * corner:
+            return estimate
+        u = estimate
     return u
 
 
@@ -528,7 +528,7 @@ cpdef void project(
     """
     cdef double x0, y0, size, fx, fy, sine, cosine, u0, v0, pixel, u, t, last, next_x, next_y
     cdef double foot, low, high, before, z
-    cdef Int ny, nx, i, j, row, rows, column, here, there, done, until
+    cdef Int ny, nx, i, j, row, rows, column, cell_before, cell_of, done, until
     x0, y0, size = grid
     fx, fy, sine, cosine, u0, v0, pixel = camera
     ny, nx = heights.shape[0], heights.shape[1]
@@ -547,10 +547,10 @@ cpdef void project(
             continue
         i = _index((u * fy + t * fx - x0) / size, nx - 1)
         j = _index((t * fy - u * fx - y0) / size, ny - 1)
-        done, here = 0, -1  # pixels below `done` are seen already
+        done, cell_before = 0, -1  # pixels below `done` are seen already
         before = 0.0
         while t < last and 0 <= i < nx and 0 <= j < ny:
-            there = j * nx + i
+            cell_of = j * nx + i
             z = heights[j, i]
             # Where the walk leaves the cell.
             next_x = _border(x0, size, i, fx, u * fy)
@@ -559,41 +559,41 @@ cpdef void project(
             t = max(t, min(next_x, next_y, last))
             low = (foot + z * cosine - v0) / pixel
             high = (t * sine + z * cosine - v0) / pixel
-            if here >= 0 and z > before:  # what rises between the cell before and this one
+            if cell_before >= 0 and z > before:  # what rises between the cell before and this one
                 until = _index(math.ceil(low), rows)
                 for row in range(done, until):
-                    cell[row, column] = ~<int> here if z - before > wall else <int> there
+                    cell[row, column] = ~<int> cell_before if z - before > wall else <int> cell_of
                     level[row, column] = <float> min(
                         max((v0 + row * pixel - foot) / cosine, before), z
                     )
                 done = max(done, until)
-            elif here < 0:
+            elif cell_before < 0:
                 done = _index(math.ceil(low), rows)
             until = _index(math.ceil(high), rows)
             for row in range(done, until):
-                cell[row, column] = <int> there
+                cell[row, column] = <int> cell_of
                 level[row, column] = <float> z
             done = max(done, until)
-            here, before = there, z
+            cell_before, before = cell_of, z
             if next_x <= next_y:
                 i += 1 if fx > 0.0 else -1
             else:
                 j += 1 if fy > 0.0 else -1
 
 
-cdef inline double _border(double first, double size, Int k, double way, double start) noexcept:
+cdef inline double _border(double first, double size, Int k, double rate, double start) noexcept:
     """The t at which start + t · way leaves the cell k; inf if it never does."""
-    if abs(way) < 1e-12:
+    if abs(rate) < 1e-12:
         return math.INFINITY
-    return (first + (k + 1 if way > 0.0 else k) * size - start) / way
+    return (first + (k + 1 if rate > 0.0 else k) * size - start) / rate
 
 
 cdef (double, double) _within(
-    double start, double way, double low, double high, double first, double last
+    double start, double rate, double low, double high, double first, double last
 ) noexcept:
     """The part of first … last in which start + t · way lies between low and high."""
     cdef double one, other
-    if abs(way) < 1e-12:
+    if abs(rate) < 1e-12:
         return (first, last) if low <= start < high else (1.0, 0.0)
-    one, other = (low - start) / way, (high - start) / way
+    one, other = (low - start) / rate, (high - start) / rate
     return max(first, min(one, other)), min(last, max(one, other))

@@ -100,26 +100,26 @@ cdef inline double smallest_of_lanes(double* lanes) noexcept nogil:
 
 cpdef double largest(double[::1] values, Int low, Int high) noexcept nogil:
     """Return the largest of values[low:high], which is not empty."""
-    cdef double found
-    _find_largest(values, low, high, &found)
-    return found
+    cdef double result
+    _find_largest(values, low, high, &result)
+    return result
 
 
 cdef wide _find_largest(double[::1] values, Int low, Int high, double* result) noexcept nogil:
     cdef Int j, k, lane
-    cdef double found
+    cdef double value
     cdef double[LANES] lanes
-    found, k = values[low], low
+    value, k = values[low], low
     if high - low >= LANES:
         fill_lanes(lanes, -math.INFINITY)
         while k + LANES <= high:
             for lane in range(LANES):
                 lanes[lane] = larger(values[k + lane], lanes[lane])
             k += LANES
-        found = largest_of_lanes(lanes)
+        value = largest_of_lanes(lanes)
     for j in range(k, high):
-        found = larger(values[j], found)
-    result[0] = found
+        value = larger(values[j], value)
+    result[0] = value
 
 
 # How far points are from a move, with the side that they lie on: a line or an arc, many at once.
@@ -172,8 +172,8 @@ cdef wide _to_line(
         t = (px * dx + py * dy) * over
         t = smaller(larger(t, 0.0), 1.0)
         off_x, off_y = px - t * dx, py - t * dy
-        apart = math.sqrt(off_x * off_x + off_y * off_y)
-        errors[k] = math.copysign(apart, dx * py - dy * px)
+        distance = math.sqrt(off_x * off_x + off_y * off_y)
+        errors[k] = math.copysign(distance, dx * py - dy * px)
 
 
 cdef wide _count_outside(
@@ -229,9 +229,9 @@ cdef inline double _outside(
     have equal last bits."""
     cdef bint is_near
     above = px * px + py * py - radius * radius
-    apart = math.sqrt(px * px + py * py) - radius
+    distance = math.sqrt(px * px + py * py) - radius
     is_near = abs(above) <= 2.0 * NEAR * (radius * radius)
-    return _off(above, half, part) if is_near else apart
+    return _off(above, half, part) if is_near else distance
 
 
 cdef wide _to_circle(
@@ -299,9 +299,9 @@ cdef inline double larger(double one, double other) noexcept nogil:
 
 cdef inline Int first_of(double[::1] values, Int low, Int high, double value) noexcept nogil:
     """Return the first index of `value` in values[low:high], where it is."""
-    cdef Int found
-    _find_first(values, low, high, value, &found)
-    return found
+    cdef Int index
+    _find_first(values, low, high, value, &index)
+    return index
 
 
 cdef wide _find_first(
@@ -369,9 +369,9 @@ class Moves(NamedTuple):
 def room_for(count: int, dtype: type[np.generic] = np.float64) -> npt.NDArray[Any]:
     """(count,) numbers of 8 bytes, not set, that begin where a line of the processor's cache does:
     of what is read and written 64 bytes at once nothing lies in two of them."""
-    whole = np.empty(count + 8, dtype=dtype)
-    begin = -whole.ctypes.data % 64 // 8
-    return whole[begin : begin + count]
+    buffer = np.empty(count + 8, dtype=dtype)
+    begin = -buffer.ctypes.data % 64 // 8
+    return buffer[begin : begin + count]
 
 
 cdef class Search:
@@ -486,30 +486,30 @@ cdef wide _set_box(
 
 cdef inline bint node_near(double[:, ::1] nodes, Int node, double[::1] box) noexcept nogil:
     """True if the box of a node may have a point in the box."""
-    cdef double low_x, low_y, high_x, high_y, beside, reach
+    cdef double low_x, low_y, high_x, high_y, aside, reach
     low_x, low_y = nodes[node, 0] - box[MIDDLE_X], nodes[node, 1] - box[MIDDLE_Y]
     high_x, high_y = nodes[node, 2] - box[MIDDLE_X], nodes[node, 3] - box[MIDDLE_Y]
     if low_x > box[HALF_X] or high_x < -box[HALF_X]:
         return False
     if low_y > box[HALF_Y] or high_y < -box[HALF_Y]:
         return False
-    beside = (low_y + high_y) * box[WAY_X] - (low_x + high_x) * box[WAY_Y]
+    aside = (low_y + high_y) * box[WAY_X] - (low_x + high_x) * box[WAY_Y]
     reach = (high_y - low_y) * abs(box[WAY_X]) + (high_x - low_x) * abs(box[WAY_Y])
-    return bool(abs(beside) <= (reach + 2.0 * box[HALF_WIDE]) * (1.0 + SLACK))
+    return bool(abs(aside) <= (reach + 2.0 * box[HALF_WIDE]) * (1.0 + SLACK))
 
 
 cdef inline bint move_near(Curves curves, Int k, double[::1] box) noexcept nogil:
     """True if a move may have a point in the box; an arc counts as its full circle."""
     cdef Int at
-    cdef double ax, ay, way_x, way_y, long, wide, px, py, along, beside, near_long, near_wide
+    cdef double ax, ay, way_x, way_y, long, wide, px, py, along, aside, near_long, near_wide
     cdef double far_long, far_wide, square, to_x, to_y, further, across, side, reach
     way_x, way_y, long, wide = box[WAY_X], box[WAY_Y], box[HALF_LONG], box[HALF_WIDE]
     at = curves.arc[k]
     if at >= 0:
         px, py = curves.arcs[at, CX] - box[MIDDLE_X], curves.arcs[at, CY] - box[MIDDLE_Y]
-        along, beside = abs(px * way_x + py * way_y), abs(py * way_x - px * way_y)
-        near_long, near_wide = larger(along - long, 0.0), larger(beside - wide, 0.0)
-        far_long, far_wide = along + long, beside + wide
+        along, aside = abs(px * way_x + py * way_y), abs(py * way_x - px * way_y)
+        near_long, near_wide = larger(along - long, 0.0), larger(aside - wide, 0.0)
+        far_long, far_wide = along + long, aside + wide
         square = curves.arcs[at, RADIUS] * curves.arcs[at, RADIUS]
         if near_long * near_long + near_wide * near_wide > square * (1.0 + SLACK):
             return False
@@ -517,37 +517,37 @@ cdef inline bint move_near(Curves curves, Int k, double[::1] box) noexcept nogil
     ax, ay = curves.start[k, 0], curves.start[k, 1]
     px, py = ax - box[MIDDLE_X], ay - box[MIDDLE_Y]
     to_x, to_y = curves.end[k, 0] - ax, curves.end[k, 1] - ay
-    beside, across = py * way_x - px * way_y, to_y * way_x - to_x * way_y
-    if smaller(beside, beside + across) > wide or larger(beside, beside + across) < -wide:
+    aside, across = py * way_x - px * way_y, to_y * way_x - to_x * way_y
+    if smaller(aside, aside + across) > wide or larger(aside, aside + across) < -wide:
         return False
     along, further = px * way_x + py * way_y, to_x * way_x + to_y * way_y
     if smaller(along, along + further) > long or larger(along, along + further) < -long:
         return False
-    side = abs(along * across - beside * further)
+    side = abs(along * across - aside * further)
     reach = long * abs(across) + wide * abs(further)
-    return bool(side <= reach + SLACK * (abs(along * across) + abs(beside * further)))
+    return bool(side <= reach + SLACK * (abs(along * across) + abs(aside * further)))
 
 
-cdef bint _is_there(Curves curves, Int[::1] found, Int count, Int move) noexcept nogil:
+cdef bint _is_there(Curves curves, Int[::1] moves, Int count, Int move) noexcept nogil:
     """True if the move is one of the first `count` in the list; turns of a circle are equal."""
     cdef Int n
     n = 0
-    while n < count and not are_same(curves, found[n], move):
+    while n < count and not are_same(curves, moves[n], move):
         n += 1
     return n < count
 
 
 cdef inline bint are_same(Curves curves, Int one, Int other) noexcept nogil:
-    cdef Int at, there, k, axis
+    cdef Int at, other_arc, k, axis
     for axis in range(2):
         if curves.start[one, axis] != curves.start[other, axis]:
             return False
         if curves.end[one, axis] != curves.end[other, axis]:
             return False
-    at, there, k = int(curves.arc[one]), int(curves.arc[other]), 0
-    if at < 0 or there < 0:
-        return at == there
-    while k < COLUMNS and curves.arcs[at, k] == curves.arcs[there, k]:
+    at, other_arc, k = int(curves.arc[one]), int(curves.arc[other]), 0
+    if at < 0 or other_arc < 0:
+        return at == other_arc
+    while k < COLUMNS and curves.arcs[at, k] == curves.arcs[other_arc, k]:
         k += 1
     return k == COLUMNS
 
@@ -606,7 +606,7 @@ cdef Int _list_near(
 ) noexcept nogil:
     """List the moves that may be nearer to some of the points x, y (n,) than their own, from which
     they have these errors; it comes first. How many these are, or 0 where they are too many."""
-    cdef Int leaves, height, node, low, place, k, count, most, some
+    cdef Int leaves, height, node, low, place, k, count, limit, some
     cdef int[::1] order
     cdef Int[::1] stack, found
     cdef double[:, ::1] nodes
@@ -616,7 +616,7 @@ cdef Int _list_near(
     stack, found, box = search.stack, search.found, search.box
     _set_box(x, y, errors, box)
     some = len(x)
-    most = max(FEW, ENOUGH // some)
+    limit = max(FEW, ENOUGH // some)
     leaves = len(nodes) // 2
     found[0], count = own, 1
     height, stack[0] = 1, 1
@@ -640,7 +640,7 @@ cdef Int _list_near(
             search.looked += 1
             # To look for it among more than there are points takes longer than to compare it.
             if move_near(search.curves, k, box) and not _is_there(search.curves, found, min(count, some), k):
-                if count == most:
+                if count == limit:
                     return 0
                 found[count] = k
                 count += 1
@@ -657,10 +657,10 @@ cpdef bint nearest_errors(
     `own`. False, and inf, where there is none. `own` is the move that the points are expected to
     follow, or −1."""
     cdef Int begin, end, height, low, high, middle, k, n, near
-    cdef bint told
+    cdef bint is_listed
     cdef double far
-    cdef Int[::1] parts, by, found, mine
-    cdef double[::1] here_x, here_y, here
+    cdef Int[::1] parts, by, found, owners
+    cdef double[::1] here_x, here_y, errors
     parts, middle = search.parts, len(x) // 2
     if not is_searched(own, first, last, z_low, z_high, search.heights):
         far = math.INFINITY
@@ -676,28 +676,28 @@ cpdef bint nearest_errors(
     by, found = search.by, search.found
     begin = _first_off(out, 0)
     while begin < len(x):
-        end, told = _end_of_off(out, begin), False
+        end, is_listed = _end_of_off(out, begin), False
         height, parts[0], parts[1] = 2, begin, end
         while height > 0:
             height -= 2
             low, high = parts[height], parts[height + 1]
-            here_x, here_y, here, mine = x[low:high], y[low:high], out[low:high], by[low:high]
-            near = _list_near(here_x, here_y, here, own, first, last, z_low, z_high, search)
+            here_x, here_y, errors, owners = x[low:high], y[low:high], out[low:high], by[low:high]
+            near = _list_near(here_x, here_y, errors, own, first, last, z_low, z_high, search)
             if near == 1:
                 continue
-            if not told:
+            if not is_listed:
                 for k in range(begin, end):
                     by[k] = own
-                told = True
+                is_listed = True
             for n in range(1, near):
-                _lowered(here_x, here_y, found[n], search, here, mine)
+                _lowered(here_x, here_y, found[n], search, errors, owners)
             if near > 0:
                 continue
             middle = (low + high) // 2
             within = abs(out[middle])
             k = _nearest(x[middle], y[middle], within, first, last, z_low, z_high, search)
             if k >= 0:
-                _lowered(here_x, here_y, k, search, here, mine)
+                _lowered(here_x, here_y, k, search, errors, owners)
             if high - low > 1:
                 parts[height], parts[height + 1] = middle, high
                 parts[height + 2], parts[height + 3] = low, middle
@@ -819,9 +819,9 @@ cdef wide _add(
 ) noexcept nogil:
     """Put the points low … high − 1 into one bin."""
     cdef Int j, k, lane
-    cdef double px, py, square, sum_x, sum_y, least, most
+    cdef double px, py, square, sum_x, sum_y, smallest, largest_square
     cdef double[LANES] sums_x, sums_y, leasts, mosts
-    sum_x, sum_y, least, most, k = 0.0, 0.0, math.INFINITY, 0.0, low
+    sum_x, sum_y, smallest, largest_square, k = 0.0, 0.0, math.INFINITY, 0.0, low
     if high - low >= LANES:
         fill_lanes(sums_x, 0.0)
         fill_lanes(sums_y, 0.0)
@@ -837,20 +837,20 @@ cdef wide _add(
                 mosts[lane] = larger(square, mosts[lane])
             k += LANES
         sum_x, sum_y = sum_of_lanes(sums_x), sum_of_lanes(sums_y)
-        least, most = smallest_of_lanes(leasts), largest_of_lanes(mosts)
+        smallest, largest_square = smallest_of_lanes(leasts), largest_of_lanes(mosts)
     for j in range(k, high):
         px, py = x[j] - cx, y[j] - cy
         square = px * px + py * py
         sum_x += px
         sum_y += py
-        least, most = smaller(square, least), larger(square, most)
+        smallest, largest_square = smaller(square, smallest), larger(square, largest_square)
     bins[which, 0] += high - low
     bins[which, 1] += sum_x
     bins[which, 2] += sum_y
-    if least < bins[which, 3]:
-        _place(x, y, low, cx, cy, least, bins, which, 3)
-    if most > bins[which, 6]:
-        _place(x, y, low, cx, cy, most, bins, which, 6)
+    if smallest < bins[which, 3]:
+        _place(x, y, low, cx, cy, smallest, bins, which, 3)
+    if largest_square > bins[which, 6]:
+        _place(x, y, low, cx, cy, largest_square, bins, which, 6)
 
 
 cdef void _place(
@@ -882,10 +882,10 @@ def new_pen(stride: int, room: int) -> Floats:
 def unwritten(pen: Floats) -> Floats:
     """(0 to 2, 4) points that the pen still holds: x, y, error, row."""
     peak, last = pen[[PEAK_X, PEAK_Y, PEAK, ROW]], pen[[LAST_X, LAST_Y, LAST_ERROR, ROW]]
-    held = [peak] if pen[IN_RUN] > 0.0 else []
+    samples = [peak] if pen[IN_RUN] > 0.0 else []
     if pen[ROW] >= 0.0 and not (pen[LAST_IS_WRITTEN] > 0.0):
-        held.append(last)
-    return np.array(held).reshape(-1, 4)
+        samples.append(last)
+    return np.array(samples).reshape(-1, 4)
 
 
 cdef void _write(double[::1] pen, double x, double y, double error, double[:, ::1] trace) noexcept nogil:
@@ -912,13 +912,13 @@ cdef void end_row(double[::1] pen, double[:, ::1] trace) noexcept nogil:
 
 
 cpdef void trace_block(
-    Int row, double[::1] x, double[::1] y, double[::1] error, double most, double[::1] pen,
+    Int row, double[::1] x, double[::1] y, double[::1] error, double max_error, double[::1] pen,
     double[:, ::1] trace
 ) noexcept nogil:
-    """Take points x, y (n,) of one row; `error` (n,) of them, the largest of which is `most`,
+    """Take points x, y (n,) of one row; `error` (n,) of them, the largest of which is `max_error`,
     where that is above 0; else they have none. What is full of points takes only the ends of
     rows; a pen whose runs have no samples writes nothing."""
-    cdef Int count, low, high, at, left
+    cdef Int count, low, high, at, to_stride
     cdef double peak
     count = len(x)
     if pen[STRIDE] <= 0.0:
@@ -928,10 +928,10 @@ cpdef void trace_block(
         pen[ROW] = row
     low = 0
     while low < count:
-        left = int(pen[STRIDE] - pen[IN_RUN])
-        high = min(count, low + left)
+        to_stride = int(pen[STRIDE] - pen[IN_RUN])
+        high = min(count, low + to_stride)
         at, peak = low, 0.0
-        if most > pen[PEAK] and most > 0.0:
+        if max_error > pen[PEAK] and max_error > 0.0:
             peak = largest(error, low, high)
             at = first_of(error, low, high, peak)
         if peak > pen[PEAK]:
@@ -941,7 +941,7 @@ cpdef void trace_block(
             pen[LAST_IS_WRITTEN] = 0.0
         pen[IN_RUN] += high - low
         pen[LAST_X], pen[LAST_Y] = x[high - 1], y[high - 1]
-        pen[LAST_ERROR] = error[high - 1] if most > 0.0 else 0.0
+        pen[LAST_ERROR] = error[high - 1] if max_error > 0.0 else 0.0
         if pen[IN_RUN] >= pen[STRIDE]:
             end_run(pen, trace)
         low = high
@@ -1013,11 +1013,11 @@ cdef wide _spread(
 ) noexcept nogil:
     """Widen the extents of the slides; compute the largest square of mechanics and their sum."""
     cdef Int j, k, lane
-    cdef double low_x, low_y, high_x, high_y, most, sum_, here_x, here_y, off_x, off_y, square
+    cdef double low_x, low_y, high_x, high_y, far, sum_, here_x, here_y, off_x, off_y, square
     cdef double[LANES] lows_x, lows_y, highs_x, highs_y, mosts, sums
     low_x, low_y = figures[row, LOW_X], figures[row, LOW_Y]
     high_x, high_y = figures[row, HIGH_X], figures[row, HIGH_Y]
-    most, sum_, k = 0.0, 0.0, 0
+    far, sum_, k = 0.0, 0.0, 0
     if len(x) >= LANES:
         fill_lanes(lows_x, math.INFINITY)
         fill_lanes(lows_y, math.INFINITY)
@@ -1042,17 +1042,17 @@ cdef wide _spread(
         low_y = smaller(smallest_of_lanes(lows_y), low_y)
         high_x = larger(largest_of_lanes(highs_x), high_x)
         high_y = larger(largest_of_lanes(highs_y), high_y)
-        most = largest_of_lanes(mosts)
+        far = largest_of_lanes(mosts)
     for j in range(k, len(x)):
         off_x, off_y = slide_x[j] - x[j], slide_y[j] - y[j]
         square = off_x * off_x + off_y * off_y
         low_x, low_y = smaller(slide_x[j], low_x), smaller(slide_y[j], low_y)
         high_x, high_y = larger(slide_x[j], high_x), larger(slide_y[j], high_y)
-        most = larger(square, most)
+        far = larger(square, far)
         sum_ += square
     figures[row, LOW_X], figures[row, LOW_Y] = low_x, low_y
     figures[row, HIGH_X], figures[row, HIGH_Y] = high_x, high_y
-    largest_square[0], sum_of_squares[0] = most, sum_
+    largest_square[0], sum_of_squares[0] = far, sum_
 
 
 cdef struct ErrorSums:
@@ -1068,11 +1068,11 @@ cdef wide _sizes(
     histogram, where four samples take turns so that none waits for the one before. `bits` are
     those of `size`."""
     cdef Int j, k, lane, leading
-    cdef double most, squares, signed
+    cdef double largest_size, squares, signed
     cdef double[LANES] mosts, sums, signs
     for j in range(len(errors)):
         size[j] = abs(errors[j]) + off
-    most, squares, signed, k = 0.0, 0.0, 0.0, 0
+    largest_size, squares, signed, k = 0.0, 0.0, 0.0, 0
     if len(errors) >= LANES:
         fill_lanes(mosts, 0.0)
         fill_lanes(sums, 0.0)
@@ -1085,13 +1085,13 @@ cdef wide _sizes(
                 places[k + lane] = _place_of(bits[k + lane], lane & 3)
             k += LANES
         squares, signed = sum_of_lanes(sums), sum_of_lanes(signs)
-        most = largest_of_lanes(mosts)
+        largest_size = largest_of_lanes(mosts)
     for j in range(k, len(errors)):
-        most = larger(size[j], most)
+        largest_size = larger(size[j], largest_size)
         squares += size[j] * size[j]
         signed += errors[j]
         places[j] = _place_of(bits[j], j & 3)
-    result.largest, result.squares, result.signed_errors = most, squares, signed
+    result.largest, result.squares, result.signed_errors = largest_size, squares, signed
 
 
 cdef inline int _place_of(Int bits, Int turn) noexcept nogil:
@@ -1107,7 +1107,7 @@ cdef void _count(int[::1] places, Int count, Int[:, ::1] histograms, Int which) 
 
 cdef void judge_block(Int row, Int count, Judge judge) noexcept nogil:
     """Judge the first `count` samples of the room, all of one row."""
-    cdef Int last, own, of_program, k, circle, first, upto, beside
+    cdef Int last, own, of_program, k, circle, first, upto, other
     cdef Int[:, ::1] rows
     cdef Int[::1] bits
     cdef int[::1] places
@@ -1142,8 +1142,8 @@ cdef void judge_block(Int row, Int count, Judge judge) noexcept nogil:
         _count(places, count, judge.histograms, 0)
         first, upto = rows[row, FIRST], rows[row, LAST]
         z_low, z_high = window[row, 0], window[row, 1]
-        beside = rows[row, BESIDE]
-        if nearest_errors(slide_x, slide_y, beside, first, upto, z_low, z_high, judge.search, errors):
+        other = rows[row, BESIDE]
+        if nearest_errors(slide_x, slide_y, other, first, upto, z_low, z_high, judge.search, errors):
             _sizes(errors, judge.off[row], size, bits, places, &sums)
             shown = sums.largest
             figures[row, TOTAL_SQUARES] += sums.squares

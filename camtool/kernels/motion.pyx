@@ -19,20 +19,20 @@ from camtool.arrays import Floats, Ints
 
 
 cpdef void legs_fill(
-    Int done, Int[:, ::1] begin, Int[:, ::1] way, double[::1] step_mm, double[:, ::1] out
+    Int done, Int[:, ::1] begin, Int[:, ::1] travel, double[::1] step_mm, double[:, ::1] out
 ) noexcept:
     """Positions after the passes of legs, `out` (n, 3) mm, those of the first from `done` on.
 
-    Each leg starts at `begin` (L, 3) steps and goes by `way` (L, 3) steps, not all of them 0;
+    Each leg starts at `begin` (L, 3) steps and goes by `travel` (L, 3) steps, not all of them 0;
     `step_mm` (3,). `out` may end within a leg, not behind the last one.
     """
     cdef Int leg, filled, passes, run, axis, position, k, size, sense, count
     leg, filled = 0, 0
     while filled < len(out):
-        passes = max(abs(way[leg, 0]), abs(way[leg, 1]), abs(way[leg, 2]))
+        passes = max(abs(travel[leg, 0]), abs(travel[leg, 1]), abs(travel[leg, 2]))
         run = min(passes - done, len(out) - filled)
         for axis in range(3):
-            size, sense = abs(way[leg, axis]), 1 if way[leg, axis] > 0 else -1
+            size, sense = abs(travel[leg, axis]), 1 if travel[leg, axis] > 0 else -1
             position = begin[leg, axis] + sense * (done * size // passes)
             count, step = done * size % passes, step_mm[axis]
             for k in range(filled, filled + run):

@@ -85,8 +85,8 @@ def hilbert_order_of(count: int, middles: Callable[[Ints], Floats]) -> Indices:
     lots = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for lot in lots:
-        here = middles(np.arange(*lot))
-        low, high = np.minimum(low, here.min(axis=0)), np.maximum(high, here.max(axis=0))
+        places = middles(np.arange(*lot))
+        low, high = np.minimum(low, places.min(axis=0)), np.maximum(high, places.max(axis=0))
     size = max(float((high - low).max()), np.finfo(np.float64).tiny)
     place = np.empty(count, dtype=np.uint32)
     for lot in lots:

@@ -6,5 +6,5 @@ cpdef enum:
 
 cpdef Int way_of(Int before, Int[::1] positions) noexcept
 cpdef Int play_block(
-    Int way, double[::1] positions, double[::1] axis, double[::1] state, double[::1] out
+    Int trend, double[::1] positions, double[::1] axis, double[::1] state, double[::1] out
 ) noexcept

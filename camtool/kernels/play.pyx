@@ -99,13 +99,13 @@ def play_start(position: float, scale: float, direction: int) -> Floats:
 
 
 cdef inline (double, double, bint) turned(
-    double position, double furthest, double direction, double least
+    double position, double furthest, double direction, double threshold
 ) noexcept:
     """The new furthest position and direction, and whether the axis has reversed."""
     ahead = (position - furthest) * direction
     if ahead >= 0.0:
         return position, direction, False
-    if ahead <= -least:
+    if ahead <= -threshold:
         return position, -direction, True
     return furthest, direction, False
 
@@ -129,14 +129,14 @@ cpdef void play_fill(
     cdef bint reversed_
     for axis in range(3):
         scale, low, high = axes[axis, 0], axes[axis, 1], axes[axis, 2]
-        compensation, least = axes[axis, 3], axes[axis, 4]
+        compensation, threshold = axes[axis, 3], axes[axis, 4]
         furthest, direction = states[axis, 0], states[axis, 1]
         added, slide = states[axis, 2], states[axis, 3]
         for run in range(len(turns)):
             count = 0
             for k in range(offsets[run], offsets[run + 1]):
                 position = positions[k, axis]
-                furthest, direction, reversed_ = turned(position, furthest, direction, least)
+                furthest, direction, reversed_ = turned(position, furthest, direction, threshold)
                 if reversed_:
                     added += direction * compensation
                     count += 1
@@ -161,7 +161,7 @@ cpdef void play_varied_fill(
     cdef Int axis, run, number, before, k
     cdef bint reversed_
     for axis in range(3):
-        scale, compensation, least = axes[axis, 0], axes[axis, 3], axes[axis, 4]
+        scale, compensation, threshold = axes[axis, 0], axes[axis, 3], axes[axis, 4]
         furthest, direction = states[axis, 0], states[axis, 1]
         added, slide = states[axis, 2], states[axis, 3]
         number, shift = int(states[axis, 4]), states[axis, 5]
@@ -169,7 +169,7 @@ cpdef void play_varied_fill(
             before = number
             for k in range(offsets[run], offsets[run + 1]):
                 position = positions[k, axis]
-                furthest, direction, reversed_ = turned(position, furthest, direction, least)
+                furthest, direction, reversed_ = turned(position, furthest, direction, threshold)
                 if reversed_:
                     added += direction * compensation
                     shift = scatter[axis] * deviate(seed, axis, number)
@@ -199,57 +199,57 @@ cpdef void play_varied_fill(
 
 cpdef Int way_of(Int before, Int[::1] positions) noexcept:
     """Return the direction of the positions (n,) that follow `before`."""
-    cdef Int least, most, k, change
-    least = most = positions[0] - before
+    cdef Int smallest, largest, k, change
+    smallest = largest = positions[0] - before
     for k in range(1, len(positions)):
         change = positions[k] - positions[k - 1]
-        least = min(least, change)
-        most = max(most, change)
-    if least >= 0:
-        return RISING if most > 0 else STILL
-    return FALLING if most <= 0 else TURNING
+        smallest = min(smallest, change)
+        largest = max(largest, change)
+    if smallest >= 0:
+        return RISING if largest > 0 else STILL
+    return FALLING if largest <= 0 else TURNING
 
 
 cpdef Int play_block(
-    Int way, double[::1] positions, double[::1] axis, double[::1] state, double[::1] out
+    Int trend, double[::1] positions, double[::1] axis, double[::1] state, double[::1] out
 ) noexcept:
-    """Compute slides, `out` (n,) mm, for positions (n,) that run `way`; return the reversals.
+    """Compute slides, `out` (n,) mm, for positions (n,) that run `trend`; return the reversals.
 
     `axis` (5,) and `state` (4,) as in `play_fill`; steps are wider than axis[4].
     """
     cdef Int reversals
-    _fill_block(way, positions, axis, state, out, &reversals)
+    _fill_block(trend, positions, axis, state, out, &reversals)
     return reversals
 
 
 cdef wide _fill_block(
-    Int way, double[::1] positions, double[::1] axis, double[::1] state, double[::1] out,
+    Int trend, double[::1] positions, double[::1] axis, double[::1] state, double[::1] out,
     Int* result
 ) noexcept:
     cdef Int count, begin, reversals, k
     cdef double motor
-    if way == TURNING or len(positions) == 0:
+    if trend == TURNING or len(positions) == 0:
         result[0] = _step_by_step(positions, axis, state, out)
         return
     scale, low, high = axis[0], axis[1], axis[2]
     begin, reversals = 0, 0
-    if way != STILL and way != state[1]:
+    if trend != STILL and trend != state[1]:
         while positions[begin] == state[0]:
             begin += 1
         if begin > 0:
             state[3] = taken_along(state[3], (state[0] + state[2]) * scale, low, high)
         for k in range(begin):
             out[k] = state[3]
-        state[1] = way
-        state[2] += way * axis[3]
+        state[1] = trend
+        state[2] += trend * axis[3]
         reversals = 1
     added = state[2]
     slide = taken_along(state[3], (positions[begin] + added) * scale, low, high)
     count = len(positions)
-    if way == STILL:
+    if trend == STILL:
         for k in range(begin, count):
             out[k] = slide
-    elif way == RISING:
+    elif trend == RISING:
         for k in range(begin, count):
             motor = (positions[k] + added) * scale + low
             out[k] = slide if slide > motor else motor

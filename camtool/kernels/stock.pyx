@@ -70,23 +70,23 @@ cdef inline double profile(const double* tool, double distance, double grow) noe
 
 
 cdef inline double downhill(
-    const double* tool, double aside, double steep, double most, double grow
+    const double* tool, double aside, double steep, double limit, double grow
 ) noexcept nogil:
     """Distance downhill, from the place on a sloping line that is nearest to a point `aside` of it
-    to the one where the tool is lowest over the point; `most` at most."""
+    to the one where the tool is lowest over the point; `limit` at most."""
     cdef double flat = tool[FLAT] + grow, corner = tool[CORNER]
     cdef double low, high, middle, distance, out
     cdef int k
     low = math.sqrt(flat * flat - aside * aside) if aside < flat else 0.0
     if corner <= 0.0:
         if tool[RISE] <= 0.0 or steep >= tool[RISE]:
-            return most
+            return limit
         middle = aside * steep / math.sqrt(tool[RISE] * tool[RISE] - steep * steep)
-        return min(max(low, middle), most)
+        return min(max(low, middle), limit)
     if flat == 0.0:
         middle = max(corner * corner - aside * aside, 0.0) / (1.0 + steep * steep)
-        return min(steep * math.sqrt(middle), most)
-    high = most
+        return min(steep * math.sqrt(middle), limit)
+    high = limit
     for k in range(HALVINGS):
         middle = 0.5 * (low + high)
         distance = math.sqrt(aside * aside + middle * middle)
@@ -210,7 +210,7 @@ cdef class StockTree:
         `grow` farther out, or nearer where it is below 0."""
         cdef double[:, ::1] at = np.ascontiguousarray(points, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
-        cdef double[::1] found = np.empty(count)
+        cdef double[::1] lowest_z = np.empty(count)
         cdef Int[::1] which = np.empty(count, dtype=np.int64)
         cdef Int[::1] until
         cdef bint timed = before is not None
@@ -220,27 +220,27 @@ cdef class StockTree:
         with nogil:
             for k in range(count):
                 row = -1
-                found[k] = self.lowest(
+                lowest_z[k] = self.lowest(
                     at[k, 0], at[k, 1], grow, self.top, until[k] if timed else -1, &row, last
                 )
                 last = row
                 which[k] = self.number[row] if row >= 0 else -1
-        return np.asarray(found), np.asarray(which)
+        return np.asarray(lowest_z), np.asarray(which)
 
     def least(self, squares: Floats, double grow=0.0):
         """(K,) the least height over the disc round each square: middle and half a side (K, 3)."""
         cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
-        cdef double[::1] found = np.empty(count)
+        cdef double[::1] lowest_z = np.empty(count)
         cdef Int last = -1, row
         with nogil:
             for k in range(count):
                 row = -1
-                found[k] = self.lowest(
+                lowest_z[k] = self.lowest(
                     at[k, 0], at[k, 1], at[k, 2] * math.sqrt(2.0) + grow, self.top, -1, &row, last
                 )
                 last = row
-        return np.asarray(found)
+        return np.asarray(lowest_z)
 
     def greatest(
         self,
@@ -272,7 +272,7 @@ cdef class StockTree:
         cdef double[:, :, ::1] at = np.ascontiguousarray(corners, dtype=np.float64)
         cdef double[:, ::1] more = np.ascontiguousarray(values, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
-        cdef double[::1] found = np.empty(count)
+        cdef double[::1] bounds = np.empty(count)
         cdef Int[::1] until
         cdef bint timed = before is not None
         cdef Int last = -1
@@ -292,10 +292,10 @@ cdef class StockTree:
                     polygon[1][corner_count] = at[k, c, 1]
                     polygon[2][corner_count] = more[k, c]
                     corner_count += 1
-                found[k] = self.bound(
+                bounds[k] = self.bound(
                     corner_count, polygon, grow, until[k] if timed else -1, enough, &last
                 )
-        return np.asarray(found)
+        return np.asarray(bounds)
 
     def quarter_means(self, squares: Floats, double bottom=-math.INFINITY):
         """(4 K,), (4 K,) bounds of the mean height over the quarters of each square, in the order
@@ -307,17 +307,17 @@ cdef class StockTree:
         cdef double[::1] high = np.empty(4 * count)
         cdef Int[::1] near = np.empty(self.moves.shape[0], dtype=np.int64)
         cdef double[::1] heights = np.empty(self.moves.shape[0])
-        cdef Int last = -1, found
+        cdef Int last = -1, gathered
         cdef double[3] quarter
         with nogil:
             for k in range(count):
-                found = self.gather(&at[k, 0], near, &last)
+                gathered = self.gather(&at[k, 0], near, &last)
                 quarter[2] = 0.5 * at[k, 2]
                 for q in range(4):
                     quarter[0] = at[k, 0] + signs[q, 0] * quarter[2]
                     quarter[1] = at[k, 1] + signs[q, 1] * quarter[2]
                     self.mean_of(
-                        quarter, bottom, near, found, heights, &low[4 * k + q], &high[4 * k + q]
+                        quarter, bottom, near, gathered, heights, &low[4 * k + q], &high[4 * k + q]
                     )
         return np.asarray(low), np.asarray(high)
 
@@ -330,7 +330,7 @@ cdef class StockTree:
         cdef double[MAX_CORNERS] now
         cdef double[3][MAX_CORNERS] polygon
         cdef int count = 1, depth
-        cdef Int node, child, end, row = -1, cover = -1, found = 0
+        cdef Int node, child, end, row = -1, cover = -1, gathered = 0
         if self.height == 0:
             return 0
         corners_of(square, polygon)
@@ -340,7 +340,7 @@ cdef class StockTree:
             best = min(best, self.corners(row, 4, polygon, 0.0, now))
         if best < self.top:  # one move covers all of it
             cover = near[0] = row
-            found = 1
+            gathered = 1
         stack[0], levels[0] = 0, self.height - 1
         while count:
             count -= 1
@@ -358,9 +358,9 @@ cdef class StockTree:
                 ) < best and height_of(
                     &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, room
                 ) < best:
-                    near[found] = child
-                    found += 1
-        return found
+                    near[gathered] = child
+                    gathered += 1
+        return gathered
 
     cdef void mean_of(
         self, const double* square, double bottom, Int[::1] near, Int count, double[::1] heights,
@@ -374,14 +374,14 @@ cdef class StockTree:
         cdef double room = half * math.sqrt(2.0), best = self.top, z, average, lowest = self.top
         cdef double[2] slope
         cdef double[MAX_CORNERS] now
-        cdef double[3][MAX_CORNERS] whole
-        cdef double[4] least
+        cdef double[3][MAX_CORNERS] outline
+        cdef double[4] lows
         cdef int k
         cdef Int i, row = -1
         cdef double[2] direction
         cdef double cover = -math.INFINITY, part, floor
         direction[0], direction[1] = 0.0, 0.0
-        corners_of(square, whole)
+        corners_of(square, outline)
         low[0], high[0] = self.top, self.top
         for i in range(count):
             heights[i] = height_of(
@@ -390,7 +390,7 @@ cdef class StockTree:
             if heights[i] < lowest:
                 lowest, row = heights[i], near[i]
         if row >= 0:
-            z = self.corners(row, 4, whole, 0.0, now)
+            z = self.corners(row, 4, outline, 0.0, now)
             if z <= best:
                 best, high[0] = z, mean_above(now, bottom)
         if best == self.top:
@@ -412,7 +412,7 @@ cdef class StockTree:
         # Moves that are nowhere lower than `best` are not looked at; they leave no less than it.
         floor = best
         for k in range(4):
-            least[k] = best
+            lows[k] = best
         for i in range(count):
             row = near[i]
             z = height_of(&self.moves[row, 0], &self.tools[self.tool[row], 0], x, y, room)
@@ -429,18 +429,18 @@ cdef class StockTree:
             else:
                 z = average
             for k in range(4):
-                least[k] = min(
-                    least[k],
+                lows[k] = min(
+                    lows[k],
                     z
                     + (half if k & 1 else -half) * slope[0]
                     + (half if k & 2 else -half) * slope[1],
                 )
             # The mean of a convex function is no less than its value in the middle.
-            if heights[i] < high[0] and self.corners(row, 4, whole, 0.0, now) < math.INFINITY:
+            if heights[i] < high[0] and self.corners(row, 4, outline, 0.0, now) < math.INFINITY:
                 high[0] = min(high[0], mean_above(now, bottom))
-        low[0] = max(0.25 * (least[0] + least[1] + least[2] + least[3]), floor, bottom)
+        low[0] = max(0.25 * (lows[0] + lows[1] + lows[2] + lows[3]), floor, bottom)
         if best == self.top and cover < room:
-            low[0] = max(low[0], half_plane_mean(half, direction, cover, least, self.top))
+            low[0] = max(low[0], half_plane_mean(half, direction, cover, lows, self.top))
         high[0] = max(high[0], low[0])
 
     cdef double beyond(self, Int move, double x, double y, double* direction) noexcept nogil:
@@ -587,8 +587,8 @@ cdef class StockTree:
         cdef int levels[FAN * DEPTH]
         cdef double now[MAX_CORNERS]
         cdef double corner[MAX_CORNERS + 1][MAX_CORNERS]
-        cdef Int[MAX_CORNERS + 1] known
-        cdef int kept = 0, k, j, count, level
+        cdef Int[MAX_CORNERS + 1] rows
+        cdef int count_kept = 0, k, j, count, level
         cdef Int row, node, child, end
         cdef double best = -math.INFINITY, x = 0.0, y = 0.0, z
         for k in range(corner_count):
@@ -607,18 +607,18 @@ cdef class StockTree:
                 self.lowest(
                     polygon[0][k], polygon[1][k], grow, self.top, before, &row, guess[0]
                 )
-            for j in range(kept):
-                if known[j] == row:
+            for j in range(count_kept):
+                if rows[j] == row:
                     row = -1
                     break
             if row < 0:
                 continue
-            known[kept] = row
-            z = self.corners(row, corner_count, polygon, grow, corner[kept])
+            rows[count_kept] = row
+            z = self.corners(row, corner_count, polygon, grow, corner[count_kept])
             if z < math.INFINITY:
                 best = min(best, z)
-                kept += 1
-        for k in range(kept):
+                count_kept += 1
+        for k in range(count_kept):
             for j in range(k):
                 if best <= enough:
                     return best
@@ -649,20 +649,20 @@ cdef class StockTree:
         return best
 
     cdef inline double corners(
-        self, Int move, int count, double[3][MAX_CORNERS] polygon, double grow, double* found
+        self, Int move, int count, double[3][MAX_CORNERS] polygon, double grow, double* heights
     ) noexcept nogil:
         """Heights of a move plus the given values at the corners of a polygon, and the greatest."""
         cdef double* tool = &self.tools[self.tool[move], 0]
         cdef double* columns = &self.moves[move, 0]
-        cdef double most = -math.INFINITY
+        cdef double highest = -math.INFINITY
         cdef int k
         for k in range(count):
-            found[k] = height_of(columns, tool, polygon[0][k], polygon[1][k], grow)
-            found[k] += polygon[2][k]
-            most = max(most, found[k])
-            if most == math.INFINITY:
+            heights[k] = height_of(columns, tool, polygon[0][k], polygon[1][k], grow)
+            heights[k] += polygon[2][k]
+            highest = max(highest, heights[k])
+            if highest == math.INFINITY:
                 break
-        return most
+        return highest
 
 
 cdef inline void corners_of(const double* square, double[3][MAX_CORNERS] at) noexcept nogil:
@@ -676,11 +676,11 @@ cdef inline void corners_of(const double* square, double[3][MAX_CORNERS] at) noe
 
 cdef inline double mean_above(const double* corner, double bottom) noexcept nogil:
     """Mean of four heights, none of them below a bottom."""
-    cdef double found = 0.0
+    cdef double mean = 0.0
     cdef int k
     for k in range(4):
-        found += 0.25 * max(corner[k], bottom)
-    return found
+        mean += 0.25 * max(corner[k], bottom)
+    return mean
 
 
 cdef int clipped(
@@ -690,7 +690,7 @@ cdef int clipped(
     """Store the corners of the part of a square about 0 that lies no farther than `far` along a
     direction: x, y and the value, which is given at the corners of the square and linear along its
     sides; return their number."""
-    cdef int count = 0, k, here, there
+    cdef int count = 0, k, corner, other_corner
     cdef double[4] off
     cdef double share
     cdef int[4] order
@@ -699,36 +699,36 @@ cdef int clipped(
         off[k] = (half if k & 1 else -half) * direction[0] - far
         off[k] += (half if k & 2 else -half) * direction[1]
     for k in range(4):
-        here, there = order[k], order[(k + 1) & 3]
-        if off[here] <= 0.0:
-            at[0][count] = half if here & 1 else -half
-            at[1][count] = half if here & 2 else -half
-            at[2][count] = value[here]
+        corner, other_corner = order[k], order[(k + 1) & 3]
+        if off[corner] <= 0.0:
+            at[0][count] = half if corner & 1 else -half
+            at[1][count] = half if corner & 2 else -half
+            at[2][count] = value[corner]
             count += 1
-        if (off[here] < 0.0 < off[there]) or (off[there] < 0.0 < off[here]):
-            share = off[here] / (off[here] - off[there])
-            at[0][count] = (half if here & 1 else -half) * (1.0 - share) + (
-                half if there & 1 else -half
+        if (off[corner] < 0.0 < off[other_corner]) or (off[other_corner] < 0.0 < off[corner]):
+            share = off[corner] / (off[corner] - off[other_corner])
+            at[0][count] = (half if corner & 1 else -half) * (1.0 - share) + (
+                half if other_corner & 1 else -half
             ) * share
-            at[1][count] = (half if here & 2 else -half) * (1.0 - share) + (
-                half if there & 2 else -half
+            at[1][count] = (half if corner & 2 else -half) * (1.0 - share) + (
+                half if other_corner & 2 else -half
             ) * share
-            at[2][count] = value[here] * (1.0 - share) + value[there] * share
+            at[2][count] = value[corner] * (1.0 - share) + value[other_corner] * share
             count += 1
     return count
 
 
 cdef double fan_integral(int count, double[3][MAX_CORNERS] at) noexcept nogil:
     """Integral over a convex polygon of a function that is linear in each triangle of a fan."""
-    cdef double found = 0.0, area
+    cdef double integral = 0.0, area
     cdef int k
     for k in range(2, count):
         area = 0.5 * (
             (at[0][k - 1] - at[0][0]) * (at[1][k] - at[1][0])
             - (at[0][k] - at[0][0]) * (at[1][k - 1] - at[1][0])
         )
-        found += area * (at[2][0] + at[2][k - 1] + at[2][k]) / 3.0
-    return found
+        integral += area * (at[2][0] + at[2][k - 1] + at[2][k]) / 3.0
+    return integral
 
 
 cdef double half_plane_mean(
@@ -750,7 +750,7 @@ cdef inline double mean_bound(
 ) noexcept nogil:
     """Least over all means of two moves of the greatest value at the corners, or `best` where
     that is less: at an end or where the lines of two corners cross."""
-    cdef double share, rise, most, value
+    cdef double share, rise, highest, value
     cdef int k, j, c
     for k in range(count):
         for j in range(k):
@@ -760,11 +760,11 @@ cdef inline double mean_bound(
             share = (other[j] - other[k]) / rise
             if not 0.0 < share < 1.0:
                 continue
-            most = -math.INFINITY
+            highest = -math.INFINITY
             for c in range(count):
                 value = other[c] + share * (one[c] - other[c])
-                most = max(most, value)
-            best = min(best, most)
+                highest = max(highest, value)
+            best = min(best, highest)
     return best
 
 
@@ -776,25 +776,25 @@ def heights_of_moves(moves: Floats, tools: Floats, points: Floats, grow: Floats)
     cdef double[:, ::1] at = np.ascontiguousarray(points, dtype=np.float64)
     cdef double[::1] more = np.ascontiguousarray(grow, dtype=np.float64)
     cdef Py_ssize_t k, count = columns.shape[0]
-    cdef double[::1] found = np.empty(count)
+    cdef double[::1] heights = np.empty(count)
     with nogil:
         for k in range(count):
-            found[k] = height_of(&columns[k, 0], &tool[k, 0], at[k, 0], at[k, 1], more[k])
-    return np.asarray(found)
+            heights[k] = height_of(&columns[k, 0], &tool[k, 0], at[k, 0], at[k, 1], more[k])
+    return np.asarray(heights)
 
 
-def thinned(points: Floats, row: Ints, start: Floats, double beside):
+def thinned(points: Floats, row: Ints, start: Floats, double tolerance):
     """(J,) the samples that stay of points (K, 3) of the rows (K,): the last one of each row, and
-    so many between that every sample lies within `beside` of the straight move between those that
-    stay before and behind it. `start` (3,): the place before the first sample.
+    so many between that every sample lies within `tolerance` of the straight move between those
+    that stay before and behind it. `start` (3,): the place before the first sample.
 
     From each kept sample the move is drawn twice as far again and again, as long as all samples
     between lie beside it; then the last doubling is halved down.
     """
     cdef double[:, ::1] at = np.ascontiguousarray(np.concatenate([start[None], points]))
     cdef Int[::1] of = np.ascontiguousarray(row, dtype=np.int64)
-    cdef Py_ssize_t count = of.shape[0], anchor = 0, end, good, span, kept = 0, last
-    cdef Int[::1] found = np.empty(count, dtype=np.int64)
+    cdef Py_ssize_t count = of.shape[0], anchor = 0, end, good, span, count_kept = 0, last
+    cdef Int[::1] rows = np.empty(count, dtype=np.int64)
     with nogil:
         end = 0
         while anchor < count:
@@ -806,24 +806,24 @@ def thinned(points: Floats, row: Ints, start: Floats, double beside):
             good, span = anchor + 1, 2
             while good < end:
                 last = min(anchor + span, end)
-                if not lies_beside(at, anchor, last, beside):
+                if not lies_beside(at, anchor, last, tolerance):
                     break
                 good, span = last, 2 * span
             last = min(anchor + span, end)
             while last - good > 1:
                 span = (good + last) // 2
-                if lies_beside(at, anchor, span, beside):
+                if lies_beside(at, anchor, span, tolerance):
                     good = span
                 else:
                     last = span
-            found[kept] = good - 1
-            kept += 1
+            rows[count_kept] = good - 1
+            count_kept += 1
             anchor = good
-    return np.asarray(found[:kept])
+    return np.asarray(rows[:count_kept])
 
 
 cdef inline bint lies_beside(
-    double[:, ::1] at, Py_ssize_t begin, Py_ssize_t end, double beside
+    double[:, ::1] at, Py_ssize_t begin, Py_ssize_t end, double tolerance
 ) noexcept nogil:
     """True if all points between two lie within a distance of the line from one to the other."""
     cdef double[3] direction
@@ -843,7 +843,7 @@ cdef inline bint lies_beside(
         distance = 0.0
         for c in range(3):
             distance += (off[c] - share * direction[c]) * (off[c] - share * direction[c])
-        if distance > beside * beside:
+        if distance > tolerance * tolerance:
             return False
     return True
 

@@ -381,8 +381,8 @@ cdef Int _halves_wait(
 ) noexcept:
     """Let the halves of a node wait, the nearer one on top; how many wait then."""
     cdef bint left_first
-    left = _box_distance_square(tree, 2 * node + 1, x, y)
-    left_first = left <= _box_distance_square(tree, 2 * node + 2, x, y)
+    distance = _box_distance_square(tree, 2 * node + 1, x, y)
+    left_first = distance <= _box_distance_square(tree, 2 * node + 2, x, y)
     waiting[top] = 2 * node + (2 if left_first else 1)
     waiting[top + 1] = 2 * node + (1 if left_first else 2)
     return top + 2

@@ -488,10 +488,10 @@ class _Checks:
         stock = self.request.stock
         if stock is None:
             return
-        found = loose_pieces(self.moves, stock.thickness_mm, stock.box_mm, self.before)
-        every = found.pieces
-        if found.narrowest_mm < found.seen_mm - POSITION_EPS_MM:
-            yield STOCK_NOT_JUDGED_NARROW(measured=found.narrowest_mm, limit=found.seen_mm)
+        result = loose_pieces(self.moves, stock.thickness_mm, stock.box_mm, self.before)
+        every = result.pieces
+        if result.narrowest_mm < result.seen_mm - POSITION_EPS_MM:
+            yield STOCK_NOT_JUDGED_NARROW(measured=result.narrowest_mm, limit=result.seen_mm)
         pieces = [
             (piece, is_part)
             for piece in every

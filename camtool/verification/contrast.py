@@ -8,7 +8,6 @@ import msgspec
 import numpy as np
 
 from camtool.arrays import Bools, Floats
-from camtool.plain import to_json as json_text
 from camtool.simulation.motion import Chunk
 from camtool.units import clock
 from camtool.verification.report import Report
@@ -75,11 +74,6 @@ def contrast_table(rows: Sequence[ContrastRow]) -> str:
         ).rstrip()
         for line in cells
     )
-
-
-def to_json(rows: Sequence[ContrastRow]) -> str:
-    """Return the rows as indented JSON with a newline at its end."""
-    return json_text(list(rows))
 
 
 def worst_place(verdicts: Iterable[Verification]) -> tuple[float, float]:

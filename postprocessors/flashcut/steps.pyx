@@ -109,9 +109,9 @@ cdef Int _displacement(Int axis, double target, bint sensed, Timers timers) noex
     if sensed or timers.from_reached:
         here = timers.origin[axis] + float(timers.steps[axis]) * timers.step_mm[axis]
     timers.programmed[axis] = target
-    way = target - here
-    steps = int(abs(way) / timers.step_mm[axis] + timers.added)
-    return -steps if way < 0.0 else steps
+    change = target - here
+    steps = int(abs(change) / timers.step_mm[axis] + timers.added)
+    return -steps if change < 0.0 else steps
 
 
 cdef void _begin(Int move, Timers timers) noexcept:

@@ -21,12 +21,12 @@ import numpy as np
 from camtool.arrays import Floats, Ints
 
 
-def steps_taken(way: Ints, events: Ints) -> Ints:
-    """(B, 3) signed steps of blocks of `way` (B, 3) steps after `events` (B,) of their events."""
-    size = np.abs(way)
-    most = np.maximum(size.max(axis=1, initial=0), 1)[:, None]
-    taken = (most + 2 * size * events[:, None] - 1) // (2 * most)
-    return np.asarray(np.sign(way) * taken)
+def steps_taken(travel: Ints, events: Ints) -> Ints:
+    """(B, 3) signed steps of blocks of `travel` (B, 3) steps after `events` (B,) events of each."""
+    size = np.abs(travel)
+    event_count = np.maximum(size.max(axis=1, initial=0), 1)[:, None]
+    step_count = (event_count + 2 * size * events[:, None] - 1) // (2 * event_count)
+    return np.asarray(np.sign(travel) * step_count)
 
 
 cpdef void step_lines_fill(
@@ -37,24 +37,24 @@ cpdef void step_lines_fill(
     `blocks`: where each starts (B, 3) and its way (B, 3), steps, none without steps; `first`: the
     block of the first event, and how many of its events came before.
     """
-    cdef Int k, block, event, most, count, axis, size, sign, taken, counter, position, m
-    cdef Int[:, ::1] start, way
-    start, way = blocks
+    cdef Int k, block, event, event_count, count, axis, size, sign, taken_steps, counter, position, m
+    cdef Int[:, ::1] start, travel
+    start, travel = blocks
     block, event = first
     k = 0
     while k < len(out):
-        most = max(abs(way[block, 0]), abs(way[block, 1]), abs(way[block, 2]))
-        count = min(most - event, len(out) - k)
+        event_count = max(abs(travel[block, 0]), abs(travel[block, 1]), abs(travel[block, 2]))
+        count = min(event_count - event, len(out) - k)
         for axis in range(3):
-            size = abs(way[block, axis])
-            sign = 1 if way[block, axis] > 0 else -1
-            taken = (most + 2 * size * event - 1) // (2 * most)
-            counter = most + 2 * size * event - 2 * most * taken
-            position = start[block, axis] + sign * taken
+            size = abs(travel[block, axis])
+            sign = 1 if travel[block, axis] > 0 else -1
+            taken_steps = (event_count + 2 * size * event - 1) // (2 * event_count)
+            counter = event_count + 2 * size * event - 2 * event_count * taken_steps
+            position = start[block, axis] + sign * taken_steps
             for m in range(k, k + count):
                 counter += 2 * size
-                if counter > 2 * most:
-                    counter -= 2 * most
+                if counter > 2 * event_count:
+                    counter -= 2 * event_count
                     position += sign
                 out[m, axis] = float(position) * step_mm[axis]
         k += count
@@ -179,12 +179,12 @@ cdef class Segments:
 
     cdef float _advance(self) noexcept:
         """Go on by a segment; return its minutes."""
-        cdef float longest, dt, time, ahead, change, least, mm, acceleration
+        cdef float longest, dt, time, ahead, change, end_mm, mm, acceleration
         acceleration = self.acceleration[self.block]
         longest, dt, time, mm = SEGMENT_MIN, ZERO, SEGMENT_MIN, self.mm
-        least = mm - self.least_mm
-        if least < ZERO:
-            least = ZERO
+        end_mm = mm - self.least_mm
+        if end_mm < ZERO:
+            end_mm = ZERO
         while True:
             change = acceleration * time
             if self.ramp == ACCELERATES:
@@ -216,7 +216,7 @@ cdef class Segments:
             dt += time
             if dt < longest:
                 time = longest - dt
-            elif mm > least:
+            elif mm > end_mm:
                 longest += SEGMENT_MIN
                 time = longest - dt
             else:

@@ -60,10 +60,10 @@ cpdef (Int, Int, Int) records_in_a_row(
     most records of a packet, the pulses that a high byte counts, those that are lost at each
     start, the byte before a wait, and whether the key stands before each packet.
     """
-    cdef Int at, inside, most, high_steps, lost, mark, rows, size, behind, end
+    cdef Int at, inside, max_records, high_steps, lost, mark, rows, size, behind, end
     cdef bint keys
     at, inside = place
-    most, high_steps, lost, mark, keys = rules
+    max_records, high_steps, lost, mark, keys = rules
     rows, size = 0, len(data)
     while rows < len(records):
         if inside > 0 and at < size and data[at] == _PACKET_END:
@@ -71,7 +71,7 @@ cpdef (Int, Int, Int) records_in_a_row(
             if behind >= size or data[behind] == _DATA_END or (keys and data[at + 1] != _KEY):
                 break
             at, inside = behind, 0
-        if inside == most:
+        if inside == max_records:
             break
         end = _motor(data, at, 1, (high_steps, lost), records[rows], X)
         end = _motor(data, end, 2, (high_steps, lost), records[rows], Y)

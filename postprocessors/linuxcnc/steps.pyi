@@ -3,5 +3,5 @@ from camtool.arrays import Bools, Floats, Ints
 MAX_CHAIN_POINTS: int
 
 def merge_lines(
-    points: Floats, apart: Bools, tolerance: Floats, chain: Ints, moved: Floats
+    points: Floats, breaks: Bools, tolerance: Floats, chain: Ints, moved: Floats
 ) -> None: ...

@@ -24,13 +24,13 @@ cpdef enum:
 cdef inline double _share(double[:, ::1] points, Int base, Int end, Int point) noexcept:
     """Return the parameter of the point of the line from base to end that is nearest to `point`."""
     cdef Int axis
-    cdef double way, along, whole
-    along, whole = 0.0, 0.0
+    cdef double change, along, square
+    along, square = 0.0, 0.0
     for axis in range(3):
-        way = points[end, axis] - points[base, axis]
-        along += way * (points[point, axis] - points[base, axis])
-        whole += way * way
-    return min(max(along / whole, 0.0), 1.0)
+        change = points[end, axis] - points[base, axis]
+        along += change * (points[point, axis] - points[base, axis])
+        square += change * change
+    return min(max(along / square, 0.0), 1.0)
 
 
 cdef bint _joins(double[:, ::1] points, Int base, Int new, double tolerance) noexcept:
@@ -57,31 +57,31 @@ cdef bint _joins(double[:, ::1] points, Int base, Int new, double tolerance) noe
 
 
 cpdef void merge_lines(
-    double[:, ::1] points, uint8_t[::1] apart, double[:] tolerance, Int[::1] chain,
+    double[:, ::1] points, uint8_t[::1] breaks, double[:] tolerance, Int[::1] chain,
     double[:, ::1] moved
 ) noexcept:
     """The chain of each of N moves, `chain` (N,), numbered from 0, and where the moves then end,
     `moved` (N, 3): on the chain's line, never back.
 
-    `points` (N+1, 3): the start and all ends; `apart` (N,): moves that do not join the one before;
+    `points` (N+1, 3): the start and all ends; `breaks` (N,): moves that do not join the one before;
     `tolerance` (N,): within which a move joins.
     """
     cdef Int k, base, number, axis, j
-    cdef double reached, whole
+    cdef double reached, travel
     number, base = -1, 0
-    for k in range(len(apart)):
-        if k == 0 or apart[k] or not _joins(points, base, k + 1, tolerance[k]):
+    for k in range(len(breaks)):
+        if k == 0 or breaks[k] or not _joins(points, base, k + 1, tolerance[k]):
             number, base = number + 1, k
         chain[k] = number
         for axis in range(3):
             moved[k, axis] = points[k + 1, axis]
     base = 0
-    for k in range(len(apart)):
-        if k + 1 == len(apart) or chain[k + 1] != chain[k]:
+    for k in range(len(breaks)):
+        if k + 1 == len(breaks) or chain[k + 1] != chain[k]:
             reached = 0.0
             for j in range(base, k):
                 reached = max(reached, _share(points, base, k + 1, j + 1))
                 for axis in range(3):
-                    whole = points[k + 1, axis] - points[base, axis]
-                    moved[j, axis] = points[base, axis] + reached * whole
+                    travel = points[k + 1, axis] - points[base, axis]
+                    moved[j, axis] = points[base, axis] + reached * travel
             base = k + 1

@@ -98,7 +98,7 @@ cdef void listed_loop(
     double* motor, Int* slave, double* axis, Int* table
 ) noexcept:
     """The interrupt of the listing: L5496-5584."""
-    cdef Int phase, shown, change, drive, left, fast, speed, ref, kid, kpd
+    cdef Int phase, shown, change, drive, to_go, fast, speed, ref, kid, kpd
     phase = int(axis[PHASE])
     shown = (slave[COUNT] + phase) & (TURN - 1)
     change = shown - slave[SHOWN] if slave[UP] == 1 else slave[SHOWN] - shown
@@ -106,9 +106,9 @@ cdef void listed_loop(
     if change >= 0:
         slave[SEEN] = change
     if slave[STAGE] == SLOWING:
-        left = int(axis[CHUNK])
-        left -= _seen_way(slave, axis, slave[UP])
-        fast = table[min(max(left, 0), TABLE_COUNTS)]
+        to_go = int(axis[CHUNK])
+        to_go -= _seen_way(slave, axis, slave[UP])
+        fast = table[min(max(to_go, 0), TABLE_COUNTS)]
         slave[REF] = fast if slave[NEXT_REF] >= 0 else -fast
     speed, ref = slave[SEEN], slave[REF]
     kid, kpd = int(axis[KID]), int(axis[KPD])
@@ -126,10 +126,10 @@ cdef void text_loop(double* motor, Int* slave, double* axis, Int top) noexcept:
     speed = float(slave[COUNT] - slave[SHOWN])
     slave[SHOWN] = slave[COUNT]
     if slave[STAGE] == FOLLOWING:
-        left = float(slave[TARGET] - slave[COUNT])
-        most = float(abs(slave[REF]))
-        ref = min(most, float(top) * math.sqrt(abs(left) / float(TABLE_COUNTS)))
-        ref = math.copysign(ref if abs(left) < float(TABLE_COUNTS) else most, left)
+        to_go = float(slave[TARGET] - slave[COUNT])
+        full_speed = float(abs(slave[REF]))
+        ref = min(full_speed, float(top) * math.sqrt(abs(to_go) / float(TABLE_COUNTS)))
+        ref = math.copysign(ref if abs(to_go) < float(TABLE_COUNTS) else full_speed, to_go)
         change = axis[KID] * (ref - speed) - axis[KPD] * (speed - motor[SPEED_BEFORE])
         motor[DRIVE] = min(max(motor[DRIVE] + change / 1000.0, -100.0), 100.0)
     motor[SPEED_BEFORE] = speed
@@ -243,15 +243,15 @@ cpdef enum:
 cdef double REST_COUNTS = 1e-6
 
 
-cdef double _moment(double way, double speed, double aim, double tau, double most) noexcept:
-    """When a motor at `speed` that tends to `aim` has gone `way`; it has by `most`."""
+cdef double _moment(double travel, double speed, double aim, double tau, double upper) noexcept:
+    """When a motor at `speed` that tends to `aim` has gone `travel`; it has by `upper`."""
     cdef Int _
     cdef double low, high, moment, better
-    low, high, moment = 0.0, most, 0.5 * most
+    low, high, moment = 0.0, upper, 0.5 * upper
     for _ in range(SEARCHES):
         fade = -math.expm1(-moment / tau)
-        miss = aim * moment + (speed - aim) * tau * fade - way
-        if (miss > 0.0) == (way > 0.0):
+        miss = aim * moment + (speed - aim) * tau * fade - travel
+        if (miss > 0.0) == (travel > 0.0):
             high = moment
         else:
             low = moment

@@ -103,15 +103,15 @@ cdef void scan(
     No coordinate changes by more than one from sample to sample: of `STRIDE` of them none is 0, or
     nearer than the nearest, when the one before is far enough away.
     """
-    cdef Int x, y, entered, seen, least, k, square, nearest, apart
-    cdef bint wanted
+    cdef Int x, y, entered, seen, min_square, k, square, nearest, gap
+    cdef bint in_window
     x, y, entered = tracker[0], tracker[1], tracker[2]
-    seen, nearest, least, k = tracker[3], tracker[4], tracker[5], 0
+    seen, nearest, min_square, k = tracker[3], tracker[4], tracker[5], 0
     while k < count:
         if abs(x) > STRIDE and abs(y) > STRIDE and k + STRIDE <= count:
-            apart = max(abs(x - end_x), abs(y - end_y)) - STRIDE
-            wanted = low <= entered <= high
-            if not wanted or (least >= 0 and apart > 0 and apart * apart >= least):
+            gap = max(abs(x - end_x), abs(y - end_y)) - STRIDE
+            in_window = low <= entered <= high
+            if not in_window or (min_square >= 0 and gap > 0 and gap * gap >= min_square):
                 k += STRIDE
                 x, y = path_x[k - 1], path_y[k - 1]
                 continue
@@ -121,10 +121,10 @@ cdef void scan(
         k += 1
         if low <= entered <= high:
             square = (x - end_x) * (x - end_x) + (y - end_y) * (y - end_y)
-            if least < 0 or square < least:
-                nearest, least = seen + k, square
+            if min_square < 0 or square < min_square:
+                nearest, min_square = seen + k, square
     tracker[0], tracker[1], tracker[2] = x, y, entered
-    tracker[3], tracker[4], tracker[5] = seen + count, nearest, least
+    tracker[3], tracker[4], tracker[5] = seen + count, nearest, min_square
 
 
 # Arcs by direct search (DSM), the step-by-step method of the PIC18F8720 controller.
@@ -224,34 +224,34 @@ def direct_search_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints
     return np.array([x, y, error, sx, sy], dtype=np.int64)
 
 
-cdef Int _run_length(Int m, Int n, Int way, Int error, Int room) noexcept:
+cdef Int _run_length(Int m, Int n, Int sense, Int error, Int room) noexcept:
     """Return the number of positions, up to `room`, for which the closed form holds from M, N on
-    while M runs `way`."""
+    while M runs `sense`."""
     cdef Int invariant, diagonal
     invariant = m * m + n * n - error
     if error < -abs(n) or error >= abs(n) or invariant >= MAX_SQUARE or 2 * m * m > invariant:
         return 0
-    if m * way < 0:
+    if m * sense < 0:
         return min(room, abs(m))
     diagonal = int(math.sqrt(0.5 * invariant))
     return min(room, diagonal - 1 - abs(m))
 
 
 cdef wide _run(
-    Int m, Int n, Int way, Int error, Int[::1] out_m, Int[::1] out_n, Int low, Int high
+    Int m, Int n, Int sense, Int error, Int[::1] out_m, Int[::1] out_n, Int low, Int high
 ) noexcept:
-    """The positions that follow M, N while M runs `way`, by the closed form, into the rows
+    """The positions that follow M, N while M runs `sense`, by the closed form, into the rows
     low … high − 1."""
     cdef Int first, k, size
-    cdef double here, invariant
+    cdef double position, invariant
     invariant = float(m * m + n * n - error)
-    first = m + way * (1 - low)
+    first = m + sense * (1 - low)
     for k in range(low, high):
-        out_m[k] = first + way * k
+        out_m[k] = first + sense * k
     for k in range(low, high):
-        here = float(out_m[k])
+        position = float(out_m[k])
         # What is cut off here is cut off as by floor: the sum is not negative.
-        size = int(math.sqrt(invariant - here * here) + 0.5)
+        size = int(math.sqrt(invariant - position * position) + 0.5)
         out_n[k] = size if n > 0 else -size
 
 
@@ -271,23 +271,23 @@ cdef (Int, bint) direct_search_run(
     Int[::1] state, Int end_x, Int end_y, Int[::1] out_x, Int[::1] out_y
 ) noexcept:
     """As `direct_search_fill`, into one array for each axis."""
-    cdef Int x, y, error, sx, sy, room, filled, run, _, m, n, way, upto, delta_x, delta_y, at
+    cdef Int x, y, error, sx, sy, room, filled, run, _, m, n, sense, upto, delta_x, delta_y, at
     cdef bint met, by_x
     x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
     room, filled, met = len(out_x), 0, False
     while filled < room and not met:
         by_x = abs(x) < abs(y)
-        m, n, way = (x, y, sx) if by_x else (y, x, sy)
-        run = _run_length(m, n, way, error, room - filled)
+        m, n, sense = (x, y, sx) if by_x else (y, x, sy)
+        run = _run_length(m, n, sense, error, room - filled)
         if run >= MIN_RUN:
             # M passes the end once.
-            at = ((end_x if by_x else end_y) - m) * way - 1
+            at = ((end_x if by_x else end_y) - m) * sense - 1
             upto = filled + run
             if by_x:
-                _run(m, n, way, error, out_x, out_y, filled, upto)
+                _run(m, n, sense, error, out_x, out_y, filled, upto)
                 met = 0 <= at < run and out_y[filled + at] == end_y
             else:
-                _run(m, n, way, error, out_y, out_x, filled, upto)
+                _run(m, n, sense, error, out_y, out_x, filled, upto)
                 met = 0 <= at < run and out_x[filled + at] == end_x
             filled = filled + at + 1 if met else upto
             x, y = out_x[filled - 1], out_y[filled - 1]
@@ -312,16 +312,16 @@ cdef (Int, bint) direct_search_run(
 cpdef void skip(Int[::1] state, Int count) noexcept:
     """Run on by so many iterations: as `direct_search_fill`, but no position on the way is made
     where the closed form gives the last one."""
-    cdef Int x, y, error, sx, sy, m, n, way, run, size, _, invariant, delta_x, delta_y
+    cdef Int x, y, error, sx, sy, m, n, sense, run, size, _, invariant, delta_x, delta_y
     cdef bint by_x
     x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
     while count > 0:
         by_x = abs(x) < abs(y)
-        m, n, way = (x, y, sx) if by_x else (y, x, sy)
-        run = _run_length(m, n, way, error, count)
+        m, n, sense = (x, y, sx) if by_x else (y, x, sy)
+        run = _run_length(m, n, sense, error, count)
         if run >= MIN_RUN:
             invariant = m * m + n * n - error
-            m += way * run
+            m += sense * run
             size = int(math.sqrt(float(invariant - m * m)) + 0.5)
             n = size if n > 0 else -size
             error = m * m + n * n - invariant
@@ -348,11 +348,11 @@ cpdef Int first_at(Int[::1] state, Int end_x, Int end_y, Int limit) noexcept:
     after a whole turn. No coordinate changes by more than one an iteration, so the end is not
     nearer than the larger of its two distances.
     """
-    cdef Int done, apart, run
+    cdef Int done, distance, run
     done = 0
     while done < limit:
-        apart = int(max(abs(state[0] - end_x), abs(state[1] - end_y)))
-        run = min(max(apart, 1), limit - done)
+        distance = int(max(abs(state[0] - end_x), abs(state[1] - end_y)))
+        run = min(max(distance, 1), limit - done)
         skip(state, run)
         done += run
         if state[0] == end_x and state[1] == end_y:
@@ -367,17 +367,17 @@ cpdef (Int, Int) nearest_to(Int[::1] state, Int end_x, Int end_y, Int low, Int h
     As in `first_at`; what is to be no farther than d has come nearer by apart − d. Long strides
     show first how near it comes at least.
     """
-    cdef Int done, best, least, off_x, off_y, square, run, x, y, error, sx, sy
+    cdef Int done, best, min_square, off_x, off_y, square, run, x, y, error, sx, sy
     if high < low:
         return -1, -1
     skip(state, low)
     x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
-    done, best, least = low, -1, -1
+    done, best, min_square = low, -1, -1
     while True:
         off_x, off_y = abs(state[0] - end_x), abs(state[1] - end_y)
         square = off_x * off_x + off_y * off_y
-        if least < 0 or square < least:
-            least = square
+        if min_square < 0 or square < min_square:
+            min_square = square
         if done == high:
             break
         run = min(max(off_x, off_y, 1), high - done)
@@ -388,11 +388,11 @@ cpdef (Int, Int) nearest_to(Int[::1] state, Int end_x, Int end_y, Int low, Int h
     while True:
         off_x, off_y = abs(state[0] - end_x), abs(state[1] - end_y)
         square = off_x * off_x + off_y * off_y
-        if square < least or (best < 0 and square == least):
-            best, least = done, square
+        if square < min_square or (best < 0 and square == min_square):
+            best, min_square = done, square
         if done == high:
-            return best, least
-        run = max(off_x, off_y) - int(math.sqrt(float(least)))
+            return best, min_square
+        run = max(off_x, off_y) - int(math.sqrt(float(min_square)))
         run = min(max(run, 1), high - done)
         skip(state, run)
         done += run
@@ -712,12 +712,12 @@ cdef Int _passes(
 ) noexcept:
     """At which of so many positions an arc stops in its final quadrant, or −1; `tracker` as in
     `approach_start`."""
-    cdef Int x, y, entered, end_x, end_y, to_x, to_y, found, k
+    cdef Int x, y, entered, end_x, end_y, to_x, to_y, index, k
     cdef bint reached, short
     x, y, entered = tracker[0], tracker[1], tracker[2]
     end_x, end_y = leg[END_X], leg[END_Y]
     to_x, to_y = heading(end_x, end_y, leg[CW] != 0)
-    found, k = -1, 0
+    index, k = -1, 0
     while k < count:
         if abs(x) > STRIDE and abs(y) > STRIDE and k + STRIDE <= count:
             # Not before one of the coordinates has come as far as the end (see `scan`).
@@ -731,11 +731,11 @@ cdef Int _passes(
         x, y = path_x[k], path_y[k]
         reached = to_x * (x - end_x) >= 0 and to_y * (y - end_y) >= 0
         if entered > expected or (entered == expected and reached):
-            found = k
+            index = k
             break
         k += 1
     tracker[0], tracker[1], tracker[2] = x, y, entered
-    return found
+    return index
 
 
 cdef void _stop(
@@ -1001,12 +1001,12 @@ cdef (Int, Int) _ways(
     signs come back is a whole turn: more than a block, when the circle is larger than that.
     """
     cdef Int last, sign_x, sign_y
-    cdef bint known
-    known, sign_x, sign_y = leg[KIND] == LINE, leg[SIGN_X], leg[SIGN_Y]
+    cdef bint is_exact
+    is_exact, sign_x, sign_y = leg[KIND] == LINE, leg[SIGN_X], leg[SIGN_Y]
     if method == DSM and leg[KIND] == ARC and max(abs(at_x), abs(at_y)) > BLOCK:
-        known = before[3] == after[3] and before[4] == after[4]
+        is_exact = before[3] == after[3] and before[4] == after[4]
         sign_x, sign_y = after[3], after[4]
-    if not known:
+    if not is_exact:
         return way_of(at_x, path_x), way_of(at_y, path_y)
     last = len(path_x) - 1
     return (
@@ -1043,19 +1043,19 @@ cdef (Int, bint) _passed(
 
 
 cdef wide _move_slide(
-    Int[::1] leg, Int axis, Int way, Int[::1] steps, Int at, double step_mm, double[::1] play,
+    Int[::1] leg, Int axis, Int trend, Int[::1] steps, Int at, double step_mm, double[::1] play,
     double[::1] state, Int[::1] counts, double[::1] commanded, double[::1] slide
 ) noexcept:
-    """Move the slide of X or Y by `steps` (n,) about the origin of the leg, in the direction `way`
-    from `at` on, and count steps and reversals."""
+    """Move the slide of X or Y by `steps` (n,) about the origin of the leg, in the direction
+    `trend` from `at` on, and count steps and reversals."""
     cdef Int origin, k, way_on, count
     count = len(steps)
     origin = leg[ORIGIN_X + axis]
     for k in range(count):
         commanded[k] = (origin + steps[k]) * step_mm
-    counts[REVERSALS + axis] += play_block(way, commanded[:count], play, state, slide[:count])
+    counts[REVERSALS + axis] += play_block(trend, commanded[:count], play, state, slide[:count])
     way_on = abs(steps[count - 1] - at)
-    if way == TURNING:
+    if trend == TURNING:
         way_on = abs(steps[0] - at)
         for k in range(1, count):
             way_on += abs(steps[k] - steps[k - 1])
@@ -1099,7 +1099,7 @@ cdef void _judge_leg(
     Int[::1] count, Judge judge, Room room
 ) noexcept:
     """Run and judge a leg from the state in `room` on."""
-    cdef Int x, y, end_x, end_y, at_x, at_y, low, high, expected, entered, left, size, filled
+    cdef Int x, y, end_x, end_y, at_x, at_y, low, high, expected, entered, remaining, size, filled
     cdef Int passes, way_x, way_y, more
     cdef Int[::1] path_x, path_y, state, other
     cdef bint arc, careful, met, near
@@ -1113,18 +1113,18 @@ cdef void _judge_leg(
     if arc:
         expected = expected_quadrants(x, y, leg[CW] != 0, end_x, end_y)
         low, high = expected - 1, expected + 1
-        apart = abs(math.hypot(float(x), float(y)) - math.hypot(float(end_x), float(end_y)))
-        careful = method == DDA or apart > NEAR_RADIUS or max(abs(x), abs(y)) < MIN_RADIUS
-    entered, left, met = 0, -1, False
+        change = abs(math.hypot(float(x), float(y)) - math.hypot(float(end_x), float(end_y)))
+        careful = method == DDA or change > NEAR_RADIUS or max(abs(x), abs(y)) < MIN_RADIUS
+    entered, remaining, met = 0, -1, False
     if arc and leg[STOP] >= 0:
-        left, count[ENDED] = leg[STOP], 1
-    while left != 0 and not (left < 0 and met):
-        if careful and left < 0:
-            left, met = _run_ahead(leg, method, entered, low, high, room)
+        remaining, count[ENDED] = leg[STOP], 1
+    while remaining != 0 and not (remaining < 0 and met):
+        if careful and remaining < 0:
+            remaining, met = _run_ahead(leg, method, entered, low, high, room)
             count[ENDED] = 1 if met else 0
             continue
         _copy(state, other)
-        size = BLOCK if left < 0 or left >= BLOCK else left
+        size = BLOCK if remaining < 0 or remaining >= BLOCK else remaining
         path_x, path_y = room.path_x[:size], room.path_y[:size]
         filled, passes, met = fill_leg(leg, method, state, registers, path_x, path_y)
         if filled > 0:
@@ -1132,8 +1132,8 @@ cdef void _judge_leg(
             if not arc:
                 turn_round(leg, path_x, path_y, filled)
             way_x, way_y = _ways(leg, method, other, state, at_x, at_y, path_x, path_y)
-        if left >= 0:
-            left -= filled
+        if remaining >= 0:
+            remaining -= filled
         elif arc:
             more, near = _passed(leg, at_x, at_y, path_x, path_y, way_x, way_y)
             if entered + more > high or (near and entered + more >= low and not met):
@@ -1143,7 +1143,7 @@ cdef void _judge_leg(
             entered += more
         count[PASSES] += passes
         count[SAMPLES] += filled
-        if left < 0:
+        if remaining < 0:
             count[ENDED] = 1 if met else 0
         if filled == 0:
             continue
@@ -1350,7 +1350,7 @@ cdef void _land(
 ) noexcept:
     """Fill `out` (3,) for one arc (7,), as `land` says; left alone when there is no landing."""
     cdef double radius, latest
-    cdef Int end_x, end_y, low, high, met, near, _, first, count, row, least, off_x, off_y, square
+    cdef Int end_x, end_y, low, high, met, near, _, first, count, row, min_square, off_x, off_y, square
     cdef Int upto, room
     cdef bint nearer
     radius = _radius(arc[START_X], arc[START_Y])
@@ -1374,15 +1374,15 @@ cdef void _land(
             return
     if first == 0:
         return
-    least = -1
+    min_square = -1
     for row in range(count - 1, -1, -1):
         off_x, off_y = search.path_x[row] - end_x, search.path_y[row] - end_y
         square = off_x * off_x + off_y * off_y
-        nearer = search.onward[row] == 0 and (least < 0 or square < least)
+        nearer = search.onward[row] == 0 and (min_square < 0 or square < min_square)
         if nearer and _lands(arc, row, first, search):
-            least = square
+            min_square = square
             _store_landing(row, first, search, out)
-    if least >= 0:
+    if min_square >= 0:
         return
     upto, room = first, len(search.path_x)
     while upto > 0:

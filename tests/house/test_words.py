@@ -26,7 +26,7 @@ CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILI
 MAX_QUESTIONS = 1
 MAX_SHARED_CLASS_NAMES = 0
 MAX_SUPERLATIVES = 0
-MAX_RIDDLES = 125
+MAX_RIDDLES = 28
 
 RIDDLE = re.compile(
     r"_*(?:found|made|way|most|asked|kept|held|said|apart|whole|mine|theirs|taken|known|about|on|left"

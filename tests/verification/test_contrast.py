@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from camtool.plain import to_json
 from camtool.simulation.motion import Chunk, one_row
 from camtool.verification import contrast
-from camtool.verification.contrast import contrast_row, contrast_table, paths_within, to_json
+from camtool.verification.contrast import contrast_row, contrast_table, paths_within
 from tests.oracles.judged import judged, sample_part
 
 WINDOW = np.array([[0.0, 1.0], [0.0, 1.0]])
