@@ -199,22 +199,22 @@ def plain(convert: Callable[[object], Any]) -> Callable[[Given], Any]:
 
 
 def length(value: object) -> float:
-    """mm."""
+    """Read a length, mm."""
     return parse_length(number_text(value))
 
 
 def feed(value: object) -> float:
-    """mm/min."""
+    """Read a feed, mm/min."""
     return parse_feed(number_text(value))
 
 
 def angle(value: object) -> float:
-    """rad."""
+    """Read an angle, rad."""
     return parse_angle(number_text(value))
 
 
 def time(value: object) -> float:
-    """s."""
+    """Read a time, s."""
     return parse_time(number_text(value))
 
 
@@ -228,7 +228,7 @@ def number(value: object) -> float:
 
 
 def fraction(value: object) -> float:
-    """0.4 or "40%"."""
+    """Read a fraction: 0.4 or "40%"."""
     text = number_text(value).strip()
     return number(text[:-1]) / 100.0 if text.endswith("%") else number(text)
 
@@ -253,7 +253,7 @@ def engagement_angle(value: object) -> float:
 
 
 def whole_number(value: object) -> int:
-    """A whole number."""
+    """Read a whole number."""
     text = number_text(value).strip()
     if not re.fullmatch(r"[+-]?\d{1,9}", text):
         raise OptionError(f"{text!r} is no whole number", mend="write it like 4")
@@ -261,14 +261,14 @@ def whole_number(value: object) -> int:
 
 
 def switch(value: object) -> bool:
-    """true or false."""
+    """Read true or false."""
     if not isinstance(value, bool):
         raise OptionError(f"{value!r} is neither true nor false", mend="write true or false")
     return value
 
 
 def text(value: object) -> str:
-    """Any text."""
+    """Read any text."""
     if not isinstance(value, str):
         raise OptionError(f"{value!r} is no text", mend=f'write it in quotes: "{value}"')
     return value
@@ -291,7 +291,7 @@ def word(words: Sequence[str]) -> Callable[[Given], Any]:
 
 
 def patterns(value: object) -> tuple[str, ...]:
-    """A list of texts."""
+    """Read a list of texts."""
     if not isinstance(value, list | tuple):
         raise OptionError(f"{value!r} is no list", mend=f'write it in brackets: ["{value}"]')
     if not value:

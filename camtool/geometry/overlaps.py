@@ -74,7 +74,7 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
 
 
 def _may_be_loose(lines: Polylines) -> Bools:
-    """Mask (M,) of the open paths that are a single line, or arcs alone."""
+    """Mask (M,) of the paths that an overlap may shorten: open, and a single line or only arcs."""
     counts = np.diff(lines.offsets) - 1
     arcs = np.searchsorted(lines.offsets, np.flatnonzero(lines.vertices[:, 2]), side="right") - 1
     of_arcs = np.bincount(arcs, minlength=len(lines)) == counts

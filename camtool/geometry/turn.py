@@ -36,7 +36,7 @@ class Turn:
 
     @property
     def back(self) -> Turn:
-        """The map back."""
+        """Return the inverse map."""
         x, y = (-sign * by for sign, by in zip(self.signs, self.shift_mm, strict=True))
         return Turn(self.signs, (x, y))
 

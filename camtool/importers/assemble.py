@@ -291,7 +291,7 @@ def skip_findings(skipped: Sequence[Skipped], dropped: Sequence[Skipped]) -> lis
 
 
 def font_findings(lacking: Counter[str]) -> list[Finding]:
-    """FONT_SUBSTITUTED for what texts wanted and could not have, and how many texts did."""
+    """Return FONT_SUBSTITUTED for each font that is not installed, and the number of its texts."""
     return [FONT_SUBSTITUTED(measured=count, what=what) for what, count in lacking.items()]
 
 

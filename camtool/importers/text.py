@@ -184,7 +184,7 @@ class _Face(Struct, frozen=True, order=True):
         return any(word in self.style.lower() for word in ("italic", "oblique"))
 
     def distance(self, request: WantedFont) -> tuple[bool, int, int, str]:
-        """Smaller is more alike."""
+        """Return the key that sorts fonts by how much they differ from the requested one."""
         weight = _BOLD if request.bold else _REGULAR
         slant = self.italic is not request.italic
         return (slant, abs(self.weight - weight), abs(self.width - _NORMAL_WIDTH), self.path)

@@ -107,7 +107,7 @@ def length_range(value: object) -> tuple[float, float]:
 
 
 def number_range(value: object) -> tuple[float, float]:
-    """[10, 200] or "10..200"."""
+    """Read a range of numbers: [10, 200] or "10..200"."""
     return _range(value, number)
 
 
@@ -152,7 +152,7 @@ def lengths(value: object) -> tuple[float, float]:
 
 
 def counts(value: object) -> tuple[int, int]:
-    """[3, 2] or "3x2"."""
+    """Read two counts: [3, 2] or "3x2"."""
     if isinstance(value, str):
         match = _PAIR.fullmatch(value.strip())
         if match is None:

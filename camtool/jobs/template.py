@@ -427,7 +427,7 @@ class Remaining(Struct, frozen=True):
 
     @property
     def branched(self) -> tuple[int, ...]:
-        """Rows of the paths of which it is not clear what they enclose."""
+        """Rows of the paths that meet at a branch, so that it is not clear what they enclose."""
         branched_rows = {path for branch in self.drawing.healing.branches for path in branch.paths}
         return tuple(row for row in self.rows if row in branched_rows)
 

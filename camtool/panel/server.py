@@ -568,7 +568,7 @@ def _cycle_of(request: TouchRequest) -> Callable[[Place], probing.Measured]:
 
 
 def _tool_at_choices(wire: Wire) -> list[ToolAt]:
-    """Return what can be said of the place of the tool when a program goes on."""
+    """Return the answers to --tool-at that the controller allows when a program is resumed."""
     choices: dict[str, list[ToolAt]] = {
         "told": ["", "journal", "zero", "known"],
         "kept": ["zero"],

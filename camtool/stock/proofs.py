@@ -220,7 +220,7 @@ class _Chords(Struct, frozen=True, eq=False):
 
     @property
     def halves(self) -> _Chords:
-        """Both halves of each."""
+        """Return both halves of each chord."""
         half, middle = 0.5 * self.half, self.z.mean(axis=1)
         return _Chords(
             np.concatenate([self.middle - half, self.middle + half]),

@@ -222,7 +222,7 @@ class GrblWire(Wire):
         return GrblConversation(packets, machine, manner)
 
     def terminal(self, machine: GrblMachine) -> GrblTerminal:
-        """Lines, and the numbers of its errors, alarms and settings."""
+        """Return the terminal, which explains numbers of errors, alarms and settings."""
         return GrblTerminal()
 
     def command(
@@ -232,7 +232,8 @@ class GrblWire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> GrblConversation:
-        """`$H`; `$X`; the place as zero of G54; `$J=`."""
+        """Return the conversation that homes (`$H`), unlocks (`$X`), zeroes (G10 L20 of G54) or
+        jogs (`$J=`)."""
         if action == "unlock":
             return GrblConversation((), machine, replace(manner, unlock=True))
         return GrblConversation((), machine, manner, (hand_line(action, values).rstrip(b"\n"),))
@@ -242,7 +243,8 @@ class GrblWire(Wire):
         return GrblProbing(cycle, machine, manner)
 
     def travel_mm(self, machine: GrblMachine) -> tuple[Place, Place]:
-        """From −travel to 0 (limits.c, system_check_travel_limits)."""
+        """Return the travel in machine coordinates: from −travel to 0 (limits.c,
+        system_check_travel_limits)."""
         _, (u, v, w) = super().travel_mm(machine)
         x, y, z = (0.0 if math.isfinite(each) else each for each in (u, v, w))
         return (-u, -v, -w), (x, y, z)
@@ -250,7 +252,7 @@ class GrblWire(Wire):
     def settings(
         self, machine: GrblMachine, manner: Manner, changes: Sequence[str] = ()
     ) -> GrblSettings:
-        """`$$`, a line for each change, and `$$`."""
+        """Return the conversation that reads the settings, writes each change, and reads again."""
         return GrblSettings(machine, manner, changes)
 
     def recognised(self, heard: str) -> str:
@@ -383,7 +385,7 @@ class GrblConversation(Conversation):
         self._poll(now)
 
     def pause(self, now: float) -> None:
-        """Feed hold."""
+        """Hold the feed."""
         self._resumes = False
         if self.state is WireState.SENDING:
             self.state, self._halted = WireState.PAUSING, now
@@ -1227,7 +1229,7 @@ class GrblHand(GrblConversation, Hand):
         self._refusal = ""
 
     def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
-        """`$H`, `$X`, the place as zero of G54, `$J=`."""
+        """Carry out an order: home (`$H`), unlock (`$X`), zero (G10 L20 of G54) or jog (`$J=`)."""
         self._begin(action, hand_line(action, values), now)
 
     def say(self, line: str, now: float) -> None:
@@ -1442,7 +1444,7 @@ class GrblTerminal(Terminal):
         self._homes = 0  # the answers that are due up to that of homing
 
     def halt(self) -> bytes:
-        """Homing hears nothing but a reset."""
+        """Stop the machine; while it homes only a reset stops it."""
         stop = super().halt()
         self._typed = True  # the reports that follow are to be seen
         if not self._homes:
@@ -1451,7 +1453,7 @@ class GrblTerminal(Terminal):
         return RESET
 
     def is_urgent(self, line: str) -> bool:
-        """Holds, resets and the word to go on."""
+        """True for holds, resets and the command to go on."""
         return line.strip().lower() in ("!", "~", "^x", r"\x18", r"\x84", r"\x85")
 
     def decode(self, data: bytes) -> list[str]:

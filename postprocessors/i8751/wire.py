@@ -100,7 +100,7 @@ class I8751Wire(Wire):
         return I8751Conversation(packets, machine, manner)
 
     def terminal(self, machine: I8751Machine) -> Terminal:
-        """Bytes in hex, and what the letters mean."""
+        """Return the terminal, to which bytes are typed in hex; it explains the letters."""
         return I8751Terminal()
 
     def command(
@@ -367,7 +367,7 @@ class I8751Conversation(PacketByPacket):
             self._fail(f"no reply, {self._reply} was awaited{self._in_reply}", now)
 
     def _halt(self, now: float, *, unsent: bool) -> bool:
-        """A packet that is not complete is never executed."""
+        """Send nothing more: a packet that is not complete is never executed."""
         if self._executes and not unsent:
             return False
         if self._seeks_origin:

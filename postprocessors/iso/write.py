@@ -277,8 +277,8 @@ class TextForm:
         return template.replace("{number}", f"{self.number:04}")
 
     def fill(self, template: str, values: Mapping[str, Callable[[str], str]]) -> str:
-        """Return a template with its fields replaced by texts; each is given the letter before
-        it."""
+        """Return a template with its fields replaced by the texts of `values`, each of which is
+        called with the letter before its field."""
         return _FIELD.sub(
             lambda field: f"{field['letter'] or ''}{values[field['name']](field['letter'] or '')}",
             template,

@@ -64,7 +64,7 @@ class Compensation:
         return self.side != 0 and self.radius > 0.0
 
     def scale(self, factor: float) -> None:
-        """Another unit of length."""
+        """Multiply the radius, the places and the queued moves: another unit of length."""
         self.radius *= factor
         self.programmed = [value * factor for value in self.programmed]
         if self._from is not None:

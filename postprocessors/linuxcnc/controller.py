@@ -824,11 +824,12 @@ class Tangents:
         return np.searchsorted(self.arms.row, arcs)
 
     def at_starts(self, rows: Ints) -> Floats:
-        """(K, 3) where rows (K,), which move, begin."""
+        """Return (K, 3) unit tangents at the starts of rows (K,), which move."""
         return self._at(rows, self.arms.radius, 0.0)
 
     def at_ends(self, rows: Ints, *, level: bool = False) -> Floats:
-        """(K, 3) where they end; with `level`, of arcs without their rise."""
+        """Return (K, 3) unit tangents at the ends of rows (K,); with `level` without the rise of
+        arcs."""
         return self._at(rows, self.arms.end_radius, 1.0, level=level)
 
     def pushed_at_starts(self, rows: Ints, acceleration: Floats, speed: Floats) -> Floats:

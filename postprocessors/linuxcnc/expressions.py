@@ -86,7 +86,7 @@ class Scanner:
         return lambda parameters: whole_number(function(parameters), begin)
 
     def expression(self) -> Value:
-        """[value operator value …]"""
+        """Parse [value operator value …]."""
         begin = self.at
         self.at += 1
         self._depth += 1
@@ -166,7 +166,7 @@ class Scanner:
         return _apply_function(FUNCTIONS[name], first, begin)
 
     def _exists(self) -> Value:
-        """exists[#<name>]"""
+        """Parse exists[#<name>]."""
         self.at += 1
         if self.text[self.at : self.at + 1] != "#":
             raise LineFault("exists wants a parameter", self.at)

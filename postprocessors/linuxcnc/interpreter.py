@@ -227,7 +227,7 @@ class Interpreter(BlockMoves):
     # G words
 
     def _g_words(self, block: LinuxcncBlock, words: dict[str, float]) -> None:
-        """All but the motion."""
+        """Carry out all G words of a block but the motion."""
         g = block.g
         one_shot = g.get("one block")
         if one_shot == 40:

@@ -135,7 +135,7 @@ class Parameters:
         return before
 
     def leave(self, before: dict[int, float | None] | None) -> None:
-        """A call ends."""
+        """Restore the local parameters of the caller: a call ends."""
         self._locals.pop()
         for index, value in (before or {}).items():
             if value is None:

@@ -175,7 +175,7 @@ class LinuxcncWire(Wire):
         return LinuxcncConversation(packets, link, manner, "run")
 
     def terminal(self, machine: LinuxcncMachine) -> LinuxcncTerminal:
-        """The words of linuxcncrsh."""
+        """Return the terminal for the commands of linuxcncrsh."""
         return LinuxcncTerminal(_link(machine))
 
     def travel_mm(self, machine: LinuxcncMachine) -> tuple[Place, Place]:
@@ -195,7 +195,7 @@ class LinuxcncWire(Wire):
         return LinuxcncConversation((), _link(machine), manner, action, values)
 
     def recognised(self, heard: str) -> str:
-        """Its answer to the greeting, which enables nothing."""
+        """Return its answer to the greeting, which enables nothing; "" if it is none."""
         return "LinuxCNC (linuxcncrsh)" if heard.upper().startswith("HELLO ") else ""
 
     def probing(
@@ -343,7 +343,7 @@ class LinuxcncConversation(Conversation):
             self._abort_at(now)
 
     def _go(self, answer: str | None, now: float) -> None:
-        """The next turn of the script."""
+        """Run the script to its next wait."""
         self._now = now
         try:
             # A script that begins has asked nothing yet, whatever was answered to another.
@@ -477,7 +477,7 @@ class LinuxcncConversation(Conversation):
         yield from self._watch()
 
     def _watch(self) -> Script:
-        """Until it is idle again."""
+        """Wait until the controller is idle again."""
         start_s, ran, before = self._now, 0.0, self._now
         busy, still_count, last = False, 0, None
         while True:
@@ -563,7 +563,7 @@ class LinuxcncConversation(Conversation):
         self._end(WireState.FINISHED)
 
     def _abort(self) -> Script:
-        """Until it is idle, and stands."""
+        """Abort, and wait until the controller is idle and the slides stand."""
         yield from self._set("abort")
         end, last, still_count = self._now + self.manner.patience_s, None, 0
         while still_count < STILL_REPORTS:

@@ -630,6 +630,6 @@ def state_of(start_mm: Floats, machine: _Machine) -> State:
 
 
 def account_of(rows: int) -> Account:
-    """Nothing done yet."""
+    """Return the account of so many rows, none of which has been run yet."""
     steps = np.zeros((rows, 3), dtype=np.int64)
     return Account(np.zeros(rows), steps, np.ones(rows, dtype=np.bool_))

@@ -69,7 +69,7 @@ class MatlabRouterWire(Wire):
     def packets(
         self, data: bytes, machine: MatlabRouterMachine, forecast: Forecast
     ) -> Sequence[Packet]:
-        """The jobs."""
+        """Return one packet for each job."""
         assert isinstance(machine.link, MatlabRouterLink)
         jobs = list(read_jobs(data, machine))
         packets, low = list[Packet](), 0
@@ -93,7 +93,7 @@ class MatlabRouterWire(Wire):
         return MatlabRouterConversation(packets, machine, manner)
 
     def terminal(self, machine: MatlabRouterMachine) -> Terminal:
-        """Numbers."""
+        """Return the terminal, to which numbers are typed."""
         return MatlabRouterTerminal()
 
 

@@ -126,7 +126,7 @@ class PicMmhWire(Wire):
         return PicMmhConversation(packets, machine, manner)
 
     def terminal(self, machine: PicMmhMachine) -> PicMmhTerminal:
-        """Strings, their echo, and steps by the dozen."""
+        """Return the terminal, which shows the echo of strings and counts the reported steps."""
         return PicMmhTerminal(machine)
 
     def command(

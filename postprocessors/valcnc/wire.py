@@ -64,7 +64,7 @@ class ValcncWire(Wire):
     stopping = "nothing more is sent; the block that is being cut is cut to its end"
 
     def packets(self, data: bytes, machine: ValcncMachine, forecast: Forecast) -> Sequence[Packet]:
-        """The lines with words, without blanks."""
+        """Return a packet for each line that has words, without its blanks."""
         packets = [Packet(OPENING)]
         lines = (line.translate(None, b" \t") for line in data.splitlines())
         for block, line in enumerate(filter(None, lines)):
@@ -87,7 +87,7 @@ class ValcncWire(Wire):
         return ValcncConversation(packets, machine.link, manner)
 
     def terminal(self, machine: ValcncMachine) -> Terminal:
-        """Blocks."""
+        """Return the terminal, to which blocks are typed."""
         return ValcncTerminal()
 
     def command(

@@ -258,7 +258,7 @@ class MTextCell(Struct, frozen=True, eq=False):
 
     @property
     def height(self) -> float:
-        """Above its own baseline."""
+        """Height above the baseline."""
         share = {"": 1.0, "#": 2.0}.get(self.bar, STACK_HEIGHT)
         return 0.0 if self.glue is not Glue.NONE else share * self.look.height
 

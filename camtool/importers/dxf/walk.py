@@ -150,7 +150,7 @@ class DxfWalk:
             raise Unusable(WHY_UNUSED.get(kind, OTHER))
 
     def _following(self, entity: Any) -> BulkLines:
-        """The LINEs that follow this entity and are no entities of the document."""
+        """Return the LINEs behind this one in the file that were read in bulk, without ezdxf."""
         return self.loaded.lines.get(entity.dxf.handle, _NO_LINES)
 
     def _count_with(self, entity: Any) -> int:

@@ -260,12 +260,12 @@ class FileUnit(Struct, frozen=True):
 
 
 def unnamed_unit() -> FileUnit:
-    """BREP names none."""
+    """Return mm, since BREP files name no unit."""
     return FileUnit("BREP names no unit; its makers count in mm")
 
 
 def script_unit() -> FileUnit:
-    """build123d's own."""
+    """Return mm, the unit of build123d."""
     return FileUnit("build123d counts in mm")
 
 
