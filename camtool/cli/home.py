@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 import click
 
 from camtool.cli.messages import say
-from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
+from camtool.cli.options import (
+    Command,
+    MachineFlags,
+    SectionedCommand,
+    decorate,
+    machine_options,
+    talk_options,
+)
 from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
 from camtool.errors import MachineError, OptionError
 from camtool.sending.drive import Driver, Order, Request
@@ -20,15 +27,18 @@ from camtool.units import parse_feed, parse_length
 if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
 
-PORT = click.option("--port", metavar="PORT", required=True, help="Such as /dev/ttyUSB0.")
-UNLOCK = click.option("--unlock", is_flag=True, help="Unlock a controller that is locked first.")
 BAUD = click.option("--baud", type=click.IntRange(min=1), help="Rate, where not its own.")
+UNLOCK = click.option("--unlock", is_flag=True, help="Unlock a controller that is locked first.")
+
+
+def port_options(command: Command) -> Command:
+    """Add `machine: MachineFlags`, `port` and `baud`."""
+    port = click.option("--port", metavar="PORT", required=True, help="Such as /dev/ttyUSB0.")
+    return machine_options(decorate(command, [port, BAUD]))
 
 
 @click.command(cls=SectionedCommand, short_help="Home a machine.")
-@machine_options
-@PORT
-@BAUD
+@port_options
 @click.option("--yes", is_flag=True, help="Do not ask for what must be done at the machine first.")
 @talk_options
 def home(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from camtool.cli.home import BAUD, PORT, UNLOCK, act, axes_of
-from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
+from camtool.cli.home import UNLOCK, act, axes_of, port_options
+from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.errors import OptionError
 from camtool.target.wire import Place
 
@@ -16,9 +16,7 @@ from camtool.target.wire import Place
     context_settings={"ignore_unknown_options": True},
 )
 @click.argument("axes", nargs=-1, required=True, metavar="X1.5 Y-2mm F200")
-@machine_options
-@PORT
-@BAUD
+@port_options
 @UNLOCK
 @click.option(
     "--at",

@@ -13,15 +13,16 @@ from typing import Any
 import click
 
 from camtool.cli.files import display_name, read_bytes, refuse_same, write_all
-from camtool.cli.home import BAUD, PORT, UNLOCK, carried
+from camtool.cli.home import UNLOCK, carried, port_options
 from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import (
+    Command,
     MachineFlags,
     SectionedCommand,
+    decorate,
     feed,
     length,
-    machine_options,
     talk_options,
 )
 from camtool.errors import OptionError, OutputError
@@ -45,16 +46,24 @@ from camtool.toolpath.probing import (
 )
 from camtool.toolpath.surface import text_of_surface
 
-JOURNAL = click.option(
-    "--journal", metavar="FILE", help="Add each touch and the result to this file."
-)
+
+def touch_options(command: Command) -> Command:
+    """Add `journal`, `as_json`, `yes`, `quiet` and `verbose`."""
+    options = [
+        click.option(
+            "--journal", metavar="FILE", help="Add each touch and the result to this file."
+        ),
+        click.option(
+            "--json", "as_json", is_flag=True, help="What was measured as JSON, on stdout."
+        ),
+        click.option("--yes", is_flag=True, help="Begin without asking."),
+    ]
+    return decorate(talk_options(command), options)
 
 
 @click.command(cls=SectionedCommand, short_help="Measure the top of the blank.")
 @click.argument("program", metavar="PROGRAM")
-@machine_options
-@PORT
-@BAUD
+@port_options
 @UNLOCK
 @click.option("-o", "--output", metavar="FILE", help="The surface  [PROGRAM.surface.csv]")
 @click.option(
@@ -76,10 +85,7 @@ JOURNAL = click.option(
     metavar="LENGTH",
     help="Distance of points from holes and clamps.",
 )
-@JOURNAL
-@click.option("--json", "as_json", is_flag=True, help="What was measured as JSON, on stdout.")
-@click.option("--yes", is_flag=True, help="Begin without asking.")
-@talk_options
+@touch_options
 def probe(
     program: str,
     machine: MachineFlags,

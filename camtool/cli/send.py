@@ -129,8 +129,8 @@ def send(
             )
         state = None
     elif state is not None:
-        answer = tool_at_of(wire_of(target), state, tool_at, target.machine.target.name)
-        tool_at = _confirmed_place(*answer)
+        name = target.machine.target.name
+        tool_at = _confirmed_place(*tool_at_of(wire_of(target), state, tool_at, name))
     elif tool_at:
         raise OptionError(
             "no journal says where this program was left",

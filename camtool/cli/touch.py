@@ -8,17 +8,15 @@ from typing import cast
 
 import click
 
-from camtool.cli.home import BAUD, PORT, UNLOCK, axes_of, carried
+from camtool.cli.home import UNLOCK, axes_of, carried, port_options
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import (
     MachineFlags,
     SectionedCommand,
     feed,
     length,
-    machine_options,
-    talk_options,
 )
-from camtool.cli.probe import JOURNAL, asked_to_begin, check_sizes, journaled
+from camtool.cli.probe import asked_to_begin, check_sizes, journaled, touch_options
 from camtool.errors import OptionError
 from camtool.sending.line import manner_of, wire_of
 from camtool.toolpath import probing
@@ -53,9 +51,7 @@ LABELS = {
 @click.command(cls=SectionedCommand, short_help="Touch off an edge, a corner, a bore or a plate.")
 @click.argument("what", type=click.Choice(list(AXES_OF)), metavar="WHAT")
 @click.argument("axes", nargs=-1, metavar="[X0 Y0 Z0]")
-@machine_options
-@PORT
-@BAUD
+@port_options
 @UNLOCK
 @click.option("--towards", default="", metavar="x+", help="edge, skew: the way; corner: x+y-.")
 @click.option("--inside", is_flag=True, help="corner: of a pocket.")
@@ -77,10 +73,7 @@ LABELS = {
 @click.option("--back", default="1mm", callback=length, metavar="LENGTH", help="Between them.")
 @click.option("--travel", default="150", callback=feed, metavar="FEED", help="Between places.")
 @click.option("--keep-zero", is_flag=True, help="Measure only.")
-@JOURNAL
-@click.option("--json", "as_json", is_flag=True, help="What was measured as JSON, on stdout.")
-@click.option("--yes", is_flag=True, help="Begin without asking.")
-@talk_options
+@touch_options
 def touch(
     what: str,
     axes: tuple[str, ...],

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import click
 
-from camtool.cli.home import BAUD, PORT, act
-from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
+from camtool.cli.home import act, port_options
+from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 
 
 @click.command(cls=SectionedCommand, short_help="Unlock a controller.")
-@machine_options
-@PORT
-@BAUD
+@port_options
 @talk_options
 def unlock(machine: MachineFlags, port: str, baud: int | None, quiet: bool, verbose: bool) -> int:
     """Unlock a controller that has locked itself, after an alarm or until it is homed.

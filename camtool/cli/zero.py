@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import click
 
-from camtool.cli.home import BAUD, PORT, UNLOCK, act, axes_of
-from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
+from camtool.cli.home import UNLOCK, act, axes_of, port_options
+from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.errors import OptionError
 
 
 @click.command(cls=SectionedCommand, short_help="Make this place part zero.")
 @click.argument("axes", nargs=-1, metavar="[X0 Y0 Z0]")
-@machine_options
-@PORT
-@BAUD
+@port_options
 @UNLOCK
 @talk_options
 def zero(

@@ -27,7 +27,7 @@ from .dialect import (
     IsoMachine,
 )
 from .lines import EVENT_KEYS, EventPattern, event_patterns, with_modes
-from .read import GROUPS, contradiction_of, read_program
+from .read import EVENTS, GROUPS, contradiction_of, read_program
 
 SAFE_CHARACTERS: Final = "._+:/=-"
 """Characters that no controller obeys within a comment."""
@@ -481,7 +481,7 @@ class _Check:
         lines = [_FIELD.sub("1.", template) for template in templates]
         lines = [re.sub(r"1\.(?=\D*$)", "1.", line) for line in lines]
         path = self._read(f"events.{each.key}", lines)
-        wanted_kind = _KINDS[each.key]
+        wanted_kind = EVENTS[each.key]
         if path.kind.tolist() != [wanted_kind]:
             names = ", ".join(Kind(kind).name for kind in path.kind.tolist()) or "nothing"
             self._fail(
@@ -495,17 +495,3 @@ class _Check:
             return read_program(self._data(lines), self._machine)
         except ProgramError as error:
             self._fail(key, f"{error.message} ({error.where})", error.mend)
-
-
-_KINDS: Final = {
-    "spindle_cw": Kind.SPINDLE_CW,
-    "spindle_ccw": Kind.SPINDLE_CCW,
-    "spindle_off": Kind.SPINDLE_OFF,
-    "mist": Kind.COOLANT_MIST,
-    "flood": Kind.COOLANT_FLOOD,
-    "coolant_off": Kind.COOLANT_OFF,
-    "dwell": Kind.DWELL,
-    "tool_change": Kind.TOOL_CHANGE,
-    "home_xy": Kind.HOME_XY,
-    "home_z": Kind.HOME_Z,
-}

@@ -377,15 +377,7 @@ def _see_events(lines: Sequence[_Line], sample: _Sample) -> None:
         sample.say("dialect.events.first_tool", "by-hand", "the program names no tool")
     dwell = next((line for line in lines if 4.0 in line.codes("G")), None)
     if dwell is None:
-        sample.ask(
-            "dialect.events.dwell",
-            "How is a dwell said: {s} are seconds, {ms} milliseconds",
-            "G4 P{s}",
-            "G4 P{s}",
-            "G4 P{ms}",
-            "G4 X{s}",
-            "G4 S{s}",
-        )
+        _ask_dwell(sample)
         return
     letter = next((each for each, _ in dwell.words if each in "PXSU"), "P")
     text = next((text for each, text in dwell.words if each == letter), "0")
@@ -411,6 +403,19 @@ def _filled(line: _Line, fields: dict[str, str], keep: str) -> str:
         if letter in keep
     ]
     return " ".join(words)
+
+
+def _ask_dwell(sample: _Sample) -> None:
+    """Ask how a dwell is written."""
+    sample.ask(
+        "dialect.events.dwell",
+        "How is a dwell said: {s} are seconds, {ms} milliseconds",
+        "G4 P{s}",
+        "G4 P{s}",
+        "G4 P{ms}",
+        "G4 X{s}",
+        "G4 S{s}",
+    )
 
 
 def _see_cycles(lines: Sequence[_Line], sample: _Sample) -> None:
@@ -472,15 +477,7 @@ def _ask_what_is_open(sample: _Sample) -> None:
         )
         sample.ask("dialect.program.end", "The last block", "M30", "M2", "M30", "")
         sample.ask("dialect.lines.end", "How lines end", "lf", "lf", "crlf", "cr")
-        sample.ask(
-            "dialect.events.dwell",
-            "How is a dwell said: {s} are seconds, {ms} milliseconds",
-            "G4 P{s}",
-            "G4 P{s}",
-            "G4 P{ms}",
-            "G4 X{s}",
-            "G4 S{s}",
-        )
+        _ask_dwell(sample)
     inches = values.get("dialect.program.units") == "in"
     decimals = values.get("dialect.words.inch_decimals" if inches else "dialect.words.decimals", 3)
     unit_mm = (25.4 if inches else 1.0) * 10.0 ** -float(str(decimals))
