@@ -279,7 +279,7 @@ def test_a_report_that_is_lost_or_garbled_sets_no_zero(report: str, why: str) ->
 
 def test_a_port_that_vanishes_sets_no_zero() -> None:
     twin = load_target("grbl").twin(["probe_mm=-9"])
-    port, wired = PseudoTerminal(), WiredTwin(twin, Faults.of("unplug=20s"))
+    port, wired = PseudoTerminal(), WiredTwin(twin, Faults.of("unplug=60s"))
 
     def host() -> None:
         serve(wired, port, Clock(20.0))
@@ -287,7 +287,7 @@ def test_a_port_that_vanishes_sets_no_zero() -> None:
 
     thread = threading.Thread(target=host)
     thread.start()
-    code, measured, said = run(port.name, "plate", "--thickness", "1mm", "--feed", "15")
+    code, measured, said = run(port.name, "plate", "--thickness", "1mm", "--feed", "5")
     thread.join()
     assert code == 1, said
     assert "the port is gone" in measured["why"] or "does not answer" in measured["why"]
