@@ -294,6 +294,10 @@ def _swept_band(paths: Polylines, cutter: Cutter) -> Any:
         region = _inside_of(outline, cutter.tolerance_mm)
         if shapely.is_valid(region):
             return region
+    if len(paths) > 1:
+        # Passes that nearly repeat each other: alone each of them has an outline.
+        alone = (paths.select(np.array([row])) for row in range(len(paths)))
+        return shapely.union_all([_swept_band(path, cutter) for path in alone])
     segments = Segments.of(paths)
     no_depth = np.zeros((len(segments), 2))
     return _swept_hulls(_chord_lines(segments, no_depth, cutter.tolerance_mm), cutter)
