@@ -213,12 +213,12 @@ def _envelope(
     if not len(segment):
         return positions
     level = level[segment]
-    place, normal = stations.places[station], stations.normals[station]
-    along = np.column_stack([normal[:, 1], -normal[:, 0]])
+    (x, y), (normal_x, normal_y) = stations.places.T[:, station], stations.normals.T[:, station]
     radius = swept.radius[segment]
-    from_a, from_b = swept.a[segment] - place, swept.b[segment] - place
-    ua, va = (from_a * along).sum(axis=1), (from_a * normal).sum(axis=1)
-    ub, vb = (from_b * along).sum(axis=1), (from_b * normal).sum(axis=1)
+    (ax, ay), (bx, by) = swept.a.T[:, segment], swept.b.T[:, segment]
+    ax, ay, bx, by = ax - x, ay - y, bx - x, by - y
+    ua, va = ax * normal_y - ay * normal_x, ax * normal_x + ay * normal_y
+    ub, vb = bx * normal_y - by * normal_x, bx * normal_x + by * normal_y
     wide = radius > 0.0
     for u, v in ((ua, va), (ub, vb)):
         under = wide & (np.abs(u) <= radius)
