@@ -1,4 +1,4 @@
-"""Slow, obvious oracle of a pocket: discs put down along the moves, and regions of fine chords.
+"""Obvious oracle of a pocket: discs put down along the moves, and regions of fine chords.
 
 Arcs are chords here; nothing of camtool is used beyond the records.
 """
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from camtool.arrays import Floats
+from camtool.arrays import Bools, Floats
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.items import CutRun
 from tests.oracles.offset import GRID_MM, chords, dense, distance, inside, near_region, pieces
@@ -20,7 +20,13 @@ CHORD_RAD = 0.05
 """Sweep of the chords that stand for the edges of discs, at first."""
 
 FINE_CHORD_RAD = 0.015
-"""The same where coarse chords find something wrong: then these decide."""
+"""The same where it decides what can be reached."""
+
+FLAT = 1e-4
+"""How far chords of moves are from their arcs, over the tool's radius."""
+
+PLACES, LATTICE_RAD = 30_000, 0.4
+"""Places of the lattice within the region, and its turn."""
 
 SAG = 2e-5
 """How far the chords that stand for arcs of a drawing are from them, over its size."""
@@ -56,7 +62,7 @@ def area_of(region: Polylines) -> shapely.Geometry:
 
 
 def _chords(path: Polyline, sag_mm: float) -> Floats:
-    """The points of a closed path, with chords no farther than that from their arcs."""
+    """The points of a path, with chords no farther than that from their arcs."""
     points = []
     for start, _, arc in pieces(path):
         if arc is None:
@@ -65,6 +71,8 @@ def _chords(path: Polyline, sag_mm: float) -> Floats:
         most_rad = min(math.sqrt(8.0 * sag_mm / arc.radius), 0.5)
         count = max(2, math.ceil(abs(arc.sweep) / most_rad))
         points.append(arc.at(np.arange(count) / count))
+    if not path.closed:
+        points.append(path.vertices[-1:, :2])
     return np.concatenate(points)
 
 
@@ -120,22 +128,44 @@ def _boundary(area: shapely.Geometry) -> list[Polyline]:
 def complaints(
     runs: Sequence[CutRun], region: Polylines, radius_mm: float, z: float, *, share: float = 1e-3
 ) -> list[str]:
-    """Return the faults of runs that must clear a region down to z with a tool of this radius."""
-    paths, area = at_depth(runs, z), area_of(region)
+    """Return the faults of runs that must clear a region down to z with a tool of this radius.
+
+    Places of a lattice are counted: a disc covers those that are nearer than its radius to the
+    moves, and can reach those that are as near to where its centre has room.
+    """
+    area = area_of(region)
+    near = swept(_boundary(area), radius_mm, FINE_CHORD_RAD)
+    room = shapely.difference(area, near, grid_size=GRID_MM)
+    lines = [_chords(path, FLAT * radius_mm) for path in at_depth(runs, z)]
+    moves = shapely.multilinestrings([shapely.linestrings(line) for line in lines])
+    places = _places(area, radius_mm)
+    wanted, got = _within(room, places, radius_mm), _within(moves, places, radius_mm)
+    missed, beyond = (wanted & ~got).sum(), (got & ~wanted).sum()
     found: list[str] = []
-    for most_rad in (CHORD_RAD, FINE_CHORD_RAD):
-        found = []
-        wanted = opened(area, radius_mm, most_rad)
-        got = swept(paths, radius_mm, most_rad)
-        missed = shapely.difference(wanted, got, grid_size=GRID_MM).area
-        if missed > share * wanted.area:
-            found.append(f"{missed} of {wanted.area} mm² left over")
-        beyond = shapely.difference(got, wanted, grid_size=GRID_MM).area
-        if beyond > share * wanted.area:
-            found.append(f"{beyond} mm² cut beyond {wanted.area} mm²")
-        if not found:
-            break
+    if missed > share * wanted.sum():
+        found.append(f"{missed} of {wanted.sum()} places left over")
+    if beyond > share * wanted.sum():
+        found.append(f"{beyond} places cut beyond {wanted.sum()}")
     return found + gouges(runs, region, radius_mm)
+
+
+def _places(area: shapely.Geometry, margin_mm: float) -> Floats:
+    """Points (P, 2) of a lattice over an area and about it, turned so that no edge of a drawing
+    runs along it."""
+    left, low, right, high = area.buffer(margin_mm).bounds
+    step, size = math.sqrt(area.area / PLACES), max(right - left, high - low)
+    line = np.arange(-size, size, step)
+    x, y = (each.ravel() for each in np.meshgrid(line, line))
+    cosine, sine = math.cos(LATTICE_RAD), math.sin(LATTICE_RAD)
+    x, y = cosine * x - sine * y + 0.5 * (left + right), sine * x + cosine * y + 0.5 * (low + high)
+    is_near = (left < x) & (x < right) & (low < y) & (y < high)
+    return np.column_stack([x[is_near], y[is_near]])
+
+
+def _within(shape: shapely.Geometry, places: Floats, radius_mm: float) -> Bools:
+    """Mask of the places that are nearer to a shape than that."""
+    shapely.prepare(shape)
+    return np.asarray(shapely.dwithin(shape, shapely.points(places), radius_mm))
 
 
 def gouges(runs: Sequence[CutRun], region: Polylines, radius_mm: float) -> list[str]:
