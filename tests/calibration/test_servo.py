@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import signal
 
 from camtool.arrays import Floats
 from camtool.calibration.servo import (
@@ -189,6 +188,8 @@ MOTORS = st.builds(MotorModel, gain=st.floats(1.0, 20.0), time_constant_s=st.flo
 def test_the_continuous_loop_has_the_wanted_poles(
     motor: MotorModel, damping: float, share: float
 ) -> None:
+    from scipy import signal  # late: it takes a second or two of each worker
+
     settling_s = share * motor.time_constant_s
     found = loop(motor, unit=1e-9)
     try:
@@ -207,6 +208,8 @@ def test_the_continuous_loop_has_the_wanted_poles(
 
 @given(MOTORS, st.floats(0.0, 0.2), st.floats(0.0, 0.3))
 def test_the_poles_are_those_of_scipy(motor: MotorModel, kid: float, kpd: float) -> None:
+    from scipy import signal  # late: it takes a second or two of each worker
+
     b, a, _ = signal.cont2discrete(
         ([motor.gain], [motor.time_constant_s, 1.0]), TICK_S, method="zoh"
     )

@@ -7,7 +7,6 @@ import io
 
 import numpy as np
 import pytest
-from scipy import signal
 
 from camtool.pictures.options import PictureOptions
 from camtool.simulation.motion import IDEAL, Options
@@ -81,6 +80,8 @@ def test_a_long_line_answers_as_scipy_simulates_the_loop() -> None:
     closed_num = np.convolve(plant[0], [kid, 0.0])
     assert b > 0.0
     count = 60
+    from scipy import signal  # late: it takes a second or two of each worker
+
     system = signal.dlti(closed_num, closed_den, dt=loop.tick_s)
     _, (answer,) = signal.dstep(system, n=count)
     first = int(np.searchsorted(at_s, begun.at_s + 1e-6))
