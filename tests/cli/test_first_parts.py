@@ -18,10 +18,12 @@ from tests.oracles.rs274 import RS274, run_rs274
 from tests.oracles.stock import Move, moves_of
 
 TOLERANCE_MM = 0.02
-QUARTER = 128
-"""Chords of a quarter of the tool: of 3.175 mm they are 0.03 µm off."""
+QUARTER = 32
+"""Chords of a quarter of the tool: of 3.175 mm they are 0.5 µm off."""
 
-POINT_MM = 0.02
+POINT_MM, SAG_MM = 0.02, 5e-4
+"""From one point of a move to the next, and how far chords through some of them may be from the
+others."""
 
 
 def rounded(left: float, low: float, right: float, high: float, radius: float) -> shapely.Polygon:
@@ -67,7 +69,8 @@ def cut_below(moves: list[Move], z: float, radius: float) -> shapely.Geometry:
                     shapely.LineString(run[:, :2]) if len(run) > 1 else shapely.Point(run[0, :2])
                 )
                 swept.append(line)
-    return shapely.union_all(shapely.buffer(swept, radius, quad_segs=QUARTER))
+    lines = shapely.simplify(swept, SAG_MM)
+    return shapely.union_all(shapely.buffer(lines, radius, quad_segs=QUARTER))
 
 
 def check_that_linuxcnc_runs(program: Path) -> None:

@@ -44,18 +44,26 @@ PLUNGE = (240, 138, 29)
 """Slopes."""
 
 Made = Callable[..., tuple[Path, Paths]]
+POSTED: dict[tuple[str, str], Path] = {}
+"""Folders of what was posted before, by the sample and the layers of its pictures."""
 
 
 @pytest.fixture
-def made(camtool: Run, samples: Path, tmp_path: Path) -> Made:
-    """Posts a sample with more flags: the folder of what was written, and the program's moves."""
+def made(camtool: Run, samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """Posts a sample, once, with these layers: the folder of the program, the viewer and the
+    report, and the program's moves."""
 
-    def make(name: str, *flags: str) -> tuple[Path, Paths]:
-        drawing, job = str(samples / f"{name}.dxf"), str(samples / f"{name}.toml")
-        line = ("post", drawing, "-t", JOBS[name], "--job", job, "-o", "p.nc", "-q")
-        done = camtool(*line, *flags)
-        assert done.returncode == 0, done.stderr
-        return tmp_path, program_paths((tmp_path / "p.nc").read_text())
+    def make(name: str, layers: str = "feeds,path") -> tuple[Path, Paths]:
+        if (name, layers) not in POSTED:
+            folder = tmp_path_factory.mktemp(name)
+            drawing, job = samples / f"{name}.dxf", samples / f"{name}.toml"
+            files = ("-o", folder / "p.nc", "--preview", folder / "p.html", "--report")
+            line = ("post", drawing, "-t", JOBS[name], "--job", job, "-q", *files)
+            done = camtool(*line, folder / "r.html", "--layers", layers)
+            assert done.returncode == 0, done.stderr
+            POSTED[name, layers] = folder
+        folder = POSTED[name, layers]
+        return folder, program_paths((folder / "p.nc").read_text())
 
     return make
 
@@ -74,9 +82,7 @@ def groups(svg: str, *names: str) -> list[Floats]:
 
 @pytest.mark.parametrize("name", JOBS)
 def test_the_data_of_every_page_is_the_program(made: Made, name: str) -> None:
-    folder, program = made(
-        name, "--preview", "p.html", "--report", "r.html", "--layers", "feeds,path"
-    )
+    folder, program = made(name)
     cuts = across(program.cuts)
     # The viewer has every move, in its order.
     shown = viewer_paths((folder / "p.html").read_text())
@@ -94,23 +100,23 @@ def test_the_data_of_every_page_is_the_program(made: Made, name: str) -> None:
 
 @pytest.mark.parametrize("name", JOBS)
 def test_the_data_of_pictures_is_the_program(
-    made: Made, camtool: Run, samples: Path, name: str
+    made: Made, camtool: Run, samples: Path, tmp_path: Path, name: str
 ) -> None:
-    folder, program = made(name, "--no-verify")
+    folder, program = made(name)
     for line in (
-        ("p.nc",),
+        (str(folder / "p.nc"),),
         (str(samples / f"{name}.dxf"), "--job", str(samples / f"{name}.toml")),
     ):
         done = camtool("preview", *line, "-t", JOBS[name], "-o", "p.svg")
         assert done.returncode == 0, done.stderr
-        svg = (folder / "p.svg").read_text()
+        svg = (tmp_path / "p.svg").read_text()
         assert beside(groups(svg, "feeds", "ramps"), across(program.cuts)) < 2e-3
         assert beside(groups(svg, "rapids"), across(program.rapids)) < 2e-3
 
 
 @pytest.mark.parametrize("name", JOBS)
 def test_the_setup_sheet_shows_the_drawing(made: Made, samples: Path, name: str) -> None:
-    folder, _ = made(name, "--report", "r.html")
+    folder, _ = made(name)
     drawn = []
     for entity in ezdxf.readfile(samples / f"{name}.dxf").modelspace():
         if entity.dxftype() in ("DIMENSION", "TEXT", "MTEXT", "POINT"):
@@ -197,7 +203,7 @@ class TestPixels:
     def test_the_live_page(
         self, made: Made, browser: Any, name: str, width: int, scheme: str
     ) -> None:
-        folder, program = made(name, "--no-verify")
+        folder, program = made(name)
         target = load_target(JOBS[name])
         data = (folder / "p.nc").read_bytes()
         live = LivePage(folder / "live.html", "p.nc", target.target.read(data, target.machine))
@@ -213,7 +219,7 @@ class TestPixels:
     def test_the_report(
         self, made: Made, browser: Any, name: str, width: int, scheme: str
     ) -> None:
-        folder, program = made(name, "--report", "r.html", "--layers", "feeds")
+        folder, program = made(name, "feeds")
         page = opened(browser, folder / "r.html", width, scheme)
         picture = page.locator("figure img").first
         # The legend has these colours too.
@@ -235,7 +241,7 @@ class TestPixels:
     def test_the_viewer(
         self, made: Made, browser: Any, name: str, width: int, scheme: str
     ) -> None:
-        folder, program = made(name, "--preview", "p.html")
+        folder, program = made(name)
         page = opened(browser, folder / "p.html", width, scheme)
         page.wait_for_selector("body[data-painted]")
         page.keyboard.press("r")  # without rapids

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import camtool as library
@@ -18,6 +18,7 @@ from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.cli.conftest import ROOT, Run
 from tests.drawings import drawing_of
+from tests.strategies import examples
 
 SAMPLES = ROOT / "samples"
 PLATE = ("post", str(SAMPLES / "plate.dxf"), "--job", str(SAMPLES / "plate.toml"), "-t", "grbl")
@@ -52,8 +53,12 @@ def test_each_program_is_complete_and_verified(camtool: Run, tmp_path: Path) -> 
 
 
 def test_names_begin_with_the_one_that_is_given(camtool: Run, tmp_path: Path) -> None:
-    assert camtool(*PLATE, "--split", "tool", "-q", "-o", "left.nc").returncode == 0
-    assert programs(tmp_path) == [name.replace("plate", "left") for name in PROGRAMS]
+    """The list of programs may go to stdout."""
+    done = camtool(*PLATE, "--split", "tool", "-q", "-o", "left.nc", "--json", "-")
+    assert done.returncode == 0, done.stderr
+    names = [name.replace("plate", "left") for name in PROGRAMS]
+    assert programs(tmp_path) == names
+    assert [each["program"] for each in json.loads(done.stdout)["programs"]] == names
     assert not (tmp_path / "left.nc").exists()
 
 
@@ -82,11 +87,6 @@ def test_stdout_holds_no_more_than_one(
     assert done.returncode == 2
     assert b"--split writes several files" in done.stderr
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_list_of_programs_may_go_to_stdout(camtool: Run) -> None:
-    done = camtool(*PLATE, "--split", "tool", "-q", "--json", "-")
-    assert [each["program"] for each in json.loads(done.stdout)["programs"]] == PROGRAMS
 
 
 def test_one_tool_is_one_program(camtool: Run, tmp_path: Path) -> None:
@@ -145,7 +145,7 @@ def cuts(path: Toolpath) -> list[tuple[float, ...]]:
     return [tuple(row) for row in np.nan_to_num(rows, nan=-1.0).tolist()]
 
 
-@settings(max_examples=60, deadline=None)
+@examples(20, 600, deadline=None)
 @given(job=jobs())
 def test_the_programs_together_cut_what_the_one_would(job: Job) -> None:
     machine = load_target("grbl").machine
