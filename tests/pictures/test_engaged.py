@@ -20,12 +20,18 @@ from camtool.pictures.options import PictureOptions
 from camtool.pictures.scene import Scene, stock_pair
 from camtool.pictures.viewer.columns import ENTRY_DEG
 from camtool.pictures.viewer.page import viewer_page
+from camtool.planning.job import Entry, Job, Operation, Tool
+from camtool.planning.plan import planned
 from camtool.records import replace
 from camtool.stock.cutters import CutterProfile
+from camtool.stock.engagement import COARSE_RAD, THICK_SHARE, engagement_of
 from camtool.stock.moves import stock_moves_of_toolpath
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles import svg_page
+from tests.oracles.contours import closed
 from tests.oracles.page_paths import viewer_column
+from tests.pictures.conftest import drawing_of
 
 RADIUS_MM = 2.0
 ENGAGED = PictureOptions(layers=frozenset({"engagement"}))
@@ -150,3 +156,59 @@ def test_the_viewer_has_the_greatest_of_each_move() -> None:
     assert entries[~np.isnan(entries)].tolist() == [ENTRY_DEG, ENTRY_DEG]
     ball = CutterProfile(RADIUS_MM, 0.0, corner_mm=RADIUS_MM)
     assert not len(angles_of(scene(10.0, cutter=ball)))
+
+
+DIRECTIONS, PLACES = 360, 5
+
+
+def sampled(
+    moves: Floats, number: int, place: Floats, behind_mm: Floats, thick_mm: float
+) -> float:
+    """The angle, rad, of the front of the tool's circle at a place of a move that no move (x, y to
+    x, y) before has come nearer to than the radius: directions are looked at one by one."""
+    heading = math.atan2(*(moves[number, 2:] - moves[number, :2])[::-1])
+    angles = heading + ((np.arange(DIRECTIONS) + 0.5) / DIRECTIONS - 0.5) * math.pi
+    rim = place + RADIUS_MM * np.column_stack([np.cos(angles), np.sin(angles)])
+    start, along = moves[:number, None, :2], (moves[:number, 2:] - moves[:number, :2])[:, None]
+    square = np.maximum((along**2).sum(axis=2), 1e-30)
+    part = np.clip(((rim[None] - start) * along).sum(axis=2) / square, 0.0, 1.0)
+    gaps = np.hypot(*np.moveaxis(rim[None] - start - part[..., None] * along, 2, 0))
+    wider = np.where(behind_mm > 100.0 * thick_mm, thick_mm, 0.0)
+    return float((gaps > RADIUS_MM - 1e-9 + wider[:, None]).all(axis=0).mean()) * math.pi
+
+
+def test_rings_of_a_pocket_have_the_angles_of_an_independent_measure() -> None:
+    """All moves at the depth of a pocket with rounded corners, outside of its entry."""
+    operation = Operation(
+        kind="pocket",
+        tool=Tool(2.0 * RADIUS_MM),
+        depth_mm=1.0,
+        step_over=0.35,
+        entry=Entry("helix", angle_rad=math.radians(5.0)),
+    )
+    shape = closed((0, 0), (17, 0), (22, 9), (17, 13), (6, 15), (0, 11))
+    drawing = drawing_of([shape], ["CUT"])
+    path = planned(drawing, Job((operation,)), load_target("linuxcnc").machine).toolpath
+    cutters = (CutterProfile(RADIUS_MM, RADIUS_MM),)
+    every = stock_moves_of_toolpath(path, np.zeros(len(path), dtype=np.int64), cutters)
+    judged = engagement_of(every, path, None)
+    moves = np.column_stack([judged.moves.start[:, :2], judged.moves.end[:, :2]])
+    z = np.column_stack([judged.moves.start[:, 2], judged.moves.end[:, 2]])
+    level = np.flatnonzero((z < -0.98).all(axis=1) & (moves[:, :2] != moves[:, 2:]).any(axis=1))
+    rows, bound, is_entry = moves[level], judged.bound_rad[level], judged.is_entry[level]
+    lengths = np.hypot(*(rows[:, 2:] - rows[:, :2]).T)
+    travelled, thick = np.cumsum(lengths), THICK_SHARE * RADIUS_MM
+    slack, above = 3.0 * math.pi / DIRECTIONS, list[float]()
+    for number in np.flatnonzero(~is_entry).tolist():
+        greatest = 0.0
+        for share in np.linspace(0.001, 0.999, PLACES):
+            place = rows[number, :2] + share * (rows[number, 2:] - rows[number, :2])
+            before = travelled[number] - (1.0 - share) * lengths[number]
+            own = np.vstack([rows[:number], [*rows[number, :2], *place], rows[number]])
+            behind = np.append(before - travelled[:number], 0.0)
+            greatest = max(greatest, sampled(own, number + 1, place, behind, thick))
+        assert greatest <= bound[number] + slack
+        above.append(bound[number] - greatest)
+    assert len(above) > 20
+    assert np.median(above) <= COARSE_RAD + slack  # some are greatest between the places
+    assert bound[~is_entry].max() > math.radians(120.0)
