@@ -18,9 +18,9 @@ centre is s beyond that disc has material only within the angle φ of the direct
     cos φ = ((ρ + r)² − (ρ + s)² − r²) / (2 r (ρ + s)),
 
 so a front s beyond V engages at most φ, and s follows from the limit (`front_step`). First ρ is as
-large as the region allows, for wide steps; when nothing grows any more, ρ shrinks by RATIO, and
-fronts go on into narrower places and corners, down to the radius that leaves no more than the
-tolerance in a square corner.
+large as the region allows, for wide steps; when nothing grows any more, ρ shrinks by RATIO (in
+corners by what they allow), and fronts go on into narrower places and corners, down to the radius
+that leaves no more than the tolerance in a square corner.
 """
 
 from __future__ import annotations
@@ -61,8 +61,20 @@ CORNER_SHARE = 0.02
 """The smallest opening disc, over the tool's radius: it leaves 0.41 of that in a square corner."""
 
 RATIO = 0.75
-CORNER_RATIO = 0.93
-"""Each opening disc is this part of the one before it; those smaller than the tool, of corners."""
+"""Each opening disc is at least this part of the one before it, ..."""
+
+NARROW_RATIO = 0.93
+"""... and this part where discs smaller than the tool go on between parallel walls."""
+
+MIN_CORNER_RAD = math.radians(10.0)
+"""Walls that meet at a smaller angle are taken as parallel."""
+
+MAX_RATIO = 0.985
+"""No disc is nearer in size to the one before it: sharper corners exceed the limit."""
+
+RATIO_SHARE = 0.5
+"""Discs shrink by this part of what a corner of straight walls allows: walls may be curved, and in
+corners smaller than a hundred steps of the slides these go beside the path."""
 
 PLANNED_SHARE = 0.98
 """Steps follow from this part of the limit, since strokes are smoothed."""
@@ -154,6 +166,45 @@ def front_step(engagement_rad: float, opening_mm: float, radius_mm: float) -> fl
     return low
 
 
+def corner_ratio(
+    engagement_rad: float, opening_mm: float, radius_mm: float, corner_rad: float
+) -> float:
+    """Return the smallest opening disc, over the one before it, whose arc between two straight
+    walls engages the tool by no more than the angle after that of the larger disc.
+
+    Both arcs touch both walls. At the angle α from the bisector the smaller one is D away from the
+    middle of the larger disc, and leaves it at the angle δ,  sin δ = g sin α / D,  where g is the
+    distance of the middles; this adds to the engagement, as in `front_step`.
+    """
+    half = 0.5 * corner_rad
+    angle = np.linspace(0.0, 0.5 * math.pi - half, ARC_PLACES)
+    low, high = 0.0, 1.0
+    for _ in range(STEP_HALVINGS):
+        ratio = 0.5 * (low + high)
+        gap, small = (1.0 - ratio) * opening_mm / math.sin(half), ratio * opening_mm
+        far = np.hypot(gap + small * np.cos(angle), small * np.sin(angle))
+        cosine = ((opening_mm + radius_mm) ** 2 - far**2 - radius_mm**2) / (2.0 * radius_mm * far)
+        engaged = np.arccos(np.clip(cosine, -1.0, 1.0))
+        askew = np.arcsin(np.minimum(gap * np.sin(angle) / far, 1.0))
+        fits = float((engaged + np.minimum(askew, engaged)).max()) <= engagement_rad
+        low, high = (low, ratio) if fits else (ratio, high)
+    return high
+
+
+def _next_opening(cleared: Polylines, opening_mm: float, tool_mm: float, limit: float) -> float:
+    """Return the radius of the next smaller discs: the sharpest corner into which the present ones
+    reach says how much smaller they may be."""
+    sweep = 4.0 * np.arctan(cleared.vertices[:, 2])
+    fronts_of_discs = sweep[np.isclose(Segments.of(cleared).radius, opening_mm, rtol=1e-3)]
+    corner = math.pi - fronts_of_discs.max(initial=0.0)
+    if opening_mm > tool_mm:
+        return RATIO * opening_mm
+    if corner < MIN_CORNER_RAD:
+        return NARROW_RATIO * opening_mm
+    ratio = corner_ratio(PLANNED_SHARE * limit, opening_mm, tool_mm, corner)
+    return min(max(RATIO, 1.0 - RATIO_SHARE * (1.0 - ratio)), MAX_RATIO) * opening_mm
+
+
 class FrontStroke(Struct, frozen=True, eq=False):
     """A piece of a front: `vertices` (n, 3) x, y, bulge of an open path, cut as it runs, with what
     is cleared on its left; the number of its front; `opening_mm`, the radius of the discs that fit
@@ -222,7 +273,7 @@ def fronts(
             if grows and len(offset_shape(before, next_mm + UNION_MM)):
                 break
         if not grows:
-            next_mm = opening * (RATIO if opening > tool_mm else CORNER_RATIO)
+            next_mm = _next_opening(wider, opening, tool_mm, limit)
         opening = next_mm
 
 

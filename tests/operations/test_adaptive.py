@@ -16,7 +16,14 @@ from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.geometry.polylines import Polyline
 from camtool.operations.pocket import engagement
-from camtool.planning.adaptive import Pose, chords, ends_of, step_for, tangent_link
+from camtool.planning.adaptive import (
+    Pose,
+    chords,
+    corner_ratio,
+    ends_of,
+    step_for,
+    tangent_link,
+)
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
 from camtool.progress import Progress
@@ -189,6 +196,25 @@ def test_links_are_tangent_everywhere(
         assert abs(math.remainder(begin.angle - poses[-1].angle, math.tau)) < 1e-3
         poses.append(finish)
     assert abs(math.remainder(end.angle - poses[-1].angle, math.tau)) < 1e-3
+
+
+@examples(60, nightly=2_000)
+@given(st.floats(0.2, 1.5), st.floats(0.05, 3.0), st.floats(0.4, 2.5))
+def test_a_smaller_disc_in_a_corner_engages_by_no_more_than_the_limit(
+    limit: float, opening: float, corner: float
+) -> None:
+    """The tool of radius 1 goes along the arc of the smaller disc behind the larger one: of the
+    front half of its circle, what lies out of that is within the limit, counted in points."""
+    ratio = corner_ratio(limit, opening, 1.0, corner)
+    assert 0.0 <= ratio < 1.0
+    gap = (1.0 - ratio) * opening / math.sin(0.5 * corner)
+    rim = (np.arange(4000) + 0.5) / 4000 * math.pi
+    most = 0.5 * (math.pi - corner)
+    for normal in np.linspace(-most, most, 17):
+        x = gap + ratio * opening * math.cos(normal) + np.cos(normal + rim)
+        y = ratio * opening * math.sin(normal) + np.sin(normal + rim)
+        engaged = float((np.hypot(x, y) > opening + 1.0).mean()) * math.pi
+        assert engaged <= limit + 2e-3
 
 
 @pytest.mark.parametrize("value", ["0%", "100%", "51%", "-3%", "4deg", "91deg", "nan", "", "abc"])
