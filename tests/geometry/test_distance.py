@@ -14,7 +14,7 @@ from camtool.geometry.distance import approach, approaches, nearest, points_to_s
 from camtool.geometry.polylines import Polyline, Polylines, Segments, begin_at, reverse, rotate
 from tests.oracles.geometry import dense_points, line_string, sagitta
 from tests.paths import mirrored, moved, scaled
-from tests.strategies import coordinates, polylines
+from tests.strategies import coordinates, examples, polylines
 
 N = 64
 
@@ -196,6 +196,7 @@ def test_paths_are_as_far_as_very_many_of_their_points(
     assert abs(distance - brute) <= sagitta(a, N) + sagitta(other, N) + 1e-9
 
 
+@examples(30, 2000)
 @given(polylines(max_points=5), polylines(max_points=5), st.floats(-3.0, 3.0), st.integers(0, 4))
 def test_the_distance_of_paths_stays_when_both_are_moved_about(
     a: Polyline, b: Polyline, angle: float, start: int
@@ -211,6 +212,7 @@ def test_the_distance_of_paths_stays_when_both_are_moved_about(
         assert path_distance(begin_at(a, start), b) == pytest.approx(wanted, abs=1e-12)
 
 
+@examples(20, 2000)
 @given(
     st.lists(polylines(max_points=24), min_size=1, max_size=5),
     coordinates(40.0),

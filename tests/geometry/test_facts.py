@@ -24,7 +24,7 @@ from camtool.geometry.facts import (
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from tests.drawings import drawing_of
 from tests.paths import moved
-from tests.strategies import contours, polylines
+from tests.strategies import contours, examples, polylines
 
 
 def path(*points: tuple[float, ...], closed: bool = True) -> Polyline:
@@ -35,6 +35,7 @@ def circle(x: float, y: float, radius: float) -> Polyline:
     return path((x - radius, y, 1), (x + radius, y, 1))
 
 
+@examples(20, 2000)
 @given(
     st.lists(st.tuples(contours(), st.floats(-30, 30), st.floats(-30, 30)), min_size=2, max_size=6)
 )

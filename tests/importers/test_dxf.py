@@ -27,6 +27,7 @@ from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
 from tests.oracles import arcs
+from tests.strategies import examples
 
 OPTIONS = ReadOptions()
 SINGLE = ReadOptions(chain_gaps=False)
@@ -774,6 +775,7 @@ def test_a_file_that_is_cut_off_is_refused(end):
         read(SAMPLE[:end], "part.dxf", OPTIONS)
 
 
+@examples(20, 2000)
 @given(st.integers(ALL_ENTITIES, len(SAMPLE) - 5))
 def test_a_file_that_is_cut_off_behind_its_entities_has_all_of_them(end):
     found = read(SAMPLE[:end], "part.dxf", OPTIONS)

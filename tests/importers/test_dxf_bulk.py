@@ -16,6 +16,7 @@ from camtool.importers.dxf import load as dxf_load
 from camtool.importers.dxf.bulk import MIN_VERTICES, Bulk
 from camtool.importers.dxf.reader import read
 from camtool.importers.options import ReadOptions
+from tests.strategies import examples
 
 NUMBERS = st.sampled_from(["0", "1.5", "-2e1", " 7.0", "10", "3.25", "0.125"])
 ODD = st.sampled_from(["nan", "x1y", "1_0", "", "1e999"])
@@ -136,6 +137,7 @@ def drawings(draw: st.DrawFn, odd: bool) -> bytes:
 
 
 @pytest.mark.parametrize("options", [ReadOptions(), ReadOptions(layout="Layout1")])
+@examples(30, 2000)
 @given(data=drawings(odd=False))
 def test_whole_drawings_are_read_as_by_entities(data: bytes, options: ReadOptions) -> None:
     assert seen(data, options) == by_entities(data, options)

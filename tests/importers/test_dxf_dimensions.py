@@ -17,6 +17,7 @@ from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import Unusable
 from tests.importers.test_dxf import OPTIONS, R2000, document, drawn
+from tests.strategies import examples
 
 WITH_LINES = ReadOptions(dimensions=True)
 
@@ -172,6 +173,7 @@ def test_a_frame_around_the_text_makes_it_exact():
     assert only(drawn(doc)).exact
 
 
+@examples(20, 2000)
 @given(
     st.floats(-180, 180),
     st.sampled_from([1.0, -1.0]),

@@ -27,6 +27,7 @@ from camtool.importers.findings import DrawingCode
 from camtool.importers.healing import clean_pieces
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import Piece
+from tests.strategies import examples
 
 
 def piece(
@@ -384,6 +385,7 @@ def is_ring(path: Polyline, rows: list[list[float]], within: float) -> bool:
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-5, 0.003, 0.01, 0.05])
+@examples(15, 2000)
 @given(seed=st.integers(0, 10**9))
 def test_exploded_outlines_are_joined_as_they_were_drawn(gap: float, seed: int) -> None:
     check_exploded_outlines(gap, seed)

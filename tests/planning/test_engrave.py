@@ -22,6 +22,7 @@ from camtool.operations.engrave.work import engrave
 from camtool.planning.items import Chosen, Contour, Feeds, Setting
 from camtool.planning.job import Operation, Tool
 from tests.oracles import contours as shapes
+from tests.strategies import examples
 
 PATHS = [shapes.SLOT, shapes.opened((0, 0), (5, 0, 1), (9, 0)), shapes.NOTCH]
 
@@ -206,7 +207,7 @@ def keeps_all(lines: list[shapely.Geometry], width: float) -> bool:
     return apart and grounds == closed
 
 
-@settings(max_examples=60, deadline=None)
+@examples(20, 1000)
 @given(st.lists(SHAPES, min_size=1, max_size=6), st.floats(0.6, 1.9))
 def test_random_lines_run_together_where_buffers_meet(paths: list[Polyline], share: float) -> None:
     """Against shapely alone: which lines overlap when all are as wide as the tool, where, and the

@@ -29,7 +29,7 @@ from camtool.planning.paths import MeasuredPath
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.oracles.runs import runs_of
 from tests.paths import moved
-from tests.strategies import contours, open_contours, polylines
+from tests.strategies import contours, examples, open_contours, polylines
 
 ARC, LINE = Lead("arc", 2.0), Lead("line", 2.0)
 SQUARE = Polyline(np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0.0]]), True)
@@ -160,6 +160,7 @@ def _left(path: Polyline, points: np.ndarray) -> np.ndarray:
     return np.where(within == ccw, distance, -distance)
 
 
+@examples(30, 2000)
 @given(
     contours(),
     st.integers(0, 11),

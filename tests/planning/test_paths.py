@@ -15,7 +15,7 @@ from camtool.planning.paths import MeasuredPath, MeasuredPaths, reverse_vertices
 from camtool.planning.ramps import lift_paths
 from tests.oracles import passes
 from tests.oracles.arcs import chain_distances, chain_points
-from tests.strategies import contours, open_contours, polylines
+from tests.strategies import contours, examples, open_contours, polylines
 
 pytestmark = pytest.mark.checked
 
@@ -137,6 +137,7 @@ def test_a_piece_is_that_of_the_plain_way(path: Polyline, begin: float, end: flo
     assert found == pytest.approx(wanted, rel=1e-12, abs=1e-12)
 
 
+@examples(30, 2000)
 @given(
     st.lists(
         st.tuples(polylines(), st.lists(st.tuples(lengths, st.floats(-3.0, 0.0)), min_size=1)),

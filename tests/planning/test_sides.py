@@ -27,6 +27,7 @@ from camtool.planning.plan import planned
 from camtool.planning.sides import Sides, choose
 from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
+from tests.strategies import examples
 
 LAYERS = ("A", "B", "C", "D")
 D = 0.5
@@ -100,7 +101,7 @@ def _nests(draw: st.DrawFn) -> list[np.ndarray]:
     return shapes
 
 
-@settings(max_examples=60, deadline=None)
+@examples(20, 1000)
 @given(_nests(), st.data())
 def test_no_choice_changes_a_side(shapes: list[np.ndarray], data: st.DataObject) -> None:
     layers = data.draw(
