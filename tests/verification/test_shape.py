@@ -7,6 +7,7 @@ import pytest
 import shapely
 
 from camtool.findings import Severity
+from camtool.geometry.offset import swept_outline
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drawn import kept_of
 from camtool.planning.job import Tool, job_of
@@ -78,6 +79,28 @@ def test_a_ring_too_large_or_too_small(more: float) -> None:
     assert shape.undercut_mm2 == pytest.approx(under, rel=0.02)
     assert shape.overcut_mm == pytest.approx(abs(more), abs=2.0 * shape.tolerance_mm)
     assert shape.undercut_mm == pytest.approx(abs(more), abs=2.0 * shape.tolerance_mm)
+
+
+def test_passes_that_differ_by_rounding_cover_what_one_of_them_does() -> None:
+    angles = [(np.arange(401) + 0.5 * k) * 2.0 * math.pi / 400 for k in range(3)]
+    passes = [
+        (5.02 + 1e-7 * k) * np.column_stack([np.cos(angle), np.sin(angle)])
+        for k, angle in enumerate(angles)
+    ]
+    joint = [np.column_stack([each, np.zeros(401)]) for each in passes]
+    # The outline of all three is not found at once ...
+    assert swept_outline(Polylines.of(Polyline(each, closed=False) for each in joint), 0.5) is None
+    points = np.concatenate(passes)
+    cutting = np.arange(len(points)) % 401 > 0
+    row = np.repeat(np.arange(3), 401)
+    made = SlideTrace(points, np.zeros(len(points)), row, cutting)
+    shape, alone = shape_of(made, circle(5.0), 1.0), shape_of(trace(passes[0]), circle(5.0), 1.0)
+    # ... but that of each is, and all of them cover one ring.
+    assert shape is not None
+    assert alone is not None
+    assert shape.overcut_mm2 == pytest.approx(2.0 * math.pi * 5.51 * 0.02, rel=0.02)
+    assert shape.overcut_mm2 == pytest.approx(alone.overcut_mm2, abs=1e-3)
+    assert shape.undercut_mm == pytest.approx(0.02, abs=2.0 * shape.tolerance_mm)
 
 
 def test_a_cut_that_ends_early_leaves_its_end() -> None:
