@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,10 @@ Coordinate = float | None
 
 ROWS_AT_ONCE = 1 << 14
 """Rows kept as Python objects before they are moved into the columns."""
+
+FEW_ROWS = 16
+"""Columns of up to this many rows become rows of Python objects too: to add a column takes as long
+as some ten rows."""
 
 GROWTH = 8
 """A full column grows by 1/GROWTH of its rows."""
@@ -103,13 +108,18 @@ class ToolpathBuilder:
         """Add K > 0 rows given as columns of a `Toolpath`. `others` sets `block`, `value`,
         `source` (indices from `provenance`) or `run`, where they differ from the builder's
         present values."""
-        self._gather()
         count = len(kind)
         of_all = {"source": self._of_source(), "mode": self._of_mode(), "run": self.run}
         columns = {"value": math.nan, "block": self.block, **of_all, **others}
         columns |= {"kind": kind, "end": end, "centre": centre, "feed": feed}
-        for name, column in self._columns.items():
-            column.add(columns[name], count)
+        if count <= FEW_ROWS:
+            self._rows += _as_rows([columns[name] for name in self._columns], count)
+            if len(self._rows) >= ROWS_AT_ONCE:
+                self._gather()
+        else:
+            self._gather()
+            for name, column in self._columns.items():
+                column.add(columns[name], count)
         x, y, z = end[-1].tolist()
         self.position = (x, y, z)
 
@@ -167,7 +177,7 @@ class ToolpathBuilder:
         number = math.nan if value is None else float(value)
         of_all = self._of_source(), self.block, self._of_mode(), self.run
         self._rows.append((kind, *end, *centre, feed, number, *of_all))
-        if len(self._rows) == ROWS_AT_ONCE:
+        if len(self._rows) >= ROWS_AT_ONCE:
             self._gather()
         return self
 
@@ -231,6 +241,17 @@ class _Column:
         if len(self._rows) != self._count:
             self._rows.resize(self.shape_of(self._count), refcheck=False)
         return read_only(self._rows)
+
+
+def _as_rows(columns: Sequence[Ints | Floats | float], count: int) -> Iterator[tuple[float, ...]]:
+    """Yield rows of numbers from columns of this length; a single number is the value of all."""
+    parts: list[Any] = []
+    for column in columns:
+        if isinstance(column, np.ndarray):
+            parts += [column.tolist()] if column.ndim == 1 else column.T.tolist()
+        else:
+            parts.append(repeat(column, count))
+    return zip(*parts, strict=True)
 
 
 def _are_same(one: Any, rows: Any) -> bool:
