@@ -16,8 +16,9 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import Any, TypeVar
+
+from msgspec import Struct, field
 
 from camtool.errors import OptionError
 from camtool.patterns import guess
@@ -26,8 +27,7 @@ from camtool.units import parse_angle, parse_feed, parse_length, parse_time
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True)
-class Given:
+class Given(Struct, frozen=True):
     """A value as the user wrote it; `where` names its key or flag, `file` its file, if any."""
 
     value: Any
@@ -47,8 +47,7 @@ class Given:
             raise self.refused(error.message, error.mend) from error
 
 
-@dataclass(frozen=True)
-class Value:
+class Value(Struct, frozen=True):
     """The values that a key may have: `read` makes the field's value of what was given. The help
     of its flag shows `metavar` or `choices`; a switch has neither. With `tables`, a table
     may give it too."""
@@ -59,8 +58,7 @@ class Value:
     tables: bool = False
 
 
-@dataclass(frozen=True)
-class Key:
+class Key(Struct, frozen=True):
     """A key of a table: the `field` of its record that it fills, and what its `value` may be.
 
     `help` is that of the flag that says the same; a key without has none. `example` stands in the
@@ -81,8 +79,7 @@ class Key:
         return self.value.read(raw)
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(Struct, frozen=True):
     """The keys of one table of a file, or flags, as given; `where` and `file` name the table."""
 
     given: Mapping[str, Given] = field(default_factory=dict)

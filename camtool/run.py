@@ -7,7 +7,6 @@ and toolpaths that `import camtool` returns are here too: they show a picture in
 from __future__ import annotations
 
 import hashlib
-import html
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -202,6 +201,8 @@ class Run(Shown):
 
     def _repr_html_(self) -> str:
         """Return the page in a frame, which runs no script."""
+        import html
+
         picture = embedded_address(self._repr_svg_().encode())
         page = page_html(self.report_page(((_CAPTION, picture),)))
         return (

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import click
+from msgspec import Struct
+from msgspec.structs import astuple
 
 from camtool.cli.files import display_name, write_all
 from camtool.cli.options import Command, option, with_flags
@@ -24,8 +25,7 @@ if TYPE_CHECKING:
 _PIPELINES = "For pipelines"
 
 
-@dataclass(frozen=True)
-class CheckOutputs:
+class CheckOutputs(Struct, frozen=True):
     """`--sarif`, `--junit`, `--annotations`: names of files; None is not requested."""
 
     sarif: str | None = None
@@ -35,7 +35,7 @@ class CheckOutputs:
     @property
     def names(self) -> list[str]:
         """The files that are requested."""
-        values = (getattr(self, each.name) for each in fields(self))
+        values = astuple(self)
         return [value for value in values if value is not None]
 
     def files(

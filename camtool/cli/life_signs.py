@@ -10,7 +10,6 @@ begin. It stands still while a compiled loop runs that gives no other thread a t
 from __future__ import annotations
 
 import os
-import shutil
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -73,6 +72,8 @@ class LifeSigns:
         parts = (progress.stage, share, f"{seconds:.0f} s")
         line = one_line(f"camtool: {', '.join(filter(None, parts))}")
         if seconds >= AFTER_S:
+            import shutil
+
             self._write(line[: shutil.get_terminal_size().columns - 1])
 
     def hide(self) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
@@ -129,6 +128,8 @@ _LINES = {
 def show_facts(text: str, name_width: int, marks: Marks, *, err: bool = False) -> None:
     """Show lines of a name and a value; the names are `name_width` wide."""
     if in_colour(sys.stderr if err else sys.stdout):
+        import shutil
+
         columns = shutil.get_terminal_size().columns
         lines = text.split("\n")
         text = "\n".join(_line(line, name_width, marks, columns) for line in lines)

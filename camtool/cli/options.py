@@ -18,12 +18,13 @@ import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
 import click
+from msgspec import Struct, field
+from msgspec.structs import astuple
 
 from camtool.cli.files import STDOUT
 from camtool.cli.life_signs import progress
@@ -140,9 +141,9 @@ def decorate(command: Command, options: Sequence[Option]) -> Command:
 def with_flags(
     command: Command, record: str, make: type[Any], options: Sequence[Option]
 ) -> Command:
-    """Return the command with these options, passed to it as `record`, a dataclass whose fields
+    """Return the command with these options, passed to it as `record`, a struct whose fields
     have their names."""
-    names = [each.name for each in fields(make)]
+    names = make.__struct_fields__
     return decorate(gather(record, make, names)(command), options)
 
 
@@ -189,8 +190,7 @@ _engagement = _number_by(engagement_limit)
 _MACHINE = "Machine"
 
 
-@dataclass(frozen=True)
-class MachineFlags:
+class MachineFlags(Struct, frozen=True):
     """`--target`, `--machine` (a file), `--set`; `by_default` if a `camtool.toml` names the
     machine, and no flag does."""
 
@@ -290,8 +290,7 @@ def talk_options(command: Command) -> Command:
 _LIMITS = "Limits (exit code 1 beyond them)"
 
 
-@dataclass(frozen=True)
-class GateFlags:
+class GateFlags(Struct, frozen=True):
     """`--max-error` (mm), `--max-reversals`, `--max-time` (s), `--max-gouge` and `--max-leftover`
     (mm), `--max-engagement` (rad)."""
 
@@ -305,7 +304,7 @@ class GateFlags:
     @property
     def given(self) -> bool:
         """True if there is any limit."""
-        return any(getattr(self, each.name) is not None for each in fields(self))
+        return any(value is not None for value in astuple(self))
 
     def gates(self) -> Gates | None:
         """Return the limits; None if there are none."""
@@ -373,8 +372,7 @@ def gate_options(command: Command) -> Command:
 # Dimensions that must hold.
 
 
-@dataclass(frozen=True)
-class InspectionFlags:
+class InspectionFlags(Struct, frozen=True):
     """`--tolerances` and `--require`."""
 
     tolerances: str | None = None
@@ -441,8 +439,7 @@ _OF_READING = "read_"
 """Begins the names of these parameters: flags of pictures have `layers` too."""
 
 
-@dataclass(frozen=True)
-class DrawingFlags:
+class DrawingFlags(Struct, frozen=True):
     """Patterns that select what is read (`--layer` to `--line-type`), and fields of ReadOptions,
     None for flags that are not given."""
 
@@ -539,8 +536,7 @@ ReadJob = Callable[["Table"], "Job"]
 """Makes a job of the tables of its file."""
 
 
-@dataclass(frozen=True)
-class JobFlags:
+class JobFlags(Struct, frozen=True, dict=True):
     """`--job`, `--operation`, `--setup` and the flags that set the same keys as a job; `given` has
     the values of those that were given. `project`: the defaults of the project."""
 

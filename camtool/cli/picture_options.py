@@ -7,12 +7,12 @@ refused by name before any work is done; the user is warned about named layers t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import click
+from msgspec import Struct
 
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say
@@ -47,8 +47,7 @@ def picture_name(ctx: click.Context, param: click.Parameter, value: str | None) 
     return value
 
 
-@dataclass(frozen=True)
-class Canvas:
+class Canvas(Struct, frozen=True):
     """The possible content of a command's pictures: moves of a machine or a drawing alone; with
     the predicted path or without; in layers or without. `more` says what would allow the rest."""
 
@@ -70,8 +69,7 @@ UNVERIFIED = Canvas("drop --no-verify")
 OVERLAY = Canvas("drop --compare", layered=False)
 
 
-@dataclass(frozen=True)
-class PictureFlags:
+class PictureFlags(Struct, frozen=True):
     """`--view`, `--size` (px), `--crop` (x, y, width, height in mm), `--dark`, `--exaggerate`,
     `--layers`, `--no-layer`, `--polar`."""
 
@@ -166,7 +164,7 @@ class PictureFlags:
         return Painter(scenes, self, quiet)
 
 
-FLAGS = tuple(field.name for field in fields(PictureFlags))
+FLAGS = PictureFlags.__struct_fields__
 """The names of the flags of pictures, as a command has them."""
 
 
@@ -258,8 +256,7 @@ CLOSEUP = "closeup.svg"
 """A name that says which kind of picture a close-up is."""
 
 
-@dataclass(frozen=True)
-class Painter:
+class Painter(Struct, frozen=True, dict=True):
     """Draw the pictures of a command from the scenes that `make` returns when the first picture is
     requested; several stand side by side."""
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import click
+from msgspec import Struct
 
 from camtool.cli.options import Command, duration, option, with_flags
 from camtool.pictures.options import PictureOptions
@@ -22,8 +22,7 @@ LOOKS = {"--size", "--dark"}
 """The flags of pictures that plots have too."""
 
 
-@dataclass(frozen=True)
-class PlotFlags:
+class PlotFlags(Struct, frozen=True):
     """`--plot KIND FILE` (several), and the stretch of time that they show, s."""
 
     plot: tuple[tuple[PlotKind, str], ...] = ()

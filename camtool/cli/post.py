@@ -6,11 +6,11 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from msgspec import Struct, field
 
 from camtool.cli.checks import CheckOutputs, check_outputs
 from camtool.cli.files import STDOUT, check_ours, check_places, part_name, write_all
@@ -79,8 +79,7 @@ def scenes_of(run: Run, *, before: bool) -> list[Scene]:
     return [run.before.scene(f"{name}, before"), run.scene(f"{name}, after")]
 
 
-@dataclass(frozen=True)
-class Posting:
+class Posting(Struct, frozen=True):
     """The flags of posting drawings."""
 
     machine: MachineFlags
@@ -293,8 +292,7 @@ SHORT = {"flat": "mill", "v": "bit"}
 """Short names of kinds of tools in names of files; other kinds keep their name."""
 
 
-@dataclass(frozen=True)
-class RequestedOutputs:
+class RequestedOutputs(Struct, frozen=True):
     """The requested outputs: `source` is the drawing or program that is read, `output` the program
     that is written; `reads` are all files that are read."""
 

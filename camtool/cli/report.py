@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
+from msgspec import Struct, field
 
 from camtool.cli.checks import CheckOutputs
 from camtool.cli.files import STDOUT, check_places, is_foreign, seal
@@ -34,7 +34,7 @@ EMBEDDED = "picture.svg"
 _CAPTION = "The predicted result"
 _PLACES = ("target", "machine", "settings", "output", "preview", "report", "page", "plot")
 _LOOKS = (*PICTURE_FLAGS, "beside", "before_after", "plot_from", "plot_span")
-_CHECKS = tuple(each.name for each in fields(CheckOutputs))
+_CHECKS = CheckOutputs.__struct_fields__
 _NOT_LISTED = frozenset((*_PLACES, *_LOOKS, *_CHECKS, "quiet", "verbose", "watching"))
 """Flags that a page does not list: places, looks of pictures, verbosity; the machine has a row of
 its own."""
@@ -54,8 +54,7 @@ def _page_name(ctx: click.Context, param: click.Parameter, value: str | None) ->
     return value
 
 
-@dataclass(frozen=True)
-class ReportOutputs:
+class ReportOutputs(Struct, frozen=True):
     """The requested outputs of a program: a picture, the report as JSON, a page (the values of
     `--preview`, `--json` and `--report`), None is not requested; findings for pipelines, and plots
     over time."""

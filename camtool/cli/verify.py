@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
+from msgspec import Struct
 
 from camtool.cli.checks import CheckOutputs, check_outputs
 from camtool.cli.files import STDOUT, display_name, read_bytes, write_all
@@ -210,8 +210,7 @@ def _variants(spec: str, machine: MachineFlags, judging: Judging) -> list[Progra
     return variants_of(spec, load, judging)
 
 
-@dataclass(frozen=True)
-class VerifyOutputs:
+class VerifyOutputs(Struct, frozen=True):
     """The requested outputs, and options of pictures; `beside` is another program for the
     picture."""
 
@@ -246,8 +245,7 @@ class VerifyOutputs:
         self.looks.check(outputs.pictures, OVERLAY)
 
 
-@dataclass(frozen=True, eq=False)
-class VerifySettings:
+class VerifySettings(Struct, frozen=True, eq=False):
     """The settings of judging programs: the machine, the criteria, the drawing; `finding`: for
     programs by others it is found which contours they cut."""
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import Segments
 from camtool.kernels import near
@@ -237,7 +237,7 @@ def nearest_pairs(
     pairs = [np.empty((2, 0), dtype=np.int64)]
     # One search has one reach: points of about the same one are searched for together.
     octave = np.frexp(reach)[1]
-    for each in np.unique(octave):
+    for each in distinct(octave):
         rows = np.flatnonzero(octave == each)
         point, move, gap = near.pairs(moves, places[rows], (float(reach[rows].max()), np.inf))
         is_near = gap <= reach[rows[point]]

@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.errors import GeometryError
 from camtool.geometry.drawing import Branch, Gap
 from camtool.geometry.measure import path_lengths, signed_areas
@@ -368,7 +368,7 @@ class _Joining(Struct, eq=False):
         has_free = np.zeros(len(label), dtype=np.bool_)
         has_free[label[is_free]] = True
         meeting = np.flatnonzero((size[label] > 2) & has_free[label])
-        for number in np.unique(self.node[meeting]).tolist():
+        for number in distinct(self.node[meeting]).tolist():
             self.branches.pop(number, None)  # it is part of a larger one
         label += len(label)
         self.node[meeting] = label[meeting]
@@ -445,7 +445,7 @@ def _rank_pairs(ends: Ends, one: Ints, other: Ints) -> tuple[Ints, Ints]:
     differs_in_style = ends.style[one // 2] != ends.style[other // 2]
     turn = np.abs(wrapped(ends.leaving[one] - ends.leaving[other] - math.pi))
     bend = np.round(turn / SAME_TURN_RAD)
-    place = _place_ranks(ends, np.unique(np.concatenate([one, other])))
+    place = _place_ranks(ends, distinct(np.concatenate([one, other])))
     first = np.minimum(place[one], place[other])
     second = np.maximum(place[one], place[other])
     order = np.lexsort((second, first, bend, differs_in_style, distance))
@@ -716,7 +716,7 @@ def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float)
     """
     gaps: dict[tuple[int, int], Gap] = {}
     is_open = np.flatnonzero(np.repeat(ends.is_open, 2))
-    for group in np.unique(ends.group[is_open // 2]):
+    for group in distinct(ends.group[is_open // 2]):
         rows = is_open[ends.group[is_open // 2] == group]
         one, other, size = _nearest_ends(
             ends.points[rows], NEAR_GAPS * max(gap_mm, POSITION_EPS_MM)

@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import force_setattr
 
-from camtool.arrays import Floats
+from camtool.arrays import Floats, distinct
 from camtool.errors import GeometryError
 
 MAX_PIECE_RAD = 0.5 * math.pi
@@ -197,7 +197,7 @@ class SplineCurve(Struct, frozen=True, eq=False):
     @property
     def breaks(self) -> Floats:
         """(k,) the distinct knots of the domain."""
-        return np.unique(self.knots[self.degree : len(self.control) + 1])
+        return distinct(self.knots[self.degree : len(self.control) + 1])
 
     def point(self, t: Floats) -> Floats:
         """Positions (n, 2) mm."""

@@ -206,11 +206,10 @@ def _touching(crossings: Crossings, frames: Frames, eps: float) -> Bools:
     Two curves that meet at the angle θ, with curvatures that differ by k, part again after 2θ/k,
     and are θ²/(2k) apart at most until then.
     """
-    at_end = np.isin(crossings.ta, (0.0, 1.0)) | np.isin(crossings.tb, (0.0, 1.0))
     angle, bend = _angle_and_bend(
         crossings.point, frames[crossings.row_a], frames[crossings.row_b]
     )
-    return np.asarray(at_end | (angle**2 <= 2.0 * bend * eps))
+    return np.asarray(_at_vertex(crossings) | (angle**2 <= 2.0 * bend * eps))
 
 
 # Where closed paths cross themselves: inside and outside are not clear there.
@@ -282,7 +281,8 @@ def _pairs_of_one_path(segments: Segments) -> Iterator[tuple[Ints, Ints]]:
 
 
 def _at_vertex(crossings: Crossings) -> Bools:
-    return np.asarray(np.isin(crossings.ta, (0.0, 1.0)) | np.isin(crossings.tb, (0.0, 1.0)))
+    ta, tb = crossings.ta, crossings.tb
+    return np.asarray((ta == 0.0) | (ta == 1.0) | (tb == 0.0) | (tb == 1.0))
 
 
 def _pass_through(crossings: Crossings, segments: Segments, frames: Frames) -> Bools:

@@ -67,7 +67,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.errors import GeometryError, OptionError
 from camtool.geometry.boxes import BoxIndex, IndexedCurves, curve_rows_of
 from camtool.geometry.measure import (
@@ -171,7 +171,7 @@ def offset_each(
     for rows in _far_apart(boxes, longest * offset.distance_mm + POSITION_EPS_MM):
         group_lines = lines.select(rows)
         meets_itself = np.zeros(len(rows), dtype=np.bool_)
-        meets_itself[np.unique(_touching_paths(group_lines))] = True
+        meets_itself[distinct(_touching_paths(group_lines))] = True
         for each in (rows[~meets_itself], *rows[meets_itself][:, None]):
             loops, loop_sources = _offset_paths(lines.select(each), distance_mm, offset)
             loops_so_far += loops

@@ -19,7 +19,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import astuple
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.geometry.boxes import touching_boxes
 from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import Polylines, Segments
@@ -124,7 +124,7 @@ def _intervals(lines: Polylines, groups: Ints, tolerance: float) -> Intervals:
 
 def _remaining_spans(items: Intervals, laps: Covers, tolerance: float) -> dict[int, _Spans]:
     """Return the remaining spans of each loose interval that is covered by what stays."""
-    rank = _ranks(items, np.unique(np.concatenate([laps.a, laps.b])))
+    rank = _ranks(items, distinct(np.concatenate([laps.a, laps.b])))
     # A loose interval yields to what is not loose, and to loose ones that rank before it.
     yields = ~items.loose[laps.b] | (rank[laps.b] < rank[laps.a])
     order = np.argsort(rank[laps.a], kind="stable")
@@ -290,7 +290,7 @@ def _on_lines(items: Intervals, within_mm: float) -> Iterator[Covers]:
     lines = np.flatnonzero(~np.isnan(items.direction[:, 0]))
     angle = np.arctan2(items.direction[lines, 1], items.direction[lines, 0])
     of_bin = np.round(angle / (np.pi / BINS)).astype(np.int64) % BINS
-    for number in np.unique(of_bin[items.loose[lines]]).tolist():
+    for number in distinct(of_bin[items.loose[lines]]).tolist():
         rows = lines[(of_bin - number + 1) % BINS <= 2]
         is_searched = items.loose[rows] & (of_bin[(of_bin - number + 1) % BINS <= 2] == number)
         boxes = _level_boxes(items, rows, number * np.pi / BINS, 0.5 * within_mm)

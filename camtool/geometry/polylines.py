@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.errors import GeometryError
 
 POSITION_EPS_MM = 1e-6
@@ -410,7 +410,7 @@ def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bool
     step = np.hypot(*np.diff(vertices[:, :2], axis=0, prepend=np.nan).T)
     keep = begins | ~(step <= POSITION_EPS_MM)
     owner = np.repeat(np.arange(len(counts)), counts)
-    for path in np.unique(owner[~keep]).tolist():
+    for path in distinct(owner[~keep]).tolist():
         rows = slice(int(first[path]), int(first[path] + counts[path]))
         _leave_out(vertices[rows], keep[rows])
     repeated = np.bincount(owner[~keep], minlength=len(counts)).astype(np.int64)

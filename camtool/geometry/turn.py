@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from msgspec import Struct
 
 if TYPE_CHECKING:
     from camtool.arrays import Floats
@@ -14,8 +15,7 @@ Box = tuple[float, float, float, float]
 Pair = tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Turn:
+class Turn(Struct, frozen=True):
     """A map of the plane, p ↦ `signs` · p + `shift_mm`: a part that is turned over about a line
     along an axis (`Turn.about`), half a turn (both signs are −1), or a shift alone."""
 

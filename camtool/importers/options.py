@@ -13,6 +13,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, get_type_hints
 
+from msgspec import Struct
+
 from camtool.errors import OptionError
 from camtool.records import replace
 from camtool.units import MM_PER_UNIT, parse_length
@@ -47,8 +49,7 @@ DPI = 96.0
 _MM_PER_INCH = 25.4
 
 
-@dataclass(frozen=True)
-class Flag:
+class Flag(Struct, frozen=True):
     """The flag of an option, with its help and what it shows for its value; a switch has neither
     `metavar` nor `choices`. `for_pixels`: the option is for pictures of pixels alone."""
 

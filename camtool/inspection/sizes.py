@@ -32,7 +32,7 @@ from functools import cached_property
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.inspection.features import (
     BoundDimension,
     CircleFeature,
@@ -324,7 +324,7 @@ def _cut_of(feature: Feature, wanted_moves: SweptSegments) -> tuple[Cut, float] 
         best = int(np.argmin(np.abs(np.abs(v) - radius)))
         side = 1 if v[best] > 0.0 else -1
         own_moves = near_moves[side * v > ON_PATH_SHARE * radius]
-    rows = np.unique(wanted_moves.row[own_moves])
+    rows = distinct(wanted_moves.row[own_moves])
     chosen_moves = wanted_moves.of(np.isin(wanted_moves.row, rows))
     if on_path:
         chosen_moves = replace(chosen_moves, radius=np.zeros(len(chosen_moves.a)))
@@ -350,7 +350,7 @@ def _cut_of(feature: Feature, wanted_moves: SweptSegments) -> tuple[Cut, float] 
 def _levels(swept: SweptSegments) -> Floats:
     """Return the heights (L,) mm of all moves, falling; at the highest one all moves count, and
     all tapered tools."""
-    heights = np.unique(np.round(swept.z[np.isfinite(swept.z)] / SAME_LEVEL_MM) * SAME_LEVEL_MM)
+    heights = distinct(np.round(swept.z[np.isfinite(swept.z)] / SAME_LEVEL_MM) * SAME_LEVEL_MM)
     below = heights[:-1][::-1]
     if len(below) >= MAX_LEVELS:
         below = below[np.linspace(0, len(below) - 1, MAX_LEVELS - 1).round().astype(np.int64)]
@@ -432,7 +432,7 @@ def sizes_of(
     """Compute best fit, least and largest local size (N, 3) mm of N parts at once.
     `edges_of_features` (N, L, S) are the positions of the edges of each feature at its depths
     `levels_mm` (L,); NaN where one is not cut. A station counts if it is cut on all N parts."""
-    every = np.unique(np.concatenate(levels_mm))[::-1]
+    every = distinct(np.concatenate(levels_mm))[::-1]
     sizes_by_level: list[Floats] = []
     last: list[Floats] = []
     for level in every.tolist():

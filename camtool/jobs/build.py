@@ -19,7 +19,6 @@ A key that no operation of the job can use is refused, wherever it was given.
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -406,6 +405,8 @@ def _rows(operations: list[Operation], selection: tuple[str, ...]) -> list[int]:
         elif _OPERATION_NUMBER.fullmatch(text) and 1 <= int(text) <= len(names):
             rows.add(int(text) - 1)
         else:
+            import difflib
+
             near_names = difflib.get_close_matches(text, names, n=1)
             raise OptionError(
                 f"there is no operation {text!r}",

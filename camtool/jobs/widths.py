@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from camtool.arrays import Bools, Ints
+from camtool.arrays import Bools, Ints, distinct
 from camtool.errors import GeometryError
 from camtool.geometry.boxes import BoxIndex
 from camtool.geometry.distance import paired_distances
@@ -55,7 +55,7 @@ def has_room(lines: Polylines, radius_mm: float) -> Bools:
     except GeometryError:
         return has_space
     has_space[:] = False
-    has_space[rows[np.unique(owners)]] = True
+    has_space[rows[distinct(owners)]] = True
     return has_space
 
 

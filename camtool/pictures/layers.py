@@ -11,8 +11,9 @@ numpy: help and completion ask for the names.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from msgspec import Struct
 
 from camtool.errors import OptionError
 from camtool.patterns import guess
@@ -70,8 +71,7 @@ FAULT_MARK: Look = {"r": 9.0, "fill": "none", "stroke": GAP, "stroke-width": 3.0
 CROSSING_MARK: Look = {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1.2}
 
 
-@dataclass(frozen=True)
-class LegendEntry:
+class LegendEntry(Struct, frozen=True):
     """A line of the legend: its text, and its swatch as SVG from x 0 to `SWATCH`, centred on
     height 0 ("" for none)."""
 
@@ -79,8 +79,7 @@ class LegendEntry:
     name: str
 
 
-@dataclass(frozen=True, eq=False)
-class LineGroup:
+class LineGroup(Struct, frozen=True, eq=False):
     """Lines and arcs of one look, as an SVG group of this id. Width and dashes are in units of the
     page; `name` stands in the legend."""
 
@@ -109,8 +108,7 @@ class LineGroup:
         yield LegendEntry(swatch, self.name)
 
 
-@dataclass(frozen=True, eq=False)
-class DotGroup:
+class DotGroup(Struct, frozen=True, eq=False):
     """Round marks of one look at `places` (x, y) mm, as an SVG group of this id; `name` stands in
     the legend."""
 
@@ -132,8 +130,7 @@ class DotGroup:
             yield LegendEntry(dot_swatch(self.look), self.name)
 
 
-@dataclass(frozen=True, eq=False)
-class TextGroup:
+class TextGroup(Struct, frozen=True, eq=False):
     """Short texts of one colour beside their `places` (x, y) mm, as a group of this id; a text
     without room is left out. The legend does not name them."""
 
@@ -157,8 +154,7 @@ class TextGroup:
 Part = LineGroup | DotGroup | TextGroup
 
 
-@dataclass(frozen=True)
-class Layer:
+class Layer(Struct, frozen=True):
     """A layer of a picture, made of `parts` or drawn by functions.
 
     parts: the groups of lines, dots and texts that it draws and that the legend names.

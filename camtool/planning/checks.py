@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats
+from camtool.arrays import Bools, Floats, distinct
 from camtool.findings import Finding, Sentence, Severity
 from camtool.geometry.measure import path_extents
 from camtool.geometry.polylines import POSITION_EPS_MM
@@ -213,14 +213,14 @@ def _beside_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
         return
     is_beside = _is_beside(toolpath, stock.box_mm, _radii(toolpath, job))
     stay = np.cumsum((toolpath.kind == Kind.RAPID) & (toolpath.end[:, 2] >= STOCK_TOP_MM))
-    touching_stays = np.unique(stay[cuts & ~is_beside])
+    touching_stays = distinct(stay[cuts & ~is_beside])
     outside = cuts & ~np.isin(stay, touching_stays)
     if outside.any():
         row = int(outside.argmax())
         x, y = toolpath.end[row, :2].tolist()
         yield OUT_OF_STOCK_BESIDE(
             where=f"{_place(toolpath, row)} near ({x:.3f}, {y:.3f}) mm",
-            measured=len(np.unique(stay[outside])),
+            measured=len(distinct(stay[outside])),
         )
 
 

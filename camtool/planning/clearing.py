@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from msgspec import Struct, field
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct, distinct_rows
 from camtool.geometry.distance import nearest, points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import (
@@ -575,7 +575,7 @@ def _outside(
     every = np.arange(len(long_rows))
     rows = np.concatenate([every, every, crossings_found.row_a])
     marks = np.concatenate([np.zeros(len(long_rows)), np.ones(len(long_rows)), crossings_found.ta])
-    rows, marks = np.unique(np.column_stack([rows, marks]), axis=0).T
+    rows, marks = distinct_rows(np.column_stack([rows, marks])).T
     parts = np.flatnonzero(rows[1:] == rows[:-1])  # a part is between two marks of one line
     line, begin, stop = rows[parts].astype(np.int64), marks[parts], marks[parts + 1]
     is_outside = ~region.holds(point_at(lines, line, 0.5 * (stop + begin)))
@@ -666,7 +666,7 @@ def _marks(along: MeasuredPath, border: Segments) -> Floats:
     common = crossings(along.segments, border)
     lengths = segment_lengths(along.segments)
     meeting_lengths = along.reach[common.row_a] + common.ta * lengths[common.row_a]
-    every = np.unique(np.concatenate([[0.0, along.total_mm], meeting_lengths]))
+    every = distinct(np.concatenate([[0.0, along.total_mm], meeting_lengths]))
     is_distinct = np.concatenate([[True], np.diff(every) > POSITION_EPS_MM])
     marks: Floats = every[is_distinct]
     marks[-1] = along.total_mm

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.geometry.boxes import moves_of, nearest_pairs
 from camtool.geometry.measure import extents, path_extents
 from camtool.geometry.polylines import Polylines, Segments, reverse, segment_rows
@@ -180,7 +180,7 @@ def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
 def _beside_or_on(step: Step, contours: Sequence[Contour], drawn: Floats) -> _Edges:
     """The edges of contours beside their lines, or on them; `drawn` (M, 2, 2): the boxes of what
     is drawn."""
-    used_contours = np.unique(step.owner).tolist()
+    used_contours = distinct(step.owner).tolist()
     centres = path_extents(Polylines.of(contours[k].path for k in used_contours))
     source = np.array([contours[k].source for k in used_contours])
     nominal, planned_boxes = drawn[source], centres.copy()
@@ -319,7 +319,7 @@ def _regions(operation: Operation, nesting: Nesting, rim: Bools) -> Iterator[Boo
         yield from regions_of(nesting, rim)
         return
     depth = nesting.levels.depth
-    for each in np.unique(depth).tolist():
+    for each in distinct(depth).tolist():
         yield depth == each
 
 

@@ -19,6 +19,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
+from msgspec import Struct
+
 from camtool.errors import CamtoolError, OptionError
 from camtool.keys import Key
 from camtool.plugins import EntryPoint, entry_points
@@ -148,8 +150,7 @@ class OperationKind:
         return self.leaves_walls or self.cuts in ("along", "within")
 
 
-@dataclass(frozen=True)
-class _Broken:
+class _Broken(Struct, frozen=True):
     """A kind whose plug-in cannot be loaded: where it is from, and why not."""
 
     value: str

@@ -19,7 +19,7 @@ import math
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats
+from camtool.arrays import Bools, Floats, distinct
 from camtool.findings import Finding
 from camtool.geometry.distance import nearest, paired_distances, points_to_segments
 from camtool.geometry.intersect import crossings
@@ -103,7 +103,7 @@ class Border(Struct, frozen=True, eq=False):
     def _is_beside(self, lead: Segments) -> bool:
         """True if no piece of the lead lies on the side of the contour that is not free."""
         common = crossings(lead, Segments.of(self.line))
-        parts = np.unique(np.concatenate([[0.0, 1.0], common.ta]))
+        parts = distinct(np.concatenate([[0.0, 1.0], common.ta]))
         rows = np.zeros(len(parts) - 1, dtype=np.int64)
         distances = signed_distances(
             self.line, point_at(lead, rows, 0.5 * (parts[:-1] + parts[1:]))

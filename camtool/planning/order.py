@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct_rows
 from camtool.errors import OptionError
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines, begin_lines_at, reverse_lines
@@ -241,7 +241,7 @@ def travel_mm(choices: Choices, rows: Ints, from_point: Point, to_point: Point |
 
 def _followers(before: Ints, count: int) -> tuple[Ints, Ints]:
     """Return the items that must follow each item i: after[first[i] : first[i + 1]], each once."""
-    pairs = np.unique(np.asarray(before, dtype=np.int64).reshape(-1, 2), axis=0)
+    pairs = distinct_rows(np.asarray(before, dtype=np.int64).reshape(-1, 2))
     if len(pairs) and not (pairs.min() >= 0 and pairs.max() < count):
         raise ValueError(f"a pair names an item that is none of {count}")
     return np.searchsorted(pairs[:, 0], np.arange(count + 1)), pairs[:, 1].copy()
@@ -336,7 +336,7 @@ def must_precede(items: Items) -> Ints:
         np.repeat(item[inner_rows], counts),
         item[np.repeat(first[holder], counts) + steps],
     )
-    return np.unique(np.column_stack([one, other])[one != other], axis=0)
+    return distinct_rows(np.column_stack([one, other])[one != other])
 
 
 def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:

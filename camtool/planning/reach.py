@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.findings import Finding
 from camtool.geometry.boxes import IndexedCurves
 from camtool.geometry.distance import nearest
@@ -150,7 +150,7 @@ def _separate_sections(lines: Polylines, other: Polylines, least_mm2: float) -> 
     lengths = segment_lengths(segments)[row] * (high - low)
     first = np.searchsorted(segments.path[row], np.arange(len(lines) + 1))
     sections: list[Polyline] = []
-    for index in np.unique(segments.path[row[is_wanted]]).tolist():
+    for index in distinct(segments.path[row[is_wanted]]).tolist():
         path_rows = slice(int(first[index]), int(first[index + 1]))
         path_parts = _Parts(
             lengths[path_rows], distances[path_rows].max(axis=1), is_wanted[path_rows]

@@ -25,7 +25,7 @@ from itertools import chain, pairwise
 import numpy as np
 from msgspec import Struct, field
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Ints, distinct
 from camtool.findings import Finding
 from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
@@ -195,7 +195,7 @@ def _begun_at_reversals(
         places = np.flatnonzero(parts.begin == 0.0)[contour.starts]
     else:
         ends = [np.append(each.first, each.last) for each in reversals]
-        places = np.unique(np.concatenate(ends) % count)
+        places = distinct(np.concatenate(ends) % count)
     if len(places) == 0:
         return contour, 0
     held_axes = [

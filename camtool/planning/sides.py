@@ -25,7 +25,7 @@ from functools import cached_property
 import numpy as np
 from msgspec import Struct, field
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.errors import OptionError
 from camtool.geometry.boxes import box_pairs
 from camtool.geometry.distance import nearest
@@ -365,7 +365,7 @@ def regions_of(nesting: Nesting, rim: Bools) -> Iterator[Bools]:
             region[rows[wrong]] = False
         is_open &= ~region
     depth = nesting.levels.depth
-    for level in np.unique(depth[is_open]).tolist():
+    for level in distinct(depth[is_open]).tolist():
         for is_rim in (True, False):
             region = is_open & (depth == level) & (rim == is_rim)
             if region.any():

@@ -27,7 +27,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats
+from camtool.arrays import Bools, Floats, distinct
 from camtool.errors import OptionError
 from camtool.findings import Finding
 from camtool.geometry.boxes import BoxIndex
@@ -671,7 +671,7 @@ def _tabs_over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> 
     common = crossings(along.segments[rows], zone)
     spans: list[tuple[float, float, bool]] = []
     for k, row in enumerate(rows.tolist()):
-        parts = np.unique(np.concatenate([[0.0, 1.0], common.ta[common.row_a == k]]))
+        parts = distinct(np.concatenate([[0.0, 1.0], common.ta[common.row_a == k]]))
         centres = 0.5 * (parts[:-1] + parts[1:])
         is_inside = inside(point_at(along.segments, np.full(len(centres), row), centres), zone)
         begin, size = along.reach[row], along.reach[row + 1] - along.reach[row]

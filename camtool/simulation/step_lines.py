@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Ints, distinct
 from camtool.kernels.judging import CIRCLE, STRIDE, WRITTEN, Sums, Task, new_pen
 from camtool.kernels.lines import Followed, StepLines, follow_lines, judge_lines
 from camtool.simulation.mechanics import Mechanics
@@ -124,7 +124,7 @@ def _parts(row: Ints, task: Task) -> list[int]:
         return [0, count]
     begins = np.flatnonzero(np.diff(row, prepend=-1))
     cuts = begins[np.searchsorted(begins, np.arange(0, begins[-1] + 1, LINES_AT_ONCE))]
-    return [*np.unique(cuts).tolist(), count]
+    return [*distinct(cuts).tolist(), count]
 
 
 class _Part:

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.findings import Finding, Severity
 from camtool.geometry.measure import path_extents, signed_areas
 from camtool.geometry.nesting import inside
@@ -613,7 +613,7 @@ class _Checks:
                     *tool.bodies,
                 ):
                     depths, place = self._entered(rows, box, (radius, begin, end))
-                    blocks = np.unique(self.moves.row[rows[depths > POSITION_EPS_MM]])
+                    blocks = distinct(self.moves.row[rows[depths > POSITION_EPS_MM]])
                     if len(blocks):
                         k = int(depths.argmax())
                         yield KEEP_OUT_ENTERED(

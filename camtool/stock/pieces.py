@@ -21,7 +21,7 @@ import math
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Ints, distinct
 from camtool.kernels.pieces import CUT, partings, piece_at
 from camtool.records import replace
 from camtool.stock.before import THROUGH_SLACK_MM, WHOLE, StockBefore
@@ -146,7 +146,7 @@ def _floors(moves: StockMoves, thickness_mm: float, before: StockBefore) -> list
     step = math.sqrt(max(float(np.prod(high - low)), 1e-12) / LEVEL_POINTS)
     x, y = (np.arange(low[k], high[k] + step, step) for k in (0, 1))
     floors = before.floors(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
-    floors = np.unique(np.floor(floors / WIDTH_STEP_MM) * WIDTH_STEP_MM)
+    floors = distinct(np.floor(floors / WIDTH_STEP_MM) * WIDTH_STEP_MM)
     floors = floors[(floors > -thickness_mm) & (floors < 0.0)]
     return [-thickness_mm, *floors[:: max(1, math.ceil(len(floors) / MAX_LEVELS))].tolist()]
 

@@ -45,7 +45,7 @@ from functools import cached_property
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.geometry.boxes import IndexedCurves
 from camtool.geometry.distance import near_paths
 from camtool.geometry.measure import point_at, signed_areas
@@ -439,7 +439,7 @@ class _Layers:
             depth = nesting.levels.depth
             groups = [
                 (depth == level) & (rim == is_rim)
-                for level in np.unique(depth).tolist()
+                for level in distinct(depth).tolist()
                 for is_rim in (True, False)
             ]
         for group in groups:

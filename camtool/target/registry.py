@@ -11,7 +11,6 @@ of which extends a target, or another one of them, and is known by its own name.
 
 from __future__ import annotations
 
-import difflib
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -389,6 +388,8 @@ def _entry_point(name: str) -> EntryPoint:
     none."""
     points = {point.name: point for point in entry_points(GROUP)}
     if name not in points:
+        import difflib
+
         names = [*points, *shipped_files()]
         near_names = difflib.get_close_matches(name, names, n=3, cutoff=0.5) or sorted(points)
         raise UnknownTargetError(

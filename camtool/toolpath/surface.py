@@ -13,7 +13,7 @@ import math
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.errors import InputError, OptionError, PostError
 from camtool.toolpath.lower import MAX_PARTS
 from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, read_only
@@ -231,7 +231,7 @@ def _shares(
     crossings = [np.array([0.0, 1.0])]
     for axis, nodes in ((0, surface.x), (1, surface.y)):
         crossings.append(_crossings(start, end, centre, sweep, axis, nodes))
-    shares = np.unique(np.concatenate(crossings))
+    shares = distinct(np.concatenate(crossings))
     shares = np.concatenate([shares[:-1][np.diff(shares) > 1e-12], [1.0]])
     middle = _points(toolpath, row, start, sweep, np.append(0.5 * (shares[1:] + shares[:-1]), 1.0))
     radius = math.dist(start[:2], centre) if centre is not None else 0.0

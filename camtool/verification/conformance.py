@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct_rows
 from camtool.findings import Finding, Severity
 from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at
@@ -369,7 +369,7 @@ def _repeated_cuts(
     z = side.cuts.heights(segment).mean(axis=1)
     point, move, _ = other.moves.pairs_within(middle, z, limits)
     moves = np.column_stack([point, other.cuts.row[move]])
-    lie = np.bincount(np.unique(moves, axis=0)[:, 0], minlength=len(rows))
+    lie = np.bincount(distinct_rows(moves)[:, 0], minlength=len(rows))
     repeated = np.flatnonzero(counts[more_often] > np.maximum(lie, 1))
     for place, other_count in first_items(repeated.tolist()):
         row = int(rows[place])
@@ -460,7 +460,7 @@ class _SettingPairs(Struct, frozen=True, eq=False):
         z = side.cuts.heights(segment).mean(axis=1)
         point, move, _ = other.moves.pairs_within(middle, z, limits)
         nearby_pairs = np.column_stack([unpaired[point], other.cuts.row[move]])
-        every = np.concatenate([paired, np.unique(nearby_pairs, axis=0)])
+        every = np.concatenate([paired, distinct_rows(nearby_pairs)])
         return cls(side.toolpath, other.toolpath, rows, every)
 
     def differing(self, is_equal: Bools) -> tuple[Ints, Ints]:

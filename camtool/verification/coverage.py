@@ -20,7 +20,7 @@ from typing import TypeVar
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints, distinct, distinct_rows
 from camtool.findings import Finding, Sentence
 from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
@@ -202,7 +202,7 @@ def _contours_from(cuts: CutMoves, goal: CutMoves, row_from: Indices | None) -> 
         )  # contours follow one another: pairs as numbers are mostly in order
         pair = cuts.contour[rows].astype(np.int64) * pair_base + (wanted_contour - ANY_CONTOUR)
         changes = np.flatnonzero(np.diff(pair, prepend=-1))
-        decoded_contours, wanted_contours = np.divmod(np.unique(pair[changes]), pair_base)
+        decoded_contours, wanted_contours = np.divmod(distinct(pair[changes]), pair_base)
         wanted_contours += ANY_CONTOUR
         for one, other, partners in (
             (decoded_contours, wanted_contours, of_decoded),
@@ -676,7 +676,7 @@ class NearPairs(Struct, eq=False):
         """Return (P, 2) rows of both sides that lie on each other and have the same direction."""
         along = self.cosine > MIN_SAME_COSINE
         other_rows = self.other_moves.cuts.row[self.move[along]]
-        return np.unique(np.column_stack([self.rows[self.point[along]], other_rows]), axis=0)
+        return distinct_rows(np.column_stack([self.rows[self.point[along]], other_rows]))
 
 
 def near_pairs(

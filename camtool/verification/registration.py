@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints, distinct, distinct_rows
 from camtool.errors import DrawingError
 from camtool.findings import Finding, Severity
 from camtool.geometry.boxes import near_points
@@ -253,7 +253,7 @@ class _Path(Struct, frozen=True, eq=False):
             row,
             tool[row],
             _boxes_of(cuts, limit_mm),
-            np.unique(cuts.segments[arcs].centre.round(3), axis=0),
+            distinct_rows(cuts.segments[arcs].centre.round(3)),
             program.holes.places,
         )
 
@@ -536,7 +536,7 @@ def _largest_boxes(boxes: Floats) -> Floats:
 def _centres_of(lines: _Lines) -> Floats:
     """Return (K, 2) mm: the centres of all arcs."""
     arcs = np.flatnonzero(lines.segments.is_arc)
-    return np.unique(lines.segments[arcs].centre.round(3), axis=0)
+    return distinct_rows(lines.segments[arcs].centre.round(3))
 
 
 def _refine_shift(path: _Path, lines: _Lines, shift: Floats) -> Floats:
@@ -591,7 +591,7 @@ def _followed_share(path: _Path, lines: _Lines, shift: Floats) -> float:
     """Return the part of the path that keeps to the lines, or to one distance from them."""
     if len(path.points) == 0:
         drilled = near_points(path.holes - shift, _centres_of(lines), NEAR_MM)[0]
-        return len(np.unique(drilled)) / max(len(path.holes), 1)
+        return len(distinct(drilled)) / max(len(path.holes), 1)
     distances = np.abs(lines.signed_distances(path.points - shift)[0])
     radius = _peak_distance(distances, path.length, 2.0 * path.near_mm(0.0))
     nearness = path.near_mm(radius)
@@ -771,7 +771,7 @@ class _Follower(Struct, frozen=True, eq=False):
             findings.append(DRAWING_PLACE_MOVED(x=shift[0], y=shift[1]))
         radius = None if tool_diameter_mm is None else 0.5 * tool_diameter_mm
         parts, tools = [], []
-        for number in np.unique(self.path.tool).tolist():
+        for number in distinct(self.path.tool).tolist():
             own_points = np.flatnonzero(self.path.tool == number)
             trial, remarks = self._radius(own_points, radius)
             findings += remarks
@@ -901,7 +901,7 @@ class _Follower(Struct, frozen=True, eq=False):
         is_reached = np.zeros(len(self.lines.paths), dtype=np.bool_)
         distances, _, segment = self.lines.signed_distances(points)
         is_reached[
-            np.unique(self.lines.segments.path[segment[np.abs(distances) <= radius + nearness]])
+            distinct(self.lines.segments.path[segment[np.abs(distances) <= radius + nearness]])
         ] = True
         return is_reached
 
@@ -960,7 +960,7 @@ class _Follower(Struct, frozen=True, eq=False):
         count = len(self.lines.paths)
         cut = np.zeros(count, dtype=np.bool_)
         if followed is not None:
-            cut[np.unique(followed.tracks.contour)] = True
+            cut[distinct(followed.tracks.contour)] = True
         for index, other_count in first_items(np.flatnonzero(~cut & ~drilled).tolist()):
             yield NOT_CUT(
                 where=at_point(self.lines.boxes[index].mean(axis=1)),

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from camtool.arrays import Ints
+from camtool.arrays import Ints, distinct
 from camtool.simulation.pulses import Pulses, in_order
 from camtool.target.signals import Board, Coils, StepDirection
 
@@ -138,7 +138,7 @@ class _LevelRun:
         if until is not None:
             self._falls = [_those(each, each.tick >= until) for each in changes]
             changes = [_those(each, each.tick < until) for each in changes]
-        moments = np.unique(np.concatenate([ticks, *(each.tick for each in changes)]))
+        moments = distinct(np.concatenate([ticks, *(each.tick for each in changes)]))
         ports = np.tile(self._bytes, (len(moments), 1))
         for each in changes:
             index = np.searchsorted(moments, each.tick)

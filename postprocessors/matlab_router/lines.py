@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.records import replace
@@ -174,7 +174,7 @@ class _Maker:
             lines = self._without_ones(lines)
         keep = (lines.end != lines.start).any(axis=1)
         self.changes.dropped += int(len(keep) - keep.sum())
-        remaining = np.unique(lines.stroke[keep])
+        remaining = distinct(lines.stroke[keep])
         for stroke in np.setdiff1d(lines.stroke, remaining).tolist():
             row = int(lines.row[int(np.searchsorted(lines.stroke, stroke))])
             self.changes.note_loss(self._toolpath.place(row))

@@ -18,7 +18,7 @@ from typing import Final, NoReturn
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
@@ -103,7 +103,7 @@ class _Writer:
         changes.split_step_mm = slope_step_mm(self._machine)
         stepped = helices_to_steps(straight.toolpath, changes.split_step_mm)
         steps = np.bincount(stepped.row, minlength=len(straight.toolpath)) > 1
-        slopes = np.unique(straight.row[steps & straight.toolpath.is_feed])
+        slopes = distinct(straight.row[steps & straight.toolpath.is_feed])
         changes.split = len(slopes)
         changes.split_place = toolpath.place(int(slopes[0])) if changes.split else ""
         lowered_path = stepped.after(straight)

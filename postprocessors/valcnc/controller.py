@@ -22,7 +22,7 @@ from collections.abc import Iterator
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Ints, distinct_rows
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
 from camtool.machine.model import Machine
@@ -171,7 +171,7 @@ class _Pieces:
         """Return how many coordinates of programmed ends lie where the rounding to whole steps
         changes, within `HALF_STEP_GUARD` of a step."""
         turns_at = 0.5 if self._controller.rounding == "nearest" else 0.0
-        points = np.unique(self._end, axis=0) / self._step_mm
+        points = distinct_rows(self._end) / self._step_mm
         offsets = points - turns_at
         is_near = np.abs(offsets - np.rint(offsets)) <= HALF_STEP_GUARD
         return int((is_near & (points != 0.0)).sum())

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 
 SPUR_SHARE = 1.5
 """A branch that ends within this many half widths of the stroke at its junction is a spur: it
@@ -67,7 +67,7 @@ def thin(dark: Bools) -> Bools:
             changed |= len(removed) > 0
             neighbours = (removed[:, None] + around).ravel()
             edge = np.concatenate([edge, neighbours])
-            edge = np.unique(edge[pixels[edge]])
+            edge = distinct(edge[pixels[edge]])
     return pixels.reshape(height + 2, wide)[1:-1, 1:-1]
 
 

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 import numpy as np
 from msgspec import Struct, field
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.importers.dxf.tags import DxfSections, Tags
 
 MIN_VERTICES = 32
@@ -100,7 +100,7 @@ def _lines(tags: Tags, marks: Ints, is_line: Bools, is_other: Bools) -> dict[str
     sizes = np.diff(marks)
     follows = np.zeros(len(sizes) + 1, dtype=np.bool_)
     follows[1:-1] = is_line[1:] & is_line[:-1] & (sizes[1:] == sizes[:-1])
-    for size in np.unique(sizes[follows[:-1]]).tolist():
+    for size in distinct(sizes[follows[:-1]]).tolist():
         candidates = np.flatnonzero(follows[:-1] & (sizes == size))
         follows[candidates] = _say_the_same(tags, marks[candidates], size)
     firsts, lasts = (np.flatnonzero(np.diff(follows.astype(np.int8)) == step) for step in (1, -1))

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, distinct
 from camtool.errors import DrawingError
 from camtool.records import replace
 
@@ -189,7 +189,7 @@ class TextTags(Tags):
     def values_with(self, letters: Bools) -> Ints:
         """The tags whose values have one of these bytes (of `data`)."""
         lines = np.searchsorted(self.at, np.flatnonzero(letters), side="right") - 1
-        rows = np.unique(lines[lines % 2 == 1] // 2)
+        rows = distinct(lines[lines % 2 == 1] // 2)
         return rows[rows < len(self.codes)]
 
 
@@ -396,7 +396,7 @@ def _check_codes(tags: Tags, file: str) -> None:
 
 def check_numbers(tags: Tags, file: str, rows: Ints) -> None:
     """DrawingError for a value of these tags that must be a number and is none."""
-    is_number = {code: _is_number(code) for code in np.unique(tags.codes[rows]).tolist()}
+    is_number = {code: _is_number(code) for code in distinct(tags.codes[rows]).tolist()}
     for row, (code, value) in zip(rows.tolist(), tags.pairs(rows), strict=True):
         if is_number[code] and not _NUMBER.fullmatch(str(value)):
             raise DrawingError(

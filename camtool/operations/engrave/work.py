@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats
+from camtool.arrays import Bools, Floats, distinct
 from camtool.errors import OptionError
 from camtool.findings import Finding
 from camtool.geometry.measure import point_at
@@ -127,7 +127,7 @@ def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float,
             gaps[is_apart], spans[is_apart], near_rows[is_apart].tolist(), strict=True
         )
     ]
-    for row in np.unique(group).tolist():
+    for row in distinct(group).tolist():
         places += [(*each, row) for each in _enclosed(lines[group == row], width)]
     return places
 

@@ -8,6 +8,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from camtool.arrays import distinct
 from camtool.geometry.measure import path_extents, path_lengths
 from camtool.jobs.template import Part, Remaining
 from camtool.jobs.widths import SLOT_MM, is_slot
@@ -107,7 +108,7 @@ def _by_tabs(
     height = min(max(thickness / 3.0, MIN_TAB_HEIGHT_MM), thickness)
     height += remaining.proposal.breakthrough_mm
     groups: list[tuple[Keys, list[int]]] = []
-    for count in np.unique(counts).tolist():
+    for count in distinct(counts).tolist():
         tabs = f'"{count}:{2.0 * tool:.3g}mm:{height:.3g}mm"'
         key = (("tabs", tabs, "so that it stays where it is; cut them by hand"),)
         groups.append((key if count else (), np.array(rows)[counts == count].tolist()))
