@@ -699,9 +699,15 @@ def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
     begins with its first slice, and they come in the order of these.
     """
     rows, begins = traced(curve_rows_of(elements), slices.element, slices.span, slices.ends)
+    if len(rows) == 0:
+        return []
+    first, counts = begins[:-1], np.diff(begins)
+    least = np.minimum.reduceat(rows, first)
+    turn = np.flatnonzero(rows == np.repeat(least, counts)) - first
+    place = np.arange(len(rows)) - np.repeat(first - turn, counts)
+    rows = rows[np.repeat(first, counts) + place % np.repeat(counts, counts)]
     loops = [rows[low:high] for low, high in pairwise(begins.tolist())]
-    rolled = (np.roll(loop, -int(loop.argmin())) for loop in loops)
-    return sorted(rolled, key=lambda loop: int(loop[0]))
+    return [loops[loop] for loop in np.argsort(least).tolist()]
 
 
 def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> tuple[Polylines, Ints]:

@@ -250,15 +250,15 @@ def _area_outside(
     nowhere = (0.0, 0.0)
     if rest.is_empty:
         return 0.0, 0.0, nowhere
-    rings = [*map(shapely.get_coordinates, shapely.get_rings(shapely.get_parts(other)))]
-    if not rings:
+    rings = shapely.get_rings(shapely.get_parts(other))
+    if not len(rings):
         return float(rest.area), math.inf, nowhere
     # A strip may be deeper between its corners than at them.
     dense = shapely.segmentize(rest, max(rest.length / MAX_DEPTH_POINTS, DEPTH_SPACING_MM))
     places = shapely.get_coordinates(dense)
-    starts = np.concatenate([ring[:-1] for ring in rings])
-    ends = np.concatenate([ring[1:] for ring in rings])
-    edges = Segments.between(starts, ends, np.zeros(len(starts)))
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    starts = np.flatnonzero(ring[1:] == ring[:-1])
+    edges = Segments.between(points[starts], points[starts + 1], np.zeros(len(starts)))
     distance = distances_from(places, moves_of(edges))
     depth = float(distance.max())
     if depth <= 2.0 * tolerance:
@@ -320,14 +320,17 @@ def _inside_of(outline: Polylines, tolerance: float) -> Any:
     is_outer = signed_areas(outline) > 0.0
     outer, holes = shapely.polygons(rings[is_outer]), rings[~is_outer]
     places = shapely.points(outline.vertices[outline.offsets[:-1][~is_outer], :2])
-    hole, holder = shapely.STRtree(outer).query(places, predicate="intersects")
+    holder, hole = shapely.STRtree(places).query(outer, predicate="intersects")
     # A hole belongs to the smallest of all that it lies in.
     order = np.lexsort((shapely.area(outer)[holder], hole))
     hole, first = np.unique(hole[order], return_index=True)
+    holder = holder[order][first]
+    by_holder = np.argsort(holder, kind="stable")
+    ends = np.searchsorted(holder[by_holder], np.arange(len(outer) + 1))
     return shapely.multipolygons(
         [
-            shapely.polygons(ring, holes[hole[holder[order][first] == k]])
-            for k, ring in enumerate(rings[is_outer])
+            shapely.polygons(ring, holes[hole[by_holder[low:high]]])
+            for ring, (low, high) in zip(rings[is_outer], pairwise(ends.tolist()), strict=True)
         ]
     )
 

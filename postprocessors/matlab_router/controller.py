@@ -158,6 +158,9 @@ class _Run:
         coded = np.array([axis.coded_step_mm for axis in machine.axes])
         self._count_mm = SIGNS * coded
         self._samples = options.chunk_steps
+        # One long row: numpy multiplies rows of three numbers in a tenth of the speed.
+        self._counts_mm = np.tile(self._count_mm, self._samples)
+        self._homes = np.tile(self._home, self._samples)
 
     def run(self) -> Iterator[Chunk]:
         """The chunks of all rows up to the end of the program."""
@@ -256,8 +259,9 @@ class _Run:
         first = min(first, int(row[0])) if len(row) else first
         rows = np.arange(first, last)
         offsets = np.searchsorted(row, np.arange(first, last + 1))
-        commanded = count * self._count_mm
-        commanded += self._home
+        commanded = count.reshape(-1) * self._counts_mm[: count.size]
+        commanded += self._homes[: count.size]
+        commanded = commanded.reshape(-1, 3)
         slide, reversals = NO_SAMPLES, np.zeros((len(rows), 3), dtype=np.int64)
         if len(row):
             slide, reversals = self._mechanics.follow(commanded, offsets)
