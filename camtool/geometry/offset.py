@@ -702,12 +702,12 @@ def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
     if len(rows) == 0:
         return []
     first, counts = begins[:-1], np.diff(begins)
-    least = np.minimum.reduceat(rows, first)
-    turn = np.flatnonzero(rows == np.repeat(least, counts)) - first
+    lowest = np.minimum.reduceat(rows, first)
+    turn = np.flatnonzero(rows == np.repeat(lowest, counts)) - first
     place = np.arange(len(rows)) - np.repeat(first - turn, counts)
     rows = rows[np.repeat(first, counts) + place % np.repeat(counts, counts)]
     loops = [rows[low:high] for low, high in pairwise(begins.tolist())]
-    return [loops[loop] for loop in np.argsort(least).tolist()]
+    return [loops[loop] for loop in np.argsort(lowest).tolist()]
 
 
 def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> tuple[Polylines, Ints]:
