@@ -312,7 +312,7 @@ class GateFlags(Struct, frozen=True):
             return None
         from camtool.verification.report import Gates
 
-        return Gates(*(getattr(self, each.name) for each in fields(self)))
+        return Gates(*astuple(self))
 
 
 def gate_options(command: Command) -> Command:
