@@ -32,21 +32,16 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine, PathController
 from camtool.records import replace
-from camtool.simulation.controller import ControllerModel
-from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Chunk, Options
+from camtool.simulation.motion import Options
 from camtool.simulation.rows import check_positions, check_rows, with_ends, with_event_positions
 from camtool.simulation.samples import (
     ROWS_AT_ONCE,
     CountedSamples,
+    SampledModel,
     SampledRows,
     move_lengths,
-    row_chunks,
-    row_seconds,
     sample_spacing_mm,
-    timed_row_chunks,
 )
-from camtool.simulation.timing import TimedChunk
 from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 SPREAD_STEPS = 2.0
@@ -60,30 +55,17 @@ MIN_CHORD_STEPS = 2.0
 _Machine = Machine[PathController, Any]
 
 
-class PathModel(ControllerModel[PathController, Any]):
+class PathModel(SampledModel[PathController, Any]):
     """The exact-path controller."""
-
-    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """Yield the motion; ProgramError, which names the block, for rows that cannot be
-        followed."""
-        path = self.quantised(toolpath, machine)
-        mechanics = Mechanics(machine, path.start, options.effects)
-        return row_chunks(_sampled(path, machine), mechanics, options.chunk_steps)
 
     samples_per_speed = 1
 
-    def timed(
-        self, toolpath: Toolpath, machine: _Machine, options: Options
-    ) -> Iterator[TimedChunk]:
-        """Yield the motion with the times of its samples."""
-        path = self.quantised(toolpath, machine)
-        mechanics = Mechanics(machine, path.start, options.effects)
-        return timed_row_chunks(_sampled(path, machine), mechanics, options.chunk_steps)
-
-    def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
-        """Return (N,) s that each row takes."""
-        blocks = _sampled(self.quantised(toolpath, machine), machine)
-        return row_seconds(blocks, len(toolpath))
+    def sampled(self, path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
+        """Yield the rows up to the end of the program; ProgramError for those that cannot be
+        followed."""
+        spacing_mm = sample_spacing_mm(path, machine)
+        check_rows(path, path.executed_rows)
+        return _blocks(path.first(path.executed_rows), machine, spacing_mm)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """Return the moves with their ends on the controller's grid, if it has one."""
@@ -106,14 +88,6 @@ class PathModel(ControllerModel[PathController, Any]):
             "the controller follows every line and arc exactly",
             "speeds change at once: there is no acceleration, and compensation takes no time",
         )
-
-
-def _sampled(path: Toolpath, machine: Machine) -> Iterator[SampledRows]:
-    """Yield the rows up to the end of the program; ProgramError for those that cannot be
-    followed."""
-    spacing_mm = sample_spacing_mm(path, machine)
-    check_rows(path, path.executed_rows)
-    return _blocks(path.first(path.executed_rows), machine, spacing_mm)
 
 
 def _blocks(path: Toolpath, machine: Machine, spacing_mm: float) -> Iterator[SampledRows]:

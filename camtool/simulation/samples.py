@@ -9,6 +9,7 @@ all axes are samples, so extents and reversals are exact.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import Protocol
@@ -18,9 +19,10 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.kernels.lattice import to_steps
-from camtool.machine.model import Machine
+from camtool.machine.model import ControllerT, DialectT, Machine
+from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import NO_SAMPLES, Chunk, still_ledger
+from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, still_ledger
 from camtool.simulation.timing import TimedChunk
 from camtool.toolpath.moves import PolarArcs, Toolpath, are_arcs
 
@@ -80,6 +82,44 @@ def row_seconds(blocks: Iterable[SampledRows], rows: int) -> Floats:
     for block in blocks:
         seconds[block.low : block.high] = block.seconds
     return seconds
+
+
+class SampledModel(ControllerModel[ControllerT, DialectT]):
+    """A controller whose motion is the samples of its rows."""
+
+    @abstractmethod
+    def sampled(
+        self, path: Toolpath, machine: Machine[ControllerT, DialectT]
+    ) -> Iterator[SampledRows]:
+        """Yield the rows of a quantised path up to the end of the program; ProgramError, which
+        names the block, for rows that cannot be followed."""
+
+    def mechanics(
+        self, path: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
+    ) -> Mechanics:
+        """Return the slides at the start of the path."""
+        return Mechanics(machine, path.start, options.effects)
+
+    def run(
+        self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
+    ) -> Iterator[Chunk]:
+        """Yield the motion in chunks."""
+        path = self.quantised(toolpath, machine)
+        mechanics = self.mechanics(path, machine, options)
+        return row_chunks(self.sampled(path, machine), mechanics, options.chunk_steps)
+
+    def timed(
+        self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
+    ) -> Iterator[TimedChunk]:
+        """Yield the motion with the times of its samples."""
+        path = self.quantised(toolpath, machine)
+        mechanics = self.mechanics(path, machine, options)
+        return timed_row_chunks(self.sampled(path, machine), mechanics, options.chunk_steps)
+
+    def seconds(self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]) -> Floats:
+        """Return (N,) s that each row takes."""
+        blocks = self.sampled(self.quantised(toolpath, machine), machine)
+        return row_seconds(blocks, len(toolpath))
 
 
 def row_chunks(

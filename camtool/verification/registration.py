@@ -469,7 +469,8 @@ def _rival_places(best: _Place, places: Sequence[_Place]) -> list[_Place]:
 
 
 def _refined_places(path: _Path, lines: _Lines) -> list[_Place]:
-    """Return the best candidates, refined, each once, the best first."""
+    """Return the places of the path on the drawing, the one that follows it most first; places
+    nearer than VOTE_MM count once."""
     places: list[_Place] = []
     for shift in _candidate_shifts(path, lines):
         refined = _refine_shift(path, lines, shift)

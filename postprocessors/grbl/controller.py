@@ -27,17 +27,11 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
 from camtool.records import replace
-from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import coded_steps_mm
 from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Chunk, Options
+from camtool.simulation.motion import Options
 from camtool.simulation.rows import check_rows
-from camtool.simulation.samples import (
-    SampledRows,
-    row_chunks,
-    row_seconds,
-    timed_row_chunks,
-)
+from camtool.simulation.samples import SampledModel, SampledRows
 from camtool.simulation.speed_plan import (
     FROM_REST,
     EntryState,
@@ -46,7 +40,6 @@ from camtool.simulation.speed_plan import (
     max_along,
 )
 from camtool.simulation.step_lines import LineRows, LineRun
-from camtool.simulation.timing import TimedChunk
 from camtool.toolpath.moves import EVENTS_AT_REST, Kind, Toolpath, are_arcs
 
 from .dialect import GrblController, GrblDialect
@@ -67,42 +60,27 @@ LASER_ASSUMPTION = (
 )
 
 
-class GrblModel(ControllerModel[GrblController, GrblDialect]):
+class GrblModel(SampledModel[GrblController, GrblDialect]):
     """grbl 1.1: chords, whole steps, trapezoids planned ahead."""
-
-    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """The motion, chunk by chunk."""
-        path, mechanics = self._at_start(toolpath, machine, options)
-        return row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
-
-    def timed(
-        self, toolpath: Toolpath, machine: _Machine, options: Options
-    ) -> Iterator[TimedChunk]:
-        """The motion with the times of its steps by the planned trapezoids."""
-        path, mechanics = self._at_start(toolpath, machine, options)
-        return timed_row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
 
     def fused_run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> LineRun | None:
         """Return the lines of all rows; None where the mechanics differ from place to place."""
-        path, mechanics = self._at_start(toolpath, machine, options)
+        path = self.quantised(toolpath, machine)
+        mechanics = self.mechanics(path, machine, options)
         if not mechanics.even:
             return None
         rows = path.executed_rows
         blocks = map(GrblSamples.lines, _rows_to_end(path, machine))
         return LineRun(blocks, rows, coded_steps_mm(machine), mechanics, rounds=True)
 
-    def _at_start(
-        self, toolpath: Toolpath, machine: _Machine, options: Options
-    ) -> tuple[Toolpath, Mechanics]:
-        """Return the path, and the slides at its start."""
-        path = self.quantised(toolpath, machine)
-        start_mm = _nearest_steps(path.start.astype(np.float32), machine) * coded_steps_mm(machine)
-        return path, Mechanics(machine, start_mm, options.effects)
+    def sampled(self, path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
+        """Yield the rows up to the end of the program."""
+        return _rows_to_end(path, machine)
 
-    def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
-        """(N,) s that each row takes."""
-        blocks = _rows_to_end(self.quantised(toolpath, machine), machine)
-        return row_seconds(blocks, len(toolpath))
+    def mechanics(self, path: Toolpath, machine: _Machine, options: Options) -> Mechanics:
+        """Return the slides at the step that is nearest to the start of the path."""
+        start_mm = _nearest_steps(path.start.astype(np.float32), machine) * coded_steps_mm(machine)
+        return Mechanics(machine, start_mm, options.effects)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """Chords, and Bresenham lines."""

@@ -29,20 +29,16 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.machine.model import Machine
 from camtool.records import replace
-from camtool.simulation.controller import ControllerModel
-from camtool.simulation.mechanics import Mechanics
-from camtool.simulation.motion import Chunk, Options
+from camtool.simulation.motion import Options
 from camtool.simulation.rows import check_rows
 from camtool.simulation.samples import (
     ROWS_AT_ONCE,
     CountedSamples,
+    SampledModel,
     SampledRows,
     move_lengths,
-    row_chunks,
-    row_seconds,
     sample_spacing_mm,
     spacing_along,
-    timed_row_chunks,
 )
 from camtool.simulation.speed_plan import (
     FROM_REST,
@@ -51,7 +47,6 @@ from camtool.simulation.speed_plan import (
     axis_limits,
     max_along,
 )
-from camtool.simulation.timing import TimedChunk
 from camtool.toolpath.moves import (
     EVENTS_AT_REST,
     Kind,
@@ -87,14 +82,8 @@ REST_PERIODS = 2.0
 number: 1 to 3 in all, by where the last of them ends (measured on 278 stops)."""
 
 
-class LinuxcncModel(ControllerModel[LinuxcncController, LinuxcncDialect]):
+class LinuxcncModel(SampledModel[LinuxcncController, LinuxcncDialect]):
     """LinuxCNC: the path itself, its corners as the path mode says."""
-
-    def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """The motion, chunk by chunk."""
-        path = self.quantised(toolpath, machine)
-        mechanics = Mechanics(machine, path.start, options.effects)
-        return row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
 
     samples_per_speed = 1
 
@@ -102,18 +91,9 @@ class LinuxcncModel(ControllerModel[LinuxcncController, LinuxcncDialect]):
         """The period in which its trajectory planner runs."""
         return machine.controller.servo_period_s
 
-    def timed(
-        self, toolpath: Toolpath, machine: _Machine, options: Options
-    ) -> Iterator[TimedChunk]:
-        """The motion with the times of its samples by the planned trapezoids."""
-        path = self.quantised(toolpath, machine)
-        mechanics = Mechanics(machine, path.start, options.effects)
-        return timed_row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
-
-    def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
-        """(N,) s that each row takes."""
-        blocks = _rows_to_end(self.quantised(toolpath, machine), machine)
-        return row_seconds(blocks, len(toolpath))
+    def sampled(self, path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
+        """Yield the rows up to the end of the program."""
+        return _rows_to_end(path, machine)
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
         """A coded step, or what a million samples of the whole program allow."""

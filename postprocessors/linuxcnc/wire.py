@@ -400,7 +400,7 @@ class LinuxcncConversation(Conversation):
         return x, y, z
 
     def _errors(self) -> Generator[str | float, str, str]:
-        """Show what it reports; return its message of a probe."""
+        """Read and show the messages of LinuxCNC; return that of a probe, "" if there is none."""
         report = ""
         for name in ("error", "operator_text", "operator_display"):
             text = yield from self._get(name)

@@ -187,7 +187,8 @@ def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed],
 
 
 def _walks(trace: MedialTrace, floor: list[Floats], band: Band, again_mm: float) -> list[Floats]:
-    """The walks of one band: the grooves, the walls, and the centre of a round region."""
+    """Return the paths of the tip in one band of depths: the grooves, the walls, and the centre
+    of a round region."""
     graph = pruned(graph_of([*grooves(trace, band), *floor]), band.tolerance_mm)
     largest = trace.discs[int(np.argmax(trace.rho))]
     is_cut = band.low_mm < largest[2] <= band.high_mm
