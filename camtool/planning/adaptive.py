@@ -33,6 +33,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Floats
+from camtool.errors import OptionError
 from camtool.geometry.curves import FunctionCurve
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.fit import fit_curve
@@ -44,8 +45,10 @@ from camtool.kernels.engagement import Cleared
 from camtool.planning.clearing import outside_parts, parts_of, pole
 from camtool.planning.items import CutRun, Setting
 from camtool.planning.job import Operation
+from camtool.planning.naming import key_of
 from camtool.planning.paths import MeasuredPath
 from camtool.planning.ramps import feeds_along, helix
+from camtool.planning.strategies import STRATEGIES
 from camtool.progress import tell_share
 
 NO_AIR = Polylines.of([])
@@ -258,7 +261,7 @@ def fronts(
             grown = offset_shape(inner, -(opening + step))
             inner = _within(offset_shape(Polylines.joined([grown, region]), opening), grown)
             wider = offset_shape(inner, -opening)
-            after = offset_shape(Polylines.joined([wider, clear]), -UNION_MM)
+            after = _union(wider, clear)
             if signed_areas(after).sum() - signed_areas(before).sum() < growth:
                 grows = False
                 break
@@ -288,6 +291,17 @@ def _within(loops: Polylines, region: Polylines) -> Polylines:
         return loops
     starts = loops.vertices[loops.offsets[:-1], :2]
     return loops.select(np.flatnonzero(inside(starts, Segments.of(region))))
+
+
+def _union(one: Polylines, other: Polylines) -> Polylines:
+    """Return the union of two regions, wider by UNION_MM."""
+    loops = offset_shape(Polylines.joined([one, other]), -UNION_MM)
+    starts = loops.vertices[loops.offsets[:-1], :2]
+    is_edge = np.ones(len(loops), dtype=np.bool_)
+    for region in (one, other):  # loops that lie in the other region are no edges
+        if len(region) and len(loops):
+            is_edge &= ~inside(starts, Segments.of(region))
+    return loops.select(np.flatnonzero(is_edge))
 
 
 def _cut_at_corners(path: Polyline, tool_mm: float) -> list[Floats]:
@@ -368,9 +382,11 @@ def tangent_link(start: Pose, end: Pose, radius: float, turns: tuple[int, int]) 
     leave = c0 - radius * one * _left(heading)
     arrive = c1 - radius * other * _left(heading)
     rows = [
-        *_arc(np.array([start.x, start.y]), c0, (one * (heading - start.angle)) % math.tau, one),
+        *arc_rows(
+            np.array([start.x, start.y]), c0, (one * (heading - start.angle)) % math.tau, one
+        ),
         np.array([*leave, 0.0]),
-        *_arc(arrive, c1, (other * (end.angle - heading)) % math.tau, other),
+        *arc_rows(arrive, c1, (other * (end.angle - heading)) % math.tau, other),
         np.array([end.x, end.y, 0.0]),
     ]
     vertices = np.array(rows)
@@ -380,7 +396,7 @@ def tangent_link(start: Pose, end: Pose, radius: float, turns: tuple[int, int]) 
     return vertices if len(vertices) > 1 else None
 
 
-def _arc(begin: Floats, centre: Floats, sweep: float, turn: int) -> list[Floats]:
+def arc_rows(begin: Floats, centre: Floats, sweep: float, turn: int) -> list[Floats]:
     """The vertices (x, y, bulge) of an arc without its end, in parts of half a circle at most."""
     if sweep > math.tau - 1e-6 or sweep < 1e-9:
         return []
@@ -675,6 +691,17 @@ def adaptive_runs(region: Polylines, setting: Setting, name: str) -> list[CutRun
     limit: float = operation.own_value("engagement")
     tool_mm = operation.tool.radius_mm
     return runs_of([adaptive_legs(region, entry_mm(operation), tool_mm, limit)], setting, name)
+
+
+def refuse_strategy(operation: Operation, own_strategy: str) -> None:
+    """Refuse a strategy that limits the engagement, other than the one of this kind."""
+    strategy = operation.own_value("strategy")
+    if strategy not in (STRATEGIES[0], own_strategy):
+        raise OptionError(
+            f"a {operation.kind} has no strategy {strategy!r}",
+            where=key_of(operation, "strategy"),
+            mend=f'give strategy = "{own_strategy}"',
+        )
 
 
 def entry_mm(operation: Operation) -> float:

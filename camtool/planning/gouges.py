@@ -40,7 +40,7 @@ from camtool.planning.findings import (
     SIDE_BY_UNCUT,
     SIDE_BY_UNCUT_FRAME,
 )
-from camtool.planning.items import Chosen, Work, contours_of
+from camtool.planning.items import Chosen, Fixed, Item, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, operation_name, shortened_list, tool_name
 from camtool.planning.paths import midpoints
@@ -102,6 +102,15 @@ def branch_findings(
     return shortened_list(findings, BRANCHED_REGION_MORE)
 
 
+def _centre_paths(work: Work) -> Iterator[tuple[Item, Polyline]]:
+    """Yield the items of a work that run beside a wall, with each of their paths."""
+    for item in work.items:
+        if isinstance(item, Fixed):
+            yield from ((item, path) for path in item.centre_lines or ())
+        elif item.material_left is not None:
+            yield item, item.path
+
+
 def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> Iterator[Finding]:
     """Yield a finding where the tool, beside one contour, comes over another one, or into the
     allowance that its operation leaves on that."""
@@ -109,7 +118,7 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     if operation.stage == "rough":
         allowance = 0.0  # what roughing takes of it is not missed
     bevel = operation.chamfer_mm or 0.0  # edges of others are not to be broken
-    beside_items = [item for item in contours_of(work.items) if item.material_left is not None]
+    beside_items = list(_centre_paths(work))
     seen_sides, sided = sides.seen_by(operation), sides.sided()
     is_wall = sided | seen_sides.bounds
     # Those of one operation with the side auto are offset together.
@@ -119,20 +128,20 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         is_wall[chosen.source] = False
     wall_rows = np.flatnonzero(is_wall)
     walls = sides.lines.select(wall_rows.tolist())
-    paths = Polylines.of(item.path for item in beside_items)
-    count = 0
+    paths = Polylines.of(path for _, path in beside_items)
+    count, reported_pairs = 0, set[tuple[int, int]]()
     for one, wall_row in near_paths(paths, walls, radius + bevel + max(allowance, 0.0)):
-        item, other = beside_items[one], int(wall_rows[wall_row])
-        if item.source == other:
+        (item, path), other = beside_items[one], int(wall_rows[wall_row])
+        if item.source == other or (item.source, other) in reported_pairs:
             continue
         # Where the job names the side, contours of the same operation are no error.
         is_asked = operation.side != "auto" and other in own_rows
         if count >= MAX_COUNTED and (is_asked or not sided[other]):
             continue
         wall = walls[wall_row]
-        nearest_approach = approach(item.path, wall)
+        nearest_approach = approach(path, wall)
         reach = radius if other in own_rows else radius + bevel
-        reach -= _taken_back(sides, other, item.path)
+        reach -= _taken_back(sides, other, path)
         if nearest_approach.distance >= reach - GOUGE_TOLERANCE_MM:
             if (
                 other in own_rows
@@ -156,9 +165,11 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
             continue  # the edge of the stock, or of a sheet: nothing says that it stays
         is_asked = is_asked or (operation.side != "auto" and _cross(drawn, wall))
         count += 1
+        if isinstance(item, Fixed):
+            reported_pairs.add((item.source, other))
         amount = reach - nearest_approach.distance
         if nearest_approach.distance <= POSITION_EPS_MM:
-            amount = reach + _overshoot(item.path, wall, drawn)
+            amount = reach + _overshoot(path, wall, drawn)
         yield (GOUGE if is_kept else GOUGE_OF_UNCUT)(
             where=at_place(item.name, nearest_approach.point),
             measured=nearest_approach.distance,

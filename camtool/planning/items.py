@@ -164,7 +164,8 @@ class Contour(Struct, frozen=True, eq=False):
 class Fixed(Struct, frozen=True, eq=False):
     """Runs that are cut one after the other as they are: a pocket, a hole, a carved letter.
 
-    `outline`: a closed path around it, when there is one, for the nesting.
+    `outline`: a closed path around it, when there is one, for the nesting. `centre_lines`: lines
+    of the tool's centre that bound a slot beside a contour, which holds what lies within it.
     """
 
     runs: tuple[CutRun, ...]
@@ -172,6 +173,7 @@ class Fixed(Struct, frozen=True, eq=False):
     name: str
     source: int = -1
     outline: Polyline | None = None
+    centre_lines: Polylines | None = None
 
 
 Item = Contour | Fixed

@@ -97,6 +97,10 @@ STAGES = ("", "rough", "finish")
 """Stages of an operation with a finishing pass: all of it (it has none), all but the last
 pass, or that."""
 
+SLOT_LEAD_SHARE = 0.05
+"""Radius of the arcs on which the tool comes to the wall of a trochoidal slot and leaves it, over
+its diameter."""
+
 MAX_FINISH_SHARE = 0.25
 """A finishing pass takes no more than this part of its tool's diameter."""
 
@@ -593,11 +597,12 @@ class Operation:
                 mend="give a smaller last pass, or a larger depth",
             )
         self._refuse_finish(named)
-        if self.entry.kind == "helix" and not self.contract.clears:
+        if self.entry.kind == "helix" and not (self.contract.clears or self.makes_slots):
+            slots = "make it trochoidal, or " if "slot_width" in self.contract.own else ""
             raise OptionError(
                 f"only pockets can be entered by a helix, not the kind {self.kind}",
                 where=f"{named}key entry",
-                mend='use "ramp" or "plunge"',
+                mend=f'{slots}use "ramp" or "plunge"',
             )
         if self.contract.descent == "helix" and self.entry.radius_mm is not None:
             raise OptionError(
@@ -707,10 +712,14 @@ class Operation:
     def stages(self) -> tuple[Operation, ...]:
         """The operation, or the two that its finishing pass makes of it: one that leaves this on
         the wall, and one along the wall, which comes in and leaves on quarter arcs as large as
-        what was left: from where the tool of the first ran. OptionError for a feed or a tool of
+        what was left: from where the tool of the first ran. A trochoidal slot has the latter
+        always, for its cusps. OptionError for a feed or a tool of
         a pass that there is not, and for a tool that cannot cut as far beyond the line."""
         self._refuse_beyond()
-        if self.finish_mm is None:
+        left_mm = self.finish_mm
+        if left_mm is None and self.makes_slots and self.side != "on" and not self.stage:
+            left_mm = 0.0  # cusps
+        if left_mm is None:
             for key, value in (
                 ("finish_feed", self.finish_feed_mm_min),
                 ("finish_spindle", self.finish_spindle_rpm),
@@ -730,31 +739,34 @@ class Operation:
             finish_spindle_rpm=None,
             finish_tool=None,
         )
-        lead = Lead("arc", self.finish_mm)
         feed, speed = self.finish_feed_mm_min, self.finish_spindle_rpm
         # An overcut before the finishing pass would go into the wall; a dog-bone does not.
         corners = "dogbone" if self.corners == "overcut" else self.corners
-        return (
-            replace(
-                without_finish,
-                stage="rough",
-                allowance_mm=self.allowance_mm + self.finish_mm,
-                corners=corners,
-            ),
-            replace(
-                without_finish,
-                stage="finish",
-                name=f"{self.name or self.kind}{FINISH}",
-                tool=self.finish_tool or self.tool,
-                feed_mm_min=self.feed_mm_min if feed is None else feed,
-                spindle_rpm=self.spindle_rpm if speed is None else speed,
-                entry=Entry(),
-                lead_in=lead,
-                lead_out=lead,
-                start="longest-line" if self.start == "nearest" else self.start,
-                tabs=None,
-            ),
+        tool = self.finish_tool or self.tool
+        finish = replace(
+            without_finish,
+            stage="finish",
+            name=f"{self.name or self.kind}{FINISH}",
+            tool=tool,
+            feed_mm_min=self.feed_mm_min if feed is None else feed,
+            spindle_rpm=self.spindle_rpm if speed is None else speed,
+            entry=Entry(),
+            start="longest-line" if self.start == "nearest" else self.start,
+            tabs=None,
         )
+        if self.makes_slots:
+            lead = Lead("arc", SLOT_LEAD_SHARE * tool.diameter_mm)
+            direction = "climb" if self.direction == "drawn" else self.direction
+            lead_in, lead_out = (
+                lead if each.kind == "none" else each for each in (self.lead_in, self.lead_out)
+            )
+            finish = replace(finish, direction=direction, lead_in=lead_in, lead_out=lead_out)
+        else:
+            lead = Lead("arc", left_mm)
+            finish = replace(finish, lead_in=lead, lead_out=lead)
+        allowance_mm = self.allowance_mm + left_mm
+        rough = replace(without_finish, stage="rough", allowance_mm=allowance_mm, corners=corners)
+        return rough, finish
 
     def _refuse_beyond(self) -> None:
         """A cut beyond the line for which the tool's centre would have to cross it."""
@@ -825,10 +837,23 @@ class Operation:
     @property
     def engagement_rad(self) -> float | None:
         """The angle by which its tool promises to be engaged at most, rad; None: it does not."""
-        if "strategy" not in self.contract.own or self.own_value("strategy") != "adaptive":
+        if "strategy" not in self.contract.own or self.own_value("strategy") == "passes":
             return None
         limit: float = self.own_value("engagement")
         return limit
+
+    @property
+    def makes_slots(self) -> bool:
+        """True if it clears a band beside or along its lines, wider than its tool."""
+        return self.engagement_rad is not None and not self.contract.clears
+
+    @property
+    def spare_mm(self) -> float:
+        """Width by which its slots are wider than its tool, mm; 0 where it makes none."""
+        if not self.makes_slots:
+            return 0.0
+        slot_mm: float = self.own_value("slot_width").mm(self.tool.diameter_mm)
+        return slot_mm - self.tool.diameter_mm
 
     @property
     def wall_radius_mm(self) -> float:

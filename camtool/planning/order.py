@@ -320,8 +320,8 @@ def _start_mask(contours: Sequence[Contour], lines: Polylines) -> Bools:
 def must_precede(items: Items) -> Ints:
     """Return pairs (P, 2) of items, the first to be cut before the second, ascending.
 
-    An item goes before the smallest closed Contour that holds it, or any of its runs; nothing
-    else does. Contours that cross hold each other not.
+    An item goes before the smallest closed Contour, or slot, that holds it, or any of its runs;
+    nothing else does. Contours that cross hold each other not.
     """
     shapes, shape, item = _shapes(items)
     parent = Nesting(shapes).levels.parent
@@ -343,7 +343,7 @@ def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
     """Return paths that show where items lie, and pairs (J,), (J,) of a path and an item that it
     belongs to.
 
-    Only a Contour's path is closed and holds any.
+    Only a Contour's path, or that round a slot, is closed and holds any.
     """
     contours, owner = contours_of(items), _contour_rows(items)
     lines, shape = _lines_of(contours), np.arange(len(contours))
@@ -364,9 +364,9 @@ def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
 
 
 def _places_of(item: Fixed) -> Iterator[Polyline]:
-    """Yield open paths that show where an item lies that is cut as it is."""
+    """Yield paths that show where an item lies that is cut as it is."""
     if item.outline is not None:
-        yield Polyline(item.outline.vertices, closed=False)
+        yield Polyline(item.outline.vertices, closed=item.centre_lines is not None)
         return
     for run in item.runs:
         x, y = run.vertices[0, :2]

@@ -295,9 +295,9 @@ class _Layers:
         elif runs_beside(operation):
             yield from self._waste()
             yield from self._reliefs()
-            yield from self._grooves(self._lines(closed=False), self._leads_mm, is_full=True)
+            yield from self._grooves(self._lines(closed=False), self._aside_mm, is_full=True)
         else:
-            yield from self._grooves(self._lines(), self._leads_mm, is_full=True)
+            yield from self._grooves(self._lines(), self._aside_mm, is_full=True)
 
     def must(self) -> Iterator[WantedLayer]:
         """Yield the layers of what must be cut."""
@@ -383,6 +383,11 @@ class _Layers:
         leads = (self.operation.lead_in, self.operation.lead_out)
         return max(reach[each.kind] * each.length_mm for each in leads)
 
+    @property
+    def _aside_mm(self) -> float:
+        """The farthest that leads, or a slot, take the tool from its line, mm."""
+        return max(self._leads_mm, 0.5 * self.operation.spare_mm)
+
     def _holes(self) -> Iterator[WantedLayer]:
         """The discs of drilled holes."""
         holes = drilled_holes(self.chosen, self.operation)[0]
@@ -412,7 +417,7 @@ class _Layers:
         """The waste beside the walls: as far as the tool and its leads reach, and its centre on
         the joins of corners."""
         operation, tool = self.operation, self.operation.tool
-        reach = 2.0 * tool.radius_mm
+        reach = 2.0 * tool.radius_mm + operation.spare_mm
         if operation.joins != "round":
             limit = operation.mitre_limit if operation.joins == "mitre" else SHARP_LIMIT
             reach = max(reach, operation.away_mm * limit + tool.radius_mm)

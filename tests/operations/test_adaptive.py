@@ -15,7 +15,6 @@ import camtool
 from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.geometry.polylines import Polyline
-from camtool.operations.pocket import engagement
 from camtool.planning.adaptive import (
     Pose,
     chords,
@@ -26,6 +25,7 @@ from camtool.planning.adaptive import (
 )
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
+from camtool.planning.strategies import engagement
 from camtool.progress import Progress
 from tests.oracles.contours import CIRCLE, SQUARE, closed
 from tests.oracles.swept import complaints

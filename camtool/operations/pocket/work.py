@@ -38,7 +38,7 @@ from camtool.geometry.polylines import (
     Segments,
     reverse_lines,
 )
-from camtool.planning.adaptive import adaptive_runs, wide_parts
+from camtool.planning.adaptive import adaptive_runs, refuse_strategy, wide_parts
 from camtool.planning.clearing import (
     SLOT_TOLERANCE,
     ConnectedRegion,
@@ -60,7 +60,7 @@ from camtool.planning.findings import (
 )
 from camtool.planning.finish import along_walls
 from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
-from camtool.planning.job import Operation
+from camtool.planning.job import Operation, Stock
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import MeasuredPath, join_paths
 from camtool.planning.ramps import MIN_HELIX_SHARE, feeds_along, helix
@@ -103,6 +103,12 @@ class Cleared(Struct, frozen=True, eq=False):
 
     runs: list[CutRun]
     changed: dict[str, CutRun]
+
+
+def checked(operation: Operation, _: Stock | None) -> Operation:
+    """Return the operation; OptionError for a strategy that is not for pockets."""
+    refuse_strategy(operation, "adaptive")
+    return operation
 
 
 def pocket(chosen: Chosen, setting: Setting) -> Work:

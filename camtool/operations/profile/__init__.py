@@ -1,6 +1,7 @@
 """Profiles: the tool runs beside closed contours, outside of parts and inside of holes."""
 
 from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, OperationKind
+from camtool.planning.strategies import LIMIT_KEYS, SLOT_KEYS
 
 PROFILE = OperationKind(
     name="profile",
@@ -25,6 +26,8 @@ PROFILE = OperationKind(
         "joins",
         "mitre_limit",
     ),
+    own=LIMIT_KEYS | SLOT_KEYS,
+    settle="camtool.operations.profile.slots:checked",
     rank=1,
     proposal_rank=5,
     cuts="beside",

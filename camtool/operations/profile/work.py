@@ -28,6 +28,7 @@ from camtool.geometry.polylines import (
     reverse_lines,
 )
 from camtool.operations.engrave.work import run_together
+from camtool.operations.profile.slots import SlotWall, slot_items, without_feet
 from camtool.planning.findings import (
     CONTOUR_TOO_SMALL,
     CONTOUR_TOO_SMALL_ROUND,
@@ -98,6 +99,14 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
         )
     if operation.corners != "none":
         lines.lines = [_relieved(line, chosen, setting, lines.findings) for line in lines.lines]
+    if operation.makes_slots and operation.stage == "finish":
+        tool_mm = operation.tool.radius_mm
+        lines.lines = [
+            replace(line, path=without_feet(line.path, tool_mm)) for line in lines.lines
+        ]
+    elif operation.makes_slots:
+        walls = [SlotWall(line.path, line.sources[0]) for line in lines.lines]
+        return Work(slot_items(walls, opens, chosen, setting), tuple(lines.findings))
     names, sources = [chosen.names[k] for k in opens], chosen.source[opens].tolist()
     on_line = contours_along(chosen.lines.select(opens), setting, names, sources)
     items = [*_side_contours(lines.lines, chosen, setting), *on_line]

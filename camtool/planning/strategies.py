@@ -1,0 +1,87 @@
+"""Keys by which an operation says how it limits the tool's engagement, for the kinds that can."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from camtool.errors import OptionError
+from camtool.keys import FEED, Key, Value, fraction, length, one_of, plain
+from camtool.units import parse_angle
+
+STRATEGIES = ("passes", "adaptive", "trochoidal")
+LIMITED = STRATEGIES[1:]
+"""Those that keep to a limit of engagement: of pockets, and of profiles."""
+
+MIN_ENGAGEMENT_RAD = math.radians(5.0)
+MAX_ENGAGEMENT_RAD = math.radians(90.0)
+"""Beside a straight cut a tool that is engaged by 90 degrees removes half of its diameter."""
+
+
+def engagement(value: object) -> float:
+    """Read a limit of engagement, rad: an angle with its unit, or the part of the diameter that
+    is cut beside a straight wall: a part a is the angle acos(1 − 2 a)."""
+    text = str(value).strip()
+    angle_rad = (
+        parse_angle(text)
+        if isinstance(value, str) and text.endswith(("deg", "°", "rad"))
+        else math.acos(1.0 - 2.0 * min(max(fraction(value), 0.0), 1.0))
+    )
+    if not MIN_ENGAGEMENT_RAD <= angle_rad <= MAX_ENGAGEMENT_RAD:
+        raise OptionError(
+            f"an engagement of {math.degrees(angle_rad):.3g}° is not within 5° and 90° (0.2 % and"
+            " 50 % of the diameter)",
+            mend='give a part of the diameter such as engagement = "15%", or an angle',
+        )
+    return angle_rad
+
+
+class SlotWidth(NamedTuple):
+    """A width in mm, or as a part of the tool's diameter."""
+
+    amount: float
+    is_part: bool
+
+    def mm(self, diameter_mm: float) -> float:
+        """The width for a tool, mm."""
+        return self.amount * diameter_mm if self.is_part else self.amount
+
+
+def width(value: object) -> SlotWidth:
+    """Read a width: a length, or such as "150%" of the diameter."""
+    if isinstance(value, str) and value.strip().endswith("%"):
+        return SlotWidth(fraction(value), True)
+    return SlotWidth(length(value), False)
+
+
+LIMIT_KEYS = {
+    "strategy": Key(
+        "strategy", one_of(STRATEGIES), "How its engagement is kept.", default="passes"
+    ),
+    "engagement": Key(
+        "engagement_rad",
+        Value(plain(engagement), "PART|ANGLE"),
+        "Limit of the engagement: part of the diameter, or angle.",
+        '"15%"',
+        only=("strategy", LIMITED),
+        default=math.acos(1.0 - 2.0 * 0.15),
+    ),
+    "link_feed": Key(
+        "link_feed_mm_min",
+        FEED,
+        "Feed of links, which cut nothing.",
+        '"2000mm/min"',
+        only=("strategy", LIMITED),
+    ),
+}
+
+SLOT_KEYS = {
+    "slot_width": Key(
+        "slot_width",
+        Value(plain(width), "LENGTH|PART"),
+        "SlotWidth of a trochoidal slot.",
+        '"150%"',
+        only=("strategy", ("trochoidal",)),
+        default=SlotWidth(1.5, True),
+    ),
+}

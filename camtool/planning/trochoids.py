@@ -1,0 +1,140 @@
+"""Clear a band along a line in circles, so that the tool's engagement never exceeds a limit.
+
+A disc of tool centres of radius ρ is moved along a line, step by step. Where the disc before it is
+cleared, the tool cuts on the part of the circle that is outside of that disc, half of it and a
+little more, and returns through the disc on a shorter way. The engagement follows from the step as
+that of the fronts of `camtool.planning.adaptive` (`front_step`), wherever the line leads: it is a
+matter of two discs.
+
+    line ─cut at its corners, stepped─▶ middles ─helix, spiral, part circles and links─▶ legs
+    band without what these have cleared ─fronts─▶ legs of corners, and of what is wider
+
+Between two circles a cusp stays beside each edge of the band (`cusp_mm`), as high as s² / (8 ρ) on
+a straight line for the step s. The fronts count on no more than is cleared within the cusps.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from camtool.arrays import Floats
+from camtool.errors import GeometryError
+from camtool.geometry.nesting import inside
+from camtool.geometry.offset import swept_outline
+from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.planning.adaptive import (
+    CORNER_TURN_RAD,
+    PLANNED_SHARE,
+    AdaptiveStays,
+    Leg,
+    adaptive_legs,
+    arc_rows,
+    ends_of,
+    front_step,
+    rest_stays,
+    spiral,
+    tangent_link,
+)
+from camtool.planning.paths import MeasuredPath
+
+MAX_STEP_SHARE = 0.7
+"""Circles are no farther apart than this part of their radius."""
+
+LINK_SHARE = 0.5
+"""Radius of the arcs at both ends of a way back, over that of the circles."""
+
+SWEPT_SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3)
+"""A band is taken narrower by these parts, in turn, where rounding hides its outline."""
+
+
+def trochoid_step(radius_mm: float, tool_mm: float, limit: float) -> float:
+    """Return the distance of the circles' middles, mm."""
+    step = front_step(PLANNED_SHARE * limit, radius_mm, tool_mm)
+    return min(step, MAX_STEP_SHARE * radius_mm)
+
+
+def cusp_mm(radius_mm: float, tool_mm: float, limit: float) -> float:
+    """Return a bound of how far cusps reach into the band of the circles: twice their height along
+    a straight line, since lines may be curved."""
+    return trochoid_step(radius_mm, tool_mm, limit) ** 2 / (4.0 * radius_mm)
+
+
+def band_of(lines: Polylines, half_mm: float) -> Polylines:
+    """Return the region of all within a distance of lines; GeometryError where that cannot be
+    told."""
+    for share in SWEPT_SHARES:
+        outline = swept_outline(lines, (1.0 - share) * half_mm)
+        if outline is not None:
+            return outline
+    raise GeometryError(f"the outline of a band of {2.0 * half_mm:.4g} mm is not clear")
+
+
+def middles(line: Polyline, radius_mm: float, step_mm: float) -> Floats:
+    """(N, 2) the middles of circles along a line: at its corners, and in steps between these;
+    shorter ones where it turns on arcs smaller than the circles, since cusps are higher there."""
+    along = MeasuredPath.of(line)
+    corners = along.reach[np.flatnonzero(np.abs(along.turns) > CORNER_TURN_RAD)]
+    marks = np.unique(np.concatenate([[0.0, along.total_mm], corners]))
+    radii = np.where(along.segments.is_arc, along.segments.radius, np.inf)
+    weights = np.maximum(np.sqrt(0.5 * (1.0 + radius_mm / radii)), 1.0)
+    steps = np.concatenate([[0.0], np.cumsum(np.diff(along.reach) * weights)]) / step_mm
+    lengths = [np.zeros(1)]
+    for low, high in pairwise(np.interp(marks, along.reach, steps).tolist()):
+        count = max(1, math.ceil(high - low - 1e-9))
+        ends = low + (high - low) * np.arange(1, count + 1) / count
+        lengths.append(np.interp(ends, steps, along.reach))
+    places = along.at(np.concatenate(lengths))
+    return places[:-1] if line.closed else places
+
+
+def trochoid_legs(
+    line: Polyline, radius_mm: float, helix_mm: float, tool_mm: float, limit: float
+) -> tuple[Floats, list[Leg]]:
+    """Return where a helix goes down (2,), and the legs of circles along a line behind it."""
+    places = middles(line, radius_mm, trochoid_step(radius_mm, tool_mm, limit))
+    legs = [Leg(spiral(places[0], helix_mm, radius_mm, tool_mm, limit))]
+    for before, place in pairwise(places):
+        ahead = place - before
+        heading, step = math.atan2(ahead[1], ahead[0]), math.hypot(*ahead)
+        half = math.acos(-0.5 * step / radius_mm)
+        begin, end = (
+            place + radius_mm * np.array([math.cos(angle), math.sin(angle)])
+            for angle in (heading - half, heading + half)
+        )
+        cut = np.array([*arc_rows(begin, place, 2.0 * half, 1), [*end, 0.0]])
+        tool = ends_of(legs[-1].vertices)[1]
+        link = tangent_link(tool, ends_of(cut)[0], LINK_SHARE * radius_mm, (1, 1))
+        if link is not None:
+            legs.append(Leg(link, cuts=False))
+        legs.append(Leg(cut))
+    return places[0], legs
+
+
+def trochoid_stays(
+    region: Polylines,
+    lines: Polylines,
+    radius_mm: float,
+    helix_mm: float,
+    tool_mm: float,
+    limit: float,
+) -> list[AdaptiveStays]:
+    """Return the stays that clear a connected tool centre region: in circles along those of the
+    lines that lie in it, and by fronts what is left; none where it has no room."""
+    starts = lines.vertices[lines.offsets[:-1], :2]
+    rows: list[int] = []
+    if len(lines):
+        rows = np.flatnonzero(inside(starts, Segments.of(region))).tolist()
+    if not rows:
+        return [adaptive_legs(region, helix_mm, tool_mm, limit)]
+    own_lines = lines.select(rows)
+    helix_mm = min(helix_mm, radius_mm)
+    chains = [trochoid_legs(line, radius_mm, helix_mm, tool_mm, limit) for line in own_lines]
+    legs = [leg for _, each in chains for leg in each]
+    clear = band_of(own_lines, radius_mm - cusp_mm(radius_mm, tool_mm, limit))
+    rest = rest_stays(region, clear, legs, tool_mm, limit)
+    centre, last = chains[-1]
+    stays = [AdaptiveStays(middle, helix_mm, [each]) for middle, each in chains[:-1]]
+    return [*stays, AdaptiveStays(centre, helix_mm, [[*last[:-1], *rest[0]], *rest[1:]])]
