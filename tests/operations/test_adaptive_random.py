@@ -7,26 +7,34 @@ and limits of 5° to 90°.
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given
+from hypothesis import HealthCheck, assume, given
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry
+from camtool.run import Run
+from camtool.stock.slides import slide_moves, tools_of_rows
+from camtool.target.registry import LoadedTarget, load_target
+from tests.operations.adaptive_programs import posted
 from tests.operations.test_adaptive import adaptive
 from tests.oracles.contours import SQUARE, closed, comb, gear, spiral, star
 from tests.oracles.engagement import (
     CHORD_SHARE,
+    LEVEL_EPS_MM,
     Place,
     Stay,
     Stock,
     chords_of,
     engagements,
+    lines_of,
     stays_of,
 )
 from tests.oracles.swept import area_of, gouges
@@ -137,6 +145,11 @@ def with_tool(
     return Case(paths, radius, draw(st.floats(least, 0.5 * math.pi)))
 
 
+def thick_share(case: Case) -> float:
+    """Return the thickness up to which chips do not count, over the tool's radius."""
+    return min(THICK_SHARE, THICK_OF_STEP * (1.0 - math.cos(case.limit)))
+
+
 def too_high(
     case: Case, stock: Stock, runs: list[CutRun], every: float, phase: float
 ) -> list[str]:
@@ -182,8 +195,7 @@ def faults(case: Case, every: float, phase: float) -> list[str]:
 
 
 def faults_of(runs: list[CutRun], case: Case, every: float, phase: float) -> list[str]:
-    step = 1.0 - math.cos(case.limit)
-    stock = Stock(case.radius_mm, case.radius_mm * min(THICK_SHARE, THICK_OF_STEP * step))
+    stock = Stock(case.radius_mm, case.radius_mm * thick_share(case))
     return [
         *gouges(runs, region_of(case.paths), case.radius_mm),
         *too_high(case, stock, runs, every, phase),
@@ -228,3 +240,72 @@ def test_the_oracle_finds_the_angle_of_a_straight_cut(degrees: float) -> None:
         beside = [place.angle for place in places if place.stay == 1 and place.travelled_mm > 1.0]
         angle = math.acos(1.0 - step + thick)
         assert beside == pytest.approx([angle] * len(beside), abs=3e-3)
+
+
+CUT_POINTS = 100
+"""So many chords are cut at once."""
+
+STOCK_FAULTS = {
+    "CUT_TOO_DEEP",
+    "PASS_TOO_DEEP",
+    "TOOL_IN_STOCK",
+    "RAPID_IN_STOCK",
+    "STOCK_NOT_JUDGED",
+}
+
+
+def job_faults(case: Case, target: LoadedTarget, folder: Path) -> list[str]:
+    """Return what the stock simulator finds wrong with a program, but for the scallop in corners
+    (MATERIAL_LEFT), which the oracle judges; and what is wrong with what it says of the
+    engagement: that is either kept, or truly exceeded on the predicted slides."""
+    run = posted(case.paths, 2.0 * case.radius_mm, case.limit, target, folder)
+    names = {finding.code.name for finding in run.findings}
+    told = names & {"ENGAGEMENT_KEPT", "ENGAGEMENT_TOO_HIGH"}
+    words = sorted(names & STOCK_FAULTS)
+    stock = Stock(case.radius_mm, 0.0)
+    for line in lines_of(run.decoded, CHORD_SHARE * case.radius_mm):
+        deep = line[line[:, 2] <= -1.0 + LEVEL_EPS_MM]
+        for first in range(0, len(deep), CUT_POINTS):
+            stock.cut(deep[first : first + CUT_POINTS + 1, :2])
+    words += uncut(case, stock)
+    if len(told) != 1:
+        words.append(f"{sorted(told)} of the engagement")
+    for finding in run.findings:
+        if finding.code.name == "ENGAGEMENT_TOO_HIGH":
+            x, y = map(float, re.findall(r"-?[\d.]+", finding.where))
+            angle = greatest_on_slides(run, case, (x, y))
+            if angle <= case.limit:
+                words.append(
+                    f"{finding.measured}° at {x} {y}; {math.degrees(angle)}° by the oracle"
+                )
+    return words
+
+
+def greatest_on_slides(run: Run, case: Case, at_mm: tuple[float, float]) -> float:
+    """Return the greatest engagement, by the oracle, of the slides near a place."""
+    slides = slide_moves(run.decoded, run.target, tools_of_rows(run.decoded, run.job))
+    radius, lines = case.radius_mm, [list[list[float]]()]
+    rows = zip(slides.start.tolist(), slides.end.tolist(), slides.rapid.tolist(), strict=True)
+    for start, end, is_rapid in rows:
+        if is_rapid:
+            lines.append([])
+            continue
+        lines[-1] += [end] if lines[-1] else [start, end]
+    stays = stays_of([np.array(line) for line in lines if line], -1.0)
+    stock = Stock(radius, max(thick_share(case) * radius, 2.0 * slides.beside_mm))
+    near = 0.1 * radius
+    places = engagements(stock, stays, 3.0 * radius, 0.5, (*at_mm, near))
+    angles = [
+        place.angle
+        for place in places
+        if math.dist((place.x, place.y), at_mm) < near and not math.isnan(place.heading)
+    ]
+    return max(angles, default=0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["grbl", "linuxcnc"])
+@examples(250, nightly=1_000, suppress_health_check=list(HealthCheck))
+@given(cases(40.0))
+def test_programs_of_random_pockets_in_the_stock(name: str, tmp_path: Path, case: Case) -> None:
+    assert job_faults(case, load_target(name), tmp_path) == []

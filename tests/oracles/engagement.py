@@ -42,6 +42,9 @@ LEVEL_EPS_MM = 2e-3
 CHORD_SHARE = 5e-5
 """Sagitta of the chords that stand for arcs of a path, over the tool's radius."""
 
+FOCUS_SHARE = 0.03
+"""Distance of places that are looked at more closely, over the tool's radius."""
+
 BEHIND_SHARE = 0.02
 """What is swept ends this part of the radius behind the place that is looked at: the circle there
 would lie on the edge of what is swept up to it."""
@@ -109,6 +112,8 @@ class Stock:
 
     def remaining(self, area: shapely.Geometry) -> shapely.Geometry:
         """Return what of an area is in the stock."""
+        if area.is_empty:
+            return area
         corners = np.reshape(area.bounds, (2, 2))
         cells = self.cells(corners, 0.0)
         boxes = [shapely.intersection(self.of(cell), self.box(cell, 0.0)) for cell in cells]
@@ -190,8 +195,8 @@ def engagements(
 ) -> Iterator[Place]:
     """Yield the engagement at places of the stays `every_mm` apart, the first at that part of it;
     and as a stay's first place, of no heading, the part of the disc that is in the stock where the
-    tool comes down, times a whole turn. `focus`: x, y and radius of a disc in which every chord is
-    looked at."""
+    tool comes down, times a whole turn. `focus`: x, y and radius of a disc in which the ends of
+    each chord, and a place each FOCUS_SHARE of the radius, are looked at."""
     radius_mm, thick_mm = stock.radius_mm, stock.thick_mm
     behind_mm = BEHIND_SHARE * radius_mm
     lag_mm = max(RECENT * thick_mm, behind_mm)
@@ -204,15 +209,17 @@ def engagements(
         done = 0.0
         places = np.arange(phase * every_mm, reach[-1], every_mm)
         if focus is not None:
-            near = np.hypot(*(points - focus[:2]).T) < focus[2]
-            places = np.union1d(places, reach[:-1][near[:-1]] + 0.5 * length[near[:-1]])
+            ends = np.concatenate([reach[:-1] + 1e-6, reach[1:] - 1e-6])
+            every = np.union1d(np.arange(0.0, reach[-1], FOCUS_SHARE * radius_mm), ends)
+            x, y = (np.interp(every, reach, column) for column in points.T)
+            near = np.hypot(x - focus[0], y - focus[1]) < focus[2]
+            places = np.union1d(places, every[near])
         for travelled in places.tolist():
             row = int(np.searchsorted(reach, travelled, side="right")) - 1
             # In the middle of a chord its direction is that of the arc.
-            share = (
-                0.5 if length[row] < 0.1 * radius_mm else (travelled - reach[row]) / length[row]
-            )
-            travelled = reach[row] + share * length[row]
+            if focus is None and length[row] < 0.1 * radius_mm:
+                travelled = float(0.5 * (reach[row] + reach[row + 1]))
+            share = (travelled - reach[row]) / length[row]
             old = max(travelled - lag_mm, 0.0)
             if old > done:
                 stock.cut(_between(points, reach, done, old))
