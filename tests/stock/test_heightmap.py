@@ -217,7 +217,9 @@ def two_tools(*, plan: bool, changes: bool) -> Toolpath:
     builder = ToolpathBuilder().rapid(z=5.0)
     for tool in (MILL, BIT):
         if plan:
-            builder.operation(OperationNote("profile", "", tool_note(tool), 1.0, 1.0, 1.0))
+            builder.operation(
+                OperationNote("profile", "", tool_note(Operation(tool=tool)), 1.0, 1.0, 1.0)
+            )
         if changes and tool is BIT:
             builder.event(Kind.TOOL_CHANGE, float(tool.number or 0))
         builder.line(1.0, 1.0, -1.0, feed=100.0).line(2.0, 2.0, 1.0, feed=100.0)
@@ -238,7 +240,8 @@ def test_a_program_for_one_of_the_tools_of_a_job() -> None:
     with pytest.raises(OptionError, match="--tool-diameter"):
         tools_of_rows(bare, BOTH)
     of_bit = Operations(
-        (OperationNote("profile", "", tool_note(BIT), 1.0, 1.0, 1.0),), np.zeros(1, dtype=np.int64)
+        (OperationNote("profile", "", tool_note(Operation(tool=BIT)), 1.0, 1.0, 1.0),),
+        np.zeros(1, dtype=np.int64),
     )
     assert tools_of_rows(bare, BOTH, of_bit).cutters == (cutter_profile(BIT),)
 

@@ -16,6 +16,7 @@ from camtool.stock.heights import divided, greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
 from tests.oracles import stock_heights as slow
 from tests.stock.cuts import BALL, BULL, CUTTERS, FLAT, V_BIT, moves_of
+from tests.strategies import examples
 
 pytestmark = pytest.mark.checked
 
@@ -118,7 +119,7 @@ def test_means_lie_between_their_bounds(seed: int, count: int, size: float) -> N
     assert (high <= np.maximum(tree.greatest(squares), bottom) + 1e-12).all()
 
 
-@settings(max_examples=15)
+@examples(5, 300)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 60), size=st.floats(1e-3, 2.0))
 def test_means_agree_with_those_of_small_squares(seed: int, count: int, size: float) -> None:
     """Without any slack: extremes over 32 × 32 squares hold the mean of the whole one. Some lie on
