@@ -26,8 +26,8 @@ that leaves no more than the tolerance in a square corner.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise, product
 
 import numpy as np
 from msgspec import Struct
@@ -123,7 +123,8 @@ AIR_SHARE = 0.5
 """A link may touch the stock with this part of the limit: at both ends it runs beside it."""
 
 LINK_SHARES = (0.9, 0.45, 0.2)
-"""Radii of links that are tried, over that of the discs that fit on the left of a stroke."""
+"""Radii of links that are tried, over that of the discs that fit on the left of a stroke, or the
+tool's where that is less."""
 
 AIR_THICK_SHARE = 0.02
 """Chips thinner than this part of the tool's radius do not count there."""
@@ -243,26 +244,28 @@ def fronts(
     openings_mm: tuple[float, float],
     tool_mm: float,
     limit: float,
+    holes: Polylines = NO_AIR,
 ) -> Iterator[FrontStroke]:
     """Yield the strokes that clear a region of tool centres, after the part that is `clear`; with
     discs that begin with the first of two radii, grow up to the second as what is cleared gets
-    wider, and shrink then."""
+    wider, and shrink then. `holes` are clear too, and nothing begins there."""
     opening, widest = openings_mm
-    before = offset_shape(clear, -UNION_MM)
+    reached = _union([clear])
+    before = _union([reached, holes]) if len(holes) else reached
     number, grows = 0, True
     first_mm2, last_mm2 = (float(signed_areas(each).sum()) for each in (before, region))
     while opening > CORNER_SHARE * tool_mm and number < MAX_FRONTS:
         step = front_step(PLANNED_SHARE * limit, opening, tool_mm)
         growth = MIN_GROWTH_SHARE * math.pi * min(opening, tool_mm) ** 2
-        inner = offset_shape(before, opening + UNION_MM)
+        inner = offset_shape(reached, opening + UNION_MM)
         next_mm = opening / RATIO
         grows = grows and next_mm <= widest
         while number < MAX_FRONTS:
             grown = offset_shape(inner, -(opening + step))
-            inner = _within(offset_shape(Polylines.joined([grown, region]), opening), grown)
+            inner = _common(grown, region, opening)
             wider = offset_shape(inner, -opening)
-            after = _union(wider, clear)
-            if signed_areas(after).sum() - signed_areas(before).sum() < growth:
+            after = _union([wider, clear])
+            if signed_areas(after).sum() - signed_areas(reached).sum() < growth:
                 grows = False
                 break
             number += 1
@@ -270,10 +273,11 @@ def fronts(
                 for piece in _cut_at_corners(path, tool_mm):
                     fit_mm = FIT_SHARE * min(tool_mm, FIT_OPENINGS * opening)
                     yield FrontStroke(_smooth(piece, fit_mm), number, opening)
-            before = after
+            reached = after
+            before = _union([reached, holes]) if len(holes) else reached
             cleared_mm2 = float(signed_areas(before).sum()) - first_mm2
             tell_share("fronts", cleared_mm2 / max(last_mm2 - first_mm2, cleared_mm2))
-            if grows and len(offset_shape(before, next_mm + UNION_MM)):
+            if grows and len(offset_shape(reached, next_mm + UNION_MM)):
                 break
         if not grows:
             next_mm = _next_opening(wider, opening, tool_mm, limit)
@@ -291,17 +295,6 @@ def _within(loops: Polylines, region: Polylines) -> Polylines:
         return loops
     starts = loops.vertices[loops.offsets[:-1], :2]
     return loops.select(np.flatnonzero(inside(starts, Segments.of(region))))
-
-
-def _union(one: Polylines, other: Polylines) -> Polylines:
-    """Return the union of two regions, wider by UNION_MM."""
-    loops = offset_shape(Polylines.joined([one, other]), -UNION_MM)
-    starts = loops.vertices[loops.offsets[:-1], :2]
-    is_edge = np.ones(len(loops), dtype=np.bool_)
-    for region in (one, other):  # loops that lie in the other region are no edges
-        if len(region) and len(loops):
-            is_edge &= ~inside(starts, Segments.of(region))
-    return loops.select(np.flatnonzero(is_edge))
 
 
 def _cut_at_corners(path: Polyline, tool_mm: float) -> list[Floats]:
@@ -438,6 +431,19 @@ class _Clearing:
         """Take the strokes that are to be put in order."""
         self.strokes, self.poses = strokes, [ends_of(each.vertices) for each in strokes]
 
+    def cuts(self, first: Floats | None) -> bool:
+        """True if a path or a stroke takes more from what is not air at first than a hair."""
+        thick = AIR_THICK_SHARE * self.tool_mm
+        for path in (
+            *([] if first is None else [first]),
+            *(each.vertices for each in self.strokes),
+        ):
+            moves = self.moves(path)
+            every = np.ones(len(moves), dtype=np.bool_)
+            if self.cleared.judge(moves, every, thick, 0.0, math.inf, adds=False).any():
+                return True
+        return False
+
     def add_air(self, clear: Polylines) -> None:
         """Take it that the tool has been at all places of a region: once round its rings."""
         while len(clear):
@@ -452,12 +458,13 @@ class _Clearing:
         radius, flat = np.full((len(ends), 1), self.tool_mm), np.zeros((len(ends), 4))
         return np.concatenate([ends, radius, flat], axis=1)
 
-    def is_clear(self, vertices: Floats) -> bool:
-        """True if the tool hardly cuts along a path, and stays in the region."""
+    def is_clear(self, vertices: Floats, share: float = AIR_SHARE) -> bool:
+        """True if the tool is engaged by this share of the limit at most along a path, and stays
+        in the region."""
         places = sample(Polyline(vertices), PLACES_SHARE * self.tool_mm)
         if not inside(places, self.border).all():
             return False
-        limit, thick = AIR_SHARE * self.limit, AIR_THICK_SHARE * self.tool_mm
+        limit, thick = share * self.limit, AIR_THICK_SHARE * self.tool_mm
         moves = self.moves(vertices, AIR_THICK_SHARE)
         middle = np.argsort(np.abs(np.arange(len(moves)) - 0.5 * len(moves)))
         for rows in np.array_split(moves[middle], max(1, len(moves) // 8)):
@@ -488,7 +495,9 @@ class _Clearing:
             if link is None:
                 if legs:
                     yield legs
-                legs = self.lead(self.poses[number][0], stroke.opening_mm)
+                gap = stroke.vertices[-1, :2] - stroke.vertices[0, :2]
+                is_closed = math.hypot(*gap) <= POSITION_EPS_MM
+                legs = self.lead(self.poses[number][0], stroke.opening_mm, is_closed)
             elif len(link):
                 legs.append(Leg(link, cuts=False))
             legs.append(Leg(stroke.vertices))
@@ -552,30 +561,33 @@ class _Clearing:
         turned = abs(math.remainder(end.angle - start.angle, math.tau))
         if math.hypot(end.x - start.x, end.y - start.y) <= POSITION_EPS_MM and turned < 1e-3:
             return np.empty((0, 3))
+        widest = min(opening_mm, self.tool_mm)
         for share in LINK_SHARES:
             links = [
                 link
                 for turns in ((1, 1), (1, -1), (-1, 1))
-                if (link := tangent_link(start, end, share * opening_mm, turns)) is not None
+                if (link := tangent_link(start, end, share * widest, turns)) is not None
             ]
             for link in sorted(links, key=lambda link: length(Polyline(link))):
                 if self.is_clear(link):
                     return link
         return None
 
-    def lead(self, begin: Pose, opening_mm: float) -> list[Leg]:
+    def lead(self, begin: Pose, opening_mm: float, is_closed: bool) -> list[Leg]:
         """Return the leg that leads from air to where a stroke begins: a quarter circle from the
-        left, or a line; none where neither is clear."""
-        place, ahead = np.array([begin.x, begin.y]), _left(begin.angle - 0.5 * math.pi)
-        for share in LINK_SHARES:
+        left, or a line from behind or from the left; none where none of these is clear. A closed
+        stroke does not begin in air, and gets one that is not."""
+        place = np.array([begin.x, begin.y])
+        shares = (AIR_SHARE, math.inf) if is_closed else (AIR_SHARE,)
+        for engaged, share in product(shares, LINK_SHARES):
             radius = share * min(opening_mm, self.tool_mm)
-            for aside, bulge in (
-                (_left(begin.angle), math.tan(math.pi / 8.0)),
-                (0.0 * ahead, 0.0),
+            ahead, aside = radius * _left(begin.angle - 0.5 * math.pi), radius * _left(begin.angle)
+            for start, bulge in (
+                (place + aside - ahead, math.tan(math.pi / 8.0)),
+                *((place + away, 0.0) for away in (-ahead, aside - ahead, aside, aside + ahead)),
             ):
-                start = place + radius * (aside - ahead)
                 path = np.array([[*start, bulge], [*place, 0.0]])
-                if self.is_air(start) and self.is_clear(path):
+                if self.is_air(start) and self.is_clear(path, engaged):
                     return [Leg(path, cuts=False)]
         return []
 
@@ -613,27 +625,45 @@ def adaptive_legs(
     clearing = _Clearing(region, tool_mm, limit)
     clearing.add_air(clear)
     min_mm = MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm
-    first, helix = None, 0.0
     centre, room = _widest(region)
     if room < min_mm:
-        return AdaptiveStays(centre, helix, [])
-    widest = room
-    if _common(clear, region, min_mm):
-        parts = [part for part in parts_of(clear) if _common(part, region, min_mm)]
-        opening = FIRST_SHARE * max(_widest(part)[1] for part in parts)
-        widest = max(opening, room)
+        return AdaptiveStays(centre, 0.0, [])
+    parts = parts_of(clear)
+    has_place = [len(_common(part, region, min_mm)) > 0 for part in parts]
+    places = [part for part, has in zip(parts, has_place, strict=True) if has]
+    # Holes in the middle would be left in rings: one is widened by a spiral, or none is needed.
+    is_beside = [
+        has and len(outside_parts(part, region)) > 0
+        for part, has in zip(parts, has_place, strict=True)
+    ]
+    open_parts = [part for part, reaches in zip(parts, is_beside, strict=True) if reaches]
+    holes, first, helix = clear, None, 0.0
+    if open_parts:
+        opening = FIRST_SHARE * max(_widest(part)[1] for part in open_parts)
+        inner = [part for part, reaches in zip(parts, is_beside, strict=True) if not reaches]
+        holes = Polylines.joined(inner)
+        clear = Polylines.joined(open_parts)
     else:
-        opening, helix = FIRST_SHARE * room, min(helix_mm, room)
-        first = spiral(centre, helix, room, tool_mm, limit)
-        clearing.cleared.add(clearing.moves(np.array(_ring(centre, helix))))
-        clear = Polylines.joined([Polylines.of([_circle(centre, room)]), clear])
-    full_region = region
+        begin_mm = helix = min(helix_mm, room)
+        if places:
+            centre, begin_mm = max(map(_widest, places), key=lambda place: place[1])
+            room, helix = (
+                float(points_to_segments(centre[None, :], Segments.of(region)).min()),
+                0.0,
+            )
+            begin_mm *= FIRST_SHARE
+        first = spiral(centre, begin_mm, room, tool_mm, limit)
+        clearing.cleared.add(clearing.moves(np.array(_ring(centre, begin_mm))))
+        opening = FIRST_SHARE * room
+        clear = Polylines.of([_circle(centre, room)])
+    full_region, widest = region, max(opening, room)
     if len(air):
-        union = offset_shape(Polylines.joined([region, clear]), -UNION_MM)
-        full_region = offset_shape(union, UNION_MM)
-    strokes = fronts(full_region, clear, (opening, widest), tool_mm, limit)
+        full_region = _union([region, clear, holes])
+        clear, holes = _union([clear]), _union([holes])
+    strokes = fronts(full_region, clear, (opening, widest), tool_mm, limit, holes)
     clearing.take(list(strokes))
-    return AdaptiveStays(centre, helix, list(clearing.legs(first)))
+    stays = list(clearing.legs(first)) if helix or clearing.cuts(first) else []
+    return AdaptiveStays(centre, helix, stays)
 
 
 def rest_stays(
@@ -655,7 +685,21 @@ def _places_in_air(air: Polylines, tool_mm: float) -> Polylines:
     if len(air) == 0:
         return air
     slack_mm = AIR_SLACK_SHARE * tool_mm
-    return offset_shape(offset_shape(air, -slack_mm), tool_mm)
+    return offset_shape(_union([air], slack_mm), tool_mm)
+
+
+def _union(regions: list[Polylines], wider_mm: float = UNION_MM) -> Polylines:
+    """Return what is in any of some regions, grown by a distance."""
+    loops = offset_shape(Polylines.joined(regions), -wider_mm)
+    starts = loops.vertices[loops.offsets[:-1], :2]
+    is_hole = signed_areas(loops) < 0.0
+    around = np.zeros(len(loops), dtype=np.int64)
+    for row, path in enumerate(loops if len(loops) > 1 else ()):
+        holds = inside(starts, Segments.of(path))
+        holds[row] = False
+        around += np.where(holds, -1 if is_hole[row] else 1, 0)
+    # Loops that do not cross are all given: those within another region are no boundary.
+    return loops.select(np.flatnonzero(around == is_hole))
 
 
 def _common(one: Polylines, other: Polylines, room_mm: float) -> Polylines:
@@ -679,18 +723,34 @@ def wide_parts(region: Polylines, tool_mm: float) -> list[Polylines]:
     """Return the connected parts of a tool centre region that discs reach which have room for a
     helix: necks that are narrower part it, and stay."""
     opening = 1.01 * (MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm)
-    margin = (FIT_SHARE + WALL_SHARE) * tool_mm
-    return parts_of(offset_shape(offset_shape(region, margin + opening), -opening))
+    shrunk_mm = neck_mm(tool_mm)
+    return parts_of(offset_shape(offset_shape(region, shrunk_mm), -opening))
 
 
-def adaptive_runs(region: Polylines, setting: Setting, name: str) -> list[CutRun]:
-    """Return the runs that clear one connected tool centre region at all levels, in order; none
-    where it is too narrow for a helix."""
+def neck_mm(tool_mm: float) -> float:
+    """Return how far from the boundary of a tool centre region there must be places for a neck of
+    it to be cleared."""
+    opening = 1.01 * (MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm)
+    return opening + (FIT_SHARE + WALL_SHARE) * tool_mm
+
+
+def adaptive_runs(
+    region: Polylines, setting: Setting, name: str, air_at: Callable[[float], Polylines]
+) -> list[CutRun]:
+    """Return the runs that clear one connected tool centre region at all levels, in order, but for
+    what is air at a level; none where nothing is left, or it is too narrow for a helix."""
     operation = setting.operation
-    region = mirrored(region) if operation.direction == "conventional" else region
-    limit: float = operation.own_value("engagement")
     tool_mm = operation.tool.radius_mm
-    return runs_of([adaptive_legs(region, entry_mm(operation), tool_mm, limit)], setting, name)
+    backward = operation.direction == "conventional"
+    limit: float = operation.own_value("engagement")
+    runs, clearing, air = list[CutRun](), None, NO_AIR
+    for heights in pairwise((0.0, *setting.levels_mm)):
+        above, air = air, air_at(heights[1])
+        if clearing is None or not np.array_equal(above.vertices, air.vertices):
+            regions = [mirrored(each) if backward else each for each in (region, air)]
+            clearing = adaptive_legs(regions[0], entry_mm(operation), tool_mm, limit, regions[1])
+        runs += runs_at(clearing, heights, setting, name)
+    return runs
 
 
 def refuse_strategy(operation: Operation, own_strategy: str) -> None:
@@ -713,20 +773,28 @@ def entry_mm(operation: Operation) -> float:
 def runs_of(clearings: Sequence[AdaptiveStays], setting: Setting, name: str) -> list[CutRun]:
     """Return the runs that make all stays at all levels, in order; where the operation is cut
     conventionally they are mirrored about X = 0, as the regions were for which they were made."""
-    backward = setting.operation.direction == "conventional"
-    runs: list[CutRun] = []
-    for heights in pairwise((0.0, *setting.levels_mm)):
-        for each in clearings:
-            for number, stay in enumerate(each.stays):
-                parts = [_at_level(leg, heights[1], setting) for leg in stay]
-                if number == 0 and each.helix_mm:
-                    parts.insert(0, _down(each, heights, setting))
-                vertices = np.concatenate([*(part[:-1] for part, _ in parts), parts[-1][0][-1:]])
-                if backward:
-                    vertices = vertices * [-1.0, 1.0, 1.0, -1.0]
-                feeds = np.concatenate([feed for _, feed in parts])
-                runs.append(CutRun(vertices, feeds, setting.feeds.plunge_mm_min, name))
-    return runs
+    return [
+        run
+        for heights in pairwise((0.0, *setting.levels_mm))
+        for each in clearings
+        for run in runs_at(each, heights, setting, name)
+    ]
+
+
+def runs_at(
+    clearing: AdaptiveStays, heights: tuple[float, float], setting: Setting, name: str
+) -> Iterator[CutRun]:
+    """Yield the runs that make all stays at the second of two heights, for a tool that goes down
+    in a helix from the first."""
+    for number, stay in enumerate(clearing.stays):
+        parts = [_at_level(leg, heights[1], setting) for leg in stay]
+        if number == 0 and clearing.helix_mm:
+            parts.insert(0, _down(clearing, heights, setting))
+        vertices = np.concatenate([*(part[:-1] for part, _ in parts), parts[-1][0][-1:]])
+        if setting.operation.direction == "conventional":
+            vertices = vertices * [-1.0, 1.0, 1.0, -1.0]
+        feeds = np.concatenate([feed for _, feed in parts])
+        yield CutRun(vertices, feeds, setting.feeds.plunge_mm_min, name)
 
 
 def _down(

@@ -202,8 +202,8 @@ class PlanningCode(Code):
     NO_REST = (
         229,
         INFO,
-        "there is nothing in a region that the tool of a `rest` reaches and what was cut before "
-        "it has left",
+        "there is nothing in a region that the tool of a `rest`, or of an adaptive pocket, "
+        "reaches and what was cut before it has left",
         "none",
     )
     NOT_CHAMFERED = (

@@ -203,11 +203,20 @@ class Work(Struct, frozen=True, eq=False):
     findings: tuple[Finding, ...] = ()
 
 
+class Air(Struct, frozen=True, eq=False):
+    """A `region` (on the left of its closed paths, work frame) in which nothing of the stock is
+    left down to `z_mm`."""
+
+    region: Polylines
+    z_mm: float
+
+
 class Chosen(Struct, frozen=True, eq=False):
     """The paths that an operation takes, in the work frame: `lines` with their `nesting`; `source`
     (M,), the index of each in the placed drawing; `names` for people; `points` (K, 2) mm, the
     marks of its layers, with their `point_names`. `rim` (M,): whether a closed path is the rim of
-    a part, what lies within it staying, or of a hole. `file`: that of the drawing."""
+    a part, what lies within it staying, or of a hole. `file`: that of the drawing. `air`: what
+    operations before have cleared, for those that ask for it (`Operation.engagement_rad`)."""
 
     nesting: Nesting
     source: Ints
@@ -216,6 +225,7 @@ class Chosen(Struct, frozen=True, eq=False):
     point_names: tuple[str, ...]
     rim: Bools
     file: str | None = None
+    air: tuple[Air, ...] = ()
 
     @property
     def lines(self) -> Polylines:

@@ -23,6 +23,7 @@ from camtool.geometry.drawing import Drawing, is_text
 from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
+from camtool.planning.air import air_after
 from camtool.planning.checks import checked
 from camtool.planning.contours import runs_of, with_starts
 from camtool.planning.drawn import drawn_of
@@ -117,14 +118,12 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
     settings = [setting_of(operation, job, machine) for operation in job.operations]
     for rank, setting in enumerate(settings, 1):
         end_place = machine.defaults.park_mm if rank == len(settings) else None
-        before = steps[-1] if setting.operation.stage == "finish" else None
-        step = _step(placed_drawing, job, setting, machine, (tool_place, end_place), sides, before)
+        ends = tool_place, end_place
+        step = _step(placed_drawing, job, setting, machine, ends, sides, steps)
         end = _end(step.runs, tool_place)
         if undivided and _is_divided(job, setting.operation):
             plain_job = replace(job, minimise="rapids")
-            step = _step(
-                placed_drawing, plain_job, setting, machine, (tool_place, end_place), sides, before
-            )
+            step = _step(placed_drawing, plain_job, setting, machine, ends, sides, steps)
         tool_place = end
         steps.append(step)
     steps = _rested(_sparing(steps))
@@ -237,20 +236,22 @@ def _step(
     machine: Machine,
     ends: tuple[Point, Point | None],
     sides: Sides,
-    rough: Step | None = None,
+    before: Sequence[Step],
 ) -> Step:
     """Plan one operation from what it takes to its runs, for a tool that comes from the first
-    point of its `ends` and goes to the second (None: stays). `rough`: what has cleared the way,
-    where it is a finishing pass."""
+    point of its `ends` and goes to the second (None: stays). `before`: the steps so far, the last
+    of which has cleared the way where it is a finishing pass."""
     chosen = choose(placed_drawing, setting.operation, sides)
     chosen = with_pins(chosen, placed_drawing, job, setting.operation)
+    if setting.operation.engagement_rad is not None:
+        chosen = replace(chosen, air=tuple(chain.from_iterable(map(air_after, before))))
     work: Work = function_of(setting.operation.contract.work)(chosen, setting)
     items, tab_findings = work.items, list[Finding]()
     if contours := contours_of(items):
         contours, tab_findings = with_tabs(_with_starts(contours))
         contours = _begun_between_tabs(contours)
-        if rough is not None:
-            contours, pass_findings = in_passes(contours, setting, rough)
+        if setting.operation.stage == "finish":
+            contours, pass_findings = in_passes(contours, setting, before[-1])
             tab_findings += pass_findings
         items = contours
     sided = side_findings(work, chosen, sides, setting.operation)
@@ -258,7 +259,7 @@ def _step(
     findings = of_stage(setting.operation, [*unclear, *work.findings, *sided, *tab_findings])
     findings = [*_text_as_edge(placed_drawing, chosen, setting.operation, findings), *findings]
     choices = choices_of(items)
-    before = travel_mm(choices, drawn_order(choices), *ends)
+    drawn_mm = travel_mm(choices, drawn_order(choices), *ends)
     if job.minimise == "reversals":
         from camtool.planning.reversing import fewer_reversals
 
@@ -286,7 +287,7 @@ def _step(
         runs=runs,
         owner=np.repeat(order, counts),
         findings=tuple(findings),
-        rapid_drawn_mm=before,
+        rapid_drawn_mm=drawn_mm,
         rapid_mm=travel_mm(choices, rows, *ends),
         bridges=bridges,
     )

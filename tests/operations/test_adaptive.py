@@ -12,22 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import camtool
-from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.geometry.polylines import Polyline
-from camtool.planning.adaptive import (
-    Pose,
-    chords,
-    corner_ratio,
-    ends_of,
-    step_for,
-    tangent_link,
-)
+from camtool.planning.adaptive import Pose, corner_ratio, ends_of, step_for, tangent_link
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
 from camtool.planning.strategies import engagement
 from camtool.progress import Progress
 from tests.oracles.contours import CIRCLE, SQUARE, closed
+from tests.oracles.engaged import chords_of, greatest_engagement
 from tests.oracles.swept import complaints
 from tests.paths import mirrored, moved, scaled
 from tests.planning.pocket_cases import SHAPES, region_of, runs_of, work_of
@@ -37,9 +30,6 @@ PLATE = [SQUARE, moved(scaled(CIRCLE, 0.1), 3.0, 3.0), moved(scaled(SQUARE, 0.1)
 QUICK = {"square": [SQUARE], "plate": PLATE, "star": SHAPES["star"]}
 SHARE = 3e-3
 """This part of the area may be left in sharp corners."""
-DIRECTIONS = 360
-EVERY = 23
-"""One of so many chords is looked at."""
 
 
 def adaptive(
@@ -48,56 +38,6 @@ def adaptive(
     own = (("strategy", "adaptive"), ("engagement_rad", limit))
     entry = Entry("helix", angle_rad=math.radians(5.0))
     return runs_of(work_of(paths, diameter_mm, own=own, entry=entry, **options))
-
-
-def greatest_engagement(runs: list[CutRun], radius: float, thick: float) -> float:
-    """Return the greatest engagement angle, rad, behind the entry: the front of the tool's circle
-    is looked at in many directions, and a point of it is air where it is nearer than the radius to
-    any place where the tool was before."""
-    ends = np.concatenate([chords_of(run) for run in runs])
-    level = ends[:, 4:].max(axis=1) < ends[:, 4:].min() + 1e-6
-    moves = ends[level][:, :4]
-    length = np.hypot(*(moves[:, 2:] - moves[:, :2]).T)
-    way = np.cumsum(length)
-    is_judged = (way > 2.0 * math.pi * radius) & (length > 1e-9)
-    angles = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS * math.pi - 0.5 * math.pi
-    greatest = 0.0
-    for number in np.flatnonzero(is_judged)[::EVERY].tolist():
-        start, end = moves[number, :2], moves[number, 2:]
-        heading = math.atan2(*(end - start)[::-1])
-        place = 0.5 * (start + end)
-        circle = place + radius * np.column_stack(
-            [np.cos(angles + heading), np.sin(angles + heading)]
-        )
-        near = distance(place[None, :], moves[:number])[:, 0] < 2.0 * radius
-        older = way[number] - way[:number] > 100.0 * thick
-        gap = np.full(DIRECTIONS, np.inf)
-        for rows, slack in ((near & older, thick), (near & ~older, 0.0)):
-            if rows.any():
-                gap = np.minimum(gap, distance(circle, moves[:number][rows]).min(axis=0) - slack)
-        greatest = max(greatest, float((gap > radius).mean()) * math.pi)
-    return greatest
-
-
-def chords_of(run: CutRun) -> Floats:
-    """(K, 6) x, y to x, y, and the heights of both ends, of short chords of a run."""
-    flat = run.vertices[:, [0, 1, 3]]
-    parts = []
-    for index in range(len(flat) - 1):
-        if np.hypot(*(flat[index + 1, :2] - flat[index, :2])) < 1e-9:
-            continue
-        piece = chords(np.array([flat[index], [*flat[index + 1, :2], 0.0]]), 1e-3)
-        z = run.vertices[index : index + 2, 2]
-        parts.append(np.column_stack([piece, np.full((len(piece), 2), z)]))
-    return np.concatenate(parts)
-
-
-def distance(points: Floats, moves: Floats) -> Floats:
-    """(M, P) distances of points (P, 2) from straight moves (M, 4)."""
-    start, along = moves[:, None, :2], (moves[:, 2:] - moves[:, :2])[:, None, :]
-    square = np.maximum((along**2).sum(axis=2), 1e-30)
-    part = np.clip(((points[None] - start) * along).sum(axis=2) / square, 0.0, 1.0)
-    return np.asarray(np.hypot(*np.moveaxis(points[None] - start - part[..., None] * along, 2, 0)))
 
 
 @pytest.mark.parametrize("shape", ["square", "star"])

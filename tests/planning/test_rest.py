@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from camtool.errors import OptionError
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
-from camtool.operations.pocket.work import REST_OVERLAP
+from camtool.planning.air import REST_OVERLAP
 from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Step
 from camtool.planning.job import Job, Operation, Tool

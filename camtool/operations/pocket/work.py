@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -39,6 +40,7 @@ from camtool.geometry.polylines import (
     reverse_lines,
 )
 from camtool.planning.adaptive import adaptive_runs, refuse_strategy, wide_parts
+from camtool.planning.air import REST_OVERLAP, air_at, left_beside_mm, reached
 from camtool.planning.clearing import (
     SLOT_TOLERANCE,
     ConnectedRegion,
@@ -59,7 +61,7 @@ from camtool.planning.findings import (
     SLOT_AS_WIDE_IN_POCKET,
 )
 from camtool.planning.finish import along_walls
-from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
+from camtool.planning.items import Air, Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation, Stock
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import MeasuredPath, join_paths
@@ -77,9 +79,6 @@ MAX_HELIX_SHARE = 0.5
 
 MAX_HELIX_TURNS = 200
 """A helix of more turns than this at one level is not made."""
-
-REST_OVERLAP = 0.02
-"""The tool that cleared before counts as wider by this part, so that its cut is overlapped."""
 
 MAX_RAMP_LAPS = 20
 """A ramp that would go back and forth on the whole path more often than this becomes a plunge."""
@@ -99,10 +98,11 @@ class Pocket(Struct, frozen=True, eq=False):
 
 class Cleared(Struct, frozen=True, eq=False):
     """The runs that clear a region, in order; and what did not fit of their entries, with the
-    first run for which that is so."""
+    first run for which that is so. `is_rest`: others have cleared before."""
 
     runs: list[CutRun]
     changed: dict[str, CutRun]
+    is_rest: bool
 
 
 def checked(operation: Operation, _: Stock | None) -> Operation:
@@ -125,11 +125,11 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
     findings: list[Finding] = []
     for each in pockets(chosen):
         radius = setting.operation.tool.radius_mm
-        centre_region = offset_shape(each.region, _left_mm(setting))
+        centre_region = offset_shape(each.region, left_beside_mm(setting))
         slots = slot_paths(centre_region, radius)
-        cleared = _cleared(slots, each, setting)
+        cleared = _cleared(slots, each, setting, chosen.air)
         if not cleared.runs:
-            finding_for = _too_small if setting.operation.rest_of is None else _no_rest
+            finding_for = _no_rest if cleared.is_rest else _too_small
             findings.append(finding_for(each, setting.operation))
             continue
         outline = each.region[0]
@@ -172,17 +172,27 @@ def pockets(chosen: Chosen) -> list[Pocket]:
     ]
 
 
-def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
+def _cleared(
+    slots: list[Floats], each: Pocket, setting: Setting, airs: tuple[Air, ...]
+) -> Cleared:
     """The runs of one region: each connected tool centre region, then the slots."""
     groups: list[list[CutRun]] = []
     changed_runs: dict[str, CutRun] = {}
+    wider = setting.operation.rest_of
+    is_rest = wider is not None
+    if wider is not None and wider.contract.rest == "corners":
+        cleared = reached(each.region, wider, setting.operation.allowance_mm)
+        airs = (*airs, Air(cleared, setting.levels_mm[-1]))
     for part in _tool_regions(each.region, setting):
+        parts = []
         if setting.operation.engagement_rad is not None:
             parts = wide_parts(part, setting.operation.tool.radius_mm)
-            runs_of_parts = [adaptive_runs(wide, setting, each.name) for wide in parts]
-            if runs_of_parts and all(runs_of_parts):
-                groups += runs_of_parts
-                continue
+        for wide in parts:
+            air = partial(air_at, airs, wide, setting)
+            groups.append(adaptive_runs(wide, setting, each.name, air))
+            is_rest = is_rest or not groups[-1]
+        if parts:
+            continue
         connected, runs = ConnectedRegion(part), list[CutRun]()
         for path, region in clearing_paths(part, setting.operation):
             way_down = down_for(path, region, connected, setting)
@@ -194,17 +204,7 @@ def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
         groups.append(lowered_runs(path, way_down, back_along(path), setting, each.name))
         changed_runs.setdefault(way_down.changed, groups[-1][0])
     changed_runs.pop("", None)
-    return Cleared(_nearest_next(groups), changed_runs)
-
-
-def _left_mm(setting: Setting) -> float:
-    """Distance left beside the edge, mm: the allowance, and of a carving its slopes. The wall of a
-    V bit of half the angle α is z tan α from the edge where it is z deep."""
-    operation, carved = setting.operation, setting.operation.rest_of
-    if carved is None or carved.contract.rest != "floor" or carved.tool.tip_angle_rad is None:
-        return operation.allowance_mm
-    slope = math.tan(0.5 * carved.tool.tip_angle_rad)
-    return operation.allowance_mm - setting.levels_mm[-1] * slope
+    return Cleared(_nearest_next([group for group in groups if group]), changed_runs, is_rest)
 
 
 def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
@@ -220,9 +220,10 @@ def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
     """
     operation = setting.operation
     region = _without_lost_islands(region, operation.beyond_mm)
-    tool_region = offset_shape(region, operation.tool.radius_mm + _left_mm(setting))
+    tool_region = offset_shape(region, operation.tool.radius_mm + left_beside_mm(setting))
     wider = operation.rest_of
-    if wider is None or wider.contract.rest == "floor":
+    is_adaptive = operation.engagement_rad is not None
+    if wider is None or wider.contract.rest == "floor" or is_adaptive:
         return parts_of(tool_region)
     reached_mm = (1.0 + REST_OVERLAP) * wider.tool.radius_mm
     pieces = unreached(tool_region, reached_mm - operation.tool.radius_mm)
@@ -341,7 +342,7 @@ def _no_rest(each: Pocket, operation: Operation) -> Finding:
     return NO_REST(
         where=at_place(each.name, extents(each.region).mean(axis=1).tolist()),
         tool=tool_name(operation.tool),
-        other=operation.rest,
+        other=operation.rest or "what was cut before",
     )
 
 
