@@ -667,15 +667,21 @@ def adaptive_legs(
 
 
 def rest_stays(
-    region: Polylines, clear: Polylines, legs: Sequence[Leg], tool_mm: float, limit: float
+    region: Polylines,
+    clear: Polylines,
+    opening_mm: float,
+    legs: Sequence[Leg],
+    tool_mm: float,
+    limit: float,
 ) -> list[list[Leg]]:
     """Return the stays that clear the rest of a connected tool centre region, of which a part is
-    `clear`, after these legs; the first begins with the last of them."""
+    `clear`, a union of discs of the opening's radius, after these legs; the first begins with the
+    last of them."""
     clearing = _Clearing(region, tool_mm, limit)
     for leg in legs[:-1]:
         clearing.cleared.add(clearing.moves(leg.vertices))
     room = _widest(region)[1]
-    opening = FIRST_SHARE * max(_widest(part)[1] for part in parts_of(clear))
+    opening = FIRST_SHARE * opening_mm
     clearing.take(list(fronts(region, clear, (opening, max(opening, room)), tool_mm, limit)))
     return list(clearing.legs(legs[-1].vertices))
 

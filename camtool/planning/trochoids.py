@@ -46,6 +46,9 @@ MAX_STEP_SHARE = 0.7
 LINK_SHARE = 0.5
 """Radius of the arcs at both ends of a way back, over that of the circles."""
 
+MIN_BACK_RAD = 0.25 * math.pi
+"""A way back that is seen from the middle under a smaller angle stays on the circle."""
+
 SWEPT_SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3)
 """A band is taken narrower by these parts, in turn, where rounding hides its outline."""
 
@@ -100,17 +103,38 @@ def trochoid_legs(
         ahead = place - before
         heading, step = math.atan2(ahead[1], ahead[0]), math.hypot(*ahead)
         half = math.acos(-0.5 * step / radius_mm)
-        begin, end = (
-            place + radius_mm * np.array([math.cos(angle), math.sin(angle)])
-            for angle in (heading - half, heading + half)
-        )
+        begin = place + radius_mm * np.array([math.cos(heading - half), math.sin(heading - half)])
+        end = place + radius_mm * np.array([math.cos(heading + half), math.sin(heading + half)])
+        if len(legs) == 1:  # as far round as circles end
+            legs += _round(legs[0], before, end - ahead)
         cut = np.array([*arc_rows(begin, place, 2.0 * half, 1), [*end, 0.0]])
-        tool = ends_of(legs[-1].vertices)[1]
-        link = tangent_link(tool, ends_of(cut)[0], LINK_SHARE * radius_mm, (1, 1))
-        if link is not None:
-            legs.append(Leg(link, cuts=False))
-        legs.append(Leg(cut))
+        legs += [*_back(legs[-1], before, cut, radius_mm), Leg(cut)]
     return places[0], legs
+
+
+def _round(leg: Leg, centre: Floats, end: Floats) -> list[Leg]:
+    """Return the arc CCW about a centre from where a leg ends to a place of that circle; none
+    where it is there already."""
+    begin = leg.vertices[-1, :2]
+    sweep = _angle(end - centre) - _angle(begin - centre)
+    rows = arc_rows(begin, centre, sweep % math.tau, 1)
+    return [Leg(np.array([*rows, [*end, 0.0]]), cuts=False)] if rows else []
+
+
+def _back(leg: Leg, centre: Floats, cut: Floats, radius_mm: float) -> list[Leg]:
+    """Return the way through a disc from where a leg ends to the next cut, which leaves the disc;
+    tangent, unless it is so short that the tool has to stay on the circle."""
+    start, end = ends_of(leg.vertices)[1], ends_of(cut)[0]
+    sweep = _angle(cut[0, :2] - centre) - _angle(leg.vertices[-1, :2] - centre)
+    if sweep % math.tau >= MIN_BACK_RAD:
+        link = tangent_link(start, end, LINK_SHARE * radius_mm, (1, 1))
+        if link is not None:
+            return [Leg(link, cuts=False)]
+    return _round(leg, centre, cut[0, :2])
+
+
+def _angle(arm: Floats) -> float:
+    return math.atan2(arm[1], arm[0])
 
 
 def trochoid_stays(
@@ -133,8 +157,8 @@ def trochoid_stays(
     helix_mm = min(helix_mm, radius_mm)
     chains = [trochoid_legs(line, radius_mm, helix_mm, tool_mm, limit) for line in own_lines]
     legs = [leg for _, each in chains for leg in each]
-    clear = band_of(own_lines, radius_mm - cusp_mm(radius_mm, tool_mm, limit))
-    rest = rest_stays(region, clear, legs, tool_mm, limit)
+    opening = radius_mm - cusp_mm(radius_mm, tool_mm, limit)
+    rest = rest_stays(region, band_of(own_lines, opening), opening, legs, tool_mm, limit)
     centre, last = chains[-1]
     stays = [AdaptiveStays(middle, helix_mm, [each]) for middle, each in chains[:-1]]
     return [*stays, AdaptiveStays(centre, helix_mm, [[*last[:-1], *rest[0]], *rest[1:]])]

@@ -21,7 +21,7 @@ from camtool.planning.adaptive import chords
 from camtool.planning.items import CutRun, Fixed
 from camtool.planning.job import Entry, Job, Operation, Tabs, Tool
 from camtool.planning.strategies import width
-from camtool.planning.trochoids import middles
+from camtool.planning.trochoids import middles, trochoid_legs, trochoid_step
 from camtool.records import replace
 from tests.oracles.contours import closed
 from tests.paths import mirrored
@@ -146,6 +146,22 @@ def test_middles_stand_at_corners_and_no_farther_apart_than_a_step() -> None:
     assert gaps.max() <= 0.25 + 1e-9
     corners = line.vertices[:, :2]
     assert np.hypot(*(places[:, None] - corners[None]).transpose(2, 0, 1)).min(axis=0).max() < 1e-6
+
+
+@pytest.mark.parametrize("step", [3.0, 0.3])
+def test_all_legs_keep_within_the_discs(step: float) -> None:
+    """Corners to both sides, a spike among them, and arcs smaller than the circles."""
+    corners = [(0, 0), (4, 0), (4, 4, 1), (3, 4), (1.5, 0.6), (1.0, 5), (0, 5)]
+    for path in (closed(*corners), reverse(closed(*corners))):
+        line = Polyline(path.vertices * [step, step, 1.0], closed=True)
+        radius, tool_mm = 0.4, 1.0
+        legs = trochoid_legs(line, radius, 0.3, tool_mm, LIMIT)[1]
+        places = middles(line, radius, trochoid_step(radius, tool_mm, LIMIT))
+        points = np.concatenate([chords(leg.vertices, 1e-4)[:, :2] for leg in legs])
+        gaps = np.hypot(*(points[:, None] - places[None]).transpose(2, 0, 1)).min(axis=1)
+        assert gaps.max() <= radius + 1e-6
+        ends = np.array([[leg.vertices[0, :2], leg.vertices[-1, :2]] for leg in legs])
+        assert np.abs(ends[1:, 0] - ends[:-1, 1]).max() < 1e-6
 
 
 @pytest.mark.parametrize("target_name", ["grbl", "linuxcnc"])
