@@ -49,6 +49,9 @@ THICK_SHARE = 4e-3
 THICK_OF_STEP = 0.2
 """... but no more than this part of the step beside a straight wall, which is less below 12°."""
 
+MAX_FRONTS = 999.0
+"""Limits that make more fronts across a pocket are refused."""
+
 FINE_SHARE = 0.02
 """Discs of this part of the tool's radius that fit in the tool centre region are cleared."""
 
@@ -140,6 +143,8 @@ def with_tool(
     radius = most * draw(fitting)
     centres = shapely.buffer(area, -radius).area
     step = centres / (strokes * radius**2)
+    low_x, low_y, high_x, high_y = area.bounds
+    step = max(step, max(high_x - low_x, high_y - low_y) / (MAX_FRONTS * radius))
     assume(step < 0.9)
     least = max(math.radians(5.0), math.acos(1.0 - step))
     return Case(paths, radius, draw(st.floats(least, 0.5 * math.pi)))
