@@ -17,6 +17,7 @@ import shapely
 from hypothesis import HealthCheck, assume, given
 from hypothesis import strategies as st
 
+from camtool.errors import CamtoolError
 from camtool.geometry.polylines import Polyline
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry
@@ -314,3 +315,22 @@ def greatest_on_slides(run: Run, case: Case, at_mm: tuple[float, float]) -> floa
 @given(cases(40.0))
 def test_programs_of_random_pockets_in_the_stock(name: str, tmp_path: Path, case: Case) -> None:
     assert job_faults(case, load_target(name), tmp_path) == []
+
+
+def square(x: float, y: float, size: float) -> Polyline:
+    return closed((x, y), (x + size, y), (x + size, y + size), (x, y + size))
+
+
+BAD = {
+    "islands that cross": [square(0, 0, 20), square(6, 6, 4), square(8, 8, 4)],
+    "a contour that crosses itself": [closed((0, 0), (20, 20), (20, 0), (0, 20))],
+    "smaller than the tool": [square(0, 0, 2)],
+    "a sliver": [closed((0, 0), (100, 0), (100, 0.001))],
+    "too large for its tool": [square(0, 0, 20_000)],
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_cannot_be_cleared_is_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(CamtoolError):
+        assert posted(BAD[name], 4.0, math.radians(40.0), "grbl", tmp_path).data
