@@ -67,7 +67,7 @@ RATIO = 0.75
 """Each opening disc is at least this part of the one before it, ..."""
 
 NARROW_RATIO = 0.93
-"""... and this part where discs smaller than the tool go on between parallel walls."""
+"""... and this part of it where they are smaller than the tool."""
 
 MIN_CORNER_RAD = math.radians(10.0)
 """Walls that meet at a smaller angle are taken as parallel."""
@@ -206,7 +206,7 @@ def _next_opening(cleared: Polylines, opening_mm: float, tool_mm: float, limit: 
     if corner < MIN_CORNER_RAD:
         return NARROW_RATIO * opening_mm
     ratio = corner_ratio(PLANNED_SHARE * limit, opening_mm, tool_mm, corner)
-    return min(max(RATIO, 1.0 - RATIO_SHARE * (1.0 - ratio)), MAX_RATIO) * opening_mm
+    return min(max(NARROW_RATIO, 1.0 - RATIO_SHARE * (1.0 - ratio)), MAX_RATIO) * opening_mm
 
 
 class FrontStroke(Struct, frozen=True, eq=False):
