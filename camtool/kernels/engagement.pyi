@@ -12,7 +12,9 @@ LOW: int
 RADIUS: int
 
 class Cleared:
-    def __init__(self, extents: Floats, reach_mm: float, box: Floats) -> None: ...
+    def __init__(
+        self, extents: Floats, reach_mm: float, box: Floats, *, from_right: bool = False
+    ) -> None: ...
     def add(self, moves: Floats) -> None: ...
     def judge(
         self,

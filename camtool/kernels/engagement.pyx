@@ -63,14 +63,19 @@ cdef class Cleared:
 
     cdef double low_x, low_y, cell, reach, x, y, travelled
     cdef Int columns, rows, count, used
+    cdef bint from_right
     cdef Int[::1] head, following, item
     cdef double[:, ::1] moves
     cdef double[::1] box, marks
 
-    def __init__(self, extents: Floats, reach_mm: float, box: Floats) -> None:
+    def __init__(
+        self, extents: Floats, reach_mm: float, box: Floats, *, from_right: bool = False
+    ) -> None:
         """`extents` (2, 2): least and greatest place of tools; `reach_mm`: the radius of the
         widest tool; `box` (4,): low x, low y, high x, high y of the stock, outside of which
-        nothing is cut (infinite: not known)."""
+        nothing is cut (infinite: not known); `from_right`: angles are those from the right end of
+        the front half to the farthest place in the stock, with all that is air between."""
+        self.from_right = from_right
         (low_x, low_y), (high_x, high_y) = extents.tolist()
         size = max(high_x - low_x, high_y - low_y, reach_mm)
         self.cell = max(reach_mm, size / 512.0)
@@ -273,6 +278,8 @@ cdef double _open_angle(
     cdef int i
     for i in range(arcs.count):
         angle += arcs.high[i] - arcs.low[i]
+    if self.from_right and arcs.count:
+        angle = arcs.high[arcs.count - 1] + 0.5 * PI
     return angle if angle > NO_ANGLE else 0.0
 
 

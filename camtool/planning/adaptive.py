@@ -27,17 +27,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise, product
+from itertools import islice, pairwise, product
 
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Floats
+from camtool.arrays import Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.curves import FunctionCurve
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.fit import fit_curve
-from camtool.geometry.measure import Frames, length, path_extents, point_at, sample, signed_areas
+from camtool.geometry.measure import (
+    Frames,
+    length,
+    path_extents,
+    point_at,
+    sample,
+    signed_areas,
+)
 from camtool.geometry.nesting import inside
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
@@ -49,6 +56,7 @@ from camtool.planning.naming import key_of
 from camtool.planning.paths import MeasuredPath
 from camtool.planning.ramps import feeds_along, helix
 from camtool.planning.strategies import STRATEGIES
+from camtool.planning.thin_chips import feed_levels, thin_chip_feeds
 from camtool.progress import tell_share
 
 NO_AIR = Polylines.of([])
@@ -323,14 +331,20 @@ def _smooth(piece: Floats, fit_mm: float) -> Floats:
     return fit_curve(curve, fit_mm).vertices
 
 
-def chords(vertices: Floats, sagitta_mm: float) -> Floats:
-    """(K, 4) x, y to x, y of an open path (n, 3), arcs as chords within a distance."""
+def chord_rows(vertices: Floats, sagitta_mm: float) -> tuple[Segments, Ints, Ints]:
+    """Return the segments of an open path (n, 3), of how many chords each of them consists within
+    a distance (n − 1,), and the segment of each chord (K,)."""
     path = Segments.of(Polyline(vertices))
     radius = np.where(path.is_arc, path.radius, np.inf)
     angle = 2.0 * np.arccos(1.0 - np.minimum(sagitta_mm / np.maximum(radius, 1e-9), 1.0))
     sweep = np.where(path.is_arc, np.abs(path.sweep), 0.0)
     count = np.maximum(np.ceil(sweep / np.maximum(angle, 1e-9)), 1.0).astype(np.int64)
-    row = np.repeat(np.arange(len(path)), count)
+    return path, count, np.repeat(np.arange(len(path)), count)
+
+
+def chords(vertices: Floats, sagitta_mm: float) -> Floats:
+    """(K, 4) x, y to x, y of an open path (n, 3), arcs as chords within a distance."""
+    path, count, row = chord_rows(vertices, sagitta_mm)
     step = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
     begin = point_at(path, row, step / count[row])
     end = np.concatenate([begin[1:], path.end[-1:]])
@@ -792,8 +806,12 @@ def runs_at(
 ) -> Iterator[CutRun]:
     """Yield the runs that make all stays at the second of two heights, for a tool that goes down
     in a helix from the first."""
+    legs = iter(_with_feeds(clearing, setting))
     for number, stay in enumerate(clearing.stays):
-        parts = [_at_level(leg, heights[1], setting) for leg in stay]
+        parts = [
+            (np.insert(vertices, 2, heights[1], axis=1), feeds)
+            for vertices, feeds in islice(legs, len(stay))
+        ]
         if number == 0 and clearing.helix_mm:
             parts.insert(0, _down(clearing, heights, setting))
         vertices = np.concatenate([*(part[:-1] for part, _ in parts), parts[-1][0][-1:]])
@@ -822,10 +840,50 @@ def mirrored(region: Polylines) -> Polylines:
     return Polylines.of([reverse(path) for path in paths])
 
 
-def _at_level(leg: Leg, level: float, setting: Setting) -> tuple[Floats, Floats]:
-    """The vertices (n, 4) of a leg at a level, and the feeds (n − 1,) of its moves."""
-    feed = setting.feeds.cut_mm_min
-    if not leg.cuts:
-        feed = setting.operation.own_value("link_feed") or feed
-    vertices = np.insert(leg.vertices, 2, level, axis=1)
-    return vertices, np.full(len(vertices) - 1, feed)
+def _with_feeds(clearing: AdaptiveStays, setting: Setting) -> list[tuple[Floats, Floats]]:
+    """Return the vertices (n, 3) of all legs, in the order of cutting, and the feeds (n − 1,) of
+    their moves; arcs and lines are split where the feed changes (`max_feed`)."""
+    operation, feed = setting.operation, setting.feeds.cut_mm_min
+    legs = [leg for stay in clearing.stays for leg in stay]
+    cuts = [(leg.vertices, np.full(len(leg.vertices) - 1, feed)) for leg in legs]
+    max_feed = operation.own_value("max_feed")
+    if max_feed is not None and max_feed < feed:
+        raise OptionError(
+            f"a greatest feed of {max_feed:g} mm/min is below the feed of {feed:g} mm/min",
+            where=key_of(operation, "max_feed"),
+            mend="give a higher one, or leave it out",
+        )
+    if max_feed is not None and legs:
+        tool_mm, limit = operation.tool.radius_mm, operation.own_value("engagement")
+        rows = [_chords_of(leg, tool_mm) for leg in legs]
+        levels = feed_levels(feed, max_feed)
+        cuts = [
+            (_split(leg, row, each.first), each.feed_mm_min)
+            for leg, row, each in zip(
+                legs, rows, thin_chip_feeds(rows, tool_mm, limit, levels), strict=True
+            )
+        ]
+    link_feed = operation.own_value("link_feed") or feed
+    return [
+        each if leg.cuts else (leg.vertices, np.full(len(leg.vertices) - 1, link_feed))
+        for leg, each in zip(legs, cuts, strict=True)
+    ]
+
+
+def _chords_of(leg: Leg, tool_mm: float) -> tuple[Floats, Ints]:
+    """Return the chords of a leg as moves (K, 9), each with the angles to the path's direction at
+    its ends, and the line or arc (K,) that each is a part of."""
+    path, count, row = chord_rows(leg.vertices, SAGITTA_SHARE * tool_mm)
+    half = 0.5 * (np.where(path.is_arc, path.sweep, 0.0) / count)[row]
+    flat = np.column_stack([np.full(len(row), tool_mm), np.zeros((len(row), 2)), -half, half])
+    ends = chords(leg.vertices, SAGITTA_SHARE * tool_mm)
+    return np.concatenate([ends, flat], axis=1), row
+
+
+def _split(leg: Leg, rows: tuple[Floats, Ints], first: Ints) -> Floats:
+    """Return the vertices of a leg that is split before these chords of it."""
+    moves, row = rows
+    share = np.diff(np.append(first, len(row))) / np.bincount(row)[row[first]]
+    bulge = np.tan(share * np.arctan(leg.vertices[row[first], 2]))
+    pieces = np.column_stack([moves[first, :2], bulge])
+    return np.concatenate([pieces, leg.vertices[-1:]])

@@ -73,6 +73,13 @@ LIMIT_KEYS = {
         '"2000mm/min"',
         only=("strategy", LIMITED),
     ),
+    "max_feed": Key(
+        "max_feed_mm_min",
+        FEED,
+        "Greatest feed, where less engagement makes thinner chips.",
+        '"1500mm/min"',
+        only=("strategy", LIMITED),
+    ),
 }
 
 SLOT_KEYS = {

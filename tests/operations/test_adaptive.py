@@ -56,6 +56,29 @@ def test_the_engagement_keeps_to_its_limit(shape: str, part: float) -> None:
     assert 0.7 * limit < engaged <= 1.02 * limit
 
 
+def test_the_feed_rises_on_the_same_path() -> None:
+    """Lines and arcs are split where the feed changes, between `feed` (600) and `max_feed`."""
+    limit = math.acos(1.0 - 2.0 * 0.12)
+    own = (("strategy", "adaptive"), ("engagement_rad", limit), ("max_feed_mm_min", 1800.0))
+    entry = Entry("helix", angle_rad=math.radians(5.0))
+    plain = adaptive([SQUARE], 1.2, limit)
+    runs = runs_of(work_of([SQUARE], 1.2, own=own, entry=entry))
+    assert len(runs) == len(plain)
+    for run, same in zip(runs, plain, strict=True):
+        assert length_of(run) == pytest.approx(length_of(same), rel=1e-4)
+        places = {tuple(place) for place in np.round(run.vertices[:, :2], 6).tolist()}
+        assert places >= {tuple(place) for place in np.round(same.vertices[:, :2], 6).tolist()}
+    feeds = np.concatenate([run.feed_mm_min[run.feed_mm_min >= 600.0] for run in runs])
+    assert len(np.unique(feeds)) > 2
+    assert feeds.max() <= 1800.0 + 1e-9
+
+
+def test_a_greatest_feed_below_the_feed_is_refused() -> None:
+    own = (("strategy", "adaptive"), ("max_feed_mm_min", 500.0))
+    with pytest.raises(OptionError, match="greatest feed"):
+        work_of([SQUARE], 1.2, own=own, entry=Entry("helix", angle_rad=0.1))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("diameter_mm", [0.7, 1.7])
 @pytest.mark.parametrize("shape", SHAPES)
