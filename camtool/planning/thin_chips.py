@@ -2,7 +2,7 @@
 
 A tooth that advances by f before the next one follows takes a chip whose thickness is f sin φ at
 the angle φ from the beginning of its cut, which is the greatest one while φ is below 90° (H.
-El-Hofy, Fundamentals of Machining Processes, 2nd ed., 2014, section 6.3.1: the greatest thickness
+El-Hofy, Fundamentals of Machining Processes, 2nd ed., 2014, page 174: the greatest thickness
 of a chip in plain milling). Where the engagement is φ instead of the limit Φ, the feed that keeps
 that thickness is  sin Φ / sin φ  times that at the limit. The angle counts from the right end of
 the front half of the tool's circle, where the chip is thinnest, to the farthest place in stock: a
