@@ -120,16 +120,16 @@ def test_a_new_two_sided_job_is_cut_from_both_faces(
 @pytest.mark.parametrize(
     ("flags", "error"),
     [
-        (("--tool-diameter", "3mm"), "needs the thickness"),
-        (("--thickness", "10mm"), "needs an end mill"),
-        (("--thickness", "10mm", "--tool-diameter", "3mm", "--two-sided", "z"), "'z'"),
+        (("--two-sided", "y", "--tool-diameter", "3mm"), "needs the thickness"),
+        (("--two-sided", "y", "--thickness", "10mm"), "needs an end mill"),
+        (("--two-sided", "z", "--thickness", "10mm", "--tool-diameter", "3mm"), "'z'"),
     ],
 )
 def test_a_two_sided_job_needs_stock_and_tool(
     camtool: Run, tmp_path: Path, flags: tuple[str, ...], error: str
 ) -> None:
     write_hinge(tmp_path)
-    done = camtool("job", "new", "hinge.dxf", "--two-sided", "y", *flags)
+    done = camtool("job", "new", "hinge.dxf", *flags)
     assert done.returncode == 2
     assert error in done.stderr.decode()
 
