@@ -602,7 +602,7 @@ def _text(drawing: Drawing, group: _Group, part: Part, proposal: Proposal) -> li
     known_values = {
         name: key
         for name, key in OPERATION.items()
-        if is_known(name, part.kind) and name not in given_keys
+        if is_known(name, part.kind) and name not in given_keys and key.only is None
     }
     return [*text, *_comments(known_values)]
 
