@@ -6,8 +6,7 @@ import math
 from typing import NamedTuple
 
 from camtool.errors import OptionError
-from camtool.keys import FEED, Key, Value, fraction, length, one_of, plain
-from camtool.units import parse_angle
+from camtool.keys import FEED, Key, Value, engagement_angle, fraction, length, one_of, plain
 
 STRATEGIES = ("passes", "adaptive", "trochoidal")
 LIMITED = STRATEGIES[1:]
@@ -19,14 +18,8 @@ MAX_ENGAGEMENT_RAD = math.radians(90.0)
 
 
 def engagement(value: object) -> float:
-    """Read a limit of engagement, rad: an angle with its unit, or the part of the diameter that
-    is cut beside a straight wall: a part a is the angle acos(1 − 2 a)."""
-    text = str(value).strip()
-    angle_rad = (
-        parse_angle(text)
-        if isinstance(value, str) and text.endswith(("deg", "°", "rad"))
-        else math.acos(1.0 - 2.0 * min(max(fraction(value), 0.0), 1.0))
-    )
+    """Read the limit of engagement that an operation keeps, rad."""
+    angle_rad = engagement_angle(value)
     if not MIN_ENGAGEMENT_RAD <= angle_rad <= MAX_ENGAGEMENT_RAD:
         raise OptionError(
             f"an engagement of {math.degrees(angle_rad):.3g}° is not within 5° and 90° (0.2 % and"
@@ -86,7 +79,7 @@ SLOT_KEYS = {
     "slot_width": Key(
         "slot_width",
         Value(plain(width), "LENGTH|PART"),
-        "SlotWidth of a trochoidal slot.",
+        "Width of a trochoidal slot.",
         '"150%"',
         only=("strategy", ("trochoidal",)),
         default=SlotWidth(1.5, True),

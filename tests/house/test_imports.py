@@ -100,7 +100,7 @@ HEAVY_WHOLE = {
 """Modules that work with a heavy package from end to end, and are imported within functions."""
 
 
-MAX_LATE_IMPORTS = 249
+MAX_LATE_IMPORTS = 250
 """Imports of our own modules within functions; a fifth of them are those of the targets."""
 
 MACHINES = [path.parent for path in sorted(ROOT.glob("postprocessors/*/machine.toml"))]

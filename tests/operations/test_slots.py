@@ -15,7 +15,7 @@ from camtool.errors import OptionError
 from camtool.geometry.distance import nearest
 from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotate
-from camtool.operations.profile.slots import checked
+from camtool.operations.profile import checked
 from camtool.operations.profile.work import profile
 from camtool.planning.adaptive import chords
 from camtool.planning.items import CutRun, Fixed

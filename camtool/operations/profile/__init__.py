@@ -1,7 +1,21 @@
 """Profiles: the tool runs beside closed contours, outside of parts and inside of holes."""
 
+from __future__ import annotations
+
+from camtool.planning.job import Operation, Stock
 from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, OperationKind
-from camtool.planning.strategies import LIMIT_KEYS, SLOT_KEYS
+from camtool.planning.strategies import LIMIT_KEYS, SLOT_KEYS, STRATEGIES
+
+
+def checked(operation: Operation, stock: Stock | None) -> Operation:
+    """Return the operation; OptionError for a slot that cannot be. What plans slots is not loaded
+    for other profiles: a batch that has nothing to do would load numpy for it."""
+    if operation.own_value("strategy") == STRATEGIES[0]:
+        return operation
+    from camtool.operations.profile.slots import checked_slot
+
+    return checked_slot(operation, stock)
+
 
 PROFILE = OperationKind(
     name="profile",
@@ -27,7 +41,7 @@ PROFILE = OperationKind(
         "mitre_limit",
     ),
     own=LIMIT_KEYS | SLOT_KEYS,
-    settle="camtool.operations.profile.slots:checked",
+    settle="camtool.operations.profile:checked",
     rank=1,
     proposal_rank=5,
     cuts="beside",

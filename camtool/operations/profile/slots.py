@@ -49,7 +49,7 @@ NEAR_SHARE = 0.05
 """A wall begins no farther than this part of the tool's radius from the band that it bounds."""
 
 
-def checked(operation: Operation, _: Stock | None) -> Operation:
+def checked_slot(operation: Operation, _: Stock | None) -> Operation:
     """Return the operation; OptionError for a strategy that is not for profiles, for a slot too
     narrow or too wide, and for what cannot be with one."""
     refuse_strategy(operation, "trochoidal")
