@@ -101,8 +101,8 @@ UNION_MM = 2.0 * POSITION_EPS_MM
 """Regions that are nearer to each other than twice this are one."""
 
 AIR_SLACK_SHARE = 1e-3
-"""What is air counts as wider by this part of the tool's radius: along walls that two operations
-have in common no stroke is left."""
+"""Air counts as wider by this part of the tool's radius: along walls that two operations have in
+common no stroke is left."""
 
 MAX_FRONTS = 20_000
 """No more fronts are made in one region."""
@@ -764,12 +764,14 @@ def adaptive_runs(
     backward = operation.direction == "conventional"
     limit: float = operation.own_value("engagement")
     runs, clearing, air = list[CutRun](), None, NO_AIR
+    legs = list[tuple[Floats, Floats]]()
     for heights in pairwise((0.0, *setting.levels_mm)):
         above, air = air, air_at(heights[1])
         if clearing is None or not np.array_equal(above.vertices, air.vertices):
             regions = [mirrored(each) if backward else each for each in (region, air)]
             clearing = adaptive_legs(regions[0], entry_mm(operation), tool_mm, limit, regions[1])
-        runs += runs_at(clearing, heights, setting, name)
+            legs = _with_feeds(clearing, setting)
+        runs += _runs_at(clearing, legs, heights, setting, name)
     return runs
 
 
@@ -793,24 +795,29 @@ def entry_mm(operation: Operation) -> float:
 def runs_of(clearings: Sequence[AdaptiveStays], setting: Setting, name: str) -> list[CutRun]:
     """Return the runs that make all stays at all levels, in order; where the operation is cut
     conventionally they are mirrored about X = 0, as the regions were for which they were made."""
+    legs = [_with_feeds(each, setting) for each in clearings]
     return [
         run
         for heights in pairwise((0.0, *setting.levels_mm))
-        for each in clearings
-        for run in runs_at(each, heights, setting, name)
+        for each, own_legs in zip(clearings, legs, strict=True)
+        for run in _runs_at(each, own_legs, heights, setting, name)
     ]
 
 
-def runs_at(
-    clearing: AdaptiveStays, heights: tuple[float, float], setting: Setting, name: str
+def _runs_at(
+    clearing: AdaptiveStays,
+    legs: Sequence[tuple[Floats, Floats]],
+    heights: tuple[float, float],
+    setting: Setting,
+    name: str,
 ) -> Iterator[CutRun]:
-    """Yield the runs that make all stays at the second of two heights, for a tool that goes down
-    in a helix from the first."""
-    legs = iter(_with_feeds(clearing, setting))
+    """Yield the runs that make all stays, whose legs have these vertices and feeds, at the second
+    of two heights, for a tool that goes down in a helix from the first."""
+    next_legs = iter(legs)
     for number, stay in enumerate(clearing.stays):
         parts = [
             (np.insert(vertices, 2, heights[1], axis=1), feeds)
-            for vertices, feeds in islice(legs, len(stay))
+            for vertices, feeds in islice(next_legs, len(stay))
         ]
         if number == 0 and clearing.helix_mm:
             parts.insert(0, _down(clearing, heights, setting))
