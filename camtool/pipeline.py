@@ -959,7 +959,9 @@ def _row_from(program: Program, decoded: Toolpath, written: Toolpath) -> Indices
     for moves, min_count in ((decoded.is_feed, 2), (decoded.kind == Kind.RAPID, 1)):
         is_cycle &= np.bincount(block[moves], minlength=last + 1)[:last] >= min_count
     cycles = np.flatnonzero(is_cycle)
-    order = np.argsort(block, kind="stable") if len(cycles) else np.arange(len(block))
+    if not len(cycles):
+        return np.asarray(rows)
+    order = np.argsort(block, kind="stable")
     lows, highs = (np.searchsorted(block[order], cycles, side=side) for side in ("left", "right"))
     for cycle, low, high in zip(cycles, lows, highs, strict=True):
         moves = order[low:high]
