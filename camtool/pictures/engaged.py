@@ -13,7 +13,7 @@ from camtool.arrays import Floats, Ints
 from camtool.pictures.colours import AIR, BINS, CUT_ENTRY, ENGAGED_STYLES, UNKNOWN
 from camtool.pictures.scene import Scene
 from camtool.pictures.svg import Look, PathData, element
-from camtool.pictures.trace import MERGED_SHARE, decimals_in
+from camtool.pictures.trace import MERGED_SHARE, decimals_in, round_pen
 from camtool.pictures.view import View
 from camtool.stock.engagement import COARSE_RAD
 
@@ -71,13 +71,7 @@ def engagement_layer(trace: EngagementTrace, view: View, pen: float) -> str:
         if data:
             width: Look = {} if share == 1.0 else {"stroke-width": view.mm(share * pen)}
             paths.append(element("path", {"d": str(data), "stroke": colour, **width}))
-    pen_of_all: Look = {
-        "fill": "none",
-        "stroke-width": view.mm(pen),
-        "stroke-linecap": "round",
-        "stroke-linejoin": "round",
-    }
-    return element("g", {"id": "engagement", **pen_of_all}, *paths)
+    return element("g", {"id": "engagement", **round_pen(view, pen)}, *paths)
 
 
 def _lines(begin: Floats, end: Floats, apart_mm: float) -> list[list[list[float]]]:

@@ -112,6 +112,16 @@ def decimals_in(window_mm: float) -> int:
     return max(0, math.ceil(-math.log10(FINEST_SHARE * window_mm)))
 
 
+def round_pen(view: View, pen: float) -> Look:
+    """Return the look of lines of a pen's width with round ends and joints."""
+    return {
+        "fill": "none",
+        "stroke-width": view.mm(pen),
+        "stroke-linecap": "round",
+        "stroke-linejoin": "round",
+    }
+
+
 def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
     """The coloured path, in mm."""
     (low, high), colours = view.x_range, bin_colours()
@@ -126,13 +136,7 @@ def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
                 data.line(*point)
         if data:
             paths.append(element("path", {"d": str(data), "stroke": colour}))
-    pen_of_all: Look = {
-        "fill": "none",
-        "stroke-width": view.mm(pen),
-        "stroke-linecap": "round",
-        "stroke-linejoin": "round",
-    }
-    return element("g", {"id": "slide-path", **pen_of_all}, *paths)
+    return element("g", {"id": "slide-path", **round_pen(view, pen)}, *paths)
 
 
 # The predicted path with its deviation from the wanted one N times as large.
