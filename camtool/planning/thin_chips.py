@@ -30,7 +30,7 @@ MIN_STRETCH_SHARE = 2.0
 """The feed does not rise for stretches shorter than so many times the tool's radius."""
 
 THICK_SHARE = 0.02
-"""What sticks out by less than this part of the tool's radius does not count."""
+"""Material that sticks out by less than this part of the tool's radius does not count."""
 
 FINE_RAD = math.radians(3.0)
 """Bounds of the engagement are as close as this."""

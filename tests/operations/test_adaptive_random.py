@@ -60,7 +60,7 @@ DEEP_SHARE = 0.01
 """Uncut strips up to twice this part of the tool's radius wide are the scallop."""
 
 DOWN_RAD = 0.02
-"""Where the tool comes down without a helix, less than this part of its disc is stock."""
+"""Less than this part of the tool's disc is stock where it comes down without a helix."""
 
 
 class Case(NamedTuple):

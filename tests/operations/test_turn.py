@@ -224,7 +224,7 @@ class TestScrew:
 
     @pytest.mark.parametrize("units", ["mm", "in"])
     def test_the_cycle_makes_the_same_moves(self, units: str) -> None:
-        """One block of G76 for all passes; in inches coordinates are rounded otherwise."""
+        """G76 cuts all passes in one block; in inches coordinates are rounded otherwise."""
         job = camtool.read_job(SAMPLES / "screw.toml")
         paths = []
         for cycles in ("false", "true"):

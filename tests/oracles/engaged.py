@@ -14,7 +14,7 @@ from camtool.planning.items import CutRun
 
 DIRECTIONS = 360
 EVERY = 23
-"""One of so many chords is looked at."""
+"""The oracle looks at every chord of this number."""
 
 
 def greatest_engagement(

@@ -46,7 +46,7 @@ FOCUS_SHARE = 0.03
 """Distance of places that are looked at more closely, over the tool's radius."""
 
 BEHIND_SHARE = 0.02
-"""What is swept ends this part of the radius behind the place that is looked at: the circle there
+"""The swept area ends this part of the radius behind the place that is looked at: the circle there
 would lie on the edge of what is swept up to it."""
 
 

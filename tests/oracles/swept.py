@@ -23,7 +23,7 @@ FINE_CHORD_RAD = 0.015
 """The same where it decides what can be reached."""
 
 FLAT = 1e-4
-"""How far chords of moves are from their arcs, over the tool's radius."""
+"""Greatest distance of chords of moves from their arcs, over the tool's radius."""
 
 PLACES, LATTICE_RAD = 30_000, 0.4
 """Places of the lattice within the region, and its turn."""
