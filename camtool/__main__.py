@@ -1,6 +1,43 @@
-"""`python -m camtool` is the same as the console script `camtool`."""
+"""`python -m camtool` is the same as the console script `camtool`: `run`."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import sys
+import threading
+from contextlib import suppress
+from typing import NoReturn
 
 from camtool.cli.main import main
 
+
+def run() -> NoReturn:
+    """Run the command line as a process of its own, and end it without taking apart what the
+    system takes back at once: some 20 ms after a `post` (docs/decisions/0115-start.md)."""
+    try:
+        main()
+    except SystemExit as end:
+        if _is_watched() or not isinstance(end.code, int):
+            raise
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:
+                with suppress(OSError, ValueError):  # full, or closed
+                    stream.flush()
+        os._exit(end.code)
+
+
+def _is_watched() -> bool:
+    """True if the process has more to do when its command has ended: for a profiler, a debugger,
+    `python -i`, or a thread that Python waits for."""
+    monitoring = getattr(sys, "monitoring", None)  # from Python 3.12 on
+    tools = [] if monitoring is None else [monitoring.get_tool(number) for number in range(6)]
+    threads = [each for each in threading.enumerate() if not each.daemon]
+    return bool(
+        sys.gettrace() or sys.getprofile() or sys.flags.inspect or any(tools) or threads[1:]
+    )
+
+
 if __name__ == "__main__":
-    main()
+    run()

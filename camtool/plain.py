@@ -8,8 +8,6 @@ shown as escapes. JSON text has JSON's own escapes instead, so that its reader g
 
 from __future__ import annotations
 
-import base64
-import json
 import re
 from typing import Any
 from unicodedata import category
@@ -47,6 +45,8 @@ def one_line(text: str) -> str:
 def to_json(value: Any, indent: int = 2) -> str:
     """Format records, lists, tables and scalars as JSON text that ends with a line break, on one
     line if `indent` is 0; bytes of names that are not text appear as \\udcXX."""
+    import json
+
     import msgspec
 
     try:
@@ -72,4 +72,6 @@ def _shortened(text: str, length: int) -> str:
 
 def embedded_address(svg: bytes) -> str:
     """Return the address of a picture that is embedded in a page."""
+    import base64
+
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"

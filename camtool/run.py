@@ -6,7 +6,6 @@ and toolpaths that `import camtool` returns are here too: they show a picture in
 
 from __future__ import annotations
 
-import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -177,6 +176,8 @@ class Run(Shown):
     ) -> ReportPage:
         """Return the page of the run with captions and addresses of pictures, the address of a
         picture of the stock, and the flags that made it."""
+        import hashlib
+
         machine, program = self.target.machine, self.program
         setup = Setup(
             machine=f"{machine.target.name}: {machine.target.title}",

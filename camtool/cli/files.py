@@ -10,7 +10,6 @@ is gone, Ctrl-C) leaves old files as they were and no new one.
 from __future__ import annotations
 
 import errno
-import hashlib
 import io
 import os
 import re
@@ -345,6 +344,8 @@ SEAL = b"<!-- camtool: sha256 "
 def seal(svg: bytes, maker: str) -> bytes:
     """Return the picture with the seal of its maker, the name of a page or of the outputs of a
     drawing."""
+    import hashlib
+
     name = os.fsencode(PurePath(maker).name)
     digest = hashlib.sha256(name + b"\n" + svg).hexdigest().encode()
     return svg + SEAL + digest + b" -->\n"

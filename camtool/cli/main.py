@@ -14,7 +14,6 @@ import os
 import signal
 import sys
 import threading
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib import import_module
@@ -40,6 +39,11 @@ AGAIN_S = 0.01
 
 _FULL = (errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG)
 """Errors of a full or closed stream, which name no file."""
+
+BLAS_THREADS = "OPENBLAS_NUM_THREADS"
+"""The variable that says how many threads numpy's linear algebra starts when it is loaded. They
+wait by running, 20 to 40 ms of every command on two cores, and our matrices are small: one is
+enough. With one, sums have one order on every machine."""
 
 GARBAGE_AFTER = 150_000
 """How many more objects are made than freed before Python looks for cycles of garbage. Its default
@@ -156,6 +160,7 @@ def main() -> NoReturn:
     """Run the command line; never returns. Every error is one line on stderr."""
     _keep_streams()
     _collect_seldom()
+    os.environ.setdefault(BLAS_THREADS, "1")
     sys.unraisablehook = _repeat_interrupt
     if COMPLETE in os.environ:
         from camtool.cli.completion import answer_shells
@@ -224,6 +229,8 @@ def _system_errors() -> Iterator[None]:
 
 def _trace(debug: bool) -> None:
     if debug:
+        import traceback
+
         for line in traceback.format_exc().splitlines():
             say(line, quiet=False)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -466,6 +464,8 @@ def _tool(run: Run) -> ToolNote | None:
 
 def _programs_json(runs: Sequence[Run], parts: Sequence[RequestedOutputs]) -> bytes:
     """Return JSON with file, set-up, tool, picture, page and report of each program."""
+    import json
+
     from camtool.planning.naming import setup_name
 
     programs = []
@@ -564,6 +564,8 @@ def _digests(files: Files) -> Digests:
 
 
 def _digest(file: Path) -> bytes | None:
+    import hashlib
+
     try:
         with file.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").digest()

@@ -7,7 +7,6 @@ Field names carry their units. `msgspec` checks types and ranges and refuses unk
 
 from __future__ import annotations
 
-import hashlib
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -467,6 +466,8 @@ class Machine(
         """SHA-256, hex, of all that a file must say to get this machine: equal for equal machines,
         on every computer, wherever their records stand in the code. How well its numbers are known
         is no part of it: no program depends on that."""
+        import hashlib
+
         values = {key: value for key, value in _given_values(self).items() if key != "uncertainty"}
         data = msgspec.json.encode(values, order="deterministic")
         return hashlib.sha256(data).hexdigest()

@@ -11,7 +11,6 @@ of which extends a target, or another one of them, and is known by its own name.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -181,6 +180,8 @@ class LoadedTarget:
 
         Keys of `needs` always differ: the target's own value is `not said`.
         """
+        import json
+
         values = dict(_flat("", self.values()))
         base = read_table(self.file) if self.base is None else self.base
         needs = missing_keys(base, str(self.file))
@@ -465,6 +466,8 @@ class Guarded:
 
 
 def _as_text(value: Any) -> str:
+    import json
+
     return NOT_SAID if value is None else json.dumps(value, ensure_ascii=False)
 
 

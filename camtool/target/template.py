@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -163,6 +162,8 @@ def _rows(
 
 
 def _line(setting: ControllerSetting, key: str) -> str:
+    import json
+
     text = f"{key} = {json.dumps(setting.value)}"
     if setting.doubt:
         return f"{f'# {text}':<28}# {setting.said}: {setting.doubt}"

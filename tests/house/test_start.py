@@ -3,6 +3,7 @@
 docs/benchmarks.md has the times.
 """
 
+import os
 import re
 import shutil
 import subprocess
@@ -167,3 +168,20 @@ def test_a_checkout_without_compiled_kernels_names_the_command(tmp_path: Path) -
     assert not (tmp_path / "part.pic").exists()
     assert run("-P").returncode == 0
     assert (tmp_path / "part.pic").stat().st_size > 0
+
+
+@pytest.mark.parametrize(("said", "threads"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "3"}, 3)])
+def test_linear_algebra_has_one_thread_unless_the_user_says_more(
+    said: dict[str, str], threads: int
+) -> None:
+    code = (
+        "import sys, os, atexit; sys.argv = ['camtool', *sys.argv[1:]]; "
+        "atexit.register(lambda: print('ASKED', os.environ['OPENBLAS_NUM_THREADS'])); "
+        "from camtool.cli.main import main; assert 'numpy' not in sys.modules; main()"
+    )
+    command = [sys.executable, "-c", code, "targets", "--json"]
+    environment = {k: v for k, v in os.environ.items() if "_NUM_THREADS" not in k} | said
+    result = subprocess.run(
+        command, capture_output=True, text=True, env=environment, cwd=ROOT, check=True
+    )
+    assert result.stdout.rpartition("ASKED")[2].split() == [str(threads)]

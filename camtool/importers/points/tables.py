@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import math
 import re
 import warnings
@@ -320,6 +319,8 @@ _STROKE_KEYS = ("points", "closed", "layer")
 
 def parse_json(text: str, file: str) -> PointTable:
     """The strokes of a JSON text and its unit; DrawingError naming the field."""
+    import json
+
     try:
         value = json.loads(text, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:
