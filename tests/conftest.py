@@ -8,6 +8,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
+from tests.strategies import scaled
+
 # What somebody who runs the tests keeps for camtool is no matter of theirs.
 os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
 
@@ -26,16 +28,16 @@ providers.is_local_module_file = lambda path: False
 # are kept. Commands search as seldom as this.
 gc.set_threshold(150_000)
 
-# No deadline: speed is no matter of tests here.
+# The number of examples of a property that names none; tests.strategies scales all numbers. No
+# deadline: speed is no matter of tests here.
 settings.register_profile(
-    "default",
-    max_examples=60,
+    "tests",
+    max_examples=scaled(60),
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
-settings.register_profile("nightly", parent=settings.get_profile("default"), max_examples=2000)
-settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
+settings.load_profile("tests")
 
 
 def pytest_collection_finish() -> None:

@@ -21,11 +21,23 @@ GRID_MM = 1e-3
 """Random points lie on a grid, so that two of them are equal or clearly apart."""
 
 
-def examples(usual: int, nightly: int, **more: Any) -> settings:
-    """Return the settings of a property: so many examples, of which each costs much; with the
-    profile `nightly` as many as that says."""
-    many = os.environ.get("HYPOTHESIS_PROFILE") == "nightly"
-    return settings(max_examples=nightly if many else usual, **more)
+SHARE = {"default": 0.4, "checked": 0.2, "nightly": 30.0}[
+    os.environ.get("HYPOTHESIS_PROFILE", "default")
+]
+"""The part of the examples that a property asks for: by day few (they are the same in every run),
+fewer with checked kernels, and many at night."""
+
+
+def scaled(number: int) -> int:
+    """Return how many examples are tried where a property asks for this number."""
+    return math.ceil(number * SHARE)
+
+
+def examples(number: int, nightly: int | None = None, **more: Any) -> settings:
+    """Return the settings of a property: a number of examples, scaled for the kind of run, or
+    what it says for the night where each costs much."""
+    at_night = SHARE > 1.0 and nightly is not None
+    return settings(max_examples=nightly if at_night else scaled(number), **more)
 
 
 def coordinates(reach_mm: float = 20.0) -> st.SearchStrategy[float]:

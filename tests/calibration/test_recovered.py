@@ -7,7 +7,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.calibration.calibrate import Calibration, calibrate
@@ -25,6 +25,7 @@ from camtool.calibration.measurements import (
 from camtool.machine.model import CORRELATED_KEYS, Machine
 from camtool.target.registry import load_target
 from tests.oracles import measured
+from tests.strategies import examples
 
 RECORDS: dict[str, type[Coupon]] = {
     "lines": LinesCoupon, "squares": SquareCoupon, "circles": CircleCoupon, "steps": StepsCoupon
@@ -101,7 +102,7 @@ TELLS_SQUARENESS = {"squares", "circles"}
     ("kind", "backwards"),
     [*((kind, False) for kind in KINDS), ("squares", True)],
 )
-@settings(max_examples=15)
+@examples(15)
 @given(machine=FAULTS)
 def test_exact_readings_give_the_machine_back(
     kind: Kind, backwards: bool, machine: Machine

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -24,6 +24,7 @@ from camtool.calibration.servo import (
 from camtool.errors import InputError, OptionError
 from camtool.machine.servo import MotorModel, SpeedLoop
 from camtool.target.registry import load_target
+from tests.strategies import examples
 
 TICK_S = 0.005
 THESIS = MotorModel(gain=680 / 70, time_constant_s=0.067)
@@ -60,7 +61,7 @@ def by_small_steps(
     return np.array(speeds), np.array(places)
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     st.floats(2.0, 12.0),
     st.floats(0.02, 0.2),
@@ -92,7 +93,7 @@ def sample(motor: MotorModel, drives: list[float], seed: int, noise: float) -> M
     )
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(
     st.floats(3.0, 12.0),
     st.floats(0.03, 0.15),

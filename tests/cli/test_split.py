@@ -145,7 +145,7 @@ def cuts(path: Toolpath) -> list[tuple[float, ...]]:
     return [tuple(row) for row in np.nan_to_num(rows, nan=-1.0).tolist()]
 
 
-@examples(20, 600, deadline=None)
+@examples(20, 600)
 @given(job=jobs())
 def test_the_programs_together_cut_what_the_one_would(job: Job) -> None:
     machine = load_target("grbl").machine

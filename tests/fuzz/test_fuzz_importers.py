@@ -3,7 +3,7 @@
 from functools import cache
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import CamtoolError
@@ -11,6 +11,7 @@ from camtool.importers.options import FORMATS, ReadOptions
 from tests.fuzz.damage import EVERY, Damage, cut, flip, headless
 from tests.fuzz.reading import read_or_refuse
 from tests.fuzz.seeds import BINARIES, TEXTS
+from tests.strategies import examples
 from tests.waiting import no_chewing
 
 pytestmark = pytest.mark.checked
@@ -36,7 +37,7 @@ def test_each_seed_is_whole(name: str) -> None:
     hits=st.lists(st.tuples(st.sampled_from(EVERY), CHOICES, CHOICES), min_size=1, max_size=3),
     everything=st.booleans(),
 )
-@settings(max_examples=25)
+@examples(25)
 def test_damaged_texts(name: str, hits: list[tuple[Damage, int, int]], everything: bool) -> None:
     data = seed(name)
     for damage, at, choice in hits:
@@ -48,7 +49,7 @@ def test_damaged_texts(name: str, hits: list[tuple[Damage, int, int]], everythin
 
 @pytest.mark.parametrize("name", BINARIES)
 @given(damage=st.sampled_from([cut, headless, flip]), at=CHOICES, choice=CHOICES)
-@settings(max_examples=40)
+@examples(40)
 def test_damaged_binaries(name: str, damage: Damage, at: int, choice: int) -> None:
     with no_chewing():
         read_or_refuse(damage(seed(name), at, choice), name, ReadOptions())
@@ -65,7 +66,7 @@ def test_any_bytes_as_any_format(data: bytes, form: str | None) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEEDS)
 @given(hits=st.lists(st.tuples(st.sampled_from(EVERY), CHOICES, CHOICES), min_size=1, max_size=6))
-@settings(max_examples=1500)
+@examples(1500)
 def test_damaged_a_thousand_times(name: str, hits: list[tuple[Damage, int, int]]) -> None:
     data = seed(name)
     for damage, at, choice in hits:

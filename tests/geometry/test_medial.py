@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 
 from camtool.arrays import Floats
 from camtool.geometry.distance import nearest
@@ -17,7 +17,7 @@ from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.kernels.discs import LENGTH, SWEEP, frame
 from camtool.operations.vcarve.work import with_level
 from tests.oracles import contours as shapes
-from tests.strategies import contours
+from tests.strategies import contours, examples
 
 pytestmark = pytest.mark.checked
 
@@ -61,7 +61,7 @@ def test_the_same_with_islands() -> None:
 
 
 @given(contours())
-@settings(max_examples=40)
+@examples(40)
 def test_random_contours(path: Polyline) -> None:
     assume(shapes.is_simple(path))
     region = region_of(path)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import Frames, length, point_at, signed_area
@@ -51,7 +51,7 @@ def test_contours(source: tuple[Polyline, float], share: float, sign: float) -> 
     assert complaints(offset(p, d), p, d, np.random.default_rng(0)) == []
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(contours(), SHARES, st.floats(0.0, 6.3), st.integers(0, 11))
 def test_changed_contours(
     source: tuple[Polyline, float], share: float, angle: float, start: int
@@ -73,7 +73,7 @@ def test_changed_contours(
         )
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(contours(), SHARES, st.floats(0.1, 0.9))
 def test_in_two_steps_as_in_one(source: tuple[Polyline, float], share: float, part: float) -> None:
     # Farther than d1 + d2 from a path is farther than d2 from what is d1 from it.
@@ -86,7 +86,7 @@ def test_in_two_steps_as_in_one(source: tuple[Polyline, float], share: float, pa
     assert largest[1] == pytest.approx(largest[0], rel=1e-6)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_paths_that_may_cross_themselves(seed: int, closed: bool) -> None:
     rng = np.random.default_rng(seed)

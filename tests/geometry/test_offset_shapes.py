@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from camtool.errors import GeometryError, OptionError
@@ -46,7 +46,7 @@ from tests.oracles.contours import (
 from tests.oracles.offset import distance_complaints
 from tests.oracles.offset_shapes import shape_complaints
 from tests.paths import mirrored, moved, offset, scaled
-from tests.strategies import contours
+from tests.strategies import contours, examples
 
 pytestmark = pytest.mark.checked
 
@@ -294,8 +294,8 @@ def apart(paths: list[Polyline]) -> bool:
     return len(self_crossings(Segments.of(Polylines.of(paths)))) == 0
 
 
-@settings(max_examples=12)
-@given(shapes(), st.floats(0.005, 0.4), st.sampled_from([1.0, -1.0]))
+@examples(12, nightly=1500)
+@given(shapes(tuple(RANDOM)), st.floats(0.005, 0.4), st.sampled_from([1.0, -1.0]))
 def test_random_shapes(source: tuple[list[Polyline], float], share: float, sign: float) -> None:
     paths, size = source
     assume(apart(paths))
@@ -303,7 +303,7 @@ def test_random_shapes(source: tuple[list[Polyline], float], share: float, sign:
     assert shape_complaints(list(offset_shape(lines, d)), list(lines), d, rng()) == []
 
 
-@settings(max_examples=8)
+@examples(8)
 @given(shapes(), st.floats(0.005, 0.2), st.sampled_from([1.0, -1.0]), st.floats(1.0, 4.0))
 def test_random_mitres(
     source: tuple[list[Polyline], float], share: float, sign: float, limit: float
@@ -315,7 +315,7 @@ def test_random_mitres(
     assert shape_complaints(list(results), list(lines), d, rng(), limit) == []
 
 
-@settings(max_examples=10)
+@examples(10)
 @given(st.integers(0, 2**32 - 1))
 def test_contours_that_cross_each_other(seed: int) -> None:
     generator = np.random.default_rng(seed)
@@ -332,7 +332,7 @@ def test_contours_that_cross_each_other(seed: int) -> None:
         assert points == []
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(
     st.lists(
         st.tuples(st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(0.5, 3.0)),
@@ -433,19 +433,7 @@ def test_thousands_of_mitres(kind: str) -> None:
                 assert found == [], f"{p.vertices.tolist()} at {d}, {limit}"
 
 
-@pytest.mark.slow
-@settings(max_examples=1500)
-@given(shapes(tuple(RANDOM)), st.floats(0.003, 0.45), st.sampled_from([1.0, -1.0]))
-def test_thousands_of_shapes(
-    source: tuple[list[Polyline], float], share: float, sign: float
-) -> None:
-    paths, size = source
-    assume(apart(paths))
-    lines, d = shape(paths), sign * share * size
-    assert shape_complaints(list(offset_shape(lines, d)), list(lines), d, rng()) == []
-
-
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     st.lists(
         st.tuples(

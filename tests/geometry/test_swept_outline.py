@@ -69,7 +69,7 @@ def test_a_path_that_ends_beside_its_start() -> None:
     )
 
 
-@examples(60, 3000, deadline=None)
+@examples(60, 3000)
 @given(
     st.lists(polylines(max_points=7), min_size=1, max_size=3),
     st.sampled_from([0.05, 0.5, 3.0, 20.0]),

@@ -8,7 +8,7 @@ import zlib
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -23,6 +23,7 @@ from camtool.importers.bitmap.strokes import MEETING_PX, strokes
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_bytes
 from camtool.pictures import draw
+from tests.strategies import examples
 
 SIDE_MM = 40.0
 HALF_PIXEL = 0.5
@@ -93,7 +94,7 @@ turns = st.tuples(
 )
 
 
-@settings(deadline=None, max_examples=40)
+@examples(40)
 @given(st.sampled_from(sorted(SHAPES)), st.sampled_from([90, 151, 240]), turns, st.booleans())
 def test_contours_lie_within_the_limit_and_half_a_pixel_of_the_truth(
     shape: str, side: int, turn: tuple[float, float, float, float, float], stairs: bool
@@ -190,7 +191,7 @@ def bar(angle: float, *, cross: bool) -> str:
     return page('<rect x="6" y="17" width="28" height="6"/>' + rest, f"rotate({angle} 20 20)")
 
 
-@settings(deadline=None, max_examples=30)
+@examples(30)
 @given(st.floats(-90.0, 90.0), st.sampled_from([150, 301]), st.booleans(), st.booleans())
 def test_centre_lines_of_a_bar_and_of_a_cross(
     angle: float, side: int, cross: bool, stairs: bool
@@ -376,7 +377,6 @@ def test_flags_of_pictures_are_refused_elsewhere(options: dict[str, object], fla
 # Broken, and too large.
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12), st.booleans())
 def test_damaged_pictures_are_read_or_refused(seed: int, count: int, jpeg: bool) -> None:
     rng = np.random.default_rng(seed)

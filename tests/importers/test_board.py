@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
@@ -24,6 +24,7 @@ from camtool.geometry.measure import extents, sample, signed_areas
 from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.importers.read import read_bytes, read_drawing
+from tests.strategies import examples
 
 pytest.importorskip("gerbonara", reason="the extra boards is not installed")
 
@@ -134,7 +135,7 @@ EDGE_MM = 5e-4
 """Points nearer to an edge than this are not looked at: chords lie within 0.2 µm of arcs."""
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.lists(st.tuples(SHAPE, st.booleans()), min_size=1, max_size=8), st.integers(0, 2**31))
 def test_areas_are_those_of_a_painter(shapes: list[tuple[tuple, bool]], seed: int) -> None:
     body = f"{APERTURES}%LPD*%\n{written(FAR)}"

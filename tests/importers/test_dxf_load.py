@@ -7,7 +7,7 @@ import io
 import ezdxf
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
@@ -17,6 +17,7 @@ from camtool.importers.dxf import walk as dxf_walk
 from camtool.importers.dxf.reader import read
 from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
+from tests.strategies import examples
 
 OPTIONS = ReadOptions(tolerance_mm=0.01, text="stroke", dimensions=True)
 
@@ -91,7 +92,7 @@ def attempt(data: bytes) -> None:
     assert "\n" not in message
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.data())
 def test_any_lines_may_be_changed_lost_or_doubled(data):
     lines = TEXTS[data.draw(st.sampled_from(sorted(TEXTS)))].split(b"\n")
@@ -109,7 +110,7 @@ def test_any_lines_may_be_changed_lost_or_doubled(data):
     attempt(b"\n".join(lines))
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.data())
 def test_any_bytes_of_a_binary_file_may_be_changed(data):
     content = bytearray(BINARIES[data.draw(st.sampled_from(sorted(BINARIES)))])
@@ -119,7 +120,7 @@ def test_any_bytes_of_a_binary_file_may_be_changed(data):
     attempt(bytes(content))
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(st.data())
 def test_a_binary_file_that_is_cut_off_is_refused_or_has_all_its_entities(data):
     content = BINARIES[data.draw(st.sampled_from(sorted(BINARIES)))]

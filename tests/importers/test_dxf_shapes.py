@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from ezdxf import path as ezdxf_path
 from ezdxf.math import Vec3
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
@@ -20,6 +20,7 @@ from camtool.importers.dxf.reader import read
 from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 from tests.oracles import arcs
+from tests.strategies import examples
 
 TOLERANCE_MM = 0.0005
 FLATTENING_MM = 0.002
@@ -249,7 +250,7 @@ def mapped(block, *inserts) -> list[np.ndarray]:
     return found
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(-180, 180),

@@ -6,7 +6,7 @@ import io
 import ezdxf
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
@@ -21,6 +21,7 @@ from camtool.importers.svg.reader import read
 from camtool.importers.text import TextLook, WantedFont, font_for
 from tests.importers.test_dxf_text import MODES, OUTLINE_FONT, needs_font
 from tests.oracles.svg_ink import ink
+from tests.strategies import examples
 
 FAMILY = "DejaVu Sans"
 NEAR_MM = 1e-6
@@ -393,7 +394,7 @@ def test_the_letters_of_a_file_are_bounded(monkeypatch: pytest.MonkeyPatch) -> N
         drawn("<text y='9'>AB</text>" * 51)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(
     st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=30),
     st.sampled_from(["x", "dy", "font-family", "font-size", "font-weight", "style", "xml:space"]),

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
@@ -30,6 +30,7 @@ from camtool.inspection.sizes import (
     size_of,
     stations_of,
 )
+from tests.strategies import examples
 
 WHOLE = np.array([[0.0, 2.0 * math.pi]])
 HOLE = CircleFeature(0, (1.0, 2.0), 3.0, WHOLE)
@@ -73,7 +74,7 @@ def cleared(feature: Feature, side: int, path: SweptSegments) -> Floats:
     return np.array(found)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(
     feature=st.sampled_from([HOLE, EDGE]),
     side=st.sampled_from([1, -1]),
@@ -103,7 +104,7 @@ def test_envelopes_are_the_edge_of_what_the_tool_clears(
     assert np.median(np.abs(mine[reached] - theirs[reached])) < 1e-5
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(feature=st.sampled_from([HOLE, EDGE]), seed=st.integers(0, 10_000))
 def test_at_each_depth_the_moves_count_that_reach_it(feature: Feature, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -201,7 +202,7 @@ def measured(
     return size.fit_mm
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(
     tool=st.floats(0.2, 1.4),
     grown=st.floats(-0.1, 0.1),
@@ -274,7 +275,6 @@ def test_widths_between_edges_that_move_apart() -> None:
     assert (size.low_mm, size.high_mm) == pytest.approx((6.085, 6.135), abs=1e-3)
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 100_000), count=st.integers(3, 60), unknowns=st.integers(1, 3))
 def test_narrowest_zones_by_a_linear_programme(seed: int, count: int, unknowns: int) -> None:
     random = np.random.default_rng(seed)

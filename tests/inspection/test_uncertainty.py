@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import uncertainties
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -30,6 +30,7 @@ from camtool.inspection.uncertainty import (
 from camtool.machine.model import AxisUncertainty, Machine, Uncertainty
 from camtool.records import replace
 from camtool.target.registry import load_target
+from tests.strategies import examples
 
 NAMES = (
     "x.backlash_mm",
@@ -505,7 +506,7 @@ def uniform_below(z: float) -> float:
 CLOSE = st.floats(0.0, 12.0).map(lambda power: 1.0 - 10.0**-power)
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(
     st.floats(-6.0, 6.0),
     st.floats(-6.0, 6.0),
@@ -555,7 +556,7 @@ def test_probabilities_of_one_size() -> None:
         assert within(size, 0.0, (10.0, 10.02)) == sure
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     st.floats(-0.03, 0.03), st.floats(0.0, 0.03), st.floats(0.001, 0.03), st.floats(0.0, 0.03),
     st.floats(-1.0, 1.0), st.integers(0, 1000),

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.findings import Severity
@@ -21,6 +21,7 @@ from camtool.planning.plan import plan, planned
 from camtool.records import replace
 from camtool.target.registry import load_target
 from tests.oracles.run_sweep import dense
+from tests.strategies import examples
 
 MILL_MM = 3.0
 
@@ -173,7 +174,7 @@ def test_each_shape_of_a_plate_is_cut_as_a_machinist_would(tmp_path: Path) -> No
     assert "LOOSE_PIECE" not in {each.code.name for each in made.findings}
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.floats(0.0, 2.0 * math.pi), st.booleans(), st.permutations(range(len(PLATE))))
 def test_turned_mirrored_and_shuffled_drawings_are_cut_alike(
     turn_rad: float, mirrored: bool, order: list[int]
@@ -184,7 +185,7 @@ def test_turned_mirrored_and_shuffled_drawings_are_cut_alike(
     assert found == expected
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.floats(0.5, 40.0), st.floats(-0.05, 0.05), st.floats(0.0, math.pi))
 def test_a_slot_is_as_wide_as_the_mill_or_not(
     length: float, wider: float, turn_rad: float
@@ -207,7 +208,7 @@ def test_a_slot_as_wide_as_the_mill_is_cut_along_its_middle(tmp_path: Path) -> N
     assert np.abs(within[:, 1] - 10.0).max() <= 0.011
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.lists(st.tuples(st.floats(0, 60), st.floats(0, 60), st.floats(1, 12), st.floats(1, 12)),
                 min_size=1, max_size=8))  # fmt: skip
 def test_crowded_parts_are_those_whose_buffers_meet(
@@ -325,7 +326,7 @@ def test_layers_called_countersink_are_countersunk(
     assert errors_of(drawing, with_mill(BIT, thickness_mm=6.0), tmp_path) == []
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(hole=st.floats(3.2, 5.4), share=st.floats(1.8, 2.1), degrees=st.sampled_from([82.0, 90.0]))
 def test_a_countersink_is_as_wide_as_drawn(
     hole: float, share: float, degrees: float, tmp_path_factory: pytest.TempPathFactory

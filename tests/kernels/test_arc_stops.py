@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 from camtool_postprocessors.pic_mmh import steps as loops
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.oracles import arc_ends as oracle
+from tests.strategies import examples
 
 pytestmark = pytest.mark.checked
 
@@ -32,7 +33,7 @@ def error_of(start: tuple[int, int], rounded: bool) -> int:
 
 @pytest.mark.parametrize("reading", oracle.READINGS)
 @pytest.mark.parametrize("rounded", [False, True])
-@settings(deadline=None, max_examples=150)
+@examples(150)
 @given(
     x=st.integers(-120, 120),
     y=st.integers(-120, 120),

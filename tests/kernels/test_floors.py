@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.kernels.floors import (
@@ -19,6 +19,7 @@ from camtool.kernels.floors import (
     sums_along,
 )
 from tests.oracles.stepped_lines import steps_of_line, sums_of_line, values_of_line
+from tests.strategies import examples
 
 pytestmark = pytest.mark.checked
 
@@ -140,7 +141,7 @@ def test_figures_of_a_whole_line(events: int, size: int, nearest: bool) -> None:
     assert j == 0 or counted_along(events, line, form, (j - 0.5) * unit) < rank
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(st.integers(1 << 20, 1 << 29), st.floats(0.0, 1.0), st.integers(1, 60))
 def test_long_lines_are_sums_of_their_parts(events: int, slope: float, parts: int) -> None:
     """Beyond 63 bits: the sums of a line in one piece are those of windows of it."""

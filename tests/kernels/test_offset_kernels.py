@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.boxes import IndexedCurves, curve_rows_of
@@ -31,6 +31,7 @@ from tests.oracles import offset_stages as oracle
 from tests.oracles.contours import RANDOM, gear
 from tests.oracles.offset_shapes import kites
 from tests.paths import offset
+from tests.strategies import examples
 
 pytestmark = pytest.mark.checked
 
@@ -147,7 +148,7 @@ def test_thousands_of_points_in_one_place_are_one_node() -> None:
     assert (node[:5000] == 0).all()
 
 
-@settings(max_examples=12)
+@examples(12)
 @given(SEEDS, st.sampled_from(list(RANDOM)), st.floats(0.01, 0.6), st.booleans())
 def test_stages(seed: int, kind: str, share: float, outward: bool) -> None:
     rng = np.random.default_rng(seed)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -26,6 +26,7 @@ from camtool.stock.wanted import CopperNets
 from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 from tests.oracles.contours import closed
+from tests.strategies import examples
 
 pytest.importorskip("gerbonara", reason="the extra boards is not installed")
 
@@ -164,7 +165,7 @@ def flood(
     return pairs, [len(labels) for labels in of_net]
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.integers(0, 2**31))
 def test_nets_are_those_of_a_flood_of_pixels(seed: int) -> None:
     """Pads of random sizes, and grooves along lines that divide the board at random."""

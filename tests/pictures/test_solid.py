@@ -11,7 +11,7 @@ import click
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.cli.main import cli
@@ -36,6 +36,7 @@ from camtool.toolpath.moves import Toolpath
 from tests.drawings import drawing_of
 from tests.oracles.png import decode
 from tests.stock.cuts import moves_of
+from tests.strategies import examples
 
 OUTSIDE = ("iso", "front", "side")
 Pixels = npt.NDArray[np.uint8]
@@ -330,7 +331,7 @@ def literal(heights: Pixels, cell: float, camera: Camera, u: float, v: float) ->
     return math.nan
 
 
-@settings(max_examples=6, deadline=None)
+@examples(6)
 @given(seed=st.integers(0, 1000), view=st.sampled_from(OUTSIDE))
 def test_each_pixel_shows_what_a_ray_meets_first(seed: int, view: str) -> None:
     rng, cell, camera = np.random.default_rng(seed), 1.0, CAMERAS[view]

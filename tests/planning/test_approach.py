@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from camtool_postprocessors.pic_mmh.dialect import PicMmhController
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
@@ -23,7 +23,7 @@ from camtool.simulation.motion import ALL
 from camtool.verification.cuts import cut_moves
 from tests.paths import scaled
 from tests.planning.reversal_parts import reversals_of, run_of, square, toolpath, with_play
-from tests.strategies import contours, open_contours
+from tests.strategies import contours, examples, open_contours
 from tests.targets import simulate
 
 
@@ -93,7 +93,7 @@ def test_an_engaged_axis_comes_straight(machine: Machine) -> None:
     assert come(line((1 + 0.5 * MARGIN, 3), (2, 4))) == pytest.approx((1 - 0.5 * MARGIN, 3))
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.lists(st.one_of(contours(max_points=6), open_contours(max_points=6)), max_size=5))
 def test_the_first_motion_of_a_cut_is_no_reversal(machine: Machine, paths: list[Polyline]) -> None:
     follower = replace(machine, controller=PathController(grid="none"))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -53,7 +53,7 @@ def sizes(run: Run) -> dict[str, tuple[float, float]]:
     return {each.name: (each.nominal_mm, each.predicted_mm) for each in run.report.dimensions}
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(
     path=star_contours(),
     beyond=st.floats(1e-4, 0.9 * R),
@@ -71,7 +71,7 @@ def test_a_profile_runs_as_a_thinner_tool_would(
     assert nearer.lines.vertices == pytest.approx(thin.lines.vertices, abs=1e-9)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(
     path=star_contours(),
     beyond=st.floats(0.002, 0.5 * R),

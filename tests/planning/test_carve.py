@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -29,7 +29,7 @@ from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 from tests.oracles import contours as shapes
 from tests.oracles.carved import area_of, dense, swept
-from tests.strategies import contours
+from tests.strategies import contours, examples
 
 CHORD_MM = 1e-3
 STEP_MM = 0.1
@@ -316,7 +316,7 @@ def test_an_open_path_is_refused_by_name() -> None:
 
 
 @given(contours(), st.sampled_from([0.3, 1.5, 100.0]), st.sampled_from([0.0, 0.2]))
-@settings(max_examples=40)
+@examples(40)
 def test_random_contours_are_never_gouged(path: Polyline, depth: float, tip: float) -> None:
     setting = setting_of(-depth, tip_diameter_mm=tip)
     work = vcarve(chosen_of([path]), setting)

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -25,6 +25,7 @@ from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
 from tests.oracles.run_sweep import dense
 from tests.planning.test_drill import circle
+from tests.strategies import examples
 
 BIT = Tool(6.0, "v", tip_angle_rad=math.radians(90.0))
 
@@ -61,7 +62,7 @@ def surface(plan: Plan, points: Floats) -> Floats:
     return low
 
 
-@settings(deadline=None, max_examples=25)
+@examples(25)
 @given(
     width=st.floats(0.1, 1.2),
     offset=st.floats(0.02, 0.6),

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -33,6 +33,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
 from tests.oracles.path_machine import path_machine
+from tests.strategies import examples
 
 STOCK = Stock(2.0, (0.0, 0.0), (10.0, 10.0))
 
@@ -227,7 +228,7 @@ PROFILE = Operation(tool=Tool(3.0), depth_mm=1.0)
     width=st.floats(4.0, 60.0),
     height=st.floats(4.0, 50.0),
 )
-@settings(max_examples=60)
+@examples(60)
 def test_a_part_must_lie_within_the_stock(x: float, y: float, width: float, height: float) -> None:
     part, stock = shapely.box(x, y, x + width, y + height), shapely.box(0, 0, 40, 30)
     errors = [e for e in off_stock(job_on(PROFILE), box(x, y, width, height))
@@ -277,7 +278,7 @@ def test_a_clamp_reaches_the_stock(x: float, y: float, width: float, height: flo
 
 @pytest.mark.parametrize("lead", ["line", "arc"])
 @given(length=st.floats(0.5, 12.0), gap=st.floats(0.0, 12.0))
-@settings(max_examples=30)
+@examples(30)
 def test_leads_stay_over_the_stock(lead: str, length: float, gap: float) -> None:
     """A part `gap` from the left edge of the stock, which the tool reaches from there: where the
     path ends is looked up in the plan."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from shapely import Point, Polygon
 
@@ -28,7 +28,7 @@ from tests.oracles.offset import chords, dense, distance, inside
 from tests.oracles.routes import outside as outside_of_one
 from tests.paths import moved, scaled
 from tests.planning.pocket_cases import SHAPES, region_of, shapes
-from tests.strategies import polylines
+from tests.strategies import examples, polylines
 
 
 def way(paths: list[Polyline], start: tuple[float, float], end: tuple[float, float]) -> Polyline:
@@ -80,7 +80,7 @@ def are_joined(paths: list[Polyline], ends: list[np.ndarray]) -> bool:
     )
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(paths=shapes(), parts=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)))
 def test_ways_stay_in_the_region(paths: list[Polyline], parts: tuple[float, float]) -> None:
     region = region_of(paths)
@@ -97,7 +97,7 @@ def test_ways_stay_in_the_region(paths: list[Polyline], parts: tuple[float, floa
     assert found[[0, -1], :2] == pytest.approx(np.array(ends), abs=1e-5)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     paths=shapes(),
     parts=st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), max_size=9),
@@ -137,7 +137,7 @@ def test_the_closest_place_of_a_path(path: Polyline, place: tuple[float, float])
     assert math.dist(found, point) == pytest.approx(apart, abs=1e-6)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(path=polylines(closed=True), shape=st.sampled_from(["annulus", "ell", "letter"]))
 def test_outside_parts_are_what_samples_say(path: Polyline, shape: str) -> None:
     region = region_of(SHAPES[shape])

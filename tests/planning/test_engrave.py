@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -104,7 +104,7 @@ TRIANGLE = [shapes.opened((0, 0), (6, 0)), shapes.opened((6, 0), (3, 3 * math.sq
     ],
 )
 @given(share=st.floats(0.3, 3.0))
-@settings(max_examples=30)
+@examples(30)
 def test_lines_nearer_than_the_tool_is_wide_run_together(
     paths: list[Polyline], fits: float | None, share: float
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
@@ -17,14 +17,14 @@ from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import COLUMNS, Kind
 from tests.drawings import drawing_of
-from tests.strategies import polylines
+from tests.strategies import examples, polylines
 
 EIGHTH = 3.175
 MACHINE = load_target("grbl").machine
 
 
 @pytest.mark.parametrize("target", ["grbl", "linuxcnc", "valcnc"])
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(
     st.tuples(st.integers(-50, 50), st.integers(-50, 50)),
     st.tuples(st.integers(120, 190), st.integers(120, 180)),

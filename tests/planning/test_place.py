@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -316,7 +316,6 @@ def _fine(count: int) -> Polyline:
     return Polyline(np.array([*run, [4.0, 0.0, 0.5], [4.0, 3.0, 0.0], [0.0, 3.0, 0.0]]), True)
 
 
-@settings(deadline=None)
 @given(
     scale=st.sampled_from([1.0, 0.5, 0.06, 0.05, 0.04, 0.01, 1e-3]),
     count=st.integers(1, 60),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -26,6 +26,7 @@ from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
 from tests.paths import moved, scaled
 from tests.strategies import contours as star_contours
+from tests.strategies import examples
 
 R = 0.25
 
@@ -363,7 +364,7 @@ def test_a_round_hole_as_wide_as_the_tool_leaves_nothing_uncut() -> None:
     assert PlanningCode.UNREACHED in _codes(small)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.lists(star_contours(), min_size=2, max_size=5), st.integers(0, 2**32 - 1))
 def test_no_line_comes_nearer_to_any_contour_than_the_tool_is_wide(
     shapes: list[Polyline], seed: int

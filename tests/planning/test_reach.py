@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
@@ -34,6 +34,7 @@ from tests.oracles.contours import (
 )
 from tests.paths import mirrored, scaled
 from tests.planning.pocket_cases import LETTER_B, region_of, shapes
+from tests.strategies import examples
 
 FOOT = 1.0 - 0.25 * math.pi
 """Area at the foot of a square corner that a disc of radius 1 leaves."""
@@ -152,7 +153,7 @@ def test_open_paths_have_no_inside() -> None:
         unreached(Polylines.of([open_path((0, 0), (1, 0), (1, 1))]), 0.1)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(paths=shapes(), radius=st.floats(0.03, 3.0))
 def test_pieces_are_the_region_less_the_opened_one(paths: list[Polyline], radius: float) -> None:
     region = region_of(paths)
@@ -163,7 +164,7 @@ def test_pieces_are_the_region_less_the_opened_one(paths: list[Polyline], radius
     assert sum(piece.area_mm2 for piece in pieces) == pytest.approx(exact, abs=slack)
 
 
-@settings(max_examples=5)
+@examples(5)
 @given(paths=shapes(), radius=st.floats(0.2, 2.0))
 def test_pieces_are_where_chords_say(paths: list[Polyline], radius: float) -> None:
     region = region_of(paths)

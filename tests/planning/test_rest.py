@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -20,6 +20,7 @@ from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.plan import planned
 from tests.drawings import drawing_of
 from tests.oracles.run_sweep import dense, swept
+from tests.strategies import examples
 
 SLACK = 0.02
 WIDE, FINE = Tool(1.0), Tool(0.4)
@@ -54,7 +55,7 @@ SHAPES = {
 }
 
 
-@settings(max_examples=12)
+@examples(12)
 @given(
     shape=st.sampled_from(sorted(SHAPES)),
     angle=st.floats(0.0, 6.0),
@@ -94,7 +95,7 @@ def test_a_rest_of_nothing_says_so(machine: Machine) -> None:
     assert not len(fine.runs)
 
 
-@settings(max_examples=6)
+@examples(6)
 @given(angle=st.floats(0.0, 6.0), mirrored=st.booleans(), first=st.booleans())
 def test_the_flat_floor_of_a_carving_is_cleared_beside_its_slopes(
     machine: Machine, angle: float, mirrored: bool, first: bool

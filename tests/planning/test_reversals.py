@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.findings import Severity
@@ -46,7 +46,7 @@ from tests.planning.reversal_parts import (
     star,
     with_play,
 )
-from tests.strategies import contours, open_contours
+from tests.strategies import contours, examples, open_contours
 
 LOGO = Path(__file__).parents[2] / "samples" / "logo.dxf"
 
@@ -158,7 +158,7 @@ def test_reversals_and_errors_of_shapes(machine: Machine, name: str) -> None:
     assert (after.error_um.total.rms or 0.0) < (before.error_um.total.rms or 0.0)
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.one_of(contours(max_points=7), open_contours(max_points=7)))
 def test_the_error_never_rises(machine: Machine, path: Polyline) -> None:
     small = moved(scaled(path, 0.05), 1.0, 1.0)

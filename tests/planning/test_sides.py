@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.findings import Code, Finding, Severity
@@ -252,7 +252,7 @@ def test_a_cut_into_what_another_operation_keeps_is_an_error(machine: Machine) -
     assert "which is not cut itself" in finding.message
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(
     st.floats(-1.0, 1.5).filter(lambda gap: abs(gap) > 0.01 and abs(gap - D) > 0.01),
     st.floats(-1.0, 1.0),

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -12,6 +12,7 @@ from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from tests.postprocessors.i8751.machines import SAMPLE
+from tests.strategies import examples
 
 # How far the decoded path may lie from the arc: a chord's sagitta of a unit or step (or the
 # tolerance that the machine file gives to lines), and its points' own rounding, mm.
@@ -88,7 +89,7 @@ def cut_points(path: Toolpath) -> Floats:
     return np.concatenate(found)
 
 
-@settings(deadline=None, max_examples=30)
+@examples(30)
 @given(
     angle=st.floats(0.0, 2.0 * math.pi),
     chord=st.floats(0.5, 6.0),

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError
@@ -15,6 +15,7 @@ from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
 from camtool.target.registry import load_target
 from tests.drawings import drawing_of
+from tests.strategies import examples
 
 # A wave of half circles, which chains their ends; a lens; a nearly straight arc; a speck; a line.
 SHAPES = [
@@ -75,7 +76,7 @@ OPTIONS: dict[str, dict[str, st.SearchStrategy[Any]]] = {
 
 
 @pytest.mark.parametrize("name", OPTIONS)
-@settings(deadline=None, max_examples=12)
+@examples(12)
 @given(data=st.data())
 def test_an_option_is_refused_or_holds(name: str, data: st.DataObject) -> None:
     chosen = data.draw(st.fixed_dictionaries({}, optional=OPTIONS[name]))

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from hypothesis import Phase, settings
+from hypothesis import Phase
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
@@ -32,6 +32,7 @@ from camtool.target.wire import Conversation, Forecast, Manner, Packet, ToolAt, 
 from camtool.toolpath.moves import Toolpath
 from tests.feeding import motion
 from tests.sending.talking import Talking
+from tests.strategies import examples
 
 PROGRAMS = {
     "grbl": b"G21 G90\nG0 Z5\nM3 S1000\nG0 X1 Y1\n"
@@ -302,28 +303,18 @@ def _unknown(why: str) -> bool:
     return "switch it off" in why or "plug" in why or "nothing answers" in why
 
 
-def run(name: str, examples: int) -> None:
+@pytest.mark.parametrize("name", sorted(PROGRAMS))
+def test_any_order(name: str) -> None:
     machine = type(f"Sending to {name}", (Sending,), {"name": name})
     run_state_machine_as_test(  # type: ignore[no-untyped-call]
         machine,
-        settings=settings(
-            max_examples=examples,
+        settings=examples(
+            20,
             stateful_step_count=20,
             phases=(Phase.explicit, Phase.generate),  # to shrink a failure takes minutes
             report_multiple_bugs=False,
         ),
     )
-
-
-@pytest.mark.parametrize("name", sorted(PROGRAMS))
-def test_some_orders(name: str) -> None:
-    run(name, 20)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(PROGRAMS))
-def test_two_thousand_orders(name: str) -> None:
-    run(name, 2000)
 
 
 # Stopped at any time, and gone on with where it stands.

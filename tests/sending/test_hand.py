@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError
@@ -17,6 +17,7 @@ from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.wire import Hand, Manner, Tell, WireState
 from tests.sending.talking import Talking
 from tests.sending.test_any_order import SETTINGS
+from tests.strategies import examples
 
 READY = WireState.READY
 
@@ -119,7 +120,7 @@ def test_a_locked_grbl_takes_unlocking_alone() -> None:
     assert at.place()[0] == pytest.approx(-1.0, abs=0.01)
 
 
-@settings(max_examples=10)
+@examples(10)
 @given(held_s=st.floats(0.01, 4.0), feed=st.floats(20.0, 500.0), sense=st.sampled_from([1, -1]))
 def test_a_held_jog_ends_when_it_is_let_go(held_s: float, feed: float, sense: int) -> None:
     """Within the distance of braking, and what is fixed already (50 ms)."""
@@ -154,7 +155,7 @@ def test_a_held_jog_reaches_its_speed() -> None:
     at.until_ready()
 
 
-@settings(max_examples=10)
+@examples(10)
 @given(held_s=st.floats(0.1, 3.0))
 def test_a_machine_whose_sender_is_gone_stands_soon(held_s: float) -> None:
     """kill -9 while a key is held: grbl has no more than the pieces that it was sent."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError, ProgramError
@@ -25,6 +25,7 @@ from tests.oracles.path_machine import (
     length_of,
     path_machine,
 )
+from tests.strategies import examples
 from tests.targets import model_of, simulate
 
 FREE = "controller.grid=none"
@@ -99,7 +100,7 @@ def square(side: float = 1.0) -> Toolpath:
     return b.finish()
 
 
-@settings(max_examples=20)  # chunks of one sample are slow
+@examples(20)  # chunks of one sample are slow
 @given(jobs(), st.sampled_from([1, 7, 65536]))
 def test_every_row_gives_its_chunks_in_order(toolpath: Toolpath, chunk_steps: int) -> None:
     chunks = list(simulate(toolpath, path_machine(), Options(chunk_steps=chunk_steps)))
@@ -146,7 +147,7 @@ def test_extents_are_exact(toolpath: Toolpath) -> None:
     assert reach == pytest.approx(toolpath_extents(toolpath), abs=1e-12)
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(jobs(), st.sampled_from([1, 10, 65536]))
 def test_chunks_do_not_matter(toolpath: Toolpath, chunk_steps: int) -> None:
     machine = path_machine(*both("backlash_mm", 0.03), *both("compensation_mm", 0.02))

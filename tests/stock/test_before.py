@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -31,6 +31,7 @@ from tests.oracles.path_machine import path_machine
 from tests.stock.cuts import moves_of
 from tests.stock.test_heights import random_moves
 from tests.stock.test_pieces import box
+from tests.strategies import examples
 
 THICK = 4.0
 TURNS: dict[str, Callable[[Floats], Floats]] = {
@@ -53,7 +54,7 @@ def literal_column(cuts: list[tuple[StockMoves, str]], points: Floats) -> tuple[
     return floor, top
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(
     seed=st.integers(0, 10_000),
     turns=st.lists(st.sampled_from(sorted(TURNS)), min_size=1, max_size=3),
@@ -83,7 +84,7 @@ def test_columns_are_the_literal_ones_and_bounds_hold(
             assert (values <= most + 2e-8).all()
 
 
-@settings(max_examples=8)
+@examples(8)
 @given(seed=st.integers(0, 10_000), turn=st.sampled_from(sorted(TURNS)))
 def test_a_map_shows_what_is_left(seed: int, turn: str) -> None:
     """Cell by cell, of two programs from either face, against the literal columns."""
@@ -100,7 +101,7 @@ def test_a_map_shows_what_is_left(seed: int, turn: str) -> None:
     assert (np.abs(left.heights - wanted) < 1e-4).mean() > 0.99
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(a=st.sampled_from(sorted(MAPS)), b=st.sampled_from(sorted(MAPS)), x=st.floats(-9.0, 9.0))
 def test_turns_are_undone_and_follow_each_other(a: str, b: str, x: float) -> None:
     points = np.array([[x, 3.0], [1.0, x]])
@@ -263,7 +264,7 @@ def test_a_shank_has_room_where_the_other_face_is_cut_through() -> None:
         assert len(codes(found, "TOOL_IN_STOCK")) == count
 
 
-@settings(max_examples=10)
+@examples(10)
 @given(seed=st.integers(0, 10_000))
 def test_a_stock_turned_over_shows_the_columns_from_below(seed: int) -> None:
     cuts = [(random_moves(seed, 12), "same"), (random_moves(seed + 1, 12), "x")]

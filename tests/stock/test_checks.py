@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -41,6 +41,7 @@ from tests.oracles.stock import Cutter, Move
 from tests.oracles.stock import Stock as Needles
 from tests.oracles.stock_jobs import random_job
 from tests.planning.test_stock import operation_of
+from tests.strategies import examples
 
 DEEP_MM = 0.01
 CELL_MM = 0.1
@@ -423,7 +424,7 @@ def test_a_clamp_in_the_way_is_found_and_one_beside_it_is_not() -> None:
     assert codes(judged(plan_of(operation, keep_out=(low,)))) == {"TOOL_NOT_KNOWN"}
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(seed=st.integers(0, 1 << 30))
 def test_boxes_are_entered_as_dense_points_say(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -16,6 +16,7 @@ from camtool.stock.heights import stock_tree
 from camtool.stock.moves import StockMoves
 from tests.stock.cuts import BALL, FLAT, moves_of
 from tests.stock.test_heights import random_moves
+from tests.strategies import examples
 
 RING = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 10.0], [0.0, 10.0], [0.0, 0.0]])
 LIMIT_MM = 0.01
@@ -75,7 +76,7 @@ def test_the_volume_between_two_slots() -> None:
     assert deeper.less_mm3.low == 0.0
 
 
-@settings(max_examples=10)
+@examples(10)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 30))
 def test_volumes_hold_those_of_a_fine_grid(seed: int, count: int) -> None:
     moves = random_moves(seed, count)
@@ -109,7 +110,7 @@ def test_a_section_of_a_ball_is_round() -> None:
     assert rows[cut, 1] == pytest.approx(wanted, abs=1e-12)
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(seed=st.integers(0, 10_000))
 def test_heights_lie_between_their_bounds(seed: int) -> None:
     moves = random_moves(seed, 40)

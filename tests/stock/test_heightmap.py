@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -32,6 +32,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.wanted import OperationNote, Operations
 from tests.oracles import stock_heights as slow
 from tests.stock.cuts import CUTTERS, moves_of
+from tests.strategies import examples
 
 pytestmark = pytest.mark.checked
 
@@ -75,7 +76,7 @@ def on_rim(moves: StockMoves, points: Floats) -> np.ndarray:
     return near
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 12))
 def test_cells_are_as_high_as_the_slow_twin_says(seed: int, count: int) -> None:
     moves = chains(seed, count)
@@ -95,7 +96,7 @@ def test_cells_are_as_high_as_the_slow_twin_says(seed: int, count: int) -> None:
         assert z == 0.0 if row == NO_MOVE else abs(slow.height(moves, row, *place) - z) < 1e-6
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 400))
 def test_cells_are_as_high_as_the_tree_says(seed: int, count: int) -> None:
     moves = chains(seed, count)
@@ -118,7 +119,7 @@ def test_a_bull_nose_may_slope_as_it_likes(slope: float, flat: float) -> None:
     assert off.max() < 1e-6
 
 
-@settings(max_examples=10)
+@examples(10)
 @given(seed=st.integers(0, 10_000), count=st.integers(2, 60), part=st.integers(1, 59))
 def test_maps_add_up(seed: int, count: int, part: int) -> None:
     moves = chains(seed, count)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -34,7 +34,7 @@ def random_moves(seed: int, count: int, size: float = 10.0) -> StockMoves:
     return moves_of(start, end, rng.integers(0, len(CUTTERS), count))
 
 
-@settings(max_examples=12)
+@examples(12)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 40))
 def test_heights_are_those_of_the_slow_twin(seed: int, count: int) -> None:
     moves = random_moves(seed, count)
@@ -47,7 +47,7 @@ def test_heights_are_those_of_the_slow_twin(seed: int, count: int) -> None:
         assert z == 0.0 if row < 0 else slow.height(moves, row, *place) == pytest.approx(z, 1e-7)
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(seed=st.integers(0, 10_000))
 def test_heights_turn_with_the_program(seed: int) -> None:
     moves = random_moves(seed, 60)
@@ -66,7 +66,7 @@ def test_heights_turn_with_the_program(seed: int) -> None:
     assert (np.abs(found - again) < 1e-6).mean() > 0.99
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 200))
 def test_only_moves_before_count(seed: int, count: int) -> None:
     moves = random_moves(seed, count)
@@ -80,7 +80,7 @@ def test_only_moves_before_count(seed: int, count: int) -> None:
         assert part[0] == z
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 200), size=st.floats(1e-4, 2.0))
 def test_bounds_hold_everywhere_in_a_square(seed: int, count: int, size: float) -> None:
     tree = stock_tree(random_moves(seed, count))
@@ -98,7 +98,7 @@ def test_bounds_hold_everywhere_in_a_square(seed: int, count: int, size: float) 
         assert (z - (tilt * off).sum(axis=1) <= over + 1e-12).all()
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 100), size=st.floats(1e-3, 1.0))
 def test_means_lie_between_their_bounds(seed: int, count: int, size: float) -> None:
     tree = stock_tree(random_moves(seed, count))
@@ -145,7 +145,7 @@ def test_means_agree_with_those_of_small_squares(seed: int, count: int, size: fl
         assert most >= np.maximum(tree.least(small), bottom).mean() - 1e-9
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(seed=st.integers(0, 10_000), grow=st.floats(-0.05, 0.05))
 def test_a_grown_profile_holds_moves_that_lie_beside(seed: int, grow: float) -> None:
     moves = random_moves(seed, 50)

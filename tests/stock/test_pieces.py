@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.findings import Finding
@@ -27,6 +27,7 @@ from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
 from tests.oracles import stock_pieces as slow
 from tests.oracles.path_machine import path_machine
+from tests.strategies import examples
 
 
 def box(x: float, y: float, width: float, height: float) -> Polyline:
@@ -60,7 +61,7 @@ THROUGH = Operation(tool=Tool(3.0), depth_mm=3.2)
     cut=st.floats(-0.3, 20.0),
     side=st.sampled_from(["auto", "inside"]),
 )
-@settings(max_examples=60)
+@examples(60)
 def test_a_piece_that_comes_loose_is_as_large_as_the_tool_leaves_it(
     width: float, height: float, cut: float, side: str
 ) -> None:
@@ -160,7 +161,7 @@ def test_a_part_that_is_cut_after_it_came_loose_is_found_with_its_blocks() -> No
     assert freed < again < int(found[1])
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(gap=st.floats(0.02, 3.0), turn=st.floats(0.0, 6.28))
 def test_the_thinnest_bridge_holds_a_piece_and_none_does_not(gap: float, turn: float) -> None:
     """A circle that ends a gap before its start, or is lifted there: any bridge is one."""
@@ -189,7 +190,7 @@ def test_the_thinnest_bridge_holds_a_piece_and_none_does_not(gap: float, turn: f
 
 
 @pytest.mark.checked
-@settings(max_examples=80)
+@examples(80)
 @given(seed=st.integers(0, 100_000))
 def test_pieces_of_rasters_are_those_of_the_twin(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.api import read_job
@@ -41,6 +41,7 @@ from tests.drawings import drawing_of
 from tests.oracles.contours import closed
 from tests.oracles.stock_jobs import circle, random_job
 from tests.planning.test_stock import operation_of
+from tests.strategies import examples
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 MILL, BALL = Tool(4.0), Tool(4.0, "ball")
@@ -51,7 +52,7 @@ BESIDE_MM = 1e-3
 
 
 @pytest.mark.checked
-@settings(max_examples=60)
+@examples(60)
 @given(seed=st.integers(0, 100_000))
 def test_linear_bounds_hold_the_distances(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from manifold3d import Manifold
 
@@ -22,6 +22,7 @@ from camtool.stock.heights import stock_tree
 from camtool.stock.moves import StockMoves
 from tests.stock.cuts import CUTTERS
 from tests.stock.test_heights import random_moves
+from tests.strategies import examples
 
 pytestmark = pytest.mark.referee
 
@@ -65,7 +66,7 @@ def cut_volume(moves: StockMoves, stretch: float) -> float:
     return float((stock ^ swept).volume())
 
 
-@settings(max_examples=8)
+@examples(8)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 12))
 def test_volumes_are_those_of_booleans(seed: int, count: int) -> None:
     moves = random_moves(seed, count)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -23,6 +23,7 @@ from tests.oracles.stock import Cutter, moves_of
 from tests.oracles.stock import Stock as Needles
 from tests.oracles.stock_jobs import circle, random_job, rectangle
 from tests.planning.test_stock import operation_of
+from tests.strategies import examples
 
 SEEDS = (1, 6, 7, 9, 11, 13, 21, 27, 30, 34, 40, 52)
 """Random jobs of each kind whose plan has no finding."""
@@ -185,7 +186,7 @@ def test_what_cuts_no_width_leaves_all() -> None:
     assert solid.cut_by((0.0, 0.0)) == ""
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(seed=st.integers(0, 59), half=st.floats(1e-3, 3.0), place=st.integers(0, 1 << 30))
 def test_bounds_hold_over_squares(seed: int, half: float, place: int) -> None:
     asked = random_job(np.random.default_rng(seed))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -26,6 +26,7 @@ from camtool.toolpath.surface import (
     surface_of_text,
     text_of_surface,
 )
+from tests.strategies import examples
 
 TOLERANCE_MM = 0.002
 
@@ -93,7 +94,7 @@ def random_path(seed: int) -> Toolpath:
     return builder.rapid(z=5.0).rapid(0.0, 0.0).finish()
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(seed=st.integers(0, 2**32), nodes=st.integers(2, 9))
 def test_cuts_keep_their_depth_below_the_surface(seed: int, nodes: int) -> None:
     surface, path = random_surface(seed, nodes), random_path(seed)
@@ -112,7 +113,7 @@ def test_cuts_keep_their_depth_below_the_surface(seed: int, nodes: int) -> None:
     assert surface_error(path, warped, surface)[0] <= 1.01 * TOLERANCE_MM
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(seed=st.integers(0, 2**32), nodes=st.integers(2, 9))
 def test_a_cut_that_does_not_follow_is_found(seed: int, nodes: int) -> None:
     surface, path = random_surface(seed, nodes), random_path(seed)

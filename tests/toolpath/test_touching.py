@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.touching import CLEARANCE_MM, untouched_place
 from camtool.toolpath.wanted import OperationNote, ToolNote
+from tests.strategies import examples
 
 PLACES = st.tuples(st.floats(-5.0, 30.0), st.floats(-5.0, 20.0))
 
@@ -37,7 +38,7 @@ def cut_lines(lines: list[Line], diameter: float) -> Toolpath:
     return path.finish()
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.lists(st.tuples(PLACES, PLACES), max_size=6), st.floats(0.5, 10.0))
 def test_nothing_was_cut_at_the_place_before(lines: list[Line], diameter: float) -> None:
     path = cut_lines(lines, diameter)

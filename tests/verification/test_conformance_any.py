@@ -4,7 +4,7 @@ from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.errors import CamtoolError
@@ -22,7 +22,7 @@ from camtool.verification.findings import VerificationCode
 from camtool.verification.verify import Verification
 from tests.drawings import drawing_of
 from tests.paths import moved, scaled
-from tests.strategies import contours, open_contours
+from tests.strategies import contours, examples, open_contours
 from tests.verification.test_damage import CASES, NAMES, sound
 
 AGAINST = (
@@ -142,14 +142,14 @@ def check_rearranged(name: str, data: st.DataObject) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-@settings(max_examples=4)
+@examples(4)
 @given(data=st.data())
 def test_the_own_program_is_as_asked(name: str, data: st.DataObject) -> None:
     check_own(name, data)
 
 
 @pytest.mark.parametrize("name", CASES)
-@settings(max_examples=4)
+@examples(4)
 @given(data=st.data())
 def test_other_starts_and_another_order_are_as_asked(name: str, data: st.DataObject) -> None:
     check_rearranged(name, data)
@@ -158,7 +158,7 @@ def test_other_starts_and_another_order_are_as_asked(name: str, data: st.DataObj
 @pytest.mark.slow
 @pytest.mark.parametrize("check", [check_own, check_rearranged])
 @pytest.mark.parametrize("name", CASES)
-@settings(max_examples=40)
+@examples(40)
 @given(data=st.data())
 def test_many_more(name: str, check: object, data: st.DataObject) -> None:
     assert callable(check)

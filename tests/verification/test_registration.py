@@ -18,7 +18,7 @@ import ezdxf
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from shapely import Polygon
 
@@ -36,6 +36,7 @@ from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.findings import VerificationCode
 from camtool.verification.registration import Registration, register
+from tests.strategies import examples
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 CHORD_MM = 0.004
@@ -134,7 +135,7 @@ def test_place_tool_and_sides_are_found() -> None:
     assert codes(result) == {VerificationCode.DRAWING_PLACE: Severity.INFO}
 
 
-@settings(max_examples=8)
+@examples(8)
 @given(
     st.builds(
         Made,

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.kernels import judging as at
@@ -45,7 +45,6 @@ def made(rng: np.random.Generator, count: int) -> tuple[CutMoves, Match, np.ndar
     return cuts, match, columns
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 30), st.integers(1, 9))
 def test_blocks_are_summed_up_as_all_rows_are(seed: int, count: int, size: int) -> None:
     rng = np.random.default_rng(seed)

@@ -91,7 +91,7 @@ def literally(found: Signals) -> dict[int, dict[str, int]]:
 
 
 @pytest.mark.parametrize("name", ["pic-mmh", "i8751", "flashcut"])
-@examples(25, 1000, deadline=None)
+@examples(25, 1000)
 @given(data=st.data())
 def test_bytes_are_those_of_the_pulses(name: str, data: st.DataObject) -> None:
     bench = BENCHES[name]
@@ -107,7 +107,7 @@ def test_bytes_are_those_of_the_pulses(name: str, data: st.DataObject) -> None:
 
 
 @pytest.mark.parametrize("name", BENCHES)
-@examples(15, 500, deadline=None)
+@examples(15, 500)
 @given(data=st.data())
 def test_a_dump_says_the_same_as_the_table(name: str, data: st.DataObject) -> None:
     bench = BENCHES[name]
@@ -136,7 +136,7 @@ def test_a_dump_says_the_same_as_the_table(name: str, data: st.DataObject) -> No
 
 
 @pytest.mark.parametrize("name", ["valcnc", "grbl"])
-@examples(25, 1000, deadline=None)
+@examples(25, 1000)
 @given(data=st.data())
 def test_step_lines_rise_once_a_step_with_the_direction_set(
     name: str, data: st.DataObject

@@ -58,7 +58,7 @@ def times_of(name: str, moves: int) -> dict[str, float]:
     ("name", "settings"),
     [(name, settings) for name, many in READINGS.items() for settings in many],
 )
-@examples(30, 2000, deadline=None)
+@examples(30, 2000)
 @given(data=st.data())
 def test_steps_and_times_are_those_of_the_ledger(
     name: str, settings: tuple[str, ...], data: st.DataObject
@@ -73,7 +73,7 @@ def test_steps_and_times_are_those_of_the_ledger(
 
 
 @pytest.mark.parametrize("name", READINGS)
-@examples(20, 500, deadline=None)
+@examples(20, 500)
 @given(data=st.data())
 def test_pulses_are_in_order_and_chunks_change_none(name: str, data: st.DataObject) -> None:
     """However small the chunks are: the same pulses at the same times."""

@@ -35,7 +35,7 @@ def runs(path: Toolpath, target: LoadedTarget, chunk_steps: int = 1 << 16) -> li
 
 
 @pytest.mark.parametrize("name", ["pic-mmh", "valcnc", "i8751", "flashcut"])
-@examples(25, 1000, deadline=None)
+@examples(25, 1000)
 @given(data=st.data())
 def test_samples_are_at_the_times_of_the_pulses(name: str, data: st.DataObject) -> None:
     """Each sample is a pulse; flashcut's last state of a step is at the sample's millisecond."""
@@ -56,7 +56,7 @@ def test_samples_are_at_the_times_of_the_pulses(name: str, data: st.DataObject) 
         np.testing.assert_allclose(own_s, pulse_s[states - 1 :: states], atol=1e-9, rtol=1e-12)
 
 
-@examples(15, 500, deadline=None)
+@examples(15, 500)
 @given(data=st.data())
 def test_steps_of_grbl_are_near_its_pulses(data: st.DataObject) -> None:
     """Trapezoids without segments: the same but for the slow ends of each move."""
@@ -71,7 +71,7 @@ def test_steps_of_grbl_are_near_its_pulses(data: st.DataObject) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-@examples(20, 500, deadline=None)
+@examples(20, 500)
 @given(data=st.data())
 def test_times_ascend_and_chunks_change_none(name: str, data: st.DataObject) -> None:
     target = ALL[name].target()
@@ -98,7 +98,7 @@ class Recorder(TimeColumns):
 
 
 @pytest.mark.parametrize("name", ALL)
-@examples(20, 500, deadline=None)
+@examples(20, 500)
 @given(data=st.data())
 def test_speeds_add_up_to_the_way(name: str, data: st.DataObject) -> None:
     """The speeds of the axes times their durations are the way, and together they last as long as

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from camtool_postprocessors.flashcut import read as reader
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError, PostError, ProgramError
@@ -17,6 +17,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274
 from tests.postprocessors.gcode.plain_parts import FLASHCUT, on_grid, part
 from tests.postprocessors.golden import GOLDEN, compare_golden
+from tests.strategies import examples
 
 EXAMPLES = {
     # L1004-1005; the text has a blank before G02, which is read and not written.
@@ -173,7 +174,6 @@ def test_what_a_feed_becomes_is_said() -> None:
 
 
 @given(part_rows=st.integers(1, 7), seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None)
 def test_findings_do_not_depend_on_how_many_rows_are_looked_at_together(
     part_rows: int, seed: int
 ) -> None:
@@ -362,7 +362,7 @@ class TestReferee:
     pytestmark = needs_rs274
 
     @given(wanted=on_grid(FLASHCUT))
-    @settings(max_examples=25)
+    @examples(25)
     def test_linuxcnc_finds_the_same_moves(
         self, wanted: Toolpath, tmp_path_factory: pytest.TempPathFactory
     ) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.findings import Finding, Severity
@@ -26,6 +26,7 @@ from tests.drawings import drawing_of
 from tests.oracles.rs274 import RS274, interpreted
 from tests.postprocessors.gcode.test_write import EVIL
 from tests.postprocessors.golden import GOLDEN, compare_golden
+from tests.strategies import examples
 
 TARGETS = ("grbl", "linuxcnc")
 
@@ -244,7 +245,7 @@ def jobs(draw: st.DrawFn) -> Job:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(job=jobs(), lengths=st.booleans(), place=st.booleans())
 def test_after_a_change_the_tool_goes_up_before_it_goes_across(
     name: str, job: Job, lengths: bool, place: bool

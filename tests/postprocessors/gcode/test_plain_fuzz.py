@@ -3,13 +3,14 @@
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import Toolpath
 from tests.postprocessors.gcode.plain_parts import KINDS, part
+from tests.strategies import examples
 from tests.waiting import no_chewing
 
 LOADED = {name: load_target(name) for name in sorted(KINDS)}
@@ -45,21 +46,21 @@ def test_cut_anywhere(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LOADED)
-@settings(max_examples=200)
+@examples(200)
 @given(data=st.binary(max_size=200))
 def test_noise(name: str, data: bytes) -> None:
     tried(name, data)
 
 
 @pytest.mark.parametrize("name", LOADED)
-@settings(max_examples=200)
+@examples(200)
 @given(text=st.text(alphabet="GMXYZIJF0123456789.-+,(); %\t\r\n", max_size=80))
 def test_likely_noise(name: str, text: str) -> None:
     tried(name, text.encode())
 
 
 @pytest.mark.parametrize("name", LOADED)
-@settings(max_examples=200)
+@examples(200)
 @given(data=st.data())
 def test_damaged_programs(name: str, data: st.DataObject) -> None:
     program = bytearray(PROGRAMS[name])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.target.registry import load_target
@@ -85,7 +85,7 @@ def test_random_paths_come_back(name: str, path: Toolpath) -> None:
     ["dialect.strip_zeros=true", "dialect.block_numbers=true", "dialect.comments=none"],
 )
 @pytest.mark.parametrize("name", TARGETS)
-@settings(max_examples=30)
+@examples(30)
 @given(path=toolpaths())
 def test_options_change_the_text_and_not_the_path(name: str, option: str, path: Toolpath) -> None:
     plain, decoded = there_and_back(path, name)
@@ -94,7 +94,7 @@ def test_options_change_the_text_and_not_the_path(name: str, option: str, path: 
     assert columns(same) == columns(decoded)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(path=toolpaths())
 def test_full_circles_as_halves_are_the_same_circles(path: Toolpath) -> None:
     _, whole = there_and_back(path, "grbl")

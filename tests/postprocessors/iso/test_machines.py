@@ -92,14 +92,6 @@ def test_random_paths_come_back(name: str, path: Toolpath) -> None:
     check_there_and_back(kept(path, name), load_target(name))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ON_ISO)
-@examples(1000, 1000)
-@given(path=toolpaths())
-def test_a_thousand_random_paths_of_each(name: str, path: Toolpath) -> None:
-    check_there_and_back(kept(path, name), load_target(name))
-
-
 @pytest.mark.parametrize("name", sorted(FILES))
 @pytest.mark.parametrize("units", ["mm", "in"])
 def test_a_drawing_is_written_and_judged(name: str, units: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from camtool_postprocessors.valcnc.wire import ValcncWire
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError
@@ -19,6 +19,7 @@ from camtool.target.wire import Conversation, Manner, Place, WireState, Write
 from tests.feeding import logo, made, same_motion
 from tests.sending.talking import Talking
 from tests.sending.talking import talked as talked_with
+from tests.strategies import examples
 
 LOADED = load_target("valcnc")
 ANSWERS = load_target("valcnc", settings=["link.answer=ok"])
@@ -174,7 +175,7 @@ def jogged(at_mm: Place | None, **values: float) -> tuple[Conversation, Any]:
     st.tuples(*[st.floats(-20.0, 20.0)] * 3),
     st.tuples(*[st.floats(-9.0, 9.0)] * 3),
 )
-@settings(max_examples=25)
+@examples(25)
 def test_a_jog_moves_by_so_much_from_where_it_stands(at: Place, by: Place) -> None:
     x, y, z = by
     assume(max(map(abs, by)) > 0.01)
