@@ -58,7 +58,8 @@ TOLERATED_SHARE = 1.02
 """Engagements up to this part of the limit keep it."""
 
 MAX_ASKEW_RAD = 0.3
-"""Slides that run beside their path by steps head no farther than this to either side of it."""
+"""Slides that run beside their path by steps head no farther than this to either side of it, or of
+the chord of its arc, ..."""
 
 FINE_RAD = np.radians(0.1)
 """Bounds of engagements above the limit are told to this angle, ..."""
@@ -126,8 +127,11 @@ def _askew(moves: StockMoves, decoded: Toolpath) -> Floats:
         across = own[:, 0] * heading[:, 1] - own[:, 1] * heading[:, 0]
         angles[:, column] = np.arctan2(across, (own * heading).sum(axis=1))
     # At joints of moves, and where the mechanics lag behind, the slides' own direction counts.
-    is_near = np.asarray((np.abs(angles) <= MAX_ASKEW_RAD).all(axis=1))
-    return np.where(is_near[:, None], angles, 0.0)
+    length = np.hypot(*own.T)
+    unsure = np.arcsin(2.0 * moves.beside_mm / np.maximum(length, 2.0 * moves.beside_mm + 1e-9))
+    is_chord = np.abs(angles.mean(axis=1)) <= np.maximum(unsure, MAX_ASKEW_RAD)
+    is_ahead = (np.abs(angles) < 0.5 * np.pi).all(axis=1)
+    return np.where((is_chord & is_ahead)[:, None], angles, 0.0)
 
 
 def engagement_of(

@@ -222,3 +222,24 @@ def test_holes_are_drilled_without_an_engagement() -> None:
     judging = camtool.Judging(gates=camtool.Gates(engagement_rad=0.2))
     program = "\n".join(lines).encode() + b"\n"
     assert messages(camtool.verify(program, "linuxcnc", job=job, judging=judging)) == []
+
+
+def test_small_arcs_head_as_commanded() -> None:
+    """A circle of 0.04 mm round one of 0.02 mm: each chord of the slides stands for 40° of it,
+    and the tool is engaged by the angle of two discs all the same."""
+    radius, inner, outer = 2.0, 0.02, 0.04
+    lines = ["G21 G90", "G0 Z5", "M3 S9000", f"G0 X{inner} Y0", "G1 Z-1 F100"]
+    lines += [f"G3 X{inner} Y0 I{-inner} J0 F300", "G1 X-9", f"G1 X{inner}", "G3 X-0.04 I-0.03 J0"]
+    lines += [f"G3 X{-outer} Y0 I{outer} J0", "G0 Z5", "M5", "M2", ""]
+    operation = Operation(kind="profile", tool=Tool(2.0 * radius))
+    judging = camtool.Judging(gates=camtool.Gates(engagement_rad=math.pi))
+    program = "\n".join(lines).encode()
+    run = camtool.verify(program, "grbl", job=Job((operation,)), judging=judging)
+    assert run.report is not None
+    assert run.report.engagement is not None
+    reach = inner + radius
+    cosine = (reach**2 - outer**2 - radius**2) / (2.0 * radius * outer)
+    known = math.degrees(math.acos(cosine))
+    greatest = run.report.engagement[0].greatest_deg
+    assert greatest is not None
+    assert 0.8 * known < greatest < known + 8.0
