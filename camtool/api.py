@@ -423,12 +423,12 @@ def meet(
     tolerances: str | Path | None = None,
     *,
     job: str | Path | None = None,
-    most: int | None = None,
+    max_trials: int | None = None,
 ) -> Meeting:
     """The cheapest change of a job file after which all dimensions of the part hold.
 
     `tolerances` as for `inspect`; `job`: the file (None: a tool of no width follows all lines).
-    `most` programs are tried (None: 100). `text` is the new job file, `run` its program;
+    `max_trials` programs are tried (None: 100). `text` is the new job file, `run` its program;
     `certificate` says why no job does, None where one does. Raises OptionError where the job
     has errors, and where no dimension has limits. Source: docs/tolerances.md.
     """
@@ -447,7 +447,7 @@ def meet(
     case = MeetingCase(
         read, loaded_target, tables, job_of, Tolerances(*dimensions_of(read, tolerances_file))
     )
-    return met(case, most or DEFAULT_TRIALS)
+    return met(case, max_trials or DEFAULT_TRIALS)
 
 
 def convert(
@@ -636,7 +636,7 @@ class Looks(TypedDict, total=False):
 
 def preview(
     what: Toolpath | Shown | Drawable,
-    *beside: Toolpath | Shown | Drawable,
+    *others: Toolpath | Shown | Drawable,
     titles: Sequence[str] = (),
     **looks: Unpack[Looks],
 ) -> Picture:
@@ -644,19 +644,19 @@ def preview(
     toolpath, the predicted path of the slides in colours of its error (µm, with a scale), or
     several such paths.
 
-    Several values are drawn `beside` each other, at one scale and with one scale of errors;
+    Several values are drawn side by side, at one scale and with one scale of errors;
     `titles` replace their own, in order. Raises OptionError for looks that make no picture.
     Source: docs/pictures.md, docs/viewer.md.
     """
-    scenes = [_as_shown(each).scene() for each in (what, *beside)]
+    scenes = [_as_shown(each).scene() for each in (what, *others)]
     if len(titles) > len(scenes):
         raise TypeError(f"{len(titles)} titles for {len(scenes)} values")
     for row, title in enumerate(titles):
         scenes[row] = replace(scenes[row], title=title)
     options = PictureOptions(**looks)
-    if not beside:
+    if not others:
         return Picture(scenes[0], options)
-    for value, scene in zip((what, *beside), scenes, strict=True):
+    for value, scene in zip((what, *others), scenes, strict=True):
         if not isinstance(scene, Scene):
             raise TypeError(f"a {type(value).__name__} stands beside no other picture")
     return Picture(tuple(scene for scene in scenes if isinstance(scene, Scene)), options)

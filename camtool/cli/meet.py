@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 @click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
 @click.option(
     "--most",
+    "max_trials",
     type=click.IntRange(min=1),
     metavar="COUNT",
     help="So many programs are tried at most.  [100]",
@@ -52,7 +53,7 @@ def meet(
     tolerances: str,
     output: str | None,
     report: str | None,
-    most: int | None,
+    max_trials: int | None,
     machine: MachineFlags,
     job: JobFlags,
     drawing: DrawingFlags,
@@ -85,7 +86,9 @@ def meet(
         limits = Tolerances(dimensions, findings)
         say_findings((*read.findings, *findings), quiet=quiet, verbose=verbose)
         result = met(
-            MeetingCase(read, target, tables, job_of, limits), most or DEFAULT_TRIALS, progress()
+            MeetingCase(read, target, tables, job_of, limits),
+            max_trials or DEFAULT_TRIALS,
+            progress(),
         )
     files = {output: result.text.encode()} if result.changed else {}
     if files and not named:

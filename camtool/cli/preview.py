@@ -59,6 +59,7 @@ if TYPE_CHECKING:
 @click.option("--simulate", is_flag=True, help="Show the predicted path and its error too.")
 @click.option(
     "--beside",
+    "second_source",
     metavar="FILE",
     help="Another file of the same flags, beside the first: one scale, one map of errors.",
 )
@@ -71,7 +72,7 @@ def preview(
     output: str,
     machine: MachineFlags,
     simulate: bool,
-    beside: str | None,
+    second_source: str | None,
     picture: PictureFlags,
     job: JobFlags,
     drawing: DrawingFlags,
@@ -87,8 +88,8 @@ def preview(
     if simulate and machine.name() is None:
         raise click.UsageError("--simulate needs --target")
     picture.check([output], _canvas(machine, simulate=simulate))
-    sources = [source] if beside is None else [source, beside]
-    if beside is not None:
+    sources = [source] if second_source is None else [source, second_source]
+    if second_source is not None:
         check_beside("--beside", [output])
     check_places([*sources, *machine.files(), *job.files()], [output])
     asks_for_path = simulate or not machine.by_default or bool(machine.settings) or job.is_given

@@ -105,6 +105,7 @@ if TYPE_CHECKING:
 @check_outputs
 @click.option(
     "--beside",
+    "second_program",
     metavar="PROGRAM",
     help="Another program beside it in the picture: one scale, one map of errors.",
 )
@@ -128,7 +129,7 @@ def verify(
     report: str | None,
     page: str | None,
     checks: CheckOutputs,
-    beside: str | None,
+    second_program: str | None,
     plots: PlotFlags,
     picture: PictureFlags,
     gates: GateFlags,
@@ -151,7 +152,7 @@ def verify(
     drawing lies; then how far it is from them, and what is not cut.
     """
     outputs = ReportOutputs(preview, report, page, checks, plots)
-    wishes = VerifyOutputs(outputs, picture, beside, quiet, verbose)
+    wishes = VerifyOutputs(outputs, picture, second_program, quiet, verbose)
     wishes.check(comparing=compare is not None, gated=gates.given)
     finding = _finds_contours(job, against, align=align, comparing=compare is not None)
     leaves_none = "--compare" if compare is not None else None
@@ -159,7 +160,7 @@ def verify(
     if inspection.tolerances is not None and against is None:
         raise click.UsageError("--tolerances needs the drawing: give --against")
     read_files = [*machine.files(), *job.files(), *inspection.files()]
-    wishes.outputs.check([program, against, beside, *read_files])
+    wishes.outputs.check([program, against, second_program, *read_files])
 
     from camtool.comparison import effects_without
     from camtool.pipeline import Judging
@@ -211,12 +212,12 @@ def _variants(spec: str, machine: MachineFlags, judging: Judging) -> list[Progra
 
 
 class VerifyOutputs(Struct, frozen=True):
-    """The requested outputs, and options of pictures; `beside` is another program for the
+    """The requested outputs, and options of pictures; `second_program` is another program for the
     picture."""
 
     outputs: ReportOutputs
     looks: PictureFlags
-    beside: str | None
+    second_program: str | None
     quiet: bool
     verbose: bool
 
@@ -226,7 +227,7 @@ class VerifyOutputs(Struct, frozen=True):
         outputs.plots.check(self.looks.given, pictures=bool(outputs.pictures))
         if not comparing:
             self.looks.check([*outputs.pictures, *outputs.plots.names], RESULT)
-            if self.beside is not None:
+            if self.second_program is not None:
                 check_beside("--beside", outputs.pictures)
             return
         outputs.plots.refuse("is of a single variant; drop --compare")
@@ -238,7 +239,7 @@ class VerifyOutputs(Struct, frozen=True):
             )
         if gated:
             raise click.UsageError("limits are for a single variant; drop --compare")
-        if self.beside is not None:
+        if self.second_program is not None:
             raise click.UsageError("--beside is for a single variant; drop --compare")
         if outputs.preview is not None and is_viewer(outputs.preview):
             raise click.UsageError("--compare draws only .svg and .png")
@@ -280,7 +281,10 @@ def _judge(
     run, outputs = inspection.inspect_run(case.judge(file)), wishes.outputs
 
     def scenes() -> list[Scene]:
-        return [run.scene(), *([case.judge(wishes.beside).scene()] if wishes.beside else [])]
+        return [
+            run.scene(),
+            *([case.judge(wishes.second_program).scene()] if wishes.second_program else []),
+        ]
 
     files = outputs.files(run, wishes.looks.painter(scenes, quiet=wishes.quiet))
     write_all({**files, **outputs.check_files([(run, run.source)])})

@@ -263,11 +263,11 @@ def _over_region(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths
 
     highest = greatest(
         lambda at: tree.heights(at, None, -beside_mm)[0],
-        lambda squares: tree.greatest(squares, None, -beside_mm),
+        lambda squares: tree.max_heights(squares, None, -beside_mm),
     )
     deepest = greatest(
         lambda at: -tree.heights(at, None, beside_mm)[0],
-        lambda squares: -tree.least(squares, beside_mm),
+        lambda squares: -tree.min_heights(squares, beside_mm),
     )
     if not math.isfinite(highest + deepest):
         return None

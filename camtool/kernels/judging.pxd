@@ -65,7 +65,7 @@ cdef class Search:
     cdef const double[:, :] heights
     cdef double[:, ::1] nodes
     cdef int[::1] order
-    cdef Int[::1] found, stack, parts, by
+    cdef Int[::1] candidates, stack, parts, by
     cdef double[::1] box, x, y, error, other
     cdef readonly Int looked
 

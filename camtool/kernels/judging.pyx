@@ -381,7 +381,7 @@ cdef class Search:
     def __init__(self, moves: Moves) -> None:
         shapes, self.heights, self.nodes, self.order = moves
         self.curves = Curves(shapes)
-        self.found, self.box = np.empty(ENOUGH, dtype=np.int64), np.empty(8)
+        self.candidates, self.box = np.empty(ENOUGH, dtype=np.int64), np.empty(8)
         self.stack = np.empty(DEPTH, dtype=np.int64)
         self.parts = np.empty(DEPTH, dtype=np.int64)
         self.x, self.y, self.error = np.empty(1), np.empty(1), np.empty(1)
@@ -608,17 +608,17 @@ cdef Int _list_near(
     they have these errors; it comes first. How many these are, or 0 where they are too many."""
     cdef Int leaves, height, node, low, place, k, count, limit, some
     cdef int[::1] order
-    cdef Int[::1] stack, found
+    cdef Int[::1] stack, candidates
     cdef double[:, ::1] nodes
     cdef const double[:, :] heights
     cdef double[::1] box
     heights, nodes, order = search.heights, search.nodes, search.order
-    stack, found, box = search.stack, search.found, search.box
+    stack, candidates, box = search.stack, search.candidates, search.box
     _set_box(x, y, errors, box)
     some = len(x)
     limit = max(FEW, ENOUGH // some)
     leaves = len(nodes) // 2
-    found[0], count = own, 1
+    candidates[0], count = own, 1
     height, stack[0] = 1, 1
     while height > 0:
         height -= 1
@@ -639,10 +639,10 @@ cdef Int _list_near(
                 continue
             search.looked += 1
             # To look for it among more than there are points takes longer than to compare it.
-            if move_near(search.curves, k, box) and not _is_there(search.curves, found, min(count, some), k):
+            if move_near(search.curves, k, box) and not _is_there(search.curves, candidates, min(count, some), k):
                 if count == limit:
                     return 0
-                found[count] = k
+                candidates[count] = k
                 count += 1
     return count
 
@@ -659,7 +659,7 @@ cpdef bint nearest_errors(
     cdef Int begin, end, height, low, high, middle, k, n, near
     cdef bint is_listed
     cdef double far
-    cdef Int[::1] parts, by, found, owners
+    cdef Int[::1] parts, by, candidates, owners
     cdef double[::1] here_x, here_y, errors
     parts, middle = search.parts, len(x) // 2
     if not is_searched(own, first, last, z_low, z_high, search.heights):
@@ -673,7 +673,7 @@ cpdef bint nearest_errors(
                 out[k] = far
             return False
     set_errors(search.curves, own, x, y, out)
-    by, found = search.by, search.found
+    by, candidates = search.by, search.candidates
     begin = _first_off(out, 0)
     while begin < len(x):
         end, is_listed = _end_of_off(out, begin), False
@@ -690,7 +690,7 @@ cpdef bint nearest_errors(
                     by[k] = own
                 is_listed = True
             for n in range(1, near):
-                _lowered(here_x, here_y, found[n], search, errors, owners)
+                _lowered(here_x, here_y, candidates[n], search, errors, owners)
             if near > 0:
                 continue
             middle = (low + high) // 2

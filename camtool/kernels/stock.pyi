@@ -10,15 +10,15 @@ class StockTree:
     def heights(
         self, points: Floats, before: Ints | None = None, grow: float = 0.0
     ) -> tuple[Floats, Ints]: ...
-    def least(self, squares: Floats, grow: float = 0.0) -> Floats: ...
-    def greatest(
+    def min_heights(self, squares: Floats, grow: float = 0.0) -> Floats: ...
+    def max_heights(
         self,
         squares: Floats,
         tilt: Floats | None = None,
         grow: float = 0.0,
         before: Ints | None = None,
     ) -> Floats: ...
-    def greatest_over(
+    def max_heights_over(
         self,
         corners: Floats,
         values: Floats,

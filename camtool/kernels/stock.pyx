@@ -227,7 +227,7 @@ cdef class StockTree:
                 which[k] = self.number[row] if row >= 0 else -1
         return np.asarray(lowest_z), np.asarray(which)
 
-    def least(self, squares: Floats, double grow=0.0):
+    def min_heights(self, squares: Floats, double grow=0.0):
         """(K,) the least height over the disc round each square: middle and half a side (K, 3)."""
         cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
@@ -242,7 +242,7 @@ cdef class StockTree:
                 last = row
         return np.asarray(lowest_z)
 
-    def greatest(
+    def max_heights(
         self,
         squares: Floats,
         tilt: Floats | None = None,
@@ -256,9 +256,9 @@ cdef class StockTree:
         values = np.zeros(ways.shape[:2])
         if tilt is not None:
             values = -(ways * tilt[:, None]).sum(axis=2)
-        return self.greatest_over(squares[:, None, :2] + ways, values, grow, before)
+        return self.max_heights_over(squares[:, None, :2] + ways, values, grow, before)
 
-    def greatest_over(
+    def max_heights_over(
         self,
         corners: Floats,
         values: Floats,
@@ -404,7 +404,7 @@ cdef class StockTree:
                         lowest, row = z, near[i]
             if row < 0:
                 return
-            part = self.beyond(row, x, y, direction)
+            part = self.reach_past(row, x, y, direction)
             if part == math.INFINITY:
                 cover = part
             else:
@@ -443,7 +443,7 @@ cdef class StockTree:
             low[0] = max(low[0], half_plane_mean(half, direction, cover, lows, self.top))
         high[0] = max(high[0], low[0])
 
-    cdef double beyond(self, Int move, double x, double y, double* direction) noexcept nogil:
+    cdef double reach_past(self, Int move, double x, double y, double* direction) noexcept nogil:
         """Return how far the tool of a move gets beyond a point, along `direction` from
         the nearest place of its axis to the point, below 0 where it ends before it; inf where the
         point lies on the axis."""
@@ -463,7 +463,7 @@ cdef class StockTree:
         """Upper bound of how far the tool of a move gets along a direction from a point, within a
         disc of radius `room` round it. The tool lies on one side of its tangent."""
         cdef double[2] own
-        cdef double far = self.beyond(move, x, y, own), cosine
+        cdef double far = self.reach_past(move, x, y, own), cosine
         if far >= room:
             return room
         if far <= -room:

@@ -112,7 +112,7 @@ def on_dark(colour: str) -> str:
 def darkened(svg: str) -> str:
     """A picture in the dark palette: only the colours of its fills and strokes change."""
     instead = _DARK | dict(zip(bin_colours(), bin_colours(dark=True), strict=True))
-    return _PAINT.sub(lambda found: f'{found[1]}="{instead[found[2]]}"', svg)
+    return _PAINT.sub(lambda match: f'{match[1]}="{instead[match[2]]}"', svg)
 
 
 def channels(colour: str) -> tuple[int, int, int]:

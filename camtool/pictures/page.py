@@ -267,11 +267,11 @@ def rows_beside(
     return [[], *rows], 0
 
 
-def legend_rows(table: Sequence[Sequence[LegendEntry]], left: float, middle: float) -> str:
+def legend_rows(table: Sequence[Sequence[LegendEntry]], left_x: float, middle: float) -> str:
     """The rows of the legend, the first centred on height `middle`."""
     parts = []
     for index, row in enumerate(table):
-        across, height = left, middle + index * ROW_STEP
+        across, height = left_x, middle + index * ROW_STEP
         for entry in row:
             move = f"translate({number(across)} {number(height)})"
             place = (across + SWATCH + SWATCH_GAP, height + ENTRY.cap / 2.0)
@@ -315,13 +315,13 @@ def colour_bar_width(scale: MapScale, height: float) -> float:
 
 def colour_bar(scale: MapScale, box: PageBox) -> str:
     """The colour map with its numbers, right of the plot and as high."""
-    left = box.right + BAR_GAP
+    bar_x = box.right + BAR_GAP
     step = box.height / BINS
     parts = []
     for index, colour in reversed(list(enumerate(bin_colours()))):
         # Each step reaches down to the foot and is covered by the lower ones: no seams.
         y = round(box.bottom - (index + 1) * step, 2)
-        piece: Look = {"x": left, "y": number(y), "width": BAR_WIDTH}
+        piece: Look = {"x": bar_x, "y": number(y), "width": BAR_WIDTH}
         parts.append(
             element(
                 "rect",
@@ -333,18 +333,18 @@ def colour_bar(scale: MapScale, box: PageBox) -> str:
                 },
             )
         )
-    edge: Look = {"x": left, "y": box.top, "width": BAR_WIDTH, "height": box.height}
+    edge: Look = {"x": bar_x, "y": box.top, "width": BAR_WIDTH, "height": box.height}
     parts.append(element("rect", {**edge, "fill": "none", "stroke": FRAME, "stroke-width": 1.4}))
     ticks = PathData()
     for value, name in colour_bar_labels(scale, box.height):
         y = box.bottom - value / scale.top * box.height
-        ticks.move(left + BAR_WIDTH, y)
-        ticks.line(left + BAR_WIDTH + 5.0, y)
-        place = (left + BAR_WIDTH + 12.0, y + TICK_CAP / 2.0)
+        ticks.move(bar_x + BAR_WIDTH, y)
+        ticks.line(bar_x + BAR_WIDTH + 5.0, y)
+        place = (bar_x + BAR_WIDTH + 12.0, y + TICK_CAP / 2.0)
         parts.append(text.label(name, place, TextStyle(TICK_CAP, QUIET)))
     line: Look = {"d": str(ticks), "fill": "none", "stroke": FRAME, "stroke-width": 1.4}
     parts.append(element("path", line))
-    parts.append(text.label(scale.title, (left, box.top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))
+    parts.append(text.label(scale.title, (bar_x, box.top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))
     return element("g", {"id": scale.id}, *parts)
 
 

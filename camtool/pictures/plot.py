@@ -229,9 +229,9 @@ def _label_box(
 ) -> tuple[float, float, float, float]:
     """The box of a text to the right or left of a place, and below or above it."""
     wide = text.width(words, CAP)
-    left = place[0] + AWAY if direction[0] > 0.0 else place[0] - AWAY - wide
+    left_x = place[0] + AWAY if direction[0] > 0.0 else place[0] - AWAY - wide
     top = place[1] + 0.5 * AWAY if direction[1] > 0.0 else place[1] - 0.5 * AWAY - CAP
-    return left, top, left + wide, top + CAP
+    return left_x, top, left_x + wide, top + CAP
 
 
 def _inside(box: tuple[float, float, float, float], view: View) -> bool:

@@ -52,7 +52,7 @@ def circle_pair(scene: Scene, circle_number: int) -> tuple[CircleErrors, ...]:
     partner = scene.rounds[circle_number - 1].partner
     numbers = [circle_number] if partner is None else [circle_number, partner]
     rounds = [(number, scene.rounds[number - 1]) for number in numbers]
-    rounds.sort(key=lambda found: not found[1].ccw)
+    rounds.sort(key=lambda pair: not pair[1].ccw)
     return tuple(CircleErrors(number, one, one.errors() * UM_PER_MM) for number, one in rounds)
 
 

@@ -628,8 +628,8 @@ def _faults(report: Report) -> tuple[tuple[float, float], ...]:
 
     codes = {each.name for each in StockCode}
     codes |= {ProgramCode.RAPID_IN_STOCK.name, ProgramCode.LOOSE_PIECE.name}
-    told = [item for item in report.findings if item.severity != "info"]
-    places = [_place_in(item.where) for item in told if item.code in codes]
+    faults = [item for item in report.findings if item.severity != "info"]
+    places = [_place_in(item.where) for item in faults if item.code in codes]
     return tuple(dict.fromkeys(place for place in places if place is not None))
 
 

@@ -516,8 +516,8 @@ class MmBar(Struct, frozen=True, eq=False):
     def draw(self, box: PageBox) -> str:
         """The bar right of the plot, no higher than MAX_BAR."""
         height = min(box.height - 2.0 * NAME_LIFT, MAX_BAR)
-        left, top = box.right + BAR_GAP, 0.5 * (box.top + box.bottom - height)
-        sides: Look = {"x": left, "y": top, "width": BAR_WIDTH, "height": height}
+        bar_x, top = box.right + BAR_GAP, 0.5 * (box.top + box.bottom - height)
+        sides: Look = {"x": bar_x, "y": top, "width": BAR_WIDTH, "height": height}
         column = self.colours if self.is_downward else self.colours[::-1]
         pixels = np.repeat(column[:, None, :], 2, axis=1)
         look: Look = {"preserveAspectRatio": "none", "href": data_uri(png_of(pixels))}
@@ -525,13 +525,13 @@ class MmBar(Struct, frozen=True, eq=False):
         for value, name in self.labels:
             share = value / self.top if self.is_downward else 1.0 - value / self.top
             y = top + share * height
-            ticks.move(left + BAR_WIDTH, y)
-            ticks.line(left + BAR_WIDTH + 5.0, y)
-            place = (left + BAR_WIDTH + 12.0, y + TICK_CAP / 2.0)
+            ticks.move(bar_x + BAR_WIDTH, y)
+            ticks.line(bar_x + BAR_WIDTH + 5.0, y)
+            place = (bar_x + BAR_WIDTH + 12.0, y + TICK_CAP / 2.0)
             parts.append(text.label(name, place, TextStyle(TICK_CAP, QUIET)))
         pen: Look = {"fill": "none", "stroke": FRAME, "stroke-width": 1.4}
         parts += [element("rect", {**sides, **pen}), element("path", {"d": str(ticks), **pen})]
-        parts.append(text.label(self.name, (left, top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))
+        parts.append(text.label(self.name, (bar_x, top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))
         return element("g", {"id": "mm-scale"}, *parts)
 
 

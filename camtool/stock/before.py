@@ -78,21 +78,21 @@ class StockBefore(Struct, frozen=True, eq=False):
 
     def least_tops(self, squares: Floats) -> Floats:
         """Return lower bounds (K,) of the tops over squares (K, 3)."""
-        return _lowest(self.above, squares, lambda tree, at: tree.least(at))
+        return _lowest(self.above, squares, lambda tree, at: tree.min_heights(at))
 
     def greatest_tops(self, squares: Floats, grow_mm: float = 0.0) -> Floats:
         """Return upper bounds (K,) of the tops over squares (K, 3)."""
-        return _lowest(self.above, squares, lambda tree, at: tree.greatest(at, None, grow_mm))
+        return _lowest(self.above, squares, lambda tree, at: tree.max_heights(at, None, grow_mm))
 
     def least_floors(self, squares: Floats, grow_mm: float = 0.0) -> Floats:
         """Return lower bounds (K,) of the floors over squares (K, 3)."""
         return self._raised(
-            _lowest(self.below, squares, lambda tree, at: tree.greatest(at, None, grow_mm))
+            _lowest(self.below, squares, lambda tree, at: tree.max_heights(at, None, grow_mm))
         )
 
     def greatest_floors(self, squares: Floats) -> Floats:
         """Return upper bounds (K,) of the floors over squares (K, 3)."""
-        return self._raised(_lowest(self.below, squares, lambda tree, at: tree.least(at)))
+        return self._raised(_lowest(self.below, squares, lambda tree, at: tree.min_heights(at)))
 
     def shown_in(self, drawn: HeightMap) -> HeightMap:
         """Return a map of what is left of a stock; where it is gone it has its bottom."""
@@ -186,8 +186,8 @@ def least_remaining(tree: StockTree, before: StockBefore, box_mm: Box) -> Bracke
         return np.where(is_between & (floor < TOP_MM - THROUGH_SLACK_MM), floor - top, -np.inf)
 
     def upper(squares: Floats) -> Floats:
-        low = np.minimum(tree.least(squares), before.least_tops(squares)).clip(min=bottom)
-        high = np.minimum(tree.greatest(squares), before.greatest_tops(squares))
+        low = np.minimum(tree.min_heights(squares), before.least_tops(squares)).clip(min=bottom)
+        high = np.minimum(tree.max_heights(squares), before.greatest_tops(squares))
         # Where one is cut through all over a square, nothing is left that could meet.
         is_between = (low < TOP_MM) & (high > bottom + THROUGH_SLACK_MM)
         is_between &= before.least_floors(squares) < TOP_MM - THROUGH_SLACK_MM

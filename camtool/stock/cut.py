@@ -100,7 +100,7 @@ class CutStock(Struct, frozen=True, eq=False):
         top = self.tree.top
         return greatest_value(
             lambda at: top - self.tree.heights(at)[0],
-            lambda squares: top - self.tree.least(squares),
+            lambda squares: top - self.tree.min_heights(squares),
             self.box_mm,
         )
 
@@ -114,7 +114,7 @@ class CutStock(Struct, frozen=True, eq=False):
             return top - high, top - low
 
         def extremes(squares: Floats) -> tuple[Floats, Floats]:
-            low, high = self.tree.least(squares), self.tree.greatest(squares)
+            low, high = self.tree.min_heights(squares), self.tree.max_heights(squares)
             return top - np.maximum(high, bottom), top - np.maximum(low, bottom)
 
         return integral(quarter_means, extremes, self.box_mm, share)
@@ -218,7 +218,7 @@ def _distance(one: StockTree, other: StockTree, box: Box, limit_mm: float) -> Br
         return greatest_value(
             lambda at: one.heights(at, None, distance)[0] - distance - other.heights(at)[0],
             lambda squares: (
-                one.greatest(squares, None, distance) - distance - other.least(squares)
+                one.max_heights(squares, None, distance) - distance - other.min_heights(squares)
             ),
             box,
             0.5 * tolerance_mm,
@@ -251,7 +251,7 @@ def _volume_between(one: StockTree, other: StockTree, box: Box, slack_mm3: float
     """Return the volume that `other` cuts below `one`, mm³, to 1 % or `slack_mm3`."""
 
     def extremes(squares: Floats) -> tuple[Floats, Floats]:
-        lower = np.maximum(one.least(squares) - other.greatest(squares), 0.0)
-        return lower, np.maximum(one.greatest(squares) - other.least(squares), 0.0)
+        lower = np.maximum(one.min_heights(squares) - other.max_heights(squares), 0.0)
+        return lower, np.maximum(one.max_heights(squares) - other.min_heights(squares), 0.0)
 
     return integral(None, extremes, box, slack=slack_mm3)

@@ -83,7 +83,7 @@ class Engagement(Struct, frozen=True, eq=False):
     is_known: Bools
     moves: StockMoves
 
-    def greatest(self, chosen: Bools) -> tuple[float, int | None]:
+    def max_heights(self, chosen: Bools) -> tuple[float, int | None]:
         """Return the greatest bound of some moves outside of entries, rad, and which one has it;
         0 and None where none of them cuts."""
         bound = np.where(chosen & ~self.is_entry, np.nan_to_num(self.bound_rad), 0.0)
@@ -255,7 +255,7 @@ def engagement_by_operation(
             words = CHANGING_WIDTH if blind.all() else NO_WIDTH
             rows.append(OperationEngagement(name, None, limit_rad=own, reason=words))
             continue
-        greatest, move = engagement.greatest(chosen)
+        greatest, move = engagement.max_heights(chosen)
         if move is None:
             rows.append(OperationEngagement(name, greatest, limit_rad=own))
             continue

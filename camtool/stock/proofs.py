@@ -115,7 +115,9 @@ class JudgedStock(Struct, frozen=True, eq=False):
 
         def upper(squares: Floats) -> Floats:
             low = np.minimum(self.solid.bounds(squares)[:, 1], self.before.greatest_tops(squares))
-            return low - np.maximum(self.tree.least(squares), self.before.least_floors(squares))
+            return low - np.maximum(
+                self.tree.min_heights(squares), self.before.least_floors(squares)
+            )
 
         return value, upper
 
@@ -129,7 +131,7 @@ class JudgedStock(Struct, frozen=True, eq=False):
             )
 
         def upper(squares: Floats) -> Floats:
-            top = np.minimum(self.tree.greatest(squares), self.before.greatest_tops(squares))
+            top = np.minimum(self.tree.max_heights(squares), self.before.greatest_tops(squares))
             lowest = self.solid.bounds(squares)[:, 2]
             return top - np.maximum(lowest, self.before.least_floors(squares))
 
@@ -478,7 +480,7 @@ class Leftovers:
         rest = [np.empty((0, 2, 2))]
         while len(begin):
             corners = np.stack([begin, end], axis=1)
-            high = tree.greatest_over(corners, np.zeros(corners.shape[:2]), enough=level)
+            high = tree.max_heights_over(corners, np.zeros(corners.shape[:2]), enough=level)
             rows = high > level + EPS_MM
             begin, end = begin[rows], end[rows]
             middle = 0.5 * (begin + end)
@@ -527,12 +529,12 @@ class Leftovers:
         """Return upper bounds (K,) of the excess over squares (K, 3)."""
         bound = np.full(len(squares), -np.inf)
         for row, corners, values in _pieces(layer, squares, distance_mm):
-            high = self.stock.tree.greatest_over(corners, values, enough=distance_mm)
+            high = self.stock.tree.max_heights_over(corners, values, enough=distance_mm)
             # Where the linear depth is more than the layer's, the latter counts.
             doubtful = np.flatnonzero((high > distance_mm) & (values.max(axis=1) > layer.depth_mm))
             if len(doubtful):
                 full = np.full_like(values[doubtful], layer.depth_mm)
-                high_of_layer = self.stock.tree.greatest_over(
+                high_of_layer = self.stock.tree.max_heights_over(
                     corners[doubtful], full, enough=distance_mm
                 )
                 high[doubtful] = np.minimum(high[doubtful], high_of_layer)

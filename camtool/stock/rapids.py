@@ -262,7 +262,7 @@ class _Search:
         is_inside = (squares[:, :2] + half > self.low) & (squares[:, :2] - half < self.high)
         max_taken = np.full(len(rapids), -np.inf)
         near_squares = np.flatnonzero(is_inside.all(axis=1) & np.isfinite(own_heights))
-        stock = self.tree.greatest(
+        stock = self.tree.max_heights(
             squares[near_squares], None, self.room_mm, self.before[rapids[near_squares]]
         )
         stock = np.minimum(stock, self.others.greatest_tops(squares[near_squares], self.room_mm))

@@ -113,7 +113,7 @@ class Side(Struct, frozen=True, eq=False, dict=True):
 
 def cover(
     decoded: Side,
-    wanted: Side,
+    wanted_side: Side,
     goal: Goal,
     spacing_mm: float,
     row_from: Indices | None,
@@ -130,16 +130,18 @@ def cover(
     (docs/decisions/0037-own-rows-first.md).
     """
     cuts, limits = decoded.cuts, (goal.limit_mm, goal.depth_mm)
-    source, became = _contours_from(cuts, wanted.cuts, row_from)
-    holes = compare_holes(decoded, wanted, limits)
+    source, became = _contours_from(cuts, wanted_side.cuts, row_from)
+    holes = compare_holes(decoded, wanted_side, limits)
     match, rounding, extra = empty_match(len(cuts.contour)), Figure(), list[UncoveredContour]()
-    alike_rows = _rows_alike(cuts, wanted.cuts, limits, row_from)
+    alike_rows = _rows_alike(cuts, wanted_side.cuts, limits, row_from)
     for samples in samples_by_parts(
         cuts, spacing_mm, cuts.is_cut, SAMPLES_AT_ONCE, _judged_together(cuts, source, alike_rows)
     ):
         nearest_wanted, belongs = _nearest_in_own_contour(cuts, samples, source, goal)
         other = np.flatnonzero(belongs == ANY_CONTOUR)
-        nearest_other, is_wrong = nearest_at_height(samples.of(other), None, wanted.moves, limits)
+        nearest_other, is_wrong = nearest_at_height(
+            samples.of(other), None, wanted_side.moves, limits
+        )
         wrong_depth = np.zeros(len(nearest_wanted.distance), dtype=np.bool_)
         wrong_depth[other] = is_wrong
         nearest_wanted.distance[other], nearest_wanted.segment[other] = (
@@ -161,27 +163,31 @@ def cover(
     match = with_neighbours(match)
     if not is_judged:
         return Coverage(match, rounding, ())
-    has_copy = _rows_copied(wanted.cuts, alike_rows, row_from)
+    has_copy = _rows_copied(wanted_side.cuts, alike_rows, row_from)
     cut = np.append(
-        _fits_contour(wanted.cuts, became, has_copy, decoded.moves, limits, spacing_mm), True
+        _fits_contour(wanted_side.cuts, became, has_copy, decoded.moves, limits, spacing_mm), True
     )
     missing = list[UncoveredContour]()
     for remaining in samples_by_parts(
-        wanted.cuts, spacing_mm, ~cut[wanted.cuts.contour], SAMPLES_AT_ONCE, wanted.cuts.contour
+        wanted_side.cuts,
+        spacing_mm,
+        ~cut[wanted_side.cuts.contour],
+        SAMPLES_AT_ONCE,
+        wanted_side.cuts.contour,
     ):
         nearest_decoded = nearest_at_height(remaining, None, decoded.moves, limits)
         missing += uncovered_contours(
-            wanted.cuts, remaining, nearest_decoded, holes.undrilled, limits
+            wanted_side.cuts, remaining, nearest_decoded, holes.undrilled, limits
         )
 
     def block(part: UncoveredContour) -> str:
         return block_name(cuts.toolpath, part.row)
 
     def contour(part: UncoveredContour) -> str:
-        return _contour_name(wanted.cuts, part)
+        return _contour_name(wanted_side.cuts, part)
 
     findings = (
-        *uncovered_findings(missing, wanted.cuts, goal.limit_mm, _MISSING, contour),
+        *uncovered_findings(missing, wanted_side.cuts, goal.limit_mm, _MISSING, contour),
         *uncovered_findings(extra, cuts, goal.limit_mm, _EXTRA, block),
         *holes.findings,
     )

@@ -88,7 +88,7 @@ cdef class Timers:
     cdef Int[:, ::1] steps_of_rows
     cdef double[:, ::1] target, commanded
     cdef const double[::1] origin
-    cdef double[::1] step_mm, programmed, here
+    cdef double[::1] step_mm, programmed, position
     cdef double added
     cdef bint from_reached, late_longer
 
@@ -98,18 +98,18 @@ cdef class Timers:
         self.steps, self.programmed, self.under_way = counters
         self.commanded, self.row, self.move, self.since_ms = issued[:4]
         self.duration_ms, self.steps_of_rows = issued[4:]
-        self.here = np.empty(3)
+        self.position = np.empty(3)
 
 
 cdef Int _displacement(Int axis, double target, bint sensed, Timers timers) noexcept:
     """Steps of an axis to its target, which then is where the program is."""
     cdef Int steps
-    cdef double here
-    here = timers.programmed[axis]
+    cdef double position
+    position = timers.programmed[axis]
     if sensed or timers.from_reached:
-        here = timers.origin[axis] + float(timers.steps[axis]) * timers.step_mm[axis]
+        position = timers.origin[axis] + float(timers.steps[axis]) * timers.step_mm[axis]
     timers.programmed[axis] = target
-    change = target - here
+    change = target - position
     steps = int(abs(change) / timers.step_mm[axis] + timers.added)
     return -steps if change < 0.0 else steps
 
@@ -148,36 +148,36 @@ cdef void _begin(Int move, Timers timers) noexcept:
 
 cdef Int _run(Timers timers, Int row, Int move, Int first) noexcept:
     """Let the timers run until the move ends or the samples are full; the samples then filled."""
-    cdef Int axis, left, gap, longer, shorter, sense, short_sense, every, short_every, count
+    cdef Int axis, steps_left, gap, longer, shorter, sense, short_sense, every, short_every, count
     cdef Int short_count, k, next_ms, unit
     cdef Int[::1] steps, under_way, rows, moves, since
     cdef bint fires
     cdef double[:, ::1] commanded
-    cdef double[::1] step_mm, here
+    cdef double[::1] step_mm, position
     under_way, step_mm = timers.under_way, timers.step_mm
-    steps, here, commanded, rows = timers.steps, timers.here, timers.commanded, timers.row
+    steps, position, commanded, rows = timers.steps, timers.position, timers.commanded, timers.row
     moves, since = timers.move, timers.since_ms
-    left, gap, longer, shorter = under_way[0], under_way[1], under_way[2], under_way[3]
+    steps_left, gap, longer, shorter = under_way[0], under_way[1], under_way[2], under_way[3]
     sense, short_sense = under_way[4], under_way[5]
     every, short_every, next_ms, unit = under_way[6], under_way[7], under_way[8], under_way[9]
     for axis in range(3):
-        here[axis] = timers.origin[axis] + float(steps[axis]) * step_mm[axis]
+        position[axis] = timers.origin[axis] + float(steps[axis]) * step_mm[axis]
     count, short_count, k = steps[longer], steps[max(shorter, 0)], first
-    while left > 0 and k < len(rows):
+    while steps_left > 0 and k < len(rows):
         fires = shorter < 0 or gap >= 0
         since[k] = next_ms if fires else next_ms - (unit - 1 - gap) // unit
         if shorter >= 0 and gap <= 0:
             short_count += short_sense
-            here[shorter] = timers.origin[shorter] + float(short_count) * step_mm[shorter]
+            position[shorter] = timers.origin[shorter] + float(short_count) * step_mm[shorter]
             gap += short_every
         if fires:
             count += sense
-            here[longer] = timers.origin[longer] + float(count) * step_mm[longer]
+            position[longer] = timers.origin[longer] + float(count) * step_mm[longer]
             gap -= every
             next_ms += every // unit
-            left -= 1
+            steps_left -= 1
         for axis in range(3):
-            commanded[k, axis] = here[axis]
+            commanded[k, axis] = position[axis]
         rows[k], moves[k] = row, move
         k += 1
     timers.steps_of_rows[row, longer] += abs(count - steps[longer])
@@ -185,7 +185,7 @@ cdef Int _run(Timers timers, Int row, Int move, Int first) noexcept:
     if shorter >= 0:
         timers.steps_of_rows[row, shorter] += abs(short_count - steps[shorter])
         steps[shorter] = short_count
-    under_way[0], under_way[1], under_way[8] = left, gap, next_ms
+    under_way[0], under_way[1], under_way[8] = steps_left, gap, next_ms
     return k
 
 

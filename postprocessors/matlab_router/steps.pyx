@@ -149,28 +149,28 @@ cdef Int to_go_of(Int* slave, double* axis, Int sense) noexcept:
     Posi does not fall: within the turn number k it is c + 1023 k, c = 0 … 1023. It first reaches
     T in the turn k' = ⌈T / 1023⌉ − 1, or in the present one, at c' = max(T − 1023 k', 0).
     """
-    cdef Int stage, wanted, up, wraps, here, turn, way, left
+    cdef Int stage, goal, up, wraps, seen, turn, to_go
     cdef bint ahead
     stage = slave[STAGE]
     if stage == FOLLOWING:
-        left = slave[TARGET] - slave[COUNT]
-        left = left if slave[NEXT_REF] >= 0 else -left
+        to_go = slave[TARGET] - slave[COUNT]
+        to_go = to_go if slave[NEXT_REF] >= 0 else -to_go
         ahead = sense == (1 if slave[NEXT_REF] >= 0 else -1)
-        return int(left) if left <= 0 or ahead else NEVER
+        return int(to_go) if to_go <= 0 or ahead else NEVER
     if stage != CRUISING and stage != SLOWING:
         return NEVER
-    wanted = int(axis[CHUNK])
+    goal = int(axis[CHUNK])
     if stage == CRUISING:
-        wanted += 1 if slave[LEFT] > 1 else -TABLE_COUNTS
+        goal += 1 if slave[LEFT] > 1 else -TABLE_COUNTS
     up = slave[UP]
     if sense != 0:
         up = 1 if sense > 0 else 0
     wraps = slave[WRAPS]
-    here = _seen_way(slave, axis, up) - (TURN - 1) * wraps
-    turn = max(wraps, (max(wanted, 0) + TURN - 2) // (TURN - 1) - 1)
-    way = (turn - wraps) * TURN + max(wanted - (TURN - 1) * turn, 0) - here
+    seen = _seen_way(slave, axis, up) - (TURN - 1) * wraps
+    turn = max(wraps, (max(goal, 0) + TURN - 2) // (TURN - 1) - 1)
+    to_go = (turn - wraps) * TURN + max(goal - (TURN - 1) * turn, 0) - seen
     # The direction is that of the last count: a motor that turns back must count first.
-    return int(way) if up == slave[UP] else int(max(way, 1))
+    return int(to_go) if up == slave[UP] else int(max(to_go, 1))
 
 
 cdef void next_stage(double* motor, Int* slave, double moment) noexcept:

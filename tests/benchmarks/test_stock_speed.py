@@ -50,7 +50,7 @@ def test_a_planted_gouge_among_20_000_moves() -> None:
         tree = stock_tree(moves)
         found = greatest_value(
             lambda at: -1.0 - tree.heights(at)[0],
-            lambda squares: -1.0 - tree.least(squares),
+            lambda squares: -1.0 - tree.min_heights(squares),
             box,
             1e-6,
             floor=0.0,
@@ -99,7 +99,7 @@ def test_the_greatest_leftover_of_a_raster() -> None:
                     0.075 * np.sin(x / 3.0) * np.sin(y / 4.0),
                 ]
             )
-            return tree.greatest(squares, slope) - surface(squares[:, :2]) + bend * half**2
+            return tree.max_heights(squares, slope) - surface(squares[:, :2]) + bend * half**2
 
         found = greatest_value(lambda at: tree.heights(at)[0] - surface(at), upper, box, 1e-3)
         assert found.high - found.low <= 1e-3

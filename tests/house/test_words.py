@@ -23,10 +23,10 @@ CYTHON_DOCSTRING = re.compile(
 CYTHON_FUNCTION = re.compile(r" {0,4}(?:def|cdef|cpdef) (?!class|enum)[^=]*?(\w+)\(")
 CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILINE)
 
-MAX_QUESTIONS = 1
+MAX_QUESTIONS = 0
 MAX_SHARED_CLASS_NAMES = 0
 MAX_SUPERLATIVES = 0
-MAX_RIDDLES = 28
+MAX_RIDDLES = 0
 
 RIDDLE = re.compile(
     r"_*(?:found|made|way|most|asked|kept|held|said|apart|whole|mine|theirs|taken|known|about|on|left"

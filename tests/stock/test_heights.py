@@ -87,7 +87,11 @@ def test_bounds_hold_everywhere_in_a_square(seed: int, count: int, size: float) 
     rng = np.random.default_rng(seed)
     squares = np.column_stack([rng.uniform(0.0, 10.0, (40, 2)), np.full(40, size)])
     tilt = rng.normal(0.0, 1.0, (40, 2))
-    low, high, over = tree.least(squares), tree.greatest(squares), tree.greatest(squares, tilt)
+    low, high, over = (
+        tree.min_heights(squares),
+        tree.max_heights(squares),
+        tree.max_heights(squares, tilt),
+    )
     for _ in range(60):
         off = rng.uniform(-1.0, 1.0, (40, 2)) * size
         if rng.random() < 0.3:
@@ -115,8 +119,8 @@ def test_means_lie_between_their_bounds(seed: int, count: int, size: float) -> N
         slack = 0.05 * float(np.ptp(z)) + 1e-12
         assert least - slack <= z.mean() <= most + slack
     # No mean lies beyond the extremes.
-    assert (low >= np.maximum(tree.least(squares), bottom) - 1e-12).all()
-    assert (high <= np.maximum(tree.greatest(squares), bottom) + 1e-12).all()
+    assert (low >= np.maximum(tree.min_heights(squares), bottom) - 1e-12).all()
+    assert (high <= np.maximum(tree.max_heights(squares), bottom) + 1e-12).all()
 
 
 @examples(5, 300)
@@ -141,8 +145,8 @@ def test_means_agree_with_those_of_small_squares(seed: int, count: int, size: fl
     grid = np.stack(np.meshgrid(off, off), axis=-1).reshape(-1, 2) * size
     for square, least, most in zip(squares, low.tolist(), high.tolist(), strict=True):
         small = np.column_stack([square[:2] + grid, np.full(len(grid), size / 32.0)])
-        assert least <= np.maximum(tree.greatest(small), bottom).mean() + 1e-9
-        assert most >= np.maximum(tree.least(small), bottom).mean() - 1e-9
+        assert least <= np.maximum(tree.max_heights(small), bottom).mean() + 1e-9
+        assert most >= np.maximum(tree.min_heights(small), bottom).mean() - 1e-9
 
 
 @examples(20)
@@ -167,7 +171,7 @@ def test_the_scallop_between_passes_of_a_ball() -> None:
         moves_of(start, start + np.array([10.0, 0.0, 0.0]), BALL, CutterProfile(r, 0.0, r))
     )
     box = (1.0, rows[1], 9.0, rows[-2])
-    found = greatest_value(lambda at: tree.heights(at)[0], tree.greatest, box, 1e-6)
+    found = greatest_value(lambda at: tree.heights(at)[0], tree.max_heights, box, 1e-6)
     assert found.low <= -1.0 + r - math.sqrt(r**2 - step**2 / 4.0) <= found.high
     assert found.margin <= 0.5e-6
 
@@ -196,7 +200,7 @@ def test_a_planted_gouge_is_bracketed_to_a_nanometre(tool: int) -> None:
     tree = stock_tree(moves_of(start, end, tool))
     found = greatest_value(
         lambda at: -1.0 - tree.heights(at)[0],
-        lambda squares: -1.0 - tree.least(squares),
+        lambda squares: -1.0 - tree.min_heights(squares),
         (0.0, 0.0, 100.0, 90.0),
         1e-6,
         floor=0.0,
@@ -215,16 +219,22 @@ def test_nothing_is_cut_without_moves_or_by_a_point() -> None:
     for tree in (stock_tree(random_moves(1, 5).select(slice(0))), stock_tree(point)):
         z, which = tree.heights(np.array([[1.0, 0.0]]))
         assert (z[0], which[0]) == (0.0, -1)
-        assert tree.greatest(np.array([[1.0, 0.0, 0.5]]))[0] == 0.0
-        assert tree.least(np.array([[1.0, 0.0, 0.5]]))[0] == 0.0
+        assert tree.max_heights(np.array([[1.0, 0.0, 0.5]]))[0] == 0.0
+        assert tree.min_heights(np.array([[1.0, 0.0, 0.5]]))[0] == 0.0
 
 
 def test_a_search_that_may_not_look_on_says_so() -> None:
     tree = stock_tree(random_moves(3, 50))
     short = greatest_value(
-        lambda at: -tree.heights(at)[0], lambda at: -tree.least(at), BOX, 1e-9, max_squares=20
+        lambda at: -tree.heights(at)[0],
+        lambda at: -tree.min_heights(at),
+        BOX,
+        1e-9,
+        max_squares=20,
     )
-    full = greatest_value(lambda at: -tree.heights(at)[0], lambda at: -tree.least(at), BOX, 1e-3)
+    full = greatest_value(
+        lambda at: -tree.heights(at)[0], lambda at: -tree.min_heights(at), BOX, 1e-3
+    )
     assert short.low <= full.high
     assert full.low <= short.high
     assert short.margin > 1e-9

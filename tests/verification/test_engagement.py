@@ -102,7 +102,7 @@ def test_chips_that_do_not_count_are_thinner_than_the_step_of_a_small_limit() ->
     slides = slide_moves(decoded, target, tools)
     limit, number = np.array([math.radians(5.0)]), np.zeros(len(slides), dtype=np.int64)
     engagement = engagement_of(slides, decoded, (0.0, 0.0, 40.0, 20.0), (number, limit))
-    greatest, _ = engagement.greatest(number == 0)
+    greatest, _ = engagement.max_heights(number == 0)
     assert math.radians(6.0) < greatest <= math.radians(7.05)
 
 

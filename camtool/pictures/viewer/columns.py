@@ -108,13 +108,13 @@ def height_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
         across, upwards = stock.grid
         cell = (right - left) / (across - 1)
         corner = (left - 0.5 * cell, low - 0.5 * cell)
-        whole = HeightMap(np.zeros((upwards, across), dtype=np.float32), cell, corner)
+        uncut = HeightMap(np.zeros((upwards, across), dtype=np.float32), cell, corner)
         before = pair.before or WHOLE
         if before.above or before.below:
-            begun = before.shown_in(whole)
+            begun = before.shown_in(uncut)
         if pair.wanted is not None:
-            add_moves(whole, pair.wanted)
-            goal = before.shown_in(whole)
+            add_moves(uncut, pair.wanted)
+            goal = before.shown_in(uncut)
     return {**_run_columns("goal", goal, stock), **_run_columns("begun", begun, stock)}
 
 

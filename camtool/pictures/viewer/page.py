@@ -123,7 +123,7 @@ def viewer_page(scene: Scene, live: str = "") -> bytes:
         "columns": base64.b64encode(data).decode("ascii"),
     }
     # One pass: the contents of a slot are not searched for slots.
-    page = _SLOT.sub(lambda found: slots[found[1]], _file("viewer.html"))
+    page = _SLOT.sub(lambda match: slots[match[1]], _file("viewer.html"))
     return page.encode("utf-8")
 
 
@@ -387,8 +387,8 @@ def _figure(scene: Scene, circle_number: int) -> str:
     title = f"radial error of circle {circle_number}"
     look: Look = {"viewBox": box, "role": "img", "aria-label": title}
     svg = element("svg", look, *plot(errors, dial))
-    svg = _PAINT.sub(lambda found: f'{found[1]}="var(--{NAMES[found[2]]})"', _ID.sub("", svg))
-    svg = _SHAPE.sub(lambda found: _DECIMAL.sub(r"\1", found[0]), svg)
+    svg = _PAINT.sub(lambda match: f'{match[1]}="var(--{NAMES[match[2]]})"', _ID.sub("", svg))
+    svg = _SHAPE.sub(lambda match: _DECIMAL.sub(r"\1", match[0]), svg)
     caption = "<br>".join(map(html.escape, notes(circles, dial)))
     return f"<figure>\n{svg}\n<figcaption>{caption}</figcaption>\n</figure>"
 
