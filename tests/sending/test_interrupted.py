@@ -278,8 +278,7 @@ def interrupted_and_gone_on(name: str, kind: str, seed: int) -> str:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", sorted(PARTS))
 def test_nothing_stays_uncut_and_nothing_is_cut_elsewhere(name: str, kind: str) -> None:
-    for seed in range(1 if name == "grbl" else 3):
-        interrupted_and_gone_on(name, kind, seed)
+    interrupted_and_gone_on(name, kind, 0)
 
 
 def test_the_cases_do_interrupt() -> None:
