@@ -815,10 +815,12 @@ def _runs_at(
     of two heights, for a tool that goes down in a helix from the first."""
     next_legs = iter(legs)
     for number, stay in enumerate(clearing.stays):
-        parts = [
-            (np.insert(vertices, 2, heights[1], axis=1), feeds)
-            for vertices, feeds in islice(next_legs, len(stay))
-        ]
+        parts = []
+        for leg, (flat, feeds) in zip(stay, islice(next_legs, len(stay)), strict=True):
+            vertices = np.insert(flat, 2, heights[1], axis=1)
+            if not leg.cuts:
+                vertices[:, 2] += _lifts(flat, setting.operation.own_value("lift"))
+            parts.append((vertices, feeds))
         if number == 0 and clearing.helix_mm:
             parts.insert(0, _down(clearing, heights, setting))
         vertices = np.concatenate([*(part[:-1] for part, _ in parts), parts[-1][0][-1:]])
@@ -826,6 +828,14 @@ def _runs_at(
             vertices = vertices * [-1.0, 1.0, 1.0, -1.0]
         feeds = np.concatenate([feed for _, feed in parts])
         yield CutRun(vertices, feeds, setting.feeds.plunge_mm_min, name)
+
+
+def _lifts(link: Floats, lift_mm: float) -> Floats:
+    """(n,) by how much each vertex of a link (n, 3) is lifted: it rises and falls by 45° at most,
+    so that short pieces, which a dialect may leave out, rise by less than a unit."""
+    reach = MeasuredPath.of(Polyline(link)).reach
+    lifts: Floats = np.minimum(np.minimum(reach, reach[-1] - reach), lift_mm)
+    return lifts
 
 
 def _down(
@@ -859,6 +869,13 @@ def _with_feeds(clearing: AdaptiveStays, setting: Setting) -> list[tuple[Floats,
             f"a greatest feed of {max_feed:g} mm/min is below the feed of {feed:g} mm/min",
             where=key_of(operation, "max_feed"),
             mend="give a higher one, or leave it out",
+        )
+    lift_mm, first_mm = operation.own_value("lift"), -setting.levels_mm[0]
+    if lift_mm > first_mm:
+        raise OptionError(
+            f"a lift of {lift_mm:g} mm takes links out of a pass {first_mm:g} mm deep",
+            where=key_of(operation, "lift"),
+            mend="give a smaller one",
         )
     if max_feed is not None and legs:
         tool_mm, limit = operation.tool.radius_mm, operation.own_value("engagement")

@@ -6,7 +6,17 @@ import math
 from typing import NamedTuple
 
 from camtool.errors import OptionError
-from camtool.keys import FEED, Key, Value, engagement_angle, fraction, length, one_of, plain
+from camtool.keys import (
+    FEED,
+    LENGTH,
+    Key,
+    Value,
+    engagement_angle,
+    fraction,
+    length,
+    one_of,
+    plain,
+)
 
 STRATEGIES = ("passes", "adaptive", "trochoidal")
 LIMITED = STRATEGIES[1:]
@@ -65,6 +75,14 @@ LIMIT_KEYS = {
         "Feed of links, which cut nothing.",
         '"2000mm/min"',
         only=("strategy", LIMITED),
+    ),
+    "lift": Key(
+        "lift_mm",
+        LENGTH,
+        "Height by which links are lifted.",
+        '"0.2mm"',
+        only=("strategy", LIMITED),
+        default=0.0,
     ),
     "max_feed": Key(
         "max_feed_mm_min",

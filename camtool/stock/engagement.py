@@ -190,7 +190,9 @@ def engagement_of(
         )
         if counts:
             greatest[own] = max(greatest[own], result[part].max())
-    is_entry = _behind(down & (np.nan_to_num(result) > 0.0), length, radius)
+    # A way down that keeps the limit is none: a link that was lifted, and may touch the stock.
+    excused = np.where(limit < np.pi, limit, 0.0)[number]
+    is_entry = _behind(down & (np.nan_to_num(result) > excused), length, radius)
     return Engagement(result, is_entry, is_known, moves)
 
 

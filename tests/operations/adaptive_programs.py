@@ -16,6 +16,7 @@ from camtool.target.registry import LoadedTarget
 from tests.oracles.contours import SQUARE, star
 from tests.paths import moved, scaled
 
+LIFT_MM = {"island": 0.2, "star": 0.0}
 SHAPES = {
     "island": [SQUARE, moved(scaled(SQUARE, 0.2), 3.0, 5.0)],
     "star": [scaled(star(5, 4.0, 12.0), 0.5)],
@@ -28,6 +29,7 @@ def posted(
     limit: float,
     target: str | LoadedTarget,
     folder: Path,
+    lift_mm: float = 0.0,
     **settings: object,
 ) -> Run:
     """Return the run of a pocket 1 mm deep."""
@@ -42,7 +44,7 @@ def posted(
         depth_mm=1.0,
         spindle_rpm=9000.0,
         plunge_feed_mm_min=60.0,
-        own=(("strategy", "adaptive"), ("engagement_rad", limit)),
+        own=(("strategy", "adaptive"), ("engagement_rad", limit), ("lift_mm", lift_mm)),
         entry=Entry("helix", angle_rad=math.radians(5.0)),
         **settings,  # type: ignore[arg-type]
     )

@@ -73,6 +73,30 @@ def test_the_feed_rises_on_the_same_path() -> None:
     assert feeds.max() <= 1800.0 + 1e-9
 
 
+def test_links_are_lifted_and_nothing_else() -> None:
+    """Strokes are the same; links rise by 45 degrees at most, up to the lift."""
+    limit = math.acos(1.0 - 2.0 * 0.12)
+    own = (("strategy", "adaptive"), ("engagement_rad", limit), ("lift_mm", 0.1))
+    entry = Entry("helix", angle_rad=math.radians(5.0))
+    plain = adaptive([SQUARE], 1.2, limit)
+    runs = runs_of(work_of([SQUARE], 1.2, own=own, entry=entry))
+    highest = -1.0
+    for run, same in zip(runs, plain, strict=True):
+        assert np.array_equal(run.vertices[:, [0, 1, 3]], same.vertices[:, [0, 1, 3]])
+        lifts = run.vertices[:, 2] - same.vertices[:, 2]
+        gaps = np.hypot(*np.diff(run.vertices[:, :2], axis=0).T)
+        assert (lifts >= 0.0).all()
+        assert (np.abs(np.diff(lifts)) <= 0.5 * math.pi * gaps + 1e-9).all()
+        highest = max(highest, float(lifts.max()))
+    assert highest == pytest.approx(0.1)
+
+
+def test_a_lift_out_of_the_first_pass_is_refused() -> None:
+    own = (("strategy", "adaptive"), ("lift_mm", 1.1))
+    with pytest.raises(OptionError, match="a lift of"):
+        work_of([SQUARE], 1.2, own=own, entry=Entry("helix", angle_rad=0.1))
+
+
 def test_a_greatest_feed_below_the_feed_is_refused() -> None:
     own = (("strategy", "adaptive"), ("max_feed_mm_min", 500.0))
     with pytest.raises(OptionError, match="greatest feed"):

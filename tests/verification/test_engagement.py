@@ -243,3 +243,17 @@ def test_small_arcs_head_as_commanded() -> None:
     greatest = run.report.engagement[0].greatest_deg
     assert greatest is not None
     assert 0.8 * known < greatest < known + 8.0
+
+
+def test_a_lifted_link_is_no_entry() -> None:
+    """A tool that comes down beside the stock, touches it by 0.05 mm, and then cuts too much."""
+    lines = ["G21 G90", "G0 Z5", "M3 S9000", "G0 X-9 Y-1.25", "G1 Z-1 F100", "G1 X49 F600"]
+    lines += ["G1 Y-5", "G1 X10 Z-0.8", "G1 X12 Y-1.2 Z-1", "G1 X14 Y1.25", "G1 X20", "G1 Y-5"]
+    job = Job(
+        operations=(Operation(kind="profile", tool=Tool(2.0 * RADIUS_MM)),),
+        stock=Stock(2.0, (0.0, 0.0), (60.0, 20.0)),
+    )
+    judging = camtool.Judging(gates=camtool.Gates(engagement_rad=math.radians(75.0)))
+    program = "\n".join([*lines, "G0 Z5", "M5", "M2", ""]).encode()
+    run = camtool.verify(program, "grbl", job=job, judging=judging)
+    assert len(messages(run)) == 1

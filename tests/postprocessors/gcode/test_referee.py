@@ -74,8 +74,8 @@ def test_the_logo(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("shape", adaptive_programs.SHAPES)
 def test_adaptive_pockets(shape: str, name: str, tmp_path: Path) -> None:
     """Hundreds of short arcs: none is refused, and all end where they should."""
-    paths = adaptive_programs.SHAPES[shape]
-    run = adaptive_programs.posted(paths, 1.7, math.radians(65.0), name, tmp_path)
+    paths, lift_mm = adaptive_programs.SHAPES[shape], adaptive_programs.LIFT_MM[shape]
+    run = adaptive_programs.posted(paths, 1.7, math.radians(65.0), name, tmp_path, lift_mm)
     assert sum(run.decoded.is_arc) > 300
     compare(run.decoded, run.data, tmp_path)
     ends = motions(interpreted(run.data, tmp_path, table=NO_LENGTHS))[:, 1:4]

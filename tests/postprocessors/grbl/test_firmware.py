@@ -192,8 +192,8 @@ def test_steps_and_times(firmware: Callable[..., Ran], seed: int) -> None:
 @pytest.mark.parametrize("shape", adaptive_programs.SHAPES)
 def test_adaptive_pockets(firmware: Callable[..., Ran], shape: str, tmp_path: Path) -> None:
     """Every block is taken, and all steps are those of the model."""
-    paths = adaptive_programs.SHAPES[shape]
-    data = adaptive_programs.posted(paths, 1.7, math.radians(65.0), "grbl", tmp_path).data
+    paths, lift_mm = adaptive_programs.SHAPES[shape], adaptive_programs.LIFT_MM[shape]
+    data = adaptive_programs.posted(paths, 1.7, math.radians(65.0), "grbl", tmp_path, lift_mm).data
     ran = firmware(data.decode(), {"$1": 25.0})
     assert not any(ran.errors)
     places, _ = model(data.decode())
