@@ -6,7 +6,7 @@ the model of its controller. Methods with a body are optional: a target override
 differs. docs/write-a-post.md builds a complete target.
 
 A list of all targets uses only the attributes of each; so a target imports its writer, its reader
-and its model within the methods that need them.
+and its model within the methods that need them, or names them with `lazy_call`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import msgspec
@@ -79,6 +80,18 @@ class SampledDialect(Struct, frozen=True):
 
     settings: tuple[ControllerSetting, ...]
     questions: tuple[OpenKey, ...]
+
+
+def lazy_call(path: str) -> Any:
+    """Return a method that calls the function or class at `path` ("package.module:name") with its
+    own arguments; the module is imported at the first call."""
+    module, _, name = path.partition(":")
+
+    def call(self: Target, *arguments: Any, **named: Any) -> Any:
+        return getattr(import_module(module), name)(*arguments, **named)
+
+    call.path = path  # type: ignore[attr-defined]
+    return call
 
 
 class Target(ABC):

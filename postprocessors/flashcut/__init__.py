@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target
+from camtool.target.contract import Target, lazy_call
 
 from ..gcode.meanings import MEANINGS
 from .dialect import FlashcutController, FlashcutDialect, FlashcutMachine, check
@@ -16,11 +16,7 @@ from .dialect import FlashcutController, FlashcutDialect, FlashcutMachine, check
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
     from camtool.target.wire import NoWire
-    from camtool.toolpath.moves import Toolpath
-    from camtool.toolpath.program import Listing, Program
-
-    from .controller import FlashcutModel
-    from .signals import FlashcutSignals
+    from camtool.toolpath.program import Listing
 
 
 class Flashcut(Target):
@@ -35,37 +31,18 @@ class Flashcut(Target):
     controllers = (FlashcutController,)
     dialect = FlashcutDialect
 
+    write = lazy_call("camtool_postprocessors.flashcut.write:write_program")
+    read = lazy_call("camtool_postprocessors.flashcut.read:read_program")
+    model = lazy_call("camtool_postprocessors.flashcut.controller:FlashcutModel")
+    signals = lazy_call("camtool_postprocessors.flashcut.signals:FlashcutSignals")
+
     def check(self, machine: FlashcutMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
         check(machine)
 
-    def write(self, toolpath: Toolpath, machine: FlashcutMachine) -> Program:
-        """The program; PostError naming the move that cannot be written or done."""
-        from .write import write_program
-
-        return write_program(toolpath, machine)
-
-    def read(self, data: bytes, machine: FlashcutMachine) -> Toolpath:
-        """The moves as the controller takes them; ProgramError with block, line and column."""
-        from .read import read_program
-
-        return read_program(data, machine)
-
-    def model(self) -> FlashcutModel:
-        """The model of its controller."""
-        from .controller import FlashcutModel
-
-        return FlashcutModel()
-
     def unit_mm(self, machine: FlashcutMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return float(10.0**-machine.dialect.decimals)
-
-    def signals(self) -> FlashcutSignals:
-        """The signals of its motors; docs/signals.md."""
-        from .signals import FlashcutSignals
-
-        return FlashcutSignals()
 
     def wire(self) -> NoWire:
         """None: its port is no line, and the PC is its clock (L1044-1050)."""

@@ -58,10 +58,10 @@ def header(
     return [comment(line) for line in lines]
 
 
-def has_heading(data: bytes) -> bool:
-    """True if a program has the heading that `header` writes."""
+def lacks_heading(data: bytes) -> bool:
+    """True if a program does not begin with the heading that `header` writes."""
     heading = f"({MAKER}".encode()
-    return any(line.startswith(heading) for line in data[:4096].splitlines()[:HEADING_LINES])
+    return not any(line.startswith(heading) for line in data[:4096].splitlines()[:HEADING_LINES])
 
 
 def comments(

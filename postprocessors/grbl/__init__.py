@@ -6,7 +6,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import ControllerSetting, Target, TwinKind
+from camtool.target.contract import Target, TwinKind, lazy_call
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
 from ..gcode.meanings import MEANINGS
@@ -15,12 +15,7 @@ from .findings import CODES
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
-    from camtool.toolpath.moves import Toolpath
-    from camtool.toolpath.program import Listing, Program
-
-    from .controller import GrblModel
-    from .signals import GrblSignals
-    from .wire import GrblWire
+    from camtool.toolpath.program import Listing
 
 
 class Grbl(Target):
@@ -36,63 +31,24 @@ class Grbl(Target):
     settings_listing = "what it answers to $$"
     codes = CODES
 
+    write = lazy_call("camtool_postprocessors.grbl.write:write_program")
+    read = lazy_call("camtool_postprocessors.grbl.read:read_program")
+    model = lazy_call("camtool_postprocessors.grbl.controller:GrblModel")
+    settings_from = lazy_call("camtool_postprocessors.grbl.settings:settings_of")
+    compare_settings = lazy_call("camtool_postprocessors.grbl.settings:differences")
+    signals = lazy_call("camtool_postprocessors.grbl.signals:GrblSignals")
+    wire = lazy_call("camtool_postprocessors.grbl.wire:GrblWire")
+    made_elsewhere = lazy_call("camtool_postprocessors.gcode.comments:lacks_heading")
+
     def check(self, machine: GrblMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
         feed_decimals(machine)
         if machine.dialect.start_blocks or machine.dialect.end_blocks:
             check_blocks(machine, partial(self.read, machine=machine))
 
-    def write(self, toolpath: Toolpath, machine: GrblMachine) -> Program:
-        """The program; PostError naming the move that cannot be written or done."""
-        from .write import write_program
-
-        return write_program(toolpath, machine)
-
-    def read(self, data: bytes, machine: GrblMachine) -> Toolpath:
-        """The moves as the controller decodes them; ProgramError with block, line and column."""
-        from .read import read_program
-
-        return read_program(data, machine)
-
-    def model(self) -> GrblModel:
-        """The model of its controller."""
-        from .controller import GrblModel
-
-        return GrblModel()
-
     def unit_mm(self, machine: GrblMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return last_decimal_mm(machine.dialect)
-
-    def settings_from(self, text: str) -> list[ControllerSetting] | None:
-        """The values that grbl's answer to `$$` says; None for another text."""
-        from .settings import settings_of
-
-        return settings_of(text)
-
-    def compare_settings(self, text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
-        """Compare its answer to `$$` with the machine file."""
-        from .settings import differences
-
-        return differences(text, machine)
-
-    def signals(self) -> GrblSignals:
-        """The signals of its motors; docs/signals.md."""
-        from .signals import GrblSignals
-
-        return GrblSignals()
-
-    def wire(self) -> GrblWire:
-        """Lines, as many as its buffer takes."""
-        from .wire import GrblWire
-
-        return GrblWire()
-
-    def made_elsewhere(self, data: bytes) -> bool:
-        """True if the program does not begin with camtool's own heading."""
-        from ..gcode.comments import has_heading
-
-        return not has_heading(data)
 
     def listing(self, data: bytes, machine: GrblMachine) -> Listing:
         """The lines that are blocks."""

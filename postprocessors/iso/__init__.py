@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target
+from camtool.target.contract import Target, lazy_call
 
 from .dialect import IsoDialect, IsoMachine
 from .findings import CODES
@@ -16,11 +16,6 @@ from .planners import controller_records, planner_of
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis, Grade
-    from camtool.target.contract import SampledDialect
-    from camtool.toolpath.moves import Toolpath
-    from camtool.toolpath.program import Listing, Program
-
-    from .planners import PlannedModel
 
 
 class Iso(Target):
@@ -35,34 +30,23 @@ class Iso(Target):
     codes = CODES
     no_twin = "only its language is described"
 
+    write = lazy_call("camtool_postprocessors.iso.write:write_program")
+    read = lazy_call("camtool_postprocessors.iso.read:read_program")
+    model = lazy_call("camtool_postprocessors.iso.planners:PlannedModel")
+    dialect_from = lazy_call("camtool_postprocessors.iso.sample:sampled_dialect")
+    listing = lazy_call("camtool_postprocessors.iso.read:listing_of")
+    made_elsewhere = lazy_call("camtool_postprocessors.gcode.comments:lacks_heading")
+
     def check(self, machine: IsoMachine) -> None:
         """Raise MachineError where the dialect contradicts itself."""
         from .check import check_machine
 
         check_machine(machine)
 
-    def write(self, toolpath: Toolpath, machine: IsoMachine) -> Program:
-        """The program; PostError naming the move that cannot be written or done."""
-        from .write import write_program
-
-        return write_program(toolpath, machine)
-
-    def read(self, data: bytes, machine: IsoMachine) -> Toolpath:
-        """The moves as the controller decodes them; ProgramError with block, line and column."""
-        from .read import read_program
-
-        return read_program(data, machine)
-
     def grade_of(self, machine: IsoMachine) -> Grade:
         """Return what the machine's planner knows."""
         planner = planner_of(machine)
         return machine.target.grade or ("path only" if planner is None else planner.grade)
-
-    def model(self) -> PlannedModel:
-        """The model of the machine's planner."""
-        from .planners import PlannedModel
-
-        return PlannedModel()
 
     def stray_mm(self, machine: IsoMachine) -> float:
         """The distance that lines may have from the arcs that they replace."""
@@ -73,24 +57,6 @@ class Iso(Target):
     def unit_mm(self, machine: IsoMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return machine.dialect.last_decimal_mm
-
-    def dialect_from(self, data: bytes) -> SampledDialect:
-        """Return what a sample program shows of its dialect."""
-        from .sample import sampled_dialect
-
-        return sampled_dialect(data)
-
-    def made_elsewhere(self, data: bytes) -> bool:
-        """True if the program does not begin with camtool's own heading."""
-        from ..gcode.comments import has_heading
-
-        return not has_heading(data)
-
-    def listing(self, data: bytes, machine: IsoMachine) -> Listing:
-        """The lines that are blocks."""
-        from .read import listing_of
-
-        return listing_of(data, machine)
 
 
 POST = Iso()

@@ -6,7 +6,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import ControllerSetting, Target, TwinKind
+from camtool.target.contract import Target, TwinKind, lazy_call
 from camtool.target.signals import NoSignals
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 
     from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
-    from camtool.toolpath.program import Listing, Program
-
-    from .controller import LinuxcncModel
-    from .wire import LinuxcncWire
+    from camtool.toolpath.program import Listing
 
 
 class Linuxcnc(Target):
@@ -42,17 +39,17 @@ class Linuxcnc(Target):
     filter_default = True
     codes = CODES
 
+    write = lazy_call("camtool_postprocessors.linuxcnc.write:write_program")
+    model = lazy_call("camtool_postprocessors.linuxcnc.controller:LinuxcncModel")
+    wire = lazy_call("camtool_postprocessors.linuxcnc.wire:LinuxcncWire")
+    settings_from = lazy_call("camtool_postprocessors.linuxcnc.ini:settings_of")
+    made_elsewhere = lazy_call("camtool_postprocessors.gcode.comments:lacks_heading")
+
     def check(self, machine: LinuxcncMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
         feed_decimals(machine)
         if machine.dialect.start_blocks or machine.dialect.end_blocks:
             check_blocks(machine, partial(self.read, machine=machine))
-
-    def write(self, toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
-        """The program; PostError naming the move that cannot be written or done."""
-        from .write import write_program
-
-        return write_program(toolpath, machine)
 
     def read(self, data: bytes, machine: LinuxcncMachine) -> Toolpath:
         """The moves as the controller decodes them; ProgramError with block, line and column."""
@@ -64,12 +61,6 @@ class Linuxcnc(Target):
 
         return read_program(data, machine, folder)
 
-    def model(self) -> LinuxcncModel:
-        """The model of its controller."""
-        from .controller import LinuxcncModel
-
-        return LinuxcncModel()
-
     def signals(self) -> NoSignals:
         """None; docs/signals.md."""
         return NoSignals(
@@ -77,12 +68,6 @@ class Linuxcnc(Target):
             "follow the trajectory",
             "halscope shows its pins; camtool preview --simulate FILE.html plays the trajectory",
         )
-
-    def wire(self) -> LinuxcncWire:
-        """A file that it opens, told and watched through linuxcncrsh."""
-        from .wire import LinuxcncWire
-
-        return LinuxcncWire()
 
     def twin_kind(self) -> TwinKind:
         """The virtual controller; docs/wires/linuxcnc.md."""
@@ -93,18 +78,6 @@ class Linuxcnc(Target):
     def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return last_decimal_mm(machine.dialect)
-
-    def settings_from(self, text: str) -> list[ControllerSetting] | None:
-        """The values that LinuxCNC's INI file says; None for another text."""
-        from .ini import settings_of
-
-        return settings_of(text)
-
-    def made_elsewhere(self, data: bytes) -> bool:
-        """True if the program does not begin with camtool's own heading."""
-        from ..gcode.comments import has_heading
-
-        return not has_heading(data)
 
     def listing(self, data: bytes, machine: LinuxcncMachine) -> Listing:
         """The lines that are blocks."""

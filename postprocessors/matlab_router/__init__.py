@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from camtool.target.contract import Target, TwinKind
+from camtool.target.contract import Target, TwinKind, lazy_call
 from camtool.target.signals import NoSignals
 
 from .dialect import (
@@ -27,10 +27,8 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.machine.servo import ServoTicks, SpeedLoop
     from camtool.toolpath.moves import Toolpath
-    from camtool.toolpath.program import Listing, Program
 
     from .controller import MatlabRouterModel
-    from .wire import MatlabRouterWire
 
 
 def _controller() -> ModuleType:
@@ -48,21 +46,14 @@ class MatlabRouter(Target):
     dialect = MatlabRouterDialect
     link = MatlabRouterLink
 
+    write = lazy_call("camtool_postprocessors.matlab_router.write:write_program")
+    read = lazy_call("camtool_postprocessors.matlab_router.read:read_program")
+    wire = lazy_call("camtool_postprocessors.matlab_router.wire:MatlabRouterWire")
+    listing = lazy_call("camtool_postprocessors.matlab_router.jobs:listing")
+
     def check(self, machine: MatlabRouterMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
         dialect_of(machine)
-
-    def write(self, toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
-        """The program; PostError naming the move that cannot be written or done."""
-        from .write import write_program
-
-        return write_program(toolpath, machine)
-
-    def read(self, data: bytes, machine: MatlabRouterMachine) -> Toolpath:
-        """The moves as the machine executes them; ProgramError with line and column."""
-        from .read import read_program
-
-        return read_program(data, machine)
 
     def model(self) -> MatlabRouterModel:
         """The model of its controller."""
@@ -91,12 +82,6 @@ class MatlabRouter(Target):
             "camtool preview --simulate FILE.html plays the places of its encoders",
         )
 
-    def wire(self) -> MatlabRouterWire:
-        """Numbers, and the time of a job."""
-        from .wire import MatlabRouterWire
-
-        return MatlabRouterWire()
-
     def rest(
         self, data: bytes, machine: MatlabRouterMachine, first: int
     ) -> tuple[bytes, int] | None:
@@ -110,12 +95,6 @@ class MatlabRouter(Target):
         from .twin import MatlabRouterTwin, MatlabRouterTwinSettings
 
         return TwinKind(MatlabRouterTwinSettings, MatlabRouterTwin)
-
-    def listing(self, data: bytes, machine: MatlabRouterMachine) -> Listing:
-        """The columns of the arrays that each block is."""
-        from .jobs import listing
-
-        return listing(data, machine)
 
 
 POST = MatlabRouter()

@@ -9,18 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, get_args
 
-from camtool.target.contract import Target, TwinKind
+from camtool.target.contract import Target, TwinKind, lazy_call
 
 from .dialect import Interpolator, PicMmhController, PicMmhDialect, PicMmhLink, PicMmhMachine
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
-    from camtool.toolpath.moves import Toolpath
-    from camtool.toolpath.program import Listing, Program
+    from camtool.toolpath.program import Listing
 
-    from .controller import PicMmhModel
-    from .signals import PicMmhSignals
-    from .wire import PicMmhWire
 
 MEANINGS: Final[Mapping[str, str]] = {"G90": "positions are absolute"}
 
@@ -35,23 +31,11 @@ class PicMmh(Target):
     link = PicMmhLink
     interpolators = get_args(Interpolator)
 
-    def write(self, toolpath: Toolpath, machine: PicMmhMachine) -> Program:
-        """The program; PostError naming the move that cannot be written or done."""
-        from .write import write_program
-
-        return write_program(toolpath, machine)
-
-    def read(self, data: bytes, machine: PicMmhMachine) -> Toolpath:
-        """The moves as the controller decodes them; ProgramError with block and column."""
-        from .read import read_program
-
-        return read_program(data, machine)
-
-    def model(self) -> PicMmhModel:
-        """The model of its controller."""
-        from .controller import PicMmhModel
-
-        return PicMmhModel()
+    write = lazy_call("camtool_postprocessors.pic_mmh.write:write_program")
+    read = lazy_call("camtool_postprocessors.pic_mmh.read:read_program")
+    model = lazy_call("camtool_postprocessors.pic_mmh.controller:PicMmhModel")
+    signals = lazy_call("camtool_postprocessors.pic_mmh.signals:PicMmhSignals")
+    wire = lazy_call("camtool_postprocessors.pic_mmh.wire:PicMmhWire")
 
     def unit_mm(self, machine: PicMmhMachine, axis: Axis) -> float:
         """The coarser of the last decimal of a coordinate and a step."""
@@ -59,18 +43,6 @@ class PicMmh(Target):
 
         steps = (each.coded_step_mm for each in machine.axes)
         return max(1.0 / UNITS_PER_MM[machine.dialect.form], *steps)
-
-    def signals(self) -> PicMmhSignals:
-        """The signals of its motors; docs/signals.md."""
-        from .signals import PicMmhSignals
-
-        return PicMmhSignals()
-
-    def wire(self) -> PicMmhWire:
-        """A block, its echo, its steps."""
-        from .wire import PicMmhWire
-
-        return PicMmhWire()
 
     def listing(self, data: bytes, machine: PicMmhMachine) -> Listing:
         """Divide the program into its blocks, each with its semicolon."""

@@ -8,19 +8,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target, TwinKind
+from camtool.target.contract import Target, TwinKind, lazy_call
 
 from ..gcode.meanings import MEANINGS
 from .dialect import ValcncController, ValcncDialect, ValcncLink, ValcncMachine, check, scales_of
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
-    from camtool.toolpath.moves import Toolpath
-    from camtool.toolpath.program import Listing, Program
-
-    from .controller import ValcncModel
-    from .signals import ValcncSignals
-    from .wire import ValcncWire
+    from camtool.toolpath.program import Listing
 
 
 class Valcnc(Target):
@@ -32,44 +27,20 @@ class Valcnc(Target):
     dialect = ValcncDialect
     link = ValcncLink
 
+    write = lazy_call("camtool_postprocessors.valcnc.write:write_program")
+    read = lazy_call("camtool_postprocessors.valcnc.read:read_program")
+    model = lazy_call("camtool_postprocessors.valcnc.controller:ValcncModel")
+    signals = lazy_call("camtool_postprocessors.valcnc.signals:ValcncSignals")
+    wire = lazy_call("camtool_postprocessors.valcnc.wire:ValcncWire")
+
     def check(self, machine: ValcncMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
         check(machine)
-
-    def write(self, toolpath: Toolpath, machine: ValcncMachine) -> Program:
-        """The program; PostError naming the move that cannot be written or done."""
-        from .write import write_program
-
-        return write_program(toolpath, machine)
-
-    def read(self, data: bytes, machine: ValcncMachine) -> Toolpath:
-        """The moves as the controller takes them; ProgramError with block, line and column."""
-        from .read import read_program
-
-        return read_program(data, machine)
-
-    def model(self) -> ValcncModel:
-        """The model of its controller."""
-        from .controller import ValcncModel
-
-        return ValcncModel()
 
     def unit_mm(self, machine: ValcncMachine, axis: Axis) -> float:
         """The last decimal of a coordinate, on the axis where it is the most."""
         dialect = machine.dialect
         return float(10.0**-dialect.decimals / scales_of(machine, dialect).min())
-
-    def signals(self) -> ValcncSignals:
-        """The signals of its motors; docs/signals.md."""
-        from .signals import ValcncSignals
-
-        return ValcncSignals()
-
-    def wire(self) -> ValcncWire:
-        """A block and its time."""
-        from .wire import ValcncWire
-
-        return ValcncWire()
 
     def twin_kind(self) -> TwinKind:
         """The virtual controller; docs/wires/valcnc.md."""

@@ -3,7 +3,8 @@
 import os
 import pickle
 import sys
-from importlib import metadata
+from importlib import import_module, metadata
+from inspect import isfunction
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,17 @@ def test_pic_mmh_is_installed() -> None:
     target = load_target("pic-mmh")
     assert target.machine.target.name == "pic-mmh"
     assert target.target.name == "pic-mmh"
+
+
+@pytest.mark.parametrize("name", target_names())
+def test_the_functions_that_a_target_names_exist(name: str) -> None:
+    target = type(registry.find_target(name)[0])
+    methods = filter(isfunction, vars(target).values())
+    paths = [vars(method)["path"] for method in methods if "path" in vars(method)]
+    assert {path.rpartition(":")[2] for path in paths} >= {"write_program"}
+    for path in paths:
+        module, _, function = path.partition(":")
+        assert callable(getattr(import_module(module), function)), path
 
 
 @pytest.mark.parametrize("name", ["pic-mhm", "picmmh", "", "nothing like it"])
