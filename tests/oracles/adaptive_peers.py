@@ -27,11 +27,11 @@ MOST_SECONDS = 300
 ACCURACY = 0.1
 """FreeCAD's own default of what it calls accuracy."""
 
-CUTTING = 0
-"""Its kind of a path that cuts."""
+CUTTING, LINK = 0, 1
+"""Its kinds of a path that cuts, and of one at depth through what is cleared; others retract."""
 
 _FREECAD = """
-import json, sys
+import json, sys, time
 asked = json.load(sys.stdin)
 sys.path.insert(0, asked["folder"])
 import area
@@ -43,12 +43,14 @@ work.tolerance = asked["accuracy"]
 work.stockToLeave, work.keepToolDownDistRatio = 0.0, 3.0
 work.forceInsideOut, work.finishingProfile = False, asked["finish"]
 work.opType = area.AdaptiveOperationType.ClearingInside
+begin = time.process_time()
 regions = work.Execute([asked["stock"]], asked["paths"], lambda so_far: False)
+seconds = time.process_time() - begin
 print()
-print(json.dumps([
+print(json.dumps([seconds, [
     [list(each.HelixCenterPoint), [[int(kind), way] for kind, way in each.AdaptivePaths]]
     for each in regions
-]))
+]]))
 """
 
 _HSM = """
@@ -100,15 +102,28 @@ def _moving(way: Sequence[Sequence[float]]) -> Stay:
     return Stay(points[moved], np.empty((0, 3)))
 
 
-def freecad(area: shapely.Polygon, radius_mm: float, share: float, *, finish: bool) -> Clearing:
-    """Clear an area with FreeCAD; `share` of the tool's diameter is its step-over. What it says
-    is a cut is one; a helix clears a ring of half the tool's diameter."""
+class Plan(NamedTuple):
+    """What FreeCAD plans for an area, and the processor time of that, s: for each region where its
+    helix is, and its ways, each of a kind (CUTTING, LINK) and with its points."""
+
+    seconds: float
+    regions: list[tuple[list[float], list[tuple[int, list[list[float]]]]]]
+
+
+def freecad_plan(area: shapely.Polygon, radius_mm: float, share: float, *, finish: bool) -> Plan:
+    """Clear an area with FreeCAD; `share` of the tool's diameter is its step-over."""
     rings = [shapely.get_coordinates(ring).tolist() for ring in (area.exterior, *area.interiors)]
     stock = shapely.get_coordinates(shapely.box(*shapely.buffer(area, 10.0).bounds)).tolist()
     asked = {"folder": str(FREECAD), "diameter": 2.0 * radius_mm, "share": share}
     asked |= {"accuracy": ACCURACY, "finish": finish, "stock": stock, "paths": rings}
+    return Plan(*_run(DEBIAN_PYTHON, _FREECAD, asked))
+
+
+def freecad(area: shapely.Polygon, radius_mm: float, share: float, *, finish: bool) -> Clearing:
+    """Return the cuts of `freecad_plan`, as FreeCAD calls them; a helix clears a ring of half the
+    tool's diameter."""
     stays, is_entry = list[Stay](), list[bool]()
-    for centre, ways in _run(DEBIAN_PYTHON, _FREECAD, asked):
+    for centre, ways in freecad_plan(area, radius_mm, share, finish=finish).regions:
         cuts = [_moving(way) for kind, way in ways if kind == CUTTING]
         stays += [_ring(centre, 0.5 * radius_mm), *(cut for cut in cuts if len(cut.points) > 1)]
         is_entry += [number < 2 for number in range(len(stays) - len(is_entry))]
