@@ -12,7 +12,6 @@ from typing import BinaryIO
 from camtool.errors import PostError, ProgramError
 
 MAX_PROGRAM_BYTES = 500_000_000
-"""A larger program file is refused before it is read."""
 
 MAX_MOVES = 3_000_000
 """A program of more lines, blocks or records is refused before it is decoded, and one whose blocks

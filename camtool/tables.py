@@ -27,7 +27,6 @@ _PARTS = re.compile(r"[=,{}\[\]\n]")
 """The characters between keys and values of TOML text."""
 
 MAX_SHOWN_CHARS = 40
-"""Messages do not repeat numbers of more characters."""
 
 Table = dict[str, Any]
 _T = TypeVar("_T")

@@ -30,10 +30,8 @@ MM_PER_UNIT: dict[str, float] = {
 """Units of lengths that a user may write, in mm (pt, pc, q, and px at 96 dpi as in CSS 2.1)."""
 
 RAD_PER_UNIT: dict[str, float] = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
-"""Units of angles that a user may write, in rad."""
 
 S_PER_UNIT: dict[str, float] = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
-"""Units of times that a user may write, in s."""
 
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^\d\s,]*)\s*")

@@ -30,7 +30,6 @@ CONNECT_S = 10.0
 """Time limit for the first answer of the scheduler."""
 
 CLOSE_S = 5.0
-"""Time limit for closing the connection to the scheduler."""
 
 ALONE_S = 5.0
 """Time without any worker after which the user is told; workers may still join later."""

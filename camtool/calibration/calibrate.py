@@ -56,7 +56,6 @@ INVOLVED = 1e-6
 """A parameter is part of such a direction when its share is above this."""
 
 OUTLIER_SIGMAS = 3.0
-"""A reading whose residual exceeds this many of its standard deviations is an outlier."""
 
 OUTLIER_FREEDOM = 4
 """That standard deviation is estimated from the other readings if they exceed the parameters by so
@@ -191,7 +190,6 @@ a lower one is a fault of the measurements."""
 
 
 COEFFICIENT_DECIMALS = 4
-"""Correlations are rounded to so many decimal places."""
 
 
 class Estimate(Struct, frozen=True):

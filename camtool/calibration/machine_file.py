@@ -23,7 +23,6 @@ DIGITS = 9
 """Significant digits of values whose uncertainty is not known."""
 
 UNCERTAINTY_DIGITS = 3
-"""Significant digits of standard uncertainties."""
 
 
 def machine_file(

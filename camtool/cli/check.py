@@ -103,7 +103,6 @@ class _Check:
 # The facts as lines for people. Long lists show their first rows; the JSON has all of them.
 
 SHOWN = 10
-"""So many rows of a list are shown, unless asked for all."""
 
 NAME_WIDTH = 10
 """Columns before the values."""

@@ -42,10 +42,8 @@ CODES: Final[dict[str, Code | TargetCode]] = {each.name: each for room in _ROOMS
 """The codes of all rooms by name; those of a target are its own."""
 
 LEVELS: Final = {"info": "note", "warning": "warning", "error": "error"}
-"""The levels of SARIF by severity."""
 
 COMMANDS: Final = {"info": "notice", "warning": "warning", "error": "error"}
-"""The workflow commands of GitHub by severity."""
 
 SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 

@@ -47,7 +47,6 @@ _Answer = Callable[[click.Context, str], Iterable[CompletionItem]]
 # The shells.
 
 LINE_VARIABLE = "COMP_WORDS"
-"""Environment variable with the line up to the cursor."""
 
 _BASH = r"""%(complete_func)s() {
     local answer value

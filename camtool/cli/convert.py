@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from camtool.toolpath.surface import Surface
 
 MAX_TURN_DEG = 360.0
-"""Largest angle by which a program is turned."""
 
 
 @click.command(cls=SectionedCommand, short_help="A program of one machine as that of another.")

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 KINDS = ("lines", "squares", "circles", "steps")
 DRAWINGS = (".dxf", ".svg")
 SIZE = (50.0, 50.0)
-"""Of a sheet when neither --size nor the machine's travel says it, mm."""
 
 
 def _size(

@@ -15,7 +15,6 @@ from camtool.pictures.drawing import drawing_page
 from camtool.units import parse_length
 
 MAX_SHEET_MM = 10_000.0
-"""Longest side of a sheet."""
 
 MIN_GRID_MM = 0.001
 

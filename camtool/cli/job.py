@@ -40,7 +40,6 @@ NOT_CUT = "leave"
 """The answer that leaves a group uncut."""
 
 MAX_GROUPS = 12
-"""So many groups of contours of an operation are printed."""
 
 
 @click.group(short_help="Job files: begin one, or see what one says.")

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 
 COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
-"""The colours of the first word of a message, on a terminal."""
 
 
 def say(text: str, *, quiet: bool) -> None:

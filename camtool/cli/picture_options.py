@@ -32,7 +32,6 @@ OF_ALL = ("--size", "--crop", "--dark")
 """Content of every still picture."""
 
 PICTURES = (".svg", ".png", ".html")
-"""Kinds of pictures, by the ends of their names."""
 
 
 def is_viewer(name: str) -> bool:
@@ -165,7 +164,6 @@ class PictureFlags(Struct, frozen=True):
 
 
 FLAGS = PictureFlags.__struct_fields__
-"""The names of the flags of pictures, as a command has them."""
 
 
 def check_beside(flag: str, pictures: Sequence[str | None]) -> None:

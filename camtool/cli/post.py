@@ -495,7 +495,6 @@ def _page_alone(run: Run, outputs: ReportOutputs, picture: Painter) -> dict[str,
 # counts when the content stays the same for a while: an editor may write in several steps.
 
 POLL_S = 0.4
-"""Interval at which files are checked for changes."""
 
 SETTLED_S = 0.2
 """For how long the files must stay the same before a change counts."""

@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from camtool.target.wire import Conversation, ToolAt
 
 MAX_NAMED = 5
-"""So many blocks that stop are named."""
 
 NAME_WIDTH = 11
 """Columns before the words of a dry run."""

@@ -275,7 +275,6 @@ def _check_pictures(names: Sequence[str], looks: dict[str, bool]) -> None:
 
 
 STEP_S = 1.0
-"""So long a step is simulated."""
 
 
 def _answer(
@@ -322,7 +321,6 @@ def _answer_figures(answer: StepAnswer, loop: SpeedLoop) -> dict[str, Any]:
 
 
 MOVES_SHOWN = 20
-"""A terminal lists so many moves of axes."""
 
 
 @servo.command(cls=SectionedCommand, short_help="How the axes follow a program.")

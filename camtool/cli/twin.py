@@ -23,7 +23,6 @@ MAX_SPEED = "max"
 """The speed of a clock that keeps to nothing."""
 
 LOOPBACK = "127.0.0.1"
-"""Default address of a TCP port."""
 
 COLUMNS = "time_s,block,x_commanded_mm,y_commanded_mm,z_commanded_mm,x_mm,y_mm,z_mm"
 """Of a trace; blocks count from 0, −1 is a command."""

@@ -38,7 +38,6 @@ SUSPEND = "SIGTSTP"
 
 
 MAX_OVERRIDE, OVERRIDE_STEP = 200, 10
-"""Largest override, and the change by a key, %."""
 
 OVERRIDE_KEYS: Mapping[str, tuple[Override, int]] = {
     "+": ("feed", OVERRIDE_STEP),

@@ -22,13 +22,11 @@ from camtool.kernels.near import Moves
 from camtool.kernels.offsets import curve_boxes, curve_rows, tree_of
 
 PAIRS_AT_A_TIME = 1 << 16
-"""Pairs of boxes that are handled together: it bounds the memory."""
 
 FAN = 16
 """Number of boxes in a block of an index."""
 
 BLOCKS_AT_A_TIME = PAIRS_AT_A_TIME // FAN
-"""Number of blocks that are examined together."""
 
 IN_ORDER = 2048
 """An index of no more boxes than this keeps their order: sorting takes longer than it saves."""

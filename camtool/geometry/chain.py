@@ -187,7 +187,6 @@ CLASS_RATIO = 2.0
 """Distances of ends whose ratio is below this may count as equal at a branch."""
 
 SAME_TURN_RAD = 1e-6
-"""Turns that differ by less are equal at a branch."""
 
 MAX_PAIRS = 4_000_000
 """More pairs of ends than this are not examined together: nearer ones are joined first."""

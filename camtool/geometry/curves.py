@@ -263,7 +263,6 @@ class SplineCurve(Struct, frozen=True, eq=False):
 
 
 Pieced = BezierCurve | EllipseCurve | SplineCurve
-"""Curves made of rational Bézier pieces."""
 
 
 def _bernstein(control: Floats, t: Floats) -> Floats:

@@ -31,7 +31,6 @@ from camtool.kernels.move_tree import hilbert_order
 from camtool.kernels.offsets import curves_within, nearest_distances
 
 POINTS_AT_A_TIME = 1 << 14
-"""Points that `nearest` handles together: it bounds the memory."""
 
 NEAREST_SPARE_MM = 1e-9
 """Segments that are farther than the nearest one by no more than this are measured again ..."""
@@ -43,7 +42,6 @@ FEW_PAIRS = 256
 """Up to this many distances are computed one by one: building an index would take longer."""
 
 PATHS_AT_A_TIME = 256
-"""Pairs of paths with few segments that are measured together: it bounds the memory."""
 
 
 class Nearest(Struct, frozen=True, eq=False):

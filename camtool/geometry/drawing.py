@@ -18,7 +18,6 @@ from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polylines, Segments, segment_rows
 
 TEXT_KINDS = frozenset(("text", "mtext", "attrib", "attdef"))
-"""Kinds of entities that are text, in small letters."""
 
 
 def is_text(source: str) -> bool:

@@ -182,7 +182,6 @@ def _healing(drawing: Drawing) -> dict[str, Any]:
 # arc whose boxes are as near as that, and pairs whose boxes touch, are measured exactly.
 
 MAX_WALL_PAIRS = 200_000
-"""At most this many pairs of segments are measured for the narrowest wall."""
 
 _PAIRS_AT_A_TIME = 1 << 14
 

@@ -19,7 +19,6 @@ BASELINE = 9.0
 """The y of the baseline (y down)."""
 
 NAME = "Hershey Roman simplex"
-"""The font's name for reports."""
 
 _FONT = "rowmans"
 _SPACE_WIDTH = 13.0

@@ -220,13 +220,10 @@ def _touching(crossings: Crossings, frames: Frames, eps: float) -> Bools:
 # So a contour that touches itself, at a corner or along a run (a keyhole), does not cross itself.
 
 PAIRS_AT_A_TIME = 1 << 16
-"""Number of pairs of segments that are examined exactly at a time: it bounds the memory."""
 
 MAX_CROSSINGS = 1000
-"""The search for crossings ends when there are more than this."""
 
 MAX_PAIRS = 4_000_000
-"""The search for crossings ends after this many pairs of segments whose boxes touch."""
 
 ALONG_RAD = 1e-6
 """Segments whose directions differ by less run along each other: that is touching, not

@@ -239,7 +239,6 @@ def _checked_offset(
 
 
 PATHS_AT_A_TIME = 64
-"""For how many paths those near to them are found together: it bounds the memory."""
 
 
 def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:

@@ -232,7 +232,6 @@ BINS = 50
 one bin."""
 
 MAX_PAIRS = 2_000_000
-"""At most this many pairs of overlapping intervals are examined."""
 
 
 class Intervals(Struct, frozen=True, eq=False):

@@ -30,7 +30,6 @@ POSITION_EPS_MM = 1e-6
 """Two positions nearer than this are equal."""
 
 SEGMENTS_AT_ONCE = 1 << 16
-"""Segments that are handled together where each stands alone: about 10 MB."""
 
 BULGE_EPS = 1e-12
 """|bulge| may exceed 1 by rounding alone, by no more than this, and is then set to ±1; a bulge

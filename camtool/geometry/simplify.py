@@ -31,7 +31,6 @@ NOISE_MM = 1e-7
 """Points of exact drawings lie on their circle within this."""
 
 DECIMALS = range(1, 7)
-"""Numbers of decimals that files round to."""
 
 GRID_SHARE = 1e-3
 """A number is rounded when it is off its decimals by no more than this share of the last one."""

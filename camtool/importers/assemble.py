@@ -269,7 +269,6 @@ MAX_GAP_FINDINGS = 20
 others."""
 
 MAX_PLACES = 20
-"""At most this many branches, and as many crossing paths, are listed one by one."""
 
 
 def sum_skipped(skipped: Sequence[Skipped]) -> list[Skipped]:

@@ -25,7 +25,6 @@ from camtool.importers.options import FORMATS
 BINARY_DXF = b"AutoCAD Binary DXF\r\n\x1a\x00"
 
 HEAD_BYTES = 4096
-"""Number of bytes of a file that decide its format."""
 
 MAX_ENTRIES = 100
 """A ZIP archive is a board's if one of its first entries is."""

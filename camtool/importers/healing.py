@@ -40,7 +40,6 @@ from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import MAX_COORDINATE_MM, MAX_POINTS, Piece, too_many_points
 
 IS_DRAWN_TWICE = "is drawn twice"
-"""The reason for leaving out a piece that repeats another one."""
 
 
 class Cleaned(Struct, frozen=True, eq=False):

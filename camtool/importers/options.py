@@ -41,10 +41,8 @@ TOLERANCE_MM = 0.0005
 """Largest distance between a curve and the arcs that stand for it."""
 
 GAP_MM = 0.01
-"""Open ends that lie nearer than this are joined."""
 
 DPI = 96.0
-"""Pixels per inch, as in CSS."""
 
 _MM_PER_INCH = 25.4
 

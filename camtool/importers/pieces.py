@@ -86,7 +86,6 @@ class NoMatchError(DrawingError):
 
 
 NO_LINE_TYPE = "continuous"
-"""The line type of an entity that names none."""
 
 
 def select_pieces(

@@ -26,7 +26,6 @@ MAX_FILE_BYTES = 500_000_000
 """A larger file is refused before it is read: its drawing would not fit into memory."""
 
 STDIN = "<stdin>"
-"""The name of standard input in messages."""
 
 _EXPORT_AGAIN = "export the drawing again"
 

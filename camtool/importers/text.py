@@ -292,7 +292,6 @@ MAX_NUMBER = 1e60
 """Sizes and places beyond it are refused: products of a few of them would not be finite."""
 
 MAX_OBLIQUE_DEG = 85.0
-"""Largest slant of letters; CAD programs refuse more."""
 
 
 def finite(*values: float) -> tuple[float, ...]:

@@ -42,7 +42,6 @@ from camtool.stock.wanted import ABOUT, INSIDE, WantedLayer, WantedSolid, wanted
 from camtool.toolpath.moves import STOCK_TOP_MM
 
 SAME_DEPTH_MM = 1e-6
-"""Depths that differ by at most this are those of one floor."""
 
 MARGIN_MM = 0.05
 """Width of the band beside walls in which no depth is measured, besides what the slides are off in

@@ -35,7 +35,6 @@ SQUARE_RAD = 2e-3
 """Tolerance of perpendicular and of parallel: 0.1°."""
 
 SAME_DIRECTION_RAD = 1e-6
-"""Segments whose directions differ by at most this angle, rad, form one edge."""
 
 FULL_TURN_RAD = 1e-6
 """Arcs whose sweeps lack at most this angle of a full turn form a closed circle."""

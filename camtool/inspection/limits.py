@@ -38,7 +38,6 @@ class NotUnderstood(OptionError):
 
 
 MAX_WORDS_CHARS = 200
-"""A longer text is refused without parsing it."""
 
 _INCHES = frozenset(("in", '"', "ft"))
 _UNIT = r'(?:mm|cm|um|µm|μm|in|")'

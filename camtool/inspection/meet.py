@@ -79,7 +79,6 @@ if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
 
 MAX_CHANGES = 3
-"""Largest number of changes in a proposal."""
 
 DEFAULT_TRIALS = 100
 
@@ -112,7 +111,6 @@ BISECTIONS = 6
 """Bisections of the required value of a number of the machine."""
 
 NEEDED_DIGITS = 3
-"""Its significant digits."""
 
 REFINED = 2
 """Times that allowances are corrected by the sizes that they gave."""
@@ -866,7 +864,6 @@ def _rounded(value: float, best: float) -> float:
 # In words.
 
 MAX_NAMED = 4
-"""Most contours named in a message."""
 
 
 def to_text(meeting: Meeting) -> str:

@@ -33,7 +33,6 @@ from camtool.plain import one_line
 from camtool.tables import toml_string
 
 MAX_DIMENSIONS = 200
-"""Most dimensions written to a file; a comment counts the others."""
 
 DIGITS = 4
 """Decimals of a millimetre of places and sizes."""

@@ -46,7 +46,6 @@ CIRCLE_STATIONS = 360
 """Stations on a whole circle: an even number, so that each has one opposite."""
 
 EDGE_STATIONS = 128
-"""Stations on an edge."""
 
 REACHED_MM = 5e-4
 """Where the planned edge is farther than this from its own middle, the tool cannot reach (corners
@@ -54,7 +53,6 @@ narrower than it), or another cut crosses: stations there are not measured. Plan
 exact to a fifth of this."""
 
 MIN_CUT_SHARE = 0.25
-"""Least share of a feature that must be cut for it to be measured."""
 
 LEVEL_SHARE = 0.5
 """A depth at which fewer of the stations are cut than this part of those at the surface (the end
@@ -64,7 +62,6 @@ MAX_LEVELS = 200
 """Depths at which a feature is measured; of more (a helix of many arcs) so many, evenly spaced."""
 
 SAME_LEVEL_MM = 1e-6
-"""Depths that differ by at most this are equal."""
 
 ON_PATH_SHARE = 0.25
 """A tool whose centre comes nearer to a feature than this part of its radius runs along it: the
@@ -557,7 +554,6 @@ CENTRE_ROUNDS = 50
 """Most iterations for a centre; three or four are usual."""
 
 CENTRE_MM = 1e-9
-"""An iteration that moves the centre by less is the last."""
 
 
 def fit_circles(points: Floats, near_mm: Floats) -> tuple[Floats, Floats]:

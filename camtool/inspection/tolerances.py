@@ -58,7 +58,6 @@ DIFFERS_MM = 0.02
 rounded by up to 0.0127 mm."""
 
 MAX_SIZE_MM = 1e6
-"""Largest size or coordinate."""
 
 Length = str | float
 

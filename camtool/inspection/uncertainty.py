@@ -132,7 +132,6 @@ node of its own, in standard uncertainties: it changes an edge by less than 0.05
 to 1 draw in 700."""
 
 DRAWS = 4096
-"""Number of machines drawn at random."""
 
 SEED = 20
 """The draws are the same for every part, so that a budget is deterministic."""

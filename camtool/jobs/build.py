@@ -69,7 +69,6 @@ _OF_WALLS = ("allowance", *_OF_FINISH)
 """Keys whose fields depend on tools."""
 
 TABLES = ("place", "stock", "keep_out", "setups", "tools", "operations")
-"""Tables of a job file."""
 
 AT_THE_TOP = (*WHOLE, *OF_OPERATIONS, "origin", *TABLES)
 """Keys at the top of a job file; the origin may stand here too."""

@@ -301,7 +301,6 @@ TABS = {
 # The keys, table by table.
 
 UNITS_OF_TABLES = ("mm", "in")
-"""Units that the lengths of a tool table may have."""
 
 WHOLE = {
     "safe_z": Key("safe_z_mm", LENGTH, "Height of rapids above Z0.", '"1mm"'),
@@ -351,7 +350,6 @@ WHOLE = {
         "tool_table_units", one_of(UNITS_OF_TABLES), "Of its lengths.  [mm]", '"mm"'
     ),
 }
-"""Keys of the job as a whole."""
 
 PLACE = {
     "origin": Key(

@@ -20,7 +20,6 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 from camtool.toolpath.moves import Kind, PolarArcs, Toolpath
 
 CHORD_MM = 0.001
-"""By default, chords lie within this of the arcs for which they stand."""
 
 MIN_CHORDS = 2
 """An arc becomes this many chords or more, so that two arcs still enclose an area."""

@@ -45,7 +45,6 @@ LIBRARIES = {
 _BUILTIN = "builtins"
 
 MAX_NESTING = 8
-"""Lists within lists go no deeper."""
 
 NO_UNIT = "objects without a unit of their own count in mm"
 

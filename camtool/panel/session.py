@@ -49,7 +49,6 @@ HELD_S: Final = 0.08
 jog ends within 0.1 s of a page that is gone."""
 
 MAX_MESSAGES: Final = 200
-"""Messages that are kept for pages that come later."""
 
 
 RATE_S: Final = 0.5

@@ -200,7 +200,6 @@ GROWN = 1.25
 is."""
 
 TITLE_LINES = 2
-"""Most lines of a panel's title."""
 
 _NAME = re.compile(r'( id="|url\(#)')
 

@@ -37,7 +37,6 @@ REVERSAL = "#8a2be2"
 ENTRY = "#009e73"
 
 VERDICTS = {"in": "#009e73", "undecided": "#e69f00", "out": GAP, "predicted": RAPID}
-"""The colours of inspected dimensions."""
 
 LAYER_COLOURS = ("#2b4c6f", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a")
 
@@ -124,7 +123,6 @@ UNKNOWN, AIR, CUT_ENTRY = -3, -2, -1
 """Steps of moves whose engagement is not judged, that cut nothing, and that are entries."""
 
 ENGAGED_NAMES = {AIR: "cuts nothing", UNKNOWN: "engagement not known", CUT_ENTRY: "entry"}
-"""The names of these in legends."""
 
 ENGAGED_STYLES = {
     AIR: (RAPID, 0.4),

@@ -51,7 +51,6 @@ SWATCH = 34.0
 """Width of the swatch before a line of the legend."""
 
 MAX_LAYERS_NAMED = 7
-"""The legend names at most this many layers of a drawing, and counts the others."""
 
 TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
 RING = 8.0

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from camtool.errors import OptionError
 
 MIN_PX, MAX_PX = 16, 20_000
-"""Least and greatest width of a picture."""
 
 SVG_WIDTH_PX, PNG_WIDTH_PX = 1000, 1200
-"""Widths of pictures where none is given."""
 
 POINTS_OF_A_PAGE = 400_000
 """Most points of the slides' path that the viewer gets: enough for the ends of 200,000 moves and

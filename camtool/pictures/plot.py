@@ -50,7 +50,6 @@ HALO = 5.0
 AWAY = 9.0
 CLEAR = 3.0
 MAX_LABELS = 400
-"""Of more texts than this only the first ones are tried."""
 
 DIRECTIONS = ((1.0, -1.0), (-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 

@@ -129,7 +129,6 @@ BASE_SHARE = 0.62
 """Radius of the programmed circle as a share of the outermost one, at most."""
 
 MIN_RINGS = 3
-"""Least number of rings between the programmed circle and the largest error."""
 
 MIN_RANGE_UM = 1e-3
 """The magnification grows no further for errors smaller than this."""

@@ -28,7 +28,6 @@ SAMPLES = 2
 """Pixels are computed so many times finer, in each direction, than they are written."""
 
 ROWS_AT_ONCE = 64
-"""Rows of a picture that are coloured together."""
 
 THROUGH_MM = 1e-4
 """Stock thinner than this under a cut counts as cut through."""

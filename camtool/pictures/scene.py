@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 
 LINES_SHOWN = 200
-"""Most lines of a table of the viewer; the JSON report has all of them."""
 
 _WHERE = re.compile(r"X ?(-?\d+\.?\d*) Y ?(-?\d+\.?\d*)")
 """A place in the words of a finding, mm."""

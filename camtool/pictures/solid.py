@@ -108,10 +108,8 @@ BESIDE_CELLS = 1
 moved by less than a cell is no difference of heights."""
 
 MIN_SHOWN_MM = 2e-3
-"""Smaller differences of heights have no colour."""
 
 MAX_BAR = 320.0
-"""Greatest height of the bar of depths."""
 
 BAR_STEPS = 200
 GREY = "#b9bec4"

@@ -105,7 +105,6 @@ AIR_SLACK_SHARE = 1e-3
 common no stroke is left."""
 
 MAX_FRONTS = 20_000
-"""No more fronts are made in one region."""
 
 MIN_GROWTH_SHARE = 1e-4
 """A front that adds less than this part of the opening disc, or the tool's, is none."""

@@ -54,7 +54,6 @@ MAX_COUNTED = 100
 that cross, each pair is one."""
 
 SAMPLES_ROUND = 500
-"""Number of places of a path at which its distance across another one is measured."""
 
 
 def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:

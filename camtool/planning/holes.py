@@ -27,7 +27,6 @@ SAMPLES_ROUND = 64.0
 """At least this many points of a path are examined to see whether it is a circle."""
 
 SAME_HOLE_MM = 1e-2
-"""Holes whose centres are nearer than this are the same hole."""
 
 HOLE_SIZE_MM = 1e-2
 """A circle fits a drill when their diameters differ by no more than this."""
@@ -45,7 +44,6 @@ MOVES_OF_PECK = 3
 """Number of moves of a peck: down, out, and back to just above."""
 
 NAMES_SHOWN = 3
-"""At most this many paths are named in a finding; the others are counted."""
 
 
 class Hole(Struct, frozen=True):

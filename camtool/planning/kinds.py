@@ -36,7 +36,6 @@ DESCENTS = ("passes", "helix", "pecks", "slopes")
 RESTS = ("", "corners", "floor")
 
 COMMON_KEYS = ("name", "kind", "feed", "plunge_feed", "spindle", "coolant")
-"""Keys that every operation has."""
 
 SELECTING_KEYS = (
     "layers",

@@ -26,7 +26,6 @@ CHANGE_HEIGHTS = 5.0
 height above the stock, or as far as its travel goes: a hand must get between."""
 
 VERTICES_AT_ONCE = 1 << 15
-"""Vertices of runs that become moves together: about 10 MB."""
 
 Approach = Callable[[CutRun], tuple[float, float] | None]
 """The place from which the tool comes at safe height, (x, y) mm, before a run; None: anywhere."""

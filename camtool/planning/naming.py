@@ -11,7 +11,6 @@ from camtool.planning.job import Job, JobSetup, Operation, Tool
 from camtool.toolpath.wanted import TOOL_SHAPES
 
 MAX_LISTED = 12
-"""At most this many findings of a kind are listed one by one, the others are counted."""
 
 
 def at_place(name: str, point: Sequence[float]) -> str:

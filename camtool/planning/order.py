@@ -50,7 +50,6 @@ MAX_PLACES_EACH = 8
 MAX_NAMED_ITEMS = 5
 
 ITEMS_AT_ONCE = 1 << 14
-"""Items whose reversed variants are found together: about 10 MB."""
 
 SPECK_MM = 1e-4
 """For the order, a run that stays at one place (a drilled hole) is a line of this length: long

@@ -21,7 +21,6 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 from camtool.kernels.passes import Tracks, piece, reaches
 
 QUARTER = math.tan(math.pi / 8.0)
-"""Bulge of a quarter circle."""
 
 MAX_PART_SWEEP_RAD = 2.0 * np.pi - 1e-3
 """Arcs are not put together beyond this, except a whole circle: an end near the start could be

@@ -38,7 +38,6 @@ MAX_SIZE_MM = 1e5
 """Largest size of the cut geometry: 100 m, as the longest travel of a machine file."""
 
 MAX_DISTANCE_MM = 1e6
-"""Largest distance of the cut geometry from part zero: a kilometre."""
 
 MAX_POINTS = 10_000_000
 """Vertices of all copies together: far beyond any program, well within memory."""

@@ -76,7 +76,6 @@ from camtool.toolpath.moves import Toolpath
 HOME: Point = (0.0, 0.0)
 
 MAX_OVERLAPS = 20
-"""A contour may overlap its own start by at most this many times its length: once is enough."""
 
 
 class Plan(Struct, frozen=True, eq=False):

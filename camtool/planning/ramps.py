@@ -43,7 +43,6 @@ MIN_HELIX_SHARE = 0.1
 """The smallest useful radius of a helix, over the tool's radius."""
 
 MAX_LAPS = 200.0
-"""A ramp longer than this many laps (passes along an open path) is not made."""
 
 
 def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> ZProfile:

@@ -22,7 +22,6 @@ PASS_SLACK = 1e-9
 """Steps may exceed the step down by this part of it, by rounding, before a pass is added."""
 
 MAX_PASSES = 10_000
-"""More passes than this are taken as a mistake."""
 
 
 class Cone(Struct, frozen=True):

@@ -18,7 +18,6 @@ AGAIN_S = 1.0
 """Interval at which the question is repeated: a board that begins loses what comes meanwhile."""
 
 MAX_HEARD = 400
-"""Characters of an unknown answer that are kept."""
 
 
 class Answer(Struct, frozen=True):

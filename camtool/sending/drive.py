@@ -22,7 +22,6 @@ TICK_S = 0.05
 STOPPING_MESSAGE = "stopping: waiting until it stands (a second Ctrl-C does not wait)"
 
 REOPEN_S = 60.0
-"""Time limit for a port that is to come back."""
 
 
 class Request(Enum):

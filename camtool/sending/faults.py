@@ -16,7 +16,6 @@ from camtool.target.twin import Twin
 from camtool.units import parse_time
 
 DEFAULT_PROBABILITY: Final = 0.01
-"""Probability of a fault that is requested without a number."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
 
 WRITE_S: Final = 10.0
-"""Time limit of a write, after which the port counts as stuck."""
 
 DRAIN_S: Final = 1.0
 """Time for the last bytes, such as those that stop a machine, to leave the computer."""
@@ -35,7 +34,6 @@ REOPEN_S: Final = 0.1
 """Interval at which a port that is gone is tried again."""
 
 MAX_READ_BYTES: Final = 4096
-"""Most bytes read from a port at a time."""
 
 _FRAMES: Final = ("8N1", "7N1", "8E1", "7E1", "8O1", "7O1", "8N2", "7E2")
 

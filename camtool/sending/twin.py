@@ -20,7 +20,6 @@ from camtool.errors import OptionError
 from camtool.sending.faults import WiredTwin
 
 MAX_WRITE_BYTES: Final = 4096
-"""Bytes carried at a time."""
 
 POLL_S: Final = 0.02
 """Interval at which a client is looked for."""

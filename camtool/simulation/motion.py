@@ -126,7 +126,6 @@ IDEAL = Effects(False, False, False, False, False)
 """Slides at the commanded positions."""
 
 CHUNK_STEPS = 1 << 16
-"""Samples of a chunk by default: a few MB."""
 
 
 @dataclass(frozen=True)

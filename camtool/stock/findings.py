@@ -9,7 +9,6 @@ from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, and_more
 from camtool.toolpath.findings import ProgramCode
 
 FINDINGS_LISTED = 10
-"""At most this many findings of one kind are listed; the last says how many more there are."""
 
 
 def place_words(place: Sequence[float] | Floats) -> str:

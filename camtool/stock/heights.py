@@ -21,7 +21,6 @@ from camtool.kernels.stock import QUARTERS, StockTree
 from camtool.stock.moves import StockMoves
 
 TOP_MM = 0.0
-"""Height of the top of the stock in the work frame."""
 
 TOLERANCE_MM = 1e-3
 """Width of a bracket, unless another one is asked for."""
@@ -30,7 +29,6 @@ FIRST_SQUARES = 1024
 """Squares into which a region is divided at first, about."""
 
 SQUARES_AT_ONCE = 4096
-"""Squares that are bounded in one call of the compiled loops."""
 
 MAX_SQUARES = 4_000_000
 """A search ends after this many squares: its bracket is then wider, and says so."""

@@ -53,7 +53,6 @@ STANDING = np.iinfo(np.int64).max
 
 
 BEFORE = -1
-"""Time of cells that other set-ups have cut through."""
 
 MAX_LEVELS = 16
 """So many heights of floors from below are told apart, ..."""

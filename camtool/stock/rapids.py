@@ -46,10 +46,8 @@ MIN_RADIUS_SHARE = 2.0
 """Of that, the radius that a tool has at least: a point clears its line, and needs it."""
 
 HEIGHT_EPS_MM = 1e-6
-"""Heights that differ by less are equal."""
 
 RAPIDS_AT_ONCE = 64
-"""Rapids that are looked at together: this bounds the memory."""
 
 SIZE_SQUARES = 4096
 """The place where a rapid is deepest in the stock is searched for in about so many squares."""

@@ -29,7 +29,6 @@ from camtool.tables import MAX_DEPTH, Table, convert, parse_table, read_table
 from camtool.target.contract import Target
 
 NEEDS = "needs"
-"""Key at the top of a target's file: the keys that the user's machine file must give."""
 
 
 def resolved_table(

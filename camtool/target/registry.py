@@ -55,7 +55,6 @@ OWN_PREFIX = "camtool_postprocessors."
 """Prefix of camtool's own modules: exceptions in them are faults of camtool itself."""
 
 MAX_CHAIN = 8
-"""Most machine files that extend each other in a row."""
 
 NOT_SAID = "not said"
 

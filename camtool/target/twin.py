@@ -203,7 +203,6 @@ class Twin(ABC):
     wire: ClassVar[str]
     """The line as its terminal programs are told it, such as "115200 8N1"."""
     byte_s: ClassVar[float] = 0.0
-    """Time of a byte on the line, s; 0 if not known."""
 
     def __init__(self, slides: Slides) -> None:
         self.slides = slides

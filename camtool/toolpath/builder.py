@@ -17,7 +17,6 @@ from camtool.toolpath.wanted import OperationNote, Operations
 Coordinate = float | None
 
 ROWS_AT_ONCE = 1 << 14
-"""Rows kept as Python objects before they are moved into the columns."""
 
 FEW_ROWS = 16
 """Columns of up to this many rows become rows of Python objects too: to add a column takes as long

@@ -31,7 +31,6 @@ FILL_MM = 1e-7
 """The rounds end when no node changes by more than this."""
 
 MIN_NODES = 2
-"""Nodes of a grid in X and in Y, at least."""
 
 
 class Surface(Struct, frozen=True, eq=False):

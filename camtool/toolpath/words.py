@@ -18,7 +18,6 @@ from camtool.arrays import Bools, Codes, Ints, Octets
 from camtool.kernels.words import MAX_NUMBER_CHARS, put_words
 
 ROWS_AT_ONCE = 1 << 14
-"""Blocks formatted at a time, to bound the buffer."""
 
 
 class WordColumn(Struct, frozen=True, eq=False):

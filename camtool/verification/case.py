@@ -37,10 +37,8 @@ SAMPLE_MM = 0.01
 """Spacing of the points on decoded and wanted moves that are compared with each other."""
 
 TRACE_POINTS = 20_000
-"""Points of the slides' path that are kept for pictures."""
 
 WORST_LISTED = 10
-"""Number of moves with the largest errors in a report, unless another number is given."""
 
 
 def nose_of(job: Job) -> Tool | None:

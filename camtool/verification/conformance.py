@@ -395,7 +395,6 @@ SPINDLE_OFF = NO_TOOL = 0.0
 """The speed of a spindle that is off, and the number of no tool."""
 
 COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
-"""Names of coolant states: the index is the sum of 1 for mist and 2 for flood."""
 
 
 def compare_settings(

@@ -90,7 +90,6 @@ def worst_place(verdicts: Iterable[Verification]) -> tuple[float, float]:
 
 
 MAX_SHOWN_SAMPLES = 40_000
-"""At most this many samples of each variant are drawn; later ones are left out."""
 
 
 def paths_within(

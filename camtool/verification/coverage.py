@@ -66,7 +66,6 @@ from camtool.verification.matching import (
 from camtool.verification.nearest import ANY_CONTOUR, MoveIndex, NearestMoves
 
 SAMPLES_AT_ONCE = 1 << 16
-"""So many samples are compared with the moves that they were written from in one go."""
 
 Limits = tuple[float, float]
 """Tolerances in XY and in height, mm."""

@@ -354,7 +354,6 @@ class ContourFigures(Struct, frozen=True):
 
 
 CONTOURS_AT_ONCE = 4096
-"""The figures of so many contours are Python objects at a time."""
 
 
 class ContourSums:

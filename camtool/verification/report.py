@@ -1196,7 +1196,6 @@ SETUP = "At the machine"
 _GRAVEST_FIRST = {"error": 0, "warning": 1}
 
 SETUP_FINDINGS = 6
-"""So many warnings and errors stand there, the gravest first; below are all."""
 
 
 def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
@@ -1396,10 +1395,8 @@ def gravest_findings(page: ReportPage) -> tuple[FindingReport, ...]:
 # link, a picture, a mention or a formula.
 
 MARKDOWN_ROWS = 12
-"""Markdown shows this many rows of each table; JSON has them all."""
 
 MARKDOWN_FINDINGS = 50
-"""Markdown shows this many findings, errors first; JSON has them all."""
 
 PAGE_BYTES = 65_000
 """The longest page: a comment on GitHub may have 65,536 characters, and the summary of a job 1

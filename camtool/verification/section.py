@@ -24,7 +24,6 @@ from camtool.toolpath.moves import Toolpath
 from camtool.verification.findings import SECTION_CUT
 
 POINTS = 4000
-"""Points of a section that are judged."""
 
 
 def section_findings(

@@ -21,7 +21,6 @@ from camtool.pictures.text import TextStyle
 from camtool.pictures.view import MARGIN, decimals_of, multiples, page_width, round_step
 
 NUMBERS = 96.0
-"""Room for the numbers left of the lanes."""
 
 TIME_SPACING, VALUE_SPACING = 90.0, 26.0
 """Least distances of the numbers of the two axes."""

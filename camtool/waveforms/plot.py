@@ -32,7 +32,6 @@ KINDS: Final[tuple[PlotKind, ...]] = ("speed", "position", "error")
 MIN_PER_S = 60.0
 
 HIGH, MIDDLE, LOW = 240.0, 170.0, 110.0
-"""Heights of lanes."""
 
 AXES = "XYZ"
 

@@ -35,7 +35,6 @@ NUMBER_SPACING = 90.0
 """Least distance of two numbers of the time axis."""
 
 MAX_MOMENTS = 20_000
-"""Changes that a picture can show."""
 
 UNITS = (1.0, "s"), (1e-3, "ms"), (1e-6, "µs")
 

@@ -33,7 +33,6 @@ MAX_S = 1e9
 """No stretch begins later or is longer: 30 years."""
 
 KINDS = (".vcd", ".csv", ".svg", ".png")
-"""Kinds of files, by the ends of their names."""
 
 
 class PulseCounts(Struct, frozen=True, eq=False):

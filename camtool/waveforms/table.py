@@ -19,7 +19,6 @@ from camtool.target.signals import Board
 from camtool.waveforms.levels import LineLevels, port_names
 
 MAX_ROWS = 10_000_000
-"""Rows of a table: some 400 MB."""
 
 PER_S = {"ms": 3, "us": 6}
 """Powers of ten of the units of a second."""

@@ -54,7 +54,6 @@ from .timers import feeds_of, half_periods_ms, shortest_ms
 _Machine = Machine[FlashcutController, FlashcutDialect]
 
 MOVES_AT_ONCE = 1 << 14
-"""Most chords and other moves that are computed together: some 100 bytes each."""
 
 
 class FlashcutModel(ControllerModel[FlashcutController, FlashcutDialect]):

@@ -76,7 +76,6 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
 
 
 FlashcutMachine = Machine[SlideStart, FlashcutDialect]
-"""Any machine with this dialect."""
 
 
 def check(machine: FlashcutMachine) -> None:

@@ -39,7 +39,6 @@ LINE_CHARS: Final = 4096
 """A longer line is refused where the dialect itself has no limit: no machine reads such lines."""
 
 MIN_RUN: Final = 24
-"""Shortest run of plain blocks that is read by columns."""
 
 MAX_UNTRIED_LINES: Final = 256
 """Most lines between two attempts to read a run of plain lines, in a text that has none."""

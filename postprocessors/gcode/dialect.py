@@ -112,7 +112,6 @@ def feed_decimals(machine: Machine) -> int:
 
 
 MAX_BLOCKS: Final = 100
-"""Most start blocks, and most end blocks: more are a mistake."""
 
 
 def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) -> None:

@@ -28,7 +28,6 @@ MAX_UNITS: Final = 10**15
 VALUES_AT_ONCE: Final = 1 << 16
 
 COMMENT_CHARS: Final = 60
-"""Longest comment, without its parentheses."""
 
 # Letters, digits and signs that mean nothing to any controller. Left out on purpose: ( ) ; % and
 # line ends, which end comments or programs; , which makes a comment active in LinuxCNC (MSG, …);

@@ -64,4 +64,3 @@ class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
 
 
 GrblMachine = Machine[SlideStart, GrblDialect]
-"""Any machine with this dialect."""

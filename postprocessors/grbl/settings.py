@@ -43,7 +43,6 @@ NEVER_SET = (
 )
 
 LASER = 32
-"""The setting of laser mode."""
 
 _MORE = {
     "controller.idle_delay_ms": 1,
@@ -117,7 +116,6 @@ LISTED_TOLERANCE = 6e-4
 """Largest difference of equal settings: listings have three decimals."""
 
 REPORT_INCHES = 13
-"""The setting of inches in status reports."""
 
 LASER_IS = (
     "$32 is laser mode, in which a spindle stops in rapids and does not wait: set $32=0, or "

@@ -35,7 +35,6 @@ from .pulses import PulseTimes
 _Machine = Machine[I8751Controller, I8751Dialect]
 
 ROWS_AT_ONCE = 1 << 14
-"""Rows whose legs are computed together: some 5 MB."""
 
 
 class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):

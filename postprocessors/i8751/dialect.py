@@ -103,7 +103,6 @@ class I8751Link(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 I8751Machine = Machine[SlideStart, I8751Dialect]
-"""Any machine with this dialect."""
 
 
 def check(machine: I8751Machine) -> None:

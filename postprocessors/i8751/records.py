@@ -24,13 +24,10 @@ from .dialect import MAX_DWELL_BYTE_S, I8751Dialect, I8751Machine
 from .dogleg import FREE, StepLine, elbows, reaches
 
 MAX_STEPS: Final = 10_000_000
-"""A coordinate of more steps is taken for a mistake: 26 hours at the machine's speed."""
 
 MAX_DWELL_S: Final = 36_000.0
-"""A longer dwell (10 hours) is taken for a mistake."""
 
 MAX_RECORDS: Final = 2_000_000
-"""A program of more records (30 MB, hours over the link) is taken for a mistake."""
 
 REFUSED: Final = {
     Kind.HOME_XY: "this machine has no limit switches to go home to",

@@ -31,7 +31,6 @@ READY: Final = "LISTO"
 AGAIN: Final = "OTRO"
 
 KEY_TRIES: Final = 5
-"""Ours."""
 
 TIME_FACTOR: Final = 1.05
 """Factor on the simulated time of a packet, beyond the lateness of the line."""
@@ -42,7 +41,6 @@ ANY: Final = "?"
 UNMOVED: Final = "nothing of this packet has moved, and the controller must be reset"
 
 NONE: Final = "-"
-"""No reply."""
 
 ROUND_TRIP_S: Final = 2.0 * 10.0 / 2400.0 * 0.9
 """Shortest time between a byte and its reply, s: both take ten bits on the line, less a tenth for

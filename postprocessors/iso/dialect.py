@@ -286,4 +286,3 @@ SPEED_SCALES: Final = {"rpm": None, "percent": 100.0, "pwm": 255.0}
 """What a speed field says at `spindle.max_rpm`; None: the speed itself."""
 
 IsoMachine = Machine[SlideStart, IsoDialect]
-"""Any machine with such a dialect."""

@@ -100,4 +100,3 @@ class LinuxcncLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 LinuxcncMachine = Machine[SlideStart, LinuxcncDialect]
-"""Any machine with this dialect."""

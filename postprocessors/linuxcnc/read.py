@@ -57,7 +57,6 @@ from .state import InterpreterNotes, Mounted
 from .texts import Folder, ProgramText
 
 LENGTHS_EQUAL_MM: Final = 1e-6
-"""Lengths of tools that differ by no more are equal."""
 
 BRANCHES: Final = re.compile(rb"(?im)^[ \t]*/?[ \t]*(?:n[\d. \t]*)?(?:o|m[ \t]*9[ \t]*[89])")
 """A line that may send the reading elsewhere."""

@@ -21,7 +21,6 @@ from ..gcode.faults import LineFault
 from .lines import ParsedLine
 
 MAX_FILES: Final = 100
-"""Files of subs that one program may call."""
 
 MAX_FILE_BYTES: Final = 10_000_000
 

@@ -50,7 +50,6 @@ NEAR_MM: Final = 0.02
 and encoders."""
 
 MAX_OVERRIDE: Final = 3.0
-"""Largest override of feed and rapids."""
 
 HELD_AHEAD_S: Final = 0.3
 """Time for which a held jog has increments ahead of it, s: what it moves on if camtool is killed,

@@ -193,7 +193,6 @@ class MatlabRouterLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 MatlabRouterMachine = Machine[SlideStart, MatlabRouterDialect]
-"""Any machine with this dialect."""
 
 
 def dialect_of(machine: MatlabRouterMachine) -> ResolvedDialect:

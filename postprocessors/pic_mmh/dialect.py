@@ -58,4 +58,3 @@ class PicMmhLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 PicMmhMachine = Machine[SlideStart, PicMmhDialect]
-"""Any machine with this dialect."""

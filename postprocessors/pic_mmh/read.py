@@ -29,7 +29,6 @@ from .dialect import PicMmhMachine
 from .findings import BLOCK_TOO_LONG_READ, FEED_ABOVE_LIMIT
 
 MIN_RUN: Final = 24
-"""Shortest run of moves that is read by columns."""
 
 BLOCKS_AT_ONCE: Final = 1 << 12
 

@@ -499,7 +499,6 @@ class WriterChanges(Struct):
     """Counts of the writer's changes; places name the first of each kind."""
 
     dropped: int = 0
-    """Moves of less than a step."""
     arcs_as_lines: int = 0
     split: int = 0
     split_place: str = ""

@@ -49,7 +49,6 @@ from .steps import arc_angles
 _Machine = Machine[ValcncController, ValcncDialect]
 
 PIECES_AT_ONCE = 1 << 14
-"""Lines, those of arcs included, that are computed together: some 5 MB."""
 
 PIECE_EPS = 1e-9
 """A part of a piece by which an arc may be longer than whole pieces, by rounding alone."""

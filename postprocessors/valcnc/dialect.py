@@ -74,7 +74,6 @@ class ValcncLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 ValcncMachine = Machine[SlideStart, ValcncDialect]
-"""Any machine with this dialect."""
 
 
 def check(machine: ValcncMachine) -> None:

@@ -31,7 +31,6 @@ PLAIN: Final = frozenset({"GXYZ", "GXYZIJ"})
 """Letters of a block as they mostly come; other orders are as good."""
 
 MAX_UNITS: Final = 99_999.0
-"""Larger numbers are taken for a mistake."""
 
 CHORD_GUARD: Final = 1e-9
 """Part of an arc's diameter: a chord longer by less is a diameter."""

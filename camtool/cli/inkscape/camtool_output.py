@@ -22,7 +22,6 @@ PREFIX = "camtool: "
 """Begins each message of camtool."""
 
 MAX_MESSAGES = 20
-"""A dialog shows so many messages."""
 
 
 class Refusal(Exception):

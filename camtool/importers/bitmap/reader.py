@@ -35,7 +35,6 @@ MIN_DARKNESS_RANGE = 0.05
 """A picture whose pixels differ by less in darkness is of one tone."""
 
 BINS = 256
-"""Steps of darkness in the histogram of `_otsu_threshold`."""
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:

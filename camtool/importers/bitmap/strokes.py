@@ -40,7 +40,6 @@ AS_GOOD_PX = 0.02
 """See `AS_GOOD`."""
 
 MAX_SWEEP_RAD = 1.5 * math.pi
-"""The arc of a run turns by no more than this."""
 
 BACK_PX = 1.5
 """Along a line or an arc, points may go back by no more than this."""
@@ -65,7 +64,6 @@ CORNER_POINTS = 4
 """The sharpest corner is where the path turns most within so many points to either side."""
 
 MIN_SEGMENT_PX = 0.05
-"""Segments that are shorter are left out."""
 
 MIN_RUN_POINTS = 3
 """Points of a run that is more than a chord."""

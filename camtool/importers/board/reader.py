@@ -54,7 +54,6 @@ MAX_PRIMITIVES = 400_000
 """Apertures and strokes of one file; uniting this many takes about a minute."""
 
 MAX_UNPACKED_BYTES = 200_000_000
-"""A ZIP archive may unpack to this much."""
 
 _LAYERS = (
     (r"mask|paste|silk|legend|courtyard|fab\b|assy|\.g[tb][sop]$", ""),

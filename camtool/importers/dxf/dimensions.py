@@ -32,7 +32,6 @@ SCALE_SHARE = 1e-3
 """DIMLFAC is often rounded: units that differ by less than this share are one."""
 
 MAX_TEXT_LENGTH = 2000
-"""A dimension with a longer text, in characters, is not read as a callout."""
 
 _ROTATED, _ALIGNED, _DIAMETER, _RADIUS = 0, 1, 3, 4
 _TYPE = 0x0F

@@ -455,7 +455,6 @@ def text_shapes(
 # a kilobyte than anybody could draw.
 
 MAX_INSERTED = 100_000
-"""Blocks may add at most this many entities to a drawing."""
 
 
 class BlockSizes:
@@ -533,7 +532,6 @@ FOREGROUND = "#000000"
 """White on black screens, black on paper: black here."""
 
 CONTINUOUS = "Continuous"
-"""The line type of layers that name none."""
 
 _BYBLOCK, _BYLAYER = 0, 256
 _BASIC_COLOURS = ("", "#ff0000", "#ffff00", "#00ff00", "#00ffff", "#0000ff", "#ff00ff", FOREGROUND)

@@ -435,7 +435,6 @@ NPY_START = b"\x93NUMPY"
 ZIP_START = b"PK\x03\x04"
 
 MAX_UNPACKED_BYTES = 1 << 28
-"""At most this many bytes are unpacked from one ZIP archive (268 MB: 16 million points)."""
 
 MAX_MEMBERS = 100_000
 

@@ -84,7 +84,6 @@ MAX_USE_DEPTH = 20
 """A `use` of a `use` of ...: deeper is a fault in the file."""
 
 MAX_LETTERS = 50_000
-"""At most this many letters are drawn, each of some dozens of arcs."""
 
 _CORNERS_A_UNIT = 100
 _GROUPS = ("g", "a", "svg", "switch", "use")

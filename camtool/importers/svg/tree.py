@@ -34,14 +34,12 @@ MAX_DEPTH = 150
 """Deeper nesting than any drawing has; it also bounds the recursion of the walk."""
 
 MAX_ELEMENTS = 500_000
-"""More elements than any drawing for a machine has; their tree would fill the memory."""
 
 MAX_ENTITY_SIGNS = 256
 """An entity in the document type may stand for at most this many characters of plain text, the
 length of a namespace."""
 
 MAX_REFERENCES = 10_000
-"""Largest number of references to entities that the file defines."""
 
 _WRONG_PREFIX = "unbound prefix"
 

@@ -66,7 +66,6 @@ CORE_SHARE = 0.9
 """The innermost ring is no larger than this part of the tool's radius, so that no core stays."""
 
 MAX_TURNS = 200
-"""A helix of more turns than this is made steeper."""
 
 TURN_SLACK = 1e-9
 """A turn may go deeper than its limit by this part of it, by rounding."""

@@ -25,7 +25,6 @@ OVERLAP = 0.2
 """Rings overlap by this share of the width of the tool at the bottom of the copper."""
 
 MAX_RINGS = 50
-"""More rings than this are refused: a wider tool clears such an area."""
 
 
 def isolated(operation: Operation, _: Stock | None) -> Operation:

@@ -69,16 +69,13 @@ from camtool.planning.ramps import MIN_HELIX_SHARE, feeds_along, helix
 from camtool.planning.reach import cut_away_findings, unreached, unreached_findings
 
 MAX_STEPS = 10_000
-"""More steps than this across a pocket are taken as a mistake."""
 
 MAX_FRONTS = 1_000
-"""More fronts than this across an adaptive pocket are taken as a mistake."""
 
 MAX_HELIX_SHARE = 0.5
 """Default of the largest radius of a helix, over the tool's radius."""
 
 MAX_HELIX_TURNS = 200
-"""A helix of more turns than this at one level is not made."""
 
 MAX_RAMP_LAPS = 20
 """A ramp that would go back and forth on the whole path more often than this becomes a plunge."""

@@ -41,7 +41,6 @@ SHARP_DEPTH = 0.6134
 """Depth of an outer ISO thread over its pitch (17/24 of the height of its triangle)."""
 
 MAX_PASSES = 1000
-"""Passes of a thread."""
 
 SAMPLES = 4000
 """Points of the section at which what the nose leaves is measured."""

@@ -69,7 +69,6 @@ from camtool.planning.reach import unreached
 from camtool.planning.settings import Cone
 
 CROSSINGS_SHOWN = 3
-"""At most this many places where paths cross are named."""
 
 CARVE_TOLERANCE_MM = VCARVE.path_error_mm
 
@@ -88,7 +87,6 @@ MIN_SWEEP_RAD = 1e-4
 numbers."""
 
 MAX_SWEEP_RAD = 2.0
-"""An arc of the axis that turns farther is divided."""
 
 MEET_MM = 1e-4
 """Ends of pieces that are nearer than this meet."""

@@ -419,7 +419,6 @@ def _columns(
 # round moves the path by the tolerance at most.
 
 MAX_POINTS = 200_000
-"""Most points of the predicted path in a page."""
 
 FINEST_MM = 1e-4
 """Points this near to the chord of their neighbours may be left out ..."""

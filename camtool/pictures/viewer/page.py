@@ -162,7 +162,6 @@ def _head(content: Content, run: Playback | None, traced: Traced) -> dict[str, o
 
 
 MAX_HEIGHTS = 1 << 19
-"""Most heights of the grid of the stock."""
 
 MIN_STEP_MM = 0.005
 """They are no nearer to each other."""
@@ -327,7 +326,6 @@ def _file(name: str) -> str:
 # The polar plots of full circles below the report: SVG within the page, in the page's colours.
 
 MAX_PLOTS = 16
-"""Most plots of a page: those of the largest circular errors."""
 
 BINS_SHOWN = 120
 """Errors are joined until a plot has no more than this, one every 3°."""
