@@ -391,8 +391,8 @@ FEED_SHARE = 0.5
 DWELL_S = 0.0005
 """A dwell is too short when it is shorter by more than this."""
 
-SPINDLE_OFF = NO_TOOL = 0.0
-"""The speed of a spindle that is off, and the number of no tool."""
+SETTING_OFF = 0.0
+"""The speed of a spindle that is off, the number of no tool, and no coolant."""
 
 COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
 
@@ -473,12 +473,12 @@ class _SettingPairs(Struct, frozen=True, eq=False):
 
 
 def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats, Ints]:
-    """Return (N,) each: feed, spindle speed in rev/min (CCW negative, SPINDLE_OFF when it is
+    """Return (N,) each: feed, spindle speed in rev/min (CCW negative, SETTING_OFF when it is
     off), tool, and an index of COOLANTS."""
     kind = toolpath.kind
     turning = np.where(kind == Kind.SPINDLE_CCW, -toolpath.value, toolpath.value)
     spindle = (kind >= Kind.SPINDLE_CW) & (kind <= Kind.SPINDLE_OFF)
-    turns = _last_value(spindle, np.where(kind == Kind.SPINDLE_OFF, SPINDLE_OFF, turning))
+    turns = _last_value(spindle, np.where(kind == Kind.SPINDLE_OFF, SETTING_OFF, turning))
     tool = _last_value(kind == Kind.TOOL_CHANGE, toolpath.value)
     off_row = _last_row(kind == Kind.COOLANT_OFF)
     mist, flood = (
@@ -576,69 +576,58 @@ def _speed_ratios(toolpath: Toolpath) -> Floats:
 
 def _spindle_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
     """Yield SPINDLE_DIFFERS: an error where the job starts the spindle, otherwise a remark."""
-    decoded_speed, written_speed = (
-        _settings(setting_pairs.decoded)[1],
-        _settings(setting_pairs.written)[1],
-    )
-    rows, written_rows = setting_pairs.differing(
-        decoded_speed[setting_pairs.pairs[:, 0]] == written_speed[setting_pairs.pairs[:, 1]]
-    )
-    for is_asked, row, other_row, moves in _by_severity(
-        rows, written_rows, written_speed[written_rows] != SPINDLE_OFF
-    ):
+    for is_asked, where, speed, written, moves in _unequal_settings(setting_pairs, 1):
         yield (SPINDLE_DIFFERS if is_asked else SPINDLE_DIFFERS_UNASKED)(
-            where=block_name(setting_pairs.decoded, row),
-            measured=decoded_speed[row],
-            limit=written_speed[other_row],
+            where=where,
+            measured=speed,
+            limit=written,
             moves=moves,
-            turning=_spindle_words(float(decoded_speed[row])),
-            wanted=_spindle_words(float(written_speed[other_row])),
+            turning=_spindle_words(speed),
+            wanted=_spindle_words(written),
         )
 
 
+def _unequal_settings(
+    setting_pairs: _SettingPairs, column: int
+) -> Iterator[tuple[bool, str, float, float, int]]:
+    """Compare a column of `_settings`. Yield for the moves whose setting the job asks for, and for
+    the others: whether it is asked for, the first block, its value and the written one, and the
+    number of moves."""
+    decoded, written = (
+        _settings(each)[column] for each in (setting_pairs.decoded, setting_pairs.written)
+    )
+    rows, written_rows = setting_pairs.differing(
+        decoded[setting_pairs.pairs[:, 0]] == written[setting_pairs.pairs[:, 1]]
+    )
+    for is_asked, row, other_row, moves in _by_severity(
+        rows, written_rows, written[written_rows] != SETTING_OFF
+    ):
+        where = block_name(setting_pairs.decoded, row)
+        yield is_asked, where, float(decoded[row]), float(written[other_row]), moves
+
+
 def _spindle_words(turns: float) -> str:
-    if turns == SPINDLE_OFF:
+    if turns == SETTING_OFF:
         return "the spindle off"
-    return f"the spindle at {abs(turns):g} rev/min {'CW' if turns > SPINDLE_OFF else 'CCW'}"
+    return f"the spindle at {abs(turns):g} rev/min {'CW' if turns > SETTING_OFF else 'CCW'}"
 
 
 def _tool_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for cuts with another tool than in the written program."""
-    decoded_tool, written_tool = (
-        _settings(setting_pairs.decoded)[2],
-        _settings(setting_pairs.written)[2],
-    )
-    rows, written_rows = setting_pairs.differing(
-        decoded_tool[setting_pairs.pairs[:, 0]] == written_tool[setting_pairs.pairs[:, 1]]
-    )
-    for is_asked, row, other_row, moves in _by_severity(
-        rows, written_rows, written_tool[written_rows] != NO_TOOL
-    ):
+    for is_asked, where, tool, written, moves in _unequal_settings(setting_pairs, 2):
         yield (SETTING_DIFFERS_TOOL if is_asked else SETTING_DIFFERS_TOOL_UNASKED)(
-            where=block_name(setting_pairs.decoded, row),
-            measured=decoded_tool[row],
-            limit=written_tool[other_row],
-            moves=moves,
+            where=where, measured=tool, limit=written, moves=moves
         )
 
 
 def _coolant_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for cuts with other coolant than in the written program."""
-    decoded_coolant, written_coolant = (
-        _settings(setting_pairs.decoded)[3],
-        _settings(setting_pairs.written)[3],
-    )
-    rows, written_rows = setting_pairs.differing(
-        decoded_coolant[setting_pairs.pairs[:, 0]] == written_coolant[setting_pairs.pairs[:, 1]]
-    )
-    for is_asked, row, other_row, moves in _by_severity(
-        rows, written_rows, written_coolant[written_rows] != 0
-    ):
+    for is_asked, where, coolant, written, moves in _unequal_settings(setting_pairs, 3):
         yield (SETTING_DIFFERS_COOLANT if is_asked else SETTING_DIFFERS_COOLANT_UNASKED)(
-            where=block_name(setting_pairs.decoded, row),
+            where=where,
             moves=moves,
-            coolant=COOLANTS[int(decoded_coolant[row])],
-            wanted=COOLANTS[int(written_coolant[other_row])],
+            coolant=COOLANTS[int(coolant)],
+            wanted=COOLANTS[int(written)],
         )
 
 
