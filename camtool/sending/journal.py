@@ -19,7 +19,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -65,13 +65,12 @@ class Journal:
         head: Mapping[str, Any],
         *,
         appends: bool = False,
-        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Begin a journal, which replaces an earlier one as soon as something has been sent; with
         `appends`, append to the earlier one."""
-        self.file, self._clock = file, clock
+        self.file = file
         self._replaces = not appends
-        self._begun = self._synced = clock()
+        self._begun = self._synced = time.monotonic()
         self._last: dict[str, Any] = {}
         try:
             self._handle = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
@@ -88,7 +87,7 @@ class Journal:
         if counts == self._last or not counts.get("sent"):
             return
         self._last = counts
-        time_s = self._clock()
+        time_s = time.monotonic()
         line = {"s": round(time_s - self._begun, 3), **counts, "place": place}
         if self._replaces:
             self._replaces = False
@@ -105,7 +104,7 @@ class Journal:
     def close(self, end: str, reason: str, *, is_still: bool = False, **counts: Any) -> None:
         """Write the end and its counts; `is_still`: the machine is known to stand at the place in
         them."""
-        seconds = round(self._clock() - self._begun, 3)
+        seconds = round(time.monotonic() - self._begun, 3)
         try:
             line = {"s": seconds, "end": end, "why": reason, **counts, "still": is_still}
             self._add(line, sync=True)
@@ -126,7 +125,7 @@ class Journal:
                 data = data[os.write(self._handle, data) :]
             if sync:
                 os.fsync(self._handle)
-                self._synced = self._clock()
+                self._synced = time.monotonic()
         except OSError as error:
             raise self._refused(error) from error
 

@@ -49,7 +49,7 @@ MIN_HALF_MM = 1e-9
 """Squares are not divided further: floats end here."""
 
 
-def stock_tree(moves: StockMoves, top_mm: float = TOP_MM) -> StockTree:
+def stock_tree(moves: StockMoves) -> StockTree:
     """Index the moves for searches of heights; tools that cut no width are left out."""
     number = np.flatnonzero(moves.table[moves.tool, 0] > 0.0)
     selected = moves.select(number)
@@ -60,7 +60,7 @@ def stock_tree(moves: StockMoves, top_mm: float = TOP_MM) -> StockTree:
         np.ascontiguousarray(moves.tool[number][order].astype(np.int64)),
         np.ascontiguousarray(number[order].astype(np.int64)),
         moves.table,
-        top_mm,
+        TOP_MM,
     )
 
 
@@ -169,7 +169,6 @@ def integral(
     box: tuple[float, float, float, float],
     share: float = VOLUME_SHARE,
     slack: float = MIN_VOLUME_MM3,
-    max_squares: int = MAX_VOLUME_SQUARES,
 ) -> Bracket:
     """Return the integral of a function over a box between two bounds, to a share of it or to
     `slack`, whichever is more.
@@ -183,7 +182,7 @@ def integral(
         total = float(low.sum()), float(high.sum())
         wanted_gap = max(share * total[1], slack)
         gaps = high - low
-        if total[1] - total[0] <= wanted_gap or len(squares) >= max_squares:
+        if total[1] - total[0] <= wanted_gap or len(squares) >= MAX_VOLUME_SQUARES:
             break
         order = np.argsort(gaps)
         # The squares with the smallest gaps stay: as many as make half of what may stay, or more
@@ -191,7 +190,7 @@ def integral(
         total_gap = total[1] - total[0]
         may_stay = max(0.5 * wanted_gap, (wanted_gap - LEFT_SHARE * total_gap) / (1 - LEFT_SHARE))
         is_small = np.cumsum(gaps[order]) <= may_stay
-        room = max(1, (max_squares - len(squares)) // 3)
+        room = max(1, (MAX_VOLUME_SQUARES - len(squares)) // 3)
         # In their order, so that each is near the one before.
         rows = np.sort(order[~is_small][-room:])
         parts = _quarters(squares[rows], quarter_means, extremes, box)

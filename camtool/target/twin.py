@@ -93,8 +93,8 @@ def travel_of(chunks: Iterable[Chunk], *, by_passes: bool = False) -> Travel:
 class Slides:
     """The slides of a machine: what they are to do next, and what they have done."""
 
-    def __init__(self, machine: Machine[Any, Any], start_mm: Floats | None = None) -> None:
-        self.commanded_mm: Floats = np.zeros(3) if start_mm is None else start_mm
+    def __init__(self, machine: Machine[Any, Any]) -> None:
+        self.commanded_mm: Floats = np.zeros(3)
         """(3,) where the controller believes them to be."""
         self.ends_s: float | None = None
         """When the travel that is under way will be over; None: nothing is."""
