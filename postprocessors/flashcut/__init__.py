@@ -16,7 +16,6 @@ from .dialect import FlashcutController, FlashcutDialect, FlashcutMachine, check
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
     from camtool.target.wire import NoWire
-    from camtool.toolpath.program import Listing
 
 
 class Flashcut(Target):
@@ -35,6 +34,7 @@ class Flashcut(Target):
     read = lazy_call("camtool_postprocessors.flashcut.read:read_program")
     model = lazy_call("camtool_postprocessors.flashcut.controller:FlashcutModel")
     signals = lazy_call("camtool_postprocessors.flashcut.signals:FlashcutSignals")
+    listing = lazy_call("camtool_postprocessors.gcode.blocks:listing")
 
     def check(self, machine: FlashcutMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -53,12 +53,6 @@ class Flashcut(Target):
             "millisecond, and an ordinary system keeps no such time",
             "let the machine's own program on its own PC drive it",
         )
-
-    def listing(self, data: bytes, machine: FlashcutMachine) -> Listing:
-        """The lines that are blocks."""
-        from ..gcode.blocks import listing
-
-        return listing(data)
 
 
 POST = Flashcut()

@@ -296,9 +296,9 @@ def _explain(remainder: str, lexing: Lexing) -> tuple[str, str, int]:
     return f"{sign!r} begins no word", "remove it", 0
 
 
-def listing(data: bytes) -> Listing:
+def listing(data: bytes, _machine: object) -> Listing:
     """The blocks of a program that its reader takes, each as its line stands in the file: the
-    lines with a word besides their number."""
+    lines with a word besides their number, whichever machine it is for."""
     lines = (line.decode("latin-1") for line in _LINE_END.split(data))
     numbered = [(line.strip(), number) for number, line in enumerate(lines, 1) if has_words(line)]
     return Listing(tuple(line for line, _ in numbered), lines=tuple(n for _, n in numbered))

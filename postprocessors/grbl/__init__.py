@@ -15,7 +15,6 @@ from .findings import CODES
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
-    from camtool.toolpath.program import Listing
 
 
 class Grbl(Target):
@@ -39,6 +38,7 @@ class Grbl(Target):
     signals = lazy_call("camtool_postprocessors.grbl.signals:GrblSignals")
     wire = lazy_call("camtool_postprocessors.grbl.wire:GrblWire")
     made_elsewhere = lazy_call("camtool_postprocessors.gcode.comments:lacks_heading")
+    listing = lazy_call("camtool_postprocessors.gcode.blocks:listing")
 
     def check(self, machine: GrblMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -49,12 +49,6 @@ class Grbl(Target):
     def unit_mm(self, machine: GrblMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return last_decimal_mm(machine.dialect)
-
-    def listing(self, data: bytes, machine: GrblMachine) -> Listing:
-        """The lines that are blocks."""
-        from ..gcode.blocks import listing
-
-        return listing(data)
 
     def twin_kind(self) -> TwinKind:
         """The virtual controller; docs/wires/grbl.md."""

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
-    from camtool.toolpath.program import Listing
 
 
 class Linuxcnc(Target):
@@ -44,6 +43,7 @@ class Linuxcnc(Target):
     wire = lazy_call("camtool_postprocessors.linuxcnc.wire:LinuxcncWire")
     settings_from = lazy_call("camtool_postprocessors.linuxcnc.ini:settings_of")
     made_elsewhere = lazy_call("camtool_postprocessors.gcode.comments:lacks_heading")
+    listing = lazy_call("camtool_postprocessors.gcode.blocks:listing")
 
     def check(self, machine: LinuxcncMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -78,12 +78,6 @@ class Linuxcnc(Target):
     def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return last_decimal_mm(machine.dialect)
-
-    def listing(self, data: bytes, machine: LinuxcncMachine) -> Listing:
-        """The lines that are blocks."""
-        from ..gcode.blocks import listing
-
-        return listing(data)
 
 
 POST = Linuxcnc()

@@ -15,7 +15,6 @@ from .dialect import ValcncController, ValcncDialect, ValcncLink, ValcncMachine,
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
-    from camtool.toolpath.program import Listing
 
 
 class Valcnc(Target):
@@ -32,6 +31,7 @@ class Valcnc(Target):
     model = lazy_call("camtool_postprocessors.valcnc.controller:ValcncModel")
     signals = lazy_call("camtool_postprocessors.valcnc.signals:ValcncSignals")
     wire = lazy_call("camtool_postprocessors.valcnc.wire:ValcncWire")
+    listing = lazy_call("camtool_postprocessors.gcode.blocks:listing")
 
     def check(self, machine: ValcncMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -47,12 +47,6 @@ class Valcnc(Target):
         from .twin import ValcncTwin, ValcncTwinSettings
 
         return TwinKind(ValcncTwinSettings, ValcncTwin)
-
-    def listing(self, data: bytes, machine: ValcncMachine) -> Listing:
-        """Return the texts of the lines that are blocks, for pages that show them."""
-        from ..gcode.blocks import listing
-
-        return listing(data)
 
 
 POST = Valcnc()

@@ -175,8 +175,8 @@ FREE_BLOCKS = ("G1 X1 F9 ; Y2", "n20 g0Z3", "(x)(y) M30")
 
 
 def test_lines_without_a_word_are_no_blocks() -> None:
-    assert lines_of(FREE_TEXT).blocks == FREE_BLOCKS
-    assert lines_of(b"%\n" + FREE_TEXT + b"%\n").blocks == FREE_BLOCKS
+    assert lines_of(FREE_TEXT, None).blocks == FREE_BLOCKS
+    assert lines_of(b"%\n" + FREE_TEXT + b"%\n", None).blocks == FREE_BLOCKS
 
 
 @pytest.mark.parametrize(
