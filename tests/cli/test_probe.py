@@ -3,8 +3,6 @@ program that follows it."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,8 +13,8 @@ import pytest
 
 from camtool.target.registry import load_target
 from camtool.toolpath.surface import surface_of_text
+from tests.commands import run_camtool
 from tests.sending.test_ends import hosted
-from tests.waiting import HANG_S
 
 PROGRAM = b"""G21 G90
 M3 S1000
@@ -48,14 +46,7 @@ def program(tmp_path: Path) -> Path:
 
 
 def run(*words: str) -> tuple[int, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "camtool", *words],
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-        timeout=HANG_S,
-        check=False,
-    )
+    done = run_camtool(*words)
     return done.returncode, done.stderr
 
 

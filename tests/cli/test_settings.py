@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import pty
-import subprocess
-import sys
 import threading
 import tty
 from collections.abc import Iterator
@@ -21,21 +19,14 @@ from camtool.sending.faults import Faults, WiredTwin
 from camtool.sending.twin import Clock, PseudoTerminal, TcpPort, serve
 from camtool.target.registry import load_target
 from camtool.target.twin import Twin
+from tests.commands import run_camtool
 from tests.sending.test_ends import Over, hosted
-from tests.waiting import HANG_S
 
 SPEED = 20.0
 
 
 def run(*words: str) -> tuple[int, str, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "camtool", *words],
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-        timeout=HANG_S,
-        check=False,
-    )
+    done = run_camtool(*words)
     return done.returncode, done.stdout, done.stderr
 
 

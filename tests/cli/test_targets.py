@@ -10,6 +10,7 @@ import pytest
 
 from camtool.target.registry import target_names
 from tests.cli.conftest import Run
+from tests.postprocessors.iso.test_sample import SAMPLE
 
 
 def test_all_are_listed_and_what_the_user_must_give_is_said(camtool: Run) -> None:
@@ -130,26 +131,6 @@ def test_play_by_region_is_shown_as_it_lies_on_the_table(camtool: Run) -> None:
     assert "backlash of Y by region of the table, µm\n" in used
     assert "not used" not in used
     assert "play of" not in camtool("targets", "grbl").stderr.decode()
-
-
-SAMPLE = b"""%
-O0042 (BRACKET)
-N0010 G17 G20 G90 G94 G54
-N0020 T3 M06
-N0030 G43 H3
-N0040 S1200 M03
-N0050 G00 X.5 Y0. Z.1
-N0060 G04 P500
-N0070 G01 Z-.25 F4.5
-N0080 G02 X1.5 Y0. I1. J0.
-N0090 G03 X.5 Y0. I1. J0.
-N0100 G00 Z.1
-N0110 M05
-N0120 G91 G28 Z0.
-N0130 G90
-N0140 M30
-%
-"""
 
 
 def test_the_command_writes_it_and_reads_the_program_back(camtool: Run, tmp_path: Path) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,8 +19,8 @@ from camtool.sending.faults import Faults, WiredTwin
 from camtool.sending.twin import Clock, PseudoTerminal, serve
 from camtool.target.registry import load_target
 from camtool.target.twin import Twin
+from tests.commands import run_camtool
 from tests.sending.test_ends import hosted
-from tests.waiting import HANG_S
 
 SPEED = 200.0
 NEAR = 0.006
@@ -42,14 +40,7 @@ def part(*choices: str, name: str = "grbl") -> Iterator[tuple[Twin, str]]:
 def run(port: str, *words: str, name: str = "grbl") -> tuple[int, dict[str, Any], str]:
     """Touch; the exit code, what was measured, and what was said."""
     line = ["touch", *words, "-t", name, "--port", port, "--yes", "--json"]
-    done = subprocess.run(
-        [sys.executable, "-m", "camtool", *line],
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-        timeout=HANG_S,
-        check=False,
-    )
+    done = run_camtool(*line)
     return done.returncode, json.loads(done.stdout or "{}"), done.stderr
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ import pytest
 
 from camtool.pictures.drawing import drawing_page
 from camtool.target.registry import load_target
+from tests.commands import run_camtool
 from tests.pictures.viewer_browser import NEEDS_BROWSER, browser
 from tests.waiting import HANG_S
 
@@ -157,13 +156,7 @@ def test_what_is_saved_is_posted_and_cuts_what_was_drawn(sheet: Sheet) -> None:
     sheet.page.locator("#name").fill("plate.json")
     sheet.saved()
     words = ["post", "plate.json", "-t", "grbl", "--kind", "engrave", "-o", "plate.nc"]
-    done = subprocess.run(
-        [sys.executable, "-m", "camtool", *words],
-        cwd=sheet.folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_camtool(*words, cwd=sheet.folder)
     assert done.returncode == 0, done.stderr
     target = load_target("grbl")
     path = target.target.read((sheet.folder / "plate.nc").read_bytes(), target.machine)

@@ -14,6 +14,7 @@ import pytest
 
 from camtool.sending.journal import read_journal
 from camtool.target.registry import load_target
+from tests.commands import run_camtool
 from tests.sending.test_ends import hosted
 from tests.waiting import HANG_S
 
@@ -28,15 +29,7 @@ def sent(
 ) -> subprocess.CompletedProcess[str]:
     (folder / "part.nc").write_bytes(program)
     words = ["send", "part.nc", "-t", target, "--port", port, "--yes", "--speed", "10", *more]
-    return subprocess.run(
-        [sys.executable, "-m", "camtool", *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-        timeout=HANG_S,
-        check=False,
-    )
+    return run_camtool(*words, cwd=folder)
 
 
 def test_a_command_is_run_at_each_stop(tmp_path: Path) -> None:

@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from typing import Any
 
 import pytest
 
 from camtool.target.registry import load_target
+from tests.commands import run_camtool
 from tests.sending.test_any_order import SETTINGS
 from tests.sending.test_ends import hosted
-from tests.waiting import HANG_S
 
 I8751 = (*SETTINGS["i8751"], "link.homing=start")
 
 
 def camtool(*words: str, settings: tuple[str, ...] = ()) -> subprocess.CompletedProcess[str]:
     flags = [word for setting in settings for word in ("--set", setting)]
-    return subprocess.run(
-        [sys.executable, "-m", "camtool", *words, *flags],
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-        timeout=HANG_S,
-        check=False,
-    )
+    return run_camtool(*words, *flags)
 
 
 def test_valcnc_jogs_from_a_place_and_says_the_next_one() -> None:

@@ -14,6 +14,7 @@ import pytest
 
 from camtool.target.registry import load_target
 from camtool.target.terminal import Terminal
+from tests.commands import run_camtool
 from tests.postprocessors.grbl.test_wire import Small
 from tests.sending.test_ends import hosted
 from tests.sending.test_send import behind_a_terminal
@@ -52,14 +53,7 @@ def test_motion_without_an_end_is_ended_by_the_next_line_of_a_pipe(speed: float)
     """However many steps are reported meanwhile."""
     twin: Any = load_target("pic-mmh").twin([])
     with hosted(twin, speed) as port:
-        done = subprocess.run(
-            [sys.executable, "-m", "camtool", "console", "pic-mmh", port, "--baud", "9600"],
-            input="JX+;\nA;\n",
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=HANG_S,
-        )
+        done = run_camtool("console", "pic-mmh", port, "--baud", "9600", typed="JX+;\nA;\n")
         assert not twin.is_moving
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "A;"
@@ -146,13 +140,7 @@ class Starting(Small):
 
 def piped(small: Small, text: str, *more: str) -> subprocess.CompletedProcess[str]:
     with behind_a_terminal(small) as port:
-        return subprocess.run(
-            [sys.executable, "-m", "camtool", "console", "grbl", port, *more],
-            input=text,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        return run_camtool("console", "grbl", port, *more, typed=text)
 
 
 def test_lines_from_a_pipe_wait_for_the_boot_loader() -> None:

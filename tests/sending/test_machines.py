@@ -19,6 +19,7 @@ from camtool.sending.faults import WiredTwin
 from camtool.sending.journal import read_journal
 from camtool.sending.twin import Clock, PseudoTerminal, serve
 from camtool.target.twin import Twin
+from tests.commands import run_camtool
 from tests.feeding import at_rest, logo, made, same_motion
 from tests.waiting import HANG_S
 
@@ -49,13 +50,7 @@ def sent(
     file = folder / "logo.program"
     file.write_bytes(program)
     words = ["send", str(file), "-t", name, "--port", port, "--yes", *flags]
-    return subprocess.run(
-        [sys.executable, "-m", "camtool", *words],
-        capture_output=True,
-        text=True,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
+    return run_camtool(*words)
 
 
 def check(

@@ -29,6 +29,7 @@ from camtool.sending.line import Port, opened_line
 from camtool.sending.prepare import consignment, forecast_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.wire import Manner, WireState
+from tests.commands import run_camtool
 from tests.feeding import logo
 from tests.oracles.grbl_counter import CharacterCounter
 from tests.oracles.grbl_firmware import FirmwareTwin, Switch, built, source
@@ -135,15 +136,7 @@ class Machine:
 
     def command(self, *words: str, folder: Path) -> subprocess.CompletedProcess[str]:
         fast = ["--speed", str(SPEED)] if words[0] == "send" else []
-        return subprocess.run(
-            [sys.executable, "-m", "camtool", *words, "-t", "grbl", "--port", self.port, *fast],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            stdin=subprocess.DEVNULL,
-            timeout=HANG_S,
-            check=False,
-        )
+        return run_camtool(*words, "-t", "grbl", "--port", self.port, *fast, cwd=folder)
 
 
 @contextmanager

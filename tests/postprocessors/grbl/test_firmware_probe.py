@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,9 +15,9 @@ from typing import Any
 
 import pytest
 
+from tests.commands import run_camtool
 from tests.oracles.grbl_firmware import STEPS_PER_MM, FirmwareTwin, Switch, built, source
 from tests.sending.test_ends import hosted
-from tests.waiting import HANG_S
 
 pytestmark = [
     pytest.mark.slow,
@@ -53,14 +51,7 @@ def board(program: Path, folder: Path, *switches: Switch) -> Iterator[tuple[Firm
 
 
 def camtool(port: str, *words: str) -> tuple[int, dict[str, Any], str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "camtool", *words, "-t", "grbl", "--port", port],
-        capture_output=True,
-        text=True,
-        stdin=subprocess.DEVNULL,
-        timeout=HANG_S,
-        check=False,
-    )
+    done = run_camtool(*words, "-t", "grbl", "--port", port)
     measured = json.loads(done.stdout) if done.stdout[:1] == "{" else {"shown": done.stdout}
     return done.returncode, measured, done.stderr
 
