@@ -54,9 +54,10 @@ class PlanningCode(Code):
     )
     SLOT_AS_WIDE = (
         208,
-        INFO,
-        "a slot is as wide as the tool: it is cut along its middle",
-        "none",
+        (INFO, WARNING),
+        "a slot is as wide as the tool: it is cut along its middle; warning: it is too narrow for "
+        "adaptive clearing, and is cut with the whole width of the tool, beyond its limit",
+        "none, or a smaller tool",
     )
     TAB_LEFT_OUT = (
         209,
@@ -466,10 +467,19 @@ OUT_OF_STOCK_MORE_LEADS = Sentence(
     PlanningCode.OUT_OF_STOCK, "{measured:# more lead|# more leads} like this", severity=ERROR
 )
 SLOT_AS_WIDE = Sentence(
-    PlanningCode.SLOT_AS_WIDE, "{tool} is as wide as this contour: it runs in its middle"
+    PlanningCode.SLOT_AS_WIDE,
+    "{tool} is as wide as this contour: it runs in its middle",
+    severity=INFO,
 )
 SLOT_AS_WIDE_IN_POCKET = Sentence(
-    PlanningCode.SLOT_AS_WIDE, "a slot as wide as {tool} is cut along its middle", "mm"
+    PlanningCode.SLOT_AS_WIDE, "a slot as wide as {tool} is cut along its middle", "mm", INFO
+)
+SLOT_AS_WIDE_ADAPTIVE = Sentence(
+    PlanningCode.SLOT_AS_WIDE,
+    "a place {measured:.5g} mm wide is too narrow for adaptive clearing by {tool}: it is cut with "
+    "the whole width of the tool, which no limit of engagement holds for",
+    "mm",
+    WARNING,
 )
 TAB_LEFT_OUT = Sentence(
     PlanningCode.TAB_LEFT_OUT, "there is no room for a tab of this width: the contour has one less"

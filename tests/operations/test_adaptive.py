@@ -124,6 +124,18 @@ def test_both_sides_of_a_neck_that_no_disc_passes_are_cleared() -> None:
     assert area == []
 
 
+@pytest.mark.parametrize("wide_mm", [2.0, 2.0005, 2.02])
+def test_slots_in_which_no_limit_holds_are_named(wide_mm: float) -> None:
+    slot = closed((0, 0), (20, 0), (20, wide_mm), (0, wide_mm))
+    own = (("strategy", "adaptive"), ("engagement_rad", math.radians(50.0)))
+    work = work_of([slot], 2.0, own=own, entry=Entry("helix", angle_rad=0.1))
+    (finding,) = (each for each in work.findings if each.code.name == "SLOT_AS_WIDE")
+    assert finding.measured == pytest.approx(wide_mm, abs=1e-3)
+    assert "X" in finding.where
+    assert "no limit" in finding.message
+    assert work.items
+
+
 def test_conventional_is_the_mirror_image_of_climb() -> None:
     limit = math.acos(1.0 - 2.0 * 0.2)
     climb = adaptive(PLATE, 1.6, limit)

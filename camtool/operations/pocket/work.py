@@ -58,6 +58,7 @@ from camtool.planning.findings import (
     CONTOUR_TOO_SMALL_POCKET,
     ENTRY_CHANGED_IN_POCKET,
     NO_REST,
+    SLOT_AS_WIDE_ADAPTIVE,
     SLOT_AS_WIDE_IN_POCKET,
 )
 from camtool.planning.finish import along_walls
@@ -95,11 +96,13 @@ class Pocket(Struct, frozen=True, eq=False):
 
 class Cleared(Struct, frozen=True, eq=False):
     """The runs that clear a region, in order; and what did not fit of their entries, with the
-    first run for which that is so. `is_rest`: others have cleared before."""
+    first run for which that is so. `is_rest`: others have cleared before. `narrow`: the tool
+    centre regions that adaptive clearing has no room in."""
 
     runs: list[CutRun]
     changed: dict[str, CutRun]
     is_rest: bool
+    narrow: list[Polylines]
 
 
 def checked(operation: Operation, _: Stock | None) -> Operation:
@@ -133,6 +136,7 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
         items.append(Fixed(tuple(cleared.runs), setting, each.name, each.source, outline))
         findings += [_entry_finding(each, *change) for change in cleared.changed.items()]
         findings += [_slot(each, slot, setting.operation) for slot in slots]
+        findings += [_narrow(each, part, setting.operation) for part in cleared.narrow]
         hair_mm = 2.0 * SLOT_TOLERANCE * setting.operation.tool.diameter_mm if slots else 0.0
         findings += unreached_findings(centre_region, setting, hair_mm=hair_mm)
     findings += cut_away_findings(kept_by(chosen), setting.operation)
@@ -175,6 +179,7 @@ def _cleared(
     """The runs of one region: each connected tool centre region, then the slots."""
     groups: list[list[CutRun]] = []
     changed_runs: dict[str, CutRun] = {}
+    narrow: list[Polylines] = []
     wider = setting.operation.rest_of
     is_rest = wider is not None
     if wider is not None and wider.contract.rest == "corners":
@@ -190,6 +195,8 @@ def _cleared(
             is_rest = is_rest or not groups[-1]
         if parts:
             continue
+        if setting.operation.engagement_rad is not None:
+            narrow.append(part)
         connected, runs = ConnectedRegion(part), list[CutRun]()
         for path, region in clearing_paths(part, setting.operation):
             way_down = down_for(path, region, connected, setting)
@@ -201,7 +208,9 @@ def _cleared(
         groups.append(lowered_runs(path, way_down, back_along(path), setting, each.name))
         changed_runs.setdefault(way_down.changed, groups[-1][0])
     changed_runs.pop("", None)
-    return Cleared(_nearest_next([group for group in groups if group]), changed_runs, is_rest)
+    return Cleared(
+        _nearest_next([group for group in groups if group]), changed_runs, is_rest, narrow
+    )
 
 
 def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
@@ -350,9 +359,20 @@ def _entry_finding(each: Pocket, change: str, run: CutRun) -> Finding:
 
 
 def _slot(each: Pocket, slot: Floats, operation: Operation) -> Finding:
-    return SLOT_AS_WIDE_IN_POCKET(
+    is_limited = operation.engagement_rad is not None
+    return (SLOT_AS_WIDE_ADAPTIVE if is_limited else SLOT_AS_WIDE_IN_POCKET)(
         where=at_place(each.name, slot[0, :2].tolist()),
         measured=operation.tool.diameter_mm,
+        tool=tool_name(operation.tool),
+    )
+
+
+def _narrow(each: Pocket, part: Polylines, operation: Operation) -> Finding:
+    centre = pole(part)
+    room_mm = float(points_to_segments(centre[None, :], Segments.of(part)).min())
+    return SLOT_AS_WIDE_ADAPTIVE(
+        where=at_place(each.name, centre.tolist()),
+        measured=operation.tool.diameter_mm + 2.0 * room_mm,
         tool=tool_name(operation.tool),
     )
 
