@@ -37,7 +37,7 @@ from tests.oracles.stock import Cutter, Walls
 from tests.oracles.stock import Path as Line
 from tests.oracles.stock_jobs import Asked, circle, described, moved, random_job, rectangle
 
-DEFAULT_JOBS = (0, 1, 2, 5, 6, 11, 13, 25, 34, 38, 48, 58, 97, 110)
+DEFAULT_JOBS = (0, 1, 2, 5, 6, 11, 13, 25, 48, 58, 110)
 """Small ones of all kinds."""
 SLOW_JOBS = 300
 FAST = 1e6

@@ -216,10 +216,7 @@ def test_wrong_set_ups_are_refused_with_their_place(
 
 ZERO = {
     "stock-lower-left": (0.0, 0.0),
-    "stock-lower-right": (WIDE, 0.0),
-    "stock-upper-left": (0.0, HIGH),
     "stock-upper-right": (WIDE, HIGH),
-    "stock-centre": (0.5 * WIDE, 0.5 * HIGH),
     "4, -3mm": (4.0, -3.0),
 }
 

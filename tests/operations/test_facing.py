@@ -62,8 +62,9 @@ def codes(run: Posted) -> set[str]:
 
 
 @pytest.mark.parametrize("pattern", ["contour", "zigzag"])
-@pytest.mark.parametrize("overhang", [0.0, 1.5, None, 8.0])
-@pytest.mark.parametrize("step_over", [0.3, 0.5, 0.85])
+@pytest.mark.parametrize(
+    ("overhang", "step_over"), [(0.0, 0.3), (1.5, 0.85), (None, 0.5), (8.0, 0.85)]
+)
 def test_its_area_is_that_of_the_stock_and_the_overhang(
     drawing: Path, pattern: str, overhang: float | None, step_over: float
 ) -> None:

@@ -214,17 +214,16 @@ WHOLE: dict[str, dict[str, Any]] = {
 """What a contour is not divided for, whatever is done against reversals."""
 
 
-@pytest.mark.parametrize("path", [circle(0.0, 0.0, 12.0), star(5, 5.0, 12.0)])
 @pytest.mark.parametrize(
     ("kind", "name"), [*(("profile", name) for name in WHOLE), ("engrave", "ramp")]
 )
-def test_what_is_done_against_reversals_is_accepted(kind: str, name: str, path: Path) -> None:
+def test_what_is_done_against_reversals_is_accepted(kind: str, name: str) -> None:
     play = ("axes.x.backlash_mm=0.05", "axes.y.backlash_mm=0.03")
     target = load_target("linuxcnc", settings=play)
     first = Operation(kind=kind, tool=Tool(3.0), depth_mm=1.0, **WHOLE[name])
     # The first operation ends elsewhere when it is divided, and the second begins from there.
     job = Job((Operation(tool=Tool(3.0), depth_mm=0.5), first), minimise="reversals")
-    drawing = drawing_of([closed(*path)])
+    drawing = drawing_of([closed(*star(5, 5.0, 12.0))])
     posted = post_drawing(drawing, job, target)
     assert not posted.failed, [str(finding) for finding in posted.findings]
     assert posted.program is not None

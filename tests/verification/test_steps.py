@@ -100,7 +100,7 @@ def test_rows_judged_as_they_are_made_are_those_of_the_chunks(
     rng = np.random.default_rng(5)
     machine = pic_mmh(*settings)
     missed = 0
-    for number in range(12):
+    for number in range(6):
         toolpath = random_program(rng)
         made, chunked = both_ways(toolpath, machine, toolpath if number % 2 else None)
         assert made.report.to_json() == chunked.report.to_json()
@@ -116,7 +116,7 @@ def test_rows_judged_as_they_are_made_are_those_of_the_chunks(
         assert made.trace.points.shape == chunked.trace.points.shape
         assert np.array_equal(made.trace.points, chunked.trace.points)
         missed += int((~one.books.ended).sum())
-    assert missed > 5 if EQUAL in settings else missed <= 5  # those about their own start
+    assert missed > 2 if EQUAL in settings else missed <= 2  # those about their own start
 
 
 def test_mechanics_that_need_samples_are_judged_by_chunks() -> None:

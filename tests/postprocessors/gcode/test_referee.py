@@ -70,8 +70,9 @@ def test_the_logo(name: str, tmp_path: Path) -> None:
     compare(target.target.read(program.data, target.machine), program.data, tmp_path)
 
 
-@pytest.mark.parametrize("name", TARGETS)
-@pytest.mark.parametrize("shape", adaptive_programs.SHAPES)
+@pytest.mark.parametrize(
+    ("name", "shape"), list(zip(TARGETS, adaptive_programs.SHAPES, strict=True))
+)
 def test_adaptive_pockets(shape: str, name: str, tmp_path: Path) -> None:
     """Hundreds of short arcs: none is refused, and all end where they should."""
     paths, lift_mm = adaptive_programs.SHAPES[shape], adaptive_programs.LIFT_MM[shape]

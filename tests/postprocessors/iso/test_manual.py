@@ -166,7 +166,7 @@ def check_drawing(name: str, kind: str, file: Path, units: str) -> bool:
 @pytest.mark.parametrize("name", CONTROLS)
 def test_a_job(name: str, kind: str) -> None:
     file = Path(f"samples/{FILES.get(kind, 'plate.dxf')}")
-    for units in ("mm", "in"):
+    for units in ("mm", "in") if kind == "profile" else ("mm",):
         assert check_drawing(name, kind, file, units)
 
 
