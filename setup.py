@@ -49,7 +49,8 @@ if sys.platform == "win32":
     FLAGS = ["/O2", "/fp:precise"]
 elif CHECKED:
     kinds = "undefined,float-cast-overflow" + (",address" if CHECKED == "address" else "")
-    FLAGS += ["-O1", "-fno-wrapv", f"-fsanitize={kinds}", "-fsanitize-undefined-trap-on-error"]
+    # Compiled in half the time of -O1; the tests with checks take as long.
+    FLAGS += ["-Og", "-fno-wrapv", f"-fsanitize={kinds}", "-fsanitize-undefined-trap-on-error"]
     FLAGS += ["-DCAMTOOL_CHECKED"]
 
 

@@ -181,7 +181,7 @@ def glyph_curves(count, seed=1):
 def test_arcs_are_far_fewer_than_chords():
     """The gain grows with the sixth root of size over tolerance only: arcs need their third root,
     chords their square root."""
-    curves = glyph_curves(12)
+    curves = glyph_curves(6)
     for tolerance, least in ((5e-4, 3.2), (5e-6, 6.5)):
         made = sum(
             len(fit.vertices) - 1 for fit in (fit_curve(curve, tolerance) for curve in curves)

@@ -208,7 +208,7 @@ CORNERED = {
 
 
 @pytest.mark.parametrize("name", CORNERED)
-@pytest.mark.parametrize("limit", [1.0, 1.2, 2.0, 5.0])
+@pytest.mark.parametrize("limit", [1.2, 5.0])
 def test_mitres(name: str, limit: float) -> None:
     p = CORNERED[name]
     for d in (0.3, -0.3, 1.1, -1.1, -3.0):

@@ -176,7 +176,7 @@ def far_enough(points: Floats, p: Polyline, distance_mm: float, most_rad: float)
 EXACT_MM = 1e-6
 """No point of an offset may be farther than this from the true offset curve."""
 
-CHORD_RAD = 0.02
+CHORD_RAD = 0.05
 """Sweep of the chords that stand for arcs where shapely judges."""
 
 
