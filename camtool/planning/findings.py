@@ -38,9 +38,9 @@ class PlanningCode(Code):
     UNREACHED = (
         205,
         (INFO, WARNING),
-        "part of the shape is narrower than the tool, or is the foot of a corner: it stays "
-        "uncut, with its place and area",
-        "use a smaller tool, or reliefs (`corners`)",
+        "part of the shape is narrower than the tool, or is the foot of a corner, or the scallop "
+        "of adaptive clearing in one: it stays uncut, with its place and size",
+        "use a smaller tool, reliefs (`corners`), or `finish`",
     )
     OUT_OF_STOCK = (
         206,
@@ -382,6 +382,13 @@ UNREACHED_CORNERS = Sentence(
     "{corners:an inner corner keeps|# inner corners keep} {measured:.4g} mm² that {tool} does "
     "not reach",
     "mm2",
+    INFO,
+)
+UNREACHED_SCALLOP = Sentence(
+    PlanningCode.UNREACHED,
+    "adaptive clearing leaves a scallop in {corners:an inner corner|# inner corners}, up to "
+    "{measured:.3g} mm thick: finish takes it",
+    "mm",
     INFO,
 )
 UNREACHED_BY_TIP = Sentence(

@@ -32,11 +32,13 @@ from camtool.planning.findings import (
     UNREACHED,
     UNREACHED_CORNERS,
     UNREACHED_MORE,
+    UNREACHED_SCALLOP,
 )
 from camtool.planning.items import Setting
 from camtool.planning.job import Operation
 from camtool.planning.naming import MAX_LISTED, shortened_list, tool_name, width_name
 from camtool.planning.paths import MeasuredPath, true_ranges
+from camtool.planning.strategies import MAX_SCALLOP_DISCS, SCALLOP_DISC_SHARE
 
 TOGETHER_MM = 5e-6
 """Two boundaries nearer than this run together: above the error of two offsets in a row."""
@@ -289,6 +291,28 @@ def unreached_findings(
         feet = []
     tool_words = width_name(setting.operation)
     return [*_places(wide, tool_words), *_corners(feet, tool_words)]
+
+
+def scallop_findings(region: Polylines, setting: Setting) -> Iterator[Finding]:
+    """Yield how much adaptive clearing leaves in the corners of a region that is on the left of
+    its closed paths."""
+    radius_mm = setting.operation.wall_radius_mm
+    disc_mm = SCALLOP_DISC_SHARE * radius_mm
+    centres = offset_shape(region, radius_mm)
+    cleared = opened(centres, disc_mm)
+    pieces = unreached(centres, disc_mm)
+    if not (len(cleared) and pieces):
+        return
+    places = np.array([piece.at_mm for piece in pieces])
+    depths = nearest(places, Segments.of(cleared)).distance
+    depths[depths > MAX_SCALLOP_DISCS * disc_mm] = 0.0
+    worst = int(depths.argmax())
+    if depths[worst] > 0.0:
+        yield UNREACHED_SCALLOP(
+            where=_where(pieces[worst]),
+            measured=float(depths[worst]),
+            corners=int((depths > 0.0).sum()),
+        )
 
 
 def cut_away_findings(kept_region: Polylines, operation: Operation) -> list[Finding]:

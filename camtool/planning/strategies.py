@@ -22,6 +22,14 @@ STRATEGIES = ("passes", "adaptive", "trochoidal")
 LIMITED = STRATEGIES[1:]
 """Those that keep to a limit of engagement: of pockets, and of profiles."""
 
+SCALLOP_DISC_SHARE = 0.0216
+"""An adaptive pocket clears what is within discs of tool centres of this part of the tool's
+radius, and leaves the rest of corners: a scallop, ..."""
+
+MAX_SCALLOP_DISCS = 5.0
+"""... whose thickness is up to so many times the disc's radius, in corners of 19 degrees; what is
+left elsewhere is more than a scallop."""
+
 MIN_ENGAGEMENT_RAD = math.radians(5.0)
 MAX_ENGAGEMENT_RAD = math.radians(90.0)
 """Beside a straight cut a tool that is engaged by 90 degrees removes half of its diameter."""

@@ -12,7 +12,8 @@ counted inwards; so it is exact at every point and has exact limits over a box.
     depth(s) = min(depth, base + rise · s)    for 0 ≤ s ≤ reach
 
     operation         may be cut (low)                         must be cut (high)
-    pocket, bore      region less the allowance, to its depth  that region opened by the tool
+    pocket, bore      region less the allowance, to its depth  that region opened by the tool; of
+                                                               adaptive ones all but the scallop
     rest of another   the same; on a carved floor less the     the same
                       slopes of the carving
     profile beside    the waste beside the wall, as far as     the kerf: one tool width about the
@@ -68,6 +69,7 @@ from camtool.planning.job import MILLS, Operation
 from camtool.planning.reliefs import add_reliefs
 from camtool.planning.settings import Cone
 from camtool.planning.sides import regions_of, runs_beside
+from camtool.planning.strategies import MAX_SCALLOP_DISCS, SCALLOP_DISC_SHARE
 from camtool.stock.cutters import CutterProfile, cutter_profile
 from camtool.toolpath.moves import STOCK_TOP_MM
 
@@ -313,9 +315,7 @@ class _Layers:
                 yield from self._holes()
         elif contract.cuts == "within" and contract.leaves_walls:
             if tool.kind in MILLS:
-                region = offset_shape(self._region(), self._left_mm + tool.radius_mm)
-                region = offset_shape(region, -tool.radius_mm)
-                yield self._straight(region, INSIDE, self._floor_mm, shift_mm=-tool.nose_mm)
+                yield from self._floors()
         elif contract.cuts == "within":
             yield self._carved(0.5 * tool.tip_diameter_mm, to_walls=True)
         elif runs_beside(operation):
@@ -323,6 +323,22 @@ class _Layers:
             yield from self._grooves(self._lines(closed=False), 0.0, is_full=False)
         else:
             yield from self._grooves(self._lines(), 0.0, is_full=False)
+
+    def _floors(self) -> Iterator[WantedLayer]:
+        """Yield the floor that the tool reaches; of an adaptive pocket all but the scallop of its
+        corners, unless a finishing pass takes that: what wider tools reach, and what is farther
+        from the walls than the scallop is thick."""
+        radius_mm, nose_mm = self.operation.tool.radius_mm, self.operation.tool.nose_mm
+        is_finish = self.operation.stage == "finish"
+        is_limited = self.operation.engagement_rad is not None and not is_finish
+        disc_mm = SCALLOP_DISC_SHARE * radius_mm
+        scallop_mm = MAX_SCALLOP_DISCS * disc_mm
+        sizes = ((disc_mm, 0.0), (0.0, scallop_mm)) if is_limited else ((0.0, 0.0),)
+        for wider_mm, away_mm in sizes:
+            reach_mm = radius_mm + wider_mm
+            region = offset_shape(self._region(), self._left_mm + reach_mm)
+            region = offset_shape(region, -reach_mm)
+            yield self._straight(region, INSIDE, self._floor_mm, shift_mm=-nose_mm - away_mm)
 
     def _straight(
         self,

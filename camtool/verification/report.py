@@ -766,7 +766,7 @@ def _engagement_words(item: EngagementReport) -> str:
         words += f"; limit {item.limit_deg:.2f}°"
     if item.left_mm is not None:
         height = f"{item.left_mm:.4g} mm of material is left"
-        words += f"; {height if item.left_mm else 'nothing is left that the tool reaches'}"
+        words += f"; {height if item.left_mm else 'nothing is left but the scallop'}"
     return words
 
 

@@ -246,3 +246,21 @@ def test_a_blunter_bit_is_seen_in_the_walls() -> None:
     # At its widest it cuts 2 mm instead of 2 tan 30° to each side of its tip.
     beyond = 2.0 - 2.0 * math.tan(math.radians(30.0))
     assert gouge == pytest.approx(beyond, abs=0.15)
+
+
+def test_only_the_scallop_of_adaptive_clearing_may_stay() -> None:
+    """A square corner keeps 0.9 % of the tool's radius along its bisector; a finishing pass takes
+    that. A neck that is wider than the tool by 1 % must be cut all the same."""
+    neck = [(0, 0), (8, 0), (8, 3), (12, 3), (12, 0), (20, 0), (20, 8), (12, 8)]
+    shape = closed(*neck, (12, 5.02), (8, 5.02), (8, 8), (0, 8))
+    own = (("strategy", "adaptive"), ("engagement_rad", 1.0))
+    rough = Operation(kind="pocket", tool=Tool(2.0), depth_mm=1.0, own=own)
+    # Along the bisector the tool's circle in the corner is 0.4142 mm away from it.
+    for operation, high in ((rough, math.inf), (replace(rough, finish_mm=0.1), -1.0)):
+        solid = solid_of([shape], operation)
+        solid = WantedSolid(solid.may, solid.must, wall_mm=1e-4)
+        x = (math.sqrt(2.0) - 1.0 + 0.005) / math.sqrt(2.0)
+        assert band(solid, x, x)[1] == high
+        x = (math.sqrt(2.0) - 1.0 + 0.012) / math.sqrt(2.0)
+        assert band(solid, x, x)[1] == -1.0
+        assert band(solid, 10.0, 4.01)[1] == -1.0

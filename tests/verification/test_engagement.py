@@ -172,7 +172,7 @@ def test_an_own_limit_and_the_gate_are_judged_by_one_run_of_the_slides(
         assert counts == {"slides": 1, "bounds": 1}
         counts.update(slides=0, bounds=0)
         text = run.report.to_text()
-        assert "limit 60.00°; nothing is left that the tool reaches" in text
+        assert "limit 60.00°; nothing is left but the scallop" in text
     assert greatest[0] == pytest.approx(greatest[1], abs=NEAR_DEG)
 
 

@@ -67,7 +67,12 @@ from camtool.planning.job import Operation, Stock
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import MeasuredPath, join_paths
 from camtool.planning.ramps import MIN_HELIX_SHARE, feeds_along, helix
-from camtool.planning.reach import cut_away_findings, unreached, unreached_findings
+from camtool.planning.reach import (
+    cut_away_findings,
+    scallop_findings,
+    unreached,
+    unreached_findings,
+)
 
 MAX_STEPS = 10_000
 
@@ -139,6 +144,8 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
         findings += [_narrow(each, part, setting.operation) for part in cleared.narrow]
         hair_mm = 2.0 * SLOT_TOLERANCE * setting.operation.tool.diameter_mm if slots else 0.0
         findings += unreached_findings(centre_region, setting, hair_mm=hair_mm)
+        if setting.operation.engagement_rad is not None:
+            findings += scallop_findings(centre_region, setting)
     findings += cut_away_findings(kept_by(chosen), setting.operation)
     return Work(tuple(items), tuple(findings))
 
