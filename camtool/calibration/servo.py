@@ -391,10 +391,10 @@ def simulate_step(
     kid, kpd = (gain * loop.gain_unit for gain in stored)
     ticks = round(SIMULATED_S / loop.tick_s)
     speed, drives = np.zeros(ticks), np.zeros(ticks)
-    integral, place, at, seen = 0.0, 0.0, 0.0, 0
+    integral, place, at, counts_before = 0.0, 0.0, 0.0, 0
     for tick in range(ticks):
-        measured = math.floor(place) - seen
-        seen = math.floor(place)
+        measured = math.floor(place) - counts_before
+        counts_before = math.floor(place)
         integral += kid * (reference - measured)
         drive = min(max(integral - kpd * measured, 0.0), MAX_DRIVE_PERCENT)
         drive = float(math.floor(drive)) if loop.is_whole else drive

@@ -167,14 +167,16 @@ def say_summary(outcomes: Sequence[Outcome], seconds: float, *, quiet: bool) -> 
         reasons = ", ".join(f"{number} {code}" for code, number in codes)
         parts = [f"{part} ({reasons})" if part.endswith(" failed") else part for part in parts]
     remembered = sum(each.remembered for each in outcomes)
-    again = f"; {remembered} failed before and did not change (--again)" if remembered else ""
+    failed_words = (
+        f"; {remembered} failed before and did not change (--again)" if remembered else ""
+    )
     made_count = counts[OutcomeState.MADE]
     rate = f", {made_count / seconds:.1f} made a second" if made_count and seconds > 0.0 else ""
     warnings = f"; {len(warned)} with warnings (-v shows them)" if warned else ""
     verdicts = _verdict_words(verdicts_of(outcomes))
     say(
         f"{_count_words(len(outcomes), 'drawing')}: {', '.join(parts)}; {seconds:.1f} s{rate}"
-        f"{again}{warnings}{'; dimensions: ' if verdicts else ''}{verdicts}",
+        f"{failed_words}{warnings}{'; dimensions: ' if verdicts else ''}{verdicts}",
         quiet=quiet and not failed,
     )
 

@@ -89,10 +89,10 @@ def refuse_same(reads: Iterable[str | None], writes: Iterable[str | None]) -> No
                 f"is the input itself{alias}", file=name, mend="choose another place"
             )
         if place in places_used:
-            twice = "is asked for twice"
+            complaint = "is asked for twice"
             if places_used[place] != name:
-                twice = f"is asked for twice, also as {places_used[place]}"
-            raise OutputError(twice, file=name, mend="give each output its own name")
+                complaint = f"is asked for twice, also as {places_used[place]}"
+            raise OutputError(complaint, file=name, mend="give each output its own name")
         places_used[place] = name
 
 

@@ -140,8 +140,8 @@ def new(
     say_findings(read.findings, quiet=quiet, verbose=verbose)
     for each in parts:
         if each.part.why:
-            done = "not cut" if each.part.is_left else each.part.kind
-            say(one_line(f"{each.part.name}: {done}, since {each.part.why}"), quiet=quiet)
+            outcome = "not cut" if each.part.is_left else each.part.kind
+            say(one_line(f"{each.part.name}: {outcome}, since {each.part.why}"), quiet=quiet)
     if proposal.flip:
         say(pin_words(read, proposal), quiet=quiet)
     place = "stdout" if output == STDOUT else output

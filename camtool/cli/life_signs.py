@@ -96,10 +96,10 @@ def life_signs(stream: TextIO | None, words: Sequence[str]) -> Iterator[LifeSign
     if stream is None or not _are_wanted(stream, words):
         yield LifeSigns(None, Progress())
         return
-    signs, ended = LifeSigns(stream, Progress()), threading.Event()
+    signs, end_event = LifeSigns(stream, Progress()), threading.Event()
 
     def tell() -> None:
-        while not ended.wait(EVERY_S):
+        while not end_event.wait(EVERY_S):
             signs.show()
 
     teller = threading.Thread(target=tell, daemon=True)
@@ -107,7 +107,7 @@ def life_signs(stream: TextIO | None, words: Sequence[str]) -> Iterator[LifeSign
     try:
         yield signs
     finally:
-        ended.set()
+        end_event.set()
         teller.join()
         signs.hide()
 

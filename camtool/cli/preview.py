@@ -97,16 +97,16 @@ def preview(
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
     files: dict[str, bytes] = {}
-    seen: dict[Finding, None] = {}
+    found_findings: dict[Finding, None] = {}
     for name, of_setup in _each_setup(sources, output, machine, job, drawing, asks_for_path):
         scene_source = SceneSource(machine, simulate, asks_for_path, of_setup, drawing, name)
         scenes = [scene_source.scene(each) for each in sources]
         shown = [scene for scene, _ in scenes]
         painted = picture.painter(partial(list, shown), quiet=quiet)
         files[name] = painted(name)
-        seen |= dict.fromkeys(finding for _, findings in scenes for finding in findings)
+        found_findings |= dict.fromkeys(finding for _, findings in scenes for finding in findings)
     write_all(files)
-    say_findings(tuple(seen), quiet=quiet, verbose=verbose)
+    say_findings(tuple(found_findings), quiet=quiet, verbose=verbose)
     for name in files:
         say(f"written: {name}", quiet=quiet)
     return 0

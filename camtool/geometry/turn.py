@@ -55,9 +55,9 @@ class Turn(Struct, frozen=True):
 
     def points(self, points: Floats) -> Floats:
         """Return the images of points, or of squares (J, 2 or more) by their middles."""
-        moved = points.copy()
-        moved[:, :2] = points[:, :2] * self.signs + self.shift_mm
-        return moved
+        turned_points = points.copy()
+        turned_points[:, :2] = points[:, :2] * self.signs + self.shift_mm
+        return turned_points
 
     def box(self, box: Box) -> Box:
         """Return the image of a box."""

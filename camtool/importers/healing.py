@@ -78,13 +78,13 @@ def clean_pieces(pieces: Sequence[Piece], file: str) -> Cleaned:
     vertices.flags.writeable = False
     lines = _lines(vertices, remaining[rows], closed[rows], lasting, file)
     is_first = _drawn_once(lines, [(piece.layer, piece.colour) for piece in lasting])
-    twice = np.zeros(len(pieces), dtype=np.bool_)
-    twice[rows[~is_first]] = True
+    is_repeated = np.zeros(len(pieces), dtype=np.bool_)
+    is_repeated[rows[~is_first]] = True
     lengths = path_lengths(lines)
     return Cleaned(
         lines=lines.select(np.flatnonzero(is_first)),
         piece=rows[is_first],
-        skipped=(*skips, *points, *_kinds(pieces, twice, IS_DRAWN_TWICE)),
+        skipped=(*skips, *points, *_kinds(pieces, is_repeated, IS_DRAWN_TWICE)),
         duplicates=int(np.count_nonzero(~is_first)),
         duplicates_mm=float(lengths[~is_first].sum()),
     )

@@ -262,14 +262,16 @@ def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension 
         return _distance(dimension, features, file)
     if dimension.kind in DEPTHS:
         return BoundDimension(dimension, (), (), np.zeros(2), dimension.nominal_mm or 0.0)
-    nearby = features.at(dimension.places_mm[0])
+    features_there = features.at(dimension.places_mm[0])
     if dimension.kind == "straightness":
         candidates: list[Feature] = [
-            each for each in nearby if isinstance(each, EdgeFeature) and _is_near(each, dimension)
+            each
+            for each in features_there
+            if isinstance(each, EdgeFeature) and _is_near(each, dimension)
         ]
         return _single(dimension, candidates, 0.0, file)
     if dimension.kind == "profile":
-        paths = sorted({each.path for each in nearby if _is_near(each, dimension)})
+        paths = sorted({each.path for each in features_there if _is_near(each, dimension)})
         if len(paths) != 1:
             return _unbound(dimension, len(paths), file)
         outline = OutlineFeature(
@@ -277,7 +279,9 @@ def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension 
         )
         return BoundDimension(dimension, (outline,), (), np.zeros(2), 0.0)
     circles = [
-        each for each in nearby if isinstance(each, CircleFeature) and _is_of(each, dimension)
+        each
+        for each in features_there
+        if isinstance(each, CircleFeature) and _is_of(each, dimension)
     ]
     if len(circles) > 1 and dimension.nominal_mm is not None:
         radius_wanted = dimension.nominal_mm * (0.5 if dimension.kind == "diameter" else 1.0)

@@ -105,8 +105,8 @@ class _FarCut(Struct, frozen=True, eq=False):
         """Return the cut in the frame of the dimensions, where the feature is `placed`."""
         mirrored = isinstance(placed, EdgeFeature) and self.turn.is_over
         side = -self.cut.side if mirrored else self.cut.side
-        stations, seen = stations_of(placed, side), self.stations_here(self.cut.seen)
-        return replace(self.cut, side=side, stations=stations, seen=seen)
+        stations, is_seen = stations_of(placed, side), self.stations_here(self.cut.seen)
+        return replace(self.cut, side=side, stations=stations, seen=is_seen)
 
     def stations_here(self, values: Floats | Bools) -> Any:
         """Return values (L, S) of stations in the order of the stations in the frame of the
@@ -116,9 +116,9 @@ class _FarCut(Struct, frozen=True, eq=False):
         spokes = (self.cut.side * self.cut.stations.normals) * np.array(self.turn.signs)
         angle = np.mod(np.arctan2(spokes[:, 1], spokes[:, 0]), 2.0 * math.pi)
         station = np.rint(angle / self.cut.stations.wide - 0.5).astype(np.int64) % len(angle)
-        moved = np.empty_like(values)
-        moved[:, station] = values
-        return moved
+        values_here = np.empty_like(values)
+        values_here[:, station] = values
+        return values_here
 
     def edges(self, machine: Machine, wider_mm: float) -> Floats:
         """Return the machined edge (L, S) mm in the frame of the dimensions; left of an edge is

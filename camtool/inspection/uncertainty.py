@@ -693,12 +693,12 @@ def propagate(
 def _nodes(direction: Direction, standard: float, probe: float, extremes: bool) -> Floats:
     """Return the ascending positions (J,) along a direction at which the machine is simulated, 0
     among them; only 0 if nothing is uncertain."""
-    twice = direction.bends or (extremes and direction.distorts)
-    step = (standard or probe) * (STEP_IN_BENDS if twice and standard else 1.0)
+    is_bent = direction.bends or (extremes and direction.distorts)
+    step = (standard or probe) * (STEP_IN_BENDS if is_bent and standard else 1.0)
     if not step:
         return np.zeros(1)
     places = {0.0, step}
-    if twice:
+    if is_bent:
         step_back = min(step, -direction.lowest)
         if step_back > CERTAIN:
             places.add(-step_back)

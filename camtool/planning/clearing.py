@@ -287,10 +287,12 @@ def _next(
 ) -> list[int]:
     """The strokes that may follow the last one, which went on to the next line or the one before
     (`onward` 1 or −1)."""
-    nearby = [index for index in neighbours[last] if index in remaining]
-    onward_ones = [index for index in nearby if strokes.row[index] - strokes.row[last] == onward]
-    if nearby:
-        return onward_ones or nearby
+    candidates = [index for index in neighbours[last] if index in remaining]
+    onward_ones = [
+        index for index in candidates if strokes.row[index] - strokes.row[last] == onward
+    ]
+    if candidates:
+        return onward_ones or candidates
     ends = [
         index for index in remaining if sum(other in remaining for other in neighbours[index]) <= 1
     ]

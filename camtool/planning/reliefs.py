@@ -125,13 +125,13 @@ def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner:
     before = along.at(length_here - 0.5 * np.diff(along.reach)[vertex - 1])
     pair = np.array([corner - 1, corner]) % len(walls.segments)
     wall_distances = points_to_segments(before, walls.segments[pair])[0]
-    coming, going = np.diff(walls.reach)[
+    reach_before, reach_after = np.diff(walls.reach)[
         pair[:: 1 if wall_distances[0] <= wall_distances[1] else -1]
     ]
     heading, heading_back = along.arrivals(length_here)[0], -along.directions(length_here)[0]
-    if abs(coming - going) <= POSITION_EPS_MM:
+    if abs(reach_before - reach_after) <= POSITION_EPS_MM:
         return np.asarray(heading if abs(heading[0]) >= abs(heading_back[0]) else heading_back)
-    return np.asarray(heading if coming > going else heading_back)
+    return np.asarray(heading if reach_before > reach_after else heading_back)
 
 
 def _is_clear(move: Floats, corner: Floats, other_walls: Segments, near_mm: float) -> bool:

@@ -46,12 +46,12 @@ def ask(port: Port, wire: Wire) -> Answer:
     with opened_line(port) as line:
         try:
             end = time.monotonic() + ANSWER_S
-            again = 0.0
+            next_s = 0.0
             while time.monotonic() < end:
-                if time.monotonic() >= again:
+                if time.monotonic() >= next_s:
                     line.write(wire.question)
                     sent += wire.question
-                    again = time.monotonic() + AGAIN_S
+                    next_s = time.monotonic() + AGAIN_S
                 heard = (heard + line.read(0.05))[-MAX_HEARD:]
                 more = wire.recognised(heard.decode("latin-1"))
                 if more and not controller:  # a board that begins says its state a little later

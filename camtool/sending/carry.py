@@ -57,8 +57,8 @@ class SentProgram(Struct, frozen=True, eq=False):
         """Why it ended, and which block is the last that is done."""
         ends = self.conversation.why or self.conversation.state.value
         why = f"{self.trouble}; {ends}" if self.trouble else ends
-        done = self.conversation.block
-        block = max(self.one.block_of(done) if done >= 0 else -1, self.one.first - 1)
+        last_block = self.conversation.block
+        block = max(self.one.block_of(last_block) if last_block >= 0 else -1, self.one.first - 1)
         last = f"block {block + 1} is the last that is done" if block >= 0 else "no block is done"
         return f"{why}; {last}"
 

@@ -81,16 +81,16 @@ class LegRun:
     def _lines(self, blocks: Iterator[Legs]) -> Iterator[LineRows]:
         """Yield the legs as lines, whole rows at a time: the last row of a block may go on in the
         next one."""
-        low, begun = 0, Legs(_NO_STEPS[:, 0], _NO_STEPS, np.zeros(0))
+        low, pending = 0, Legs(_NO_STEPS[:, 0], _NO_STEPS, np.zeros(0))
         for legs in blocks:
-            row = np.concatenate([begun.row, legs.row])
-            steps = np.concatenate([begun.steps, legs.steps])
-            seconds = np.concatenate([begun.seconds, legs.seconds])
+            row = np.concatenate([pending.row, legs.row])
+            steps = np.concatenate([pending.steps, legs.steps])
+            seconds = np.concatenate([pending.seconds, legs.seconds])
             high = int(row[-1]) if len(row) else low
-            done = int(np.searchsorted(row, high))
-            yield self._line_rows(low, high, Legs(row[:done], steps[:done], seconds[:done]))
-            low, begun = high, Legs(row[done:], steps[done:], seconds[done:])
-        yield self._line_rows(low, len(self._standing.waits), begun)
+            count = int(np.searchsorted(row, high))
+            yield self._line_rows(low, high, Legs(row[:count], steps[:count], seconds[:count]))
+            low, pending = high, Legs(row[count:], steps[count:], seconds[count:])
+        yield self._line_rows(low, len(self._standing.waits), pending)
 
     def _line_rows(self, low: int, high: int, legs: Legs) -> LineRows:
         start = self._position + np.cumsum(legs.steps, axis=0) - legs.steps

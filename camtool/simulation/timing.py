@@ -112,8 +112,8 @@ class SampleClock:
             period_s = (net_s / np.maximum(samples, 1))[position]
             starts_s, before_s = begin_s[position] + number * period_s, np.zeros(len(row))
             return starts_s, before_s, period_s, each_s, self._clock_s + float(net_s.sum())
-        done = np.where(row == self._row, self._done, 0)
-        before_s, after_s = self._waits(row, number + done)
+        passes_before = np.where(row == self._row, self._done, 0)
+        before_s, after_s = self._waits(row, number + passes_before)
         own_s = before_s + after_s
         total_s = np.bincount(position, own_s, minlength=len(ledger.row))
         standing_s = np.where(samples > 0, total_s, net_s)
@@ -122,7 +122,7 @@ class SampleClock:
         within_s -= np.repeat(within_s[np.flatnonzero(number == 0)], samples[samples > 0])
         if len(row):
             last = int(row[-1])
-            self._done = int((number + done)[-1]) + 1
+            self._done = int((number + passes_before)[-1]) + 1
             self._row = last
         return (
             begin_s[position] + within_s,

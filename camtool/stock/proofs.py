@@ -590,7 +590,7 @@ def _pieces(
         one, far = near[rows, own], near[rows, rival]
         direction = one[:, [SLOPE_X, SLOPE_Y]]
         bound = layer.shift_mm + one[:, APART] + one[:, MORE]
-        both, alone = np.flatnonzero(two[rows]), np.flatnonzero(~two[rows])
+        both, single = np.flatnonzero(two[rows]), np.flatnonzero(~two[rows])
         part = square[rows]
         part[both] = _clipped(
             half[rows[both]],
@@ -599,11 +599,11 @@ def _pieces(
         )
         if math.isfinite(layer.reach_mm) and layer.rise:
             # Less what lies beyond the reach of the layer.
-            nearest_s = s[rows[alone]] - np.minimum(
-                one[alone, MORE_BEYOND], 2.0 * reach[rows[alone]]
+            nearest_s = s[rows[single]] - np.minimum(
+                one[single, MORE_BEYOND], 2.0 * reach[rows[single]]
             )
-            part[alone] = _clipped(
-                half[rows[alone]], -direction[alone], nearest_s - (layer.reach_mm - distance_mm)
+            part[single] = _clipped(
+                half[rows[single]], -direction[single], nearest_s - (layer.reach_mm - distance_mm)
             )
         values = depths(bound[:, None] + (part * direction[:, None]).sum(axis=2))
         yield rows, squares[rows, None, :2] + part, values

@@ -694,9 +694,9 @@ class CommandHand(Hand):
             return
         elif order.place_mm is None and self._action == "jog" and is_done:
             x, y, z = (self._values.get(axis, 0.0) for axis in "xyz")
-            moved = _moved(self.place_mm, (x, y, z))
-            if moved is not None:
-                self._move_to(moved)
+            place = _moved(self.place_mm, (x, y, z))
+            if place is not None:
+                self._move_to(place)
         elif order.place_mm is None or not order.is_still:
             self.place_mm = self.machine_mm = None
             self.is_homed = False

@@ -338,8 +338,8 @@ class _Cuts:
         radius = 0.5 * (arcs.radius + arcs.end_radius)
         lengths[turning >= 0] = (radius * np.abs(arcs.sweep))[turning[turning >= 0]]
         # A rapid that moves nothing separates no runs: writers leave it out.
-        moved = (toolpath.starts != toolpath.end).any(axis=1)
-        breaks = np.cumsum((toolpath.kind == Kind.RAPID) & moved)[self.rows]
+        is_move = (toolpath.starts != toolpath.end).any(axis=1)
+        breaks = np.cumsum((toolpath.kind == Kind.RAPID) & is_move)[self.rows]
         _, self.run = np.unique(breaks, return_inverse=True)
         self.is_flat = lengths > VERTICAL_MM
         self.runs = int(self.run.max(initial=-1)) + 1

@@ -61,10 +61,10 @@ class TextLines(Struct, frozen=True, eq=False):
         """Return the text with further lines inserted, each (k, line) before line k; k ascends."""
         text, output, offset = memoryview(self.data), BytesIO(), 0
         for k, line in extra_lines:
-            upto = int(self.ends[k - 1]) if k > 0 else 0
-            output.write(text[offset:upto])
+            line_end = int(self.ends[k - 1]) if k > 0 else 0
+            output.write(text[offset:line_end])
             output.write(f"{line}\n".encode("ascii"))
-            offset = upto
+            offset = line_end
         output.write(text[offset:])
         return output.getvalue()
 

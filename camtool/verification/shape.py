@@ -296,8 +296,8 @@ def _swept_band(paths: Polylines, cutter: Cutter) -> Any:
             return region
     if len(paths) > 1:
         # Passes that nearly repeat each other: alone each of them has an outline.
-        alone = (paths.select(np.array([row])) for row in range(len(paths)))
-        return shapely.union_all([_swept_band(path, cutter) for path in alone])
+        passes = (paths.select(np.array([row])) for row in range(len(paths)))
+        return shapely.union_all([_swept_band(path, cutter) for path in passes])
     segments = Segments.of(paths)
     no_depth = np.zeros((len(segments), 2))
     return _swept_hulls(_chord_lines(segments, no_depth, cutter.tolerance_mm), cutter)
@@ -406,9 +406,12 @@ def _rows_with_heights(trace: SlideTrace, motion: CommandedMotion) -> list[tuple
         heights = np.append(motion.toolpath.starts_of(np.array([row]))[0, 2], height[samples])
         # The slides stand where the row before left them, which the trace has as its first point.
         begin = slides[first[row] - 1] if first[row] else points[0]
-        slid, gone = _lengths(np.concatenate([begin[None], slides[samples]])), _lengths(points)
-        scale = gone[-1] / slid[-1] if slid[-1] > 0.0 else 0.0
-        places = np.column_stack([np.interp(slid * scale, gone, axis) for axis in points.T])
+        slid, path_length = (
+            _lengths(np.concatenate([begin[None], slides[samples]])),
+            _lengths(points),
+        )
+        scale = path_length[-1] / slid[-1] if slid[-1] > 0.0 else 0.0
+        places = np.column_stack([np.interp(slid * scale, path_length, axis) for axis in points.T])
         waits = np.diff(slid) <= 0.0
         ends = np.flatnonzero(np.diff(waits)) + 1
         for low, high in pairwise([0, *ends.tolist(), len(waits)]):

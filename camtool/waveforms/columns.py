@@ -156,10 +156,10 @@ class Speeds:
         first, last = starts[:-1], starts[1:] - 1
         before = np.concatenate([self._start[None, :], self._points])[first]
         begin_s, end_s = self._begin_s[first], self._end_s[last]
-        moved = self._points[last] - before
+        change_mm = self._points[last] - before
         is_timed = end_s > begin_s
         duration_s = np.where(is_timed, end_s - begin_s, 1.0)
-        velocity = moved / duration_s[:, None]
+        velocity = change_mm / duration_s[:, None]
         speeds = np.column_stack([np.linalg.norm(velocity, axis=1), velocity])
         row = self._row[last]
         timed = np.flatnonzero(is_timed)

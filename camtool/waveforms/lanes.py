@@ -237,11 +237,11 @@ def _times(plot: TimePlot, sides: tuple[float, float], top: float, unit: tuple[f
 def _legend(plot: TimePlot, top: float, width: float) -> tuple[str, float]:
     """The names of the curves of lanes with several, below the axis, and the end of the page."""
     shared = [lane for lane in plot.lanes if len(lane.curves) > 1]
-    seen = {curve.name: curve for lane in shared for curve in lane.curves}
-    if not seen:
+    curves = {curve.name: curve for lane in shared for curve in lane.curves}
+    if not curves:
         return "", top + 6.0
     across, parts = MARGIN + NUMBERS, []
-    for curve in seen.values():
+    for curve in curves.values():
         line: Look = {"d": f"M{number(across)} {number(top)}h34", "stroke": curve.colour}
         if curve.is_wanted:
             line["stroke-dasharray"] = "7 4"

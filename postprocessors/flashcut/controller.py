@@ -177,8 +177,8 @@ class FlashcutRun:
             move, filled = timers_fill(moves, move, self._rules, self._counters, issued)
             under_way = int(moves.row[move]) if move < len(moves.row) else high - low
             rows = np.arange(done_rows, min(under_way + 1, high - low))
-            going = self._counters.under_way.copy()
-            yield TimerBatch(low, rows, moves, issued, filled, move, going)
+            counters = self._counters.under_way.copy()
+            yield TimerBatch(low, rows, moves, issued, filled, move, counters)
             done_rows = under_way
 
     def _chunk(self, batch: TimerBatch) -> Chunk:

@@ -282,9 +282,13 @@ def _explain(remainder: str, lexing: Lexing) -> tuple[str, str, int]:
     sign, shown = remainder[0], repr(remainder[:SHOWN_CHARS])
     if sign in lexing.letters:
         sign_match = re.match(r"[+-]?", remainder[1:])
-        past = 1 + (sign_match.end() if sign_match else 0)
-        past = past if past < len(remainder) else 0
-        return f"no number after {sign}", "digits, with a point if need be, follow a letter", past
+        column = 1 + (sign_match.end() if sign_match else 0)
+        column = column if column < len(remainder) else 0
+        return (
+            f"no number after {sign}",
+            "digits, with a point if need be, follow a letter",
+            column,
+        )
     if sign in _SIGNS:
         return _SIGNS[sign][0], _SIGNS[sign][1], 0
     if sign.islower() and sign.upper() in lexing.letters:

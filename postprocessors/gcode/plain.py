@@ -78,12 +78,12 @@ def split_z(toolpath: Toolpath, machine: Machine) -> tuple[LoweredToolpath, list
     """XY and Z apart, slopes and helices as steps; and MOVE_SPLIT when a feed move had to be."""
     step_mm = slope_step_mm(machine)
     parts = helices_to_steps(toolpath, step_mm)
-    twice = np.bincount(parts.row, minlength=len(toolpath)) > 1
-    twice &= toolpath.is_feed
-    if not twice.any():
+    is_split = np.bincount(parts.row, minlength=len(toolpath)) > 1
+    is_split &= toolpath.is_feed
+    if not is_split.any():
         return parts, []
-    place = toolpath.place(int(twice.argmax()))
-    return parts, [MOVE_SPLIT(where=place, measured=step_mm, count=int(twice.sum()))]
+    place = toolpath.place(int(is_split.argmax()))
+    return parts, [MOVE_SPLIT(where=place, measured=step_mm, count=int(is_split.sum()))]
 
 
 def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) -> Iterator[Finding]:

@@ -134,17 +134,17 @@ def plan_rows(
     holds."""
     window = controller.buffer_blocks - 1
     parts, stops = blocks_of(path, machine, controller), stops_of(path, controller)
-    coming: list[Blocks] = []
+    pending: list[Blocks] = []
     last, before, low = NO_BLOCKS, FROM_REST, 0
     while low < len(path):
-        while sum(len(part) for part in coming[1:]) < window:
+        while sum(len(part) for part in pending[1:]) < window:
             part = next(parts, None)
             if part is None:
                 break
-            coming.append(part)
-        block_group = coming.pop(0)
+            pending.append(part)
+        block_group = pending.pop(0)
         count, high = len(block_group), min(low + ROWS_AT_ONCE, len(path))
-        known_blocks = join_blocks([last, block_group, *coming]).part(
+        known_blocks = join_blocks([last, block_group, *pending]).part(
             0, len(last) + count + window
         )
         plan = speeds_of(known_blocks, path, machine, before, len(last), stops)

@@ -97,8 +97,8 @@ class _Clock:
         blocks, row = planned.blocks, planned.blocks.row - planned.low
         dwells_s = dwells_of(self._path, planned.low, planned.high, self._controller)
         dwelt = np.cumsum(np.rint(dwells_s * CLOCK_HZ).astype(np.int64))
-        upto = dwelt[row]
-        waits = np.diff(upto, prepend=0)
+        dwelt_at = dwelt[row]
+        waits = np.diff(dwelt_at, prepend=0)
         waits[1:] += self._idle * planned.rests[:-1]
         segments, before, from_eighths = _segments(planned), -1, 0
         columns = np.empty((4, SEGMENTS_AT_ONCE), dtype=np.int64)
@@ -119,7 +119,7 @@ class _Clock:
             from_eighths = int(eighths[own].sum()) + (0 if is_new[own].any() else from_eighths)
         rest = int(dwelt[-1]) if len(dwelt) else 0
         if len(blocks):
-            rest += self._idle * int(planned.rests[-1]) - int(upto[-1])
+            rest += self._idle * int(planned.rests[-1]) - int(dwelt_at[-1])
         self._cycles += rest
         yield in_order([Pulses.none(3)], self._cycles / CLOCK_HZ)
 
@@ -157,11 +157,11 @@ def _steps_of(blocks: Blocks, stretch: _Stretch, end: int) -> Pulses:
     for axis in range(3):
         steps = blocks.way[block, axis].astype(np.int64)
         size = np.abs(steps)
-        done = (4 * events + size * low - 1) // (8 * events)
-        count = (4 * events + size * (ends - bases) - 1) // (8 * events) - done
+        steps_before = (4 * events + size * low - 1) // (8 * events)
+        count = (4 * events + size * (ends - bases) - 1) // (8 * events) - steps_before
         index = np.repeat(np.arange(len(block)), count)
         number = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
-        step = number + done[index] + 1
+        step = number + steps_before[index] + 1
         eighth = bases[index] + 4 * events[index] * (2 * step - 1) // size[index] + 1
         segment = np.searchsorted(stretch.ends, eighth)
         ticks = -(-(eighth - starts[segment]) // stretch.tick[segment])

@@ -330,14 +330,14 @@ class PacketReader:
 def replies(data: bytes, decoded: Decoded, dialect: I8751Dialect) -> list[str]:
     """Return the expected reply of the controller to each byte of a decoded stream."""
     to_wait = dialect.dwell_replies
-    still = [dialect.motor_reply, "M"]
+    standing = [dialect.motor_reply, "M"]
     moving = [dialect.motor_reply, "M", "M", "M"]
     answers: list[str] = []
     for _ in range(len(decoded.steps)):
         if data[len(answers)] == ACCESS:
             answers.append("LISTO")
         for motor in range(3):
-            answers += still if data[len(answers) + 1] == 5 else moving
+            answers += standing if data[len(answers) + 1] == 5 else moving
             if motor:
                 answers += to_wait
         # A record begins with 01H, so that this cannot be the first byte of the next one.

@@ -445,10 +445,10 @@ class _Execution:
             reader.path.event(Kind.TOOL_CHANGE, modes.tool or 0)
         self._switch()
         self._set_modes()
-        once = codes.get("once")
-        if once == 40:
+        single_code = codes.get("once")
+        if single_code == 40:
             self._dwell()
-        elif once in (280, 300):
+        elif single_code in (280, 300):
             self._go_home()
         else:
             self._move()

@@ -117,13 +117,13 @@ def _motions(lines: Sequence[_Line]) -> list[tuple[int, int]]:
     motion, moves = -1, []
     for index, line in enumerate(lines):
         codes = line.codes("G")
-        once = any(code in (28.0, 30.0, 53.0, 92.0, 10.0, 4.0) for code in codes)
+        has_single_code = any(code in (28.0, 30.0, 53.0, 92.0, 10.0, 4.0) for code in codes)
         for code in codes:
             if code in (0.0, 1.0, 2.0, 3.0):
                 motion = int(code)
             elif code == 80.0 or (code >= 73.0 and code < 90.0):
                 motion = -1
-        if motion >= 0 and line.axes and not once:
+        if motion >= 0 and line.axes and not has_single_code:
             moves.append((index, motion))
     return moves
 
@@ -421,7 +421,7 @@ def _ask_dwell(sample: _Sample) -> None:
 def _see_cycles(lines: Sequence[_Line], sample: _Sample) -> None:
     """Cycles of holes, whose letters are those of the block that begins them."""
     names = {"X": "{x}", "Y": "{y}", "Z": "{z}", "R": "{r}", "Q": "{q}", "F": "{f}", "P": "{ms}"}
-    seen = False
+    has_drill = False
     for code, kind in _CYCLES.items():
         block = next((line for line in lines if float(code) in line.codes("G")), None)
         letters = {letter for letter, _ in block.words} if block else set()
@@ -440,8 +440,8 @@ def _see_cycles(lines: Sequence[_Line], sample: _Sample) -> None:
         if not {"98", "99"} & {text for letter, text in block.words if letter == "G"}:
             words.insert(0, "G98")
         sample.say(f"dialect.cycles.{kind}", " ".join(words), f"G{code} of the program")
-        seen |= kind == "drill"
-    if seen:
+        has_drill |= kind == "drill"
+    if has_drill:
         sample.say("dialect.cycles.use", True, "holes are drilled so")
 
 

@@ -217,19 +217,19 @@ class LatheContour:
         if across and (direction / across).imag < 0.0:
             distance = -distance
         entry = self.segments.pop(0)
-        done = 0.0
-        while done != distance:
+        shifted_mm = 0.0
+        while shifted_mm != distance:
             self.count()
             step = min(
-                *(each.size / 2.0 for each in self.segments), abs(distance - done), math.inf
+                *(each.size / 2.0 for each in self.segments), abs(distance - shifted_mm), math.inf
             )
             step = math.copysign(step, distance)
             self._shift(step, distance > 0.0)
             if not self.segments:
                 raise LineFault("nothing of the contour is left beside its offset", "g")
-            if done + step == done:
+            if shifted_mm + step == shifted_mm:
                 raise LineFault("the contour's segments are too short for its offset", "g")
-            done += step
+            shifted_mm += step
         for each, after in zip(self.segments, self.segments[1:], strict=False):
             each.end = after.start = (each.end + after.start) / 2.0
         entry.end = self.segments[0].start
@@ -293,8 +293,8 @@ class LatheContour:
                         break
                     index += 1
                 cutting = 3
-            index, at, ended = self._cut(index, at, x, depth, escape)
-            if ended:
+            index, at, has_ended = self._cut(index, at, x, depth, escape)
+            if has_ended:
                 return
             if cutting == 1:
                 for each in segments[index:]:
@@ -556,9 +556,9 @@ def _finish(
 ) -> None:
     """G70: along the contour, in passes from the distance D to E."""
     contour.segments[0].start = target
-    alone = LatheContour([each.copy() for each in contour.segments[1:]], contour.emit)
-    alone.mirror()
-    if not all(each.is_monotonic for each in alone.segments):
+    rest = LatheContour([each.copy() for each in contour.segments[1:]], contour.emit)
+    rest.mirror()
+    if not all(each.is_monotonic for each in rest.segments):
         contour.exchange_axes()
     contour.mirror()
     contour.finish_corners()

@@ -478,12 +478,12 @@ class _Profile(Struct, frozen=True, eq=False):
         way_mm = np.maximum(along - first, 0.0)[planned]
         whole_s = self.plan.moments_s(self.squares, block, self.plan.length_mm[block])
         own_share = self.plan.moments_s(self.squares, block, way_mm) / whole_s
-        begun = _part_of(along[planned], first[planned])
-        ended = 1.0 - _part_of((length - along)[planned], last[planned])
+        begin_part = _part_of(along[planned], first[planned])
+        end_part = 1.0 - _part_of((length - along)[planned], last[planned])
         # A move that overlaps with the next one goes on into the time of that.
         overlap_s = np.minimum(np.append(corners.overlap[1:], 0.0), self.own_s)
         own_s = (self.own_s + overlap_s)[one] * own_share
-        moment_s[planned] = self.begin_s[one] * begun + own_s + self.end_s[one] * ended
+        moment_s[planned] = self.begin_s[one] * begin_part + own_s + self.end_s[one] * end_part
         self._put_overlaps(moment_s, move, along, overlap_s)
         starts_s, origin = np.cumsum(self.rows_s) - self.rows_s, self.window_plan.origin
         first_row = np.searchsorted(origin, origin[row])

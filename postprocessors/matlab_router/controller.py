@@ -173,12 +173,12 @@ class _Run:
             )
             row = row[:filled]
             closed = int(self._state.clock[1])
-            going = int(self._lines.orders[closed - 1, SECOND_ROW]) + 1 if closed else 0
-            going = self._rows if finished else going
-            last = max(going, int(row[-1]) + 1) if filled else going
+            next_row = int(self._lines.orders[closed - 1, SECOND_ROW]) + 1 if closed else 0
+            next_row = self._rows if finished else next_row
+            last = max(next_row, int(row[-1]) + 1) if filled else next_row
             if filled or last > complete:
-                yield self._chunk((complete, going, last), row, positions[:filled])
-            complete = going
+                yield self._chunk((complete, next_row, last), row, positions[:filled])
+            complete = next_row
 
     def ticks(self) -> Iterator[ServoTicks]:
         """The passes of the slaves' interrupts, read from the compiled loop tick by tick."""
@@ -214,18 +214,18 @@ class _Run:
                     )
                     follows = slaves[:, STAGE] == FOLLOWING
                     reference = np.where(follows, np.copysign(fast, to_go), reference)
-                gone = np.abs(travel[order])
+                distance = np.abs(travel[order])
                 if line < 0:
-                    gone = np.zeros(3)
+                    distance = np.zeros(3)
                 elif math.isfinite(since):
-                    gone = np.minimum(np.abs(goal[order]) * since, gone)
+                    distance = np.minimum(np.abs(goal[order]) * since, distance)
                 reached = motors[:, PLACE].copy()
                 parts.append(
                     (
                         reference,
                         reached - before,
                         motors[:, DRIVE].copy(),
-                        start[order] + np.sign(travel[order]) * gone,
+                        start[order] + np.sign(travel[order]) * distance,
                         reached,
                         goal[order],
                     )

@@ -487,9 +487,9 @@ def compensations(toolpath: Toolpath, machine: Machine[Any, PicMmhDialect]) -> F
             direction, added_mm = state[axis]
             places = np.concatenate([position[None, :], chunk.commanded])
             ways = np.sign(np.rint(np.diff(places[:, axis]) / coded_mm[axis])).astype(np.int64)
-            moved = np.flatnonzero(ways)
-            before = np.concatenate([[direction], ways[moved][:-1]])
-            for index in moved[ways[moved] != before].tolist():
+            moving = np.flatnonzero(ways)
+            before = np.concatenate([[direction], ways[moving][:-1]])
+            for index in moving[ways[moving] != before].tolist():
                 table, direction = cells[axis], int(ways[index])
                 if direction == away and table is not None and not has_turned[axis]:
                     x, y = (places[index + 1, :2] - zero[:2]).tolist()

@@ -271,7 +271,7 @@ cdef (Int, bint) direct_search_run(
     Int[::1] state, Int end_x, Int end_y, Int[::1] out_x, Int[::1] out_y
 ) noexcept:
     """As `direct_search_fill`, into one array for each axis."""
-    cdef Int x, y, error, sx, sy, room, filled, run, _, m, n, sense, upto, delta_x, delta_y, at
+    cdef Int x, y, error, sx, sy, room, filled, run, _, m, n, sense, run_end, delta_x, delta_y, at
     cdef bint met, by_x
     x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
     room, filled, met = len(out_x), 0, False
@@ -282,14 +282,14 @@ cdef (Int, bint) direct_search_run(
         if run >= MIN_RUN:
             # M passes the end once.
             at = ((end_x if by_x else end_y) - m) * sense - 1
-            upto = filled + run
+            run_end = filled + run
             if by_x:
-                _run(m, n, sense, error, out_x, out_y, filled, upto)
+                _run(m, n, sense, error, out_x, out_y, filled, run_end)
                 met = 0 <= at < run and out_y[filled + at] == end_y
             else:
-                _run(m, n, sense, error, out_y, out_x, filled, upto)
+                _run(m, n, sense, error, out_y, out_x, filled, run_end)
                 met = 0 <= at < run and out_x[filled + at] == end_x
-            filled = filled + at + 1 if met else upto
+            filled = filled + at + 1 if met else run_end
             x, y = out_x[filled - 1], out_y[filled - 1]
             error += x * x + y * y - m * m - n * n
             if by_x and x == 0:

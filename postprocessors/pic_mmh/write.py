@@ -127,7 +127,7 @@ class _Writer:
         texts = texts_of(self._words(points), end=";\n")
         rows = self._row[points.row[is_sent]]
         starts = [(0, "G54;", self._row[0] if self._first else -1), (0, "G90;", -1)]
-        upto = np.concatenate([[0], np.cumsum(is_sent)])
+        sent_before = np.concatenate([[0], np.cumsum(is_sent)])
         between_blocks = [
             (int(np.searchsorted(points.row, row)), block, int(self._row[row]))
             for row, block in events
@@ -135,7 +135,7 @@ class _Writer:
         ending = (len(points.row), "M30;", int(self._row[-1]) if self._ended else -1)
         other_blocks = [*starts, *between_blocks, ending]
         data = texts.with_lines((index, block) for index, block, _ in other_blocks)
-        places = [int(upto[index]) for index, _, _ in other_blocks]
+        places = [int(sent_before[index]) for index, _, _ in other_blocks]
         return data, np.insert(rows, places, [row for _, _, row in other_blocks])
 
     def findings(self, data: bytes) -> Iterator[Finding]:

@@ -26,11 +26,12 @@ CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILI
 MAX_QUESTIONS = 0
 MAX_SHARED_CLASS_NAMES = 0
 MAX_SUPERLATIVES = 0
-MAX_RIDDLES = 0
+MAX_RIDDLES = 30
 
 RIDDLE = re.compile(
     r"_*(?:found|made|way|most|asked|kept|held|said|apart|whole|mine|theirs|taken|known|about|on|left"
-    r"|told|wanted|given|here|there|those|many|much|least|beside|beyond)_*"
+    r"|told|wanted|given|here|there|those|many|much|least|beside|beyond|upto|past|again|once|twice"
+    r"|nearby|seen|moved|ended|begun|going|coming|gone|alone|still|done)_*"
 )
 """Prepositions, participles and pronouns that do not say what a value is; `left` beside `right` is
 a side, and does."""

@@ -63,7 +63,7 @@ def post(options: Namespace, output: str, *more: str) -> tuple[bytes, list[str]]
         # Inkscape sets paths for its own Python, which another one must not have.
         own = {name: value for name, value in os.environ.items() if name[:6] != "PYTHON"}
         try:
-            done = subprocess.run(
+            process = subprocess.run(
                 words, cwd=folder, env=own, capture_output=True, stdin=subprocess.DEVNULL
             )
         except OSError as error:
@@ -71,14 +71,14 @@ def post(options: Namespace, output: str, *more: str) -> tuple[bytes, list[str]]
                 f"{COMMAND[0]} cannot be run ({error.strerror}); install camtool, then run "
                 "camtool inkscape"
             ) from error
-        text = done.stderr.decode("utf-8", "replace").replace(str(drawing), drawing.name)
+        text = process.stderr.decode("utf-8", "replace").replace(str(drawing), drawing.name)
     lines = text.splitlines()
     messages = [line.removeprefix(PREFIX) for line in lines if line.startswith(PREFIX)]
-    if done.returncode:
+    if process.returncode:
         usage = [line for line in lines if line.startswith("Error: ")]
         errors = [line for line in messages if line.startswith("error")]
         raise Refusal("\n".join((errors or usage or lines)[:MAX_MESSAGES]))
-    return done.stdout, messages[:MAX_MESSAGES]
+    return process.stdout, messages[:MAX_MESSAGES]
 
 
 def show(text: str) -> None:

@@ -307,8 +307,8 @@ def lost_entities(tags: Tags, frame: DxfSections) -> list[str]:
             continue
         rows = np.flatnonzero(tags.codes[section.begin : section.end] == _LAYER) + section.begin
         entity = np.searchsorted(tags.marks, rows, side="right")
-        twice = rows[1:][np.diff(entity) == 0]
-        losses.extend(f"{tags.where(int(k))}: two entities run into one" for k in twice)
+        repeated_rows = rows[1:][np.diff(entity) == 0]
+        losses.extend(f"{tags.where(int(k))}: two entities run into one" for k in repeated_rows)
     return losses + _lost_vertices(tags)
 
 

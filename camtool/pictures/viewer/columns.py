@@ -102,7 +102,7 @@ class StockBox(Struct, frozen=True):
 def height_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
     """The heights that the stock should have, and those that the set-ups before have left; empty
     where they are not known, or nothing was cut before."""
-    goal, begun = None, None
+    goal, heights_before = None, None
     if stock is not None and pair is not None:
         left, low, right, _ = stock.box
         across, upwards = stock.grid
@@ -111,11 +111,11 @@ def height_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
         uncut = HeightMap(np.zeros((upwards, across), dtype=np.float32), cell, corner)
         before = pair.before or WHOLE
         if before.above or before.below:
-            begun = before.shown_in(uncut)
+            heights_before = before.shown_in(uncut)
         if pair.wanted is not None:
             add_moves(uncut, pair.wanted)
             goal = before.shown_in(uncut)
-    return {**_run_columns("goal", goal, stock), **_run_columns("begun", begun, stock)}
+    return {**_run_columns("goal", goal, stock), **_run_columns("begun", heights_before, stock)}
 
 
 def _run_columns(name: str, heights: HeightMap | None, stock: StockBox | None) -> Columns:
