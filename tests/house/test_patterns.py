@@ -8,8 +8,6 @@ around a plain one, `(?>(?:a|b)*)`, says the same everywhere.
 import re
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 POSSESSIVE = re.compile(r"\)(?:[*?+]|\{[\d,]+\})\+")
 
@@ -20,9 +18,8 @@ def files() -> list[Path]:
     return found
 
 
-@pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
-def test_no_group_is_possessive(path: Path) -> None:
-    assert POSSESSIVE.search(path.read_text(encoding="utf-8")) is None
+def test_no_group_is_possessive() -> None:
+    assert [path for path in files() if POSSESSIVE.search(path.read_text(encoding="utf-8"))] == []
 
 
 def test_the_rule_can_be_broken() -> None:

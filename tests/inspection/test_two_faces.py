@@ -114,8 +114,7 @@ def test_both_set_ups_tell_the_same_distance(flip: str, tmp_path: Path) -> None:
     assert "own" not in top  # its set-up inspects it
 
 
-@pytest.mark.parametrize("setup", ["top", "bottom"])
-@pytest.mark.parametrize("flip", ["x", "y"])
+@pytest.mark.parametrize(("setup", "flip"), [("top", "x"), ("bottom", "y")])
 def test_an_error_of_scale_counts_from_the_zero_of_each_face(
     setup: str, flip: str, tmp_path: Path
 ) -> None:

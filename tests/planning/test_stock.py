@@ -102,10 +102,10 @@ def test_random_jobs_cut_so_far_beyond_the_line(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(DEFAULT_JOBS, DEFAULT_JOBS + SLOW_JOBS))
-def test_many_random_jobs(seed: int) -> None:
-    asked = job_of(seed)
-    assert judged(asked) == [], described(asked)
+@pytest.mark.parametrize("first", range(DEFAULT_JOBS, DEFAULT_JOBS + SLOW_JOBS, 50))
+def test_many_random_jobs(first: int) -> None:
+    for asked in map(job_of, range(first, first + 50)):
+        assert judged(asked) == [], described(asked)
 
 
 @pytest.mark.parametrize("seed", range(0, DEFAULT_JOBS, VERIFIED_EACH))

@@ -117,9 +117,10 @@ def test_random_jobs_raise_no_alarm(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(60, 1060))
-def test_many_random_jobs_raise_no_alarm(seed: int) -> None:
-    assert alarms(seed) == []
+@pytest.mark.parametrize("first", range(60, 1060, 50))
+def test_many_random_jobs_raise_no_alarm(first: int) -> None:
+    for seed in range(first, first + 50):
+        assert alarms(seed) == [], seed
 
 
 def alarms(seed: int) -> list[str]:

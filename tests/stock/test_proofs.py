@@ -141,7 +141,7 @@ def test_what_is_as_asked_is_proved_to_a_micrometre(name: str, paths: tuple[obje
 
 
 @pytest.mark.parametrize("name", OPERATIONS)
-@pytest.mark.parametrize("by", [(0.02, 0.0, 0.0), (0.0, 0.0, -0.02), (-0.012, 0.016, 0.01)])
+@pytest.mark.parametrize("by", [(0.0, 0.0, -0.02), (-0.012, 0.016, 0.01)])
 def test_moved_programs_are_told_by_their_way(name: str, by: tuple[float, float, float]) -> None:
     """The distance counts in the plane and in depth alike, so it is no more than either, and walls
     across the way show all of it."""

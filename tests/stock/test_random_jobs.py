@@ -71,9 +71,10 @@ def test_the_exact_stock_is_that_of_the_needles(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(JOBS, JOBS + SLOW_JOBS))
-def test_many_exact_stocks_are_those_of_the_needles(seed: int) -> None:
-    assert differences(seed) == []
+@pytest.mark.parametrize("first", range(JOBS, JOBS + SLOW_JOBS, 50))
+def test_many_exact_stocks_are_those_of_the_needles(first: int) -> None:
+    for seed in range(first, first + 50):
+        assert differences(seed) == [], seed
 
 
 def test_a_move_that_is_left_out_is_seen() -> None:
