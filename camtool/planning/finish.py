@@ -71,8 +71,9 @@ def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]
     if not operation.stage:
         return list(findings)
     if operation.stage == "rough":
-        beside, is_limited = operation.contract.runs_beside, operation.engagement_rad is not None
-        own_codes = [ProgramCode.GOUGE] * beside + [PlanningCode.SLOT_AS_WIDE] * is_limited
+        is_beside = operation.contract.runs_beside
+        is_limited = operation.engagement_rad is not None
+        own_codes = [ProgramCode.GOUGE] * is_beside + [PlanningCode.SLOT_AS_WIDE] * is_limited
         return [each for each in findings if each.code in own_codes or each.code not in OF_WALLS]
     return [each for each in findings if each.code in (*OF_WALLS, *OF_BOTH)]
 
