@@ -127,6 +127,21 @@ def test_only_what_has_changed_is_made_again(
 
 
 @pytest.mark.usefixtures("pools")
+def test_engagement_is_limited_in_each_drawing(
+    camtool: Run, drawings: Path, tmp_path: Path
+) -> None:
+    """A contour in full stock engages the tool by half of its circle; another limit is judged
+    anew."""
+    flags = ("-t", "grbl", "--tool-diameter", "0.5mm", "-o", "build", "--json", "all.json")
+    for limit, code, state in (("100%", 0, "made"), ("170deg", 1, "failed"), ("100%", 0, "made")):
+        done = camtool("batch", "drawings/in/square.dxf", *flags, "--max-engagement", limit)
+        assert done.returncode == code, done.stderr.decode()
+        (row,) = json.loads((tmp_path / "all.json").read_text())["drawings"]
+        assert row["state"] == state
+        assert ("--max-engagement" in json.dumps(row)) == (code == 1)
+
+
+@pytest.mark.usefixtures("pools")
 def test_it_replaces_only_what_it_made_and_nobody_changed(
     camtool: Run, drawings: Path, tmp_path: Path
 ) -> None:
