@@ -37,7 +37,7 @@ __all__ = ["browser"]
 JOBS = {"mount": "grbl", "plate": "linuxcnc"}
 """Samples whose jobs have one tool and three, and for which machine they are posted."""
 
-BLUE, PALE_BLUE = (15, 106, 196), (92, 171, 255)
+BLUE = (15, 106, 196)
 """What is fed, on light ground and on dark."""
 
 PLUNGE = (240, 138, 29)

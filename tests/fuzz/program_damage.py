@@ -184,7 +184,7 @@ def _moved_about(
     return done
 
 
-MOTOR, FORWARD, BACKWARD, END_PACKET = 4, 0x03, 0x04, 0x45
+MOTOR, FORWARD, BACKWARD = 4, 0x03, 0x04
 
 
 def _records(whole: Whole, kind: str, random: Random) -> bytes | None:

@@ -15,8 +15,6 @@ from tests.postprocessors.gcode.parts import toolpaths
 from tests.postprocessors.iso.tables import machine_with, tables
 from tests.strategies import examples
 
-NOT_READ = (Kind.MESSAGE,)
-
 
 def check_there_and_back(path: Toolpath, loaded: LoadedTarget) -> None:
     """Each row comes back, in order, as itself or as the pieces that stand for it."""
