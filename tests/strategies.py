@@ -21,7 +21,7 @@ GRID_MM = 1e-3
 """Random points lie on a grid, so that two of them are equal or clearly apart."""
 
 
-SHARE = {"default": 0.4, "checked": 0.2, "nightly": 30.0}[
+SHARE = {"default": 0.3, "checked": 0.2, "nightly": 30.0}[
     os.environ.get("HYPOTHESIS_PROFILE", "default")
 ]
 """The part of the examples that a property asks for: by day few (they are the same in every run),

@@ -240,7 +240,7 @@ def camtool_progress() -> Any:
     return Progress()
 
 
-@pytest.mark.parametrize("allowance", [None, '"0.1mm"'])
+@pytest.mark.parametrize("allowance", [pytest.param(None, marks=pytest.mark.slow), '"0.1mm"'])
 def test_grids_of_allowances_hold_nothing_cheaper(tmp_path: Path, allowance: str | None) -> None:
     """Every combination of two allowances on a grid, each posted: where one holds, so does the
     proposal of the closed form, and it is not worse than any of them."""
@@ -414,6 +414,7 @@ def test_contours_of_one_name_have_one_allowance(tmp_path: Path, apart: bool) ->
         assert "several contours are named path w0" in to_text(found)
 
 
+@pytest.mark.slow  # 25 programs; test_a_certificate_names_what_it_would_take is one by day
 def test_play_that_nothing_makes_up_for_is_certified(tmp_path: Path) -> None:
     """Roundness alone, without the ways that help: at most so much play."""
     made = case(tmp_path, [{**ROUND, "zone": "0.01"}], SLACK)

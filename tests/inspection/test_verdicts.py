@@ -476,8 +476,9 @@ BIG = """<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="90mm" view
 <circle cx="45" cy="45" r="30" fill="none" stroke="black"/></svg>"""
 
 
-@pytest.mark.parametrize("scales", [(2e-4, 2e-4), (3e-4, 0.0), (0.0, 0.0)])
-@pytest.mark.parametrize("lean", [0.0, 2e-4])
+@pytest.mark.parametrize(
+    ("scales", "lean"), [((2e-4, 2e-4), 0.0), ((3e-4, 0.0), 2e-4), ((0.0, 0.0), 2e-4)]
+)
 def test_what_makes_ellipses_of_circles_makes_the_least_diameter_less(
     tmp_path: Path, scales: tuple[float, float], lean: float
 ) -> None:
@@ -606,7 +607,7 @@ ASKED = {
     [
         pytest.param(added, count, marks=pytest.mark.slow if count > 1000 else ())
         for added in ASKED
-        for count in (100, 10_000)
+        for count in (40, 10_000)
     ],
 )
 def test_probabilities_agree_with_simulated_parts(
