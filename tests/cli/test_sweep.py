@@ -46,9 +46,14 @@ def test_the_flags_are_those_of_the_commands() -> None:
     assert {"--peck", "--overlap", "--set", "--size"} <= {flag.name for flag in FLAGS}
 
 
-@pytest.mark.parametrize("flag", [f for f in FLAGS if f.command == "post"], ids=lambda f: f.name)
-def test_numbers_too_large_are_refused_or_taken_by_post(flag: sweeping.Flag, folder: Path) -> None:
-    refuse_bad(ran(flag.call(value), folder) for value in SMALL)
+POST = [flag for flag in FLAGS if flag.command == "post"]
+
+
+@pytest.mark.parametrize("place", range(len(POST)), ids=[flag.name for flag in POST])
+def test_numbers_too_large_are_refused_or_taken_by_post(place: int, folder: Path) -> None:
+    """Thousands of digits are refused where numbers are read, which flags share: each fourth."""
+    values = SMALL if place % 4 == 0 else SMALL[:1]
+    refuse_bad(ran(POST[place].call(value), folder) for value in values)
 
 
 @pytest.mark.parametrize(
