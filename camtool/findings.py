@@ -19,6 +19,7 @@ from string import Formatter
 from typing import Any, Final, Protocol, Self, TypeVar
 
 from camtool.plain import one_line
+from camtool.records import FrozenRecord
 
 
 class Severity(IntEnum):
@@ -55,8 +56,8 @@ class Code(IntEnum):
         return code
 
 
-@dataclass(frozen=True)
-class TargetCode:
+@dataclass(frozen=True, repr=False, eq=False)
+class TargetCode(FrozenRecord):
     """A code of one target's own findings; its name begins with the target's: `mill.TOO_HOT`."""
 
     name: str
@@ -65,8 +66,8 @@ class TargetCode:
     mend: str
 
 
-@dataclass(frozen=True)
-class Finding:
+@dataclass(frozen=True, repr=False, eq=False)
+class Finding(FrozenRecord):
     """A remark, warning or error with its place, the measured value and the limit, if any.
 
     `unit` belongs to both `measured` and `limit` ("mm", "um", "chars", "mm_min", ...).
@@ -85,8 +86,8 @@ class Finding:
         return one_line(f"{self.severity.name.lower()} {self.code.name}{place}: {self.message}")
 
 
-@dataclass(frozen=True)
-class FindingReport:
+@dataclass(frozen=True, repr=False, eq=False)
+class FindingReport(FrozenRecord):
     """A finding, by the names of its code and severity."""
 
     code: str
@@ -108,7 +109,7 @@ class FindingReport:
         return FoundAt(**values)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class FoundAt(FindingReport):
     """A finding in a line of a file, from 1; `line` None: in the file as a whole."""
 
@@ -116,8 +117,8 @@ class FoundAt(FindingReport):
     line: int | None = None
 
 
-@dataclass(frozen=True)
-class Sentence:
+@dataclass(frozen=True, repr=False, eq=False)
+class Sentence(FrozenRecord):
     """The text of a finding of one code; called with the numbers, it makes a finding.
 
     `text` is a format string. `{measured}` and `{limit}` are those of the finding, both in `unit`

@@ -30,7 +30,7 @@ from camtool.geometry.turn import UNTURNED
 from camtool.planning.job import Job
 from camtool.planning.naming import pins_of, setup_words, tool_words
 from camtool.progress import Progress
-from camtool.records import replace
+from camtool.records import FrozenRecord, replace
 from camtool.run import Run
 from camtool.simulation.motion import ALL
 from camtool.simulation.rows import block_of
@@ -108,8 +108,8 @@ PLANNING = "planning"
 """The name of the stage that makes moves of a job."""
 
 
-@dataclass(frozen=True)
-class Judging:
+@dataclass(frozen=True, repr=False, eq=False)
+class Judging(FrozenRecord):
     """Options of judging a program.
 
     `found`: the contours of the drawing that the program cuts are found from the program; only the

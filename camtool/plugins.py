@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 import sys
 from collections.abc import Iterator
 from functools import lru_cache
@@ -60,42 +62,41 @@ def _search(group: str, folders: PathState) -> tuple[EntryPoint, ...]:
         points = metadata.entry_points(group=group)
         return tuple(EntryPoint(point.name, point.value) for point in points)
     return tuple(
-        point
-        for folder in _packages(folders).values()
-        for point in _points(folder / "entry_points.txt", group)
+        point for text in _texts(folders) if f"[{group}]" in text for point in _points(text, group)
     )
 
 
 @lru_cache(maxsize=8)
-def _packages(folders: PathState) -> dict[str, Path]:
-    """Find the folder of each installed package's metadata; of one that is installed twice the
-    first counts."""
-    folders_by_name: dict[str, Path] = {}
+def _texts(folders: PathState) -> tuple[str, ...]:
+    """Read the entry points of each installed package; of one that is installed twice the first
+    counts. A `Path` for each of a thousand modules took 4 ms."""
+    files: dict[str, str] = {}
     for folder, has_changed in folders:
-        for entry in Path(folder).iterdir() if has_changed and Path(folder).is_dir() else ():
-            if entry.suffix in (".dist-info", ".egg-info"):
-                name = entry.stem.partition("-")[0].lower().replace(".", "_")
-                folders_by_name.setdefault(name, entry)
-    return folders_by_name
+        for entry in os.scandir(Path(folder)) if has_changed and Path(folder).is_dir() else ():
+            stem, _, suffix = entry.name.rpartition(".")
+            if suffix in ("dist-info", "egg-info"):
+                files.setdefault(stem.partition("-")[0].lower().replace(".", "_"), entry.path)
+    return tuple(map(_text, files.values()))
 
 
-def _points(file: Path, group: str) -> Iterator[EntryPoint]:
-    """Yield the entry points of a group from a file like `[group]`, `name = module:attribute`."""
+def _text(folder: str) -> str:
+    """Return the entry points of a package by the folder of its metadata; "" where it has none."""
+    try:
+        with io.FileIO(f"{folder}/entry_points.txt") as file:
+            return file.readall().decode()
+    except (OSError, ValueError):  # ValueError: not UTF-8
+        return ""
+
+
+def _points(text: str, group: str) -> Iterator[EntryPoint]:
+    """Yield the entry points of a group from a text like `[group]`, `name = module:attribute`."""
     section = ""
-    for line in _lines(file):
+    for line in map(str.strip, text.splitlines()):
         if line.startswith("["):
             section = line[1:].rstrip("]")
         elif section == group and "=" in line and not line.startswith(("#", ";")):
             name, _, value = line.partition("=")
             yield EntryPoint(name.strip(), value.strip())
-
-
-def _lines(file: Path) -> list[str]:
-    """Return the lines of a file without white space around them; none where there is no file."""
-    try:
-        return [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
-    except (OSError, ValueError):  # ValueError: not UTF-8
-        return []
 
 
 def _path_state() -> PathState:

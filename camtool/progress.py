@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from contextvars import ContextVar
-from dataclasses import dataclass
 
 STEPS = 100
 """Steps in which the share of a long part of a stage is told, rounded down: only all is 100 %."""
 
 
-@dataclass
 class Progress:
     """The stage of a run, in words that follow "camtool:", and its `done` parts out of `count`
     (0 if unknown). It has one writer and many readers, in other threads. Work deep inside a stage
     tells of it by `tell_share`."""
 
-    stage: str = ""
-    done: int = 0
-    count: int = 0
+    def __init__(self) -> None:
+        self.stage = ""
+        self.done = self.count = 0
 
     def begin(self, stage: str, count: int = 0) -> None:
         """Begin the next stage."""

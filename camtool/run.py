@@ -222,7 +222,6 @@ class Run(Shown):
         return f"<Run of {name} on {target}: {written}{errors}, {_count_findings(self.findings)}>"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class ShownDrawing(Shown, Drawing):
     """A drawing: exact lines and arcs, mm, Y up (`camtool.geometry.drawing.Drawing`)."""
 

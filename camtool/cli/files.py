@@ -15,7 +15,6 @@ import os
 import re
 import stat
 import sys
-import tempfile
 import time
 import unicodedata
 from collections.abc import Callable, Hashable, Iterable, Mapping
@@ -41,6 +40,10 @@ READER_S = 10.0
 POLL_S = 0.05
 """A pipe is looked at so often until then."""
 
+
+_NEW_FILE = (
+    os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+)
 
 Content: TypeAlias = bytes | Iterable[bytes]
 """The content of a file, whole or piece by piece as it is made."""
@@ -284,8 +287,10 @@ def _stage(place: Path, data: Content) -> tuple[Path, Path]:
     named, place = str(place), Path(os.path.realpath(place))
     temporary: Path | None = None
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{place.name[:KEPT]}.", dir=place.parent)
-        temporary = Path(name)
+        # As `tempfile` does, which loads all archives: 3 ms.
+        name = place.parent / f".{place.name[:KEPT]}.{os.urandom(6).hex()}"
+        handle = os.open(name, _NEW_FILE, 0o600)
+        temporary = name
         with os.fdopen(handle, "wb") as stream:
             stream.writelines(_pieces(data))
             stream.flush()

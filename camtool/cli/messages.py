@@ -19,10 +19,10 @@ import click
 
 from camtool.cli.life_signs import hide_signs
 from camtool.errors import CamtoolError
-from camtool.findings import Finding, Severity, summarise_findings
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
+    from camtool.findings import Finding
     from camtool.verification.contrast import ContrastRow
 
 
@@ -90,6 +90,8 @@ def say_findings(
     """Show errors always, warnings unless quiet, remarks when verbose: one line each, and one line
     for many alike, unless verbose. `file` is the name of one of several files that these are
     about."""
+    from camtool.findings import Severity, summarise_findings
+
     head = f"camtool: {file}: " if file else "camtool: "
     min_severity = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
     shown = [finding for finding in findings if finding.severity >= min_severity]

@@ -47,7 +47,8 @@ _FORMAT_BY_SUFFIX = {
 
 _PICTURES = (b"\x89PNG", b"\xff\xd8\xff")
 _GZIP = b"\x1f\x8b"
-_ZIP = b"PK\x03\x04"
+NPY_START = b"\x93NUMPY"
+ZIP_START = b"PK\x03\x04"
 _EXPORT = "export SVG or DXF from the program that made it"
 _AS_PNG = "save it as PNG"
 
@@ -119,8 +120,6 @@ def find_format(data: bytes, suffix: str, file: str) -> str:
 
 def _by_bytes(data: bytes, file: str) -> str | None:
     """The format whose first bytes these are; DrawingError for what is no drawing."""
-    from camtool.importers.points.tables import NPY_START, is_npz
-
     if data.startswith(BINARY_DXF):
         return "dxf"
     if data.startswith(NPY_START) or is_npz(data):
@@ -131,7 +130,7 @@ def _by_bytes(data: bytes, file: str) -> str | None:
         if _xml_root(text_head(_unpacked_head(data))) == "svg":
             return "svg"
         raise DrawingError("is compressed with gzip", file=file, mend="unpack it first (gunzip)")
-    if data.startswith(_ZIP):
+    if data.startswith(ZIP_START):
         if _is_board_archive(data):
             return "board"
         complaint, mend = next(
@@ -165,6 +164,12 @@ def _by_text(data: bytes, suffix: str, file: str) -> str | None:
     if suffix in _FORMAT_BY_SUFFIX:
         return _FORMAT_BY_SUFFIX[suffix]
     return "points" if _looks_like_points(head) else None
+
+
+def is_npz(data: bytes) -> bool:
+    """True if the first member of this ZIP archive is an array of NumPy."""
+    length = int.from_bytes(data[26:28], "little")
+    return data.startswith(ZIP_START) and data[30 : 30 + length].endswith(b".npy")
 
 
 def is_step(head: str) -> bool:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, get_type_hints
 from msgspec import Struct
 
 from camtool.errors import OptionError
-from camtool.records import replace
+from camtool.records import FrozenRecord, replace
 from camtool.units import MM_PER_UNIT, parse_length
 
 if TYPE_CHECKING:
@@ -58,8 +58,8 @@ class Flag(Struct, frozen=True):
     for_pixels: bool = False
 
 
-@dataclass(frozen=True)
-class Selection:
+@dataclass(frozen=True, repr=False, eq=False)
+class Selection(FrozenRecord):
     """Patterns that select entities; an empty field selects all.
 
     `layers` and `exclude_layers`: patterns with `*`, `?` and `[…]`, in any case. `colours`:
@@ -82,8 +82,8 @@ class Selection:
     ] = ()
 
 
-@dataclass(frozen=True)
-class ReadOptions:
+@dataclass(frozen=True, repr=False, eq=False)
+class ReadOptions(FrozenRecord):
     """Options of reading; every field has a default that suits most files.
 
     `units`: the unit of the file's numbers, over what the file says (a name of

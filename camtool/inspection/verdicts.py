@@ -104,7 +104,7 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
 
 def _without_read(findings: Iterable[Finding], run: Run) -> list[Finding]:
     """Return the findings without those about drawing dimensions that are now inspected."""
-    from camtool.importers.dxf.dimensions import CALLOUTS
+    from camtool.importers.dxf.walk import CALLOUTS
 
     skipped = () if run.drawing is None else run.drawing.skipped
     read = [

@@ -16,6 +16,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from camtool.kernels.near import hilbert_places
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Indices = npt.NDArray[np.int32]
@@ -69,11 +71,7 @@ def move_tree(
 
 def hilbert_order(starts: Floats, ends: Floats) -> Ints:
     """(K,) rows as Hilbert's curve through their extents comes to the middles between `starts`
-    (K, 2) and `ends` (K, 2).
-
-    The quarters of a square come in the order (0, 0), (0, 1), (1, 1), (1, 0). In the first and the
-    last the curve is that of the whole with X and Y exchanged, in the last it is mirrored besides.
-    """
+    (K, 2) and `ends` (K, 2)."""
     order = hilbert_order_of(len(starts), lambda rows: 0.5 * (starts[rows] + ends[rows]))
     return order.astype(np.int64)
 
@@ -90,18 +88,5 @@ def hilbert_order_of(count: int, middles: Callable[[Ints], Floats]) -> Indices:
     size = max(float((high - low).max()), np.finfo(np.float64).tiny)
     place = np.empty(count, dtype=np.uint32)
     for lot in lots:
-        place[slice(*lot)] = _hilbert_places((middles(np.arange(*lot)) - low) / size)
+        place[slice(*lot)] = hilbert_places((middles(np.arange(*lot)) - low) / size, LEVELS)
     return np.argsort(place, kind="stable").astype(np.int32)
-
-
-def _hilbert_places(points: Floats) -> Ints:
-    """(K,) where Hilbert's curve comes to points (K, 2) in the square of size 1."""
-    x, y = np.minimum(points * 2.0**LEVELS, 2.0**LEVELS - 1.0).astype(np.int64).T
-    place = np.zeros(len(points), dtype=np.int64)
-    for level in reversed(range(LEVELS)):
-        right, above = (x >> level) & 1, (y >> level) & 1
-        place = 4 * place + (3 * right ^ above)
-        mirror = -(right & ~above & 1)
-        x, y = x ^ mirror, y ^ mirror
-        x, y = np.where(above == 1, x, y), np.where(above == 1, y, x)
-    return place

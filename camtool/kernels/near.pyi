@@ -1,5 +1,8 @@
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from camtool.arrays import Floats, Indices, Ints
 
 COLUMNS: int
@@ -29,3 +32,4 @@ def nearest(
 def pairs(
     moves: Moves, points: Floats, limits_mm: tuple[float, float]
 ) -> tuple[Ints, Ints, Floats]: ...
+def hilbert_places(points: Floats, levels: int) -> npt.NDArray[np.uint32]: ...

@@ -373,3 +373,29 @@ cdef void _list(
             if gap < math.INFINITY:
                 moves[index], distance[index] = candidates[n], gap
                 index += 1
+
+
+def hilbert_places(const double[:, :] points, Int levels) -> Indices:
+    """(K,) uint32: where Hilbert's curve comes to points (K, 2) in the square of size 1, whose
+    sides are halved `levels` times.
+
+    The quarters of a square come in the order (0, 0), (0, 1), (1, 1), (1, 0). In the first and the
+    last the curve is that of the whole with X and Y exchanged, in the last it is mirrored besides.
+    """
+    cdef Int k, level, x, y, right, above, place
+    cdef double size = 2.0**levels
+    places = np.empty(len(points), dtype=np.uint32)
+    cdef unsigned int[::1] out = places
+    for k in range(points.shape[0]):
+        x = <Int>math.fmin(points[k, 0] * size, size - 1.0)
+        y = <Int>math.fmin(points[k, 1] * size, size - 1.0)
+        place = 0
+        for level in range(levels - 1, -1, -1):
+            right, above = (x >> level) & 1, (y >> level) & 1
+            place = 4 * place + ((3 * right) ^ above)
+            if right and not above:
+                x, y = ~x, ~y
+            if not above:
+                x, y = y, x
+        out[k] = <unsigned int>place
+    return places

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from camtool.errors import OptionError
+from camtool.records import FrozenRecord
 
 MIN_PX, MAX_PX = 16, 20_000
 
@@ -24,8 +25,8 @@ MIN_TIMES, MAX_TIMES = 1.0, 1e6
 """Least and greatest factor of errors that are drawn larger."""
 
 
-@dataclass(frozen=True)
-class PictureOptions:
+@dataclass(frozen=True, repr=False, eq=False)
+class PictureOptions(FrozenRecord):
     """`view`: one of VIEWS, the plane picture of moves or a picture of the stock. `size_px` is
     the width, None: as usual. `crop_mm` (x, y, width, height): only this part of the plane,
     with more beside or above it where it is very long or very high. `dark`: on a dark ground.

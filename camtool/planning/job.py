@@ -17,7 +17,7 @@ from camtool.errors import OptionError
 from camtool.geometry.turn import UNTURNED, Box, Turn
 from camtool.patterns import guess, matches
 from camtool.planning.kinds import OperationKind, function_of, installed_kinds, kind_named
-from camtool.records import replace
+from camtool.records import FrozenRecord, replace
 
 SIDES = ("on", "outside", "inside", "auto")
 """Sides on which the tool of a profile or a chamfer runs: on the line, around it, within it, or as
@@ -263,8 +263,8 @@ def _refuse_beyond(key: str, lengths: tuple[float, float], min_mm: float, max_mm
             )
 
 
-@dataclass(frozen=True)
-class Tool:
+@dataclass(frozen=True, repr=False, eq=False)
+class Tool(FrozenRecord):
     """A tool; diameter 0 is a point that cuts no width. A V bit and a drill have a
     `tip_angle_rad`, the full angle of the cone, and a V bit may have a flat tip; a bull nose has
     a `corner_radius_mm`.
@@ -381,8 +381,8 @@ class Tool:
         return self.radius_mm / math.tan(0.5 * self.tip_angle_rad)
 
 
-@dataclass(frozen=True)
-class Entry:
+@dataclass(frozen=True, repr=False, eq=False)
+class Entry(FrozenRecord):
     """The way down of the tool; a ramp or helix slopes by `angle_rad`, a helix has `radius_mm`
     (None: as large as fits, half the tool's at most)."""
 
@@ -401,8 +401,8 @@ class Entry:
             )
 
 
-@dataclass(frozen=True)
-class Lead:
+@dataclass(frozen=True, repr=False, eq=False)
+class Lead(FrozenRecord):
     """The way to a contour or away from it: a line along its tangent of `length_mm`, or a quarter
     arc of that radius."""
 
@@ -414,8 +414,8 @@ class Lead:
         above_zero("lead length", self.length_mm, "mm")
 
 
-@dataclass(frozen=True)
-class Tabs:
+@dataclass(frozen=True, repr=False, eq=False)
+class Tabs(FrozenRecord):
     """Bridges that hold a part: so many (`count`), one each `spacing_mm`, or next to these places
     (x, y) mm of the work frame (`at_mm`); `width_mm` of
     material at the top of a tab, `height_mm` above the bottom of the cut; `ramped` or straight
@@ -447,8 +447,8 @@ class Tabs:
             )
 
 
-@dataclass(frozen=True)
-class Operation:
+@dataclass(frozen=True, repr=False, eq=False)
+class Operation(FrozenRecord):
     """A cut: the paths that it takes, its tool, depths, feeds and strategy.
 
     `layers`, `colours`: patterns of the paths that it takes, empty for all. `allowance_mm` is
@@ -904,8 +904,8 @@ def rested(operations: Sequence[Operation]) -> list[Operation]:
     return settled
 
 
-@dataclass(frozen=True)
-class Placement:
+@dataclass(frozen=True, repr=False, eq=False)
+class Placement(FrozenRecord):
     """The way of the drawing into the work frame, in this order: mirrored ("x" turns the sign of
     x, "y" of y), rotated, scaled by `scale` or to fit into `fit_mm` (width, height; 0: any),
     repeated `copies` (columns, rows) times at `pitch_mm`; then `origin` becomes part zero: one
@@ -962,8 +962,8 @@ class Placement:
             )
 
 
-@dataclass(frozen=True)
-class Stock:
+@dataclass(frozen=True, repr=False, eq=False)
+class Stock(FrozenRecord):
     """A block whose top is Z0: its thickness, and its lower-left corner and size in the work
     frame, mm (both None: as large as the job needs). Cuts may go `spoilboard_mm` below it, into
     what it lies on (None: up to THROUGH_MM, and no more than THROUGH_SHARE of its thickness)."""
@@ -1007,8 +1007,8 @@ class Stock:
         return min(THROUGH_MM, THROUGH_SHARE * self.thickness_mm)
 
 
-@dataclass(frozen=True)
-class KeepOutBox:
+@dataclass(frozen=True, repr=False, eq=False)
+class KeepOutBox(FrozenRecord):
     """A box of the work frame that no part of a tool may enter, as a clamp: from and to along each
     axis, mm; `name` as the job calls it."""
 
@@ -1032,8 +1032,8 @@ class KeepOutBox:
         return replace(self, x_mm=(left_x + x, right + x), y_mm=(low + y, high + y))
 
 
-@dataclass(frozen=True)
-class JobSetup:
+@dataclass(frozen=True, repr=False, eq=False)
+class JobSetup(FrozenRecord):
     """A clamping of the part: its name, and the names of the operations that are done in it.
 
     `flip`: the part lies turned over, about a line along "x" or "y" that is `line_mm` from zero
@@ -1086,8 +1086,8 @@ def _refuse_pins(setup: JobSetup, turn: Turn, where: str) -> None:
             )
 
 
-@dataclass(frozen=True)
-class Job:
+@dataclass(frozen=True, repr=False, eq=False)
+class Job(FrozenRecord):
     """A job: all that is to be cut of a drawing.
 
     `approach`: every cut starts after a move that takes up the backlash of both axes. `minimise`:

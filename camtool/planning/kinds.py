@@ -24,6 +24,7 @@ from msgspec import Struct
 from camtool.errors import CamtoolError, OptionError
 from camtool.keys import Key
 from camtool.plugins import EntryPoint, entry_points
+from camtool.records import FrozenRecord
 
 GROUP = "camtool.operations"
 
@@ -58,8 +59,8 @@ WALL_KEYS = (
 """Keys of operations that leave walls."""
 
 
-@dataclass(frozen=True)
-class OperationKind:
+@dataclass(frozen=True, repr=False, eq=False)
+class OperationKind(FrozenRecord):
     """A kind of operation, such as "pocket": its keys, what it takes, how it cuts, and its work.
 
     `name` is the value of the key `kind`; `keys` are the keys of jobs/keys.py that it knows, and

@@ -23,7 +23,6 @@ from camtool.geometry.drawing import Drawing, is_text
 from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
-from camtool.planning.air import air_after
 from camtool.planning.checks import checked
 from camtool.planning.contours import runs_of, with_starts
 from camtool.planning.drawn import drawn_of
@@ -243,6 +242,8 @@ def _step(
     chosen = choose(placed_drawing, setting.operation, sides)
     chosen = with_pins(chosen, placed_drawing, job, setting.operation)
     if setting.operation.engagement_rad is not None:
+        from camtool.planning.air import air_after
+
         chosen = replace(chosen, air=tuple(chain.from_iterable(map(air_after, before))))
     work: Work = function_of(setting.operation.contract.work)(chosen, setting)
     items, tab_findings = work.items, list[Finding]()

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.records import FrozenRecord
 
 
 class Ledger(Struct, frozen=True, eq=False):
@@ -105,8 +106,8 @@ NO_SAMPLES: Floats = np.empty((0, 3))
 # Options of a simulation: the interpolator, the effects of the mechanics, the size of chunks.
 
 
-@dataclass(frozen=True)
-class Effects:
+@dataclass(frozen=True, repr=False, eq=False)
+class Effects(FrozenRecord):
     """The effects of the mechanics, each of which can be left out to see its share of the error.
 
     `play`: backlash of the axes, also by region; `compensation` that the controller adds against
@@ -128,8 +129,8 @@ IDEAL = Effects(False, False, False, False, False)
 CHUNK_STEPS = 1 << 16
 
 
-@dataclass(frozen=True)
-class Options:
+@dataclass(frozen=True, repr=False, eq=False)
+class Options(FrozenRecord):
     """`interpolator` replaces the controller's own for arcs; only the `effects` act; a chunk has
     at most `chunk_steps` samples."""
 

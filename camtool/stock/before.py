@@ -8,6 +8,7 @@ top. Cuts of the other set-ups are those of their planned toolpaths, turned into
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -22,11 +23,13 @@ from camtool.machine.model import Machine
 from camtool.planning.job import Job
 from camtool.planning.naming import setup_name
 from camtool.records import replace
-from camtool.stock.heightmap import HeightMap, add_moves
 from camtool.stock.heights import TOP_MM, Bracket, greatest_value, stock_tree
 from camtool.stock.moves import StockMoves, stock_moves_of_toolpath
 from camtool.stock.slides import tools_of_rows
 from camtool.toolpath.moves import Toolpath
+
+if TYPE_CHECKING:
+    from camtool.stock.heightmap import HeightMap
 
 THROUGH_SLACK_MM = 1e-6
 """A cut that gets so near to the bottom of the stock goes through it."""
@@ -51,6 +54,8 @@ class SetupCut(Struct, frozen=True, eq=False):
     def heights_in(self, drawn: HeightMap) -> npt.NDArray[np.float32]:
         """Return the heights (NY, NX) mm that the cuts leave in the cells of a map, as they are
         seen from its own face."""
+        from camtool.stock.heightmap import add_moves
+
         start, end = map(self.turn.back.points, (self.moves.start, self.moves.end))
         cut = replace(drawn, heights=np.zeros_like(drawn.heights), owner=None)
         add_moves(cut, replace(self.moves, start=start, end=end))

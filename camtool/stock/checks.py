@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
@@ -54,11 +55,13 @@ from camtool.stock.findings import (
 )
 from camtool.stock.heights import greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
-from camtool.stock.pieces import BEFORE, LoosePiece, loose_pieces
 from camtool.stock.proofs import Gouges, JudgedStock, Leftovers, Trial
 from camtool.stock.wanted import CopperNets, WantedSolid, wanted_solid
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
+
+if TYPE_CHECKING:
+    from camtool.stock.pieces import LoosePiece
 
 ALONG_MM = 1.0
 """Along a cut the stock is looked at no farther apart than this, and at both ends."""
@@ -488,6 +491,8 @@ class _Checks:
         stock = self.request.stock
         if stock is None:
             return
+        from camtool.stock.pieces import BEFORE, loose_pieces
+
         result = loose_pieces(self.moves, stock.thickness_mm, stock.box_mm, self.before)
         every = result.pieces
         if result.narrowest_mm < result.seen_mm - POSITION_EPS_MM:

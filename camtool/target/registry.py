@@ -24,7 +24,7 @@ import msgspec
 from camtool.errors import CamtoolError, MachineError, OptionError, PostError, UnknownTargetError
 from camtool.machine.model import Grade, Machine, PathController, TargetNames
 from camtool.plugins import EntryPoint, entry_points
-from camtool.records import replace
+from camtool.records import FrozenRecord, replace
 from camtool.tables import Table, read_table
 from camtool.target.contract import Target
 from camtool.target.loader import (
@@ -67,8 +67,8 @@ def choices_of(record: type[msgspec.Struct]) -> Iterator[tuple[str, str]]:
         yield each.name, "|".join([default, *(value for value in values if value != default)])
 
 
-@dataclass(frozen=True)
-class LoadedTarget:
+@dataclass(frozen=True, repr=False, eq=False)
+class LoadedTarget(FrozenRecord):
     """A machine and its target. `file` is the target's own machine file, `table` its values with
     those of the user, `base` those without (None: they are all in `file`). `placeholders`: which
     numbers are examples of no particular machine, since the user has given no others."""
@@ -199,8 +199,8 @@ class LoadedTarget:
         ]
 
 
-@dataclass(frozen=True)
-class ListedTarget:
+@dataclass(frozen=True, repr=False, eq=False)
+class ListedTarget(FrozenRecord):
     """A target in a list. `needs` are the keys that the user's machine file must give before it
     can be loaded, such as "axes.x.coded_step_mm"; () when it is complete. `files_below`: those
     that its file extends, the lowest first. `grade`: what its model knows."""

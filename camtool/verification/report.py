@@ -26,7 +26,7 @@ from msgspec.structs import asdict
 from camtool.findings import Finding, FindingReport
 from camtool.plain import one_line, to_json
 from camtool.planning.naming import range_words
-from camtool.records import replace
+from camtool.records import FrozenRecord, replace
 from camtool.toolpath.findings import ProgramCode
 from camtool.units import UM_PER_MM, clock
 from camtool.verification.findings import (
@@ -575,8 +575,8 @@ def rounded(value: float) -> float:
 # Limits of a pipeline: exceeding one is a finding, and exit code 1.
 
 
-@dataclass(frozen=True)
-class Gates:
+@dataclass(frozen=True, repr=False, eq=False)
+class Gates(FrozenRecord):
     """The largest allowed total error (mm), number of reversals of X and Y while cutting, time
     (s), gouge and leftover of the stock (mm), and engagement of tools (rad); None: no limit."""
 

@@ -32,7 +32,6 @@ from camtool.units import UM_PER_MM
 from camtool.verification import report as record
 from camtool.verification.case import SAMPLE_MM, TRACE_POINTS, Case, VerifyOptions
 from camtool.verification.circles import NO_FIGURES, full_circles
-from camtool.verification.conformance import conformance_of
 from camtool.verification.coverage import Coverage, Side, cover, direction_findings
 from camtool.verification.cuts import CutMoves, is_flat, loops, row_lengths
 from camtool.verification.dimensions import (
@@ -229,6 +228,7 @@ def _direction_findings(
 def _conformance(case: Case, *, flat_cuts: bool) -> Conformance | None:
     if case.asked is None:
         return None
+    from camtool.verification.conformance import conformance_of
 
     return conformance_of(case.decoded, case.asked, flat_cuts=flat_cuts, sample_mm=SAMPLE_MM)
 

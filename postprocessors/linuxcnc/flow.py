@@ -11,7 +11,6 @@ What is executed is bounded: `MAX_CALL_LEVELS` calls within calls, and `most_lin
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from msgspec import Struct
@@ -90,40 +89,41 @@ class _Word(Struct):
     words: ParsedLine | None = None
 
 
-@dataclass
 class Flow:
     """The reading of one program. `restore` brings back modes that a call has saved."""
 
-    text: ProgramText
-    given: Parameters
-    folder: Folder
-    most_lines: int
-    block_delete: bool
-    restore: Callable[[Any], None] = lambda saved: None
-    at: int = 0
-    lines_read: int = 0
-    percent: bool = False
-    calls: list[Call] = field(default_factory=lambda: [Call()])
-    returned: float | None = None
-    current: ParsedLine | None = None
-    """The line that was read last, at `here`."""
-    here: TextPosition = field(init=False)
-    deleted: dict[int, None] = field(default_factory=dict)
-    """Lines of the program that begin with /, counted from 1."""
-    branches: bool = False
-    """True if there has been an O word."""
-    keep: bool = True
-    """True if lines may be read again."""
-    _labels: dict[str, FlowLabel] = field(default_factory=dict)
-    _seeking: str | None = None
-    _seeking_sub: str | None = None
-    _defining: str | None = None
-    _executed_if: bool = False
-    _breaking: bool = False
-    _continuing: bool = False
-
-    def __post_init__(self) -> None:
-        self.here = TextPosition(self.text, 0)
+    def __init__(
+        self,
+        text: ProgramText,
+        parameters: Parameters,
+        folder: Folder,
+        most_lines: int,
+        block_delete: bool,
+        restore: Callable[[Any], None] = lambda saved: None,
+    ) -> None:
+        self.text, self.given, self.folder = text, parameters, folder
+        self.most_lines, self.block_delete, self.restore = most_lines, block_delete, restore
+        self.at = 0
+        self.lines_read = 0
+        self.percent = False
+        self.calls = [Call()]
+        self.returned: float | None = None
+        self.current: ParsedLine | None = None
+        """The line that was read last, at `here`."""
+        self.here = TextPosition(text, 0)
+        self.deleted: dict[int, None] = {}
+        """Lines of the program that begin with /, counted from 1."""
+        self.branches = False
+        """True if there has been an O word."""
+        self.keep = True
+        """True if lines may be read again."""
+        self._labels: dict[str, FlowLabel] = {}
+        self._seeking: str | None = None
+        self._seeking_sub: str | None = None
+        self._defining: str | None = None
+        self._executed_if = False
+        self._breaking = False
+        self._continuing = False
         self.given.show(
             {
                 "_value": lambda: self.returned or 0.0,

@@ -40,7 +40,7 @@ ALLOWED = {
     "errors": {"plain"},
     "bounds": {"errors"},
     "units": {"errors"},
-    "findings": {"plain"},
+    "findings": {"plain", "records"},
     "keys": {"errors", "patterns", "units"},
     "arrays": set(),
     "lock": set(),

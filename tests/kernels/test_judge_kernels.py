@@ -23,6 +23,8 @@ from camtool.kernels.judging import (
     unwritten,
 )
 from camtool.kernels.move_tree import FIRST, LAST, LEAF, hilbert_order, move_tree
+from camtool.kernels.near import hilbert_places
+from tests.oracles import hilbert as oracle
 from tests.oracles.kernel_doors import (
     fill_bins_,
     nearest_errors_,
@@ -266,6 +268,14 @@ def test_the_curve_fills_a_square_by_steps_of_one() -> None:
     square = rng.permutation(np.argwhere(np.ones((16, 16))).astype(np.float64))
     along = square[hilbert_order(square, square)]
     assert np.abs(np.diff(along, axis=0)).sum(axis=1).tolist() == [1.0] * 255
+
+
+@pytest.mark.parametrize("levels", [1, 2, 7, 16])
+def test_the_curve_is_that_of_its_quarters(levels: int) -> None:
+    points = np.random.default_rng(levels).uniform(0.0, 1.0, (500, 2))
+    points[:4] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
+    expected = oracle.hilbert_places(points, levels)
+    assert hilbert_places(points, levels).tolist() == expected.tolist()
 
 
 @pytest.mark.parametrize("together", [False, True])

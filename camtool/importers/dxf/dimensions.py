@@ -25,9 +25,6 @@ from camtool.importers.dxf.load import printable
 from camtool.importers.dxf.shapes import WorldMap, require
 from camtool.importers.pieces import Unusable
 
-CALLOUTS = frozenset(("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION"))
-"""Kinds of entities that measure something."""
-
 SCALE_SHARE = 1e-3
 """DIMLFAC is often rounded: units that differ by less than this share are one."""
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
 
@@ -20,7 +19,6 @@ from camtool.arrays import Floats
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Callout, Mark
 from camtool.importers.dxf.bulk import BulkLines
-from camtool.importers.dxf.dimensions import CALLOUTS, callout
 from camtool.importers.dxf.load import Loaded, printable
 from camtool.importers.dxf.shapes import (
     DxfShape,
@@ -49,6 +47,9 @@ MAX_NESTING = 50
 _NOWHERE = Piece(np.zeros((0, 3)), False, "", "", "")
 _NO_LINES = BulkLines([], np.zeros((0, 2, 3)))
 
+CALLOUTS = frozenset(("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION"))
+"""Kinds of entities that measure something."""
+
 
 class DxfScope(Struct, frozen=True, eq=False):
     """The context of entities in a space or inside an INSERT: the map to mm, the `look` of the
@@ -62,23 +63,19 @@ class DxfScope(Struct, frozen=True, eq=False):
     source: str = ""
 
 
-@dataclass(eq=False)
 class DxfWalk:
     """Visits entities and collects what they give."""
 
-    loaded: Loaded
-    file: str
-    options: ReadOptions
-    pieces: list[Piece] = field(default_factory=list)
-    marks: list[Mark] = field(default_factory=list)
-    callouts: list[Callout] = field(default_factory=list)
-    unread: Counter[tuple[str, str]] = field(default_factory=Counter)
-    used: Counter[str] = field(default_factory=Counter)
-    skipped: Counter[tuple[str, str]] = field(default_factory=Counter)
-    lacking: Counter[tuple[str, str]] = field(default_factory=Counter)
-    fonts: Counter[str] = field(default_factory=Counter)
-
-    def __post_init__(self) -> None:
+    def __init__(self, loaded: Loaded, file: str, options: ReadOptions) -> None:
+        self.loaded, self.file, self.options = loaded, file, options
+        self.pieces: list[Piece] = []
+        self.marks: list[Mark] = []
+        self.callouts: list[Callout] = []
+        self.unread: Counter[tuple[str, str]] = Counter()
+        self.used: Counter[str] = Counter()
+        self.skipped: Counter[tuple[str, str]] = Counter()
+        self.lacking: Counter[tuple[str, str]] = Counter()
+        self.fonts: Counter[str] = Counter()
         self._inserted = 0
         self._visited = 0
         self._mm_per_unit = 1.0
@@ -244,6 +241,8 @@ class DxfWalk:
 
     def _callout(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
         """Read the dimension with its limits, whether its lines are drawn or not."""
+        from camtool.importers.dxf.dimensions import callout
+
         source, paper = _source(entity, scope), self.options.layout is not None
         unit_mm = self._mm_per_unit
         try:

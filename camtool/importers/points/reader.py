@@ -19,12 +19,11 @@ from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.fit import split_bulges
 from camtool.importers.assemble import assemble, unit_or_mm
+from camtool.importers.formats import NPY_START, ZIP_START
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import MAX_POINTS, Piece, too_many_points
 from camtool.importers.points.matlab import is_matlab, parse_matlab
 from camtool.importers.points.tables import (
-    NPY_START,
-    ZIP_START,
     PointTable,
     Stroke,
     parse_json,

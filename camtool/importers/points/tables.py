@@ -431,8 +431,6 @@ class _Walker:
 # An .npz is a ZIP: what it says of its own size is not believed, no more than MAX_UNPACKED_BYTES
 # are unpacked, and no memory is taken for numbers that are not there.
 
-NPY_START = b"\x93NUMPY"
-ZIP_START = b"PK\x03\x04"
 
 MAX_UNPACKED_BYTES = 1 << 28
 
@@ -479,12 +477,6 @@ def parse_npz(data: bytes, file: str) -> PointTable:
             raise
         raise _broken(file, error) from error
     return PointTable(strokes)
-
-
-def is_npz(data: bytes) -> bool:
-    """True if the first member of this ZIP archive is an array of NumPy."""
-    length = int.from_bytes(data[26:28], "little")
-    return data.startswith(ZIP_START) and data[30 : 30 + length].endswith(b".npy")
 
 
 def _broken(file: str, error: Exception) -> DrawingError:

@@ -28,7 +28,6 @@ from camtool.geometry.polylines import (
     reverse_lines,
 )
 from camtool.operations.engrave.work import run_together
-from camtool.operations.profile.slots import SlotWall, slot_items, without_feet
 from camtool.planning.findings import (
     CONTOUR_TOO_SMALL,
     CONTOUR_TOO_SMALL_ROUND,
@@ -100,11 +99,15 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
     if operation.corners != "none":
         lines.lines = [_relieved(line, chosen, setting, lines.findings) for line in lines.lines]
     if operation.makes_slots and operation.stage == "finish":
+        from camtool.operations.profile.slots import without_feet
+
         tool_mm = operation.tool.radius_mm
         lines.lines = [
             replace(line, path=without_feet(line.path, tool_mm)) for line in lines.lines
         ]
     elif operation.makes_slots:
+        from camtool.operations.profile.slots import SlotWall, slot_items
+
         walls = [SlotWall(line.path, line.sources[0]) for line in lines.lines]
         return Work(slot_items(walls, opens, chosen, setting), tuple(lines.findings))
     names, sources = [chosen.names[k] for k in opens], chosen.source[opens].tolist()
