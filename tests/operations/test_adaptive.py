@@ -19,6 +19,7 @@ from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
 from camtool.planning.strategies import engagement
 from camtool.progress import Progress
+from tests.operations.adaptive_programs import posted
 from tests.oracles.contours import CIRCLE, SQUARE, closed
 from tests.oracles.engaged import chords_of, greatest_engagement
 from tests.oracles.swept import complaints
@@ -28,6 +29,7 @@ from tests.strategies import examples
 
 PLATE = [SQUARE, moved(scaled(CIRCLE, 0.1), 3.0, 3.0), moved(scaled(SQUARE, 0.1), 6.0, 5.0)]
 QUICK = {"square": [SQUARE], "plate": PLATE, "star": SHAPES["star"]}
+HELIX = Entry("helix", angle_rad=math.radians(5.0))
 SHARE = 3e-3
 """This part of the area may be left in sharp corners."""
 
@@ -134,6 +136,17 @@ def test_slots_in_which_no_limit_holds_are_named(wide_mm: float) -> None:
     assert "X" in finding.where
     assert "no limit" in finding.message
     assert work.items
+
+
+def test_the_scallop_of_corners_is_named_and_nothing_else_is_left(tmp_path: Path) -> None:
+    """Discs of 2.16 % of the tool's radius leave √2 − 1 of that in a square corner, 27 µm here."""
+    run = posted([scaled(SQUARE, 1.4)], 6.0, math.radians(60.0), "grbl", tmp_path)
+    assert "MATERIAL_LEFT" not in {each.code.name for each in run.findings}
+    (scallop,) = (each for each in run.findings if "scallop" in each.message)
+    assert scallop.measured == pytest.approx((math.sqrt(2.0) - 1.0) * 0.0216 * 3.0)
+    assert "4 inner corners" in scallop.message
+    round_pocket = work_of([CIRCLE], 3.0, own=(("strategy", "adaptive"),), entry=HELIX)
+    assert not any("scallop" in each.message for each in round_pocket.findings)
 
 
 def test_conventional_is_the_mirror_image_of_climb() -> None:
