@@ -31,6 +31,7 @@ from camtool.geometry.boxes import BoxIndex, distances_from, moves_of
 from camtool.geometry.measure import chords_of, segment_boxes, signed_areas
 from camtool.geometry.offset import swept_outline
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, without_repeats
+from camtool.kernels.near import Moves
 from camtool.machine.model import Machine
 from camtool.planning.job import Tool
 from camtool.simulation.mechanics import Mechanics
@@ -43,6 +44,9 @@ from camtool.verification.case import VerifyOptions
 from camtool.verification.cuts import CutMoves, row_lengths
 from camtool.verification.findings import OVERCUT
 from camtool.verification.slides import SlideTrace
+
+POLYGON = 3
+"""The type of polygons in shapely; what two regions leave may have lines and points too."""
 
 SHAPE_TOLERANCE_MM = 5e-4
 """The tolerance of chords, at most ..."""
@@ -253,18 +257,42 @@ def _area_outside(
     rings = shapely.get_rings(shapely.get_parts(other))
     if not len(rings):
         return float(rest.area), math.inf, nowhere
-    # A strip may be deeper between its corners than at them.
-    dense = shapely.segmentize(rest, max(rest.length / MAX_DEPTH_POINTS, DEPTH_SPACING_MM))
-    places = shapely.get_coordinates(dense)
     points, ring = shapely.get_coordinates(rings, return_index=True)
     starts = np.flatnonzero(ring[1:] == ring[:-1])
     edges = Segments.between(points[starts], points[starts + 1], np.zeros(len(starts)))
-    distance = distances_from(places, moves_of(edges))
-    depth = float(distance.max())
+    spacing_mm = max(rest.length / MAX_DEPTH_POINTS, DEPTH_SPACING_MM)
+    depth, at_mm = _deepest(rest, moves_of(edges), spacing_mm)
     if depth <= 2.0 * tolerance:
         return 0.0, 0.0, nowhere
+    return float(rest.area), depth, at_mm
+
+
+def _deepest(region: Any, edges: Moves, spacing_mm: float) -> tuple[float, tuple[float, float]]:
+    """Return the greatest distance from the edges (mm) of the points of a boundary, no more than
+    `spacing_mm` apart, and its place.
+
+    A strip may be deeper between its corners than at them. On a line between two corners no point
+    is farther than half the sum of both distances and of its length, so most lines need no points.
+    """
+    import shapely
+
+    parts = shapely.get_parts(region)
+    rings = [shapely.get_rings(parts), parts[shapely.get_type_id(parts) != POLYGON]]
+    corners, ring = shapely.get_coordinates(np.concatenate(rings), return_index=True)
+    distance = distances_from(corners, edges)
+    deepest = int(distance.argmax())
+    starts = np.flatnonzero(ring[1:] == ring[:-1])
+    lines = np.stack([corners[starts], corners[starts + 1]], axis=1)
+    length = np.hypot(*(lines[:, 1] - lines[:, 0]).T)
+    bound = 0.5 * (distance[starts] + distance[starts + 1] + length)
+    is_asked = (length > spacing_mm) & (bound > distance[deepest])
+    places = shapely.get_coordinates(
+        shapely.segmentize(shapely.linestrings(lines[is_asked]), spacing_mm)
+    )
+    places = np.concatenate([corners[deepest][None], places])
+    distance = np.append(distance[deepest], distances_from(places[1:], edges))
     x, y = places[int(distance.argmax())].tolist()
-    return float(rest.area), depth, (x, y)
+    return float(distance.max()), (x, y)
 
 
 class _Lines(Struct, frozen=True, eq=False):
@@ -437,7 +465,10 @@ def _swept_by_runs(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> Any
         np.concatenate(solid), indices=np.repeat(np.arange(len(count)), count)
     )
     flat, line = shapely.get_coordinates(
-        shapely.simplify(lines, 0.5 * cutter.tolerance_mm), include_z=True, return_index=True
+        # Lines may cross themselves, before and after: the outline takes them as they are.
+        shapely.simplify(lines, 0.5 * cutter.tolerance_mm, preserve_topology=False),
+        include_z=True,
+        return_index=True,
     )
     if cutter.nose is not None:
         return _swept_hulls(_Lines(flat[:, :2], flat[:, 2], line), cutter)
