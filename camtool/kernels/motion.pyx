@@ -1,8 +1,11 @@
-"""Legs of whole steps, and the speeds at which a planner enters its blocks.
+"""Legs of whole steps, samples along lines and arcs, and the speeds at which a planner enters its
+blocks.
 """
 
 from __future__ import annotations
 
+from libc.math cimport cos, fabs, sin
+from libc.stdint cimport int32_t
 from camtool.kernels.types cimport Int
 
 from camtool.arrays import Floats, Ints
@@ -44,6 +47,81 @@ cpdef void legs_fill(
         filled += run
         leg += 1
         done = 0
+
+
+# Samples along the rows of a toolpath.
+#
+# A sample stands at a share of the length of its row, along a line or an arc whose radius and
+# height change evenly (a spiral, a helix); at the share 1 it is the end itself. Compiled, because
+# each of a million samples would be written and read in ten columns of its own.
+
+cpdef enum:
+    # Columns of an arc: its centre, the radius at its start and how much that grows, the angle at
+    # its start, the sweep, its first height and how much that rises.
+    CENTRE_X = 0, CENTRE_Y = 1, RADIUS = 2, GROWTH = 3, ANGLE = 4, SWEEP = 5, Z = 6, RISE = 7
+    ARM_COLUMNS = 8
+
+
+cdef class Ways:
+    """The ways of N rows: the `start` (3,) mm of the first and the `end` (N, 3) of each; the `arms`
+    (A, 8) of arcs, and which of them each row has, `arm` (N,), −1 for lines."""
+
+    def __init__(
+        self,
+        const double[::1] start,
+        const double[:, ::1] end,
+        const int32_t[::1] arm,
+        const double[:, ::1] arms,
+    ) -> None:
+        self.start, self.end, self.arm, self.arms = start, end, arm, arms
+
+    cdef void put(self, Int row, double share, double *point) noexcept:
+        """Put the point (3,) mm at a share of the length of a row."""
+        cdef Int arm = self.arm[row]
+        cdef Int axis
+        cdef double angle, radius, begin
+        if share == 1.0:
+            for axis in range(3):
+                point[axis] = self.end[row, axis]
+        elif arm >= 0:
+            angle = self.arms[arm, ANGLE] + share * self.arms[arm, SWEEP]
+            radius = self.arms[arm, RADIUS] + share * self.arms[arm, GROWTH]
+            point[0] = self.arms[arm, CENTRE_X] + radius * cos(angle)
+            point[1] = self.arms[arm, CENTRE_Y] + radius * sin(angle)
+            point[2] = self.arms[arm, Z] + share * self.arms[arm, RISE]
+        else:
+            for axis in range(3):
+                begin = self.end[row - 1, axis] if row else self.start[axis]
+                point[axis] = begin + share * (self.end[row, axis] - begin)
+
+    def fill(
+        self, const Int[::1] row, const double[::1] share, double[:, ::1] points
+    ) -> None:
+        """Write the points (K, 3) mm at shares (K,) of the lengths of rows (K,)."""
+        cdef Int k
+        for k in range(len(row)):
+            self.put(row[k], share[k], &points[k, 0])
+
+
+cpdef void count_steps(
+    const double[:, ::1] points, double[::1] step_mm, double guard, Int[:, ::1] counts
+) noexcept:
+    """Write how many steps each axis has made at each of K points (K, 3) mm since the first one,
+    `counts` (K, 3), where it stands at its nearest step (`camtool.kernels.lattice.to_steps`, with
+    its `guard`)."""
+    cdef Int k, axis, steps, before, total
+    cdef double quotient
+    for axis in range(3):
+        before, total = 0, 0
+        for k in range(len(points)):
+            quotient = points[k, axis] / step_mm[axis]
+            steps = <Int>(fabs(quotient) + (0.5 + guard))
+            if quotient < 0.0:
+                steps = -steps
+            if k:
+                total += abs(steps - before)
+            before = steps
+            counts[k, axis] = total
 
 
 # How fast a planner that sees only so many blocks ahead enters each of them.

@@ -18,13 +18,15 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.kernels.lattice import to_steps
+from camtool.kernels import motion as at
+from camtool.kernels.lattice import HALF_STEP_GUARD
+from camtool.kernels.motion import Ways, count_steps
 from camtool.machine.model import ControllerT, DialectT, Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, still_ledger
 from camtool.simulation.timing import TimedChunk
-from camtool.toolpath.moves import PolarArcs, Toolpath, are_arcs
+from camtool.toolpath.moves import PolarArcs, Toolpath
 
 MAX_SAMPLES = 1_000_000
 """Samples are a coded step apart, or farther where a program would have more samples than this."""
@@ -236,10 +238,10 @@ class PathSamples:
     def __init__(self, toolpath: Toolpath, spacing_mm: float) -> None:
         """Divide all rows into pieces, sampled no farther apart than `spacing_mm` along the
         path."""
-        self._toolpath = toolpath
-        self._arms = PolarArcs(toolpath, toolpath.is_arc)
+        arms = PolarArcs(toolpath, toolpath.is_arc)
+        self._ways = ways_of(toolpath, arms)
         length = move_lengths(toolpath)
-        self._pieces = _pieces_of_rows(length, self._arms)
+        self._pieces = _pieces_of_rows(length, arms)
         pieces = self._pieces
         of_piece = length[pieces.row] * (pieces.end - pieces.begin)
         self._parts = np.maximum(np.ceil(of_piece / spacing_mm - SPACING_EPS), 1.0).astype(
@@ -277,15 +279,21 @@ class PathSamples:
 
     def points(self, row: Ints, share: Floats) -> Floats:
         """Return (K, 3) mm: the points at shares (K,) of the lengths of rows (K,)."""
-        starts, ends = self._toolpath.starts_of(row), self._toolpath.end.take(row, axis=0)
-        points = starts + share[:, None] * (ends - starts)
-        kind = self._toolpath.kind[row]
-        on_arc = np.flatnonzero(are_arcs(kind))
-        arm = np.searchsorted(self._arms.row, row[on_arc])
-        points[on_arc] = self._arms.points(arm, share[on_arc])
-        last = np.flatnonzero(share == 1.0)
-        points[last] = ends.take(last, axis=0)
+        points = np.empty((len(row), 3))
+        self._ways.fill(row, share, points)
         return points
+
+
+def ways_of(toolpath: Toolpath, arms: PolarArcs) -> Ways:
+    """Return the ways of all rows of a toolpath, with its arcs."""
+    table = np.empty((len(arms.row), at.ARM_COLUMNS))
+    table[:, [at.CENTRE_X, at.CENTRE_Y]] = arms.centre
+    table[:, at.RADIUS], table[:, at.GROWTH] = arms.radius, arms.end_radius - arms.radius
+    table[:, at.ANGLE], table[:, at.SWEEP] = arms.angle, arms.sweep
+    table[:, at.Z], table[:, at.RISE] = arms.begin[:, 2], arms.end[:, 2] - arms.begin[:, 2]
+    arm = np.full(len(toolpath), -1, dtype=np.int32)
+    arm[arms.row] = np.arange(len(arms.row))
+    return Ways(toolpath.start, np.ascontiguousarray(toolpath.end), arm, table)
 
 
 class CountedSamples(PathSamples):
@@ -293,7 +301,7 @@ class CountedSamples(PathSamples):
 
     def __init__(self, toolpath: Toolpath, machine: Machine, spacing_mm: float) -> None:
         super().__init__(toolpath, spacing_mm)
-        self._step_mm = [axis.coded_step_mm for axis in machine.axes]
+        self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
         self._start = toolpath.start[None, :]
         self._counts = np.zeros((1, 3), dtype=np.int64)
         self._low = 0
@@ -301,23 +309,14 @@ class CountedSamples(PathSamples):
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
         """Return row and position of the samples low:high."""
         row, points = super().window(max(low - 1, 0), high)
-        if low == 0:
-            steps = self._in_steps(np.concatenate([self._start, points]))
-        else:
-            steps = self._in_steps(points)
-            row, points = row[1:], points[1:]
-        self._low = low
-        self._counts = np.zeros((len(steps), 3), dtype=np.int64)
-        np.cumsum(np.abs(np.diff(steps, axis=0)), axis=0, out=self._counts[1:])
-        return row, points
+        every = np.concatenate([self._start, points]) if low == 0 else points
+        self._low, self._counts = low, np.empty(every.shape, dtype=np.int64)
+        count_steps(every, self._step_mm, HALF_STEP_GUARD, self._counts)
+        return (row, points) if low == 0 else (row[1:], points[1:])
 
     def steps(self, bounds: Ints) -> Ints:
         """Return steps of each axis between samples of the window."""
         return np.diff(self._counts[bounds - self._low], axis=0)
-
-    def _in_steps(self, points: Floats) -> Ints:
-        columns = [to_steps(points[:, axis], step) for axis, step in enumerate(self._step_mm)]
-        return np.column_stack(columns)
 
 
 def _pieces_of_rows(length: Floats, arms: PolarArcs) -> _Pieces:

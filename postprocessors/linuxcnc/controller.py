@@ -57,8 +57,9 @@ from camtool.toolpath.moves import (
     read_only,
 )
 
+from . import steps as at
 from .dialect import LinuxcncController, LinuxcncDialect
-from .steps import MAX_CHAIN_POINTS, merge_lines
+from .steps import MAX_CHAIN_POINTS, Blends, merge_lines
 
 _Machine = Machine[LinuxcncController, LinuxcncDialect]
 
@@ -274,24 +275,21 @@ class LinuxcncSamples(CountedSamples):
         self._origin, self._profile = window_plan.origin, profile
         halves = np.searchsorted(self._origin, np.arange(int(self._origin[-1]) + 2))
         self.first = self.first[halves]
-        self._tangents = window_plan.tangents
-        self._row_of, self._row = moves.row_of, moves.row
-        self._reach, self._reach_on = (
-            np.append(corners.reach, 0.0),
-            np.append(corners.reach_on, 0.0),
-        )
-        self._shape = corners.shape
-        self._before = np.append(corners.before, 0.0)
-        self._behind = np.append(corners.after, 0.0)
-        self._ramp = np.append(corners.ramp, 1.0)
-        self._turn = _turn_of(self._before, self._behind, self._ramp)
-        self._blends = bool(corners.reach.any() or corners.before.any())
-        self._length = moves.length
+        self._row = moves.row
         self._row_length = move_lengths(path)
         lengths = np.where(moves.row_of >= 0, self._row_length, 0.0)
         self._by_rows = np.cumsum(np.append(passed_mm[0], lengths))
         self._by_moves = np.cumsum(np.append(passed_mm[1], moves.length))
         self._into = self._by_rows[1:] - lengths - self._by_moves[np.maximum(moves.row_of, 0)]
+        self._blends = None
+        if corners.reach.any() or corners.before.any():
+            tangent = window_plan.tangents.at_starts(moves.row)
+            self._blends = Blends(
+                self._ways,
+                _corner_columns(corners),
+                (moves.length, tangent, moves.row),
+                (moves.row_of, self._into, self._row_length),
+            )
 
     def passed_mm(self, move: int) -> tuple[float, float]:
         """The lengths of all rows, and of all moves, before a move."""
@@ -312,71 +310,27 @@ class LinuxcncSamples(CountedSamples):
     def points(self, row: Ints, share: Floats) -> Floats:
         """(K, 3) mm: the points at shares (K,) of the ways of rows (K,), blended."""
         points = super().points(row, share)
-        self._blend(points, row, share)
+        if self._blends is not None:
+            self._blends.put(row, share, points)
         return points
 
-    def _blend(self, points: Floats, row: Ints, share: Floats) -> None:
-        """Put points (K, 3) near blended corners on the blends. Their first half stands for the
-        end of the move before, their second half for the start of the move behind."""
-        if not self._blends:
-            return
-        move = self._row_of[row]
-        along = self._into[row] + share * self._row_length[row]
-        leftover = np.maximum(self._length[move] - along, 0.0)
-        ends = np.flatnonzero(leftover < self._reach[move + 1])
-        begins = np.flatnonzero(along < self._reach_on[move])
-        corner = move[ends] + 1
-        self._on_blends(points, ends, corner, 0.5 - 0.5 * leftover[ends] / self._reach[corner])
-        corner = move[begins]
-        self._on_blends(points, begins, corner, 0.5 + 0.5 * along[begins] / self._reach_on[corner])
-        ends = np.flatnonzero(leftover < self._before[move + 1])
-        begins = np.flatnonzero(along < self._behind[move])
-        corner = move[ends] + 1
-        turn = self._turn[corner]
-        self._put_overlaps(
-            points, ends, corner, turn * (1.0 - leftover[ends] / self._before[corner])
-        )
-        corner = move[begins]
-        turn = self._turn[corner]
-        later = (1.0 - turn) * along[begins] / self._behind[corner]
-        self._put_overlaps(points, begins, corner, turn + later)
 
-    def _put_overlaps(self, points: Floats, rows: Ints, corner: Ints, x: Floats) -> None:
-        """Put points (K, 3) where moves overlap: while the first slows down evenly over its last
-        `before` mm, the second speeds up in the first part `ramp` of that time, and goes on, over
-        its first `behind` mm. At the part x of the time the tool is where both are, one on top of
-        the other; what is before `_turn_of` stands for the end of the first move, the rest for the
-        start of the second."""
-        first = corner - 1
-        covered = _covered_share(x, self._ramp[corner])
-        slowing = self._length[first] - (1.0 - x) ** 2 * self._before[corner]
-        points[rows] = self._unblended_points(first, slowing)
-        points[rows] += self._unblended_points(
-            corner, covered * self._behind[corner]
-        ) - self._unblended_points(corner, 0.0 * x)
-
-    def _unblended_points(self, move: Ints, along: Floats) -> Floats:
-        """Return the points (K, 3) mm at these arc lengths (K,) along moves (K,), corners not
-        blended."""
-        row = self._row[move]
-        arc = self._tangents.path.is_arc[row]
-        points = np.empty((len(row), 3))
-        points[arc] = super().points(row[arc], along[arc] / self._length[move[arc]])
-        row, straight = row[~arc], along[~arc, None]
-        points[~arc] = self._tangents.path.starts_of(row) + straight * self._tangents.at_starts(
-            row
-        )
-        return points
-
-    def _on_blends(self, points: Floats, rows: Ints, corner: Ints, share: Floats) -> None:
-        """Put points at shares (K,) of the ways of blends: both spokes, turned into each other."""
-        centre, first, last = self._shape[:, corner]
-        angle = _angle_between(first, last)
-        turn = share * angle
-        full_sine = np.sin(angle)
-        points[rows] = centre
-        points[rows] += (np.sin(angle - turn) / full_sine)[:, None] * first
-        points[rows] += (np.sin(turn) / full_sine)[:, None] * last
+def _corner_columns(corners: PlannerCorners) -> Floats:
+    """Return the corners as columns of the compiled blends, and one behind the last move."""
+    count = len(corners.reach)
+    table = np.zeros((count + 1, at.CORNER_COLUMNS))
+    table[:, at.RAMP] = np.append(corners.ramp, 1.0)
+    columns = (at.REACH, at.REACH_ON, at.BEFORE, at.BEHIND)
+    values = (corners.reach, corners.reach_on, corners.before, corners.after)
+    for column, value in zip(columns, values, strict=True):
+        table[:count, column] = value
+    table[:, at.TURN] = _turn_of(table[:, at.BEFORE], table[:, at.BEHIND], table[:, at.RAMP])
+    centre, first, last = corners.shape
+    angle = _angle_between(first, last)
+    table[:count, at.ANGLE], table[:count, at.SINE] = angle, np.sin(angle)
+    for column, vectors in ((at.CENTRE, centre), (at.FIRST, first), (at.LAST, last)):
+        table[:count, column : column + 3] = vectors
+    return table
 
 
 def _speeds(

@@ -1,4 +1,5 @@
-"""Lines that lie on one line but for a tolerance, merged: LinuxCNC's naive cam detector.
+"""LinuxCNC's naive cam detector, which merges lines that lie on one line but for a tolerance; and
+samples on the blends of corners.
 
 Points wait in a chain that begins at `base`. A new end joins it when every waiting point lies
 within the tolerance of the line from the base to the new end (as a line of that length);
@@ -11,7 +12,9 @@ Compiled, because what joins depends on all that joined before.
 
 from __future__ import annotations
 
+from libc.math cimport sin
 from libc.stdint cimport uint8_t
+from camtool.kernels.motion cimport Ways
 from camtool.kernels.types cimport Int
 
 from camtool.arrays import Bools, Floats, Ints
@@ -85,3 +88,110 @@ cpdef void merge_lines(
                     travel = points[k + 1, axis] - points[base, axis]
                     moved[j, axis] = points[base, axis] + reached * travel
             base = k + 1
+
+
+# Samples near blended corners.
+#
+# Each sample is some way along its move, and what is left of the move lies before the next corner.
+# The first half of a blend stands for the end of the move before its corner, the second half for
+# the start of the move behind it. An arc blend turns the spoke to its start into the spoke to its
+# end; where moves overlap, the tool is where both are, one on top of the other.
+
+cpdef enum:
+    # Columns of a corner: how far it reaches into the move before and the move behind it; how far
+    # an overlap does, `ramp` and the part of its time at which one move ends and the other begins;
+    # of an arc blend its angle and the sine of that, centre and both spokes.
+    REACH = 0, REACH_ON = 1, BEFORE = 2, BEHIND = 3, RAMP = 4, TURN = 5, ANGLE = 6, SINE = 7
+    CENTRE = 8, FIRST = 11, LAST = 14, CORNER_COLUMNS = 17
+
+
+cdef class Blends:
+    """The corners (M + 1, 17) at the starts of M moves and behind the last; of each move the
+    `length` (M,) mm, the unit tangent at its start (M, 3) and the first row (M,) of it. Of each row
+    of `ways` its move (N,), and how far into that it begins and how long it is (N,), mm."""
+
+    cdef Ways ways
+    cdef double[:, ::1] corners, tangent
+    cdef double[::1] length, into, row_length
+    cdef Int[::1] first, move
+
+    def __init__(
+        self,
+        Ways ways,
+        double[:, ::1] corners,
+        moves: tuple[Floats, Floats, Ints],
+        rows: tuple[Ints, Floats, Floats],
+    ) -> None:
+        self.ways, self.corners = ways, corners
+        self.length, self.tangent, self.first = moves
+        self.move, self.into, self.row_length = rows
+
+    cdef void _turned(self, Int corner, double share, double *point) noexcept:
+        """Put a point (3,) mm at a share of the way of an arc blend."""
+        cdef Int axis
+        cdef double turn = share * self.corners[corner, ANGLE]
+        cdef double one = sin(self.corners[corner, ANGLE] - turn) / self.corners[corner, SINE]
+        cdef double other = sin(turn) / self.corners[corner, SINE]
+        for axis in range(3):
+            point[axis] = self.corners[corner, CENTRE + axis]
+            point[axis] += one * self.corners[corner, FIRST + axis]
+            point[axis] += other * self.corners[corner, LAST + axis]
+
+    cdef void _unblended(self, Int move, double along, double *point) noexcept:
+        """Put the point (3,) mm at this arc length along a move, corners not blended."""
+        cdef Int row = self.first[move]
+        cdef Int axis
+        cdef double begin
+        if self.ways.arm[row] >= 0:
+            self.ways.put(row, along / self.length[move], point)
+            return
+        for axis in range(3):
+            begin = self.ways.end[row - 1, axis] if row else self.ways.start[axis]
+            point[axis] = begin + along * self.tangent[move, axis]
+
+    cdef void _overlapped(self, Int corner, double x, double *point) noexcept:
+        """Put a point (3,) mm where two moves overlap, at the part x of the time: while the first
+        slows down evenly over its last `BEFORE` mm, the second speeds up in the first part `RAMP`
+        of that time, and goes on, over its first `BEHIND` mm."""
+        cdef double other[3]
+        cdef double corner_point[3]
+        cdef Int axis
+        cdef double ramp = self.corners[corner, RAMP]
+        cdef double covered = x * x / (2.0 * ramp) if x < ramp else x - 0.5 * ramp
+        covered /= 1.0 - 0.5 * ramp
+        self._unblended(
+            corner - 1,
+            self.length[corner - 1] - (1.0 - x) * (1.0 - x) * self.corners[corner, BEFORE],
+            point,
+        )
+        self._unblended(corner, covered * self.corners[corner, BEHIND], other)
+        self._unblended(corner, 0.0, corner_point)
+        for axis in range(3):
+            point[axis] += other[axis] - corner_point[axis]
+
+    cpdef void put(
+        self, const Int[::1] row, const double[::1] share, double[:, ::1] points
+    ) noexcept:
+        """Put points (K, 3) mm at shares (K,) of the lengths of rows (K,) on the blends beside
+        them."""
+        cdef Int k, move
+        cdef double along, rest, turn
+        cdef double[:, ::1] corners = self.corners
+        for k in range(len(row)):
+            move = self.move[row[k]]
+            along = self.into[row[k]] + share[k] * self.row_length[row[k]]
+            rest = max(self.length[move] - along, 0.0)
+            if rest < corners[move + 1, REACH]:
+                self._turned(move + 1, 0.5 - 0.5 * rest / corners[move + 1, REACH], &points[k, 0])
+            if along < corners[move, REACH_ON]:
+                self._turned(move, 0.5 + 0.5 * along / corners[move, REACH_ON], &points[k, 0])
+            if rest < corners[move + 1, BEFORE]:
+                turn = corners[move + 1, TURN]
+                self._overlapped(
+                    move + 1, turn * (1.0 - rest / corners[move + 1, BEFORE]), &points[k, 0]
+                )
+            if along < corners[move, BEHIND]:
+                turn = corners[move, TURN]
+                self._overlapped(
+                    move, turn + (1.0 - turn) * along / corners[move, BEHIND], &points[k, 0]
+                )
