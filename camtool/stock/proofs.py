@@ -397,9 +397,15 @@ def _allows(layer: WantedLayer, chords: _Chords, table: Floats, distance_mm: flo
     cone = flat + cut / np.where(rise > 0.0, rise, 1.0)
     bends = np.minimum(flat + corner * (layer.rise / math.hypot(1.0, layer.rise)), wide)
     fine: Bools = np.asarray(deepest[:, 0] <= 0.0)
-    for reach in (np.broadcast_to(wide, deep.shape), np.where(rise > 0.0, cone, wide)):
+    reaches: list[Floats] = [np.broadcast_to(wide, deep.shape)]
+    places: list[Floats] = [np.zeros((1, 1))]
+    if (rise > 0.0).any():
+        reaches.append(np.where(rise > 0.0, cone, wide))
+    if (reaches[0] > flat).any():  # a cylinder is flat from its axis to its edge
+        places += [flat, bends]
+    for reach in reaches:
         good = (s - reach >= -EPS_MM) & (farthest + reach <= layer.reach_mm + distance_mm)
-        for x in (0.0, flat, bends, reach):
+        for x in (*places, reach):
             out = np.maximum(x - flat, 0.0)
             nose = corner - np.sqrt(np.maximum(corner**2 - np.minimum(out, corner) ** 2, 0.0))
             allowed = np.minimum(layer.base_mm + layer.rise * (s - x), layer.depth_mm)

@@ -382,12 +382,12 @@ def uncovered_contours(
     excepted: they may be flat moves on it, which cut nothing.
     """
     nearest_moves, wrong_depth = nearest_found
+    failing = np.flatnonzero(wrong_depth | (nearest_moves.distance > limits[0]))
+    is_judged = ~cuts.slopes(samples.segment[failing])
+    is_judged |= samples.z[failing] < STOCK_TOP_MM - limits[1]
     rows = cuts.row[samples.segment]
     contour = cuts.contour[rows]
-    sloping = cuts.slopes(samples.segment)
-    is_judged = ~sloping | (samples.z < STOCK_TOP_MM - limits[1])
-    is_judged &= ~drilled[contour]
-    failing = np.flatnonzero(is_judged & (wrong_depth | (nearest_moves.distance > limits[0])))
+    failing = failing[is_judged & ~drilled[contour[failing]]]
     if len(failing) == 0:
         return
     sample_counts = np.bincount(contour)
