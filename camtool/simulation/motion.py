@@ -132,8 +132,10 @@ CHUNK_STEPS = 1 << 16
 @dataclass(frozen=True, repr=False, eq=False)
 class Options(FrozenRecord):
     """`interpolator` replaces the controller's own for arcs; only the `effects` act; a chunk has
-    at most `chunk_steps` samples."""
+    at most `chunk_steps` samples. Without `rapids`, of moves that cut nothing those may be missing
+    between the places where an axis turns: judging needs none of them."""
 
     interpolator: str | None = None
     effects: Effects = ALL
     chunk_steps: int = CHUNK_STEPS
+    rapids: bool = True

@@ -112,7 +112,8 @@ def verify(case: Case, progress: Progress | None = None) -> Verification:
     decoded, target, options = case.decoded, case.target, case.simulation
     target.check_options(options)
     fused = target.model.fused_run(decoded, target.machine, options)
-    return judge(case, fused or target.simulate(decoded, options), progress)
+    motion = fused or target.simulate(decoded, replace(options, rapids=False))
+    return judge(case, motion, progress)
 
 
 def judge(

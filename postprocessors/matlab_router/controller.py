@@ -150,10 +150,14 @@ class _Run:
         self._lines: MasterOrders = lines_of(path, self._rows, machine)
         self.standing_s = np.cumsum(self._lines.extra_s)
         """(R,) s that rows up to each take besides its ticks."""
-        self._program = program_of(self._lines.orders, self._lines.pauses_s, machine)
+        self._mechanics = Mechanics(machine, path.start, options.effects)
+        # Slides with the same backlash everywhere go the same way, whatever was between two turns.
+        thin = (path.kind[: self._rows] == Kind.RAPID) & (
+            not options.rapids and self._mechanics.even
+        )
+        self._program = program_of(self._lines.orders, self._lines.pauses_s, thin, machine)
         self._state = state_of(path.start, machine)
         self._account = account_of(self._rows)
-        self._mechanics = Mechanics(machine, path.start, options.effects)
         self._home = np.array(machine.controller.machine_zero_mm)
         coded = np.array([axis.coded_step_mm for axis in machine.axes])
         self._count_mm = SIGNS * coded
@@ -273,13 +277,14 @@ class _Run:
             row=rows,
             duration_s=seconds,
             compensation_s=np.zeros(len(rows)),
-            iterations=np.diff(offsets),
+            iterations=self._account.samples[first:last].copy(),
             steps=self._account.steps[first:last].copy(),
             reversals=reversals,
             ended=~is_complete | self._account.ended[rows],
         )
         # The next chunk may go on in the last of these rows.
         self._account.steps[first:last] = 0
+        self._account.samples[first:last] = 0
         return Chunk(row, commanded, slide, ledger)
 
 
@@ -594,7 +599,7 @@ def loop_keys(loop: SpeedLoop) -> dict[str, Any]:
     return {key: [float(f"{value:.6g}") for value in values] for key, values in keys.items()}
 
 
-def program_of(orders: Indices, pauses_s: Floats, machine: _Machine) -> Program:
+def program_of(orders: Indices, pauses_s: Floats, thin: Bools, machine: _Machine) -> Program:
     """Return the program for the compiled loops; MachineError for gains that the listing's
     integers cannot hold."""
     router = machine.controller
@@ -617,7 +622,7 @@ def program_of(orders: Indices, pauses_s: Floats, machine: _Machine) -> Program:
     share = np.arange(TABLE_COUNTS + 1) / TABLE_COUNTS
     table = np.rint(router.table_counts * np.sqrt(share)).astype(np.int64)
     lag = router.start_lag_s * TICKS_PER_S
-    return Program(orders, pauses_s * TICKS_PER_S, axes, table, lag, text)
+    return Program(orders, pauses_s * TICKS_PER_S, axes, table, lag, text, thin)
 
 
 def state_of(start_mm: Floats, machine: _Machine) -> State:
@@ -635,5 +640,5 @@ def state_of(start_mm: Floats, machine: _Machine) -> State:
 
 def account_of(rows: int) -> Account:
     """Return the account of so many rows, none of which has been run yet."""
-    steps = np.zeros((rows, 3), dtype=np.int64)
-    return Account(np.zeros(rows), steps, np.ones(rows, dtype=np.bool_))
+    steps, samples = np.zeros((rows, 3), dtype=np.int64), np.zeros(rows, dtype=np.int64)
+    return Account(np.zeros(rows), steps, np.ones(rows, dtype=np.bool_), samples)

@@ -26,6 +26,7 @@ class Program(NamedTuple):
     table: Ints
     lag: float
     text: bool
+    thin: Bools
 
 class State(NamedTuple):
     motors: Floats
@@ -37,6 +38,7 @@ class Account(NamedTuple):
     ticks: Floats
     steps: Ints
     ended: Bools
+    samples: Ints
 
 def slaves_fill(
     program: Program, state: State, account: Account, out: Ints, row: Ints

@@ -54,7 +54,8 @@ class Program(NamedTuple):
     has passed a count on, the ticks after which it is given up, that axis and that count. pauses
     (L,) ticks behind each, at least 1, and negative where the next line begins on a tick; axes
     (3, 8); table (1001,); lag: ticks by which Y begins after X; text: the chapters' way instead of
-    the listing's.
+    the listing's; thin (N,): rows of which nobody asks for the samples between those at which an
+    axis turns and the last.
     """
 
     lines: Indices
@@ -63,6 +64,7 @@ class Program(NamedTuple):
     table: Ints
     lag: float
     text: bool
+    thin: Bools
 
 
 class State(NamedTuple):
@@ -76,11 +78,13 @@ class State(NamedTuple):
 
 
 class Account(NamedTuple):
-    """Results of the rows so far: ticks (N,) that they took, steps (N, 3) in counts, ended (N,)."""
+    """Results of the rows so far: ticks (N,) that they took, steps (N, 3) in counts, ended (N,),
+    samples (N,) with those that are left out."""
 
     ticks: Floats
     steps: Ints
     ended: Bools
+    samples: Ints
 
 
 # The programs of the Matlab router's slaves: the interrupt every 5 ms, and the main loop.
@@ -265,6 +269,12 @@ cdef double _moment(double travel, double speed, double aim, double tau, double 
     return moment
 
 
+cdef inline Int _floor(double value) noexcept:
+    """The greatest whole number below or at a value that an Int holds."""
+    cdef Int integer = <Int>value
+    return integer - (value < <double>integer)
+
+
 cdef (double, bint) _glide(
     double* motor, Int* slave, double* axis, double aim, Int sense, double ticks,
     Int to_go, double whole_fade
@@ -279,11 +289,9 @@ cdef (double, bint) _glide(
     fade = whole_fade if ticks == 1.0 else -math.expm1(-ticks / tau)
     end = place + aim * ticks + (speed - aim) * tau * fade
     if sense > 0:
-        new = int(math.floor(end))
-        new = max(count, new)
+        new = max(count, _floor(end))
     else:
-        new = int(math.ceil(end))
-        new = min(count, new - 1)
+        new = min(count, -_floor(-end) - 1)
     reached = sense * (new - count) >= to_go
     if reached:
         new = count + sense * to_go
@@ -303,12 +311,11 @@ cdef double _home(
     double* motor, Int* slave, double* axis, double at, Int tick
 ) noexcept:
     """Run home evenly from `at` in a tick, and stand there; returns the time within the tick."""
-    cdef Int phase, count, k
+    cdef Int phase, k
     needed = max(motor[PLACE], 0.0) / axis[HOME_SPEED]
     if needed > 1.0 - at:
         motor[PLACE] -= axis[HOME_SPEED] * (1.0 - at)
-        count = int(math.floor(motor[PLACE]))
-        slave[COUNT] = count
+        slave[COUNT] = _floor(motor[PLACE])
         return 1.0
     for k in range(MOTOR_COLUMNS):
         motor[k] = 0.0
@@ -320,11 +327,49 @@ cdef double _home(
     return float(at + needed)
 
 
+cdef struct Ahead:
+    # Counts that a slave waits for in one sense, while the motor goes on that way; in the sense
+    # `UNKNOWN_SENSE` they are not known.
+    Int sense, to_go
+
+
+cdef Int UNKNOWN_SENSE = 2
+
+
+cdef bint _passes_chunk(
+    double* motor, Int* slave, double* axis, Int sense, double aim, Ahead* ahead, double whole_fade
+) noexcept:
+    """Glide for a whole tick in which at most a chunk of a line ends that is not its last: the
+    main loop counts it, and nothing else changes, so the motion need not be parted there. False,
+    and nothing done, where something else may come within the tick."""
+    cdef Int begin, end, phase, up, wraps, to_go, passed
+    cdef double place, speed
+    place, speed, begin = motor[PLACE], motor[SPEED], slave[COUNT]
+    up, wraps, to_go = slave[UP], slave[WRAPS], ahead.to_go
+    _glide(motor, slave, axis, aim, sense, 1.0, NEVER, whole_fade)
+    end = slave[COUNT]
+    passed = sense * (end - begin) - to_go
+    if passed < 0:
+        ahead.to_go = -passed
+        return True
+    phase = <Int>axis[PHASE]
+    slave[COUNT], slave[LEFT] = begin + sense * to_go, slave[LEFT] - 1
+    slave[UP], slave[WRAPS] = 1 if sense > 0 else 0, 0
+    ahead.to_go = to_go_of(slave, axis, sense) - passed
+    if ahead.to_go > 0:
+        slave[WRAPS] = abs(((end + phase) >> TURN_BITS) - ((slave[COUNT] + phase) >> TURN_BITS))
+        slave[COUNT] = end
+        return True
+    motor[PLACE], motor[SPEED], slave[COUNT] = place, speed, begin
+    slave[UP], slave[WRAPS], slave[LEFT], ahead.to_go = up, wraps, slave[LEFT] + 1, to_go
+    return False
+
+
 cdef void _advance(
-    double* motor, Int* slave, double* axis, Int tick, bint text, double whole_fade
+    double* motor, Int* slave, double* axis, Int tick, bint text, double whole_fade, Ahead* ahead
 ) noexcept:
     """Advance one motor by one tick, from event to event."""
-    cdef Int sense, to_go
+    cdef Int sense, count
     cdef bint turns, reached
     cdef double toward, at, until, ticks
     at = 0.0
@@ -334,29 +379,45 @@ cdef void _advance(
             until = min(motor[BEGIN] - float(tick), 1.0)
             if until <= at:
                 start_line(motor, slave, text)
+                ahead.sense = UNKNOWN_SENSE
                 continue
         if slave[STAGE] == HOMING:
             at = _home(motor, slave, axis, at, tick)
+            ahead.sense = UNKNOWN_SENSE
             continue
         speed, drive = motor[SPEED], motor[DRIVE]
         pushed = drive if speed != 0.0 else drive if abs(drive) > axis[FRICTION] else 0.0
         toward = speed if speed != 0.0 else pushed
         sense = 1 if toward > 0.0 else -1 if toward < 0.0 else 0
-        to_go = to_go_of(slave, axis, sense)
-        if to_go <= 0:
+        if ahead.sense != sense:
+            ahead.sense, ahead.to_go = sense, to_go_of(slave, axis, sense)
+        if ahead.to_go <= 0:
             next_stage(motor, slave, float(tick) + at)
+            ahead.sense = UNKNOWN_SENSE
             continue
         if sense == 0:
             at = until
             continue
         aim = axis[GAIN] * (drive - float(sense) * axis[FRICTION])
         ticks, turns = until - at, False
+        if (
+            ticks == 1.0
+            and slave[STAGE] == CRUISING
+            and slave[LEFT] > 1
+            and speed * aim >= 0.0
+            and _passes_chunk(motor, slave, axis, sense, aim, ahead, whole_fade)
+        ):
+            break
         if speed * aim < 0.0:
             back = axis[TAU] * math.log1p(-speed / aim)
             ticks, turns = min(ticks, back), back <= ticks
-        took, reached = _glide(motor, slave, axis, aim, sense, ticks, to_go, whole_fade)
+        count = slave[COUNT]
+        took, reached = _glide(motor, slave, axis, aim, sense, ticks, ahead.to_go, whole_fade)
+        # The same way on, that many counts less are left; NEVER stays far.
+        ahead.to_go -= sense * (slave[COUNT] - count)
         if reached:
             next_stage(motor, slave, float(tick) + at + took)
+            ahead.sense = UNKNOWN_SENSE
             at += took
         else:
             at = at + ticks if turns else until
@@ -372,17 +433,17 @@ cdef class Slaves:
     cdef int[:, ::1] lines
     cdef Int[:, ::1] slaves
     cdef Int[:, ::1] steps
-    cdef Int[::1] table, clock
+    cdef Int[::1] table, clock, samples
     cdef double[:, ::1] axes, motors
     cdef double[::1] pauses, begin, ticks
-    cdef uint8_t[::1] ended
+    cdef uint8_t[::1] ended, thin
     cdef double lag
     cdef bint text
 
     def __init__(self, program: Program, state: State, account: Account) -> None:
-        self.lines, self.pauses, self.axes, self.table, self.lag, self.text = program
+        self.lines, self.pauses, self.axes, self.table, self.lag, self.text, self.thin = program
         self.motors, self.slaves, self.clock, self.begin = state
-        self.ticks, self.steps, self.ended = account
+        self.ticks, self.steps, self.ended, self.samples = account
 
 
 cdef void _open(Slaves all_, Int line) noexcept:
@@ -456,6 +517,19 @@ cdef void _given_up(double[:, ::1] motors, Int[:, ::1] slaves, Int tick) noexcep
             motors[index, DONE], motors[index, DRIVE] = float(tick), 0.0
 
 
+cdef inline bint _goes_on(Int* moves, Int* ways) noexcept:
+    """True if no axis turns; `ways` (3,) then has the sense of each, 0 of one that has not moved.
+    Else these are the senses of the `moves` (3,)."""
+    cdef Int axis
+    cdef bint turns = False
+    for axis in range(3):
+        turns |= moves[axis] * ways[axis] < 0
+    for axis in range(3):
+        if turns or ways[axis] == 0:
+            ways[axis] = (moves[axis] > 0) - (moves[axis] < 0)
+    return not turns
+
+
 cdef inline bint _is_at_rest(double* motor, Int* slave, double* axis, Int tick) noexcept:
     """True if neither the loop nor the motor changes anything in this tick: the axis stands
     without drive, waits for no word that comes within the tick, and has been seen to stand."""
@@ -468,18 +542,116 @@ cdef inline bint _is_at_rest(double* motor, Int* slave, double* axis, Int tick) 
     return slave[SEEN] == 0 and slave[SHOWN] == (slave[COUNT] + phase) & (TURN - 1)
 
 
+cdef Int _homes_on(double* motor, Int* slave, double* axis, Int longest) noexcept:
+    """Run home for as many ticks as nothing else happens; return them."""
+    cdef Int ticks = 0
+    cdef double place = motor[PLACE]
+    cdef double rate = axis[HOME_SPEED]
+    while place > 2.0 * rate and ticks < longest:
+        place -= rate
+        ticks += 1
+    if ticks > 0:
+        motor[PLACE], slave[COUNT] = place, _floor(place)
+    return ticks
+
+
+cdef Int _cruises_on(
+    double* motor, Int* slave, double* axis, Int longest, Ahead* ahead, double fade
+) noexcept:
+    """Run the listing's loop and the motor for as many whole ticks as the motor goes on one way and
+    no chunk ends; return them. The same steps as `listed_loop` and `_glide`, in registers."""
+    cdef Int ticks, sense, phase, shown, change, drive, count, begin, new, remaining
+    cdef Int measured, total, ref, kid, kpd, wraps
+    cdef bint is_up
+    cdef double place, speed, tau, gain, rub, aim, end
+    ticks, place, speed, remaining = 0, motor[PLACE], motor[SPEED], ahead.to_go
+    sense = 1 if speed > 0.0 else -1
+    if speed == 0.0 or ahead.sense != sense or slave[LEFT] < 2:
+        return 0
+    begin = count = slave[COUNT]
+    tau, gain, rub = axis[TAU], axis[GAIN], float(sense) * axis[FRICTION]
+    phase, kid, kpd = <Int>axis[PHASE], <Int>axis[KID], <Int>axis[KPD]
+    shown, measured, total, wraps = slave[SHOWN], slave[SEEN], slave[SUM], slave[WRAPS]
+    ref, drive, is_up = slave[REF], <Int>motor[DRIVE], slave[UP] == 1
+    while ticks < longest:
+        new = (count + phase) & (TURN - 1)
+        change = new - shown if is_up else shown - new
+        change = change if change >= 0 else measured
+        end_total = _int32(total + (abs(ref) - change) * kid)
+        new_drive = _int32(drive + end_total - change * kpd)
+        new_drive = 0 if new_drive < 0 else min(new_drive // 1000, 100)
+        new_drive = new_drive if ref > 0 else -new_drive if ref < 0 else 0
+        aim = gain * (float(new_drive) - rub)
+        end = place + aim + (speed - aim) * tau * fade
+        new = max(count, _floor(end)) if sense > 0 else min(count, -_floor(-end) - 1)
+        if speed * aim < 0.0 or new_drive == 0 or sense * (new - count) >= remaining:
+            break
+        shown, measured, total = (count + phase) & (TURN - 1), change, end_total
+        drive, place, speed = new_drive, end, speed + (aim - speed) * fade
+        if new != count:
+            is_up = sense > 0
+            wraps += abs(((new + phase) >> TURN_BITS) - ((count + phase) >> TURN_BITS))
+            remaining -= sense * (new - count)
+            count = new
+        ticks += 1
+    if ticks > 0:
+        motor[PLACE], motor[SPEED], motor[DRIVE] = place, speed, float(drive)
+        slave[COUNT], slave[UP], slave[WRAPS], slave[SHOWN] = count, is_up, wraps, shown
+        slave[SEEN], slave[SUM], ahead.to_go = measured, total, remaining
+    return ticks
+
+
+cdef Int _goes_alone(
+    Slaves all_, Int line, Int tick, Int* moves, Ahead* ahead, double* whole_fade
+) noexcept:
+    """Run one axis for as many ticks as nothing changes but its speed, where the others stand;
+    return them, and the counts that it goes in `moves` (3,)."""
+    cdef Int axis, mover, ticks, longest
+    mover = -1
+    for axis in range(3):
+        moves[axis] = 0
+        if mover < 0 and all_.slaves[axis, STAGE] in (HOMING, CRUISING):
+            mover = axis
+        elif all_.slaves[axis, STAGE] != STILL or not _is_at_rest(
+            &all_.motors[axis, 0], &all_.slaves[axis, 0], &all_.axes[axis, 0], tick
+        ):
+            return 0
+    if mover < 0 or all_.lines[line, FIRST_ROW] != all_.lines[line, SECOND_ROW]:
+        return 0
+    longest = all_.lines[line, MAX_TICKS] - (tick - <Int>all_.begin[0]) - 1
+    moves[mover] = -all_.slaves[mover, COUNT]
+    if all_.slaves[mover, STAGE] == HOMING:
+        ticks = _homes_on(
+            &all_.motors[mover, 0], &all_.slaves[mover, 0], &all_.axes[mover, 0], longest
+        )
+    else:
+        ticks = _cruises_on(
+            &all_.motors[mover, 0],
+            &all_.slaves[mover, 0],
+            &all_.axes[mover, 0],
+            longest,
+            &ahead[mover],
+            whole_fade[mover],
+        )
+    moves[mover] += all_.slaves[mover, COUNT]
+    return ticks
+
+
 cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1] row):
     """Counts of the axes at each tick into `out` (n, 3), the rows that they belong to into `row`
     (n,), until these are full or all lines have run and their last pause is over.
 
-    `state` goes on from call to call; `account` grows. Returns samples filled, and whether that
-    was all.
+    Of thin rows a sample takes the place of the one before, unless an axis turned there. `state`
+    goes on from call to call; `account` grows. Returns samples filled, and whether that was all.
     """
-    cdef Int top, count, filled, tick, line, index, before, of
+    cdef Int top, count, filled, tick, ticks, line, index, of
+    cdef Int[3] moves
+    cdef Int[3] ways
     cdef Int[:, ::1] slaves
     cdef Slaves all_
     cdef bint text
     cdef double[3] whole_fade
+    cdef Ahead[3] ahead
     cdef double* begin
     cdef double* motor
     cdef double* axis
@@ -492,12 +664,25 @@ cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1]
     tick, line = all_.clock[0], all_.clock[1]
     for index in range(3):
         whole_fade[index] = -math.expm1(-1.0 / all_.axes[index, TAU])
+        ahead[index].sense = UNKNOWN_SENSE
     while filled < len(out) and (line < count or float(tick) < begin[0]):
         if tick == 0 and count > 0:
             _open(all_, 0)
+        of = row[filled - 1] if filled else -1
+        if of >= 0 and not text and all_.thin[of] and line < count and of == all_.lines[line, FIRST_ROW]:
+            ticks = _goes_alone(all_, line, tick, moves, ahead, whole_fade)
+            if ticks > 0:
+                tick += ticks
+                all_.samples[of] += ticks
+                filled += not _goes_on(moves, ways)
+                row[filled - 1] = of
+                for index in range(3):
+                    out[filled - 1, index] = slaves[index, COUNT]
+                    all_.steps[of, index] += abs(moves[index])
+                continue
         for index in range(3):
             motor, slave, axis = &all_.motors[index, 0], &slaves[index, 0], &all_.axes[index, 0]
-            out[filled, index] = slave[COUNT]
+            moves[index] = -slave[COUNT]
             if slave[STAGE] == HOMING:
                 motor[DRIVE] = 0.0
             elif text:
@@ -506,15 +691,22 @@ cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1]
                 continue
             else:
                 listed_loop(motor, slave, axis, &all_.table[0])
-            _advance(motor, slave, axis, tick, text, whole_fade[index])
+            _advance(motor, slave, axis, tick, text, whole_fade[index], &ahead[index])
         tick += 1
         of = _row(all_, line, tick)
-        row[filled] = of
+        all_.samples[of] += 1
         steps = &all_.steps[of, 0]
         for index in range(3):
-            before = out[filled, index]
+            moves[index] += slaves[index, COUNT]
+            steps[index] += abs(moves[index])
+        if filled == 0 or row[filled - 1] != of:
+            ways[0] = ways[1] = ways[2] = 0
+            _goes_on(moves, ways)
+        elif all_.thin[of] and _goes_on(moves, ways):
+            filled -= 1
+        row[filled] = of
+        for index in range(3):
             out[filled, index] = slaves[index, COUNT]
-            steps[index] += abs(slaves[index, COUNT] - before)
         filled += 1
         if line == count or float(tick) < begin[0]:
             continue
@@ -522,10 +714,14 @@ cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1]
             if not _all_still(slaves):
                 all_.ended[all_.lines[line, SECOND_ROW]] = False
             _given_up(all_.motors, slaves, tick)
+            for index in range(3):
+                ahead[index].sense = UNKNOWN_SENSE
         if _all_still(slaves):
             _close(all_, line, tick)
             line += 1
             if line < count:
                 _open(all_, line)
+            for index in range(3):
+                ahead[index].sense = UNKNOWN_SENSE
     all_.clock[0], all_.clock[1] = tick, line
     return filled, line == count and float(tick) >= begin[0]

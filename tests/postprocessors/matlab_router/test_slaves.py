@@ -21,6 +21,7 @@ def filled(
     pauses: list[float],
     lag: float = 0.08,
     chunk: int = 100_000,
+    thin: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, Account]:
     """Counts, rows and the account of the kernel for what the literal loop would run."""
     text = isinstance(slaves[0], TextSlave)
@@ -39,14 +40,22 @@ def filled(
         ],
         dtype=np.int32,
     )
-    program = Program(lines, np.array(pauses), axes, np.array(table(slaves[0].top)), lag, text)
+    whole = np.zeros(len(orders), np.bool_) if thin is None else thin
+    program = Program(
+        lines, np.array(pauses), axes, np.array(table(slaves[0].top)), lag, text, whole
+    )
     motors, inside = np.zeros((3, 6)), np.zeros((3, 11), dtype=np.int64)
     for index, slave in enumerate(slaves):
         motors[index, 0] = inside[index, 0] = slave.count
         inside[index, 5] = slave.count if text else slave.conv
     state = State(motors, inside, np.zeros(3, dtype=np.int64), np.zeros(2))
     count = len(orders)
-    account = Account(np.zeros(count), np.zeros((count, 3), np.int64), np.ones(count, np.bool_))
+    account = Account(
+        np.zeros(count),
+        np.zeros((count, 3), np.int64),
+        np.ones(count, np.bool_),
+        np.zeros(count, np.int64),
+    )
     found, rows, over = [], [], False
     while not over:
         out, row = np.empty((chunk, 3), np.int64), np.empty(chunk, np.int64)
@@ -117,6 +126,52 @@ def test_random_lines(seed: int) -> None:
             line.append((distance, speed))
         orders.append(line)
     same(slaves, orders, [luck.choice([1.0, 1.24, 3.7, 30.0]) for _ in orders])
+
+
+def path_between_turns(counts: np.ndarray) -> list[list[int]]:
+    """The first of the counts, those at which an axis turns, and the last."""
+    kept, ways = [counts[0]], np.zeros(3, dtype=np.int64)
+    for count, before in zip(counts[1:], counts[:-1], strict=True):
+        move = np.sign(count - before)
+        if (move * ways < 0).any():
+            kept.append(before)
+            ways = move
+        ways = np.where(ways == 0, move, ways)
+    return [*(each.tolist() for each in kept), counts[-1].tolist()]
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("chunk", [100_000, 37])
+def test_rows_that_nobody_samples(seed: int, chunk: int) -> None:
+    """Lines without their samples take the same ticks and steps, end at the same places and
+    turn at the same counts, also long ones of one axis, whose ticks are run together."""
+    luck = random.Random(seed)
+    orders = []
+    for _ in range(6):
+        distances = [luck.choice([0, 0, 6, 40, 300]) for _ in range(3)]
+        distances[luck.randrange(3)] = luck.choice([4, 60, 500])
+        speeds = [luck.choice([-1, 1]) * luck.randint(60, 480) for _ in range(3)]
+        orders.append(list(zip(distances, speeds, strict=True)))
+    pauses = [luck.choice([1.0, 1.24, 30.0]) for _ in orders]
+    friction = luck.choice([0.0, 2.5])
+    counts, rows, every = filled(three(friction=friction), orders, pauses)
+    thin = np.array([luck.random() < 0.7 for _ in orders])
+    some, some_rows, account = filled(three(friction=friction), orders, pauses, 0.08, chunk, thin)
+    assert np.array_equal(account.steps, every.steps)
+    assert np.array_equal(account.ticks, every.ticks)
+    assert np.array_equal(account.ended, every.ended)
+    assert np.array_equal(account.samples, every.samples)
+    assert account.samples.tolist() == np.bincount(rows, minlength=len(orders)).tolist()
+    for row, is_thin in enumerate(thin.tolist()):
+        own, kept = counts[rows == row], some[some_rows == row]
+        assert kept[-1].tolist() == own[-1].tolist()
+        if is_thin:
+            assert len(kept) <= len(own) / 5 + 10
+            before = counts[rows < row][-1:] if row else np.zeros((1, 3), dtype=np.int64)
+            whole = path_between_turns(np.concatenate([before, own]))
+            assert path_between_turns(np.concatenate([before, kept])) == whole
+        else:
+            assert kept.tolist() == own.tolist()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -206,11 +261,15 @@ def test_a_loop_that_never_gets_there_is_given_up() -> None:
     slaves[0].motor.friction = 100.0
     axes = np.array([[8.9, 12.2, 100.0, 28, 159, 5120, 0, 500.0]] * 3)
     lines = np.array([[1, 0, 0, 480, 0, 0, 0, 0, 50, 0, 0]], dtype=np.int32)
-    program = Program(lines, np.array([2.0]), axes, np.array(table(480)), 0.0, False)
+    program = Program(
+        lines, np.array([2.0]), axes, np.array(table(480)), 0.0, False, np.zeros(1, np.bool_)
+    )
     state = State(
         np.zeros((3, 6)), np.zeros((3, 11), np.int64), np.zeros(3, np.int64), np.zeros(2)
     )
-    account = Account(np.zeros(1), np.zeros((1, 3), np.int64), np.ones(1, np.bool_))
+    account = Account(
+        np.zeros(1), np.zeros((1, 3), np.int64), np.ones(1, np.bool_), np.zeros(1, np.int64)
+    )
     out, row = np.empty((1000, 3), np.int64), np.empty(1000, np.int64)
     number, over = slaves_fill(program, state, account, out, row)
     assert (number, over, bool(account.ended[0])) == (53, True, False)
