@@ -17,7 +17,8 @@ measured with the formula above.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import islice
 
 import numpy as np
 from msgspec import Struct
@@ -120,22 +121,25 @@ def approaches(
 ) -> list[NearestApproach]:
     """Return the `approach` of each pair of a path of `lines` and one of `others`; those with few
     segments are measured together."""
+    return list(each_approach(lines, others, pairs))
+
+
+def each_approach(
+    lines: Polylines, others: Polylines, pairs: Iterable[tuple[int, int]]
+) -> Iterator[NearestApproach]:
+    """Yield the same. Pairs are taken some at a time, and those with many segments are measured
+    when they are asked for."""
     one, other = _PathRows.of(lines), _PathRows.of(others)
-    rows, columns = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    segments = np.diff(other.first)[columns]
-    distances = segments * np.maximum(np.diff(lines.offsets), np.diff(one.first))[rows]
-    is_few = (segments * np.diff(one.first)[rows] > 0) & (distances <= FEW_PAIRS)
-    results = dict[int, NearestApproach]()
-    few = np.flatnonzero(is_few)
-    for begin in range(0, len(few), PATHS_AT_A_TIME):
-        batch = few[begin : begin + PATHS_AT_A_TIME]
-        results |= zip(
-            batch.tolist(), one.approaches(rows[batch], other, columns[batch]), strict=True
-        )
-    return [
-        results[k] if k in results else approach(lines[row], others[column])
-        for k, (row, column) in enumerate(pairs)
-    ]
+    counts, other_counts = np.diff(one.first), np.diff(other.first)
+    elements = np.maximum(np.diff(lines.offsets), counts)
+    every = iter(pairs)
+    while batch := list(islice(every, PATHS_AT_A_TIME)):
+        rows, columns = np.array(batch, dtype=np.int64).T
+        is_few = counts[rows] * other_counts[columns] > 0
+        is_few &= elements[rows] * other_counts[columns] <= FEW_PAIRS
+        few = one.approaches(rows[is_few], other, columns[is_few])
+        for (row, column), is_one in zip(batch, is_few.tolist(), strict=True):
+            yield next(few) if is_one else approach(lines[row], others[column])
 
 
 class _PathRows(Struct, frozen=True, eq=False):

@@ -17,12 +17,13 @@ region: to clear it, carve it, or cut beside it is an error.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import tee
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding, Severity
-from camtool.geometry.distance import approach, near_paths, nearest
+from camtool.geometry.distance import each_approach, near_paths, nearest
 from camtool.geometry.drawing import Branch
 from camtool.geometry.measure import extents, path_lengths, sample
 from camtool.geometry.nesting import inside
@@ -129,16 +130,24 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     walls = sides.lines.select(wall_rows.tolist())
     paths = Polylines.of(path for _, path in beside_items)
     count, reported_pairs = 0, set[tuple[int, int]]()
-    for one, wall_row in near_paths(paths, walls, radius + bevel + max(allowance, 0.0)):
+
+    def is_measured(one: int, wall_row: int) -> bool:
+        """True if the distance of a path from a wall may be a finding: not of its own contour, and
+        where there are many, only an error."""
+        other = int(wall_rows[wall_row])
+        is_error = sided[other] and (operation.side == "auto" or other not in own_rows)
+        return beside_items[one][0].source != other and bool(is_error or count < MAX_COUNTED)
+
+    near_pairs = near_paths(paths, walls, radius + bevel + max(allowance, 0.0))
+    measured_pairs, pairs = tee(pair for pair in near_pairs if is_measured(*pair))
+    distances = each_approach(paths, walls, measured_pairs)
+    for (one, wall_row), nearest_approach in zip(pairs, distances, strict=True):
         (item, path), other = beside_items[one], int(wall_rows[wall_row])
-        if item.source == other or (item.source, other) in reported_pairs:
+        if (item.source, other) in reported_pairs or not is_measured(one, wall_row):
             continue
         # Where the job names the side, contours of the same operation are no error.
         is_asked = operation.side != "auto" and other in own_rows
-        if count >= MAX_COUNTED and (is_asked or not sided[other]):
-            continue
         wall = walls[wall_row]
-        nearest_approach = approach(path, wall)
         reach = radius if other in own_rows else radius + bevel
         reach -= _taken_back(sides, other, path)
         if nearest_approach.distance >= reach - GOUGE_TOLERANCE_MM:
@@ -200,9 +209,10 @@ def _beside_pocket(sides: Sides, pocket: Operation) -> Iterator[Finding]:
     rows, wall_rows = np.flatnonzero(cut), np.flatnonzero(sides.sided() & ~cut)
     lines, walls = (sides.lines.select(each.tolist()) for each in (rows, wall_rows))
     cleared = Segments.of(lines)
-    for one, wall_row in near_paths(lines, walls, pocket.beyond_mm):
+    measured_pairs, pairs = tee(near_paths(lines, walls, pocket.beyond_mm))
+    distances = each_approach(lines, walls, measured_pairs)
+    for (one, wall_row), nearest_approach in zip(pairs, distances, strict=True):
         line, wall = lines[one], walls[wall_row]
-        nearest_approach = approach(line, wall)
         if nearest_approach.distance >= pocket.beyond_mm - GOUGE_TOLERANCE_MM:
             continue
         places = _witnesses(wall)
