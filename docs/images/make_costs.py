@@ -1,8 +1,9 @@
 """Draws what judging costs, and prints its numbers:  python docs/images/make_costs.py
 
 A spiral of straight cuts is judged on each target, in processor time: so many cuts of growing
-length, and a growing number of cuts of one length. The picture (docs/images/costs.svg) is
-as reproducible as the computer that draws it; nothing compares it.
+length, and a growing number of cuts of one length. All is measured in one run, and drawn as the
+ratio to the first of each row, so that other computers draw nearly the same picture
+(docs/images/costs.svg); nothing compares it.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from camtool.verification.case import Case, VerifyOptions
 from camtool.verification.verify import verify
 
 ROOT = Path(__file__).parents[2]
-LENGTHS_MM = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-COUNTS = (50, 100, 200, 400, 800, 1600)
-CUTS, LENGTH_MM = 100, 8.0
+LENGTHS_MM = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+COUNTS = (200, 400, 800, 1600, 3200)
+CUTS, LENGTH_MM = 400, 8.0
 """Fixed in the left picture, and in the right one."""
 
 TARGETS = {
@@ -36,7 +37,12 @@ TARGETS = {
     "pic-mmh": "#d62728",
     "matlab-router": "#7f7f7f",
 }
-LOW_S, HIGH_S = 1e-3, 1.0
+LOW, HIGH_RATIO, STEP = 0.5, 32.0, 2.0
+"""The axis of ratios."""
+
+ROUNDS = 3
+"""The least of so many measurements counts; between two of one point are all others."""
+
 WIDE, HIGH, LEFT, TOP, APART = 330.0, 300.0, 60.0, 40.0, 90.0
 
 
@@ -54,19 +60,26 @@ def cuts(count: int, length_mm: float) -> Toolpath:
     return b.rapid(z=0.2).finish()
 
 
-def seconds(target: str, count: int, length_mm: float) -> float:
-    """Return the least processor time (s) of two judgements."""
+def case_of(target: str, count: int, length_mm: float) -> Case:
+    """Return what is judged."""
     sample = ROOT / "samples" / "i8751-sample.toml"
     loaded = load_target(target, machine_file=sample if target == "i8751" else None)
-    path = cuts(count, length_mm)
-    case = Case(path, loaded, None, None, VerifyOptions(shape=False), Options())
-    times = []
-    for _ in range(2):
-        begun = resource.getrusage(resource.RUSAGE_SELF)
-        verify(case)
-        ended = resource.getrusage(resource.RUSAGE_SELF)
-        times.append(ended.ru_utime + ended.ru_stime - begun.ru_utime - begun.ru_stime)
-    return min(times)
+    return Case(cuts(count, length_mm), loaded, None, None, VerifyOptions(shape=False), Options())
+
+
+def seconds(case: Case) -> float:
+    """Return the processor time of a judgement, s."""
+    begun = resource.getrusage(resource.RUSAGE_SELF)
+    verify(case)
+    ended = resource.getrusage(resource.RUSAGE_SELF)
+    return ended.ru_utime + ended.ru_stime - begun.ru_utime - begun.ru_stime
+
+
+def measured(sizes: list[tuple[int, float]]) -> dict[str, list[float]]:
+    """Return the least processor time (s) of each target for cuts of these numbers and lengths."""
+    cases = {name: [case_of(name, *size) for size in sizes] for name in TARGETS}
+    rounds = [{n: [seconds(c) for c in row] for n, row in cases.items()} for _ in range(ROUNDS)]
+    return {name: [min(t) for t in zip(*(r[name] for r in rounds), strict=True)] for name in cases}
 
 
 def place(value: float, low: float, high: float, size: float) -> float:
@@ -75,24 +88,33 @@ def place(value: float, low: float, high: float, size: float) -> float:
 
 
 def panel(left: float, title: str, steps: tuple[float, ...], rows: dict[str, list[float]]) -> str:
-    """Draw one picture: seconds against lengths or numbers."""
+    """Draw one picture: ratios to the first time of each row against lengths or numbers, and
+    dashed what is proportional to these."""
     parts = [f'<text x="{left}" y="24" font-size="13">{escape(title)}</text>']
-    for power in range(round(math.log10(LOW_S)), round(math.log10(HIGH_S)) + 1):
-        y = TOP + HIGH - place(10.0**power, LOW_S, HIGH_S, HIGH)
+
+    def height(ratio: float) -> float:
+        return TOP + HIGH - place(max(ratio, LOW), LOW, HIGH_RATIO, HIGH)
+
+    ratio = LOW
+    while ratio <= HIGH_RATIO:
+        y = height(ratio)
         parts.append(f'<path d="M{left} {y:.1f}h{WIDE}" stroke="#ccc"/>')
-        parts.append(
-            f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{10.0**power:g}</text>'
-        )
+        parts.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{ratio:g}</text>')
+        ratio *= STEP
     for step in steps:
         x = left + place(step, steps[0], steps[-1], WIDE)
         parts.append(f'<path d="M{x:.1f} {TOP}v{HIGH}" stroke="#eee"/>')
         parts.append(
             f'<text x="{x:.1f}" y="{TOP + HIGH + 16}" text-anchor="middle">{step:g}</text>'
         )
+    top = height(steps[-1] / steps[0])
+    parts.append(
+        f'<path d="M{left} {height(1.0):.1f}L{left + WIDE} {top:.1f}" stroke="#000" '
+        'stroke-dasharray="4 4"/>'
+    )
     for name, times in rows.items():
         points = " ".join(
-            f"{left + place(step, steps[0], steps[-1], WIDE):.1f},"
-            f"{TOP + HIGH - place(max(time, LOW_S), LOW_S, HIGH_S, HIGH):.1f}"
+            f"{left + place(step, steps[0], steps[-1], WIDE):.1f},{height(time / times[0]):.1f}"
             for step, time in zip(steps, times, strict=True)
         )
         line = f'points="{points}" fill="none" stroke="{TARGETS[name]}" stroke-width="2"'
@@ -113,8 +135,9 @@ def legend() -> str:
 
 def main() -> None:
     """Measure, print and draw."""
-    by_length = {name: [seconds(name, CUTS, one) for one in LENGTHS_MM] for name in TARGETS}
-    by_count = {name: [seconds(name, one, LENGTH_MM) for one in COUNTS] for name in TARGETS}
+    every = measured([(CUTS, one) for one in LENGTHS_MM] + [(one, LENGTH_MM) for one in COUNTS])
+    by_length = {name: times[: len(LENGTHS_MM)] for name, times in every.items()}
+    by_count = {name: times[len(LENGTHS_MM) :] for name, times in every.items()}
     for title, steps, rows in (("mm", LENGTHS_MM, by_length), ("cuts", COUNTS, by_count)):
         print("|", " | ".join(["", *(f"{step:g} {title}" for step in steps)]), "|")
         for name, times in rows.items():
@@ -127,13 +150,13 @@ def main() -> None:
             '<rect width="100%" height="100%" fill="white"/>',
             panel(
                 LEFT,
-                f"{CUTS} cuts: processor time (s) against their length (mm)",
+                f"{CUTS} cuts: time against their length (mm)",
                 LENGTHS_MM,
                 by_length,
             ),
             panel(
                 right,
-                f"cuts of {LENGTH_MM:g} mm: processor time (s) against their number",
+                f"cuts of {LENGTH_MM:g} mm: time against their number",
                 COUNTS,
                 by_count,
             ),
