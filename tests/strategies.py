@@ -26,11 +26,13 @@ SHARE = {"default": 0.3, "checked": 0.2, "nightly": 30.0}[
 ]
 """The part of the examples that a property asks for: by day few (they are the same in every run),
 fewer with checked kernels, and many at night."""
+MIN_EXAMPLES = 5
 
 
 def scaled(number: int) -> int:
-    """Return how many examples are tried where a property asks for this number."""
-    return math.ceil(number * SHARE)
+    """Return how many examples are tried where a property asks for this number. Of few, all are:
+    the first one is always the simplest."""
+    return max(min(number, MIN_EXAMPLES), math.ceil(number * SHARE))
 
 
 def examples(number: int, nightly: int | None = None, **more: Any) -> settings:

@@ -32,6 +32,9 @@ from tests.oracles.page_paths import (
 )
 from tests.pictures.viewer_browser import NEEDS_BROWSER, browser
 
+pytestmark = pytest.mark.xdist_group("chromium")
+"""One worker posts the samples, once."""
+
 __all__ = ["browser"]
 
 JOBS = {"mount": "grbl", "plate": "linuxcnc"}

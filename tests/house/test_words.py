@@ -11,6 +11,11 @@ import tokenize
 from collections import Counter
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.xdist_group("words")
+"""One worker parses all files, once."""
+
 ROOT = Path(__file__).parents[2]
 QUESTION = re.compile(r"\s*(?:What|Whether|How|Some|One|Which|Where)\b")
 SUPERLATIVE = re.compile(

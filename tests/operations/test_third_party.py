@@ -10,6 +10,9 @@ import pytest
 from tests.third_party import camtool
 from tests.third_party import install as pip_install
 
+pytestmark = pytest.mark.xdist_group("third party's operations")
+"""One worker installs the packages, once."""
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "write-an-operation.md").read_text(encoding="utf-8")
 PARTS = {"package": "pyproject.toml", "record": "__init__.py", "functions": "work.py"}

@@ -9,6 +9,9 @@ import pytest
 from tests.third_party import camtool
 from tests.third_party import install as pip_install
 
+pytestmark = pytest.mark.xdist_group("third party's targets")
+"""One worker installs the package, once."""
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "write-a-post.md").read_text(encoding="utf-8")
 MOST_LINES = {"target": 75, "controller": 35}
