@@ -20,7 +20,7 @@ from tests.oracles.svg_ink import ink
 
 ZOOM = 10
 NEAR_PX = 0.1
-"""What the issue asks for; half a pixel of the picture is half of it."""
+"""Largest difference of extents; half a pixel of the magnified picture is half of it."""
 
 EDGE_SHARE = 0.01
 EDGE_PIXELS = 100
