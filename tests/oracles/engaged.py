@@ -43,11 +43,13 @@ def greatest_engagement(
         )
         near = distance(place[None, :], moves[:number])[:, 0] < 2.0 * radius
         older = way[number] - way[:number] > 100.0 * thick
-        gap = np.full(DIRECTIONS, np.inf)
+        points, engaged = shapely.points(circle), np.ones(DIRECTIONS, dtype=bool)
         for rows, slack in ((near & older, thick), (near & ~older, 0.0)):
             if rows.any():
-                gap = np.minimum(gap, distance(circle, moves[:number][rows]).min(axis=0) - slack)
-        engaged = gap > radius
+                lines = shapely.linestrings(moves[:number][rows].reshape(-1, 2, 2))
+                places = shapely.multilinestrings(lines)
+                shapely.prepare(places)
+                engaged &= ~shapely.dwithin(places, points, radius + slack)
         if wide_air is not None:
             engaged &= ~shapely.contains_xy(wide_air, *circle.T)
         greatest = max(greatest, float(engaged.mean()) * math.pi)
