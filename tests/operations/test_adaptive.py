@@ -138,6 +138,14 @@ def test_slots_in_which_no_limit_holds_are_named(wide_mm: float) -> None:
     assert work.items
 
 
+def test_a_slot_that_is_roughed_at_full_width_is_named(tmp_path: Path) -> None:
+    """What is left for the finishing pass makes it as wide as the tool."""
+    slot = closed((0, 0), (12, 0), (12, 2.42), (0, 2.42))
+    run = posted([slot], 2.0, math.radians(50.0), "grbl", tmp_path, finish_mm=0.2)
+    (finding,) = (each for each in run.findings if each.code.name == "SLOT_AS_WIDE")
+    assert finding.measured == pytest.approx(2.02, abs=1e-3)
+
+
 def test_the_scallop_of_corners_is_named_and_nothing_else_is_left(tmp_path: Path) -> None:
     """Discs of 2.16 % of the tool's radius leave √2 − 1 of that in a square corner, 27 µm here."""
     run = posted([scaled(SQUARE, 1.4)], 6.0, math.radians(60.0), "grbl", tmp_path)
