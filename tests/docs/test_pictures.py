@@ -25,6 +25,8 @@ DRAWN = "offset-stages.png"
 """What docs/images/make_images.py draws without a command."""
 BROWSED = {"panel.png": "docs/panel.md"}
 """Pictures that a browser takes of a page, and the pages that show them."""
+PEERS = {"adaptive-beside.png": "docs/validation.md"}
+"""Pictures that other programs draw a part of (docs/images/make_adaptive.py), and their pages."""
 
 MAX_CHANGED_SHARE, CHANGED = 5e-4, 48
 """So many of the pixels may be another by more than this: another version of the renderer may
@@ -74,7 +76,8 @@ def test_the_comparison_can_fail() -> None:
 
 
 def test_every_picture_is_shown_and_has_its_command() -> None:
-    pages = [ROOT / page for page in ("README.md", *make_images.PAGES, *BROWSED.values())]
+    elsewhere = BROWSED | PEERS
+    pages = [ROOT / page for page in ("README.md", *make_images.PAGES, *elsewhere.values())]
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
     shown = set(re.findall(r"\]\((?:docs/)?images/(\S+?\.png)\)", text))
-    assert shown == {*COMMANDS, DRAWN, *BROWSED} == {path.name for path in IMAGES.glob("*.png")}
+    assert shown == {*COMMANDS, DRAWN, *elsewhere} == {path.name for path in IMAGES.glob("*.png")}
