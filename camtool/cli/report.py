@@ -33,7 +33,7 @@ EMBEDDED = "picture.svg"
 
 _CAPTION = "The predicted result"
 _PLACES = ("target", "machine", "settings", "output", "preview", "report", "page", "plot")
-_LOOKS = (*PICTURE_FLAGS, "beside", "before_after", "plot_from", "plot_span")
+_LOOKS = (*PICTURE_FLAGS, "second_program", "before_after", "plot_from", "plot_span")
 _CHECKS = CheckOutputs.__struct_fields__
 _NOT_LISTED = frozenset((*_PLACES, *_LOOKS, *_CHECKS, "quiet", "verbose", "watching"))
 """Flags that a page does not list: places, looks of pictures, verbosity; the machine has a row of

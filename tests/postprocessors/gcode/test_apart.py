@@ -1,6 +1,7 @@
 """Writers and readers share no code: what one gets wrong, the other must be able to see."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -20,12 +21,15 @@ def neighbours(module: str) -> set[str]:
     if not file.exists():  # a kernel, which imports other kernels alone
         assert file.with_suffix(".pyx").exists()
         return set()
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    return {
-        f"{folder}.{node.module}" if node.level == 1 else str(node.module)
-        for node in ast.walk(tree)
+    text = file.read_text(encoding="utf-8")
+    imported = {
+        f"{folder}.{node.module or alias.name}" if node.level == 1 else str(node.module)
+        for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.ImportFrom) and node.level
+        for alias in node.names
     }
+    # Functions of a target are named by text.
+    return imported | set(re.findall(r'"camtool_postprocessors\.([\w.]+):\w+"', text))
 
 
 def reached(module: str) -> set[str]:
