@@ -559,8 +559,11 @@ def _best_left(
     allowances = np.zeros(count)
     for _ in range(ROUNDS):
         base = sizes(allowances)
+        # To both sides: where a zone is as wide to either side of what is off, what it grows by in
+        # one direction and what it grows by in another are no slope.
+        steps = STEP_MM * np.eye(count)
         slopes = np.stack(
-            [(sizes(allowances + STEP_MM * step) - base) / STEP_MM for step in np.eye(count)],
+            [0.5 * (sizes(allowances + dx) - sizes(allowances - dx)) / STEP_MM for dx in steps],
             axis=2,
         )  # (D, 2, C)
         for side, sign in ((0, 1.0), (1, -1.0)):

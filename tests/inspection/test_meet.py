@@ -184,6 +184,23 @@ def test_allowances_are_the_best_of_a_grid(data: st.DataObject) -> None:
     wide = np.array(data.draw(st.lists(st.floats(0.0, 0.02), min_size=dims, max_size=dims)))
     bent = np.array(data.draw(st.lists(st.booleans(), min_size=dims, max_size=dims)))
     standards = np.array(data.draw(st.lists(st.floats(1e-3, 5e-3), min_size=dims, max_size=dims)))
+    are_best_of_a_grid(slopes, off, wide, bent, standards)
+
+
+def test_zones_that_are_centred_at_first_do_not_mislead() -> None:
+    """The second dimension is a zone that grows whatever is left on either wall."""
+    slopes = np.array([[-1.0, -2.0], [-2.0, 1.0], [-2.0, -2.0], [-2.0, -1.0]])
+    off, wide = np.array([0.0, 0.0, 0.0312, 0.0]), np.array([0.0, 0.0, 0.015625, 0.0])
+    standards = np.array([0.00390625, 0.00390625, 0.00390625, 0.001953125])
+    are_best_of_a_grid(slopes, off, wide, np.array([False, True, False, False]), standards)
+
+
+def are_best_of_a_grid(
+    slopes: np.ndarray, off: np.ndarray, wide: np.ndarray, bent: np.ndarray, standards: np.ndarray
+) -> None:
+    """Hold allowances on walls against a grid of them: `slopes` (D, C) of sizes that are `off` and
+    `wide`; `bent` are zones."""
+    dims, walls = slopes.shape
     limits = np.column_stack([np.full(dims, 0.03), np.where(bent, -np.inf, -0.03)])
     most = np.full(walls, 0.05)
 
