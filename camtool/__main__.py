@@ -29,8 +29,8 @@ def run() -> NoReturn:
 
 
 def _is_watched() -> bool:
-    """True if the process has more to do when its command has ended: for a profiler, a debugger,
-    `python -i`, or a thread that Python waits for."""
+    """Return True if the process has more to do when its command has ended: for a profiler, a
+    debugger, `python -i`, or a thread that Python waits for."""
     monitoring = getattr(sys, "monitoring", None)  # from Python 3.12 on
     tools = [] if monitoring is None else [monitoring.get_tool(number) for number in range(6)]
     threads = [each for each in threading.enumerate() if not each.daemon]

@@ -117,7 +117,7 @@ BYTES = "<bytes>"
 
 
 def _patterns(patterns: str | Sequence[str]) -> tuple[str, ...]:
-    """The patterns; a single one may be given as it is."""
+    """Return the patterns; a single one may be given as it is."""
     return (patterns,) if isinstance(patterns, str) else tuple(patterns)
 
 
@@ -131,8 +131,8 @@ such objects, or {layer: objects}. Objects count in mm if they have no unit of t
 def read_drawing(
     drawing: Drawable, *, target: str | LoadedTarget | None = None, **reading: Unpack[Reading]
 ) -> ShownDrawing:
-    """The drawing in a DXF, SVG, point list, STEP file, build123d script, PNG or JPEG, or of
-    objects of other libraries (`Drawable`); mm, Y up.
+    """Return the drawing in a DXF, SVG, point list, STEP file, build123d script, PNG or JPEG, or
+    of objects of other libraries (`Drawable`); mm, Y up.
 
     `paths` holds M contours of lines and arcs in columns: `vertices` (N, 3) of x, y mm and bulge,
     `offsets` (M+1,), `closed` (M,); `layers`, `colours` and `sources` have M items each. Lines
@@ -149,7 +149,7 @@ def read_drawing(
 def check(
     drawing: Drawable, *, target: str | LoadedTarget | None = None, **reading: Unpack[Reading]
 ) -> dict[str, Any]:
-    """The facts about a drawing that `camtool check --json` writes: unit, size, layers, the
+    """Return the facts about a drawing that `camtool check --json` writes: unit, size, layers, the
     smallest features, open ends, repairs and findings; mm.
 
     Options are those of `read_drawing`, and none for a drawing that is read already. Raises as
@@ -168,7 +168,8 @@ def read_job(
     target: str | LoadedTarget | None = None,
     libraries: Sequence[str | Path] = (),
 ) -> Job:
-    """The job in a TOML file: tools, operations in order, placement, stock; mm, rad, s, mm/min.
+    """Return the job in a TOML file: tools, operations in order, placement, stock; mm, rad, s,
+    mm/min.
 
     `operations`: only those, by name or number. With a `drawing`, layers and colours that it lacks
     are refused; its file is read as finely as the `target` needs. `libraries`: files of tools that
@@ -184,7 +185,8 @@ def read_job(
 
 
 def as_drawing(drawing: Drawable, target: str | LoadedTarget | None, job: Job) -> Drawing:
-    """The drawing, or that of its file or objects, on the layers of the job's operations."""
+    """Return the drawing, or that of its file or objects, on the layers of the job's
+    operations."""
     if isinstance(drawing, Drawing):
         return drawing
     options = options_of({"text": job.text} if job.text else {}, _machine_of(target))
@@ -199,7 +201,7 @@ def _reader_of(drawing: Drawable) -> Callable[[ReadOptions], Drawing]:
 
 
 def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
-    """The program and its name in messages; ProgramError when its file cannot be read."""
+    """Return the program and its name in messages; ProgramError when its file cannot be read."""
     if isinstance(program, bytes):
         return program, BYTES
     if isinstance(program, Program):
@@ -211,8 +213,8 @@ def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
 
 
 def job_of(**settings: Any) -> Job:
-    """The job of one operation: fields of Operation, Job and Placement by name, and those of its
-    Tool with the prefix `tool_` (`tool_diameter_mm=0.2`).
+    """Return the job of one operation: fields of Operation, Job and Placement by name, and those
+    of its Tool with the prefix `tool_` (`tool_diameter_mm=0.2`).
 
     Texts and lists are read as in a job file: `depth_mm="1/8in"`, `tabs="4:3mm:1mm"`,
     `layers="CUT"` (one layer; several are separated by commas); so are the numbers of `tabs`,
@@ -232,8 +234,8 @@ def offset(
     joins: Literal["round", "mitre", "sharp"] = "round",
     mitre_limit: float = 2.0,
 ) -> ShownDrawing:
-    """The closed contours of a drawing, grown by a distance in mm, or shrunk by one below 0; each
-    layer is a region, in which holes become smaller as the part grows. Arcs stay arcs.
+    """Return the closed contours of a drawing, grown by a distance in mm, or shrunk by one below
+    0; each layer is a region, in which holes become smaller as the part grows. Arcs stay arcs.
 
     `joins`: what is about outer corners; a "mitre" longer than `mitre_limit` times the distance
     is cut off. Open contours and marks are left out. Raises OptionError for joins that do not
@@ -261,8 +263,8 @@ def offset(
 
 
 def targets() -> list[ListedTarget]:
-    """The installed machines, sorted by name: title, extension, and the keys that the user's
-    machine file must give. A plug-in that cannot be loaded is left out with a warning."""
+    """Return the installed machines, sorted by name: title, extension, and the keys that the
+    user's machine file must give. A plug-in that cannot be loaded is left out with a warning."""
     broken: list[CamtoolError] = []
     listed_targets = [listed for _, listed in each_target(list_target, broken=broken)]
     for error in broken:
@@ -276,8 +278,8 @@ def load_target(
     machine: str | Path | None = None,
     settings: Mapping[str, Any] | Sequence[str] = (),
 ) -> LoadedTarget:
-    """The target `name` with the values of a user's `machine` file and of `settings`; without a
-    name, the target that the file extends.
+    """Return the target `name` with the values of a user's `machine` file and of `settings`;
+    without a name, the target that the file extends.
 
     `settings`: {"axes.x.backlash_mm": 0.2}, or a list as for `--set`. The suffix of a key says its
     unit. Raises UnknownTargetError (with the nearest names) and MachineError.
@@ -293,7 +295,7 @@ def load_target(
 
 
 def as_target(target: str | LoadedTarget) -> LoadedTarget:
-    """The target, loaded where its name is given."""
+    """Return the target, loaded where its name is given."""
     return load_target(target) if isinstance(target, str) else target
 
 
@@ -303,7 +305,7 @@ def _machine_of(target: str | LoadedTarget | None) -> Machine | None:
 
 
 def _as_toml(value: Any) -> str:
-    """A value as `--set` takes it."""
+    """Return a value as `--set` takes it."""
     import json
 
     return json.dumps(value, ensure_ascii=False)
@@ -313,7 +315,7 @@ def _as_toml(value: Any) -> str:
 
 
 def plan(drawing: Drawable, target: str | LoadedTarget, job: Job | None = None) -> ShownToolpath:
-    """The moves that cut the drawing: work frame, mm, mm/min, in order of execution.
+    """Return the moves that cut the drawing: work frame, mm, mm/min, in order of execution.
 
     N rows in columns: `kind` (N,), `end` (N, 3), `centre` (N, 2), `feed` (N,). Without a job, a
     tool of no width follows all lines; `job_of(tool_diameter_mm=0.2, side="auto")` makes a simple
@@ -337,7 +339,7 @@ def post(
     compensate: bool = False,
     gates: Gates | None = None,
 ) -> Run:
-    """The drawing as a program of the target, read back, simulated and judged.
+    """Return the drawing as a program of the target, read back, simulated and judged.
 
     `data` are the bytes of the program, `verification` its figures (None with `check=False`),
     `findings` those of all stages. `compensate`, as the job's, corrects the path for
@@ -389,7 +391,7 @@ def post_by_setup(
 
 
 def _with_compensation(job: Job | None, compensate: bool) -> Job:
-    """The job, which compensates if it says so itself or is told to."""
+    """Return the job, which compensates if it says so itself or is told to."""
     job_used = job or Job()
     return replace(job_used, compensate=True) if compensate else job_used
 
@@ -400,7 +402,8 @@ def inspect(
     *,
     require: Literal["in", "not-out"] | None = None,
 ) -> Run:
-    """The run with a verdict on each dimension of its part: `report.inspection`, in mm and µm.
+    """Return the run with a verdict on each dimension of its part: `report.inspection`, in mm and
+    µm.
 
     `tolerances`: the file that names them besides those of the drawing; None: these alone. What
     falls short of `require` is an error of `findings`. Raises OptionError for a wrong file,
@@ -425,7 +428,7 @@ def meet(
     job: str | Path | None = None,
     max_trials: int | None = None,
 ) -> Meeting:
-    """The cheapest change of a job file after which all dimensions of the part hold.
+    """Return the cheapest change of a job file after which all dimensions of the part hold.
 
     `tolerances` as for `inspect`; `job`: the file (None: a tool of no width follows all lines).
     `max_trials` programs are tried (None: 100). `text` is the new job file, `run` its program;
@@ -458,7 +461,7 @@ def convert(
     feed_mm_min: float | None = None,
     check: bool = True,
 ) -> Run:
-    """A program of the machine `from_` as one of the machine `to`, read back, simulated and
+    """Return a program of the machine `from_` as one of the machine `to`, read back, simulated and
     compared with the moves of the first program.
 
     `program`: its bytes or its file. `feed_mm_min` replaces all feeds. Of the result, `data` are
@@ -472,7 +475,7 @@ def convert(
 
 
 def cut_stock(run: Run, job: Job | None = None) -> CutStock:
-    """The stock after the program of a run, cut by the simulated path of the slides.
+    """Return the stock after the program of a run, cut by the simulated path of the slides.
 
     `heights(points)` gives the exact height over points (J, 2), 0 at the top, and `bounds(points)`
     what it may be; `section("x", 20.0)` a profile, `removed_mm3()` the volume between two bounds.
@@ -513,8 +516,8 @@ def verify(
 
 
 def signals(program: bytes | Program | str | Path, target: str | LoadedTarget) -> Signals:
-    """The lines of the target's controller over time while it runs a program: step and direction
-    lines, or the coils of its motors.
+    """Return the lines of the target's controller over time while it runs a program: step and
+    direction lines, or the coils of its motors.
 
     `count()` gives the steps of each motor and the time in s, `levels()` the bytes of all ports in
     chunks, `save("a.vcd")` a dump, a table (.csv) or a picture (.svg, .png). Raises MachineError
@@ -533,7 +536,7 @@ def compare(
     job: Job | None = None,
     judging: Judging | None = None,
 ) -> Comparison:
-    """A program of the target, simulated and judged as several variants, side by side.
+    """Return a program of the target, simulated and judged as several variants, side by side.
 
     `ways` are the variants: "interpolators", "mechanics", values of a key such as
     "backlash=0,0.1,0.2" (mm), or targets by names of your own. `rows` holds errors in µm and times
@@ -587,8 +590,8 @@ def calibrate(
     *,
     machine: str | Path | None = None,
 ) -> Calibrated:
-    """The machine's steps, backlash (mm) and squareness (rad) from measured coupons, with standard
-    uncertainties.
+    """Return the machine's steps, backlash (mm) and squareness (rad) from measured coupons, with
+    standard uncertainties.
 
     `measurements`: the TOML file that `camtool coupon --measurements` begins; it names the target
     unless one is given. `machine`: a file that extends the target with what is known so far.
@@ -640,9 +643,9 @@ def preview(
     titles: Sequence[str] = (),
     **looks: Unpack[Looks],
 ) -> Picture:
-    """The picture of a drawing, also of a file or of objects, or of the result of another call: a
-    toolpath, the predicted path of the slides in colours of its error (µm, with a scale), or
-    several such paths.
+    """Return the picture of a drawing, also of a file or of objects, or of the result of another
+    call: a toolpath, the predicted path of the slides in colours of its error (µm, with a scale),
+    or several such paths.
 
     Several values are drawn side by side, at one scale and with one scale of errors;
     `titles` replace their own, in order. Raises OptionError for looks that make no picture.
@@ -663,7 +666,7 @@ def preview(
 
 
 def _as_shown(value: Any) -> Shown:
-    """The value as one with a picture."""
+    """Return the value as one with a picture."""
     if isinstance(value, Shown):
         return value
     if isinstance(value, Drawing):

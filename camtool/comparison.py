@@ -221,7 +221,7 @@ def _mechanics(target: LoadedTarget, judging: Judging) -> list[ProgramVariant]:
 
 
 def _acts_on(effect: str, machine: Machine) -> bool:
-    """True if this part of the mechanics acts on the machine."""
+    """Return True if this part of the mechanics acts on the machine."""
     axes = list(machine.axes)
     return {
         "play": any(axis.backlash_mm for axis in axes) or any(machine.play_map.used),

@@ -35,7 +35,7 @@ class Given(Struct, frozen=True):
     file: str | None = None
 
     def refused(self, message: str, mend: str = "") -> OptionError:
-        """The error that says what is wrong with it."""
+        """Return the error that says what is wrong with it."""
         return OptionError(message, file=self.file, where=self.where, mend=mend)
 
     @contextmanager
@@ -75,7 +75,7 @@ class Key(Struct, frozen=True):
     default: Any = None
 
     def read(self, raw: Given) -> Any:
-        """The field's value."""
+        """Return the field's value."""
         return self.value.read(raw)
 
 
@@ -87,23 +87,23 @@ class Table(Struct, frozen=True):
     file: str | None = None
 
     def refused(self, message: str, mend: str = "") -> OptionError:
-        """The error that says what is wrong with the table as a whole."""
+        """Return the error that says what is wrong with the table as a whole."""
         return OptionError(message, file=self.file, where=self.where, mend=mend)
 
     def only(self, names: Iterable[str]) -> Table:
-        """The keys of these names."""
+        """Return the keys of these names."""
         name_set = set(names)
         chosen = {name: each for name, each in self.given.items() if name in name_set}
         return Table(chosen, self.where, self.file)
 
     def over(self, below: Table) -> Table:
-        """The keys of both, those of this table where both have one."""
+        """Return the keys of both, those of this table where both have one."""
         first_table = self if self.given else below
         return Table({**below.given, **self.given}, first_table.where, first_table.file)
 
 
 def table_of(values: object, known_keys: Iterable[str], table_place: str, file: str) -> Table:
-    """A TOML table, its keys checked; `table_place` is "" for the top of the file."""
+    """Return a TOML table, its keys checked; `table_place` is "" for the top of the file."""
     if not isinstance(values, dict):
         raise OptionError(
             f"{values!r} is no table",
@@ -126,7 +126,8 @@ def record_of(
     table: Table,
     base: Mapping[str, Any] | None = None,
 ) -> _T:
-    """The record of a table's values: each is tried alone first, so that its key can be named.
+    """Return the record of a table's values: each is tried alone first, so that its key can be
+    named.
 
     `base`: fields without which the record cannot be made.
     """
@@ -149,7 +150,8 @@ def record_of(
 
 
 def why_idle(keys: Mapping[str, Key], name: str, record: object) -> OptionError | None:
-    """Why a key has no effect in this record, as an error without a place; None when it has."""
+    """Return why a key has no effect in this record, as an error without a place; None when it
+    has."""
     condition = keys[name].only
     if condition is None:
         return None
@@ -173,7 +175,8 @@ def refuse_idle(keys: Mapping[str, Key], table: Table, record: object) -> None:
 
 
 def meant(name: str, known_names: Iterable[str]) -> str:
-    """The known name that was probably meant, and all known names: the mend of an unknown key."""
+    """Return the known name that was probably meant, and all known names: the mend of an
+    unknown key."""
     return f"{guess(name, known_names)}known keys: {_listed(known_names)}"
 
 
@@ -186,7 +189,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def plain(convert: Callable[[object], Any]) -> Callable[[Given], Any]:
-    """A reader that converts the bare value; errors get the place of the value."""
+    """Return a reader that converts the bare value; errors get the place of the value."""
 
     def read(raw: Given) -> Any:
         with raw.blamed():
@@ -216,7 +219,7 @@ def time(value: object) -> float:
 
 
 def number(value: object) -> float:
-    """A number without a unit."""
+    """Return a number without a unit."""
     text = number_text(value)
     try:
         return float(text)
@@ -297,7 +300,7 @@ def patterns(value: object) -> tuple[str, ...]:
 
 
 def number_text(value: object) -> str:
-    """The text of a number with or without a unit; OptionError for what is neither."""
+    """Return the text of a number with or without a unit; OptionError for what is neither."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise OptionError(f"{value!r} is no number", mend='write it like 0.2 or "0.2mm"')
     return value if isinstance(value, str) else repr(value)

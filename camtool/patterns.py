@@ -10,7 +10,7 @@ from functools import lru_cache
 
 
 def matches(patterns: Iterable[str], name: str) -> bool:
-    """True if any of the patterns matches the whole name."""
+    """Return True if any of the patterns matches the whole name."""
     names, wild = _compiled(tuple(patterns))
     folded = name.casefold()
     return folded in names or any(each.fullmatch(folded) for each in wild)

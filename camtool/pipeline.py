@@ -282,8 +282,9 @@ def _post_plan(
     plain_run: Callable[[], Run | None],
     whole_plan: Callable[[], Plan],
 ) -> Run:
-    """The program of a plan, judged; `plain_run` gives the run of its job without measures against
-    reversals and backlash, None where it takes none, `whole_plan` the plan undivided."""
+    """Return the program of a plan, judged; `plain_run` gives the run of its job without
+    measures against reversals and backlash, None where it takes none, `whole_plan` the plan
+    undivided."""
     from camtool.planning.checks import doubtful_settings
 
     job, progress = plan.job, posting.progress
@@ -397,8 +398,8 @@ def verify_program(
     judging: Judging | None = None,
     progress: Progress | None = None,
 ) -> Run:
-    """Any program of the target, simulated and judged, against `drawing` planned with `job` if it
-    is given. ProgramError names file, block and column."""
+    """Return any program of the target, simulated and judged, against `drawing` planned with
+    `job` if it is given. ProgramError names file, block and column."""
     judging, progress = judging or Judging(), progress or Progress()
     progress.begin(f"reading {PurePath(source).name}")
     run = read_program(data, target, source=source)
@@ -486,7 +487,7 @@ def _register_drawing(case: Case, drawing: Drawing, job: Job, *, align: bool) ->
 
 
 def _found_job(job: Job, registration: Registration) -> Job:
-    """The job with the tool of a program, and the drawing where it lies under it."""
+    """Return the job with the tool of a program, and the drawing where it lies under it."""
     if registration.diameter_mm is not None:
         operations = tuple(
             replace(each, tool=replace(each.tool, diameter_mm=registration.diameter_mm))
@@ -512,7 +513,8 @@ def convert_program(
     check: bool = True,
     progress: Progress | None = None,
 ) -> Run:
-    """A program of one target as the program of another, read back and judged against the first.
+    """Return a program of one target as the program of another, read back and judged against the
+    first.
 
     The second program shall make the moves that the first controller decodes. Setting part zero
     is left out, since a program begins there. Feeds that are too fast for the second machine
@@ -581,7 +583,8 @@ def _surface_finding(
 
 
 def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
-    """A program as the controller decodes it, not judged; ProgramError names the file too."""
+    """Return a program as the controller decodes it, not judged; ProgramError names the file
+    too."""
     import numpy as np
 
     decoded = _decode(data, target, source)
@@ -593,7 +596,7 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
 
 
 def lint_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
-    """A program as the controller decodes it, with all that is found without simulating it;
+    """Return a program as the controller decodes it, with all that is found without simulating it;
     ProgramError as `read_program`."""
     run = read_program(data, target, source=source)
     assert run.decoded is not None
@@ -614,7 +617,7 @@ def _decode(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
 
 
 def _folder_of(file: str) -> Path | None:
-    """The folder of a program, None where it came from elsewhere than a file."""
+    """Return the folder of a program, None where it came from elsewhere than a file."""
     path = Path(file)
     try:
         return path.parent if path.is_file() else None
@@ -625,8 +628,8 @@ def _folder_of(file: str) -> Path | None:
 def _write_and_read_back(
     moves: Toolpath, target: LoadedTarget, file: str, progress: Progress
 ) -> tuple[Program, Toolpath]:
-    """The program of these moves, which are of a file, and what the target's controller decodes
-    of it."""
+    """Return the program of these moves, which are of a file, and what the target's controller
+    decodes of it."""
     progress.begin("writing")
     try:
         program = target.target.write(moves, target.machine)
@@ -638,7 +641,7 @@ def _write_and_read_back(
 
 
 def _repeated_findings(program: Program, decoded: Toolpath) -> set[Finding]:
-    """The findings of the reader that the writer has made too, if in other words."""
+    """Return the findings of the reader that the writer has made too, if in other words."""
     codes = {finding.code for finding in program.findings}
     return {finding for finding in decoded.findings if finding.code in codes}
 
@@ -694,7 +697,7 @@ def _deepest_mm(step: Step) -> float:
 
 
 def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
-    """The tools of the operations that cut something, in the order of first use."""
+    """Return the tools of the operations that cut something, in the order of first use."""
     deepest: dict[tuple[Tool, str], float] = {}
     for step in steps:
         if step.runs:
@@ -717,8 +720,8 @@ def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
 def _with_times(
     planned: Planned, written: Toolpath, case: Case, verification: Verification
 ) -> Planned:
-    """The operations with the time that each takes, from where it has its turn: a change of tools
-    and the way to its first cut are its own."""
+    """Return the operations with the time that each takes, from where it has its turn: a change
+    of tools and the way to its first cut are its own."""
     import numpy as np
 
     if written.operations is None or case.row_from is None:
@@ -807,26 +810,26 @@ def _stock(job: Job) -> PlannedStock | None:
 def _gate_findings(
     verification: Verification, gates: Gates | None, findings: Iterable[Finding] = ()
 ) -> tuple[Finding, ...]:
-    """A finding for each of the limits that is exceeded."""
+    """Return a finding for each of the limits that is exceeded."""
     if gates is None:
         return ()
     return tuple(gate_findings(verification.report, gates, findings))
 
 
 def _compensate(wanted_path: Toolpath, machine: Machine) -> CompensatedToolpath:
-    """The moves with which the slides follow `wanted_path`."""
+    """Return the moves with which the slides follow `wanted_path`."""
     from camtool.planning.compensating import compensate
 
     return compensate(wanted_path, machine)
 
 
 def _without_measures(job: Job) -> Job:
-    """The job without its measures against reversals and backlash."""
+    """Return the job without its measures against reversals and backlash."""
     return replace(job, minimise="rapids", approach=False, compensate=False)
 
 
 def _before_figures(plain_run: Run | None) -> BaselineReport | None:
-    """The figures of the plain run, for the report."""
+    """Return the figures of the plain run, for the report."""
     if plain_run is None:
         return None
     if plain_run.verification is None or plain_run.failed:
@@ -933,7 +936,7 @@ def _stock_gates(
 
 
 def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> Toolpath:
-    """The decoded toolpath with the operations by which it is cut, as it was written."""
+    """Return the decoded toolpath with the operations by which it is cut, as it was written."""
     import numpy as np
 
     operations = written.operations
@@ -945,7 +948,7 @@ def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> 
 
 
 def _row_from(program: Program, decoded: Toolpath, written: Toolpath) -> Indices:
-    """(N,) the row of the toolpath from which each decoded row was written, −1 for none.
+    """Return (N,) the row of the toolpath from which each decoded row was written, −1 for none.
 
     A cycle is one block, written from its first cut. Where the controller makes the same moves of
     it as were planned, each is from its own row.
@@ -1006,8 +1009,8 @@ def _program_request(
 
 
 def _is_feed_named(job: Job, machine: Machine, wanted_path: Toolpath, row_from: Indices) -> Bools:
-    """(N,) true for the written rows whose feed the job names, or which follows from one that it
-    names; they were written from the rows `row_from` (N,) of `wanted_path`."""
+    """Return (N,) true for the written rows whose feed the job names, or which follows from one
+    that it names; they were written from the rows `row_from` (N,) of `wanted_path`."""
     import numpy as np
 
     from camtool.planning.settings import feeds_of
@@ -1025,6 +1028,6 @@ def _is_feed_named(job: Job, machine: Machine, wanted_path: Toolpath, row_from: 
 def _merge_findings(
     *groups: tuple[Finding, ...], left_out: Collection[Finding] = ()
 ) -> tuple[Finding, ...]:
-    """All findings in order, each once, except those `left_out`."""
+    """Return all findings in order, each once, except those `left_out`."""
     every = dict.fromkeys(finding for group in groups for finding in group)
     return tuple(finding for finding in every if finding not in left_out)

@@ -159,7 +159,7 @@ def _read_keys(file: Path) -> ProjectKeys:
 
 
 def names_machine(file: Path) -> bool:
-    """True if a `camtool.toml`, which need not exist, names a machine or a target."""
+    """Return True if a `camtool.toml`, which need not exist, names a machine or a target."""
     keys = _read_keys(file) if file.is_file() else ProjectKeys()
     return keys.machine is not None or keys.target is not None
 
@@ -185,12 +185,12 @@ def user_folder() -> Path:
 
 
 def _is_file_name(name: str) -> bool:
-    """True if a machine is given by the name of a file, and not by its own."""
+    """Return True if a machine is given by the name of a file, and not by its own."""
     return NAME.fullmatch(name) is None or Path(name).is_file()
 
 
 def _is_machine(file: Path) -> bool:
-    """True if a TOML file is that of a machine: it extends a target."""
+    """Return True if a TOML file is that of a machine: it extends a target."""
     try:
         return isinstance(read_table(file).get("extends"), str)
     except MachineError:

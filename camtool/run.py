@@ -130,8 +130,9 @@ class Run(Shown):
         return listing
 
     def scene(self, title: str | None = None) -> Scene:
-        """The moves of the program (without one, the planned moves) over the drawing, with the
-        slides' path where it was judged. The title is the name of the source by default."""
+        """Return the moves of the program (without one, the planned moves) over the drawing,
+        with the slides' path where it was judged. The title is the name of the source by
+        default."""
         from camtool.pictures.scene import scene_of
 
         return scene_of(
@@ -190,9 +191,9 @@ class Run(Shown):
         return ReportPage(title, self.report, findings, setup, pictures, stock)
 
     def to_shapely(self, tolerance_mm: float = CHORD_MM) -> dict[str, Any]:
-        """The program's "cuts" and "rapids" as lines of shapely with heights, mm in the work frame
-        (without a program those that are planned), and what the slides cut: "predicted", without
-        heights, where it was verified."""
+        """Return the program's "cuts" and "rapids" as lines of shapely with heights, mm in the
+        work frame (without a program those that are planned), and what the slides cut:
+        "predicted", without heights, where it was verified."""
         toolpath = self.wanted if self.decoded is None else self.decoded
         lines = {} if toolpath is None else shapely_of_moves(toolpath, tolerance_mm)
         if self.verification is not None:
@@ -227,28 +228,29 @@ class ShownDrawing(Shown, Drawing):
 
     @classmethod
     def of(cls, drawing: Drawing) -> ShownDrawing:
-        """The drawing as a value with a picture."""
+        """Return the drawing as a value with a picture."""
         return _as_shown(cls, drawing)
 
     def scene(self) -> Scene:
-        """The drawing, titled by its file."""
+        """Return the drawing, titled by its file."""
         from camtool.pictures.scene import scene_of_drawing
 
         return scene_of_drawing(self, PurePath(self.file).name)
 
     def to_shapely(self, tolerance_mm: float = CHORD_MM) -> dict[str, Any]:
-        """The drawing as {layer: geometry of shapely}: closed paths as polygons with their holes,
-        open ones as lines, marks as points; mm, arcs as chords within the tolerance."""
+        """Return the drawing as {layer: geometry of shapely}: closed paths as polygons with
+        their holes, open ones as lines, marks as points; mm, arcs as chords within the
+        tolerance."""
         return shapely_of(self, tolerance_mm)
 
     def to_ezdxf(self) -> Any:
-        """The drawing as a document of ezdxf in mm, with its layers and colours; arcs stay
+        """Return the drawing as a document of ezdxf in mm, with its layers and colours; arcs stay
         arcs."""
         return ezdxf_of(self)
 
     def to_svgpathtools(self) -> dict[str, list[Any]]:
-        """The drawing as {layer: Paths of svgpathtools}, mm, Y down; arcs stay arcs, marks are
-        left out."""
+        """Return the drawing as {layer: Paths of svgpathtools}, mm, Y down; arcs stay arcs,
+        marks are left out."""
         return svgpathtools_of(self)
 
     def __repr__(self) -> str:
@@ -274,11 +276,11 @@ class ShownToolpath(Shown, Toolpath):
         job: Job | None = None,
         target: LoadedTarget | None = None,
     ) -> ShownToolpath:
-        """The toolpath as a value with a picture, and that from which it was planned."""
+        """Return the toolpath as a value with a picture, and that from which it was planned."""
         return _as_shown(cls, toolpath, drawing=drawing, job=job, target=target)
 
     def scene(self) -> Scene:
-        """The moves over the drawing."""
+        """Return the moves over the drawing."""
         from camtool.pictures.scene import scene_of
 
         return scene_of(
@@ -291,8 +293,8 @@ class ShownToolpath(Shown, Toolpath):
         )
 
     def to_shapely(self, tolerance_mm: float = CHORD_MM) -> dict[str, Any]:
-        """The "cuts" and the "rapids" as lines of shapely with heights, mm in the work frame; arcs
-        as chords within the tolerance."""
+        """Return the "cuts" and the "rapids" as lines of shapely with heights, mm in the work
+        frame; arcs as chords within the tolerance."""
         return shapely_of_moves(self, tolerance_mm)
 
     def __repr__(self) -> str:
@@ -305,7 +307,7 @@ _Kind = TypeVar("_Kind", ShownDrawing, ShownToolpath)
 
 
 def _as_shown(kind: type[_Kind], record: Drawing | Toolpath, **extra_fields: object) -> _Kind:
-    """The record as one of this `kind`, with `extra_fields` fields."""
+    """Return the record as one of this `kind`, with `extra_fields` fields."""
     values = {each.name: getattr(record, each.name) for each in fields(record)}
     return kind(**(values | extra_fields))
 

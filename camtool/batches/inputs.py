@@ -183,7 +183,7 @@ def _is_dir(entry: os.DirEntry[str]) -> bool:
 
 
 def _is_file(entry: os.DirEntry[str]) -> bool:
-    """True for a file and for a broken link (reading it gives an error), not for pipes and
+    """Return True for a file and for a broken link (reading it gives an error), not for pipes and
     devices."""
     try:
         return entry.is_file() or (entry.is_symlink() and not Path(entry.path).exists())

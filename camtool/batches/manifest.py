@@ -69,7 +69,7 @@ class Manifest:
         return frozenset(places.of(self._out / name) for name in names)
 
     def may_replace(self, stem: str, name: str, data: bytes) -> bool:
-        """True if no file is there, or one that a batch made for this drawing and that is
+        """Return True if no file is there, or one that a batch made for this drawing and that is
         unchanged, or one that holds `data` already, as after a run that was killed."""
         place, entry = self._out / name, self._entries.get(stem)
         if not os.path.lexists(place):

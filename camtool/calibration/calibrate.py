@@ -148,7 +148,8 @@ def _sigma(residual: Floats, leverage: Floats, freedom: int, *, has_uncertainty:
 def _identifiable(
     parameters: Sequence[Parameter], matrix: Floats
 ) -> tuple[Bools, tuple[FixedParameter, ...]]:
-    """Mask (P,) of the parameters that the readings determine, and the others with the reason."""
+    """Return the mask (P,) of the parameters that the readings determine, and the others with
+    the reason."""
     size = np.linalg.norm(matrix, axis=0)
     is_free = size > 0.0
     touched = is_free.copy()
@@ -420,7 +421,7 @@ def _known_uncertainty(model: Model, solution: Solution) -> Uncertainty:
 
 
 def _rows(model: Model, values: Floats) -> Iterator[tuple[str, Floats]]:
-    """(key of `[uncertainty]`, (P,) derivatives of its value by the parameters)."""
+    """Yield (key of `[uncertainty]`, (P,) derivatives of its value by the parameters)."""
     for axis in "xy":
         for quantity, key in (("play", "backlash_mm"), ("scale", "scale")):
             is_own = [each.what == quantity and each.axis == axis for each in model.parameters]
@@ -432,7 +433,8 @@ def _rows(model: Model, values: Floats) -> Iterator[tuple[str, Floats]]:
 
 
 def _compensated(model: Model, axis: str) -> bool:
-    """True if the controller added compensation at the reversals of an axis in every coupon."""
+    """Return True if the controller added compensation at the reversals of an axis in every
+    coupon."""
     courses = [each for reading in model.readings for each in reading.measure.courses]
     return all(each.added_mm > 0.0 for each in courses if each.axis == axis)
 

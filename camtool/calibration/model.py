@@ -216,7 +216,7 @@ class Diameter(Struct, frozen=True):
         return 2.0 * self._from_middle((v_x / size, v_y / size), (e_x, e_y)) / size
 
     def _from_middle(self, u: tuple[Any, Any], e: tuple[Any, Any]) -> Any:
-        """Half of D(u), mm: the distance of an end from the middle."""
+        """Return half of D(u), mm: the distance of an end from the middle."""
         turn = 1.0 if self.ccw else -1.0
         runs_back = -turn * u[1].real < 0.0, turn * u[0].real < 0.0
         s_x, s_y = (
@@ -279,7 +279,7 @@ class Model:
         return np.array(columns).T
 
     def depends(self, values: Floats) -> Bools:
-        """Mask (n, P) of readings that depend on a parameter."""
+        """Return the mask (n, P) of readings that depend on a parameter."""
         slopes = np.abs(self.slopes(values))
         return np.asarray(slopes > ROUNDING * slopes.max(axis=0))
 

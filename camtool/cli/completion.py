@@ -158,7 +158,7 @@ class Fish(_Shell):
     source_template: ClassVar[str] = _FISH
 
     def format_completion(self, item: CompletionItem[Any]) -> str:
-        """The kind, the value, and behind a tab the help."""
+        """Return the kind, the value, and behind a tab the help."""
         text, answer = _help(item), super().format_completion(item)
         return f"{answer}\t{text}" if text else answer
 

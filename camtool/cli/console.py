@@ -204,7 +204,7 @@ class _Talk:
         return None
 
     def _stopped(self, time_s: float, told_s: float) -> bool:
-        """True when the machine stands, or its state is unknown."""
+        """Return True when the machine stands, or its state is unknown."""
         terminal = self._terminal
         silent = time_s - max(told_s, self._heard) >= CONFIRMS_S
         if terminal.stands:

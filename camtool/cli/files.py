@@ -141,8 +141,8 @@ def _check_file(name: str) -> None:
 
 
 def _exists(place: Path) -> bool:
-    """True if the file exists; OSError if that cannot be determined: a loop of links, a name too
-    long."""
+    """Return True if the file exists; OSError if that cannot be determined: a loop of links, a
+    name too long."""
     try:
         place.stat()
     except FileNotFoundError:
@@ -180,7 +180,8 @@ def _place_identity(name: str) -> Hashable:
 
 
 def _is_stream(name: str) -> bool:
-    """True for `-` and for devices and pipes, which cannot be replaced by a renamed file."""
+    """Return True for `-` and for devices and pipes, which cannot be replaced by a renamed
+    file."""
     if name == STDOUT:
         return True
     try:
@@ -357,7 +358,7 @@ def seal(svg: bytes, maker: str) -> bytes:
 
 
 def is_foreign(place: str | Path, maker: str) -> bool:
-    """True if the file exists and is no unchanged picture of this maker."""
+    """Return True if the file exists and is no unchanged picture of this maker."""
     if not os.path.lexists(place):
         return False
     try:

@@ -344,7 +344,7 @@ def machine_text(
 
 
 def _is_about(error: MachineError, key: str) -> bool:
-    """True if an error is about this key of a machine file."""
+    """Return True if an error is about this key of a machine file."""
     table, _, name = key.rpartition(".")
     return error.where == f"table [{table}], key {name}"
 

@@ -52,7 +52,7 @@ def _echo(text: str) -> None:
 
 
 def in_colour(stream: TextIO | None) -> bool:
-    """True if a stream is a terminal whose user has set neither NO_COLOR (no-color.org) nor
+    """Return True if a stream is a terminal whose user has set neither NO_COLOR (no-color.org) nor
     CLICOLOR=0 (bixense.com/clicolors); a closed stream is None."""
     variable = os.environ.get
     return (

@@ -478,8 +478,8 @@ class DrawingFlags(Struct, frozen=True):
         return read_for_job(data, file, options, job)
 
     def is_program(self, name: str, target: LoadedTarget) -> bool:
-        """True if a file has the extension of the target's programs, or a content that is no
-        drawing. `--format` says that it is one, and stdin is taken for one."""
+        """Return True if a file has the extension of the target's programs, or a content that
+        is no drawing. `--format` says that it is one, and stdin is taken for one."""
         suffix = Path(name).suffix
         if suffix.lower() == target.machine.target.extension:
             return True
@@ -514,7 +514,7 @@ def drawing_options(command: Command) -> Command:
 
 
 def _read_flag(section: str, name: str, flag: Flag, kind: Any) -> Option:
-    """The flag of an option of reading; None unless given, so that defaults apply."""
+    """Return the flag of an option of reading; None unless given, so that defaults apply."""
     settings: dict[str, Any] = {"metavar": flag.metavar}
     if kind is bool:
         settings = {"is_flag": True, "default": None}

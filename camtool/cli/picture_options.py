@@ -35,7 +35,7 @@ PICTURES = (".svg", ".png", ".html")
 
 
 def is_viewer(name: str) -> bool:
-    """True if a picture of this name is a page with pan, zoom and play."""
+    """Return True if a picture of this name is a page with pan, zoom and play."""
     return PurePath(name).suffix.lower() == ".html"
 
 
@@ -56,7 +56,7 @@ class Canvas(Struct, frozen=True):
     layered: bool = True
 
     def has(self, layer: Layer) -> bool:
-        """True if its pictures can have the layer."""
+        """Return True if its pictures can have the layer."""
         if layer.needs == "path":
             return self.predicted
         return layer.needs == "drawing" or self.moves
@@ -330,5 +330,5 @@ class Painter(Struct, frozen=True, dict=True):
 
 
 def _is_judged(scenes: Sequence[Scene]) -> bool:
-    """True if all scenes have a predicted path."""
+    """Return True if all scenes have a predicted path."""
     return all(scene.trace_points is not None for scene in scenes)

@@ -309,7 +309,7 @@ class RequestedOutputs(Struct, frozen=True):
         self.outputs.check(self.reads, self.program(extension))
 
     def places(self) -> list[str | None]:
-        """Files of a program whose name is known."""
+        """Return files of a program whose name is known."""
         outputs = self.outputs
         return [self.output, outputs.preview, outputs.report, outputs.page, outputs.beside]
 

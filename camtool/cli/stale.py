@@ -152,7 +152,7 @@ def _files_named(name: Path) -> list[Path]:
 
 
 def _has_program(name: Path) -> bool:
-    """True if a file there may be a program: a dialect may have several suffixes."""
+    """Return True if a file there may be a program: a dialect may have several suffixes."""
     return any(file.suffix.lower() not in (*SUFFIXES, OWN_JOB) for file in _files_named(name))
 
 

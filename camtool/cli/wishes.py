@@ -214,7 +214,7 @@ def _streams() -> Iterator[int]:
 
 
 def _is_lost(file: int) -> bool:
-    """True if a terminal was closed, or a pipe has no reader any more."""
+    """Return True if a terminal was closed, or a pipe has no reader any more."""
     if not hasattr(select, "poll"):
         return False
     looking = select.poll()
@@ -223,8 +223,8 @@ def _is_lost(file: int) -> bool:
 
 
 def takes_more(stream: TextIO | None) -> bool:
-    """True if a stream can be written to at once. One that cannot, such as a terminal after Ctrl-S
-    or a full pipe, must not keep a machine waiting."""
+    """Return True if a stream can be written to at once. One that cannot, such as a terminal
+    after Ctrl-S or a full pipe, must not keep a machine waiting."""
     if stream is None or not hasattr(select, "poll"):
         return True
     looking = select.poll()

@@ -133,7 +133,7 @@ def _grown_boxes(boxes: Floats, reach_mm: float | Floats) -> Floats:
 def touching_boxes(
     boxes: Floats, same: Ints, differ: Ints, is_searched: Bools, *, max_pairs: int
 ) -> tuple[Ints, Ints]:
-    """Rows (J,), (J,), the lesser first, of boxes (K, 4) that touch; each pair once.
+    """Return rows (J,), (J,), the lesser first, of boxes (K, 4) that touch; each pair once.
 
     Both have the same number in `same` (K,) and different ones in `differ` (K,), and `is_searched`
     (K,) is true for one of them. No more than `max_pairs` pairs, and none of boxes that come late

@@ -734,7 +734,7 @@ def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float)
 
 
 def _is_gap(ends: Ends, lengths: Floats, one: Ints, other: Ints, size: Floats) -> Bools:
-    """Mask of the pairs of near ends that look as if they were meant to meet."""
+    """Return the mask of the pairs of near ends that look as if they were meant to meet."""
     same_path = one // 2 == other // 2
     shorter = np.minimum(lengths[one // 2], lengths[other // 2])
     is_small = size <= np.where(same_path, OWN_GAP_SHARE, GAP_SHARE) * shorter

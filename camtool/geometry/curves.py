@@ -40,11 +40,11 @@ class Curve(Protocol):
         ...
 
     def point(self, t: Floats) -> Floats:
-        """Positions (n, 2) mm at parameters (n,)."""
+        """Return positions (n, 2) mm at parameters (n,)."""
         ...
 
     def tangent(self, t: Floats) -> Floats:
-        """Derivatives (n, 2) at parameters (n,)."""
+        """Return derivatives (n, 2) at parameters (n,)."""
         ...
 
 
@@ -65,11 +65,11 @@ class FunctionCurve(Struct, frozen=True, eq=False):
     breaks: Floats
 
     def point(self, t: Floats) -> Floats:
-        """Positions (n, 2) mm."""
+        """Return positions (n, 2) mm."""
         return self.at(t)
 
     def tangent(self, t: Floats) -> Floats:
-        """Derivatives (n, 2)."""
+        """Return derivatives (n, 2)."""
         return self.derivative(t)
 
 
@@ -90,15 +90,15 @@ class BezierCurve(Struct, frozen=True, eq=False):
         return np.array([0.0, 1.0])
 
     def point(self, t: Floats) -> Floats:
-        """Positions (n, 2) mm."""
+        """Return positions (n, 2) mm."""
         return _bernstein(self.control, t)
 
     def tangent(self, t: Floats) -> Floats:
-        """Derivatives (n, 2)."""
+        """Return derivatives (n, 2)."""
         return (len(self.control) - 1.0) * _bernstein(np.diff(self.control, axis=0), t)
 
     def pieces(self) -> Pieces:
-        """The curve itself, a single piece."""
+        """Return the curve itself, a single piece."""
         rows = np.ones((1, len(self.control), 3))
         rows[0, :, :2] = self.control - self.control[0]
         return Pieces(rows, self.control[0], self.control[[0, -1]])
@@ -123,7 +123,7 @@ class EllipseCurve(Struct, frozen=True, eq=False):
         return np.array([0.0, abs(self.end - self.start)])
 
     def point(self, t: Floats) -> Floats:
-        """Positions (n, 2) mm."""
+        """Return positions (n, 2) mm."""
         angle = self._angle(t)[:, None]
         return np.asarray(
             np.asarray(self.centre)
@@ -132,7 +132,7 @@ class EllipseCurve(Struct, frozen=True, eq=False):
         )
 
     def tangent(self, t: Floats) -> Floats:
-        """Derivatives (n, 2)."""
+        """Return derivatives (n, 2)."""
         angle = self._angle(t)[:, None]
         along = np.cos(angle) * np.asarray(self.minor) - np.sin(angle) * np.asarray(self.major)
         return np.asarray(np.copysign(1.0, self.end - self.start) * along)
@@ -200,18 +200,18 @@ class SplineCurve(Struct, frozen=True, eq=False):
         return distinct(self.knots[self.degree : len(self.control) + 1])
 
     def point(self, t: Floats) -> Floats:
-        """Positions (n, 2) mm."""
+        """Return positions (n, 2) mm."""
         value = self._homogeneous(t, 0)
         return np.asarray(value[:, :2] / value[:, 2:])
 
     def tangent(self, t: Floats) -> Floats:
-        """Derivatives (n, 2): (A'w − A w')/w² of the homogeneous curve (A, w)."""
+        """Return derivatives (n, 2): (A'w − A w')/w² of the homogeneous curve (A, w)."""
         value, slope = self._homogeneous(t, 0), self._homogeneous(t, 1)
         weight = value[:, 2:]
         return np.asarray((slope[:, :2] * weight - value[:, :2] * slope[:, 2:]) / weight**2)
 
     def pieces(self) -> Pieces:
-        """The Bézier points of each span a..b between knots: the blossom at (a … a, b … b).
+        """Return the Bézier points of each span a..b between knots: the blossom at (a … a, b … b).
 
         de Boor's triangle with an argument of its own at each level is the blossom.
         """

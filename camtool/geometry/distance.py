@@ -226,7 +226,7 @@ class _PathBoxes(Struct, frozen=True, eq=False):
         return cls(paths, segment_boxes(segments), first)
 
     def comes_near(self, row: int, others: _PathBoxes, column: int, reach_mm: float) -> bool:
-        """True if a box of a segment comes within the reach of one of another path."""
+        """Return True if a box of a segment comes within the reach of one of another path."""
         one = self.segments[self.first[row] : self.first[row + 1]]
         other = others.segments[others.first[column] : others.first[column + 1]]
         (low, high), (other_low, other_high) = (
@@ -287,7 +287,8 @@ class _SegmentRows(Struct, frozen=True, eq=False):
         return linear, self.four_b * _dot(a, b) + 2.0 * self.flat * _cross(self.d, a)
 
     def is_beside(self, points: Floats) -> Bools:
-        """True where the nearest point of the full circle or line lies within the segment."""
+        """Return True where the nearest point of the full circle or line lies within the
+        segment."""
         after_a = _dot(points - self.a, self.tangent_a) >= 0.0
         before_b = _dot(points - self.b, self.tangent_b) <= 0.0
         return np.asarray(after_a & before_b)
@@ -305,7 +306,8 @@ def _distance(points: Floats, rows: _SegmentRows) -> Floats:
 
 
 def paired_distances(a: Segments, b: Segments) -> tuple[Floats, Floats]:
-    """(N,) distances of N pairs of segments, 0 where they cross, and (N, 2) where that is."""
+    """Return (N,) distances of N pairs of segments, 0 where they cross, and (N, 2) where that
+    is."""
     rows_a, rows_b = _SegmentRows.of(a), _SegmentRows.of(b)
     candidates: list[tuple[Floats, Floats]] = []
     for points in (a.start, a.end):
@@ -346,7 +348,8 @@ def _toward(
 
 
 def _common_points(a: _SegmentRows, b: _SegmentRows) -> tuple[Floats, Floats]:
-    """The two points (N, 2) that the whole lines or circles of each pair share; NaN if none.
+    """Return the two points (N, 2) that the whole lines or circles of each pair share; NaN if
+    none.
 
     power(x) = 4b |x|² + l·x + k, and 4b_b·power_a − 4b_a·power_b is linear: the line through both
     points. (Two lines: power_a itself is it.) On that line, x0 + s e, the power of the rounder
@@ -379,7 +382,7 @@ def _common_points(a: _SegmentRows, b: _SegmentRows) -> tuple[Floats, Floats]:
 
 
 def _turn_left(vectors: Floats) -> Floats:
-    """Vectors (..., 2) turned by +90°."""
+    """Return vectors (..., 2) turned by +90°."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 

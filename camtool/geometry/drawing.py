@@ -21,7 +21,7 @@ TEXT_KINDS = frozenset(("text", "mtext", "attrib", "attdef"))
 
 
 def is_text(source: str) -> bool:
-    """True if a path of this source (`TEXT 2F`) is a part of a letter."""
+    """Return True if a path of this source (`TEXT 2F`) is a part of a letter."""
     return source.partition(" ")[0].casefold() in TEXT_KINDS
 
 

@@ -28,7 +28,8 @@ from camtool.records import replace
 
 
 def drawing_extents(drawing: Drawing) -> Floats:
-    """(2, 2) [[xmin, xmax], [ymin, ymax]] of paths and marks, mm; GeometryError without any."""
+    """Return (2, 2) [[xmin, xmax], [ymin, ymax]] of paths and marks, mm; GeometryError without
+    any."""
     boxes = [extents(drawing.paths)] if len(drawing.paths) else []
     if drawing.marks:
         points = np.array([mark.at_mm for mark in drawing.marks])
@@ -71,7 +72,7 @@ def facts_of(drawing: Drawing) -> dict[str, Any]:
 
 
 def drawing_facts(drawing: Drawing) -> dict[str, Any]:
-    """All that can be counted, ready for JSON; lengths in mm, places as [x, y].
+    """Return all that can be counted, ready for JSON; lengths in mm, places as [x, y].
 
     `closed`, `open`, `marks`, `lines`, `arcs`: how many. `length_mm`: of all paths. `layers`: by
     name closed, open and marks; `colours` and `line_types`: paths by name ("" is none).
@@ -140,7 +141,7 @@ def _times(names: Iterable[str]) -> dict[str, int]:
 
 
 def _open_ends(drawing: Drawing) -> list[dict[str, Any]]:
-    """Both ends of each open path."""
+    """Return both ends of each open path."""
     paths = np.flatnonzero(~drawing.paths.closed)
     offsets, vertices = drawing.paths.offsets, drawing.paths.vertices
     rows = np.column_stack([offsets[paths], offsets[paths + 1] - 1]).ravel()
@@ -195,14 +196,14 @@ class Feature(Struct, frozen=True):
 
 
 def smallest_radius(segments: Segments) -> Feature | None:
-    """The arc of the least radius and its middle; None without arcs."""
+    """Return the arc of the least radius and its middle; None without arcs."""
     if not segments.is_arc.any():
         return None
     return _of_row(segments, int(np.argmin(segments.radius)), segments.radius)
 
 
 def shortest_segment(segments: Segments) -> Feature | None:
-    """The shortest line or arc and its middle; None without any."""
+    """Return the shortest line or arc and its middle; None without any."""
     if not len(segments):
         return None
     lengths = segment_lengths(segments)
@@ -215,7 +216,8 @@ def _of_row(segments: Segments, row: int, sizes: Floats) -> Feature:
 
 
 def smallest_contour(lines: Polylines) -> Feature | None:
-    """The closed path whose box has the shortest shorter side, and the middle of that box."""
+    """Return the closed path whose box has the shortest shorter side, and the middle of that
+    box."""
     closed = np.flatnonzero(lines.closed)
     if not len(closed):
         return None
@@ -227,7 +229,8 @@ def smallest_contour(lines: Polylines) -> Feature | None:
 
 
 def narrowest_wall(lines: Polylines) -> Feature | None:
-    """The least distance between two closed paths, 0 where they cross; None with fewer than two.
+    """Return the least distance between two closed paths, 0 where they cross; None with fewer than
+    two.
 
     Where more than MAX_WALL_PAIRS segments lie as near, it is an upper bound.
     """
@@ -259,7 +262,8 @@ def narrowest_wall(lines: Polylines) -> Feature | None:
 
 
 def _closed_segments(lines: Polylines) -> Segments | None:
-    """The segments of closed paths, near paths near each other in the list; None below two."""
+    """Return the segments of closed paths, near paths near each other in the list; None below
+    two."""
     closed = np.flatnonzero(lines.closed)
     if len(closed) < 2:
         return None
@@ -275,7 +279,8 @@ _MORTON_BITS = 16
 
 
 def _spread(numbers: Ints) -> Ints:
-    """The bits of each number with a gap before each (Morton order keeps near cells near)."""
+    """Return the bits of each number with a gap before each (Morton order keeps near cells
+    near)."""
     spread = np.zeros_like(numbers)
     for bit_index in range(_MORTON_BITS):
         spread |= (numbers >> bit_index & 1) << 2 * bit_index
@@ -287,7 +292,7 @@ def _grown(boxes: Floats, margin: float) -> Floats:
 
 
 def _nearer(segments: Segments, one: Ints, other: Ints, nearest: Feature) -> Feature:
-    """The least distance of these pairs, if it is below the one found before."""
+    """Return the least distance of these pairs, if it is below the one found before."""
     for begin in range(0, len(one), _PAIRS_AT_A_TIME):
         a, b = one[begin : begin + _PAIRS_AT_A_TIME], other[begin : begin + _PAIRS_AT_A_TIME]
         distance, points = paired_distances(segments[a], segments[b])

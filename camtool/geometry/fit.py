@@ -79,7 +79,7 @@ class Fit(Struct, frozen=True, eq=False):
 
 
 def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
-    """Arcs and lines within `tolerance_mm` of the curve, G1 wherever the curve is.
+    """Return arcs and lines within `tolerance_mm` of the curve, G1 wherever the curve is.
 
     Raises GeometryError when the curve is not finite, or for a tolerance below
     `POSITION_EPS_MM` (positions nearer than that are one).
@@ -94,7 +94,8 @@ def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
 
 
 def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: float) -> Floats:
-    """An arc as vertices (n, 3), the last one its end (bulge 0); CCW when the sweep is positive.
+    """Return an arc as vertices (n, 3), the last one its end (bulge 0); CCW when the sweep is
+    positive.
 
     More than a half circle is cut into equal parts; a full circle ends exactly where it begins.
     """
@@ -150,7 +151,7 @@ def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
 
 
 def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
-    """A curve given by functions."""
+    """Return a curve given by functions."""
     share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
 
     def samples(t: Floats) -> Floats:
@@ -168,9 +169,9 @@ def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
 def _fitted(
     nodes_of: Callable[[float, int], Nodes], samples: Callable[[Floats], Floats], tolerance: float
 ) -> tuple[Floats, Judged, Nodes]:
-    """The chain (n, 3) within `tolerance`, its deviations, and the nodes it was chosen from.
-    `samples` gives `MEASURE_STEPS` points of the curve for each step between parameters (n,), and
-    the last one.
+    """Return the chain (n, 3) within `tolerance`, its deviations, and the nodes it was chosen
+    from. `samples` gives `MEASURE_STEPS` points of the curve for each step between parameters
+    (n,), and the last one.
 
     A fit whose error turns out too large is done again over finer nodes, since errors peak
     between them; if that is not enough, with less of the tolerance as well.
@@ -264,7 +265,7 @@ class _Directions:
         self.min_length = VANISHING_TANGENT * float(lengths.max())
 
     def both_sides(self, t: Floats) -> tuple[Floats, Floats]:
-        """Directions (n, 2) just before and just after each t."""
+        """Return directions (n, 2) just before and just after each t."""
         tangent = _finite(self.curve.tangent(t))
         length = np.hypot(tangent[:, 0], tangent[:, 1])
         is_regular = length > self.min_length
@@ -276,7 +277,7 @@ class _Directions:
         return before, after
 
     def one_sided(self, t: Floats, side: float) -> Floats:
-        """Directions (n, 2) a little before (−1) or after (+1) each t, inside the curve."""
+        """Return directions (n, 2) a little before (−1) or after (+1) each t, inside the curve."""
         place = np.searchsorted(self.breaks, t, side="left" if side < 0.0 else "right")
         place = np.clip(place, 1, len(self.breaks) - 1)
         room = (self.breaks[place] - self.breaks[place - 1]) * side
@@ -325,8 +326,8 @@ def _refine(
 
 
 def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: float) -> Bools:
-    """Mask of the steps that must be halved, by points (j, steps, 2) of the curve within each
-    step."""
+    """Return the mask of the steps that must be halved, by points (j, steps, 2) of the curve
+    within each step."""
     error = step_errors(nodes.point, nodes.leave, nodes.arrive, rows, probes)
     arms = probes[0] - nodes.point[rows], probes[0] - nodes.point[rows + 1]
     size = np.maximum(np.hypot(*arms[0].T), np.hypot(*arms[1].T))
@@ -353,7 +354,7 @@ def _merge_nodes(nodes: _NodeColumns) -> Nodes:
 
 
 def turns(a: Floats, b: Floats) -> Floats:
-    """Angles (n,) rad, 0..π, between directions (n, 2)."""
+    """Return angles (n,) rad, 0..π, between directions (n, 2)."""
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return np.asarray(np.abs(np.arctan2(cross, a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1])))
 

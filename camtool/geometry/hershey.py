@@ -64,7 +64,7 @@ _CIRCLE = ((0, -3), (2.1, -2.1), (3, 0), (2.1, 2.1), (0, 3), (-2.1, 2.1), (-3, 0
 
 @lru_cache(maxsize=1)
 def _font() -> MappingProxyType[str, Glyph]:
-    """Every letter of the font, with the signs that are made from it."""
+    """Return every letter of the font, with the signs that are made from it."""
     from HersheyFonts import HersheyFonts
 
     reader = HersheyFonts()
@@ -122,7 +122,7 @@ BOX = Glyph((((3, -12), (15, -12), (15, 9), (3, 9), (3, -12)),), 18.0)
 
 
 def glyph(letter: str) -> Glyph | None:
-    """The strokes of one character, None when they are unknown."""
+    """Return the strokes of one character, None when they are unknown."""
     letter = _SAME.get(letter, letter)
     font = _font()
     if letter in font:

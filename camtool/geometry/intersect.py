@@ -49,14 +49,14 @@ class Crossings(Struct, frozen=True, eq=False):
         return len(self.row_a)
 
     def __getitem__(self, rows: Bools | Ints) -> Crossings:
-        """The chosen rows."""
+        """Return the chosen rows."""
         return Crossings(*(column[rows] for column in astuple(self)))
 
 
 def crossings(
     segments_a: Segments, segments_b: Segments, *, position_eps_mm: float = POSITION_EPS_MM
 ) -> Crossings:
-    """All common points of any segment of `a` with any segment of `b` (see `Crossings`)."""
+    """Return all common points of any segment of `a` with any segment of `b` (see `Crossings`)."""
     boxes_a, boxes_b = segment_boxes(segments_a), segment_boxes(segments_b)
     frames_a, frames_b = Frames.of(segments_a), Frames.of(segments_b)
     parts = [
@@ -67,7 +67,7 @@ def crossings(
 
 
 def self_crossings(segments: Segments) -> Crossings:
-    """All common points of two different rows, each pair once (row_a < row_b).
+    """Return all common points of two different rows, each pair once (row_a < row_b).
 
     The end that a row shares with the next one of its path is left out.
     """
@@ -182,7 +182,8 @@ def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
 
 
 def _if_apart(points: Floats, a: Frames, b: Frames, eps: float) -> Floats:
-    """The points (K, 2), but NaN where the curves stay within `eps` of each other all along.
+    """Return the points (K, 2), but NaN where the curves stay within `eps` of each other all
+    along.
 
     There rounding alone would place a crossing; the ends of what they share are found as ends.
     """
@@ -193,7 +194,8 @@ def _if_apart(points: Floats, a: Frames, b: Frames, eps: float) -> Floats:
 
 
 def _angle_and_bend(points: Floats, a: Frames, b: Frames) -> tuple[Floats, Floats]:
-    """Sine of the angle at common points (K, 2), and how much more one curve bends, 1/mm."""
+    """Return the sine of the angle at common points (K, 2), and how much more one curve bends,
+    1/mm."""
     tangent_a = a.tangent_at(a.along(points) / a.length)
     tangent_b = b.tangent_at(b.along(points) / b.length)
     same_way = np.where(dot(tangent_a, tangent_b) < 0.0, -1.0, 1.0)
@@ -201,7 +203,7 @@ def _angle_and_bend(points: Floats, a: Frames, b: Frames) -> tuple[Floats, Float
 
 
 def _touching(crossings: Crossings, frames: Frames, eps: float) -> Bools:
-    """True for meetings at an end, and where the curves enter each other by `eps` at most.
+    """Return True for meetings at an end, and where the curves enter each other by `eps` at most.
 
     Two curves that meet at the angle θ, with curvatures that differ by k, part again after 2θ/k,
     and are θ²/(2k) apart at most until then.
@@ -231,7 +233,7 @@ crossing."""
 
 
 def self_crossings_of(lines: Polylines, layers: Sequence[str]) -> tuple[SelfCrossing, ...]:
-    """The places where closed paths cross themselves, path by path, each place once.
+    """Return the places where closed paths cross themselves, path by path, each place once.
 
     At most about MAX_CROSSINGS.
     """
@@ -301,7 +303,7 @@ def _pass_through(crossings: Crossings, segments: Segments, frames: Frames) -> B
 
 
 def _passage(row: Ints, t: Floats, segments: Segments, frames: Frames) -> tuple[Floats, Floats]:
-    """The directions (J,) rad back and on at the fraction t of these rows."""
+    """Return the directions (J,) rad back and on at the fraction t of these rows."""
     before, after = _neighbours(segments)
     arriving_row = np.where(t == 0.0, before[row], row)
     goes = np.where(t == 1.0, after[row], row)
@@ -312,7 +314,7 @@ def _passage(row: Ints, t: Floats, segments: Segments, frames: Frames) -> tuple[
 
 
 def _neighbours(segments: Segments) -> tuple[Ints, Ints]:
-    """The rows before and after each row in its closed path."""
+    """Return the rows before and after each row in its closed path."""
     rows = np.arange(len(segments))
     first = np.searchsorted(segments.path, segments.path)
     last = np.searchsorted(segments.path, segments.path, side="right") - 1
@@ -322,7 +324,7 @@ def _neighbours(segments: Segments) -> tuple[Ints, Ints]:
 
 
 def _one_passage(pairs: Crossings, segments: Segments) -> Bools:
-    """True for the vertex that a row shares with the next one of its path."""
+    """Return True for the vertex that a row shares with the next one of its path."""
     _, after = _neighbours(segments)
     a_first = (after[pairs.row_a] == pairs.row_b) & (pairs.ta == 1.0) & (pairs.tb == 0.0)
     b_first = (after[pairs.row_b] == pairs.row_a) & (pairs.tb == 1.0) & (pairs.ta == 0.0)

@@ -23,7 +23,7 @@ SHALLOW_BULGE = 1e-3
 
 
 def path_lengths(lines: Polylines) -> Floats:
-    """(M,) length of each path, mm."""
+    """Return (M,) length of each path, mm."""
     lengths = np.zeros(len(lines))
     for segments in Segments.lots(lines):
         np.add.at(lengths, segments.path, segment_lengths(segments))
@@ -31,7 +31,7 @@ def path_lengths(lines: Polylines) -> Floats:
 
 
 def segment_lengths(segments: Segments) -> Floats:
-    """(K,) length of each line and arc, mm."""
+    """Return (K,) length of each line and arc, mm."""
     chord = segments.end - segments.start
     lengths = np.hypot(chord[:, 0], chord[:, 1])
     # length = radius · |sweep| = chord · (1 + b²) · atan(b)/b
@@ -42,7 +42,7 @@ def segment_lengths(segments: Segments) -> Floats:
 
 
 def signed_areas(lines: Polylines) -> Floats:
-    """(M,) area inside each closed path, mm², CCW positive; 0 for open paths.
+    """Return (M,) area inside each closed path, mm², CCW positive; 0 for open paths.
 
     Exact with arcs: the shoelace formula over the chords and the area between chord and arc.
     """
@@ -62,7 +62,7 @@ def signed_areas(lines: Polylines) -> Floats:
 
 
 def _area_beside(bulge: Floats) -> Floats:
-    """Signed area between a chord of length 1 and its arc.
+    """Return the signed area between a chord of length 1 and its arc.
 
     radius²/2 · (sweep − sin sweep)  with  radius = (1 + b²)/(4|b|)  and
     sin sweep = 4b(1 − b²)/(1 + b²)²;  for small b it is b/3 · (1 + b²/5 + …).
@@ -76,17 +76,18 @@ def _area_beside(bulge: Floats) -> Floats:
 
 
 def length(p: Polyline) -> float:
-    """Length of a path, mm."""
+    """Return the length of a path, mm."""
     return float(path_lengths(Polylines.of([p]))[0])
 
 
 def signed_area(p: Polyline) -> float:
-    """Area inside a closed path, mm², CCW positive; 0 for an open one."""
+    """Return the area inside a closed path, mm², CCW positive; 0 for an open one."""
     return float(signed_areas(Polylines.of([p]))[0])
 
 
 def segment_boxes(segments: Segments) -> Floats:
-    """(K, 4) xmin, ymin, xmax, ymax of each line and arc, mm, exact with the extremes of arcs."""
+    """Return (K, 4) xmin, ymin, xmax, ymax of each line and arc, mm, exact with the extremes of
+    arcs."""
     low = np.minimum(segments.start, segments.end)
     high = np.maximum(segments.start, segments.end)
     rows, points = _extremes(segments)
@@ -96,7 +97,7 @@ def segment_boxes(segments: Segments) -> Floats:
 
 
 def _extremes(segments: Segments) -> tuple[Ints, Floats]:
-    """Rows of arcs and the points (J, 2) in them where the tangent lies along an axis.
+    """Return rows of arcs and the points (J, 2) in them where the tangent lies along an axis.
 
     The tangent turns from  chord direction − sweep/2  to  chord direction + sweep/2;  it lies
     along an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at most.
@@ -114,7 +115,7 @@ def _extremes(segments: Segments) -> tuple[Ints, Floats]:
 
 
 def path_extents(lines: Polylines) -> Floats:
-    """(M, 2, 2) [[xmin, xmax], [ymin, ymax]] of each path, mm, exact with arcs."""
+    """Return (M, 2, 2) [[xmin, xmax], [ymin, ymax]] of each path, mm, exact with arcs."""
     low = np.full((len(lines), 2), np.inf)
     high = np.full((len(lines), 2), -np.inf)
     for segments in Segments.lots(lines):
@@ -125,7 +126,8 @@ def path_extents(lines: Polylines) -> Floats:
 
 
 def extents(lines: Polylines) -> Floats:
-    """(2, 2) [[xmin, xmax], [ymin, ymax]] of all paths, mm; GeometryError when there are none."""
+    """Return (2, 2) [[xmin, xmax], [ymin, ymax]] of all paths, mm; GeometryError when there are
+    none."""
     if len(lines) == 0:
         raise GeometryError("no paths, so there are no extents")
     each = path_extents(lines)
@@ -133,7 +135,7 @@ def extents(lines: Polylines) -> Floats:
 
 
 def point_at(segments: Segments, row_indices: Ints, t: Floats) -> Floats:
-    """(J, 2) the points at the fractions t (J,) in 0..1 of the length of these rows, mm."""
+    """Return (J, 2) the points at the fractions t (J,) in 0..1 of the length of these rows, mm."""
     start, end = segments.start.take(row_indices, axis=0), segments.end.take(row_indices, axis=0)
     bulge = segments.bulge.take(row_indices)
     arcs = np.flatnonzero(bulge)
@@ -179,7 +181,8 @@ def chords_of(segments: Segments, tolerance_mm: float, min_count: int = 1) -> Ch
 
 
 def sample(p: Polyline, step_mm: float) -> Floats:
-    """(J, 2) points along the path, all its vertices among them, no farther apart than step_mm.
+    """Return (J, 2) points along the path, all its vertices among them, no farther apart than
+    step_mm.
 
     They lie on the arcs. The first point of a closed path is not repeated at the end.
     """
@@ -237,7 +240,7 @@ class Frames(Struct, frozen=True, eq=False):
         )
 
     def __getitem__(self, rows: Bools | Ints) -> Frames:
-        """The chosen rows."""
+        """Return the chosen rows."""
         return Frames(*(column[rows] for column in astuple(self)))
 
     def tangent_at(self, t: Floats) -> Floats:
@@ -247,7 +250,7 @@ class Frames(Struct, frozen=True, eq=False):
         return np.asarray(cosine * self.tangent + sine * self.normal)
 
     def gap(self, points: Floats) -> Floats:
-        """(K,) distance of each point (K, 2) from the whole line or circle, mm.
+        """Return (K,) distance of each point (K, 2) from the whole line or circle, mm.
 
         With g = k|q|² − 2 n·q the distance from the centre squared is (1 + k g)/k².
         """
@@ -256,7 +259,7 @@ class Frames(Struct, frozen=True, eq=False):
         return np.asarray(np.abs(g) / (1.0 + np.sqrt(np.maximum(1.0 + self.curvature * g, 0.0))))
 
     def along(self, points: Floats) -> Floats:
-        """(K,) length along the curve from its start to each point (K, 2) on it, mm.
+        """Return (K,) length along the curve from its start to each point (K, 2) on it, mm.
 
         Negative before the start. The chord to the point makes half the swept angle with the
         tangent; points before the start show as half angles beyond the middle of what remains.
@@ -274,10 +277,10 @@ class Frames(Struct, frozen=True, eq=False):
 
 
 def turn_left(vectors: Floats) -> Floats:
-    """Vectors (K, 2) turned by +90°."""
+    """Return vectors (K, 2) turned by +90°."""
     return np.column_stack([-vectors[:, 1], vectors[:, 0]])
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """(K,) inner products of vectors (K, 2)."""
+    """Return (K,) inner products of vectors (K, 2)."""
     return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1])

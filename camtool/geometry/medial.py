@@ -114,7 +114,7 @@ def medial_trace(region: Polylines, tolerance_mm: float) -> tuple[Boundary, Medi
 
 
 def _gaps(trace: MedialTrace) -> Bools:
-    """Mask (N,) of the rows whose next row belongs to the same element."""
+    """Return the mask (N,) of the rows whose next row belongs to the same element."""
     return np.append(trace.element[1:] == trace.element[:-1], False)
 
 
@@ -172,7 +172,7 @@ def _events(boundary: Boundary, trace: MedialTrace, rows: Ints) -> tuple[MedialT
 
 
 def _partners(trace: MedialTrace, rows: Ints) -> Ints:
-    """(N, 2) the partners at both ends of the gaps behind these rows."""
+    """Return (N, 2) the partners at both ends of the gaps behind these rows."""
     return np.column_stack([trace.partner[rows], trace.partner[rows + 1]])
 
 
@@ -186,7 +186,8 @@ def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
 
 
 def _seen_from_partners(boundary: Boundary, trace: MedialTrace) -> MedialTrace:
-    """Discs at the touching points on partners that show no such partner next to that place."""
+    """Return discs at the touching points on partners that show no such partner next to that
+    place."""
     is_pair = trace.partner != trace.element
     element, t, partner = (trace.partner[is_pair], trace.u[is_pair], trace.element[is_pair])
     # Numbers that sort as element and place do; places lie in 0 … 1.
@@ -215,7 +216,7 @@ class Boundary(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, region: Polylines) -> Boundary:
-        """The elements of closed paths, outer ones CCW and holes CW."""
+        """Return the elements of closed paths, outer ones CCW and holes CW."""
         segments = Segments.of(region)
         leave, arrive = _tangents(segments)
         before, following = _neighbours(segments.path)
@@ -253,7 +254,7 @@ class Boundary(Struct, frozen=True, eq=False):
 
 
 def _tangents(segments: Segments) -> tuple[Floats, Floats]:
-    """(K, 2) unit tangents at the start and at the end: the chord turned by ∓ sweep/2."""
+    """Return (K, 2) unit tangents at the start and at the end: the chord turned by ∓ sweep/2."""
     chord = segments.end - segments.start
     unit = chord / np.hypot(chord[:, 0], chord[:, 1])[:, None]
     cosine, sine = np.cos(0.5 * segments.sweep)[:, None], np.sin(0.5 * segments.sweep)[:, None]
@@ -262,13 +263,13 @@ def _tangents(segments: Segments) -> tuple[Floats, Floats]:
 
 
 def _turns(arrive: Floats, leave: Floats) -> Floats:
-    """(K,) turn at each start, left positive, −π … π."""
+    """Return (K,) turn at each start, left positive, −π … π."""
     across = arrive[:, 0] * leave[:, 1] - arrive[:, 1] * leave[:, 0]
     return np.asarray(np.arctan2(across, (arrive * leave).sum(axis=1)))
 
 
 def _neighbours(path: Ints) -> tuple[Ints, Ints]:
-    """The rows before and behind each row on its closed path."""
+    """Return the rows before and behind each row on its closed path."""
     rows = np.arange(len(path))
     first = np.searchsorted(path, path, side="left")
     last = np.searchsorted(path, path, side="right") - 1

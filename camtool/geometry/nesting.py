@@ -119,7 +119,8 @@ class _Pairs(Struct, frozen=True, eq=False):
 
 
 def inside(points: Floats, ring: Segments) -> Bools:
-    """Mask (P,) of the points (P, 2) within a closed path; a point on its line may be either."""
+    """Return the mask (P,) of the points (P, 2) within a closed path; a point on its line may
+    be either."""
     curves = IndexedCurves.of(ring)
     return insides(
         np.ascontiguousarray(points, dtype=np.float64), curves.rows, ring.bulge, curves.tree

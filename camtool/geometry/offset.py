@@ -400,8 +400,8 @@ class Corners(Struct, frozen=True, eq=False):
         return cls(frames.end, before, after, turn, np.argsort(following, kind="stable"))
 
     def outer(self, offset: Offset) -> Bools:
-        """Mask (K,) of the corners where the path turns right so much that the shifted segments
-        part."""
+        """Return the mask (K,) of the corners where the path turns right so much that the
+        shifted segments part."""
         gap = 2.0 * offset.distance_mm * np.sin(-0.5 * self.turn)
         return np.asarray(gap > NODE_EPS_MM)
 
@@ -660,8 +660,8 @@ def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
 
 
 def valid_slices(slices: Slices, elements: Segments, source: Arrays, offset: Offset) -> Bools:
-    """Mask (S,) of the slices of which no measured point is too near to the source, or within a
-    mitre.
+    """Return the mask (S,) of the slices of which no measured point is too near to the source, or
+    within a mitre.
 
     Too near is what falls short of the distance, or is deeper in a kite, by VALIDITY_EPS_MM.
     The raw offset changes between valid and invalid only where it meets itself, so that one point

@@ -74,7 +74,8 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
 
 
 def _may_be_loose(lines: Polylines) -> Bools:
-    """Mask (M,) of the paths that an overlap may shorten: open, and a single line or only arcs."""
+    """Return the mask (M,) of the paths that an overlap may shorten: open, and a single line or
+    only arcs."""
     counts = np.diff(lines.offsets) - 1
     arcs = np.searchsorted(lines.offsets, np.flatnonzero(lines.vertices[:, 2]), side="right") - 1
     of_arcs = np.bincount(arcs, minlength=len(lines)) == counts
@@ -302,7 +303,7 @@ def _on_lines(items: Intervals, within_mm: float) -> Iterator[Covers]:
 
 
 def _level_boxes(intervals: Intervals, rows: Ints, angle: float, margin: float) -> Floats:
-    """(R, 4) boxes of lines turned by −angle, grown by the margin."""
+    """Return (R, 4) boxes of lines turned by −angle, grown by the margin."""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     start = intervals.start[rows]
     end = start + intervals.length[rows, None] * intervals.direction[rows]
@@ -334,8 +335,8 @@ def _shared_line(intervals: Intervals, a: Ints, b: Ints, tolerance: float) -> Co
 
 
 def _on_circles(intervals: Intervals, within_mm: float) -> Iterator[Covers]:
-    """Arcs on one circle. Circles of a grid of holes have equal centres in x, or in y, and equal
-    radii: on a slanted line their centres are apart."""
+    """Yield arcs on one circle. Circles of a grid of holes have equal centres in x, or in y,
+    and equal radii: on a slanted line their centres are apart."""
     arcs = np.flatnonzero(~np.isnan(intervals.radius))
     is_searched = intervals.loose[arcs]
     if not is_searched.any():

@@ -62,7 +62,7 @@ class Polyline:
         return path
 
     def __len__(self) -> int:
-        """The number of segments."""
+        """Return the number of segments."""
         return len(self.vertices) - (0 if self.closed else 1)
 
     @property
@@ -124,7 +124,7 @@ class Polylines:
         )
 
     def __len__(self) -> int:
-        """The number of paths."""
+        """Return the number of paths."""
         return len(self.closed)
 
     def __getitem__(self, index: int) -> Polyline:
@@ -310,7 +310,7 @@ def _check_vertices(vertices: Floats, offsets: Ints, closed: Bools | list[bool])
 
 
 def _is_short(segments: Segments) -> Bools:
-    """Mask (K,) of the segments whose ends are equal positions."""
+    """Return the mask (K,) of the segments whose ends are equal positions."""
     chord = segments.end - segments.start
     return np.asarray(np.hypot(chord[:, 0], chord[:, 1]) <= POSITION_EPS_MM)
 
@@ -418,9 +418,9 @@ def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bool
 
 
 def encloses(vertices: Floats, owner: Ints, counts: Ints) -> Bools:
-    """Mask (M,), false for paths of two vertices (of `counts` (M,)) without a bulge: there and
-    back along one line encloses nothing; it is that line, once. `owner` (N,) names each
-    vertex's path."""
+    """Return the mask (M,), false for paths of two vertices (of `counts` (M,)) without a bulge:
+    there and back along one line encloses nothing; it is that line, once. `owner` (N,) names
+    each vertex's path."""
     bent = np.bincount(owner, weights=vertices[:, 2] != 0.0, minlength=len(counts))
     return np.asarray((counts != 2) | (bent != 0.0))
 

@@ -141,7 +141,7 @@ def _arcs(start: Floats, end: Floats, circle: Floats) -> Iterator[Floats]:
 
 
 def _is_full_circle(rows: Floats) -> bool:
-    """True if a closed path became one circle of two halves."""
+    """Return True if a closed path became one circle of two halves."""
     return len(rows) == 3 and bool((np.abs(rows[:2, 2]) == 1.0).all())
 
 

@@ -112,7 +112,7 @@ def assemble(
     marks: Sequence[Mark] = (),
     callouts: Sequence[Callout] = (),
 ) -> Drawing:
-    """The Drawing of these pieces, in the order in which their first members came.
+    """Return the Drawing of these pieces, in the order in which their first members came.
 
     `findings` are those of the reader (units, repairs); gaps, size and one ENTITY_SKIPPED for
     each kind of `skipped` are added here. A drawing of `marks` alone has no paths; `callouts` are
@@ -157,7 +157,7 @@ def assemble(
 def _closed_contours_left_out(
     every: Sequence[Piece], chosen_pieces: Sequence[Piece], file: str, options: ReadOptions
 ) -> Unchosen:
-    """The closed contours among the pieces that were not chosen.
+    """Return the closed contours among the pieces that were not chosen.
 
     They are joined among themselves alone, without findings, because they are not cut. Pieces with
     coordinates that are not finite or too large are left out.
@@ -189,7 +189,7 @@ def _drawing_findings(drawing: Drawing, options: ReadOptions) -> list[Finding]:
 
 
 def _source(members: Sequence[Piece]) -> str:
-    """The sources of a chain's members, the first few by name."""
+    """Return the sources of a chain's members, the first few by name."""
     if len(members) == 1:
         return members[0].source
     names = list(dict.fromkeys(piece.source for piece in members))
@@ -199,7 +199,7 @@ def _source(members: Sequence[Piece]) -> str:
 
 
 def _nothing_drawn_error(skipped: Sequence[Skipped], file: str) -> DrawingError:
-    """The error for a drawing without geometry, saying what it held instead."""
+    """Return the error for a drawing without geometry, saying what it held instead."""
     contents = ", ".join(f"{item.count} {item.kind} ({item.reason})" for item in skipped)
     return DrawingError(
         "holds no lines or curves" + (f", only {contents}" if contents else ""),
@@ -214,7 +214,7 @@ def _nothing_drawn_error(skipped: Sequence[Skipped], file: str) -> DrawingError:
 def selected_with_marks(
     pieces: Sequence[Piece], marks: Sequence[Mark], selection: Selection, file: str
 ) -> tuple[list[Piece], list[Mark], list[Skipped]]:
-    """The chosen pieces and marks, and what was left out and why.
+    """Return the chosen pieces and marks, and what was left out and why.
 
     Both go through one selection, so that a layer of marks alone is a layer that exists.
     Raises DrawingError as `selected` does.
@@ -232,7 +232,8 @@ def selected_with_marks(
 
 
 def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], list[Skipped]]:
-    """Each mark once, and the count of what went; two within POSITION_EPS_MM on a layer are one.
+    """Return each mark once, and the count of what went; two within POSITION_EPS_MM on a layer are
+    one.
 
     DrawingError when a number is not finite or beyond MAX_COORDINATE_MM.
     """
@@ -317,7 +318,8 @@ def size_findings(drawing: Drawing) -> list[Finding]:
 
 
 def gap_findings(gaps: Sequence[Gap], gap_mm: float, *, closed: bool) -> list[Finding]:
-    """A finding for each gap, largest first, and one for all that are more than are read."""
+    """Return a finding for each gap, largest first, and one for all that are more than are
+    read."""
     ranked = sorted(gaps, key=lambda gap: -gap.size_mm if closed else gap.size_mm)
     findings = [
         (GAP_CLOSED if closed else GAP_OPEN)(

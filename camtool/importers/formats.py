@@ -119,7 +119,7 @@ def find_format(data: bytes, suffix: str, file: str) -> str:
 
 
 def _by_bytes(data: bytes, file: str) -> str | None:
-    """The format whose first bytes these are; DrawingError for what is no drawing."""
+    """Return the format whose first bytes these are; DrawingError for what is no drawing."""
     if data.startswith(BINARY_DXF):
         return "dxf"
     if data.startswith(NPY_START) or is_npz(data):
@@ -145,7 +145,7 @@ def _by_bytes(data: bytes, file: str) -> str | None:
 
 
 def _by_text(data: bytes, suffix: str, file: str) -> str | None:
-    """The format of a text, by its first signs and then by the extension."""
+    """Return the format of a text, by its first signs and then by the extension."""
     head = text_head(data)
     if _DXF_START.match(head):
         return "dxf"
@@ -167,28 +167,28 @@ def _by_text(data: bytes, suffix: str, file: str) -> str | None:
 
 
 def is_npz(data: bytes) -> bool:
-    """True if the first member of this ZIP archive is an array of NumPy."""
+    """Return True if the first member of this ZIP archive is an array of NumPy."""
     length = int.from_bytes(data[26:28], "little")
     return data.startswith(ZIP_START) and data[30 : 30 + length].endswith(b".npy")
 
 
 def is_step(head: str) -> bool:
-    """True if the text begins with the header of STEP."""
+    """Return True if the text begins with the header of STEP."""
     return _STEP_START.match(head) is not None
 
 
 def is_gerber(head: str) -> bool:
-    """True if the text begins as Gerber does: with its number format or its unit."""
+    """Return True if the text begins as Gerber does: with its number format or its unit."""
     return _GERBER_START.search(head) is not None
 
 
 def is_excellon(head: str) -> bool:
-    """True if the text begins with the head of Excellon."""
+    """Return True if the text begins with the head of Excellon."""
     return _EXCELLON_START.match(head) is not None
 
 
 def _is_board_archive(data: bytes) -> bool:
-    """True if a ZIP archive holds a Gerber or Excellon file."""
+    """Return True if a ZIP archive holds a Gerber or Excellon file."""
     import zipfile
 
     try:
@@ -204,12 +204,13 @@ def _is_board_archive(data: bytes) -> bool:
 
 
 def is_brep(head: str) -> bool:
-    """True if the text begins with the header of OpenCASCADE's BREP."""
+    """Return True if the text begins with the header of OpenCASCADE's BREP."""
     return _BREP_START.match(head) is not None
 
 
 def text_head(data: bytes, size: int = HEAD_BYTES) -> str:
-    """The first characters of a text in UTF-8 or UTF-16 (by its mark), whatever bytes follow."""
+    """Return the first characters of a text in UTF-8 or UTF-16 (by its mark), whatever bytes
+    follow."""
     head = data[:size]
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return head.decode("utf-16", errors="replace").lstrip("\ufeff")
@@ -231,7 +232,7 @@ def _xml(head: str, file: str) -> str:
 
 
 def _xml_root(head: str) -> str | None:
-    """The name of the first element, without its prefix; None when none is to be seen."""
+    """Return the name of the first element, without its prefix; None when none is to be seen."""
     offset = 0
     while match := _XML_BEFORE.match(head, offset):
         offset = match.end()
@@ -241,7 +242,7 @@ def _xml_root(head: str) -> str | None:
 
 
 def _unpacked_head(data: bytes) -> bytes:
-    """The first bytes of what gzip packed, as many as are whole."""
+    """Return the first bytes of what gzip packed, as many as are whole."""
     try:
         return zlib.decompressobj(31).decompress(data[: 16 * HEAD_BYTES], XML_HEAD_BYTES)
     except zlib.error:
@@ -249,7 +250,8 @@ def _unpacked_head(data: bytes) -> bytes:
 
 
 def _refuse_program(head: str, file: str) -> None:
-    """DrawingError when the first line that is no comment is a block of a machine program."""
+    """Raise DrawingError when the first line that is no comment is a block of a machine
+    program."""
     offset = 0
     while offset < len(head) and (comment := _COMMENT.match(head, offset)):
         if comment.end() == offset:
@@ -264,7 +266,8 @@ def _refuse_program(head: str, file: str) -> None:
 
 
 def _looks_like_points(head: str) -> bool:
-    """True if this is text, and its first line that is no comment begins with two fields."""
+    """Return True if this is text, and its first line that is no comment begins with two
+    fields."""
     if "\x00" in head or "\ufffd" in head:
         return False
     for line in head.splitlines():

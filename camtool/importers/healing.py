@@ -56,7 +56,7 @@ class Cleaned(Struct, frozen=True, eq=False):
 
 
 def clean_pieces(pieces: Sequence[Piece], file: str) -> Cleaned:
-    """The pieces without repeated points, each drawn once, and the count of what went.
+    """Return the pieces without repeated points, each drawn once, and the count of what went.
 
     DrawingError when a number is not finite or beyond MAX_COORDINATE_MM, or a piece is no path.
     """
@@ -91,19 +91,21 @@ def clean_pieces(pieces: Sequence[Piece], file: str) -> Cleaned:
 
 
 def _select_rows(rows: Floats, is_chosen: Bools) -> Floats:
-    """The chosen rows; the very array where these are all."""
+    """Return the chosen rows; the very array where these are all."""
     return rows if is_chosen.all() else rows[is_chosen]
 
 
 def is_placed(piece: Piece) -> bool:
-    """True if every number of a piece is finite, and every point within MAX_COORDINATE_MM."""
+    """Return True if every number of a piece is finite, and every point within
+    MAX_COORDINATE_MM."""
     vertices = piece.vertices
     is_near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all()
     return bool(is_near and np.isfinite(vertices).all())
 
 
 def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
-    """All vertices (N, 3) and how many each piece has; DrawingError when one is no position."""
+    """Return all vertices (N, 3) and how many each piece has; DrawingError when one is no
+    position."""
     counts = np.array([len(piece.vertices) for piece in pieces], dtype=np.int64)
     if counts.sum() > MAX_POINTS:
         raise too_many_points(file)
@@ -132,7 +134,7 @@ def _kinds(
     times: Ints | None = None,
     before: str = "",
 ) -> list[Skipped]:
-    """The chosen pieces counted by kind; `times` counts each so often."""
+    """Return the chosen pieces counted by kind; `times` counts each so often."""
     counts: Counter[str] = Counter()
     for index in np.flatnonzero(is_chosen).tolist():
         counts[pieces[index].kind] += 1 if times is None else int(times[index])
@@ -142,7 +144,7 @@ def _kinds(
 def _lines(
     vertices: Floats, counts: Ints, closed: Bools, pieces: Sequence[Piece], file: str
 ) -> Polylines:
-    """The pieces as paths; a fault is named by its piece."""
+    """Return the pieces as paths; a fault is named by its piece."""
     try:
         return Polylines(vertices, np.concatenate([[0], np.cumsum(counts)]), closed)
     except GeometryError as error:
@@ -154,7 +156,7 @@ _Words = npt.NDArray[np.uint64]
 
 
 def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
-    """(M,) false for each path that is one before it again: same style, same segments.
+    """Return (M,) false for each path that is one before it again: same style, same segments.
 
     Each segment is a number (`segment_numbers`); a path is the sum of its segments, the same from
     any start. 64 bits: two different ones of
@@ -174,8 +176,8 @@ def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
 
 
 def segment_numbers(vertices: Floats, begin: Ints | Indices, end: Ints | Indices) -> _Words:
-    """(K,) a number mixed from the rounded ends and the bulge of the segment between two vertices
-    (of N, 3), the rows (K,) of which are given; the same in both directions."""
+    """Return (K,) a number mixed from the rounded ends and the bulge of the segment between two
+    vertices (of N, 3), the rows (K,) of which are given; the same in both directions."""
     numbers = np.empty(len(begin), dtype=np.uint64)
     for first in range(0, len(begin), SEGMENTS_AT_ONCE):
         batch = slice(first, first + SEGMENTS_AT_ONCE)
@@ -254,7 +256,7 @@ def heal_contours(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions)
 
 
 def _members(chains: tuple[tuple[int, ...], ...], sources: Ints) -> tuple[tuple[int, ...], ...]:
-    """The pieces of each chain of paths, each once; `sources` says which piece each path is
+    """Return the pieces of each chain of paths, each once; `sources` says which piece each path is
     from."""
     if np.array_equal(sources, np.arange(len(sources))):
         return chains
@@ -265,7 +267,7 @@ def _members(chains: tuple[tuple[int, ...], ...], sources: Ints) -> tuple[tuple[
 def _chain_paths(
     pieces: Sequence[Piece], lines: Polylines, sources: Ints, options: ReadOptions
 ) -> Chained:
-    """The paths joined, within their layers unless `across_layers`."""
+    """Return the paths joined, within their layers unless `across_layers`."""
     members = [pieces[index] for index in sources.tolist()]
     layers = [piece.layer for piece in members]
     kinds = Kinds(
@@ -277,7 +279,8 @@ def _chain_paths(
 
 
 def _recognise_arcs(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]:
-    """The paths with arcs for chords on one circle, if that was asked for; how many arcs."""
+    """Return the paths with arcs for chords on one circle, if that was asked for; how many
+    arcs."""
     if not options.recognise_arcs:
         return lines, 0
 
@@ -301,8 +304,8 @@ PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def distance_from_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
-    """(N, 2) mm: the largest and the rms distance between what was drawn as `pieces` and the
-    segment that leaves each vertex of the paths made of them."""
+    """Return (N, 2) mm: the largest and the rms distance between what was drawn as `pieces` and
+    the segment that leaves each vertex of the paths made of them."""
     zeros = np.broadcast_to(0.0, (len(lines.vertices), 2))  # one number, seen as many
     drawn, drawn_off = _drawn_segments(pieces)
     if not len(drawn) or not len(lines):
@@ -338,7 +341,7 @@ class _Joined(Struct, frozen=True, eq=False):
         return len(self.begin)
 
     def numbers(self) -> _Words:
-        """(K,) as `segment_numbers` gives them."""
+        """Return (K,) as `segment_numbers` gives them."""
         return segment_numbers(self.vertices, self.begin, self.end)
 
     def of(self, indices: Ints) -> Segments:
@@ -348,15 +351,15 @@ class _Joined(Struct, frozen=True, eq=False):
 
 
 def _is_among(numbers: _Words, candidates: _Words) -> Bools:
-    """(K,) which numbers are among the others, of which there is at least one."""
+    """Return (K,) which numbers are among the others, of which there is at least one."""
     ordered = np.sort(candidates)
     positions = np.searchsorted(ordered, numbers)
     return np.asarray(ordered[np.minimum(positions, len(ordered) - 1, out=positions)] == numbers)
 
 
 def _drawn_segments(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
-    """The segments of the pieces that have a length, and how far off the segment that leaves a
-    vertex is said to be (N, 2)."""
+    """Return the segments of the pieces that have a length, and how far off the segment that
+    leaves a vertex is said to be (N, 2)."""
     lasting = [piece for piece in pieces if len(piece.vertices)]
     counts = np.array([0, *(len(piece.vertices) for piece in lasting)])
     offsets = np.cumsum(counts)

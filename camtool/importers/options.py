@@ -235,7 +235,8 @@ class ReadOptions(FrozenRecord):
         return DPI if self.dpi is None else self.dpi
 
     def as_drawn(self) -> ReadOptions:
-        """The same with lengths of the part as they are in the drawing; `scale` says so still.
+        """Return the same with lengths of the part as they are in the drawing; `scale` says so
+        still.
 
         A tolerance does not come below POSITION_EPS_MM by that: positions nearer than this are
         one."""

@@ -60,7 +60,7 @@ class Piece(Struct, frozen=True, eq=False):
 
 
 def too_many_points(file: str) -> DrawingError:
-    """The error for a drawing of more than MAX_POINTS."""
+    """Return the error for a drawing of more than MAX_POINTS."""
     return DrawingError(
         f"holds more than {MAX_POINTS} points",
         file=file,
@@ -91,7 +91,7 @@ NO_LINE_TYPE = "continuous"
 def select_pieces(
     pieces: Sequence[Piece], selection: Selection, file: str
 ) -> tuple[list[Piece], list[Skipped]]:
-    """The chosen pieces in order, and how many of each kind were left out, and why.
+    """Return the chosen pieces in order, and how many of each kind were left out, and why.
 
     DrawingError when a pattern (save of `exclude_layers`) matches no piece at all.
     """
@@ -140,7 +140,7 @@ def _rules(selection: Selection, pieces: Sequence[Piece], file: str) -> list[_Ru
 def matching_names(
     patterns: Sequence[str], names: Iterable[str], what: str, file: str
 ) -> set[str] | None:
-    """The names that any pattern matches, None without patterns.
+    """Return the names that any pattern matches, None without patterns.
 
     NoMatchError for a pattern that matches none, listing the names there are.
     """

@@ -37,18 +37,20 @@ class Reader(Protocol):
     """A module that reads one of camtool's own formats."""
 
     def read(self, data: bytes, file: str, options: ReadOptions) -> Drawing:
-        """The Drawing in the content of a file; DrawingError when there is none."""
+        """Return the Drawing in the content of a file; DrawingError when there is none."""
 
 
 class Importer(Reader, Protocol):
     """A reader of a file format, named by an entry point of the group `camtool.importers`."""
 
     def recognises(self, data: bytes, suffix: str) -> bool:
-        """True if this is the content of a file of its format; `suffix` is that of its name."""
+        """Return True if this is the content of a file of its format; `suffix` is that of its
+        name."""
 
 
 def read_drawing(path: Path, *, options: ReadOptions = DEFAULTS) -> Drawing:
-    """The Drawing in a file, in mm; `-` is standard input. DrawingError when there is none."""
+    """Return the Drawing in a file, in mm; `-` is standard input. DrawingError when there is
+    none."""
     return read_bytes(*content(path), options)
 
 
@@ -61,7 +63,8 @@ def content(path: Path) -> tuple[bytes, str]:
 
 
 def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawing:
-    """The Drawing in the content of a file; `file` names it in messages, and its extension hints.
+    """Return the Drawing in the content of a file; `file` names it in messages, and its extension
+    hints.
 
     DrawingError when there is none, OptionError for an option that it cannot have.
     """
@@ -82,7 +85,8 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
 
 
 def _read_by_others(data: bytes, file: str, suffix: str, options: ReadOptions) -> Drawing | None:
-    """The Drawing by the first importer of others that recognises the content; None without one.
+    """Return the Drawing by the first importer of others that recognises the content; None without
+    one.
 
     DrawingError, which names the plug-in, for one that is broken.
     """
@@ -105,7 +109,7 @@ def _read_by_others(data: bytes, file: str, suffix: str, options: ReadOptions) -
 
 
 def refuse_flags_of_pictures(options: ReadOptions, file: str) -> None:
-    """OptionError for an option that has no effect on drawings of lines."""
+    """Raise OptionError for an option that has no effect on drawings of lines."""
     for name, flag, _ in flags_of(ReadOptions):
         if flag.for_pixels and getattr(options, name) != getattr(DEFAULTS, name):
             raise OptionError(

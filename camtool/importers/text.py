@@ -121,7 +121,7 @@ class WantedFont(Struct, frozen=True):
 
 @lru_cache(maxsize=_CHOICES_KEPT)
 def font_for(request: WantedFont, mode: str) -> tuple[Font, str]:
-    """The font to draw with, and the wanted one's name when that is not it ("" otherwise).
+    """Return the font to draw with, and the wanted one's name when that is not it ("" otherwise).
 
     mode "stroke" draws all with single strokes, "outline" only what a stroke font is wanted for.
     Raises Unusable when outlines are wanted and no outline font is installed.
@@ -192,7 +192,7 @@ class _Face(Struct, frozen=True, order=True):
 
 @lru_cache(maxsize=1)
 def installed_fonts() -> tuple[_Face, ...]:
-    """All outline fonts, in an order that does not depend on the file system."""
+    """Return all outline fonts, in an order that does not depend on the file system."""
     import json
 
     from ezdxf.fonts import fonts
@@ -203,7 +203,7 @@ def installed_fonts() -> tuple[_Face, ...]:
 
 
 def _font_named(request: WantedFont) -> _Face | None:
-    """The installed font of this family or file name."""
+    """Return the installed font of this family or file name."""
     if request.family and (face := _of_family(request.family, request)) is not None:
         return face
     name = PurePath(request.file.replace("\\", "/")).name.lower()
@@ -224,7 +224,7 @@ def _substitutes(request: WantedFont) -> list[_Face]:
 
 @lru_cache(maxsize=_FONTS_KEPT)
 def _outline_font(path: str) -> Font | None:
-    """The font of a file, None when it is broken or holds no letters."""
+    """Return the font of a file, None when it is broken or holds no letters."""
     from io import BytesIO
 
     from ezdxf.fonts.font_manager import UnsupportedFont
@@ -295,7 +295,7 @@ MAX_OBLIQUE_DEG = 85.0
 
 
 def finite(*values: float) -> tuple[float, ...]:
-    """The values as floats; Unusable when one is not finite or too large."""
+    """Return the values as floats; Unusable when one is not finite or too large."""
     numbers = tuple(float(value) for value in values)
     if not all(abs(number) <= MAX_NUMBER for number in numbers):
         raise Unusable("has numbers that are not finite or too large")

@@ -86,14 +86,14 @@ class Floor(Struct, frozen=True, eq=False):
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
     def has(self, points: Floats) -> Bools:
-        """Mask (P,) of the points (P, 2) on the floor."""
+        """Return the mask (P,) of the points (P, 2) on the floor."""
         is_inside = self._holds(self.layer.inwards(points), 0.0)
         is_inside &= self.solid.bands(points)[:, 0] >= -self.depth_mm - SAME_DEPTH_MM
         return np.asarray(is_inside & self.is_beyond_tabs(points))
 
     def meets(self, squares: Floats) -> Bools:
-        """Mask (K,) of the squares (K, 3), middle and half a side, that may have points of the
-        floor."""
+        """Return the mask (K,) of the squares (K, 3), middle and half a side, that may have
+        points of the floor."""
         reach = math.sqrt(2.0) * squares[:, 2]
         is_near = self._holds(self.layer.inwards(squares[:, :2]), reach)
         is_near &= self.solid.bounds(squares)[:, 1] >= -self.depth_mm - SAME_DEPTH_MM
@@ -105,7 +105,7 @@ class Floor(Struct, frozen=True, eq=False):
         return np.asarray((s + reach >= self.begins_mm + band) & (s - reach <= last))
 
     def is_beyond_tabs(self, points: Floats) -> Bools:
-        """Mask (P,) of the points (P, 2) that are not near a tab."""
+        """Return the mask (P,) of the points (P, 2) that are not near a tab."""
         return np.asarray(self._beyond_tabs(points) > 0.0)
 
     def _beyond_tabs(self, points: Floats) -> Floats:

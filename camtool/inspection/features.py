@@ -55,8 +55,8 @@ class CircleFeature(Struct, frozen=True, eq=False):
         return bool(np.abs(self.arcs[:, 1]).sum() >= 2.0 * math.pi - FULL_TURN_RAD)
 
     def has(self, angle: Floats, slack: float = 0.0) -> Bools:
-        """Mask (K,) of the angles, rad, that lie on one of its arcs, or within `slack` beside
-        it."""
+        """Return the mask (K,) of the angles, rad, that lie on one of its arcs, or within
+        `slack` beside it."""
         is_on_arc = np.zeros(np.shape(angle), dtype=np.bool_)
         for start, sweep in self.arcs:
             first = start if sweep > 0.0 else start + sweep
@@ -100,7 +100,7 @@ class EdgeFeature(Struct, frozen=True, eq=False):
         return math.dist(self.start_mm, self.end_mm)
 
     def is_square_to(self, direction: Floats) -> bool:
-        """True if the edge is perpendicular to a unit vector (2,)."""
+        """Return True if the edge is perpendicular to a unit vector (2,)."""
         return abs(float(self.along @ direction)) <= SQUARE_RAD
 
     def distance_mm(self, place: Place) -> float:
@@ -307,7 +307,7 @@ def _is_near(feature: Feature, dimension: Dimension) -> bool:
 
 
 def _is_of(circle: CircleFeature, dimension: Dimension) -> bool:
-    """True if each place is the centre of the circle or lies on it."""
+    """Return True if each place is the centre of the circle or lies on it."""
     return all(
         math.dist(place, circle.centre_mm) <= BIND_MM or circle.distance_mm(place) <= BIND_MM
         for place in dimension.places_mm

@@ -522,7 +522,7 @@ def closed_form(
         return {}
 
     def sizes(allowances: Floats) -> Floats:
-        """(D, 2) the largest and the least local size of each dimension."""
+        """Return (D, 2) the largest and the least local size of each dimension."""
         by_path = {
             path: float(allowances[head_rows[name]])
             for path, name in enumerate(contours.of_path)
@@ -758,8 +758,8 @@ class Bench(Struct, eq=False, dict=True):
         return rounded if holds(rounded) else number.at(holding)
 
     def _holds(self, best: MeetingTrial, settings: Sequence[str]) -> bool:
-        """True if the proposal holds on a machine with other numbers, with the allowances for
-        it."""
+        """Return True if the proposal holds on a machine with other numbers, with the
+        allowances for it."""
         proposal = best.proposal + JobChanges(settings=tuple(settings))
         trial = self.try_changes(proposal)
         for _ in range(REFINED):
@@ -1027,7 +1027,7 @@ ALL_HOLD, NOT_ALL_HOLD = "Every dimension of ", "NOT ALL dimensions of "
 
 
 def is_proposal(data: bytes) -> bool:
-    """True for a job file that a proposal was written to."""
+    """Return True for a job file that a proposal was written to."""
     return data.startswith((f"# {ALL_HOLD}".encode(), f"# {NOT_ALL_HOLD}".encode()))
 
 

@@ -461,7 +461,7 @@ def distinct_levels(nodes: Floats) -> Ints:
 
 
 def _are_equal(one: Floats, other: Floats) -> bool:
-    """True if the edges have equal positions, and therefore equal sizes."""
+    """Return True if the edges have equal positions, and therefore equal sizes."""
     return bool(np.allclose(one, other, rtol=0.0, atol=SAME_LEVEL_MM, equal_nan=True))
 
 
@@ -469,7 +469,7 @@ MIN_STATIONS = 3
 
 
 def _cut_on_all(offsets: Floats) -> Bools:
-    """Mask (S,) of the stations that are cut on all parts (N, S)."""
+    """Return the mask (S,) of the stations that are cut on all parts (N, S)."""
     return np.asarray(np.isfinite(offsets).all(axis=0))
 
 

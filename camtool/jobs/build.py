@@ -105,8 +105,8 @@ class JobTables(Struct, frozen=True):
 
 
 def read_job_file(path: Path, data: bytes | None = None) -> JobTables:
-    """The tables of a job file; OptionError names file, table and key, and says how to fix it.
-    `data`: what is in it, where it has been read already."""
+    """Return the tables of a job file; OptionError names file, table and key, and says how to
+    fix it. `data`: what is in it, where it has been read already."""
     try:
         values = read_table(path, data)
     except MachineError as error:
@@ -115,14 +115,14 @@ def read_job_file(path: Path, data: bytes | None = None) -> JobTables:
 
 
 def tables_of_flags(values: Mapping[str, Any]) -> JobTables:
-    """The tables of the flags that were given, by the names of their keys."""
+    """Return the tables of the flags that were given, by the names of their keys."""
 
     flags = Table({key: Given(value, flag_name(key)) for key, value in values.items()})
     return JobTables(flags.only(WHOLE), flags.only(PLACE), defaults=flags.only(OF_OPERATIONS))
 
 
 def tables_of(values: dict[str, Any], path: Path) -> JobTables:
-    """The tables of a job as TOML gives them; `path` names the file."""
+    """Return the tables of a job as TOML gives them; `path` names the file."""
     file = str(path)
     top = table_of(values, AT_THE_TOP, "", file)
     defaults = top.only(OF_OPERATIONS)
@@ -149,7 +149,7 @@ def tables_of(values: dict[str, Any], path: Path) -> JobTables:
 
 
 def _operation_tables(values: dict[str, Any], file: str) -> tuple[Table, ...] | None:
-    """The tables of `[[operations]]`, None without any."""
+    """Return the tables of `[[operations]]`, None without any."""
     if "operations" not in values:
         return None
     return _list_of_tables(values, "operations", "operations", OF_OPERATIONS, file)
@@ -191,9 +191,10 @@ def build_job(
     selection: tuple[str, ...] = (),
     shop: Shop = Shop(),  # noqa: B008
 ) -> Job:
-    """The job of a file with the flags over it, of the operations that are `selection` by name or
-    number (none: all). `shop`: the tools that jobs may name, and what holds where they say
-    nothing. OptionError names file, table and key, or the flag, and says how to fix it."""
+    """Return the job of a file with the flags over it, of the operations that are `selection`
+    by name or number (none: all). `shop`: the tools that jobs may name, and what holds where
+    they say nothing. OptionError names file, table and key, or the flag, and says how to fix
+    it."""
     job_table = flags.whole.over(file.whole)
     tools = tools_for(file.tools, job_table, file.folder, shop)
     tables = file.operations or (Table(),)
@@ -256,8 +257,8 @@ def _with_setups(job: Job, tables: Sequence[Table], names: Sequence[str]) -> Job
 def job_of_file(
     path: Path, selection: tuple[str, ...] = (), libraries: tuple[Path, ...] = ()
 ) -> Job:
-    """The job of a file alone, and of the tools of these libraries, the nearest first; raises as
-    `build_job` does."""
+    """Return the job of a file alone, and of the tools of these libraries, the nearest first;
+    raises as `build_job` does."""
     return build_job(read_job_file(path), JobTables(), selection, Shop(libraries))
 
 
@@ -293,8 +294,8 @@ def _operation(
 
 
 def _tooled(operation: Operation, known_keys: Table, tool_used: Used, tools: Tools) -> Operation:
-    """The operation with its tool, and that of its finishing pass with the feed and the speed that
-    a preset of that gives it."""
+    """Return the operation with its tool, and that of its finishing pass with the feed and the
+    speed that a preset of that gives it."""
     fields: dict[str, Any] = {"tool": tool_used.tool, "material": tool_used.material}
     keys = {key: known_keys.given[key] for key in _OF_WALLS if key in known_keys.given}
     if FINISH_TOOL in keys:
@@ -316,8 +317,9 @@ def _tooled(operation: Operation, known_keys: Table, tool_used: Used, tools: Too
 
 
 def _merged_layers(layers: Sequence[Table]) -> Table:
-    """The keys of all layers, the nearest of which is last; a depth in it takes the place of
-    another layer's breakthrough, and the other way round, where the operation knows both."""
+    """Return the keys of all layers, the nearest of which is last; a depth in it takes the
+    place of another layer's breakthrough, and the other way round, where the operation knows
+    both."""
     merged = layers[0]
     kinds = [layer.given["kind"].value for layer in layers if "kind" in layer.given]
     kind = kinds[-1] if kinds else Operation.kind
@@ -331,7 +333,8 @@ def _merged_layers(layers: Sequence[Table]) -> Table:
 
 
 def _settled(operation: Operation, layers: Sequence[Table], stock: Stock | None) -> Operation:
-    """The operation as its kind and the stock settle it; errors at the key that is wrong."""
+    """Return the operation as its kind and the stock settle it; errors at the key that is
+    wrong."""
     try:
         return operation.settled(stock)
     except OptionError as error:
@@ -347,7 +350,7 @@ def _settled(operation: Operation, layers: Sequence[Table], stock: Stock | None)
 
 
 def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operation]:
-    """The operations with what they clear the rest of."""
+    """Return the operations with what they clear the rest of."""
     carvings = {each.name for each in operations if each.contract.rest == "floor" and each.name}
     for operation, own_table in zip(operations, tables, strict=True):
         for key in ("depth", "breakthrough"):
@@ -395,7 +398,7 @@ def _refuse_equal_names(operations: list[Operation], tables: tuple[Table, ...]) 
 
 
 def _rows(operations: list[Operation], selection: tuple[str, ...]) -> list[int]:
-    """The rows of the operations of these names or numbers, in the order of the job."""
+    """Return the rows of the operations of these names or numbers, in the order of the job."""
     names = [operation.name for operation in operations]
     rows = set()
     for text in selection:
@@ -432,7 +435,8 @@ def _why_unused(name: str, operation: Operation) -> OptionError | None:
 
 
 def _placement(file: JobTables, flags: JobTables) -> Placement:
-    """The drawing's placement; a scale on the command line takes the place of the file's fit."""
+    """Return the drawing's placement; a scale on the command line takes the place of the file's
+    fit."""
     below = dict(file.place.given)
     for one in flags.place.given:
         below.pop(EITHER.get(one, ""), None)
@@ -450,7 +454,7 @@ def _stock(table: Table | None) -> Stock | None:
 
 
 def _keep_out(number: int, table: Table) -> KeepOutBox:
-    """The box of a table `[[keep_out]]`, named by its number where it has no name."""
+    """Return the box of a table `[[keep_out]]`, named by its number where it has no name."""
     for key in ("x", "y"):
         if key not in table.given:
             raise table.refused(f"key {key} is missing", "give x and y, and z if it ends")

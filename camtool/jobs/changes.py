@@ -53,7 +53,7 @@ class Left(Struct, frozen=True):
 
 
 def merged_tables(file: JobTables, flags: JobTables, folder: Path) -> Values:
-    """The tables of a job file in `folder` that says what a file and flags say together.
+    """Return the tables of a job file in `folder` that says what a file and flags say together.
 
     OptionError for flags of a tool beside operations that name one: a file says either.
     """
@@ -89,8 +89,8 @@ def merged_tables(file: JobTables, flags: JobTables, folder: Path) -> Values:
 
 
 def _operation(own_table: Table, defaults: Table, flags: Table, carved: set[str]) -> Values:
-    """The table of an operation with the flags that it knows over it. The floor of one that is
-    `carved` has its depth."""
+    """Return the table of an operation with the flags that it knows over it. The floor of one
+    that is `carved` has its depth."""
     if _raw(own_table).get("rest") in carved:
         flags = flags.only(set(flags.given) - {"depth", "breakthrough"})
     kind = {**defaults.given, **own_table.given, **flags.given}.get("kind")
@@ -106,13 +106,13 @@ def _operation(own_table: Table, defaults: Table, flags: Table, carved: set[str]
 
 
 def _leaves_floor(table: Values) -> bool:
-    """True if the operation of this table carves a floor, whose depth is its own."""
+    """Return True if the operation of this table carves a floor, whose depth is its own."""
     kind = table.get("kind")
     return isinstance(kind, str) and kind_named(kind).rest == "floor"
 
 
 def _merged(above: Table, below: Table) -> Table:
-    """The keys of both; the upper ones say instead of the lower what contradicts them."""
+    """Return the keys of both; the upper ones say instead of the lower what contradicts them."""
     overridden = {EITHER[name] for name in above.given if name in EITHER}
     if TOOL_NAME in above.given:
         overridden |= set(TOOL_KEYS)
@@ -128,7 +128,8 @@ def _presets(presets: Mapping[str, Table]) -> Values:
 
 
 def _relative(raw: Given, old_folder: Path, folder: Path) -> str:
-    """The name of a file from the new folder: a file names it from its own, a flag from here."""
+    """Return the name of a file from the new folder: a file names it from its own, a flag from
+    here."""
     named = old_folder / str(raw.value) if raw.file is not None else Path(str(raw.value))
     return Path(os.path.relpath(named.absolute(), folder.absolute())).as_posix()
 
@@ -136,8 +137,8 @@ def _relative(raw: Given, old_folder: Path, folder: Path) -> str:
 def changed_tables_of(
     tables: Values, changes: Sequence[Change], own_parts: Sequence[Left] = ()
 ) -> Values:
-    """The tables with these changes. An operation with several `own_parts` becomes as many, in
-    their order: together they name all entities that it takes."""
+    """Return the tables with these changes. An operation with several `own_parts` becomes as
+    many, in their order: together they name all entities that it takes."""
     changed_tables = {
         **tables,
         **{each.key: each.value for each in changes if each.operation is None},
@@ -153,7 +154,8 @@ def changed_tables_of(
 
 
 def _divided(table: Values, parts_left: Sequence[Left], names: set[str]) -> list[Values]:
-    """The operations that one becomes; the first has its name, the others numbers behind it."""
+    """Return the operations that one becomes; the first has its name, the others numbers behind
+    it."""
     if not parts_left:
         return [table]
     name = str(table.get("name") or table.get("kind") or "profile")
@@ -176,8 +178,8 @@ def _divided(table: Values, parts_left: Sequence[Left], names: set[str]) -> list
 
 
 def text_of(tables: Values, head: Sequence[str] = ()) -> str:
-    """The text of a job file; `head` are comments at its top. A single operation stands at the
-    top of the file."""
+    """Return the text of a job file; `head` are comments at its top. A single operation stands
+    at the top of the file."""
     if len(tables["operations"]) == 1:
         job_values = {key: value for key, value in tables.items() if key != "operations"}
         tables = {**job_values, **tables["operations"][0]}
@@ -186,5 +188,5 @@ def text_of(tables: Values, head: Sequence[str] = ()) -> str:
 
 
 def job_of_tables(tables: Values, place: Path, shop: Shop) -> Job:
-    """The job that a file of these tables at this place says: its text is read."""
+    """Return the job that a file of these tables at this place says: its text is read."""
     return build_job(tables_of(parse_table(text_of(tables)), place), JobTables(), (), shop)

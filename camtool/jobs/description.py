@@ -31,7 +31,7 @@ NOT_KNOWN_MM = math.inf
 def described(
     job: Job, drawing: Drawing | None = None, machine: Machine | None = None
 ) -> tuple[dict[str, Any], list[Finding]]:
-    """The job in words and numbers, mm, with what it takes of a drawing, and the findings
+    """Return the job in words and numbers, mm, with what it takes of a drawing, and the findings
     about its sides. OptionError for an operation that takes nothing."""
     facts: dict[str, Any] = {
         "operations": [_operation(job, k) for k in range(len(job.operations))]
@@ -97,7 +97,8 @@ def _stages_before(job: Job, index: int) -> int:
 
 
 def _below(job: Job, operation: Operation) -> float | None:
-    """Depth of an operation below the stock, mm; None if it ends above, or is not known."""
+    """Return the depth of an operation below the stock, mm; None if it ends above, or is not
+    known."""
     if job.stock is None or operation.depth_mm is None:
         return None
     below = operation.depth_mm - job.stock.thickness_mm

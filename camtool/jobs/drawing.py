@@ -28,9 +28,9 @@ knows its size within the tolerance of the previous one."""
 
 
 def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Drawing:
-    """The drawing in the content of a file, of the layers that the job's operations take, in all
-    set-ups of the part, or of those that `options` select. OptionError for a layer or colour of
-    the job that the drawing has not, unless `options` select some."""
+    """Return the drawing in the content of a file, of the layers that the job's operations
+    take, in all set-ups of the part, or of those that `options` select. OptionError for a layer
+    or colour of the job that the drawing has not, unless `options` select some."""
     return chosen_for_job(partial(read_bytes, data, file), options, job)
 
 
@@ -74,14 +74,15 @@ def read_to_scale(
 
 
 def layers_of(job: Job) -> tuple[str, ...]:
-    """Patterns of all layers that the job needs; empty when an operation takes any."""
+    """Return patterns of all layers that the job needs; empty when an operation takes any."""
     if not all(operation.layers for operation in job.operations):
         return ()
     return tuple(dict.fromkeys(p for operation in job.operations for p in operation.layers))
 
 
 def refuse_unmatched(drawing: Drawing, job: Job) -> None:
-    """OptionError for a pattern of an operation that no path and no mark of the drawing has."""
+    """Raise OptionError for a pattern of an operation that no path and no mark of the drawing
+    has."""
     layers = {*drawing.layers, *(mark.layer for mark in drawing.marks)}
     colours = {*drawing.colours, *(mark.colour for mark in drawing.marks)}
     for number, operation in enumerate(job.operations, start=1):
@@ -100,7 +101,7 @@ def refuse_unmatched(drawing: Drawing, job: Job) -> None:
 
 
 def _unmatched(error: NoMatchError, job: Job) -> OptionError:
-    """The reader's error about a layer of the job, with the operation that names it."""
+    """Return the reader's error about a layer of the job, with the operation that names it."""
     rows = enumerate(job.operations, start=1)
     operation_place = next(
         _name_words(each, n) for n, each in rows if error.pattern in each.layers

@@ -77,26 +77,26 @@ _WILD = re.compile(r"[*?\[]")
 
 
 def layers(value: object) -> tuple[str, ...]:
-    """A list of patterns, or one text with commas between them."""
+    """Return a list of patterns, or one text with commas between them."""
     if isinstance(value, str):
         value = [word.strip() for word in value.split(",")]
     return patterns(value)
 
 
 def words(value: object) -> tuple[str, ...]:
-    """A list of words to select by, or one text with commas between them."""
+    """Return a list of words to select by, or one text with commas between them."""
     return tuple(word(SELECTED)(Given(each, "")) for each in layers(value))
 
 
 def names(value: object) -> tuple[str, ...]:
-    """A list of names of operations."""
+    """Return a list of names of operations."""
     if not isinstance(value, list) or not value:
         raise OptionError(f"{value!r} is no list of names", mend='write it like ["holes", "edge"]')
     return tuple(text(each) for each in value)
 
 
 def allowed(value: object) -> tuple[str, ...]:
-    """A list of words that a job may allow, or one text with commas between them."""
+    """Return a list of words that a job may allow, or one text with commas between them."""
     return tuple(word(ALLOWED)(Given(each, "")) for each in layers(value))
 
 
@@ -131,7 +131,8 @@ def _range(
 
 
 def colours(value: object) -> tuple[str, ...]:
-    """Patterns of colours, "#rrggbb" as drawings have them; names and numbers are converted."""
+    """Return patterns of colours, "#rrggbb" as drawings have them; names and numbers are
+    converted."""
     if isinstance(value, list | tuple):
         value = [str(item) if type(item) is int else item for item in value]
     return tuple(
@@ -162,29 +163,29 @@ def counts(value: object) -> tuple[int, int]:
 
 
 def origin(value: object) -> str | tuple[float, float]:
-    """A word, [x, y] or "x,y"."""
+    """Return a word, [x, y] or "x,y"."""
     return _word_or_place(value, ORIGINS)
 
 
 def start(value: object) -> str | tuple[float, float]:
-    """A word, [x, y] or "x,y"."""
+    """Return a word, [x, y] or "x,y"."""
     return _word_or_place(value, STARTS)
 
 
 def zero(value: object) -> str | tuple[float, float]:
-    """A place of the stock, [x, y] or "x,y"."""
+    """Return a place of the stock, [x, y] or "x,y"."""
     return _word_or_place(value, tuple(ZEROS))
 
 
 def places(value: object) -> tuple[tuple[float, float], ...]:
-    """A list of places [x, y]."""
+    """Return a list of places [x, y]."""
     if not isinstance(value, list | tuple):
         raise OptionError(f"{value!r} is no list of places", mend="write it like [[10, 5]]")
     return tuple(_pair(each, length, '["10mm", "5mm"]') for each in value)
 
 
 def kind(raw: Given) -> str:
-    """The name of an installed kind of operation."""
+    """Return the name of an installed kind of operation."""
     if raw.value in broken_kinds():
         with raw.blamed():
             kind_named(raw.value)
@@ -193,17 +194,17 @@ def kind(raw: Given) -> str:
 
 
 def entry(raw: Given) -> Entry:
-    """A table, or "ramp", "ramp:3deg", "helix:3deg:1mm"."""
+    """Return a table, or "ramp", "ramp:3deg", "helix:3deg:1mm"."""
     return _record(Entry, ENTRY, _parts(raw, ENTRY, ("kind", "angle", "radius")))
 
 
 def lead(raw: Given) -> Lead:
-    """A table, or "none", "line:1mm", "arc:1mm"."""
+    """Return a table, or "none", "line:1mm", "arc:1mm"."""
     return _record(Lead, LEAD, _parts(raw, LEAD, ("kind", "length")))
 
 
 def tabs(raw: Given) -> Tabs:
-    """A table, or how many ("4") or how far apart ("20mm"), then ":width:height"."""
+    """Return a table, or how many ("4") or how far apart ("20mm"), then ":width:height"."""
     value = raw.value
     is_count = type(value) is int or (isinstance(value, str) and _COUNT.match(value))
     first = "count" if is_count else "spacing"
@@ -223,7 +224,7 @@ def _record(make: Callable[..., _T], keys: Mapping[str, Key], table: Table) -> _
 
 
 def _part_of(raw: Given, known_keys: Iterable[str]) -> Table:
-    """A table that is the value of a key, such as `entry = {kind = "ramp"}`."""
+    """Return a table that is the value of a key, such as `entry = {kind = "ramp"}`."""
     parts = {}
     for name, value in raw.value.items():
         parts[name] = Given(value, f"{raw.where}.{name}", raw.file)
@@ -233,7 +234,8 @@ def _part_of(raw: Given, known_keys: Iterable[str]) -> Table:
 
 
 def _parts(raw: Given, keys: Mapping[str, Key], names: Sequence[str]) -> Table:
-    """The keys of a table that is a value, or of a text "a:b:c" that gives `names` in order."""
+    """Return the keys of a table that is a value, or of a text "a:b:c" that gives `names` in
+    order."""
     if isinstance(raw.value, dict):
         return _part_of(raw, keys)
     with raw.blamed():
@@ -544,7 +546,7 @@ for _contract in installed_kinds().values():
 
 
 def is_known(name: str, kind: str) -> bool:
-    """True if operations of this kind know a key of `OPERATION`."""
+    """Return True if operations of this kind know a key of `OPERATION`."""
     contract = kind_named(kind)
     return name in contract.keys or name in contract.own
 
@@ -593,13 +595,13 @@ _FIELDS: dict[str, Key] = {
 
 
 def flag_name(name: str) -> str:
-    """The flag that says what a key says."""
+    """Return the flag that says what a key says."""
     return _FLAGS_OF_OTHER_NAMES.get(name, f"--{name.replace('_', '-')}")
 
 
 def field_value(name: str, value: Any) -> Any:
-    """The value of a field of Operation, Job, Placement or (with `tool_` before it) Tool: texts,
-    lists, and numbers where a record is wanted, are read as a job file has them."""
+    """Return the value of a field of Operation, Job, Placement or (with `tool_` before it)
+    Tool: texts, lists, and numbers where a record is wanted, are read as a job file has them."""
     key = _FIELDS.get(name)
     if name == "layers" and isinstance(value, str):
         return layers(value)

@@ -71,12 +71,12 @@ class Proposal(Struct, frozen=True):
         return sorted(tools, key=lambda tool: -tool.diameter_mm)
 
     def has_drill(self, width_mm: float) -> bool:
-        """True if a drill of the library is as wide as a hole of this diameter."""
+        """Return True if a drill of the library is as wide as a hole of this diameter."""
         drills = self.tools("drill")
         return any(abs(width_mm - tool.diameter_mm) <= HOLE_SIZE_MM for tool in drills)
 
     def fits_hole(self, width_mm: float) -> bool:
-        """True if a drill or the mill makes a hole of this diameter."""
+        """Return True if a drill or the mill makes a hole of this diameter."""
         return width_mm >= self.tool_mm - HOLE_SIZE_MM or self.has_drill(width_mm)
 
     @property

@@ -150,9 +150,10 @@ def job_template(
     parts: Sequence[Proposed] | None = None,
     text: str = "",
 ) -> str:
-    """TOML text of a job for the drawing; for `machine`, when it is known, with its numbers. With
-    a proposal of tool and stock, contours are told apart by what they are. `parts`: its
-    operations, if not those that are `proposed`; `text`: how the drawing's text was read."""
+    """Return TOML text of a job for the drawing; for `machine`, when it is known, with its
+    numbers. With a proposal of tool and stock, contours are told apart by what they are.
+    `parts`: its operations, if not those that are `proposed`; `text`: how the drawing's text
+    was read."""
     proposal = proposal or Proposal()
     (left_x, right), (low, high) = drawing_extents(drawing).tolist()
     size = (right - left_x, high - low)
@@ -290,7 +291,7 @@ def _setups(
 
 
 def _frees(part: Part) -> bool:
-    """True for the outlines of parts, which come last."""
+    """Return True for the outlines of parts, which come last."""
     return part.kind == "profile" and not any('"inner"' in value for _, value, _ in part.keys)
 
 
@@ -332,7 +333,7 @@ def _groups_by(names: Sequence[str], of_marks: Sequence[str], key: str) -> list[
 
 
 def _extent(drawing: Drawing, group: _Group) -> float:
-    """The size of the group, mm; larger groups come after the ones within them."""
+    """Return the size of the group, mm; larger groups come after the ones within them."""
     lines = drawing.paths.select(group.paths)
     return float(np.ptp(extents(lines), axis=1).sum()) if len(lines) else 0.0
 
@@ -421,7 +422,8 @@ class Remaining(Struct, frozen=True):
         return depth if 0.0 < depth <= (self.proposal.thickness_mm or MAX_DEPTH_MM) else None
 
     def crowded(self, width_mm: float) -> tuple[int, ...]:
-        """Rows of the closed paths that a tool of this width cannot run beside or within."""
+        """Return rows of the closed paths that a tool of this width cannot run beside or
+        within."""
         crowded_rows = crowded(self.drawing, width_mm) - self.steps.rows
         return tuple(row for row in self.contours if row in crowded_rows)
 
@@ -447,7 +449,7 @@ class Remaining(Struct, frozen=True):
         return tuple(row for row in self.rows if self.drawing.paths.closed[row])
 
     def contours_that_are(self, *words: str) -> tuple[int, ...]:
-        """Rows of the closed paths of which all these words of `select` are true."""
+        """Return rows of the closed paths of which all these words of `select` are true."""
         drawing = self.drawing
         continuous = [kind.casefold() in CONTINUOUS for kind in drawing.line_types]
         edges = np.array(continuous, dtype=np.bool_)
@@ -481,7 +483,8 @@ def _habit(name: str) -> str:
 def _parts(
     drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal, steps: SteppedHoles
 ) -> list[Part]:
-    """The operations that a group is cut by, as the kinds propose them one after the other."""
+    """Return the operations that a group is cut by, as the kinds propose them one after the
+    other."""
     sunk = tuple(row for row in group.paths if row in steps.sunk)
     rows, marks = tuple(row for row in group.paths if row not in sunk), len(group.marks)
     title = group.called
@@ -509,8 +512,8 @@ def _parts(
 
 
 def _exact(drawing: Drawing, group: _Group, part: Part) -> Part:
-    """The part, which says sizes or names entities if its words would take others of the group;
-    entities of one name may still be taken together."""
+    """Return the part, which says sizes or names entities if its words would take others of the
+    group; entities of one name may still be taken together."""
     if part.instead is not None:
         part = replace(part, instead=_exact(drawing, group, part.instead))
     own_words = {key: value for key, value, _ in part.keys if key in SELECTING_KEYS}
@@ -549,7 +552,7 @@ def _narrower(drawing: Drawing, part: Part) -> Iterator[dict[str, str]]:
 
 
 def _excluding(part: Part, words: Sequence[str]) -> Part:
-    """The part, which selects what these words too are true of."""
+    """Return the part, which selects what these words too are true of."""
     selection = {key: value for key, value, _ in part.keys}.get("select")
     if not words or selection == '["point"]':
         return part
@@ -563,12 +566,12 @@ def _excluding(part: Part, words: Sequence[str]) -> Part:
 
 
 def _numbered(name: str, number: int) -> str:
-    """A name for what has been called so before."""
+    """Return a name for what has been called so before."""
     return name if number == 1 else f"{name} ({number})"
 
 
 def _text(drawing: Drawing, group: _Group, part: Part, proposal: Proposal) -> list[str]:
-    """The lines of the operation for a part of a group."""
+    """Return the lines of the operation for a part of a group."""
     lines = drawing.paths.select(part.rows)
     marks = f", {part.marks} points" if part.marks else ""
     text = [
@@ -631,5 +634,5 @@ def _commented(text: str) -> str:
 
 
 def pattern_of(name: str) -> str:
-    """The pattern that matches this name alone (in any case)."""
+    """Return the pattern that matches this name alone (in any case)."""
     return "".join(f"[{char}]" if char in "*?[" else char for char in name)

@@ -37,7 +37,7 @@ class TableTool(Struct, frozen=True):
 
 
 def read_tool_table(text: str, file: str) -> dict[int, TableTool]:
-    """The tools of a table by number, in the order of its lines.
+    """Return the tools of a table by number, in the order of its lines.
 
     OptionError names file and line for what is no word, comes twice, is missing or out of range.
     """
@@ -85,7 +85,7 @@ def _tool(words: dict[str, str], remark: str, line: int) -> TableTool:
 
 
 def _whole_number(words: dict[str, str], letter: str) -> int:
-    """The number of a word that must be there, and whole."""
+    """Return the number of a word that must be there, and whole."""
     if letter not in words:
         raise OptionError(
             f"the word {letter} is missing", mend=f"give every tool a T and a P, such as {letter}1"

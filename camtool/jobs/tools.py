@@ -75,8 +75,8 @@ class Used(Struct, frozen=True):
 
 
 def tool_tables(values: Mapping[str, Any], file: str) -> dict[str, Described]:
-    """The tables `[tools.NAME]` of a file, each checked; OptionError for tools that are wrong,
-    used or not, and for two tools with one number."""
+    """Return the tables `[tools.NAME]` of a file, each checked; OptionError for tools that are
+    wrong, used or not, and for two tools with one number."""
     tools = values.get("tools", {})
     if not isinstance(tools, dict):
         raise Given(tools, "key tools", file).refused(
@@ -119,7 +119,8 @@ def _described(name: str, values: object, file: str) -> Described:
 
 
 def read_library(path: Path) -> dict[str, Described]:
-    """The tools of a library; OptionError names file, table and key, and says how to fix it."""
+    """Return the tools of a library; OptionError names file, table and key, and says how to fix
+    it."""
     try:
         values = read_table(path)
     except MachineError as error:
@@ -129,13 +130,13 @@ def read_library(path: Path) -> dict[str, Described]:
 
 
 def tool_of(name: str, described: Described) -> Tool:
-    """The record of a tool that a file describes."""
+    """Return the record of a tool that a file describes."""
     return replace(_tool(name, described.keys, ""), materials=tuple(described.presets))
 
 
 def tools_for(named: Mapping[str, Described], job_table: Table, folder: Path, shop: Shop) -> Tools:
-    """The tools of a job: those `named` in its file, which is in this folder, those of libraries,
-    and those of a tool table, which its keys for the `job_table` job name."""
+    """Return the tools of a job: those `named` in its file, which is in this folder, those of
+    libraries, and those of a tool table, which its keys for the `job_table` job name."""
     library = _path_of("tool_library", job_table, folder)
     tools = Tools(
         named,
@@ -157,8 +158,8 @@ def tools_for(named: Mapping[str, Described], job_table: Table, folder: Path, sh
 
 
 def _path_of(key: str, job_table: Table, folder: Path) -> Path | None:
-    """The file that a key names: in a job file relative to it, on the command line to where it is
-    run."""
+    """Return the file that a key names: in a job file relative to it, on the command line to
+    where it is run."""
     key_value = job_table.given.get(key)
     if key_value is None:
         return None
@@ -207,8 +208,8 @@ class Tools(Struct, frozen=True, dict=True):
         return self._used(name, replace(described, keys=keys), kind)
 
     def _used(self, name: str, described: Described, kind: str) -> Used:
-        """The tool, and its preset for what is cut. OptionError for a material for which it has
-        none, though it has some."""
+        """Return the tool, and its preset for what is cut. OptionError for a material for which
+        it has none, though it has some."""
         tool = _tool(name, described.keys, kind)
         if self.material is None or not described.presets:
             return Used(replace(tool, materials=tuple(described.presets)), Table())
@@ -228,7 +229,8 @@ class Tools(Struct, frozen=True, dict=True):
         return Used(tool, preset.only(OPERATION), material)
 
     def refuse_idle_material(self, operations: Iterable[Operation]) -> None:
-        """OptionError for a material that the job or a flag says, and no tool has presets."""
+        """Raise OptionError for a material that the job or a flag says, and no tool has
+        presets."""
         if self.material is None or not self.material_is_asked:
             return
         if not any(operation.material for operation in operations):
@@ -238,7 +240,7 @@ class Tools(Struct, frozen=True, dict=True):
             )
 
     def _chosen(self, raw: Given) -> tuple[str, Described]:
-        """The tool that a name or a number says, and its name."""
+        """Return the tool that a name or a number says, and its name."""
         value = raw.value
         if isinstance(value, str) and value in self.named:
             return value, self._completed(self.named[value])
@@ -281,7 +283,7 @@ class Tools(Struct, frozen=True, dict=True):
         return every
 
     def _completed(self, described: Described) -> Described:
-        """A named tool of a number may leave its diameter to the tool table."""
+        """Complete a named tool that has a number with the diameter of the tool table."""
         keys, number = described.keys, _number_of(described.keys)
         if number is None or number not in self.table:
             return described
@@ -289,7 +291,8 @@ class Tools(Struct, frozen=True, dict=True):
         return replace(described, keys=keys.over(table_keys))
 
     def _of_table(self, number: int, *, needed: bool = True) -> Table:
-        """The keys of a tool of the table; refused when it lacks a diameter that is needed."""
+        """Return the keys of a tool of the table; refused when it lacks a diameter that is
+        needed."""
         tool = self.table[number]
         table = Table({}, f"line {tool.line}", self.table_file)
         if tool.diameter is None and needed:
@@ -304,7 +307,7 @@ class Tools(Struct, frozen=True, dict=True):
 
 
 def _with_table(tools: Tools, path: Path) -> Tools:
-    """The tools, and those of a LinuxCNC tool table; OptionError names file and line."""
+    """Return the tools, and those of a LinuxCNC tool table; OptionError names file and line."""
     try:
         text = path.read_bytes().decode("utf-8", errors="replace")
     except OSError as error:
@@ -315,14 +318,14 @@ def _with_table(tools: Tools, path: Path) -> Tools:
 
 
 def _number_of(keys: Table) -> int | None:
-    """The number of a tool of the file, if it has one."""
+    """Return the number of a tool of the file, if it has one."""
     number_value = keys.given.get("number")
     number: int | None = None if number_value is None else TOOL["number"].read(number_value)
     return number
 
 
 def _tool(name: str, keys: Table, kind: str) -> Tool:
-    """The record; a tool with a tip that does not say its kind is a V bit, or drills."""
+    """Return the record; a tool with a tip that does not say its kind is a V bit, or drills."""
     if "tip_angle" in keys.given and "kind" not in keys.given:
         drills = bool(kind) and kind_named(kind).descent == "pecks"
         meant = Given("drill" if drills else "v", keys.where, keys.file)

@@ -41,8 +41,8 @@ NEAR_SHARE = 1e-6
 
 
 def has_room(lines: Polylines, radius_mm: float) -> Bools:
-    """Mask (N,) of the closed paths within which the centre of a tool of this radius has room; of
-    paths that enclose no clear region, those whose box is large enough."""
+    """Return the mask (N,) of the closed paths within which the centre of a tool of this radius
+    has room; of paths that enclose no clear region, those whose box is large enough."""
     ccw = reverse_lines(lines, signed_areas(lines) < 0.0)
     has_space: Bools = (
         np.ptp(path_extents(lines), axis=2).min(axis=1, initial=np.inf) > 2.0 * radius_mm
@@ -60,7 +60,8 @@ def has_room(lines: Polylines, radius_mm: float) -> Bools:
 
 
 def is_slot(lines: Polylines, width_mm: float) -> Bools:
-    """Mask (N,) of the closed paths whose widest place is as wide as a tool of this width."""
+    """Return the mask (N,) of the closed paths whose widest place is as wide as a tool of this
+    width."""
     radius = 0.5 * width_mm
     if not radius > SLOT_MM:
         return np.zeros(len(lines), dtype=np.bool_)
@@ -69,9 +70,9 @@ def is_slot(lines: Polylines, width_mm: float) -> Bools:
 
 @lru_cache(maxsize=8)
 def crowded(drawing: Drawing, width_mm: float) -> frozenset[int]:
-    """Rows of the closed paths, letters aside, that a tool of this width cannot run beside or
-    within without cutting into a neighbour, and of those that cross others; small ones with all
-    that lies within them."""
+    """Return rows of the closed paths, letters aside, that a tool of this width cannot run
+    beside or within without cutting into a neighbour, and of those that cross others; small
+    ones with all that lies within them."""
     lettered = np.array([is_text(source) for source in drawing.sources], dtype=np.bool_)
     rows = np.flatnonzero(drawing.paths.closed & ~lettered)
     lines = drawing.paths.select(rows)

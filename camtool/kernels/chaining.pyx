@@ -23,7 +23,7 @@ from camtool.arrays import Bools, Floats, Indices, Ints
 
 
 cpdef near_pairs(Int[:, ::1] cells, double[:, ::1] points, double reach, Int max_pairs):
-    """Rows (J,), (J,) of all points (E, 2) within `reach` of each other, each pair once.
+    """Return rows (J,), (J,) of all points (E, 2) within `reach` of each other, each pair once.
 
     `cells` (E, 3): group, column and row of the grid cell of each point, `reach` wide, sorted.
     No point gets more than `max_pairs` pairs with points after it: that bounds time and memory.
@@ -80,7 +80,7 @@ cdef inline bint _is_before(Int[:, ::1] cells, Int i, Int group, Int column, Int
 
 
 cdef Int top(Int[::1] above, Int item) noexcept:
-    """The root of an item's set (union-find with path halving)."""
+    """Return the root of an item's set (union-find with path halving)."""
     while above[item] != item:
         above[item] = above[above[item]]
         item = above[item]
@@ -88,7 +88,7 @@ cdef Int top(Int[::1] above, Int item) noexcept:
 
 
 cpdef clusters(Int count, Int[::1] first, Int[::1] second):
-    """(count,) the least end of all ends that pairs connect with each end."""
+    """Return (count,) the least end of all ends that pairs connect with each end."""
     cdef Int k, i, a, b
     cdef Int[::1] above
     above = np.arange(count, dtype=np.int64)
@@ -137,7 +137,7 @@ cdef inline bint encloses(Int segments, Int arcs) noexcept:
 
 
 cpdef walk(Int[::1] mates, uint8_t[::1] is_chosen):
-    """The chains of the wanted paths, each begun at its first path, which is not turned.
+    """Return the chains of the wanted paths, each begun at its first path, which is not turned.
 
     Returns the ends by which the paths are entered, in the order of travel, where each chain
     begins in them (C + 1,), and which chains are rings (C,).
@@ -170,7 +170,8 @@ cpdef walk(Int[::1] mates, uint8_t[::1] is_chosen):
 
 
 cdef Int first_end(Int[::1] mates, Int end) noexcept:
-    """The free end at which the chain that enters a path by `end` begins, `end` for a ring."""
+    """Return the free end at which the chain that enters a path by `end` begins, `end` for a
+    ring."""
     cdef Int start
     start = end
     while mates[end] >= 0:
@@ -236,7 +237,7 @@ cpdef Int split_loops(
 
 
 cdef (Int, Int) _ring_weight(Int start, Int[::1] mates, Int[:, ::1] weights) noexcept:
-    """Segments and arcs of a whole ring."""
+    """Return segments and arcs of a whole ring."""
     cdef Int end, segments, arcs
     segments, arcs = weights[start // 2, 0], weights[start // 2, 1]
     end = mates[start ^ 1]
@@ -305,7 +306,7 @@ cpdef nearest_others(
 
 
 cdef Int _first(Int[:, ::1] cells, Int column, Int row) noexcept:
-    """The first sorted cell that is not before (column, row)."""
+    """Return the first sorted cell that is not before (column, row)."""
     cdef Int low, high, middle
     low, high = 0, len(cells)
     while low < high:
@@ -328,7 +329,7 @@ cpdef touching(
     double[:, ::1] boxes, Int[::1] equal_keys, Int[::1] unequal_keys, uint8_t[::1] is_queried,
     Int max_pairs
 ):
-    """Rows (J,), (J,) of boxes (K, 4) low, low, high, high that touch, each pair once.
+    """Return rows (J,), (J,) of boxes (K, 4) low, low, high, high that touch, each pair once.
 
     `boxes` are sorted by their first column. Both of a pair have the same number in `equal_keys`,
     different ones in `unequal_keys`, of which at least one `is_queried`. At most `max_pairs`.
@@ -385,8 +386,8 @@ cdef Int LOW_BITS = 0xFFFFFFFF
 
 
 cpdef latest_near(double[:, ::1] places, Int[::1] begins, double reach):
-    """(P,) the latest point before each of the points (P, 2) on its path within `reach`, −1 for
-    none. Path k has the points begins[k]:begins[k + 1], `begins` (M + 1,)."""
+    """Return (P,) the latest point before each of the points (P, 2) on its path within `reach`,
+    −1 for none. Path k has the points begins[k]:begins[k + 1], `begins` (M + 1,)."""
     cdef Int slots
     cdef int32_t[::1] heads, previous, latest
     slots = 16
@@ -429,10 +430,10 @@ cdef void _latest_near(
 
 
 cdef inline Int _cell(double place, double size) noexcept:
-    """The number of the cell of that size in which a coordinate lies."""
+    """Return the number of the cell of that size in which a coordinate lies."""
     return int(math.floor(min(max(place / size, -_FAR), _FAR)))
 
 
 cdef inline Int _slot(Int column, Int row, Int slots) noexcept:
-    """The slot of a cell, of a power of two of them."""
+    """Return the slot of a cell, of a power of two of them."""
     return ((column & LOW_BITS) * 73_856_093 ^ (row & LOW_BITS) * 19_349_663) & (slots - 1)

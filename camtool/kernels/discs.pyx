@@ -92,7 +92,7 @@ cpdef void largest_discs(
 
 
 cpdef (double, double, double, double) frame(double[:, ::1] table, Int own, double t) noexcept:
-    """The point x, y of an element at the part t of it, and its inner normal there."""
+    """Return the point x, y of an element at the part t of it, and its inner normal there."""
     cdef double chord, half
     tx, ty, length = table[own, TX], table[own, TY], table[own, LENGTH]
     turned = table[own, SWEEP] * t
@@ -113,8 +113,8 @@ cpdef (double, double, double, double) frame(double[:, ::1] table, Int own, doub
 cdef (double, double) _from_corner(
     double tx, double ty, double[:, ::1] table, Int own, double t
 ) noexcept:
-    """A point of an element as seen from its start (t > 0), or from its end (t < 0, and t_x, t_y
-    the direction back from there): without the rounding of far coordinates."""
+    """Return a point of an element as seen from its start (t > 0), or from its end (t < 0, and
+    t_x, t_y the direction back from there): without the rounding of far coordinates."""
     cdef double half, chord
     half = 0.5 * table[own, SWEEP] * t
     chord = table[own, LENGTH] * abs(t)
@@ -125,7 +125,7 @@ cdef (double, double) _from_corner(
 
 
 cdef Int _at_convex_corner(Int[:, ::1] links, Int own, double t) noexcept:
-    """The other element of the convex corner at which the point lies, −1 elsewhere."""
+    """Return the other element of the convex corner at which the point lies, −1 elsewhere."""
     if t == 0.0 and links[own, 2] == CONVEX:
         return int(links[own, 0])
     if t == 1.0 and links[links[own, 1], 2] == CONVEX:
@@ -137,7 +137,7 @@ cdef (double, Int) _largest(
     double[:, ::1] table, Int[:, ::1] links, double[:, ::1] boxes, Int own, Int guess,
     Int other_guess, (double, double, double, double, double, double) pose, bint at_start
 ) noexcept:
-    """Radius and partner of the largest disc at a point with its normal."""
+    """Return the radius and partner of the largest disc at a point with its normal."""
     cdef Int neighbour, home, turn, block, best
     cdef double x, y, radius, limit, dx, dy
     x, y = pose[0], pose[1]
@@ -170,8 +170,8 @@ cdef double _limit(
     double[:, ::1] table, Int[:, ::1] links, Int own, Int neighbour,
     (double, double, double, double, double, double) pose, double radius, bint at_start
 ) noexcept:
-    """The radius to which another element limits the disc; inf where it does not, or not below
-    `radius`."""
+    """Return the radius to which another element limits the disc; inf where it does not, or not
+    below `radius`."""
     cdef (double, double) turns
     cdef (double, double, double, double) sight
     cdef bint precedes, follows, corner, as_point
@@ -241,8 +241,8 @@ cdef double _touching(
     (double, double, double, double, double, double) pose, double radius, double min_distance,
     (double, double) turns
 ) noexcept:
-    """The radius at which the disc touches the line or arc `own` within it; inf if it is not
-    below `radius` or touches beyond the ends.
+    """Return the radius at which the disc touches the line or arc `own` within it; inf if it is
+    not below `radius` or touches beyond the ends.
 
     `sight`: the tangent at a point of the element, and how the disc's place is seen from there.
     With `min_distance` below 0 that is a shared corner, and rounding may not hide the element. Nor

@@ -58,8 +58,8 @@ cdef struct Arcs:
 
 
 cdef class Cleared:
-    """The moves that have cut so far, in a grid of cells, each with the list of those that come
-    near enough to a tool in it."""
+    """Return the moves that have cut so far, in a grid of cells, each with the list of those
+    that come near enough to a tool in it."""
 
     cdef double low_x, low_y, cell, reach, x, y, travelled
     cdef Int columns, rows, count, used
@@ -181,7 +181,7 @@ cdef Int _cell(double distance, double cell, Int count) noexcept nogil:
 
 
 cdef double _distance(double x, double y, double* move) noexcept nogil:
-    """The distance of a point from a move."""
+    """Return the distance of a point from a move."""
     cdef double ex = move[BX] - move[AX], ey = move[BY] - move[AY]
     cdef double square = ex * ex + ey * ey
     cdef double part = 0.0
@@ -195,7 +195,7 @@ cdef double _greatest(
     Cleared self, double* move, double thick, double enough, double fine, double coarse,
     double greatest,
 ) noexcept nogil:
-    """A bound of the engagement over all of a move; one up to `greatest` is not refined."""
+    """Return a bound of the engagement over all of a move; one up to `greatest` is not refined."""
     cdef double length = math.hypot(move[BX] - move[AX], move[BY] - move[AY])
     cdef double best = 0.0, bound, value, low, high, half, slack
     cdef double lows[WAITING]
@@ -228,8 +228,9 @@ cdef double _greatest(
 
 
 cdef double _all_round(Cleared self, double* move, double thick) noexcept nogil:
-    """The angle of the whole circle of a tool that goes straight down in which it cuts. What the
-    tool has cleared on the last of its way counts as wider too: it may go down where it was."""
+    """Return the angle of the whole circle of a tool that goes straight down in which it cuts.
+    What the tool has cleared on the last of its way counts as wider too: it may go down where
+    it was."""
     cdef double aside[COLUMNS]
     cdef double angle = 0.0
     cdef int k, side
@@ -245,9 +246,9 @@ cdef double _all_round(Cleared self, double* move, double thick) noexcept nogil:
 cdef double _open_angle(
     Cleared self, double* move, double length, double low, double high, double grow, double thick
 ) noexcept nogil:
-    """The angle of the front half of the tool's circle, in the middle of a stretch of a move, that
-    no earlier move has cleared with a tool wider by `grow`, or by `grow` less `thick` on the last
-    of its way."""
+    """Return the angle of the front half of the tool's circle, in the middle of a stretch of a
+    move, that no earlier move has cleared with a tool wider by `grow`, or by `grow` less
+    `thick` on the last of its way."""
     cdef Arcs arcs
     cdef double ex = (move[BX] - move[AX]) / length, ey = (move[BY] - move[AY]) / length
     cdef double middle = 0.5 * (low + high)

@@ -134,8 +134,8 @@ cpdef (double, double, double, double) evaluate(
 
 
 cpdef samples_between(double[:, :, ::1] pieces, double[:] t):
-    """((n − 1) · `MEASURE_STEPS` + 1, 2) positions: so many from each of the parameters t (n,) in
-    0..m on to the next one, and that at the last."""
+    """Return ((n − 1) · `MEASURE_STEPS` + 1, 2) positions: so many from each of the parameters
+    t (n,) in 0..m on to the next one, and that at the last."""
     cdef Int i, j, row, k
     cdef double parameter
     cdef double[:, ::1] samples
@@ -152,7 +152,7 @@ cpdef samples_between(double[:, :, ::1] pieces, double[:] t):
 
 
 cpdef double speed(double[:, :, ::1] pieces, Int k, double u) noexcept:
-    """The length of the derivative by u."""
+    """Return the length of the derivative by u."""
     _, _, dx, dy = evaluate(pieces, k, u)
     return math.sqrt(dx * dx + dy * dy)
 
@@ -175,7 +175,7 @@ cdef (double, double) aside(
 
 
 cdef double slowest(double[:, :, ::1] pieces, Int k, double low, double high) noexcept:
-    """The u between low and high where the piece moves slowest: golden section."""
+    """Return the u between low and high where the piece moves slowest: golden section."""
     cdef Int _
     lower, upper = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     lower_speed, upper_speed = speed(pieces, k, lower), speed(pieces, k, upper)
@@ -192,7 +192,8 @@ cdef double slowest(double[:, :, ::1] pieces, Int k, double low, double high) no
 
 
 cdef first_steps(double[:, :, ::1] pieces, Int k, Int each):
-    """The u (≥ each + 1,) that piece k is cut at first, tips and cusps among them; its speed."""
+    """Return the u (≥ each + 1,) that piece k is cut at first, tips and cusps among them; its
+    speed."""
     cdef Int i, count, previous, following, side
     cdef double grid_u, u, tip, fastest
     cdef double[::1] speeds, steps
@@ -226,8 +227,8 @@ cdef bint too_coarse(
     double[:, ::1] rows_behind, Int j,
     double tolerance
 ) noexcept:
-    """True if the step between two rows (u, x, y, arrive x, y, leave x, y), row i of those before
-    and row j of those behind, must be halved."""
+    """Return True if the step between two rows (u, x, y, arrive x, y, leave x, y), row i of
+    those before and row j of those behind, must be halved."""
     cdef Int turn
     cdef bint bends
     cdef double reach, distance
@@ -360,7 +361,8 @@ cpdef curve_rows(double[:, :, ::1] pieces, Int steps, double tolerance):
 cpdef inline double distance_to_arc(
     double px, double py, double ax, double ay, double bx, double by, double bulge
 ) noexcept:
-    """Distance from p to the arc from a to b, |bulge| ≤ 1, to its nearer end beside the arc.
+    """Return the distance from p to the arc from a to b, |bulge| ≤ 1, to its nearer end beside the
+    arc.
 
     With w = p − a, u = b − a, n = u turned by +90°, the power of p over the circle and the vector
     from the centre, both times the bulge, need no centre:
@@ -432,7 +434,7 @@ cdef inline double distance_to_biarc(
     double px, double py, double start_x, double start_y, double end_x, double end_y,
     (double, double, double, double) pair
 ) noexcept:
-    """Distance from p to the nearer of both arcs; infinite when there is no biarc."""
+    """Return the distance from p to the nearer of both arcs; infinite when there is no biarc."""
     jx, jy, first, second = pair
     if math.isnan(jx):
         return math.INFINITY
@@ -444,7 +446,7 @@ cdef inline double distance_to_biarc(
 cdef inline (double, double, double, double) biarc_between(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high
 ) noexcept:
-    """The `biarc` over the nodes low..high."""
+    """Return the `biarc` over the nodes low..high."""
     return biarc(
         point[low, 0],
         point[low, 1],
@@ -480,7 +482,7 @@ cpdef step_errors(
 cpdef double span_error(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high
 ) noexcept:
-    """The largest distance of the nodes between from the biarc over nodes low..high."""
+    """Return the largest distance of the nodes between from the biarc over nodes low..high."""
     cdef Int i
     cdef double distance
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
@@ -496,7 +498,7 @@ cdef bint span_holds(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high,
     double target
 ) noexcept:
-    """True if `span_error` is within the target; stops at the first node that is not."""
+    """Return True if `span_error` is within the target; stops at the first node that is not."""
     cdef Int i
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
     pair = biarc_between(point, leave, arrive, low, high)
@@ -509,7 +511,8 @@ cdef bint span_holds(
 
 
 cdef double arc_error(double[:, ::1] point, Int low, Int high, double bulge) noexcept:
-    """The largest distance of the nodes between from the arc or line over nodes low..high."""
+    """Return the largest distance of the nodes between from the arc or line over nodes
+    low..high."""
     cdef Int i
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
     largest = 0.0
@@ -529,7 +532,7 @@ cpdef Int longest_span(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int furthest,
     Int guess, double target
 ) noexcept:
-    """The end node of the longest biarc from node `low` whose error is within `target`.
+    """Return the end node of the longest biarc from node `low` whose error is within `target`.
 
     error ∝ length³   ⇒   the length that fits is about length · (target / error)^(1/3).
     That rule leads for a few tries, bisection then; at least one step is taken.
@@ -555,7 +558,7 @@ cdef double single_bulge(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high,
     double target
 ) noexcept:
-    """The bulge of the one arc or line that stands for the nodes low..high; NaN for none.
+    """Return the bulge of the one arc or line that stands for the nodes low..high; NaN for none.
 
     With α from the first tangent to the chord and β from the chord to the last one, an arc of
     sweep α + β leaves both tangents by |α − β| / 2.
@@ -606,8 +609,8 @@ cdef (Int, double) longest_single(
 
 
 cdef furthest_nodes(double[:, ::1] leave, double[:, ::1] arrive, uint8_t[::1] corner):
-    """(n,) the last node that a span from each node may reach: the next corner, or where the curve
-    has turned by `SPAN_TURN_RAD`, to either side."""
+    """Return (n,) the last node that a span from each node may reach: the next corner, or where
+    the curve has turned by `SPAN_TURN_RAD`, to either side."""
     cdef Int count, i, last
     cdef Int[::1] furthest
     cdef double[::1] turned
@@ -631,8 +634,9 @@ cdef (Int, Int, double) furthest_state(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int[::1] limit,
     Int[::1] states, Int state, Int guess, double target
 ) noexcept:
-    """The furthest node at the price that begins at row `state` of `states` (node −1: none), the
-    row whence it is reached, and the bulge of the single arc or line that does it (NaN: a biarc)."""
+    """Return the furthest node at the price that begins at row `state` of `states` (node −1:
+    none), the row whence it is reached, and the bulge of the single arc or line that does it
+    (NaN: a biarc)."""
     cdef Int row, best, whence, low, begin, high
     cdef bint first
     best, whence, bulge = states[state - CANDIDATES], state - CANDIDATES, math.NAN
@@ -746,7 +750,7 @@ cdef Int lines_for(
 
 
 cdef chain(double[:, ::1] point, Int[::1] ends, double[:, ::1] pairs, double tolerance):
-    """Rows (n + 1, 3) of all spans and the number of the first row of each (s + 1,).
+    """Return rows (n + 1, 3) of all spans and the number of the first row of each (s + 1,).
 
     Arcs that leave their chord by `STRAIGHT_SAGITTA_MM` or less, and flat ones, are lines.
     """
@@ -798,8 +802,8 @@ cdef chain(double[:, ::1] point, Int[::1] ends, double[:, ::1] pairs, double tol
 
 
 cdef double common_bulge(double[:, ::1] rows, Int first, double end_x, double end_y) noexcept:
-    """The bulge of the one arc or line that both segments lie on which begin at `first` and at the
-    row after it and end there, or NaN."""
+    """Return the bulge of the one arc or line that both segments lie on which begin at `first`
+    and at the row after it and end there, or NaN."""
     cdef Int second
     cdef double bulge, sweep
     second = first + 1
@@ -863,7 +867,7 @@ cdef joined(double[:, ::1] rows, double size):
 cdef deviations(
     double[:, ::1] samples, Int[::1] ends, Int[::1] first, double[:, ::1] vertices, Int[::1] places
 ):
-    """Distances (n,) of samples (n, 2) of the curve from the segments of their own span.
+    """Return distances (n,) of samples (n, 2) of the curve from the segments of their own span.
 
     There are equally many samples in each step between nodes, and the last one at the end. Of
     the columns (spans + 1,) span s owns the nodes ends[s]..ends[s + 1] and the old segments
@@ -889,7 +893,7 @@ cdef deviations(
 
 
 cdef (double, double, double) summary(double[:, ::1] samples, double[::1] errors) noexcept:
-    """Largest deviation and rms, weighted by length, and length of the curve, mm.
+    """Return the largest deviation and rms, weighted by length, and length of the curve, mm.
 
     Between samples i and i + 1 the deviation peaks at or below the meeting of the lines through
     the two samples before and the two behind: it is concave on each side of a peak, and where the
@@ -915,8 +919,8 @@ cdef (double, double, double) summary(double[:, ::1] samples, double[::1] errors
 
 
 cpdef fit_nodes(nodes, double[:, ::1] samples, double target, double tolerance):
-    """The chain (n, 3) over `nodes` (points, arriving and leaving tangents (n, 2), corners (n,))
-    and its largest and rms deviation from the samples, and their length, mm."""
+    """Return the chain (n, 3) over `nodes` (points, arriving and leaving tangents (n, 2),
+    corners (n,)) and its largest and rms deviation from the samples, and their length, mm."""
     cdef Int[::1] ends, first, places
     cdef double[:, ::1] point, arrive, leave, pairs, rows, vertices
     cdef double[::1] errors
@@ -971,7 +975,8 @@ cpdef enum:
 
 
 cdef bint lengths_agree(double[:, ::1] points, Int low, Int high) noexcept:
-    """True if the chords low..high − 1 have similar lengths; the first and last may be shorter."""
+    """Return True if the chords low..high − 1 have similar lengths; the first and last may be
+    shorter."""
     cdef Int k
     shortest, longest = math.INFINITY, 0.0
     for k in range(low, high):
@@ -983,7 +988,7 @@ cdef bint lengths_agree(double[:, ::1] points, Int low, Int high) noexcept:
 
 
 cdef bint is_straight(double[:, ::1] points, Int low, Int high, double noise) noexcept:
-    """True if the points lie within `noise` of the chord from the first to the last."""
+    """Return True if the points lie within `noise` of the chord from the first to the last."""
     cdef Int k
     ux, uy = points[high, 0] - points[low, 0], points[high, 1] - points[low, 1]
     length = math.hypot(ux, uy)
@@ -995,7 +1000,8 @@ cdef bint is_straight(double[:, ::1] points, Int low, Int high, double noise) no
 
 
 cpdef (double, double, double) circle_of(double[:, ::1] points, Int low, Int high) noexcept:
-    """Centre and radius of the least-squares circle; an infinite radius for points on a line."""
+    """Return the centre and radius of the least-squares circle; an infinite radius for points
+    on a line."""
     cdef Int count, k
     count = high - low + 1
     mx, my = 0.0, 0.0
@@ -1058,7 +1064,7 @@ cdef (Int, double, double, double, double) judge(
 cdef (Int, Int, double, double, double, double) longest_run(
     double[:, ::1] points, Int low, double noise, double tolerance, double[::1] errors
 ) noexcept:
-    """The last point of the longest run from `low`, and what it is; `low` for none."""
+    """Return the last point of the longest run from `low`, and what it is; `low` for none."""
     cdef Int best, too_far, size, rest, doubled, high, is_
     cdef double cx, cy, radius, sweep
     best, too_far, size = low, len(points), MIN_POINTS - 1
@@ -1087,7 +1093,8 @@ cdef (Int, Int, double, double, double, double) longest_run(
 
 
 cpdef find_runs(double[:, ::1] points, double noise, double tolerance):
-    """(r, 6) runs of chords on one circle: first and last point, centre, radius, signed sweep.
+    """Return (r, 6) runs of chords on one circle: first and last point, centre, radius, signed
+    sweep.
 
     A run that is straight so far is passed; the arc behind it begins within its last chords, and
     is extended backwards as far as it goes.
@@ -1117,7 +1124,7 @@ cpdef find_runs(double[:, ::1] points, double noise, double tolerance):
 
 
 cpdef double furthest_off(double[:, ::1] points, double[:, ::1] arcs) noexcept:
-    """The largest distance of points (n, 2) from a chain of arcs (m, 3)."""
+    """Return the largest distance of points (n, 2) from a chain of arcs (m, 3)."""
     cdef Int i, row
     cdef double bulge, nearest, largest, distance
     largest = 0.0
@@ -1144,7 +1151,8 @@ cpdef (double, Int, Int) closest(
     const double[:, :] start, const double[:, :] end, double[::1] bulge, double[:, ::1] boxes,
     Int[::1] path
 ):
-    """The distance, the row whose start is nearest to another path, and the row it is near to.
+    """Return the distance, the row whose start is nearest to another path, and the row it is near
+    to.
 
     `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4) and the ascending `path` (K,) of the
     segments. Rows are −1 when there is one path only.
@@ -1174,9 +1182,9 @@ cpdef nearest_rows(
     double[:, ::1] points, const double[:, :] start, const double[:, :] end, double[::1] bulge,
     double[:, ::1] boxes
 ):
-    """(P,) rows of the segments nearest to points (P, 2); quick when neighbours in the list are
-    near. `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4), K ≥ 1; where two are as near, the
-    last one keeps its place."""
+    """Return (P,) rows of the segments nearest to points (P, 2); quick when neighbours in the
+    list are near. `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4), K ≥ 1; where two are as
+    near, the last one keeps its place."""
     cdef Int candidate, row, index
     cdef Int[::1] nearest, stack
     cdef double _, x, y, ax, ay, bx, by
@@ -1198,8 +1206,8 @@ cdef (double, Int) _from_point(
     double x, double y, const double[:, :] start, const double[:, :] end, double[::1] bulge,
     double[:, ::1] tree, Int first, Int last, double best, Int[::1] stack
 ) noexcept:
-    """The distance to the nearest segment outside first … last that is nearer than the best one
-    so far, and its row; −1 when there is none. `stack` (`DEPTH`,) is room."""
+    """Return the distance to the nearest segment outside first … last that is nearer than the
+    best one so far, and its row; −1 when there is none. `stack` (`DEPTH`,) is room."""
     cdef Int leaves, best_row, height, node, row, low, high
     cdef bint own
     leaves = len(tree) // 2

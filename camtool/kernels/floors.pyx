@@ -221,8 +221,8 @@ cdef inline Int _clamped_up(double value, Int count) noexcept nogil:
 cdef inline bint _is_straight(
     Int count, Int size, Int phase, Int events, double along, double across, double level
 ) noexcept nogil:
-    """True if the steps do not count: there are none, or all of them together are less than a
-    billionth of a rounding error of the rest."""
+    """Return True if the steps do not count: there are none, or all of them together are less
+    than a billionth of a rounding error of the rest."""
     return (
         math.fabs(across) * STEPS_DO_NOT_COUNT < max(math.fabs(along), level)
         or across == 0.0

@@ -175,21 +175,22 @@ cdef double _behind(Cutter* cutter, double slope) noexcept:
 
 
 cdef inline Int _index(double place, Int count) noexcept:
-    """The number of a cell, no less than 0 and no more than `count`; 0 for NaN."""
+    """Return the number of a cell, no less than 0 and no more than `count`; 0 for NaN."""
     if not place > 0.0:
         return 0
     return count if place >= count else <Int> place
 
 
 cdef inline Int _from(Row* row, Int nx, double x) noexcept:
-    """The first cell whose centre is not left of x."""
+    """Return the first cell whose centre is not left of x."""
     return _index(math.ceil((x - row.x0) / row.cell), nx)
 
 
 cdef (double, double) _span(
     double ax, double ay, double run, double ux, double uy, double y, double reach
 ) noexcept:
-    """The part of the line at height y that lies within `reach` of a move; inf, −inf if none."""
+    """Return the part of the line at height y that lies within `reach` of a move; inf, −inf if
+    none."""
     cdef double left, right, half, off, low, high
     left, right = math.INFINITY, -math.INFINITY
     off = y - ay
@@ -472,7 +473,7 @@ cdef void _tabulate(Cutter* cutter, double steep) noexcept:
 
 
 cdef inline double _profile(Cutter* cutter, double square) noexcept:
-    """Height of the tool over its tip at the distance √square, within its radius."""
+    """Return the height of the tool over its tip at the distance √square, within its radius."""
     cdef double w = max(math.sqrt(square) - cutter.flat, 0.0)
     if cutter.corner > 0.0:
         w = max(cutter.corner * cutter.corner - w * w, 0.0)
@@ -483,7 +484,7 @@ cdef inline double _profile(Cutter* cutter, double square) noexcept:
 cdef double _bull(
     double corner, double flat, double steep, double square, double rim, double near
 ) noexcept:
-    """The u at which a bull nose rises as steeply as the move: w u = steep · d · q, with
+    """Return the u at which a bull nose rises as steeply as the move: w u = steep · d · q, with
     d² = a² + u², w = d − flat and q² = corner² − w². `near`: where to begin."""
     cdef double low, high, u, d, w, q, off, rate, estimate
     cdef int k
@@ -582,7 +583,7 @@ cpdef void project(
 
 
 cdef inline double _border(double first, double size, Int k, double rate, double start) noexcept:
-    """The t at which start + t · way leaves the cell k; inf if it never does."""
+    """Return the t at which start + t · way leaves the cell k; inf if it never does."""
     if abs(rate) < 1e-12:
         return math.INFINITY
     return (first + (k + 1 if rate > 0.0 else k) * size - start) / rate
@@ -591,7 +592,7 @@ cdef inline double _border(double first, double size, Int k, double rate, double
 cdef (double, double) _within(
     double start, double rate, double low, double high, double first, double last
 ) noexcept:
-    """The part of first … last in which start + t · way lies between low and high."""
+    """Return the part of first … last in which start + t · way lies between low and high."""
     cdef double one, other
     if abs(rate) < 1e-12:
         return (first, last) if low <= start < high else (1.0, 0.0)

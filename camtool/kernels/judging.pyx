@@ -41,7 +41,7 @@ cdef Int LAST_BELOW = move_tree.LAST
 
 
 def leading_bits(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
-    """The leading bits of each float64 ≥ 0, as integers in the order of the values."""
+    """Return the leading bits of each float64 ≥ 0, as integers in the order of the values."""
     return np.right_shift(np.ascontiguousarray(values).view(np.int64), SHIFT)
 
 
@@ -66,7 +66,7 @@ cdef inline void fill_lanes(double* lanes, double value) noexcept nogil:
 
 
 cdef inline double sum_of_lanes(double* lanes) noexcept nogil:
-    """The sum of all partial sums, in pairs; they are changed."""
+    """Return the sum of all partial sums, in pairs; they are changed."""
     cdef Int width, lane
     width = LANES // 2
     while width > 0:
@@ -77,7 +77,7 @@ cdef inline double sum_of_lanes(double* lanes) noexcept nogil:
 
 
 cdef inline double largest_of_lanes(double* lanes) noexcept nogil:
-    """The largest of all lanes, in pairs; they are changed."""
+    """Return the largest of all lanes, in pairs; they are changed."""
     cdef Int width, lane
     width = LANES // 2
     while width > 0:
@@ -88,7 +88,7 @@ cdef inline double largest_of_lanes(double* lanes) noexcept nogil:
 
 
 cdef inline double smallest_of_lanes(double* lanes) noexcept nogil:
-    """The smallest of all lanes, in pairs; they are changed."""
+    """Return the smallest of all lanes, in pairs; they are changed."""
     cdef Int width, lane
     width = LANES // 2
     while width > 0:
@@ -288,12 +288,12 @@ cpdef void set_errors(
 
 
 cdef inline double smaller(double one, double other) noexcept nogil:
-    """The smaller of two numbers, neither of which is NaN."""
+    """Return the smaller of two numbers, neither of which is NaN."""
     return one if one < other else other
 
 
 cdef inline double larger(double one, double other) noexcept nogil:
-    """The larger of two numbers, neither of which is NaN."""
+    """Return the larger of two numbers, neither of which is NaN."""
     return one if one > other else other
 
 
@@ -367,8 +367,8 @@ class Moves(NamedTuple):
 
 
 def room_for(count: int, dtype: type[np.generic] = np.float64) -> npt.NDArray[Any]:
-    """(count,) numbers of 8 bytes, not set, that begin where a line of the processor's cache does:
-    of what is read and written 64 bytes at once nothing lies in two of them."""
+    """Return (count,) numbers of 8 bytes, not set, that begin where a line of the processor's
+    cache does: of what is read and written 64 bytes at once nothing lies in two of them."""
     buffer = np.empty(count + 8, dtype=dtype)
     begin = -buffer.ctypes.data % 64 // 8
     return buffer[begin : begin + count]
@@ -392,7 +392,7 @@ cdef class Search:
 cdef inline bint is_searched(
     Int k, Int first, Int last, double z_low, double z_high, const double[:, :] heights
 ) noexcept nogil:
-    """True if a move is one of first:last, at heights that overlap z_low … z_high."""
+    """Return True if a move is one of first:last, at heights that overlap z_low … z_high."""
     if k < first or k >= last:
         return False
     return bool(heights[k, 0] <= z_high and heights[k, 1] >= z_low)
@@ -402,8 +402,8 @@ cdef Int _nearest(
     double x, double y, double within, Int first, Int last, double z_low, double z_high,
     Search search
 ) noexcept nogil:
-    """The move nearest to a point, if it is nearer than `within` mm, else −1; of those first:last
-    whose heights overlap z_low … z_high."""
+    """Return the move nearest to a point, if it is nearer than `within` mm, else −1; of those
+    first:last whose heights overlap z_low … z_high."""
     cdef Int leaves, height, node, low, place, k, nearest
     cdef double best
     cdef int[::1] order
@@ -485,7 +485,7 @@ cdef wide _set_box(
 
 
 cdef inline bint node_near(double[:, ::1] nodes, Int node, double[::1] box) noexcept nogil:
-    """True if the box of a node may have a point in the box."""
+    """Return True if the box of a node may have a point in the box."""
     cdef double low_x, low_y, high_x, high_y, aside, reach
     low_x, low_y = nodes[node, 0] - box[MIDDLE_X], nodes[node, 1] - box[MIDDLE_Y]
     high_x, high_y = nodes[node, 2] - box[MIDDLE_X], nodes[node, 3] - box[MIDDLE_Y]
@@ -499,7 +499,7 @@ cdef inline bint node_near(double[:, ::1] nodes, Int node, double[::1] box) noex
 
 
 cdef inline bint move_near(Curves curves, Int k, double[::1] box) noexcept nogil:
-    """True if a move may have a point in the box; an arc counts as its full circle."""
+    """Return True if a move may have a point in the box; an arc counts as its full circle."""
     cdef Int at
     cdef double ax, ay, way_x, way_y, long, wide, px, py, along, aside, near_long, near_wide
     cdef double far_long, far_wide, square, to_x, to_y, further, across, side, reach
@@ -529,7 +529,8 @@ cdef inline bint move_near(Curves curves, Int k, double[::1] box) noexcept nogil
 
 
 cdef bint _is_there(Curves curves, Int[::1] moves, Int count, Int move) noexcept nogil:
-    """True if the move is one of the first `count` in the list; turns of a circle are equal."""
+    """Return True if the move is one of the first `count` in the list; turns of a circle are
+    equal."""
     cdef Int n
     n = 0
     while n < count and not are_same(curves, moves[n], move):
@@ -651,11 +652,11 @@ cpdef bint nearest_errors(
     double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,
     Search search, double[::1] out
 ) noexcept nogil:
-    """The error of each of the points x, y (1 ≤ n ≤ `BLOCK`,) against the nearest of the moves
-    first:last whose heights overlap z_low … z_high, or of all of these where none does; signed as
-    `set_errors` does, of equally near moves by that to which the point is most square, or by
-    `own`. False, and inf, where there is none. `own` is the move that the points are expected to
-    follow, or −1."""
+    """Return the error of each of the points x, y (1 ≤ n ≤ `BLOCK`,) against the nearest of the
+    moves first:last whose heights overlap z_low … z_high, or of all of these where none does;
+    signed as `set_errors` does, of equally near moves by that to which the point is most
+    square, or by `own`. False, and inf, where there is none. `own` is the move that the points
+    are expected to follow, or −1."""
     cdef Int begin, end, height, low, high, middle, k, n, near
     cdef bint is_listed
     cdef double far
@@ -707,7 +708,8 @@ cpdef bint nearest_errors(
 
 
 cdef Int _first_off(double[::1] errors, Int low) noexcept nogil:
-    """The first point from `low` on that does not lie on its own move, or the end of all."""
+    """Return the first point from `low` on that does not lie on its own move, or the end of
+    all."""
     cdef Int k
     k = low
     while k < len(errors) and abs(errors[k]) <= TIE_MM:
@@ -748,20 +750,21 @@ cpdef enum:
 
 
 def bin_directions() -> Floats:
-    """(721, 2) the directions between which the bins lie."""
+    """Return (721, 2) the directions between which the bins lie."""
     angle = np.arange(ANGLE_BINS + 1) % ANGLE_BINS * (2.0 * np.pi / ANGLE_BINS)
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def empty_bins(count: int) -> Floats:
-    """(count, 720, 9) bins of circles that nothing went round."""
+    """Return (count, 720, 9) bins of circles that nothing went round."""
     bins = np.zeros((count, ANGLE_BINS, BIN_COLUMNS))
     bins[:, :, 3], bins[:, :, 6] = np.inf, -np.inf
     return bins
 
 
 cdef Int _bin_of(double x, double y, double[:, ::1] directions) noexcept nogil:
-    """The bin of a point: by its angle, and on the edge of two bins by the cross products."""
+    """Return the bin of a point: by its angle, and on the edge of two bins by the cross
+    products."""
     cdef Int which
     turn = math.atan2(y, x) / (2.0 * math.M_PI)
     turn = turn + 1.0 if turn < 0.0 else turn
@@ -873,14 +876,14 @@ cdef void _place(
 
 
 def new_pen(stride: int, room: int) -> Floats:
-    """A pen that has written nothing."""
+    """Return a pen that has written nothing."""
     pen = np.zeros(PEN)
     pen[STRIDE], pen[ROOM], pen[ROW], pen[PEAK] = stride, room, -1.0, -1.0
     return pen
 
 
 def unwritten(pen: Floats) -> Floats:
-    """(0 to 2, 4) points that the pen still holds: x, y, error, row."""
+    """Return (0 to 2, 4) points that the pen still holds: x, y, error, row."""
     peak, last = pen[[PEAK_X, PEAK_Y, PEAK, ROW]], pen[[LAST_X, LAST_Y, LAST_ERROR, ROW]]
     samples = [peak] if pen[IN_RUN] > 0.0 else []
     if pen[ROW] >= 0.0 and not (pen[LAST_IS_WRITTEN] > 0.0):
@@ -1095,7 +1098,7 @@ cdef wide _sizes(
 
 
 cdef inline int _place_of(Int bits, Int turn) noexcept nogil:
-    """The place of a size ≥ 0 in a histogram, from its bits."""
+    """Return the place of a size ≥ 0 in a histogram, from its bits."""
     return 4 * min(max((bits >> SHIFT) - BEFORE_FIRST, 0), BINS - 1) + turn
 
 

@@ -16,7 +16,7 @@ finest difference of quotients that a dialect can say (1/14 step)."""
 
 
 def to_steps(length_mm: npt.ArrayLike, step_mm: float) -> npt.NDArray[np.int64]:
-    """Lengths (mm) to the nearest whole steps, halves away from zero; same shape.
+    """Return lengths (mm) to the nearest whole steps, halves away from zero; same shape.
 
     >>> to_steps([0.00007, -0.00007, 0.000069, 3 * 0.00014], 0.00014).tolist()
     [1, -1, 0, 3]

@@ -221,8 +221,9 @@ cdef inline bint _takes_along(Drive* drive, Int steps) noexcept nogil:
 
 
 cdef class LineJudge:
-    """A judge of lines: the judge of samples, the lines and their slides, and scratch buffers:
-    crossings; windows of visited events, and what was found there; pieces to be counted."""
+    """Return a judge of lines: the judge of samples, the lines and their slides, and scratch
+    buffers: crossings; windows of visited events, and what was found there; pieces to be
+    counted."""
 
     cdef Judge judge
     cdef Int[::1] row
@@ -701,7 +702,8 @@ cdef double _error_to(Int move, double x, double y, LineJudge all_) noexcept nog
 cdef bint _is_more_square(
     Straight* nominal, Int by, Int move, double x, double y, LineJudge all_
 ) noexcept nogil:
-    """True if a point is more square to a move than to `by`, or to the wanted one for −1."""
+    """Return True if a point is more square to a move than to `by`, or to the wanted one for
+    −1."""
     cdef double square
     if by < 0:
         square = nominal.dx * (y - nominal.ay) - nominal.dy * (x - nominal.ax)

@@ -63,8 +63,8 @@ cpdef enum:
 
 
 cdef class Ways:
-    """The ways of N rows: the `start` (3,) mm of the first and the `end` (N, 3) of each; the `arms`
-    (A, 8) of arcs, and which of them each row has, `arm` (N,), −1 for lines."""
+    """Return the ways of N rows: the `start` (3,) mm of the first and the `end` (N, 3) of each;
+    the `arms` (A, 8) of arcs, and which of them each row has, `arm` (N,), −1 for lines."""
 
     def __init__(
         self,

@@ -38,9 +38,9 @@ LEVELS = 16
 def move_tree(
     count: int, boxes: Callable[[Ints | Indices], Floats], group: Ints | Indices | None = None
 ) -> tuple[Floats, Indices]:
-    """(2L, 6) nodes over so many rows K, whose `boxes` (J, 4) are asked for some rows (J,) at a
-    time, and the order (K,) of the rows in their L leaves. Rows of one `group` (K,), ascending,
-    stay together: a search among these looks at no others."""
+    """Return (2L, 6) nodes over so many rows K, whose `boxes` (J, 4) are asked for some rows
+    (J,) at a time, and the order (K,) of the rows in their L leaves. Rows of one `group` (K,),
+    ascending, stay together: a search among these looks at no others."""
 
     def middles(rows: Ints) -> Floats:
         box = boxes(rows)
@@ -70,14 +70,15 @@ def move_tree(
 
 
 def hilbert_order(starts: Floats, ends: Floats) -> Ints:
-    """(K,) rows as Hilbert's curve through their extents comes to the middles between `starts`
-    (K, 2) and `ends` (K, 2)."""
+    """Return (K,) rows as Hilbert's curve through their extents comes to the middles between
+    `starts` (K, 2) and `ends` (K, 2)."""
     order = hilbert_order_of(len(starts), lambda rows: 0.5 * (starts[rows] + ends[rows]))
     return order.astype(np.int64)
 
 
 def hilbert_order_of(count: int, middles: Callable[[Ints], Floats]) -> Indices:
-    """The same of so many rows, whose `middles` (J, 2) are asked for some rows (J,) at a time."""
+    """Return the same of so many rows, whose `middles` (J, 2) are asked for some rows (J,) at a
+    time."""
     if count == 0:
         return np.empty(0, dtype=np.int32)
     lots = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]

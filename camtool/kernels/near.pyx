@@ -95,9 +95,9 @@ cdef class Near:
 def nearest(
     moves: Moves, points: Floats, runs: Ints, limits_mm: tuple[float, float]
 ) -> tuple[Floats, Ints]:
-    """(P,) mm and (P,): the distance of each point from the nearest move within the limits, inf
-    for none, and the row of that, −1 for none; arguments as in `Near`. `runs` (R, 4): begin and
-    end of some points, begin and end of the moves with which they are compared."""
+    """Return (P,) mm and (P,): the distance of each point from the nearest move within the
+    limits, inf for none, and the row of that, −1 for none; arguments as in `Near`. `runs` (R,
+    4): begin and end of some points, begin and end of the moves with which they are compared."""
     count = np.zeros(len(points), dtype=np.int64)
     result = np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64), count
     search = Near(moves, points, limits_mm, result)
@@ -111,8 +111,8 @@ def nearest(
 def pairs(
     moves: Moves, points: Floats, limits_mm: tuple[float, float]
 ) -> tuple[Ints, Ints, Floats]:
-    """All pairs (point, move) within the limits, in order, and their distances, mm; arguments as
-    in `Near`."""
+    """Return all pairs (point, move) within the limits, in order, and their distances, mm;
+    arguments as in `Near`."""
     count = np.zeros(len(points), dtype=np.int64)
     place = np.empty(len(points), dtype=np.int64)
     search = Near(moves, points, limits_mm, (np.empty(len(points)), place, count))
@@ -277,7 +277,7 @@ cdef Int _divided(Int low, Int high, Int axis, double middle, Near search) noexc
 
 
 cdef inline double _distance(Near search, Int k, double x, double y, double z) noexcept:
-    """The distance of a point from a move; inf beyond the limits."""
+    """Return the distance of a point from a move; inf beyond the limits."""
     cdef Int arc
     cdef double from_z, rise, window, ax, ay, bx, by, share, dx, dy, px, py, square, distance, sine
     cdef double to_a, to_b
@@ -357,7 +357,7 @@ cdef void _compare(Int low, Int high, Int first, Int last, Near search) noexcept
 cdef void _list(
     Int low, Int high, Int first, Int last, Near search, Int[::1] moves, double[::1] distance
 ) noexcept:
-    """All of the candidates first:last that are within the limits of each of the points."""
+    """Return all of the candidates first:last that are within the limits of each of the points."""
     cdef Int i, point, n, index
     cdef double gap, x, y, z
     cdef double[:, ::1] points
@@ -376,8 +376,8 @@ cdef void _list(
 
 
 def hilbert_places(const double[:, :] points, Int levels) -> Indices:
-    """(K,) uint32: where Hilbert's curve comes to points (K, 2) in the square of size 1, whose
-    sides are halved `levels` times.
+    """Return (K,) uint32: where Hilbert's curve comes to points (K, 2) in the square of size 1,
+    whose sides are halved `levels` times.
 
     The quarters of a square come in the order (0, 0), (0, 1), (1, 1), (1, 0). In the first and the
     last the curve is that of the whole with X and Y exchanged, in the last it is mirrored besides.

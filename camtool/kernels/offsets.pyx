@@ -27,7 +27,7 @@ cpdef enum:
 
 
 cpdef tree_of(double[:, ::1] boxes):
-    """(2L, 4) boxes of the nodes over `boxes` (K, 4); the L leaves are the last."""
+    """Return (2L, 4) boxes of the nodes over `boxes` (K, 4); the L leaves are the last."""
     cdef Int leaves, node, row, k
     cdef double[:, ::1] tree
     leaves = 1
@@ -53,7 +53,7 @@ cdef void _widen(double[:, ::1] tree, Int node, double[:, ::1] boxes, Int row) n
 
 
 cdef (Int, Int) rows_under(double[:, ::1] tree, Int node, Int count) noexcept nogil:
-    """The rows low … high − 1 of `count` in all that a node holds."""
+    """Return the rows low … high − 1 of `count` in all that a node holds."""
     cdef Int leaves, span, low
     leaves = len(tree) // 2
     span = LEAF
@@ -103,7 +103,7 @@ cdef Int wait_for_children(
 
 
 cdef inline bint touch(double[:, ::1] boxes, Int i, double[:, ::1] other_boxes, Int j) noexcept:
-    """True if box i of one list and box j of another have a point in common."""
+    """Return True if box i of one list and box j of another have a point in common."""
     return bool(
         boxes[i, 0] <= other_boxes[j, 2]
         and other_boxes[j, 0] <= boxes[i, 2]
@@ -131,7 +131,7 @@ cpdef enum:
 
 
 cpdef curve_rows(double[:, ::1] start, double[:, ::1] end, double[::1] bulge):
-    """(K, 11) rows of the segments from `start` to `end` (K, 2) with their bulges (K,)."""
+    """Return (K, 11) rows of the segments from `start` to `end` (K, 2) with their bulges (K,)."""
     cdef double[:, ::1] rows
     cdef Int i
     rows = np.empty((len(bulge), 11))
@@ -161,7 +161,8 @@ cdef void set_curve_row(
 
 
 cpdef curve_boxes(double[:, ::1] curves, double margin):
-    """(K, 4) xmin, ymin, xmax, ymax of boxes that hold each curve, and `margin` more all round.
+    """Return (K, 4) xmin, ymin, xmax, ymax of boxes that hold each curve, and `margin` more all
+    round.
 
     An arc lies between its chord and the parallel of it at its height, sin(sweep/4)² · 2/k.
     """
@@ -183,7 +184,7 @@ cpdef curve_boxes(double[:, ::1] curves, double margin):
 
 
 cdef inline double gap_to(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """Distance of a point from the whole line or circle of row i."""
+    """Return the distance of a point from the whole line or circle of row i."""
     qx, qy = x - curves[i, AX], y - curves[i, AY]
     nx, ny, bend = -curves[i, TY], curves[i, TX], curves[i, BEND]
     power = bend * (qx * qx + qy * qy) - 2.0 * (nx * qx + ny * qy)
@@ -192,7 +193,7 @@ cdef inline double gap_to(double[:, ::1] curves, Int i, double x, double y) noex
 
 
 cdef inline double distance_to(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """Distance of a point from row i: from its nearer end beside it (|sweep| ≤ π)."""
+    """Return the distance of a point from row i: from its nearer end beside it (|sweep| ≤ π)."""
     cdef bint ahead
     qx, qy = x - curves[i, AX], y - curves[i, AY]
     rx, ry = x - curves[i, BX], y - curves[i, BY]
@@ -203,7 +204,8 @@ cdef inline double distance_to(double[:, ::1] curves, Int i, double x, double y)
 
 
 cpdef double arc_length_at(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """Length along row i from its start to a point on its line or circle; negative before it.
+    """Return the length along row i from its start to a point on its line or circle; negative
+    before it.
 
     The chord to the point makes half the swept angle with the tangent; points before the start
     show as half angles beyond the middle of what remains of the circle.
@@ -225,7 +227,7 @@ cpdef double arc_length_at(double[:, ::1] curves, Int i, double x, double y) noe
 
 
 cpdef inline (double, double) point_on(double[:, ::1] curves, Int i, double t) noexcept:
-    """The point of row i at the fraction t of its length.
+    """Return the point of row i at the fraction t of its length.
 
     After the length s the chord from A is turned by half = k s/2 and s · sin(half)/half long.
     """
@@ -259,7 +261,7 @@ cpdef enum:
 
 
 cpdef kite_boxes(double[:, ::1] kites):
-    """(J, 4) boxes xmin, ymin, xmax, ymax that hold the kites (J, 10)."""
+    """Return (J, 4) boxes xmin, ymin, xmax, ymax that hold the kites (J, 10)."""
     cdef double[:, ::1] boxes
     cdef Int i
     boxes = np.empty((len(kites), 4))
@@ -336,7 +338,8 @@ cdef double least_below(
     double[:, ::1] curves, double[:, ::1] tree, double x, double y, double best, double enough,
     Int[::1] stack, double[::1] squares
 ) noexcept:
-    """Distance of a point from the nearest curve, or `best` when none is nearer than that.
+    """Return the distance of a point from the nearest curve, or `best` when none is nearer than
+    that.
 
     Any distance below `enough` will do. `stack` and `squares` (`DEPTH`,) are scratch buffers.
     """
@@ -368,7 +371,7 @@ cdef double least_below(
 
 
 cpdef nearest_distances(double[:, ::1] points, double[:, ::1] curves, double[:, ::1] tree):
-    """(P,) distance of each point (P, 2) from the nearest curve."""
+    """Return (P,) distance of each point (P, 2) from the nearest curve."""
     cdef double[::1] distances, squares
     cdef Int i
     cdef Int[::1] stack
@@ -389,7 +392,8 @@ cpdef nearest_distances(double[:, ::1] points, double[:, ::1] curves, double[:, 
 
 
 cdef bint faces(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """True if the nearest place of the whole line or circle of row i lies on the row itself."""
+    """Return True if the nearest place of the whole line or circle of row i lies on the row
+    itself."""
     return bool(
         (x - curves[i, AX]) * curves[i, TX] + (y - curves[i, AY]) * curves[i, TY] >= 0.0
         and (x - curves[i, BX]) * curves[i, UX] + (y - curves[i, BY]) * curves[i, UY] <= 0.0
@@ -406,8 +410,8 @@ cdef inline double power_of(double[:, ::1] curves, Int i, double x, double y) no
 
 
 cdef (double, double, double) away_from(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """Distance of a point from row i, and the direction from the nearest place to the point; 0
-    where it lies there."""
+    """Return the distance of a point from row i, and the direction from the nearest place to
+    the point; 0 where it lies there."""
     cdef double px, py, distance, bend = curves[i, BEND], qx, qy, rx, ry
     qx, qy = x - curves[i, AX], y - curves[i, AY]
     rx, ry = x - curves[i, BX], y - curves[i, BY]
@@ -430,8 +434,8 @@ cdef (double, double, double) away_from(double[:, ::1] curves, Int i, double x, 
 cdef (double, double) least_along(
     double[:, ::1] curves, Int i, double x, double y, double dx, double dy
 ) noexcept:
-    """Values at the ends of a chord, with the middle (x, y) and half of it (dx, dy), of a linear
-    function that is nowhere on it more than the distance from row i."""
+    """Return values at the ends of a chord, with the middle (x, y) and half of it (dx, dy), of
+    a linear function that is nowhere on it more than the distance from row i."""
     cdef double distance, nx, ny, low, high, ox, oy, radius, bend = curves[i, BEND], bound
     distance, nx, ny = away_from(curves, i, x, y)
     bound = distance - math.sqrt(dx * dx + dy * dy)
@@ -453,8 +457,8 @@ cdef (double, double) least_along(
 cdef (double, double) most_along(
     double[:, ::1] curves, Int i, double x, double y, double dx, double dy
 ) noexcept:
-    """Values at the ends of a chord, as in `least_along`, of a linear function that is nowhere on
-    it less than the distance from row i."""
+    """Return values at the ends of a chord, as in `least_along`, of a linear function that is
+    nowhere on it less than the distance from row i."""
     cdef double ox, oy, low, high, slope, distance, radius, bend = curves[i, BEND]
     if bend == 0.0:
         return distance_to(curves, i, x - dx, y - dy), distance_to(curves, i, x + dx, y + dy)
@@ -500,10 +504,11 @@ cdef void nearest_two(
 cpdef chord_distances(
     double[:, ::1] middles, double[:, ::1] halves, double[:, ::1] curves, double[:, ::1] tree
 ):
-    """(K, 4) bounds of the distance from the nearest curve along chords, whose middles and half
-    ways from start to end are (K, 2): at both ends the least, at both ends the most. Between the
-    ends the distance lies between the lines through these. Along a chord that may meet a curve the
-    least is what the distance may be on either side of it, counted below 0 on the other one."""
+    """Return (K, 4) bounds of the distance from the nearest curve along chords, whose middles
+    and half ways from start to end are (K, 2): at both ends the least, at both ends the most.
+    Between the ends the distance lies between the lines through these. Along a chord that may
+    meet a curve the least is what the distance may be on either side of it, counted below 0 on
+    the other one."""
     cdef double[:, ::1] bounds = np.empty((len(middles), 4))
     cdef Int[::1] stack = np.empty(DEPTH, np.int64), row = np.empty(2, np.int64)
     cdef double[::1] distances = np.empty(2)
@@ -543,8 +548,8 @@ cpdef enum:
 cpdef disc_tangents(
     double[:, ::1] points, double[::1] reach, double[:, ::1] curves, double[:, ::1] tree
 ):
-    """(P, 2, 5) upper bounds of the distance from the two curves nearest to each point (P, 2), within
-    `reach` (P,) of it; the distance of a second one that does not exist is inf."""
+    """Return (P, 2, 5) upper bounds of the distance from the two curves nearest to each point
+    (P, 2), within `reach` (P,) of it; the distance of a second one that does not exist is inf."""
     cdef double[:, :, ::1] tangents = np.zeros((len(points), 2, TANGENT_COLUMNS))
     cdef Int[::1] stack = np.empty(DEPTH, np.int64), row = np.empty(2, np.int64)
     cdef double[::1] distances = np.empty(2)
@@ -588,7 +593,7 @@ cdef double bulge_of(double distance, double reach) noexcept:
 
 
 cdef twice_the_room(Int[:, ::1] pairs):
-    """The same pairs (J, 2), and room for as many more."""
+    """Return the same pairs (J, 2), and room for as many more."""
     cdef Int[:, ::1] more
     more = np.empty((2 * len(pairs), 2), np.int64)
     more[: len(pairs)] = pairs
@@ -598,8 +603,8 @@ cdef twice_the_room(Int[:, ::1] pairs):
 cpdef curves_within(
     double[:, ::1] points, double[::1] reach, double[:, ::1] curves, double[:, ::1] tree
 ):
-    """(J, 2) pairs of a point (P, 2) and a curve that is no farther from it than `reach` (P,), in
-    the order of the points."""
+    """Return (J, 2) pairs of a point (P, 2) and a curve that is no farther from it than `reach`
+    (P,), in the order of the points."""
     cdef Int[:, ::1] pairs
     cdef Int[::1] stack
     cdef Int i, count, leaf, height, row
@@ -671,7 +676,7 @@ cdef double _violation(
 
 
 cpdef trimmed_ends(double[:, ::1] elements, surroundings, (double, double) limits):
-    """(K, 2) fractions between which each element may be far enough from the source.
+    """Return (K, 2) fractions between which each element may be far enough from the source.
 
     The distance from the source, and the depth in a kite, change by no more than the way along an
     element: where it falls short by s, all is too near for the length s from there. `limits` are
@@ -730,7 +735,7 @@ cpdef far_enough(
     double[:, ::1] elements, Int[::1] element, double[:, ::1] span, surroundings,
     (double, double) limits
 ):
-    """(S,) true for the slices of which no measured point is too near to the source.
+    """Return (S,) true for the slices of which no measured point is too near to the source.
 
     Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]. `limits` are the
     distance, and by how much a point may be too near.
@@ -802,7 +807,7 @@ cpdef pairs_of(
     double[:, ::1] other_tree,
     bint own
 ):
-    """(J, 2) rows of `boxes` and of `other_boxes` that touch; a tree stands over each.
+    """Return (J, 2) rows of `boxes` and of `other_boxes` that touch; a tree stands over each.
 
     `own` says that both are the same: then each pair comes once, the lesser row first. Nodes of
     both trees are looked at in pairs, so that what two large boxes tell is told once.
@@ -842,7 +847,7 @@ cpdef pairs_of(
 
 
 cpdef meetings_of(double[:, ::1] a, double[:, ::1] b, Int[:, ::1] pairs, double eps):
-    """The rows (J, 2) of a and b, and the meetings (J, 4), of the pairs (P, 2) of rows."""
+    """Return the rows (J, 2) of a and b, and the meetings (J, 4), of the pairs (P, 2) of rows."""
     cdef Int room, count, k, more, m, i, j
     cdef Int[:, ::1] rows
     cdef double[:, ::1] points
@@ -893,8 +898,9 @@ cdef bint _is_stored(
     double[:, ::1] a, double[:, ::1] b, Int i, Int j, double x, double y, double eps,
     double[:, ::1] points, Int offset, Int count
 ) noexcept:
-    """True if the curves stay within eps of each other from a common point to all of the shorter
-    one, or to a meeting found before: one of `count` in the rows of `points` from `offset` on.
+    """Return True if the curves stay within eps of each other from a common point to all of the
+    shorter one, or to a meeting found before: one of `count` in the rows of `points` from `offset`
+    on.
 
     At the angle θ and with curvatures that differ by k they are θ s + k s²/2 apart after s, at
     most. There rounding alone would place a crossing: where they are tangent at an end, anywhere
@@ -938,7 +944,7 @@ cdef Int _store_intersection_if_new(
 
 
 cdef inline double _fraction(double length, double full_length, double eps) noexcept:
-    """Fraction of the whole length, exactly 0 or 1 within eps of an end."""
+    """Return the fraction of the whole length, exactly 0 or 1 within eps of an end."""
     if length >= full_length - eps:
         return 1.0
     return 0.0 if length <= eps else length / full_length
@@ -954,8 +960,8 @@ cdef inline (double, double) _tangent_after(double[:, ::1] curves, Int i, double
 cdef (double, double, double, double) _common_points(
     double[:, ::1] a, double[:, ::1] b, Int i, Int j
 ) noexcept:
-    """The two points that the whole curves share (intersect.py derives them); NaN if none. Row j
-    of b is the rounder one.
+    """Return the two points that the whole curves share (intersect.py derives them); NaN if none.
+    Row j of b is the rounder one.
 
     Where they miss each other, both are the point of the common line nearest to the rounder one.
     """
@@ -996,7 +1002,7 @@ cpdef enum:
 
 
 cpdef merged(double[:, :] points, double[::1] skew, Int[::1] order, double eps):
-    """The node (P,) of each point (P, 2), and the first point (N,) of each node.
+    """Return the node (P,) of each point (P, 2), and the first point (N,) of each node.
 
     Points within `eps` of each other share a node, and so do chains of them. `order` sorts the
     points by `skew` (P,), which differs between two points by no more than their distance.
@@ -1033,7 +1039,7 @@ cpdef merged(double[:, :] points, double[::1] skew, Int[::1] order, double eps):
 
 
 cdef Int _root(Int[::1] group, Int i) noexcept:
-    """The least member of the group of i."""
+    """Return the least member of the group of i."""
     while group[i] != i:
         group[i] = group[group[i]]
         i = group[i]
@@ -1041,7 +1047,7 @@ cdef Int _root(Int[::1] group, Int i) noexcept:
 
 
 cdef grouped(Int[::1] keys, Int count):
-    """Rows (R,) by their key below `count`, in their order, and where each key begins."""
+    """Return rows (R,) by their key below `count`, in their order, and where each key begins."""
     cdef Int[::1] begins, rows
     cdef Int row, key
     begins = np.zeros(count + 1, np.int64)
@@ -1061,7 +1067,8 @@ cdef grouped(Int[::1] keys, Int count):
 
 
 cpdef in_order(Int[::1] keys, double[::1] t, Int count):
-    """Rows (R,) by their key below `count`, then by t (R,), then as they come (a shell sort)."""
+    """Return rows (R,) by their key below `count`, then by t (R,), then as they come (a shell
+    sort)."""
     cdef Int key, gap, i, row, j
     cdef Int[::1] rows, begins, some
     rows, begins = grouped(keys, count)
@@ -1086,7 +1093,8 @@ cdef bint _is_after(double[::1] t, Int first, Int second) noexcept:
 cpdef doubles_left(
     double[:, ::1] elements, Int[::1] element, double[::1] middle_t, ends, double eps
 ):
-    """(S,) false for repeated slices, and for both of a pair that runs the same way to and fro.
+    """Return (S,) false for repeated slices, and for both of a pair that runs the same way to and
+    fro.
 
     `ends` holds the nodes (S,) that each slice runs from and to, and how many nodes there are.
     Slices between the same nodes are the same when their middles are within `eps`.
@@ -1122,7 +1130,8 @@ cpdef doubles_left(
 
 
 cpdef leading_on(Int[::1] from_node, Int[::1] to_node, Int count):
-    """(S,) true for the slices that others lead to and lead on from, when all else is gone."""
+    """Return (S,) true for the slices that others lead to and lead on from, when all else is
+    gone."""
     cdef bint ends_here
     cdef Int first, last, node, height, k, row, end, side
     cdef uint8_t[::1] keep
@@ -1170,7 +1179,7 @@ cdef double U_TURN_EPS_RAD = 1e-3
 
 
 cpdef traced(double[:, ::1] elements, Int[::1] element, double[:, ::1] span, ends):
-    """Rows (R,) of the slices of all loops, loop by loop, and where each begins (L + 1,).
+    """Return rows (R,) of the slices of all loops, loop by loop, and where each begins (L + 1,).
 
     Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]; `ends` holds the
     nodes (S,) that each slice runs from and to, and how many nodes there are. No loop passes a
@@ -1224,8 +1233,8 @@ cdef Int _leftmost(
     double[:, ::1] elements, Int[::1] element, double[:, ::1] span, Int last, uint8_t[::1] unused,
     Int[::1] ways
 ) noexcept:
-    """The unused one of the slices `ways` that turns left the most when `last` led there; turning
-    right back is left back. −1 when there is none."""
+    """Return the unused one of the slices `ways` that turns left the most when `last` led
+    there; turning right back is left back. −1 when there is none."""
     cdef Int k, best, count, row
     best, max_turn, count = -1, -math.INFINITY, 0
     for k in range(len(ways)):
@@ -1256,7 +1265,8 @@ cdef (double, double) _tangent(double[:, ::1] elements, Int i, double t) noexcep
 
 
 cpdef written(slices, double[:, ::1] nodes, double[::1] sweeps, runs, double eps):
-    """Vertices (V, 3) of runs of slices that follow each other, and where each begins (L + 1,).
+    """Return vertices (V, 3) of runs of slices that follow each other, and where each begins (L +
+    1,).
 
     `slices` are the element, span and both nodes (S,) of each slice, `sweeps` those of the
     elements. `runs` are the rows of all runs, where each begins, and whether it is closed. Slices
@@ -1298,7 +1308,7 @@ cpdef written(slices, double[:, ::1] nodes, double[::1] sweeps, runs, double eps
 
 
 cdef bint _goes_on(Int[::1] element, double[:, ::1] span, Int last, Int row) noexcept:
-    """True if a slice continues along the element of the one before it."""
+    """Return True if a slice continues along the element of the one before it."""
     return bool(element[last] == element[row] and span[row, 0] >= span[last, 1])
 
 
@@ -1384,7 +1394,8 @@ cpdef enum:
 cpdef insides(
     double[:, ::1] points, double[:, ::1] curves, double[::1] bulge, double[:, ::1] tree
 ):
-    """(P,) true for the points (P, 2) within a closed path; on the line either may come out.
+    """Return (P,) true for the points (P, 2) within a closed path; on the line either may come
+    out.
 
     `curves` (K, 11) and `tree` as in offset_curves and box_tree, `bulge` (K,).
     """
@@ -1401,7 +1412,7 @@ cdef bint is_inside(
     double[:, ::1] curves, double[::1] bulge, double[:, ::1] tree, double x, double y,
     Int[::1] stack
 ) noexcept:
-    """True if a closed path encloses a point; `stack` (`DEPTH`,) is a scratch buffer."""
+    """Return True if a closed path encloses a point; `stack` (`DEPTH`,) is a scratch buffer."""
     cdef Int leaves, height, node, low, row
     cdef bint odd
     leaves, odd = len(tree) // 2, False
@@ -1422,7 +1433,8 @@ cdef bint is_inside(
 
 
 cdef inline bint _counts(double[:, ::1] curves, Int i, double bulge, double x, double y) noexcept:
-    """True if either a ray to the right crosses the chord or the point lies between chord and arc."""
+    """Return True if either a ray to the right crosses the chord or the point lies between
+    chord and arc."""
     cdef bint crosses, in_circle, on_left
     ax, ay, bx, by = curves[i, AX], curves[i, AY], curves[i, BX], curves[i, BY]
     dx, dy = bx - ax, by - ay
@@ -1440,8 +1452,8 @@ cdef inline bint _counts(double[:, ::1] curves, Int i, double bulge, double x, d
 
 
 cpdef holds(double[:, ::1] points, Int[::1] begins, ring, Int[::1] paths, double eps):
-    """(N,) OUT, HELD or ON_LINE for each of `paths` (N,): path k has the points begins[k] … of
-    `points` (P, 2).
+    """Return (N,) OUT, HELD or ON_LINE for each of `paths` (N,): path k has the points begins[k] …
+    of `points` (P, 2).
 
     `ring` holds curves, bulge and tree of a closed path; what is within `eps` of its line is
     neither outside nor inside.

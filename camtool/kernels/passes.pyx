@@ -40,7 +40,7 @@ cdef class Tracks:
 
 
 cpdef reaches(double[::1] lengths, Int[::1] first):
-    """(K + M,) mm: for each path 0 and the sums of its lengths (K,) so far; path i has the
+    """Return (K + M,) mm: for each path 0 and the sums of its lengths (K,) so far; path i has the
     segments first[i] to first[i + 1]."""
     cdef Int path, k
     cdef double total
@@ -56,7 +56,7 @@ cpdef reaches(double[::1] lengths, Int[::1] first):
 
 
 cdef inline double begin_of(Tracks tracks, Int path, Int u) noexcept:
-    """The length at which segment u of a path begins, counted on through the laps."""
+    """Return the length at which segment u of a path begins, counted on through the laps."""
     cdef Int count, offset
     cdef double lap
     count = tracks.first[path + 1] - tracks.first[path]
@@ -66,21 +66,22 @@ cdef inline double begin_of(Tracks tracks, Int path, Int u) noexcept:
 
 
 cdef inline Int row_of(Tracks tracks, Int path, Int u) noexcept:
-    """The row of segment u of a path, counted on through the laps."""
+    """Return the row of segment u of a path, counted on through the laps."""
     cdef Int count
     count = tracks.first[path + 1] - tracks.first[path]
     return int(tracks.first[path] + u - int(math.floor(float(u) / float(count))) * count)
 
 
 cdef inline double size_of(Tracks tracks, Int path, Int u) noexcept:
-    """The length of segment u of a path, counted on through the laps."""
+    """Return the length of segment u of a path, counted on through the laps."""
     cdef Int offset
     offset = row_of(tracks, path, u) + path
     return float(tracks.reach[offset + 1] - tracks.reach[offset])
 
 
 cdef Int last_before(Tracks tracks, Int path, double length) noexcept:
-    """The last segment of a path that begins at a length or before it; the first when none does.
+    """Return the last segment of a path that begins at a length or before it; the first when none
+    does.
 
     `length` lies on the path itself, not further round.
     """
@@ -97,7 +98,7 @@ cdef Int last_before(Tracks tracks, Int path, double length) noexcept:
 
 
 cdef (double, double) point(Tracks tracks, Int row, double t) noexcept:
-    """The point of a segment at the fraction t of its length."""
+    """Return the point of a segment at the fraction t of its length."""
     cdef double ax, ay, bx, by, sweep, along, across, ratio, turn, x
     ax, ay = tracks.start[row, 0], tracks.start[row, 1]
     bx, by = tracks.end[row, 0], tracks.end[row, 1]
@@ -112,7 +113,7 @@ cdef (double, double) point(Tracks tracks, Int row, double t) noexcept:
 
 
 cdef (double, double) place(Tracks tracks, Int path, double length) noexcept:
-    """The point of a path at a length; ends of open paths reach no further."""
+    """Return the point of a path at a length; ends of open paths reach no further."""
     cdef Int offset, u
     cdef double total, part
     offset = tracks.first[path] + path
@@ -128,7 +129,7 @@ cdef (double, double) place(Tracks tracks, Int path, double length) noexcept:
 
 
 cdef (Int, Int) span(Tracks tracks, Int path, double begin, double end) noexcept:
-    """The first and the last of the segments of a path between two lengths, begin < end."""
+    """Return the first and the last of the segments of a path between two lengths, begin < end."""
     cdef Int count, limit, piece_at, first, last
     cdef double total, low_lap, high_lap
     count = tracks.first[path + 1] - tracks.first[path]
@@ -152,7 +153,7 @@ cdef (Int, Int) span(Tracks tracks, Int path, double begin, double end) noexcept
 
 
 cdef (double, double) part_of(Tracks tracks, Int path, Int u, double begin, double end) noexcept:
-    """The fractions of segment u of a path at which a piece begins and ends on it."""
+    """Return the fractions of segment u of a path at which a piece begins and ends on it."""
     cdef double start, size, low, high
     start, size = begin_of(tracks, path, u), size_of(tracks, path, u)
     low = (begin - start) / size if begin - start > NEAR_MM else 0.0
@@ -163,7 +164,8 @@ cdef (double, double) part_of(Tracks tracks, Int path, Int u, double begin, doub
 cdef (double, double) start_of(
     Tracks tracks, Int path, double begin, double end, Int first, Int last
 ) noexcept:
-    """The point at which a piece of a path begins, whose `span` is from `first` to `last`."""
+    """Return the point at which a piece of a path begins, whose `span` is from `first` to
+    `last`."""
     cdef Int u
     cdef double begins, stops
     u = last if end < begin else first
@@ -227,8 +229,8 @@ cdef Int write_piece(
 
 
 cpdef piece(Tracks tracks, Int path, double begin, double end):
-    """(k, 4) x, y, length so far and bulge of a path from one length to another, backwards when
-    `end` is the lower one. The last bulge is 0."""
+    """Return (k, 4) x, y, length so far and bulge of a path from one length to another,
+    backwards when `end` is the lower one. The last bulge is 0."""
     cdef Int first, last
     cdef double[:, ::1] vertices
     first, last = span(tracks, path, min(begin, end), max(begin, end))
@@ -240,7 +242,7 @@ cpdef piece(Tracks tracks, Int path, double begin, double end):
 
 
 cpdef lifted(Tracks tracks, Int[::1] path, Int[::1] first, double[::1] length, double[::1] z):
-    """(N, 4) x, y, z, bulge of R runs, one after the other, and where each of them begins
+    """Return (N, 4) x, y, z, bulge of R runs, one after the other, and where each of them begins
     (R + 1,).
 
     Run i follows path[i] (R,) from point to point of its profile, the lengths and heights (P,) of

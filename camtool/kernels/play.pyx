@@ -35,14 +35,14 @@ cdef uint64_t OTHER_MIXER = 0x94D049BB133111EBU
 
 
 cdef inline uint64_t _mixed(uint64_t word) noexcept:
-    """The output function of SplitMix64."""
+    """Return the output function of SplitMix64."""
     word = (word ^ (word >> 30)) * MIXER
     word = (word ^ (word >> 27)) * OTHER_MIXER
     return word ^ (word >> 31)
 
 
 cdef double deviate(Int seed, Int stream, Int number) noexcept:
-    """The `number`-th of a stream ≥ 0, from 0 on."""
+    """Return the `number`-th of a stream ≥ 0, from 0 on."""
     cdef Int k, part
     cdef uint64_t key, total, word
     key = _mixed(seed + (stream + 1) * GAMMA)
@@ -83,14 +83,14 @@ cdef double deviate(Int seed, Int stream, Int number) noexcept:
 
 
 def play_limits(play_mm: float, convention: str, direction: int) -> tuple[float, float]:
-    """(low, high) in mm for "preloaded" in `direction` ±1 or "centred"."""
+    """Return (low, high) in mm for "preloaded" in `direction` ±1 or "centred"."""
     if convention == "centred":
         return -0.5 * play_mm, 0.5 * play_mm
     return (0.0, play_mm) if direction > 0 else (-play_mm, 0.0)
 
 
 def play_start(position: float, scale: float, direction: int) -> Floats:
-    """The state (6,) of an axis at rest at `position`, engaged in `direction` ±1.
+    """Return the state (6,) of an axis at rest at `position`, engaged in `direction` ±1.
 
     Furthest position in the present direction, that direction, compensation added so far, slide
     in mm; reversals so far and shift in mm, where the axis scatters.
@@ -101,7 +101,7 @@ def play_start(position: float, scale: float, direction: int) -> Floats:
 cdef inline (double, double, bint) turned(
     double position, double furthest, double direction, double threshold
 ) noexcept:
-    """The new furthest position and direction, and whether the axis has reversed."""
+    """Return the new furthest position and direction, and whether the axis has reversed."""
     ahead = (position - furthest) * direction
     if ahead >= 0.0:
         return position, direction, False
@@ -111,7 +111,8 @@ cdef inline (double, double, bint) turned(
 
 
 cdef inline double taken_along(double slide, double motor, double low, double high) noexcept:
-    """The play operator: the slide after the motor went to `motor` mm without turning round."""
+    """Return the play operator: the slide after the motor went to `motor` mm without turning
+    round."""
     return min(max(slide, motor + low), motor + high)
 
 

@@ -58,7 +58,7 @@ cdef double BEND_MM = 1e-9  # a place of a cone nearer than this to its tip or f
 
 
 cdef inline double profile(const double* tool, double distance, double grow) noexcept nogil:
-    """Height of a tool's surface over its tip at a distance from its axis."""
+    """Return the height of a tool's surface over its tip at a distance from its axis."""
     cdef double out = distance - tool[FLAT] - grow
     if out <= 0.0:
         return 0.0
@@ -137,9 +137,9 @@ cdef inline double height_of(
 cdef inline double tangent_of(
     const double* move, const double* tool, double x, double y, double* slope
 ) noexcept nogil:
-    """Height to which a move cuts a point, and the slope in x and y of a plane through it below
-    which the height of the move nowhere lies; inf where there is none or it is not known: beyond
-    the tool, and where the edge of the tool cuts deepest."""
+    """Return the height to which a move cuts a point, and the slope in x and y of a plane
+    through it below which the height of the move nowhere lies; inf where there is none or it is
+    not known: beyond the tool, and where the edge of the tool cuts deepest."""
     cdef double px = x - move[AX], py = y - move[AY], wide = tool[RADIUS]
     cdef double along, aside, s, distance, reach, dx, dy, out, steep
     slope[0], slope[1] = 0.0, 0.0
@@ -184,9 +184,9 @@ cdef inline double tangent_of(
 
 
 cdef class StockTree:
-    """The moves (M, 7) in the order of a curve through the plane, the tool (M,) and the number in
-    the order of cutting (M,) of each; tools (T, 4); the nodes (N, 7) of all levels, the root's
-    last, where level l begins at levels[l]. `top`: the height of what is not cut."""
+    """Return the moves (M, 7) in the order of a curve through the plane, the tool (M,) and the
+    number in the order of cutting (M,) of each; tools (T, 4); the nodes (N, 7) of all levels,
+    the root's last, where level l begins at levels[l]. `top`: the height of what is not cut."""
 
     cdef double[:, ::1] moves, nodes, tools
     cdef Int[::1] tool, number, levels
@@ -205,9 +205,9 @@ cdef class StockTree:
         self.height = len(levels) - 1
 
     def heights(self, points: Floats, before: Ints | None = None, double grow=0.0):
-        """(J,) heights of the stock over points (J, 2), and (J,) the move in the order of cutting
-        that is lowest there, −1 for none; after the first `before` (J,) moves only. Profiles begin
-        `grow` farther out, or nearer where it is below 0."""
+        """Return (J,) heights of the stock over points (J, 2), and (J,) the move in the order
+        of cutting that is lowest there, −1 for none; after the first `before` (J,) moves only.
+        Profiles begin `grow` farther out, or nearer where it is below 0."""
         cdef double[:, ::1] at = np.ascontiguousarray(points, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
         cdef double[::1] lowest_z = np.empty(count)
@@ -228,7 +228,8 @@ cdef class StockTree:
         return np.asarray(lowest_z), np.asarray(which)
 
     def min_heights(self, squares: Floats, double grow=0.0):
-        """(K,) the least height over the disc round each square: middle and half a side (K, 3)."""
+        """Return (K,) the least height over the disc round each square: middle and half a side
+        (K, 3)."""
         cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
         cdef double[::1] lowest_z = np.empty(count)
@@ -249,9 +250,10 @@ cdef class StockTree:
         double grow=0.0,
         before: Ints | None = None,
     ):
-        """(K,) an upper bound of the heights over each square: middle and half a side (K, 3);
-        after the first `before` (K,) moves only. With `tilt` (K, 2) it is one of the heights over
-        the plane through 0 at the middle that rises so much for each mm of x and y."""
+        """Return (K,) an upper bound of the heights over each square: middle and half a side
+        (K, 3); after the first `before` (K,) moves only. With `tilt` (K, 2) it is one of the
+        heights over the plane through 0 at the middle that rises so much for each mm of x and
+        y."""
         ways = squares[:, 2, None, None] * CORNERS
         values = np.zeros(ways.shape[:2])
         if tilt is not None:
@@ -266,9 +268,9 @@ cdef class StockTree:
         before: Ints | None = None,
         double enough=-math.INFINITY,
     ):
-        """(K,) an upper bound of the height plus a linear function, which has `values` (K, C) at the
-        corners (K, C, 2) of convex polygons or of chords, over each of them; after the first
-        `before` (K,) moves only. Any bound no more than `enough` will do."""
+        """Return (K,) an upper bound of the height plus a linear function, which has `values`
+        (K, C) at the corners (K, C, 2) of convex polygons or of chords, over each of them;
+        after the first `before` (K,) moves only. Any bound no more than `enough` will do."""
         cdef double[:, :, ::1] at = np.ascontiguousarray(corners, dtype=np.float64)
         cdef double[:, ::1] more = np.ascontiguousarray(values, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
@@ -298,8 +300,8 @@ cdef class StockTree:
         return np.asarray(bounds)
 
     def quarter_means(self, squares: Floats, double bottom=-math.INFINITY):
-        """(4 K,), (4 K,) bounds of the mean height over the quarters of each square, in the order
-        of `QUARTERS`: middle and half a side (K, 3); the stock ends at a bottom."""
+        """Return (4 K,), (4 K,) bounds of the mean height over the quarters of each square, in
+        the order of `QUARTERS`: middle and half a side (K, 3); the stock ends at a bottom."""
         cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
         cdef double[:, ::1] signs = QUARTERS
         cdef Py_ssize_t k, q, count = at.shape[0]
@@ -460,8 +462,9 @@ cdef class StockTree:
     cdef double support(
         self, Int move, double x, double y, const double* direction, double room
     ) noexcept nogil:
-        """Upper bound of how far the tool of a move gets along a direction from a point, within a
-        disc of radius `room` round it. The tool lies on one side of its tangent."""
+        """Return the upper bound of how far the tool of a move gets along a direction from a
+        point, within a disc of radius `room` round it. The tool lies on one side of its
+        tangent."""
         cdef double[2] own
         cdef double far = self.reach_past(move, x, y, own), cosine
         if far >= room:
@@ -478,8 +481,8 @@ cdef class StockTree:
     cdef double covered(
         self, Int move, const double* square, const double* direction, double far, double bottom
     ) noexcept nogil:
-        """Upper bound of the mean height over a square, of which a move covers a part: all that
-        lies before the chord of its edge."""
+        """Return the upper bound of the mean height over a square, of which a move covers a
+        part: all that lies before the chord of its edge."""
         cdef double* columns = &self.moves[move, 0]
         cdef double* tool = &self.tools[self.tool[move], 0]
         cdef double half = square[2], radius = tool[RADIUS], room = 2.0 * half * half
@@ -580,9 +583,9 @@ cdef class StockTree:
         double enough,
         Int* guess,
     ) noexcept nogil:
-        """Upper bound of the heights and a linear function over a polygon: by the moves that are
-        lowest at its corners and in its middle, by the means of two of these, and by any move that
-        covers all of it."""
+        """Return the upper bound of the heights and a linear function over a polygon: by the
+        moves that are lowest at its corners and in its middle, by the means of two of these,
+        and by any move that covers all of it."""
         cdef Int stack[FAN * DEPTH]
         cdef int levels[FAN * DEPTH]
         cdef double now[MAX_CORNERS]
@@ -651,7 +654,8 @@ cdef class StockTree:
     cdef inline double corners(
         self, Int move, int count, double[3][MAX_CORNERS] polygon, double grow, double* heights
     ) noexcept nogil:
-        """Heights of a move plus the given values at the corners of a polygon, and the greatest."""
+        """Return heights of a move plus the given values at the corners of a polygon, and the
+        greatest."""
         cdef double* tool = &self.tools[self.tool[move], 0]
         cdef double* columns = &self.moves[move, 0]
         cdef double highest = -math.INFINITY
@@ -769,8 +773,8 @@ cdef inline double mean_bound(
 
 
 def heights_of_moves(moves: Floats, tools: Floats, points: Floats, grow: Floats):
-    """(K,) the least height to which each move (K, 7), its tool (K, 4) begun `grow` (K,) farther
-    out, cuts its point (K, 2); inf where it does not get."""
+    """Return (K,) the least height to which each move (K, 7), its tool (K, 4) begun `grow` (K,)
+    farther out, cuts its point (K, 2); inf where it does not get."""
     cdef double[:, ::1] columns = np.ascontiguousarray(moves, dtype=np.float64)
     cdef double[:, ::1] tool = np.ascontiguousarray(tools, dtype=np.float64)
     cdef double[:, ::1] at = np.ascontiguousarray(points, dtype=np.float64)
@@ -784,9 +788,9 @@ def heights_of_moves(moves: Floats, tools: Floats, points: Floats, grow: Floats)
 
 
 def thinned(points: Floats, row: Ints, start: Floats, double tolerance):
-    """(J,) the samples that stay of points (K, 3) of the rows (K,): the last one of each row, and
-    so many between that every sample lies within `tolerance` of the straight move between those
-    that stay before and behind it. `start` (3,): the place before the first sample.
+    """Return (J,) the samples that stay of points (K, 3) of the rows (K,): the last one of each
+    row, and so many between that every sample lies within `tolerance` of the straight move between
+    those that stay before and behind it. `start` (3,): the place before the first sample.
 
     From each kept sample the move is drawn twice as far again and again, as long as all samples
     between lie beside it; then the last doubling is halved down.
@@ -825,7 +829,8 @@ def thinned(points: Floats, row: Ints, start: Floats, double tolerance):
 cdef inline bint lies_beside(
     double[:, ::1] at, Py_ssize_t begin, Py_ssize_t end, double tolerance
 ) noexcept nogil:
-    """True if all points between two lie within a distance of the line from one to the other."""
+    """Return True if all points between two lie within a distance of the line from one to the
+    other."""
     cdef double[3] direction
     cdef double[3] off
     cdef double square = 0.0, share, distance
@@ -849,7 +854,7 @@ cdef inline bint lies_beside(
 
 
 def _nodes(moves: Floats, tool: Ints, number: Ints, tools: Floats) -> tuple[Floats, Ints]:
-    """The nodes of all levels, and where each level begins, with the end of the last."""
+    """Return the nodes of all levels, and where each level begins, with the end of the last."""
     count = len(moves)
     if not count:
         return np.empty((0, NODE_COLUMNS)), np.zeros(1, dtype=np.int64)

@@ -76,7 +76,7 @@ cdef class Route:
 
 
 cdef class Step:
-    """A change of the tour that shortens it by `gain`.
+    """Return a change of the tour that shortens it by `gain`.
 
     second_high < 0: the positions low … high are reversed. Otherwise they change places with those
     behind them up to `second_high`; `flip` says which of the two is reversed as well (1: the first,
@@ -109,7 +109,7 @@ cdef inline double gap(Route tour, Int from_row, Int to_row) noexcept:
 
 
 cdef inline Int row_at(Route tour, Int position) noexcept:
-    """The chosen row of the item at a position."""
+    """Return the chosen row of the item at a position."""
     return int(tour.row[tour.item[position]])
 
 
@@ -149,7 +149,7 @@ cpdef double turning(Route tour, Int low, Int high) noexcept:
 
 
 cpdef bint may_swap(Route tour, Int low, Int high, Int second_high) noexcept:
-    """True if nothing in low … high must come before anything in high + 1 … other."""
+    """Return True if nothing in low … high must come before anything in high + 1 … other."""
     cdef Int position, item, k
     if len(tour.after) == 0:
         return True
@@ -269,8 +269,8 @@ class Tree(NamedTuple):
 
 
 cpdef tree_of(double[:, :] points):
-    """The tree of these points, N ≥ 1, finite, all switched on. A node is halved across the longer
-    side of its box."""
+    """Return the tree of these points, N ≥ 1, finite, all switched on. A node is halved across
+    the longer side of its box."""
     cdef Int count, levels, leaves, nodes, node, low, middle, high, k
     cdef Int[::1] begin, size, rows, leaf
     cdef double[:, ::1] box
@@ -305,7 +305,7 @@ cpdef tree_of(double[:, :] points):
 cdef void _bound(
     double[:, :] points, Int[::1] rows, Int low, Int high, double[:, ::1] box, Int node
 ) noexcept:
-    """The box of the rows low … high − 1 becomes that of a node."""
+    """Return the box of the rows low … high − 1 becomes that of a node."""
     cdef Int k
     cdef double x, y
     box[node, 0] = box[node, 1] = math.INFINITY
@@ -342,7 +342,7 @@ cdef void _halve(
 
 
 cdef class Branches:
-    """A tree as the loops read it, and room for the nodes that wait."""
+    """Return a tree as the loops read it, and room for the nodes that wait."""
 
     cdef double[:, ::1] points, box
     cdef Int[::1] rows, begin, size, live, leaf, waiting
@@ -389,7 +389,7 @@ cdef Int _halves_wait(
 
 
 cpdef Int nearest_row(Branches tree, Int[::1] is_open, double x, double y) noexcept:
-    """The nearest point that is switched on, `is_open` (N,) 1 or 0; −1 when none is."""
+    """Return the nearest point that is switched on, `is_open` (N,) 1 or 0; −1 when none is."""
     cdef Int top, leaves, node, k, row, nearest
     cdef Int[::1] waiting
     cdef double best, square, dx, dy
@@ -418,8 +418,9 @@ cpdef Int nearest_owners(
     Branches tree, Int[::1] owner, Int row, Int max_count, Int quarter, Int[::1] nearest,
     double[::1] squares
 ) noexcept:
-    """The owners nearest to a point, but its own: up to `max_count`, each once, nearest first; they
-    are written into `nearest`, their squared distances into `squares`. Returns how many.
+    """Return the owners nearest to a point, but its own: up to `max_count`, each once, nearest
+    first; they are written into `nearest`, their squared distances into `squares`. Returns how
+    many.
 
     `quarter` 0 … 3: only those above and to the right of the point, and so on CCW.
     """
@@ -458,7 +459,7 @@ cpdef Int nearest_owners(
 
 
 cdef inline bint _looks_to(Int quarter, double dx, double dy) noexcept:
-    """True if a direction lies in a quarter of the plane; each has one of its two edges."""
+    """Return True if a direction lies in a quarter of the plane; each has one of its two edges."""
     if quarter == 0:
         return dx > 0.0 and dy >= 0.0
     if quarter == 1:
@@ -493,8 +494,8 @@ cdef void _enter(
 cdef inline bint _is_before(
     double distance, Int owner, Int[::1] nearest, double[::1] squares, Int index
 ) noexcept:
-    """True if an owner comes before the one at an index: nearer, or as near and with the smaller
-    number."""
+    """Return True if an owner comes before the one at an index: nearer, or as near and with the
+    smaller number."""
     if distance != squares[index]:
         return bool(distance < squares[index])
     return bool(nearest[index] < 0 or owner < nearest[index])
@@ -520,7 +521,7 @@ cpdef nearest_first(
     tree, double[:, ::1] ends, Int[::1] first, Int[::1] after_first, Int[::1] after,
     Int[::1] waits, double[::1] start
 ):
-    """Rows (M,) in order: from `start` (2,) always to the nearest row that may be taken.
+    """Return rows (M,) in order: from `start` (2,) always to the nearest row that may be taken.
 
     `tree` is that of the entries, and is used up. `ends` (S, 4): entry x, y and exit x, y; item i
     owns the rows from first[i] to first[i + 1]; after[after_first[i] : after_first[i + 1]] may
@@ -611,7 +612,8 @@ cpdef neighbours(tree, Int[::1] owner, Int count):
 cpdef best_rows(
     double[:, ::1] ends, Int[::1] first, Int[::1] order, double[::1] start, double[::1] goal
 ):
-    """Rows (M,) for items (M,) in this order, from `start` (2,) to `goal` (2,), NaN for no goal.
+    """Return rows (M,) for items (M,) in this order, from `start` (2,) to `goal` (2,), NaN for no
+    goal.
 
     `ends` (S, 4): entry x, y and exit x, y; item i owns the rows from first[i] to first[i + 1].
     """
@@ -772,7 +774,7 @@ cdef void best_step(Route tour, Int item, Step best) noexcept:
 
 
 cdef void _other_row(Route tour, Int item, Step best) noexcept:
-    """The best row of an item where it is."""
+    """Return the best row of an item where it is."""
     cdef Int candidate, position, row, left, right
     position, row = tour.place[item], tour.row[item]
     left, right = row_at(tour, position - 1), row_at(tour, position + 1)
@@ -795,8 +797,8 @@ cdef void _reversal(Route tour, Int low, Int high, Step best) noexcept:
 
 
 cdef void _part(Route tour, Int position, Int direction, Int spot, bint turn, Step best) noexcept:
-    """Parts of two and more items that begin (way 1) or end (way −1) at a position, moved between
-    the positions `spot` and `spot` + 1."""
+    """Return parts of two and more items that begin (way 1) or end (way −1) at a position,
+    moved between the positions `spot` and `spot` + 1."""
     cdef Int length, low, high
     for length in range(2, MAX_MOVED + 1):
         low = position if direction > 0 else position - length + 1

@@ -105,7 +105,7 @@ cpdef enum:
 
 
 cdef inline Int _column_of(Int sign) noexcept:
-    """The column of a letter, −1 for others."""
+    """Return the column of a letter, −1 for others."""
     if sign == 71:
         return G_WORD
     if 88 <= sign <= 90:
@@ -150,8 +150,8 @@ cdef Int _number(
 
 
 cdef bint _is_comment(const unsigned char[::1] data, Int at, Int end) noexcept:
-    """True if the line is only a comment, and not one in parentheses with a comma, which may be
-    obeyed, or shown to the operator."""
+    """Return True if the line is only a comment, and not one in parentheses with a comma, which
+    may be obeyed, or shown to the operator."""
     cdef Int first
     first = data[at]
     if first == _SEMICOLON:

@@ -60,7 +60,7 @@ def shapely_of(drawing: Drawing, tolerance_mm: float = CHORD_MM) -> dict[str, An
 
 
 def check_tolerance(tolerance_mm: float) -> None:
-    """OptionError for a tolerance of chords that is not above the smallest distance."""
+    """Raise OptionError for a tolerance of chords that is not above the smallest distance."""
     if not tolerance_mm >= POSITION_EPS_MM:
         raise OptionError(
             f"tolerance_mm is {tolerance_mm}, it must be {POSITION_EPS_MM:g} or more"

@@ -72,7 +72,7 @@ class ReadObject(Struct, frozen=True):
 
 
 def is_path(value: object) -> bool:
-    """True if the value names a file."""
+    """Return True if the value names a file."""
     return isinstance(value, str | PathLike)
 
 
@@ -167,7 +167,7 @@ def items_of(value: Any, place: str, layer: str, depth: int) -> Iterator[tuple[A
 
 
 def is_points(value: object) -> bool:
-    """True if the value is a list of points, each a list of numbers."""
+    """Return True if the value is a list of points, each a list of numbers."""
     if not isinstance(value, list | tuple) or not value:
         return False
     first = value[0]
@@ -207,7 +207,7 @@ def read_one(value: object, place: str, options: ReadOptions) -> Found:
 
 
 def _refuse_mixed_units(objects: list[ReadObject]) -> None:
-    """OptionError when the numbers of two objects count in different units."""
+    """Raise OptionError when the numbers of two objects count in different units."""
     for each in objects[1:]:
         first, units = objects[0].found.units, each.found.units
         if units.mm_per_unit != first.mm_per_unit:

@@ -162,7 +162,7 @@ class Spindle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("default_rpm is outside of min_rpm and max_rpm")
 
     def reaches(self, rpm: float) -> bool:
-        """True if the drive has this speed, rev/min."""
+        """Return True if the drive has this speed, rev/min."""
         return self.min_rpm <= rpm and (self.max_rpm is None or rpm <= self.max_rpm)
 
 
@@ -358,13 +358,13 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     correlations: tuple[tuple[str, str, Coefficient], ...] = ()
 
     def standard(self, key: str) -> float | None:
-        """The standard uncertainty at a key such as "x.scale"; None: not known."""
+        """Return the standard uncertainty at a key such as "x.scale"; None: not known."""
         record, _, name = key.rpartition(".")
         value: float | None = getattr(getattr(self, record) if record else self, name)
         return value
 
     def correlation(self, keys: Sequence[str]) -> Floats:
-        """(P, P) the coefficients between these keys."""
+        """Return (P, P) the coefficients between these keys."""
         import numpy as np
 
         matrix = np.eye(len(keys))
@@ -375,7 +375,8 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return matrix
 
     def check(self) -> None:
-        """MachineError for correlations that no numbers can have, or of what is not known."""
+        """Raise MachineError for correlations that no numbers can have, or of what is not
+        known."""
         pairs = set[frozenset[str]]()
         for number, (one, other, _) in enumerate(self.correlations):
             for key in (one, other):
@@ -403,7 +404,8 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         self._check_semidefinite()
 
     def _check_semidefinite(self) -> None:
-        """MachineError, which names the keys, for correlations that contradict each other."""
+        """Raise MachineError, which names the keys, for correlations that contradict each
+        other."""
         if len(self.correlations) < 2:
             return
         import numpy as np
@@ -524,7 +526,7 @@ class Machine(
 
 
 def _given_values(record: msgspec.Struct) -> dict[str, Any]:
-    """The values of a record that are not its defaults, with its tag."""
+    """Return the values of a record that are not its defaults, with its tag."""
     config, values = record.__struct_config__, dict[str, Any]()
     if config.tag_field is not None:
         values[config.tag_field] = config.tag
@@ -541,7 +543,7 @@ def _given_values(record: msgspec.Struct) -> dict[str, Any]:
 
 
 def controller_of(machine: Machine, kind: type[_Record]) -> _Record:
-    """The machine's controller, which must be of this kind; MachineError when it is not."""
+    """Return the machine's controller, which must be of this kind; MachineError when it is not."""
     if not isinstance(machine.controller, kind):
         kind_name = kind.__struct_config__.tag
         raise MachineError(
@@ -561,6 +563,6 @@ def exceeds(feed_mm_min: Floats, limit_mm_min: float) -> Bools: ...
 
 
 def exceeds(feed_mm_min: float | Floats, limit_mm_min: float) -> bool | Bools:
-    """True if a feed, or each of several feeds (K,), is above its limit by more than rounding;
-    False for NaN."""
+    """Return True if a feed, or each of several feeds (K,), is above its limit by more than
+    rounding; False for NaN."""
     return feed_mm_min > limit_mm_min * (1.0 + FEED_TOLERANCE)

@@ -59,8 +59,8 @@ MAX_OVERHANG_MM = 1000.0
 
 
 def overhang_mm(operation: Operation) -> float:
-    """Distance of the outermost round of the tool's centre from the stock: as given, or its
-    radius."""
+    """Return the distance of the outermost round of the tool's centre from the stock: as given,
+    or its radius."""
     given_mm: float | None = operation.own_value("overhang")
     return operation.tool.radius_mm if given_mm is None else given_mm
 

@@ -112,7 +112,7 @@ class LoadedProgram(Struct, frozen=True, eq=False):
         return Path(f"{self.file}.journal")
 
     def page(self) -> bytes:
-        """The page of the viewer."""
+        """Return the page of the viewer."""
         scene = self.one.run.scene()
         path = scene.toolpath
         if path is None or self.tool_mm is None:

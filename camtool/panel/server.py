@@ -309,7 +309,7 @@ class PanelServer:
         return response
 
     async def _view(self, request: web.Request) -> web.Response:
-        """The program in the viewer, which the page shows in a frame."""
+        """Return the program in the viewer, which the page shows in a frame."""
         if self.program is None:
             raise web.HTTPNotFound
         page = await asyncio.to_thread(self.program.page)

@@ -46,7 +46,7 @@ class Chain(Struct, frozen=True, eq=False):
     closed: bool = False
 
     def lengths(self) -> Floats:
-        """(n,) mm: the true length of each move."""
+        """Return (n,) mm: the true length of each move."""
         lengths = np.empty(len(self.sweep))
         for low, part in self.parts():
             chord = np.diff(part.points, axis=0)
@@ -57,14 +57,16 @@ class Chain(Struct, frozen=True, eq=False):
         return lengths
 
     def parts(self) -> Iterator[tuple[int, Chain]]:
-        """Its moves, some thousand at a time, as open chains; and the number of the first."""
+        """Yield its moves, some thousand at a time, as open chains; and the number of the
+        first."""
         for low in range(0, len(self.sweep), MOVES_AT_ONCE):
             high = low + MOVES_AT_ONCE
             points, centre = self.points[low : high + 1], self.centre[low:high]
             yield low, Chain(points, centre, self.sweep[low:high])
 
     def at(self, index: int, share: float) -> tuple[tuple[float, float], float]:
-        """The point at `share` (0 … 1) of move `index`, and the direction of travel there, rad."""
+        """Return the point at `share` (0 … 1) of move `index`, and the direction of travel
+        there, rad."""
         begin, end = self.points[index], self.points[index + 1]
         sweep = float(self.sweep[index])
         if sweep == 0.0:
@@ -96,7 +98,7 @@ class MoveChains(Struct, frozen=True, eq=False):
 
 
 def moves_of(toolpath: Toolpath) -> MoveChains:
-    """The moves of a toolpath, sorted by how they are drawn."""
+    """Return the moves of a toolpath, sorted by how they are drawn."""
     cuts, slopes, rapid, is_downward = toolpath.by_parts(_how_drawn).T
     # A step straight down within a cut, as from one pass to the next, is not drawn as a plunge.
     follows = _follows(cuts, cuts | (toolpath.kind == Kind.RAPID))
@@ -112,8 +114,8 @@ def moves_of(toolpath: Toolpath) -> MoveChains:
 
 
 def _how_drawn(toolpath: Toolpath) -> Bools:
-    """(N, 4) which rows cut in XY, which of these change Z as well, which are rapids in XY, and
-    which go straight down at a feed."""
+    """Return (N, 4) which rows cut in XY, which of these change Z as well, which are rapids in
+    XY, and which go straight down at a feed."""
     step = toolpath.end - toolpath.starts
     across = np.hypot(step[:, 0], step[:, 1]) > POSITION_EPS_MM
     cuts = toolpath.is_feed & (across | toolpath.is_arc)
@@ -124,8 +126,8 @@ def _how_drawn(toolpath: Toolpath) -> Bools:
 
 
 def _follows(cuts: Bools, is_counted: Bools) -> Bools:
-    """(N,) true where, of the rows that are `is_counted`, the last one before a row is one of the
-    `cuts`."""
+    """Return (N,) true where, of the rows that are `is_counted`, the last one before a row is
+    one of the `cuts`."""
     rows = np.flatnonzero(is_counted)
     marks = np.zeros(len(cuts), dtype=np.int8)
     # What a row that is counted says holds from the next one on.
@@ -137,14 +139,14 @@ def _follows(cuts: Bools, is_counted: Bools) -> Bools:
 
 
 def _places(points: Floats) -> Floats:
-    """Each place once, in the order of their first occurrence."""
+    """Return each place once, in the order of their first occurrence."""
     _, first = np.unique(points, axis=0, return_index=True)
     return points[np.sort(first)]
 
 
 def _chains(toolpath: Toolpath, is_chosen: Bools) -> tuple[Chain, ...]:
-    """Runs of the chosen rows, each line or arc once: passes at several depths, and a line there
-    and back, look the same. No move in XY lies between the rows of a run."""
+    """Return runs of the chosen rows, each line or arc once: passes at several depths, and a
+    line there and back, look the same. No move in XY lies between the rows of a run."""
     rows = np.flatnonzero(is_chosen)
     if not len(rows):
         return ()
@@ -164,7 +166,7 @@ def _chains(toolpath: Toolpath, is_chosen: Bools) -> tuple[Chain, ...]:
 
 
 def _part_runs(toolpath: Toolpath) -> Bools:
-    """(N,) true for moves in XY and all rapids."""
+    """Return (N,) true for moves in XY and all rapids."""
     across = (toolpath.starts[:, :2] != toolpath.end[:, :2]).any(axis=1)
     moves = toolpath.is_motion & (across | toolpath.is_arc)
     return np.asarray(moves | (toolpath.kind == Kind.RAPID))
@@ -200,7 +202,7 @@ def _single_chains(begin: Floats, end: Floats) -> tuple[Chain, ...]:
 
 
 def chains_of(lines: Polylines) -> tuple[Chain, ...]:
-    """Each of the polylines as a chain."""
+    """Return each of the polylines as a chain."""
     all_segments = Segments.of(lines)
     cuts = np.searchsorted(all_segments.path, np.arange(len(lines) + 1))
     chains = []
@@ -214,7 +216,8 @@ def chains_of(lines: Polylines) -> tuple[Chain, ...]:
 
 
 def chains_between(segments: Segments) -> tuple[Chain, ...]:
-    """Lines and arcs as chains: a chain goes on while each begins where the one before ended."""
+    """Return lines and arcs as chains: a chain goes on while each begins where the one before
+    ended."""
     if not len(segments):
         return ()
     is_break = np.hypot(*(segments.start[1:] - segments.end[:-1]).T) > POSITION_EPS_MM
@@ -230,7 +233,7 @@ def chains_between(segments: Segments) -> tuple[Chain, ...]:
 
 
 def path_data(chains: Iterable[Chain]) -> str:
-    """The `d` of a path that shows the chains, in mm, Y up (the group around it flips)."""
+    """Return the `d` of a path that shows the chains, in mm, Y up (the group around it flips)."""
     data = PathData(MM_DECIMALS)
     for chain in chains:
         data.move(*chain.points[0].tolist())
@@ -249,7 +252,7 @@ def path_data(chains: Iterable[Chain]) -> str:
 
 
 def _is_flat(chain: Chain, index: int, sweep: float) -> bool:
-    """True if an arc lies nearer to its chord than `POSITION_EPS_MM`.
+    """Return True if an arc lies nearer to its chord than `POSITION_EPS_MM`.
 
     height = chord/2 · tan(sweep/4); renderers are inexact for radii of kilometres.
     """
@@ -280,7 +283,7 @@ def chains_box(chains: Sequence[Chain]) -> Floats | None:
 
 
 def _lots(chains: Iterable[Chain]) -> Iterator[list[Chain]]:
-    """All moves of the chains, some thousand at a time, as open chains."""
+    """Yield all moves of the chains, some thousand at a time, as open chains."""
     lot: list[Chain] = []
     count = 0
     for chain in chains:
@@ -295,7 +298,7 @@ def _lots(chains: Iterable[Chain]) -> Iterator[list[Chain]]:
 
 
 def _halved(chains: Sequence[Chain]) -> Segments:
-    """All moves as segments, each arc as two: a full circle has no bulge."""
+    """Return all moves as segments, each arc as two: a full circle has no bulge."""
     begin = np.concatenate([chain.points[:-1] for chain in chains])
     end = np.concatenate([chain.points[1:] for chain in chains])
     centre = np.concatenate([chain.centre for chain in chains])
@@ -337,14 +340,14 @@ class _Pieces(Struct, frozen=True, eq=False):
 
 
 def reversals_of(toolpath: Toolpath) -> Floats:
-    """(R, 2) mm: the places of reversals, in order; both axes may reverse at one."""
+    """Return (R, 2) mm: the places of reversals, in order; both axes may reverse at one."""
     pieces = _pieces(toolpath)
     is_reversal = _sign_changes(pieces.signs[:, 0]) | _sign_changes(pieces.signs[:, 1])
     return np.asarray(pieces.begin[is_reversal & toolpath.is_feed[pieces.row]])
 
 
 def _sign_changes(signs: Ints) -> Bools:
-    """(P,) whether the sign differs from the last one before it that was not 0."""
+    """Return (P,) whether the sign differs from the last one before it that was not 0."""
     changes: Bools = np.zeros(len(signs), dtype=np.bool_)
     moving = np.flatnonzero(signs)
     changes[moving[1:]] = signs[moving[1:]] != signs[moving[:-1]]
@@ -352,7 +355,7 @@ def _sign_changes(signs: Ints) -> Bools:
 
 
 def _pieces(toolpath: Toolpath) -> _Pieces:
-    """All moves in their order, arcs cut at the multiples of 90°."""
+    """Return all moves in their order, arcs cut at the multiples of 90°."""
     starts, ends, sweeps = toolpath.starts[:, :2], toolpath.end[:, :2], toolpath.sweeps()
     rows = np.flatnonzero(toolpath.is_motion)
     is_arc = toolpath.is_arc[rows] & (sweeps[rows] != 0.0)
@@ -399,7 +402,7 @@ def _signs(lengths: Floats) -> Ints:
 
 
 def cuts_of(toolpath: Toolpath, is_chosen: Bools) -> tuple[Chain, ...]:
-    """The chosen ones of the rows (N,) that cut in XY, each line or arc once."""
+    """Return the chosen ones of the rows (N,) that cut in XY, each line or arc once."""
     return _chains(toolpath, is_chosen & toolpath.by_parts(_how_drawn)[:, 0])
 
 
@@ -429,7 +432,7 @@ def tapers(
 
 
 def _places_along(start: Floats, end: Floats, centre: Floats, sweep: float) -> Floats:
-    """(K, 3) mm: the ends of a line; of an arc those of its chords."""
+    """Return (K, 3) mm: the ends of a line; of an arc those of its chords."""
     count = math.ceil(abs(sweep) / TAPER_ARC_RAD)
     if count < 2:
         return np.stack([start, end])
@@ -440,7 +443,7 @@ def _places_along(start: Floats, end: Floats, centre: Floats, sweep: float) -> F
 
 
 def _hull(one: Floats, radius: float, other: Floats, last: float) -> Chain | None:
-    """The outline of two discs and what lies between them; None for points.
+    """Return the outline of two discs and what lies between them; None for points.
 
     Their common tangents touch both where the radius makes the angle φ with the line from one to
     the other, cos φ = (r − s) / d; there are none where one disc holds the other.
@@ -459,8 +462,8 @@ def _hull(one: Floats, radius: float, other: Floats, last: float) -> Chain | Non
 
 
 def _round(arcs: Sequence[tuple[Floats, float, float, float]]) -> Chain:
-    """A closed chain of arcs (centre, radius, first angle, turn), each in two halves, and the
-    lines between them."""
+    """Return a closed chain of arcs (centre, radius, first angle, turn), each in two halves,
+    and the lines between them."""
     points, centres, sweeps = list[Floats](), list[Floats](), list[float]()
     for centre, radius, begin, turn in arcs:
         for k in range(3):

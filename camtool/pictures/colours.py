@@ -83,7 +83,7 @@ _PAINT = re.compile('(fill|stroke)="(#[0-9a-f]{6})"')
 
 
 def sequential(fraction: float, *, dark: bool = False) -> str:
-    """The colour "#rrggbb" at `fraction` of the map, 0 … 1; ValueError outside.
+    """Return the colour "#rrggbb" at `fraction` of the map, 0 … 1; ValueError outside.
 
     >>> sequential(0.0), sequential(1.0)
     ('#0d0887', '#f8963c')
@@ -99,17 +99,18 @@ def sequential(fraction: float, *, dark: bool = False) -> str:
 
 
 def bin_colours(*, dark: bool = False) -> tuple[str, ...]:
-    """The colour of each of the `BINS` steps of the map, taken at its middle."""
+    """Return the colour of each of the `BINS` steps of the map, taken at its middle."""
     return tuple(sequential((index + 0.5) / BINS, dark=dark) for index in range(BINS))
 
 
 def on_dark(colour: str) -> str:
-    """The colour of the dark palette for one of the light palette; KeyError for any other."""
+    """Return the colour of the dark palette for one of the light palette; KeyError for any
+    other."""
     return _DARK[colour]
 
 
 def darkened(svg: str) -> str:
-    """A picture in the dark palette: only the colours of its fills and strokes change."""
+    """Return a picture in the dark palette: only the colours of its fills and strokes change."""
     instead = _DARK | dict(zip(bin_colours(), bin_colours(dark=True), strict=True))
     return _PAINT.sub(lambda match: f'{match[1]}="{instead[match[2]]}"', svg)
 

@@ -49,7 +49,7 @@ PNG_DPI = 96
 
 
 def draw(scene: Scene, options: PictureOptions = AS_USUAL) -> str:
-    """The scene as SVG text; OptionError for a circle that it does not have."""
+    """Return the scene as SVG text; OptionError for a circle that it does not have."""
     if options.polar is not None:
         return draw_polar(scene, options.polar, options)
     if options.view != "plan":
@@ -90,7 +90,8 @@ def panel(content: Content, page: PageLayout) -> list[str]:
 
 
 def png(svg: str, width_px: int) -> bytes:
-    """The PNG of an SVG text, `width_px` wide; OptionError for a width that no picture has."""
+    """Return the PNG of an SVG text, `width_px` wide; OptionError for a width that no picture
+    has."""
     check_width(width_px)
     import resvg_py
 
@@ -101,7 +102,7 @@ def png(svg: str, width_px: int) -> bytes:
 
 
 def _plot(content: Content, view: View) -> list[str]:
-    """The SVG of the plot, with a label where there is nothing to draw."""
+    """Return the SVG of the plot, with a label where there is nothing to draw."""
     layers = draw_layers(content, Plot(view))
     if not content.is_empty:
         return layers
@@ -121,7 +122,7 @@ def _scales_and_legend(content: Content, page: PageLayout) -> list[str]:
 
 
 def render(scene: Scene, name: str, options: PictureOptions = AS_USUAL) -> bytes:
-    """SVG, PNG or HTML bytes of the scene for a file of this name; OutputError for other
+    """Return SVG, PNG or HTML bytes of the scene for a file of this name; OutputError for other
     extensions. HTML is the viewer's page, which takes no options."""
     if PurePath(name).suffix.lower() == ".html":
         from camtool.pictures.viewer.page import viewer_page
@@ -131,8 +132,8 @@ def render(scene: Scene, name: str, options: PictureOptions = AS_USUAL) -> bytes
 
 
 def rendered(drawn: Callable[[PictureOptions], str], name: str, options: PictureOptions) -> bytes:
-    """SVG or PNG bytes for a file of this name; `drawn` makes SVG text by options with a width.
-    OutputError for other extensions."""
+    """Return SVG or PNG bytes for a file of this name; `drawn` makes SVG text by options with a
+    width. OutputError for other extensions."""
     suffix = PurePath(name).suffix.lower()
     if suffix not in (".svg", ".png"):
         raise OutputError("is not a picture file", file=name, mend="use .svg or .png")

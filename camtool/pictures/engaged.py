@@ -57,7 +57,7 @@ def engagement_trace(scene: Scene) -> EngagementTrace | None:
 
 
 def engagement_layer(trace: EngagementTrace, view: View, pen: float) -> str:
-    """The coloured moves, in mm."""
+    """Return the coloured moves, in mm."""
     low, high = view.x_range
     decimals, apart_mm = decimals_in(high - low), MERGED_SHARE * (high - low)
     paths = []
@@ -75,8 +75,8 @@ def engagement_layer(trace: EngagementTrace, view: View, pen: float) -> str:
 
 
 def _lines(begin: Floats, end: Floats, apart_mm: float) -> list[list[list[float]]]:
-    """Moves that follow each other as lines of points, without those nearer to the one before than
-    a distance, but with all ends."""
+    """Return moves that follow each other as lines of points, without those nearer to the one
+    before than a distance, but with all ends."""
     lines: list[list[list[float]]] = []
     last: list[float] | None = None
     for one, other in zip(begin.tolist(), end.tolist(), strict=True):

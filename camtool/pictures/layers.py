@@ -91,7 +91,7 @@ class LineGroup(Struct, frozen=True, eq=False):
         return bool(self.chains)
 
     def draw(self, plot: Plot) -> str:
-        """The lines in mm."""
+        """Return the lines in mm."""
         mm, look = plot.view.mm, {"fill": "none", **self.look}
         look["stroke-width"] = mm(float(look["stroke-width"]))
         if "stroke-dasharray" in look:
@@ -100,7 +100,7 @@ class LineGroup(Struct, frozen=True, eq=False):
         return plot.lines(self.id, self.chains, look)
 
     def entries(self, view: View) -> Iterator[LegendEntry]:
-        """Its line of the legend."""
+        """Yield its line of the legend."""
         look = self.look
         dashes = str(look.get("stroke-dasharray", ""))
         swatch = line_swatch(str(look["stroke"]), float(look["stroke-width"]), dashes)
@@ -120,11 +120,11 @@ class DotGroup(Struct, frozen=True, eq=False):
         return bool(self.places)
 
     def draw(self, plot: Plot) -> str:
-        """The marks, in units of the page."""
+        """Return the marks, in units of the page."""
         return plot.dots(self.id, self.places, self.look)
 
     def entries(self, view: View) -> Iterator[LegendEntry]:
-        """Its line of the legend, if any of the marks is in view."""
+        """Yield its line of the legend, if any of the marks is in view."""
         if any(view.shows(*place) for place in self.places):
             yield LegendEntry(dot_swatch(self.look), self.name)
 
@@ -142,7 +142,7 @@ class TextGroup(Struct, frozen=True, eq=False):
         return bool(self.places)
 
     def draw(self, plot: Plot) -> str:
-        """The texts, in units of the page."""
+        """Return the texts, in units of the page."""
         return plot.texts(self.id, self.texts, self.places, self.colour)
 
     def entries(self, view: View) -> Iterator[LegendEntry]:
@@ -186,7 +186,7 @@ class Layer(Struct, frozen=True):
     key: str = ""
 
     def is_in(self, content: Content) -> bool:
-        """True if the picture shows the layer and the layer is not empty."""
+        """Return True if the picture shows the layer and the layer is not empty."""
         shown = content.shown
         return (
             (self.usual if shown is None else self.name in shown)
@@ -195,25 +195,25 @@ class Layer(Struct, frozen=True):
         )
 
     def parts_in(self, content: Content) -> list[Part]:
-        """Its parts that are not empty."""
+        """Return its parts that are not empty."""
         return [part for part in self.parts(content) if part] if self.parts else []
 
     def svg(self, content: Content, plot: Plot) -> str:
-        """Its SVG; empty when nothing of it is in view."""
+        """Return its SVG; empty when nothing of it is in view."""
         if self.draw is not None:
             return self.draw(content, plot)
         parts = (part.draw(plot) for part in self.parts_in(content))
         return "\n".join(part for part in parts if part)
 
     def entries(self, content: Content, view: View) -> Iterable[LegendEntry]:
-        """Its lines of the legend."""
+        """Return its lines of the legend."""
         if self.legend is not None:
             return self.legend(content, view)
         return [entry for part in self.parts_in(content) for entry in part.entries(view)]
 
 
 def line_swatch(colour: str, width: float, dashes: str = "") -> str:
-    """A piece of line."""
+    """Return a piece of line."""
     look: Look = {"stroke": colour, "stroke-width": width, "fill": "none"}
     if dashes:
         look["stroke-dasharray"] = dashes
@@ -223,12 +223,12 @@ def line_swatch(colour: str, width: float, dashes: str = "") -> str:
 
 
 def dot_swatch(look: Look) -> str:
-    """A round mark in the middle of the swatch."""
+    """Return a round mark in the middle of the swatch."""
     return element("circle", {"cx": SWATCH / 2.0, "cy": 0.0, **look})
 
 
 def map_swatch(width: float) -> str:
-    """A piece of line in all colours of the map."""
+    """Return a piece of line in all colours of the map."""
     step = SWATCH / BINS
     pieces = []
     for index, colour in enumerate(bin_colours()):
@@ -244,7 +244,7 @@ def map_swatch(width: float) -> str:
 
 
 def _drawing(content: Content, plot: Plot) -> str:
-    """The lines of the drawing, a group for each of its layers."""
+    """Return the lines of the drawing, a group for each of its layers."""
     is_alone = content.is_drawing_alone
     width = plot.pen(ALONE_PEN if is_alone else DRAWING_PEN, content.outlines)
     groups = [
@@ -288,7 +288,7 @@ def faults_of(scene: Scene) -> DotGroup:
 
 
 def _swept(content: Content, plot: Plot) -> str:
-    """The cuts at the true width of the tool."""
+    """Return the cuts at the true width of the tool."""
     ends: Look = {"stroke-linecap": "round", "stroke-linejoin": "round"}
     groups = []
     for index, each in enumerate(content.swept):
@@ -327,8 +327,8 @@ def _travel_legend(content: Content, view: View) -> Iterator[LegendEntry]:
 
 
 def _stock(content: Content) -> list[Part]:
-    """The outline of the stock, where the job says where it lies, and the line about which the
-    part is turned over."""
+    """Return the outline of the stock, where the job says where it lies, and the line about
+    which the part is turned over."""
     scene, parts = content.scene, list[Part]()
     if scene.stock_mm is not None:
         left, low, right, high = scene.stock_mm
@@ -406,7 +406,7 @@ INSPECTED_PEN = 2.2
 
 
 def _inspected(content: Content) -> list[Part]:
-    """A line from end to end of each dimension, in the colour of its verdict."""
+    """Return a line from end to end of each dimension, in the colour of its verdict."""
     parts: list[Part] = []
     for verdict, colour in VERDICTS.items():
         own_dimensions = [each for each in content.scene.inspected if each.verdict == verdict]
@@ -417,7 +417,7 @@ def _inspected(content: Content) -> list[Part]:
 
 
 def _sizes(content: Content) -> list[Part]:
-    """The ends of each dimension, and its size beside it."""
+    """Return the ends of each dimension, and its size beside it."""
     parts: list[Part] = []
     every = content.scene.inspected
     for verdict, colour in VERDICTS.items():
@@ -455,7 +455,7 @@ def _zero_legend(content: Content, view: View) -> Iterator[LegendEntry]:
 
 
 def _cross(place: tuple[float, float], size: float, name: Look) -> str:
-    """A cross with a ring."""
+    """Return a cross with a ring."""
     data = PathData()
     for dx, dy in ((size, 0.0), (0.0, size)):
         data.move(place[0] - dx, place[1] - dy)
@@ -646,23 +646,23 @@ LAYERS = (
 
 
 def layer_names() -> tuple[str, ...]:
-    """The names of all layers."""
+    """Return the names of all layers."""
     return tuple(layer.name for layer in LAYERS)
 
 
 def layer_of(name: str) -> Layer:
-    """The layer of this name."""
+    """Return the layer of this name."""
     return next(layer for layer in LAYERS if layer.name == name)
 
 
 def usual_layers() -> frozenset[str]:
-    """The names of the layers that are shown where none are named."""
+    """Return the names of the layers that are shown where none are named."""
     return frozenset(layer.name for layer in LAYERS if layer.usual)
 
 
 def chosen(names: Iterable[str], excluded: Iterable[str]) -> frozenset[str]:
-    """The layers `names` (none: the usual ones) except those `excluded`; OptionError for unknown
-    names, and when no layer is left."""
+    """Return the layers `names` (none: the usual ones) except those `excluded`; OptionError for
+    unknown names, and when no layer is left."""
     shown, left_out = set(names), set(excluded)
     available = layer_names()
     for name in sorted(shown | left_out):
@@ -678,17 +678,17 @@ def chosen(names: Iterable[str], excluded: Iterable[str]) -> frozenset[str]:
 
 
 def from_the_ground_up() -> list[Layer]:
-    """All layers, each after those that it covers."""
+    """Return all layers, each after those that it covers."""
     return sorted(LAYERS, key=lambda layer: layer.height)
 
 
 def layers_in(content: Content) -> list[str]:
-    """The names of the layers that a picture has, whether in its window or not."""
+    """Return the names of the layers that a picture has, whether in its window or not."""
     return [layer.name for layer in LAYERS if layer.is_in(content)]
 
 
 def legend_of(content: Content, view: View) -> list[LegendEntry]:
-    """The legend of the layers that are in the picture."""
+    """Return the legend of the layers that are in the picture."""
     present = (layer for layer in LAYERS if layer.is_in(content))
     ordered = sorted(present, key=lambda layer: layer.place)
     return [entry for layer in ordered for entry in layer.entries(content, view)]

@@ -36,12 +36,12 @@ _ORDER = {"out": 0, "undecided": 1, "in": 2}
 
 
 def has_limits(scene: Scene) -> bool:
-    """True if at least one inspected dimension has an upper limit."""
+    """Return True if at least one inspected dimension has an upper limit."""
     return any(each.upper_mm is not None for each in scene.inspected)
 
 
 def draw_limits(scene: Scene, options: PictureOptions) -> str:
-    """SVG text of the plot of the scene's dimensions with limits."""
+    """Return SVG text of the plot of the scene's dimensions with limits."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     every = [each for each in scene.inspected if each.upper_mm is not None]
     shown = every
@@ -104,7 +104,7 @@ def _line(x0: float, y0: float, x1: float, y1: float) -> str:
 
 
 def _bar(x0: float, x1: float, y: float) -> str:
-    """A line with a mark across each end."""
+    """Return a line with a mark across each end."""
     data = PathData()
     for x in (x0, x1):
         data.move(x, y - 0.2 * ROW)

@@ -79,7 +79,7 @@ AS_USUAL = PictureOptions()
 
 
 def check_width(width_px: int) -> None:
-    """OptionError for a width that no picture has."""
+    """Raise OptionError for a width that no picture has."""
     if not MIN_PX <= width_px <= MAX_PX:
         raise OptionError(
             f"a picture cannot be {width_px} pixels wide",

@@ -72,7 +72,7 @@ class PageLayout(Struct, frozen=True, eq=False):
 
 
 def page_of(content: Content, width: float = PAGE) -> PageLayout:
-    """The page of a picture of one scene."""
+    """Return the page of a picture of one scene."""
     head, head_end = title_and_notes(content.scene.title, content.notes, width)
     top = head_end + HEAD_GAP
     shapes = (WIDEST, TALLEST) if content.crop_mm is None else CROP_SHAPES
@@ -90,7 +90,8 @@ def page_of(content: Content, width: float = PAGE) -> PageLayout:
 def table_of(
     entries: Sequence[LegendEntry], view: View, plots: PageBox
 ) -> tuple[list[list[LegendEntry]], float]:
-    """The rows of the legend below the plots, and the middle of the view's scale bar in them."""
+    """Return the rows of the legend below the plots, and the middle of the view's scale bar in
+    them."""
     bar = scale_bar_width(view) + BAR_ROOM
     table, row = rows_beside(entries, bar, plots.width)
     return table, plots.bottom + LEGEND_DROP + row * ROW_STEP
@@ -103,9 +104,9 @@ def fitted(
     shapes: tuple[float, float],
     margin_of: Callable[[View], float] = lambda view: 0.0,
 ) -> tuple[View, Ticks]:
-    """The view of a window on a page of this width, and its ticks; `margin_of` gives the width
-    that a view needs right of it. Fitted `FITS` times: the room for numbers follows from the
-    scale."""
+    """Return the view of a window on a page of this width, and its ticks; `margin_of` gives the
+    width that a view needs right of it. Fitted `FITS` times: the room for numbers follows from
+    the scale."""
     left, right = MARGIN + GUESSED_LEFT, width - MARGIN
     for _ in range(FITS):
         view = fit(window, left, top, right, shapes)
@@ -116,7 +117,7 @@ def fitted(
 
 
 def foot_of(rows: list[list[LegendEntry]], legend_y: float) -> float:
-    """Height of a page whose legend has these rows, the first centred on `legend_y`."""
+    """Return the height of a page whose legend has these rows, the first centred on `legend_y`."""
     return round(legend_y + max(len(rows) - 1, 0) * ROW_STEP + FOOT)
 
 
@@ -136,8 +137,8 @@ def mat(box: PageBox, width: float, height: float) -> str:
 
 
 def sheet(name: str, sizes: tuple[float, float], options: PictureOptions, *parts: str) -> str:
-    """The SVG text of a picture: its parts on paper of `sizes` (width and height in units of the
-    page), in the size and the palette of the options."""
+    """Return the SVG text of a picture: its parts on paper of `sizes` (width and height in
+    units of the page), in the size and the palette of the options."""
     width, height = sizes
     size_px = options.size_px or SVG_WIDTH_PX
     root: Look = {
@@ -183,27 +184,27 @@ ENGAGEMENT_SCALE = MapScale(TOP_DEG, "engaged (°)", 30.0, "engagement-scale")
 
 
 def scale_of(content: Content) -> MapScale | None:
-    """The scale of the colours of a picture; None where nothing is coloured by a map."""
+    """Return the scale of the colours of a picture; None where nothing is coloured by a map."""
     if content.trace is not None:
         return MapScale(content.trace.top_um)
     return None if content.engaged is None else ENGAGEMENT_SCALE
 
 
 def _name(entry: LegendEntry) -> str:
-    """The text of an entry, shortened to `MAX_ENTRY_WIDTH`."""
+    """Return the text of an entry, shortened to `MAX_ENTRY_WIDTH`."""
     return text.shortened(entry.name, ENTRY.cap, MAX_ENTRY_WIDTH)
 
 
 def _width(entry: LegendEntry) -> float:
-    """Width of an entry in its row, with the gap to the next."""
+    """Return the width of an entry in its row, with the gap to the next."""
     return SWATCH + SWATCH_GAP + text.width(_name(entry), ENTRY.cap) + ENTRY_GAP
 
 
 def title_and_notes(
     name: str, notes: Sequence[str], page: float = PAGE, *, lines: int = 1
 ) -> tuple[str, float]:
-    """The SVG of title, on at most `lines` lines, and notes at the top of a page of this width,
-    and the height at which they end."""
+    """Return the SVG of title, on at most `lines` lines, and notes at the top of a page of this
+    width, and the height at which they end."""
     room = page - 2.0 * MARGIN
     y = MARGIN
     parts = []
@@ -221,7 +222,7 @@ def title_and_notes(
 
 
 def _title_lines(name: str, room: float, max_lines: int) -> list[str]:
-    """The title broken at blanks into at most `max_lines` lines, the last one shortened."""
+    """Return the title broken at blanks into at most `max_lines` lines, the last one shortened."""
     words = one_line(name).split()
     lines: list[str] = []
     while words and len(lines) < max_lines - 1:
@@ -236,8 +237,8 @@ def _title_lines(name: str, room: float, max_lines: int) -> list[str]:
 
 
 def rows_of(entries: Sequence[LegendEntry], first: float, room: float) -> list[list[LegendEntry]]:
-    """The entries in rows: the first row no wider than `first`, the others than `room`; the first
-    row stays empty when no entry fits into it."""
+    """Return the entries in rows: the first row no wider than `first`, the others than `room`;
+    the first row stays empty when no entry fits into it."""
     rows: list[list[LegendEntry]] = []
     if entries and _width(entries[0]) - ENTRY_GAP > first:
         rows.append([])
@@ -255,8 +256,8 @@ def rows_of(entries: Sequence[LegendEntry], first: float, room: float) -> list[l
 def rows_beside(
     entries: Sequence[LegendEntry], bar: float, room: float
 ) -> tuple[list[list[LegendEntry]], int]:
-    """The rows, and the one that leaves `bar` free at its end: the first, where an entry fits
-    beside that, else the last one with so much room, else a row of its own."""
+    """Return the rows, and the one that leaves `bar` free at its end: the first, where an entry
+    fits beside that, else the last one with so much room, else a row of its own."""
     first = room - bar
     if not entries or _width(entries[0]) - ENTRY_GAP <= first:
         return rows_of(entries, first, room), 0
@@ -268,7 +269,7 @@ def rows_beside(
 
 
 def legend_rows(table: Sequence[Sequence[LegendEntry]], left_x: float, middle: float) -> str:
-    """The rows of the legend, the first centred on height `middle`."""
+    """Return the rows of the legend, the first centred on height `middle`."""
     parts = []
     for index, row in enumerate(table):
         across, height = left_x, middle + index * ROW_STEP
@@ -282,7 +283,7 @@ def legend_rows(table: Sequence[Sequence[LegendEntry]], left_x: float, middle: f
 
 
 def legend_below(entries: Sequence[LegendEntry], top: float, width: float) -> tuple[str, float]:
-    """The legend below `top` on a page of this width, and the height of that page."""
+    """Return the legend below `top` on a page of this width, and the height of that page."""
     if not entries:
         return "", round(top + MARGIN)
     room = width - 2.0 * MARGIN
@@ -292,7 +293,8 @@ def legend_below(entries: Sequence[LegendEntry], top: float, width: float) -> tu
 
 
 def colour_bar_labels(scale: MapScale, height: float) -> list[tuple[float, str]]:
-    """(value, text) along the colour bar: round numbers, and the largest error at the top."""
+    """Return (value, text) along the colour bar: round numbers, and the largest error at the
+    top."""
     top_um = scale.top
     if scale.step is not None:
         return [(value, number(value)) for value in multiples(0.0, top_um, scale.step)]
@@ -307,14 +309,14 @@ def colour_bar_labels(scale: MapScale, height: float) -> list[tuple[float, str]]
 
 
 def colour_bar_width(scale: MapScale, height: float) -> float:
-    """Width that the colour bar needs right of the plot."""
+    """Return the width that the colour bar needs right of the plot."""
     widest = max(text.width(name, TICK_CAP) for _, name in colour_bar_labels(scale, height))
     header = text.width(scale.title, TICK_CAP)
     return BAR_GAP + max(BAR_WIDTH + 12.0 + widest, header)
 
 
 def colour_bar(scale: MapScale, box: PageBox) -> str:
-    """The colour map with its numbers, right of the plot and as high."""
+    """Return the colour map with its numbers, right of the plot and as high."""
     bar_x = box.right + BAR_GAP
     step = box.height / BINS
     parts = []
@@ -372,7 +374,7 @@ class Ticks(Struct, frozen=True):
     y: tuple[float, ...]
 
     def text(self, value: float) -> str:
-        """The number at a tick."""
+        """Return the number at a tick."""
         return number(value, decimals_of(self.step_mm))
 
     @property
@@ -465,7 +467,7 @@ def _minor(marks: PathData, view: View, ticks: Ticks) -> None:
 
 
 def scale_bar_length(view: View) -> tuple[float, str]:
-    """A round length in mm, and its text."""
+    """Return a round length in mm, and its text."""
     length = round_length(BAR_SHARE * view.box.width / view.scale)
     if length < 1.0:
         return length, f"{number(length * 1000.0, decimals_of(length * 1000.0))} µm"
@@ -479,7 +481,8 @@ def scale_bar_width(view: View) -> float:
 
 
 def scale_bar(view: View, right: float, middle: float) -> str:
-    """A bar of round length with its label, ending at `right`, centred on height `middle`."""
+    """Return a bar of round length with its label, ending at `right`, centred on height
+    `middle`."""
     length, name = scale_bar_length(view)
     begin = right - length * view.scale
     data = PathData()

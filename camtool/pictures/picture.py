@@ -36,9 +36,9 @@ class Picture:
         return draw(self.scene, self.options)
 
     def render(self, name: str) -> bytes:
-        """The bytes of a file of this name: .svg, .png, or .html, the viewer's page of one scene,
-        without options. OutputError for other extensions, OptionError for options that do not
-        fit."""
+        """Return the bytes of a file of this name: .svg, .png, or .html, the viewer's page of
+        one scene, without options. OutputError for other extensions, OptionError for options
+        that do not fit."""
         if isinstance(self.scene, tuple):
             return render_beside(self.scene, name, self.options)
         if isinstance(self.scene, Overlay):

@@ -84,7 +84,7 @@ class Plot(Struct, frozen=True):
         return float(lengths[is_near].sum())
 
     def round_pen(self, width: float) -> Look:
-        """A pen of a width on the page."""
+        """Return a pen of a width on the page."""
         return {
             "fill": "none",
             "stroke-width": self.view.mm(width),
@@ -93,15 +93,15 @@ class Plot(Struct, frozen=True):
         }
 
     def path(self, chains: Sequence[Chain]) -> str:
-        """Lines and arcs as one path."""
+        """Return lines and arcs as one path."""
         return element("path", {"d": path_data(chains)})
 
     def lines(self, name: str, chains: Sequence[Chain], look: Look) -> str:
-        """Lines and arcs of one look as a group; empty without any."""
+        """Return lines and arcs of one look as a group; empty without any."""
         return element("g", {"id": name, **look}, self.path(chains)) if chains else ""
 
     def body(self, chains: Sequence[Chain]) -> str:
-        """A light fill of what is closed (even-odd, so that holes stay open)."""
+        """Return a light fill of what is closed (even-odd, so that holes stay open)."""
         closed = [chain for chain in chains if chain.closed]
         if not closed or len(closed) > MAX_BODIES:
             return ""
@@ -109,17 +109,17 @@ class Plot(Struct, frozen=True):
         return element("g", {"id": "body"}, element("path", fill))
 
     def frame(self, name: str, size_mm: tuple[float, float], colour: str) -> str:
-        """A rectangle whose lower left corner is part zero."""
+        """Return a rectangle whose lower left corner is part zero."""
         sides: Look = {"x": 0.0, "y": 0.0, "width": size_mm[0], "height": size_mm[1]}
         line: Look = {"fill": "none", "stroke": colour, "stroke-width": self.view.mm(2.0)}
         return element("g", {"id": name}, element("rect", {**sides, **line}))
 
     def trace(self, trace: ErrorTrace, width: float) -> str:
-        """The path of the slides, coloured by its error."""
+        """Return the path of the slides, coloured by its error."""
         return trace_layer(trace, self.view, width)
 
     def engagement(self, trace: EngagementTrace, width: float) -> str:
-        """The moves of the slides, coloured by engagement."""
+        """Return the moves of the slides, coloured by engagement."""
         return engagement_layer(trace, self.view, width)
 
     # Marks, in units of the page.
@@ -140,7 +140,7 @@ class Plot(Struct, frozen=True):
         return element("g", {"id": name, **line}, *marks)
 
     def arrows(self, chains: Sequence[Chain]) -> str:
-        """Arrows in the direction of travel: none on a short chain, four at most on any."""
+        """Return arrows in the direction of travel: none on a short chain, four at most on any."""
         view = self.view
         lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
         long = [index for index, length in enumerate(lengths) if length >= MIN_LENGTH_WITH_ARROW]
@@ -165,7 +165,7 @@ class Plot(Struct, frozen=True):
         return _group(name, [_written(label, colour) for label in labels])
 
     def ranks(self, name: str, places: Sequence[Place], look: Look) -> str:
-        """A ring at each place with its number, in the colour of the ring."""
+        """Return a ring at each place with its number, in the colour of the ring."""
         ranks = [str(rank) for rank in range(1, len(places) + 1)]
         labels = labels_beside(ranks, places, self.view)
         rings = []
@@ -226,7 +226,7 @@ def labels_beside(texts: Sequence[str], places: Sequence[Place], view: View) -> 
 def _label_box(
     words: str, place: tuple[float, float], direction: tuple[float, float]
 ) -> tuple[float, float, float, float]:
-    """The box of a text to the right or left of a place, and below or above it."""
+    """Return the box of a text to the right or left of a place, and below or above it."""
     wide = text.width(words, CAP)
     left_x = place[0] + AWAY if direction[0] > 0.0 else place[0] - AWAY - wide
     top = place[1] + 0.5 * AWAY if direction[1] > 0.0 else place[1] - 0.5 * AWAY - CAP

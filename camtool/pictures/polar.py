@@ -57,8 +57,8 @@ def circle_pair(scene: Scene, circle_number: int) -> tuple[CircleErrors, ...]:
 
 
 def draw_polar(scene: Scene, number: int, options: PictureOptions) -> str:
-    """SVG text of the plot of the `number`-th circle of the scene, from 1; OptionError when there
-    is none."""
+    """Return SVG text of the plot of the `number`-th circle of the scene, from 1; OptionError
+    when there is none."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     circles = circle_pair(scene, number)
     errors = [circle.errors_um for circle in circles]
@@ -71,7 +71,7 @@ def draw_polar(scene: Scene, number: int, options: PictureOptions) -> str:
 
 
 def entries(circles: Sequence[CircleErrors]) -> list[LegendEntry]:
-    """The legend: the direction of each circle, where there are two."""
+    """Return the legend: the direction of each circle, where there are two."""
     if len(circles) < 2:
         return []
     return [
@@ -81,7 +81,7 @@ def entries(circles: Sequence[CircleErrors]) -> list[LegendEntry]:
 
 
 def notes(circles: Sequence[CircleErrors], dial: Dial) -> tuple[str, ...]:
-    """The circle, its figures, and the magnification of its errors."""
+    """Return the circle, its figures, and the magnification of its errors."""
     first = circles[0].one
     x, y = first.centre_mm
     magnified = dial.per_um * UM_PER_MM * first.radius_mm / dial.base
@@ -164,13 +164,13 @@ class Dial(Struct, frozen=True):
         return x + radius * math.cos(angle), y - radius * math.sin(angle)
 
     def centred_below(self, top: float, width: float) -> Dial:
-        """The dial below `top`, in the middle of the width."""
+        """Return the dial below `top`, in the middle of the width."""
         return replace(self, middle=(0.5 * width, top + ROOM + self.outer))
 
 
 def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
-    """The dial of errors (B, 3) µm of circles on a plot of this width, its middle at (0, 0); the
-    largest error of all, outward or inward, just fits."""
+    """Return the dial of errors (B, 3) µm of circles on a plot of this width, its middle at (0,
+    0); the largest error of all, outward or inward, just fits."""
     outer = 0.5 * width - MARGIN - ROOM
     errors = np.concatenate([each.ravel() for each in errors_um])
     finite = errors[np.isfinite(errors)]
@@ -185,8 +185,8 @@ def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
 
 
 def plot(errors_um: Sequence[Floats], dial: Dial) -> list[str]:
-    """The SVG of rings, the ends of the axes, and the errors (B, 3) µm of each circle; bands lie
-    below lines."""
+    """Return the SVG of rings, the ends of the axes, and the errors (B, 3) µm of each circle;
+    bands lie below lines."""
     bands, lines = [], []
     for errors, (line, pale) in zip(errors_um, PENS, strict=False):
         band, mean = _band(errors, dial, line, pale)
@@ -215,7 +215,7 @@ def _rings(dial: Dial) -> str:
 
 
 def _quadrants(dial: Dial) -> str:
-    """A line to each end of an axis, where that axis reverses, with its name."""
+    """Return a line to each end of an axis, where that axis reverses, with its name."""
     data, labels = PathData(), []
     (x, y), outer, style = dial.middle, dial.outer, TextStyle(CAP, INK, "middle")
     for index, name in enumerate(AXES):
@@ -229,8 +229,8 @@ def _quadrants(dial: Dial) -> str:
 
 
 def _band(errors: Floats, dial: Dial, colour: str, pale: str) -> tuple[str, str]:
-    """A band from the least to the largest error, and a line of the mean; open where the slides
-    never were."""
+    """Return a band from the least to the largest error, and a line of the mean; open where the
+    slides never were."""
     step = 2.0 * math.pi / len(errors)
     band, line = PathData(), PathData()
     for run in _runs(np.isfinite(errors[:, 1])):
@@ -257,7 +257,7 @@ def _stroke(data: PathData, points: list[tuple[float, float]]) -> None:
 
 
 def _runs(has_error: np.ndarray) -> list[list[int]]:
-    """Runs of consecutive bins, once round; a whole circle ends where it begins."""
+    """Return runs of consecutive bins, once round; a whole circle ends where it begins."""
     count = len(has_error)
     if has_error.all():
         return [list(range(count + 1))]
@@ -273,8 +273,8 @@ def _runs(has_error: np.ndarray) -> list[list[int]]:
 
 
 def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
-    """The numbers of the rings, µm, along the direction where they hide least. A number that would
-    hide an error is left out where at least `MIN_LABELS` remain."""
+    """Return the numbers of the rings, µm, along the direction where they hide least. A number
+    that would hide an error is left out where at least `MIN_LABELS` remain."""
     places = np.array([_places(errors, dial) for errors in errors_um]).reshape(-1, 2)
     clear, numbers = [], []
     for degrees in LABELS_DEG:
@@ -291,8 +291,8 @@ def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
 
 
 def _places(errors_um: Floats, dial: Dial) -> Floats:
-    """(3 B, 2) places on the page of the least, mean and largest errors; NaN where the slides
-    never were."""
+    """Return (3 B, 2) places on the page of the least, mean and largest errors; NaN where the
+    slides never were."""
     angle = (np.arange(len(errors_um)) + 0.5) * (2.0 * np.pi / len(errors_um))
     radius = dial.base + errors_um * dial.per_um
     x = dial.middle[0] + radius * np.cos(angle)[:, None]
@@ -301,7 +301,7 @@ def _places(errors_um: Floats, dial: Dial) -> Floats:
 
 
 def _numbers(dial: Dial, angle: float) -> list[tuple[str, tuple[float, float], PageBox]]:
-    """(number, where its baseline begins, its box) of each ring with a number."""
+    """Return (number, where its baseline begins, its box) of each ring with a number."""
     every = max(1, math.ceil(2.2 * CAP / (dial.step_um * dial.per_um)))
     shown = [e for e in _ring_errors(dial) if round(e / dial.step_um) % every == 0]
     numbers = []

@@ -69,7 +69,7 @@ class Camera(Struct, frozen=True):
         return math.sqrt(1.0 - self.sine * self.sine)
 
     def place(self, x: float, y: float, z: float) -> tuple[float, float]:
-        """The place on the picture, mm, to the right and up."""
+        """Return the place on the picture, mm, to the right and up."""
         fx, fy = self.direction
         return x * fy - y * fx, z * self.cosine + (x * fx + y * fy) * self.sine
 
@@ -118,7 +118,8 @@ class Stage(Struct, frozen=True, eq=False):
 def stage_of(
     height_map: HeightMap, thickness_mm: float, moves: StockMoves | None, margin: float
 ) -> Stage:
-    """The map on a board, with `margin` (a share of its longer side) of the board around it."""
+    """Return the map on a board, with `margin` (a share of its longer side) of the board around
+    it."""
     bottom = -thickness_mm
     heights = np.where(height_map.heights <= bottom + THROUGH_MM, bottom, height_map.heights)
     rows, columns = heights.shape
@@ -154,12 +155,12 @@ def _marks(height_map: HeightMap, moves: StockMoves) -> Heights:
 
 
 def light_of(colour: str) -> Floats:
-    """The light (3,) of a colour "#rrggbb"."""
+    """Return the light (3,) of a colour "#rrggbb"."""
     return np.array(channels(colour), dtype=np.float64) ** 2 / 255.0**2
 
 
 def floor_colours(count: int) -> Octets:
-    """The colours (count, 3) of floors in the open, from the top to the deepest."""
+    """Return the colours (count, 3) of floors in the open, from the top to the deepest."""
     share = np.arange(count)[:, None] / (count - 1)
     top, low = light_of(TOP), light_of(DEEP)
     light = AMBIENT + SKY + KEY * CAMERAS["iso"].light[2]
@@ -174,8 +175,8 @@ def picture_of(
     sizes: tuple[int, int],
     ground: str,
 ) -> Octets:
-    """The picture (H, W, 3) of a window (left, low, right, high; mm on the picture) with `sizes`
-    (W, H) pixels; the board has the colour `ground`."""
+    """Return the picture (H, W, 3) of a window (left, low, right, high; mm on the picture) with
+    `sizes` (W, H) pixels; the board has the colour `ground`."""
     wide, high = sizes[0] * SAMPLES, sizes[1] * SAMPLES
     pixel = (window[2] - window[0]) / wide
     cell = np.empty((high, wide), dtype=np.int32)
@@ -239,7 +240,7 @@ def _lit(stage: Stage, camera: Camera) -> _LitStage:
 def _colours(
     lit: _LitStage, cell: npt.NDArray[np.int32], level: Heights, ground: Floats
 ) -> Heights:
-    """The light (H, W, 3) of each pixel."""
+    """Return the light (H, W, 3) of each pixel."""
     stage, size = lit.stage, lit.stage.size_mm
     is_ground = cell == -1
     wall = (cell < 0) & ~is_ground
@@ -291,8 +292,8 @@ def _towards(x: Heights, y: Heights, camera: Camera) -> Heights:
 
 
 def _lesser(heights: Heights, axis: int) -> Heights:
-    """The lesser of the steps to both neighbours, 0 where they differ in sign: floors beside walls
-    stay level."""
+    """Return the lesser of the steps to both neighbours, 0 where they differ in sign: floors
+    beside walls stay level."""
     step = np.diff(heights, axis=axis)
     zeros = np.zeros_like(heights.take([0], axis=axis))
     step_behind = np.concatenate([zeros, step], axis=axis)
@@ -309,7 +310,7 @@ def _central(heights: Heights, axis: int) -> Heights:
 
 
 def _mean(heights: Heights, reach: int, axis: int) -> Heights:
-    """The mean of 2 · reach + 1 cells along an axis; edges repeat."""
+    """Return the mean of 2 · reach + 1 cells along an axis; edges repeat."""
     widths = [(0, 0), (0, 0)]
     widths[axis] = (reach + 1, reach)
     total = np.cumsum(np.pad(heights, widths, mode="edge"), axis=axis, dtype=np.float64)
@@ -321,7 +322,7 @@ def _mean(heights: Heights, reach: int, axis: int) -> Heights:
 
 
 def _shadows(heights: Heights, light: tuple[float, float, float], cell_mm: float) -> Heights:
-    """The height (NY, NX) below which the lamp does not shine."""
+    """Return the height (NY, NX) below which the lamp does not shine."""
     x, y, z = light
     if abs(x) > abs(y):
         return np.ascontiguousarray(
@@ -348,7 +349,7 @@ def _shadows(heights: Heights, light: tuple[float, float, float], cell_mm: float
 
 
 def _openness(stage: Stage, size_mm: float) -> Heights:
-    """The share of the sky (NY, NX) that neighbours leave to each cell, about."""
+    """Return the share of the sky (NY, NX) that neighbours leave to each cell, about."""
     heights = stage.heights
     open_sky = np.ones_like(heights)
     for share, weight in NEARBY:
@@ -374,7 +375,8 @@ def _fade(stage: Stage) -> Heights:
 
 
 def _enlarged(thin: Heights, step: int, shape: tuple[int, ...]) -> Heights:
-    """The values between cells that lie `step` apart, from one to the next in a straight line."""
+    """Return the values between cells that lie `step` apart, from one to the next in a straight
+    line."""
     for axis in (0, 1):
         place = np.arange(shape[axis], dtype=np.float32) / np.float32(step)
         low = np.minimum(place.astype(np.int64), thin.shape[axis] - 1)
@@ -385,7 +387,7 @@ def _enlarged(thin: Heights, step: int, shape: tuple[int, ...]) -> Heights:
 
 
 def png_of(pixels: Octets) -> bytes:
-    """The bytes of a PNG of pixels (H, W, 3)."""
+    """Return the bytes of a PNG of pixels (H, W, 3)."""
     high, wide, _ = pixels.shape
     rows = np.zeros((high, 1 + 3 * wide), dtype=np.uint8)
     # Each row as differences from the row above (filter 2 of the format): half as many bytes.
@@ -406,5 +408,5 @@ def png_of(pixels: Octets) -> bytes:
 
 
 def data_uri(png: bytes) -> str:
-    """The address under which an SVG holds a PNG."""
+    """Return the address under which an SVG holds a PNG."""
     return "data:image/png;base64," + base64.b64encode(png).decode("ascii")

@@ -145,8 +145,8 @@ class Round(Struct, frozen=True, eq=False):
     both_circular_mm: float = math.nan
 
     def errors(self) -> Floats:
-        """(B, 3) mm: least, mean and largest radial error of each bin; NaN where the slides never
-        were."""
+        """Return (B, 3) mm: least, mean and largest radial error of each bin; NaN where the
+        slides never were."""
         has_samples = self.bins[:, 0] > 0.0
         errors = np.full((len(self.bins), 3), np.nan)
         bins = self.bins[has_samples]
@@ -177,7 +177,7 @@ class StockPair(Struct, frozen=True, eq=False):
     before: StockBefore | None = None
 
     def engagement(self, toolpath: Toolpath) -> Engagement:
-        """The engagement of the tools along the moves, which are those of a toolpath."""
+        """Return the engagement of the tools along the moves, which are those of a toolpath."""
         from camtool.stock.engagement import engagement_of
 
         return engagement_of(self.moves, toolpath, self.box_mm if self.known else None)
@@ -246,7 +246,8 @@ def by_feed(toolpath: Toolpath, rapid_mm_min: float) -> Playback:
 
 
 def scene_of_drawing(drawing: Drawing, title: str = "") -> Scene:
-    """The scene of a drawing alone, with its size; the title is its file unless one is given."""
+    """Return the scene of a drawing alone, with its size; the title is its file unless one is
+    given."""
     note = f"{len(drawing.marks)} points" if drawing.marks else "nothing drawn"
     if len(drawing.paths):
         (left, right), (bottom, top) = extents(drawing.paths).tolist()
@@ -267,7 +268,7 @@ def scene_of(
     wanted_path: Toolpath | None = None,
     target: LoadedTarget | None = None,
 ) -> Scene:
-    """The scene of what is given; with a verification, of the predicted path as well.
+    """Return the scene of what is given; with a verification, of the predicted path as well.
 
     `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer;
     `tabs` are the places (x, y) mm of tabs. `wanted_path` are the moves that the program should
@@ -383,7 +384,7 @@ MIN_BESIDE_MM = 0.01
 
 
 def _as_planned(path: Toolpath, job: Job | None) -> StockMoves:
-    """The moves of a toolpath through the stock, as planned."""
+    """Return the moves of a toolpath through the stock, as planned."""
     from camtool.stock.moves import stock_moves_of_toolpath
     from camtool.stock.slides import tools_of_rows
 
@@ -399,7 +400,7 @@ def _stock_pair(
     bands: Callable[[float], Callable[[Floats], Floats]] | None,
     before: Callable[[], StockBefore] | None,
 ) -> Callable[[], StockPair] | None:
-    """The function that gives the moves that cut the stock."""
+    """Return the function that gives the moves that cut the stock."""
     if toolpath is None:
         return None
 
@@ -446,8 +447,8 @@ def stock_pair(
 def _bands(
     drawing: Drawing | None, job: Job | None, wanted_path: Toolpath | None, machine: Machine | None
 ) -> Callable[[float], Callable[[Floats], Floats]] | None:
-    """The function that gives the heights which a drawing and its job allow, as `StockPair` has
-    it; None where the wanted moves are not those of a plan of them."""
+    """Return the function that gives the heights which a drawing and its job allow, as
+    `StockPair` has it; None where the wanted moves are not those of a plan of them."""
     if drawing is None or job is None or machine is None:
         return None
     if wanted_path is None or wanted_path.operations is None:
@@ -514,9 +515,9 @@ def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
 
 
 def _turns(job: Job, toolpath: Toolpath) -> tuple[tuple[int, Tool], ...]:
-    """The tools that cut in turn, each with the first row of its turn: those of the operations of
-    a plan, else those of the job with the numbers that the program calls; () where it calls others
-    of several, or none."""
+    """Return the tools that cut in turn, each with the first row of its turn: those of the
+    operations of a plan, else those of the job with the numbers that the program calls; ()
+    where it calls others of several, or none."""
     from camtool.planning.link import tool_note
 
     first = job.operations[0].tool if job.operations else None
@@ -539,8 +540,8 @@ def _turns(job: Job, toolpath: Toolpath) -> tuple[tuple[int, Tool], ...]:
 
 
 def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:
-    """The table's travel, mm, if the path lies in it with part zero at its lower left corner; None
-    otherwise: where the travel lies is not known then."""
+    """Return the table's travel, mm, if the path lies in it with part zero at its lower left
+    corner; None otherwise: where the travel lies is not known then."""
     if toolpath is None or machine is None:
         return None
     x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
@@ -557,8 +558,8 @@ def _playback(
     listing: Callable[[], Listing | None] | None,
     bounds: ReportTable,
 ) -> Callable[[], Playback] | None:
-    """The function that gives how the toolpath runs: as simulated where there is a verification,
-    otherwise by its feeds."""
+    """Return the function that gives how the toolpath runs: as simulated where there is a
+    verification, otherwise by its feeds."""
     if toolpath is None or machine is None:
         return None
 
@@ -580,7 +581,7 @@ def _playback(
 
 
 def _bounds(drawing: Drawing | None, job: Job | None, toolpath: Toolpath | None) -> ReportTable:
-    """The table of how far drawing, stock and program reach along the axes."""
+    """Return the table of how far drawing, stock and program reach along the axes."""
     from camtool.verification.report import mm
 
     boxes: list[tuple[str, list[list[float]]]] = []
@@ -600,8 +601,8 @@ def _bounds(drawing: Drawing | None, job: Job | None, toolpath: Toolpath | None)
 
 
 def _tables(report: Report) -> Iterator[ReportTable]:
-    """The tables of a report: its figures, findings, worst moves, contours and dimensions, none
-    without a line."""
+    """Yield the tables of a report: its figures, findings, worst moves, contours and
+    dimensions, none without a line."""
     lines = report.to_text(findings=False).splitlines()
     facts = [(line[:NAME_WIDTH].strip(), line[NAME_WIDTH:].strip()) for line in lines]
     yield ReportTable("Report", (), tuple(map(TableLine, facts)))
@@ -641,7 +642,7 @@ def _findings(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
 
 
 def _worst(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
-    """The worst moves, which the report numbers from 1."""
+    """Return the worst moves, which the report numbers from 1."""
     lines = [
         TableLine(
             (

@@ -87,8 +87,8 @@ class StockSection(Struct, frozen=True, eq=False):
 
 
 def section_svg(title: str, section: StockSection, options: PictureOptions = AS_USUAL) -> str:
-    """SVG text of a section; equal input gives equal bytes. ValueError for a profile without two
-    different places."""
+    """Return SVG text of a section; equal input gives equal bytes. ValueError for a profile
+    without two different places."""
     low, high = float(section.profile[0, 0]), float(section.profile[-1, 0])
     if not high > low:
         raise ValueError("a section needs two places")
@@ -134,7 +134,7 @@ def height_factor(length_mm: float, height_mm: float) -> float:
 
 
 def _lines(section: StockSection, view: View, factor: float) -> list[str]:
-    """The material, its surface, and the wanted heights."""
+    """Return the material, its surface, and the wanted heights."""
     profile = section.profile.tolist()
     surface, body = PathData(), PathData()
     bottom = section.foot_mm if section.bottom_mm is None else section.bottom_mm
@@ -159,7 +159,7 @@ def _lines(section: StockSection, view: View, factor: float) -> list[str]:
 
 
 def _wanted_heights(section: StockSection, view: View, factor: float) -> str:
-    """The path data of the wanted heights; interrupted where there is no limit."""
+    """Return the path data of the wanted heights; interrupted where there is no limit."""
     data = PathData()
     if section.wanted is None:
         return ""
@@ -175,7 +175,7 @@ def _wanted_heights(section: StockSection, view: View, factor: float) -> str:
 
 
 def _axes(section: StockSection, view: View, factor: float) -> tuple[str, str]:
-    """The ground with its grid, and the frame with ticks and numbers."""
+    """Return the ground with its grid, and the frame with ticks and numbers."""
     box, grid, marks, labels = view.box, PathData(), PathData(), []
     step = round_step(GAP_UNITS / view.scale)
     base = box.bottom + TICK + LABEL_GAP + TICK_CAP

@@ -28,7 +28,7 @@ Look = dict[str, str | float]
 
 
 def number(value: float, decimals: int = LENGTH_DECIMALS) -> str:
-    """The shortest text of `value` at these decimals; ValueError when it is not finite.
+    """Return the shortest text of `value` at these decimals; ValueError when it is not finite.
 
     >>> number(2.50), number(-0.001), number(1e-7, 9)
     ('2.5', '0', '0.0000001')
@@ -69,7 +69,7 @@ def element(name: str, attributes: Attributes, *children: str) -> str:
 
 
 def title(text: str) -> str:
-    """The element that names its parent to people and to screen readers."""
+    """Return the element that names its parent to people and to screen readers."""
     return f"<title>{escape(text)}</title>"
 
 

@@ -34,7 +34,7 @@ def _glyph_or_box(letter: str) -> Glyph:
 
 
 def width(text: str, cap: float) -> float:
-    """Width on the page of `text` at this height of capitals."""
+    """Return the width on the page of `text` at this height of capitals."""
     return sum(_glyph_or_box(letter).advance for letter in one_line(text)) * cap / CAP_UNITS
 
 
@@ -67,8 +67,8 @@ def wrapped(text: str, cap: float, limit: float) -> list[str]:
 def label(
     text: str, place: tuple[float, float], style: TextStyle, *, full_text: str | None = None
 ) -> str:
-    """The strokes of `text` with its baseline at `place`; `full_text` is the text for screen
-    readers."""
+    """Return the strokes of `text` with its baseline at `place`; `full_text` is the text for
+    screen readers."""
     data = strokes(text, place, style)
     spoken = text if full_text is None else full_text
     return element(
@@ -80,7 +80,7 @@ def label(
 
 
 def strokes(text: str, place: tuple[float, float], style: TextStyle) -> str:
-    """The path data of a label; empty when there is nothing to see."""
+    """Return the path data of a label; empty when there is nothing to see."""
     shown = one_line(text)
     scale = style.cap / CAP_UNITS
     x = place[0] - {"start": 0.0, "middle": 0.5, "end": 1.0}[style.anchor] * width(
@@ -98,7 +98,7 @@ def strokes(text: str, place: tuple[float, float], style: TextStyle) -> str:
 
 
 def stroke_of(style: TextStyle) -> Look:
-    """The pen of a label."""
+    """Return the pen of a label."""
     return {
         "fill": "none",
         "stroke": style.colour,

@@ -47,8 +47,8 @@ class ErrorTrace(Struct, frozen=True, eq=False):
 
 
 def trace_of(scene: Scene, times: float = 1.0) -> ErrorTrace | None:
-    """The predicted path of a scene, its errors drawn `times` as large where the wanted path is
-    known; None when there is none or it never cuts."""
+    """Return the predicted path of a scene, its errors drawn `times` as large where the wanted
+    path is known; None when there is none or it never cuts."""
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or not cutting.any():
         return None
@@ -64,8 +64,8 @@ def trace_of(scene: Scene, times: float = 1.0) -> ErrorTrace | None:
 
 
 def bins_of(trace: ErrorTrace) -> Ints:
-    """(T−1,) the step of the map for each piece of the path, by the larger error of its ends; −1
-    where the tool does not cut."""
+    """Return (T−1,) the step of the map for each piece of the path, by the larger error of its
+    ends; −1 where the tool does not cut."""
     worse = np.maximum(trace.error_um[:-1], trace.error_um[1:])
     step = np.minimum((worse / trace.top_um * BINS).astype(np.int64), BINS - 1)
     return np.where(trace.cutting[1:], step, -1)
@@ -92,8 +92,8 @@ def lines_by_step(trace: ErrorTrace, window_mm: float) -> list[list[Floats]]:
 
 
 def _kept_rows(trace: ErrorTrace, apart_mm: float) -> Ints:
-    """Rows of the points to draw: those at least `apart_mm` from the one before, and all ends of
-    cuts."""
+    """Return rows of the points to draw: those at least `apart_mm` from the one before, and all
+    ends of cuts."""
     cutting = trace.cutting
     ends = np.ones(len(cutting), dtype=np.bool_)
     ends[1:-1] = (cutting[1:-1] != cutting[:-2]) | (cutting[1:-1] != cutting[2:])
@@ -123,7 +123,7 @@ def round_pen(view: View, pen: float) -> Look:
 
 
 def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
-    """The coloured path, in mm."""
+    """Return the coloured path, in mm."""
     (low, high), colours = view.x_range, bin_colours()
     decimals = decimals_in(high - low)
     paths = []
@@ -147,7 +147,8 @@ def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
 
 
 def exaggerated(points: Floats, wanted_path: Segments, times: float) -> Floats:
-    """(T, 2) mm: points (T, 2) mm moved `times` as far from the nearest point of `wanted_path`."""
+    """Return (T, 2) mm: points (T, 2) mm moved `times` as far from the nearest point of
+    `wanted_path`."""
     if not len(points) or not len(wanted_path):
         return points
     foot = nearest_points(points, wanted_path)
@@ -155,7 +156,7 @@ def exaggerated(points: Floats, wanted_path: Segments, times: float) -> Floats:
 
 
 def nearest_points(points: Floats, wanted_path: Segments) -> Floats:
-    """(T, 2) mm: of the lines and arcs of `wanted_path`, the point nearest to each of the
+    """Return (T, 2) mm: of the lines and arcs of `wanted_path`, the point nearest to each of the
     points."""
     from camtool.kernels.fits import nearest_rows
 

@@ -77,12 +77,12 @@ class View(Struct, frozen=True):
         )
 
     def matrix(self) -> str:
-        """The SVG transform that does what `page` does."""
+        """Return the SVG transform that does what `page` does."""
         x, y = self.page(0.0, 0.0)
         return f"matrix({self.scale:.9g} 0 0 {-self.scale:.9g} {x:.9g} {y:.9g})"
 
     def mm(self, units: float) -> float:
-        """A length on the page, such as a line width, in mm; four digits are enough."""
+        """Return a length on the page, such as a line width, in mm; four digits are enough."""
         return float(f"{units / self.scale:.4g}")
 
     @property
@@ -98,13 +98,13 @@ class View(Struct, frozen=True):
         return self.centre[1] - half, self.centre[1] + half
 
     def shows(self, x: float, y: float) -> bool:
-        """True if a point in mm lies in the box."""
+        """Return True if a point in mm lies in the box."""
         (x0, x1), (y0, y1) = self.x_range, self.y_range
         return x0 <= x <= x1 and y0 <= y <= y1
 
 
 def page_width(size_px: int) -> float:
-    """Units of the page of a picture that is `size_px` wide."""
+    """Return units of the page of a picture that is `size_px` wide."""
     low, high = ORDINARY_PX
     if low <= size_px <= high:
         return PAGE
@@ -113,7 +113,7 @@ def page_width(size_px: int) -> float:
 
 
 def union(boxes: Iterable[Floats | None]) -> Floats | None:
-    """The extents [[xmin, xmax], [ymin, ymax]] of all boxes that are not None."""
+    """Return the extents [[xmin, xmax], [ymin, ymax]] of all boxes that are not None."""
     present = [box for box in boxes if box is not None]
     if not present:
         return None
@@ -122,14 +122,14 @@ def union(boxes: Iterable[Floats | None]) -> Floats | None:
 
 
 def points_box(points: Floats) -> Floats | None:
-    """The extents of points (P, 2)."""
+    """Return the extents of points (P, 2)."""
     if not len(points):
         return None
     return np.column_stack([points.min(axis=0), points.max(axis=0)])
 
 
 def window(part: Floats | None, surroundings: Floats | None) -> Floats:
-    """The window, mm: the part, with what is around it unless that is far away."""
+    """Return the window, mm: the part, with what is around it unless that is far away."""
     joined = union([part, surroundings])
     if joined is None:
         half = EMPTY_WINDOW_MM / 2.0
@@ -148,8 +148,8 @@ def fit(
     right: float,
     shapes: tuple[float, float] = (WIDEST, TALLEST),
 ) -> View:
-    """The view of a window in a box from `left` to `right`, of the window's shape; `shapes` are
-    the least and the greatest height, as a share of the width."""
+    """Return the view of a window in a box from `left` to `right`, of the window's shape;
+    `shapes` are the least and the greatest height, as a share of the width."""
     sizes = shown[:, 1] - shown[:, 0]
     left, top, right = float(math.ceil(left)), float(math.ceil(top)), float(math.floor(right))
     width = right - left
@@ -169,13 +169,13 @@ def _larger(box: Floats) -> float:
 
 
 def round_step(min_step: float) -> float:
-    """The smallest of 1, 2, 5 × 10ⁿ that is not below `min_step`."""
+    """Return the smallest of 1, 2, 5 × 10ⁿ that is not below `min_step`."""
     power = 10.0 ** math.floor(math.log10(min_step))
     return next(step * power for step in ROUND_STEPS if step * power >= min_step)
 
 
 def round_length(max_length: float) -> float:
-    """The largest of 1, 2, 5 × 10ⁿ that is not above `max_length`."""
+    """Return the largest of 1, 2, 5 × 10ⁿ that is not above `max_length`."""
     power = 10.0 ** math.floor(math.log10(max_length))
     return max(step * power for step in ROUND_STEPS if step * power <= max_length)
 
@@ -186,5 +186,5 @@ def decimals_of(step: float) -> int:
 
 
 def multiples(low: float, high: float, step: float) -> list[float]:
-    """The multiples of `step` in low … high."""
+    """Return the multiples of `step` in low … high."""
     return [k * step for k in range(math.ceil(low / step), math.floor(high / step) + 1)]

@@ -229,8 +229,9 @@ class FrontStroke(Struct, frozen=True, eq=False):
 def spiral(
     centre: Floats, first_mm: float, last_mm: float, tool_mm: float, limit: float
 ) -> Floats:
-    """(n, 3) half circles CCW, once round a circle of centres about a place, and on to a wider one
-    and once round that; the turns are as far apart as the limit of engagement (rad) allows."""
+    """Return (n, 3) half circles CCW, once round a circle of centres about a place, and on to a
+    wider one and once round that; the turns are as far apart as the limit of engagement (rad)
+    allows."""
     radii = [first_mm, first_mm, first_mm]
     while radii[-1] < last_mm - POSITION_EPS_MM:
         # The spiral runs outwards by an angle, which adds to the engagement.
@@ -324,7 +325,7 @@ def _cut_at_corners(path: Polyline, tool_mm: float) -> list[Floats]:
 
 
 def _smooth(piece: Floats, fit_mm: float) -> Floats:
-    """(n, 3) the arcs and lines, as few as it needs, of an open path without corners."""
+    """Return (n, 3) the arcs and lines, as few as it needs, of an open path without corners."""
     along = MeasuredPath.of(Polyline(piece))
     curve = FunctionCurve(along.at, along.directions, np.array([0.0, along.total_mm]))
     return fit_curve(curve, fit_mm).vertices
@@ -342,7 +343,7 @@ def chord_rows(vertices: Floats, sagitta_mm: float) -> tuple[Segments, Ints, Int
 
 
 def chords(vertices: Floats, sagitta_mm: float) -> Floats:
-    """(K, 4) x, y to x, y of an open path (n, 3), arcs as chords within a distance."""
+    """Return (K, 4) x, y to x, y of an open path (n, 3), arcs as chords within a distance."""
     path, count, row = chord_rows(vertices, sagitta_mm)
     step = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
     begin = point_at(path, row, step / count[row])
@@ -359,7 +360,7 @@ class Pose(Struct, frozen=True, eq=False):
 
 
 def ends_of(vertices: Floats) -> tuple[Pose, Pose]:
-    """The poses at the beginning and the end of an open path (n, 3)."""
+    """Return the poses at the beginning and the end of an open path (n, 3)."""
     frames = Frames.of(Segments.of(Polyline(vertices)))
     first, last = (
         frames.tangent_at(np.zeros(len(vertices) - 1))[0],
@@ -372,8 +373,9 @@ def ends_of(vertices: Floats) -> tuple[Pose, Pose]:
 
 
 def tangent_link(start: Pose, end: Pose, radius: float, turns: tuple[int, int]) -> Floats | None:
-    """(k, 3) an arc, a line and an arc, all tangent, from pose to pose; `turns`: 1 for a left turn
-    and −1 for a right one, at either end. None where circles that turn differently overlap."""
+    """Return (k, 3) an arc, a line and an arc, all tangent, from pose to pose; `turns`: 1 for a
+    left turn and −1 for a right one, at either end. None where circles that turn differently
+    overlap."""
     one, other = turns
     c0 = np.array([start.x, start.y]) + radius * one * _left(start.angle)
     c1 = np.array([end.x, end.y]) + radius * other * _left(end.angle)
@@ -403,7 +405,8 @@ def tangent_link(start: Pose, end: Pose, radius: float, turns: tuple[int, int]) 
 
 
 def arc_rows(begin: Floats, centre: Floats, sweep: float, turn: int) -> list[Floats]:
-    """The vertices (x, y, bulge) of an arc without its end, in parts of half a circle at most."""
+    """Return the vertices (x, y, bulge) of an arc without its end, in parts of half a circle at
+    most."""
     if sweep > math.tau - 1e-6 or sweep < 1e-9:
         return []
     parts = max(1, math.ceil(sweep / math.pi))
@@ -445,7 +448,8 @@ class _Clearing:
         self.strokes, self.poses = strokes, [ends_of(each.vertices) for each in strokes]
 
     def cuts(self, first: Floats | None) -> bool:
-        """True if a path or a stroke takes more from what is not air at first than a hair."""
+        """Return True if a path or a stroke takes more from what is not air at first than a
+        hair."""
         thick = AIR_THICK_SHARE * self.tool_mm
         for path in (
             *([] if first is None else [first]),
@@ -466,14 +470,14 @@ class _Clearing:
             clear = offset_shape(clear, self.tool_mm)
 
     def moves(self, vertices: Floats, sagitta_share: float = SAGITTA_SHARE) -> Floats:
-        """(K, 9) the moves of an open path, as `camtool.kernels.engagement` wants them."""
+        """Return (K, 9) the moves of an open path, as `camtool.kernels.engagement` wants them."""
         ends = chords(vertices, sagitta_share * self.tool_mm)
         radius, flat = np.full((len(ends), 1), self.tool_mm), np.zeros((len(ends), 4))
         return np.concatenate([ends, radius, flat], axis=1)
 
     def is_clear(self, vertices: Floats, share: float = AIR_SHARE) -> bool:
-        """True if the tool is engaged by this share of the limit at most along a path, and stays
-        in the region."""
+        """Return True if the tool is engaged by this share of the limit at most along a path,
+        and stays in the region."""
         places = sample(Polyline(vertices), PLACES_SHARE * self.tool_mm)
         if not inside(places, self.border).all():
             return False
@@ -528,8 +532,8 @@ class _Clearing:
             yield legs
 
     def next_one(self, tool: Pose | None, numbers: list[int]) -> tuple[int, Floats | None]:
-        """The first of some strokes to which a link leads, and the link; the first of all, and
-        None, where none of the first few has one, or the tool is not down yet."""
+        """Return the first of some strokes to which a link leads, and the link; the first of
+        all, and None, where none of the first few has one, or the tool is not down yet."""
         if tool is None:
             return numbers[0], None
         for number in numbers[:TRIED_STROKES]:
@@ -569,8 +573,8 @@ class _Clearing:
         return waits, followers
 
     def link(self, start: Pose, end: Pose, opening_mm: float) -> Floats | None:
-        """(k, 3) a way from pose to pose through what is cleared, tangent at both; no vertices
-        where they are the same; None if none was found."""
+        """Return (k, 3) a way from pose to pose through what is cleared, tangent at both; no
+        vertices where they are the same; None if none was found."""
         turned = abs(math.remainder(end.angle - start.angle, math.tau))
         if math.hypot(end.x - start.x, end.y - start.y) <= POSITION_EPS_MM and turned < 1e-3:
             return np.empty((0, 3))
@@ -605,7 +609,7 @@ class _Clearing:
         return []
 
     def is_air(self, place: Floats) -> bool:
-        """True if the tool meets nothing at a place (2,)."""
+        """Return True if the tool meets nothing at a place (2,)."""
         near = place + WALL_SHARE * self.tool_mm * np.array([[1.0, 0.0], [-1.0, 0.0]])
         moves = [self.moves(np.array([[*place, 0.0], [*end, 0.0]])) for end in near]
         thick = THICK_SHARE * self.tool_mm
@@ -830,8 +834,8 @@ def _runs_at(
 
 
 def _lifts(link: Floats, lift_mm: float) -> Floats:
-    """(n,) by how much each vertex of a link (n, 3) is lifted: it rises and falls by 45° at most,
-    so that short pieces, which a dialect may leave out, rise by less than a unit."""
+    """Return (n,) by how much each vertex of a link (n, 3) is lifted: it rises and falls by 45°
+    at most, so that short pieces, which a dialect may leave out, rise by less than a unit."""
     reach = MeasuredPath.of(Polyline(link)).reach
     lifts: Floats = np.minimum(np.minimum(reach, reach[-1] - reach), lift_mm)
     return lifts

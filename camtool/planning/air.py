@@ -97,7 +97,7 @@ def air_at(airs: Iterable[Air], region: Polylines, setting: Setting, level_mm: f
 
 
 def _beside(stock: Stock | None, low: Floats, high: Floats, radius: float) -> list[Polylines]:
-    """The air beside a stock of known size that a region reaches beyond."""
+    """Return the air beside a stock of known size that a region reaches beyond."""
     if stock is None or stock.box_mm is None:
         return []
     box = np.array(stock.box_mm).reshape(2, 2)
@@ -114,7 +114,7 @@ def _extents(region: Polylines) -> tuple[Floats, Floats]:
 
 
 def _meets(region: Polylines, low: Floats, high: Floats) -> bool:
-    """True if a region's box reaches into another."""
+    """Return True if a region's box reaches into another."""
     own_low, own_high = _extents(region)
     return bool((own_low < high).all() and (own_high > low).all())
 

@@ -142,7 +142,7 @@ def _long(toolpath: Toolpath) -> Iterator[Finding]:
 
 
 def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
-    """Axes on which the toolpath, part zero included, spans more than they can travel."""
+    """Yield axes on which the toolpath, part zero included, spans more than they can travel."""
     for name, axis, (low, high) in zip(
         AXES, machine.axes, toolpath_extents(toolpath).tolist(), strict=True
     ):
@@ -329,8 +329,8 @@ def _leads_off_stock(step: Step, stock: Stock | None) -> list[Finding]:
 
 
 def _is_beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:
-    """(N,) true where the tool, of `radius` (N,) mm, stays beside the stock's box: by the boxes
-    of the moves, of arcs by those of their circles."""
+    """Return (N,) true where the tool, of `radius` (N,) mm, stays beside the stock's box: by
+    the boxes of the moves, of arcs by those of their circles."""
     begin, end = toolpath.starts[:, :2], toolpath.end[:, :2]
     low, high = np.minimum(begin, end), np.maximum(begin, end)
     arm = np.hypot(*(begin - toolpath.centre).T)[:, None]
@@ -355,7 +355,7 @@ def _tools_not_said(job: Job) -> Iterator[Finding]:
 
 
 def _change_not_stated(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
-    """The first change of tools on a machine that does not state where they are changed."""
+    """Yield the first change of tools on a machine that does not state where they are changed."""
     changes = changes_between_cuts(toolpath)
     keys = [key for key in ("change_mm", "change_z_mm") if getattr(machine.defaults, key) is None]
     if not keys or not len(changes) or machine.spindle.turns == "work":
@@ -377,8 +377,8 @@ def _shape(tool: Tool) -> tuple[object, ...]:
 
 
 def _radii(toolpath: Toolpath, job: Job) -> Floats:
-    """Radius (N,) mm of the tool of each row; the most of all where it is not known which one is
-    in."""
+    """Return the radius (N,) mm of the tool of each row; the most of all where it is not known
+    which one is in."""
     tools = [operation.tool for operation in job.operations]
     radii = np.full(len(toolpath), max(tool.radius_mm for tool in tools))
     numbered = {tool.number: tool for tool in tools if tool.number is not None}
@@ -391,7 +391,7 @@ def _radii(toolpath: Toolpath, job: Job) -> Floats:
 
 
 def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
-    """The fastest move along X and Y, and along Z, where the machine is not so fast.
+    """Yield the fastest move along X and Y, and along Z, where the machine is not so fast.
 
     Of a feed the part |dz| / length goes along Z, and the rest of the triangle across.
     """
@@ -417,7 +417,7 @@ def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Findin
 
 
 def _lengths(toolpath: Toolpath) -> tuple[Floats, Floats]:
-    """(N,), (N,) mm: how far each row goes in XY, along its arc, and in Z."""
+    """Return (N,), (N,) mm: how far each row goes in XY, along its arc, and in Z."""
     step = toolpath.end - toolpath.starts if len(toolpath) else np.zeros((0, 3))
     spoke = toolpath.starts[:, :2] - toolpath.centre
     arc = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps())
@@ -489,7 +489,8 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
 
 
 def _plunges(step: Step) -> bool:
-    """True if a mill goes straight down into the stock; a bore does where its hole is narrow."""
+    """Return True if a mill goes straight down into the stock; a bore does where its hole is
+    narrow."""
     operation = step.operation
     if operation.stage == "finish":
         return False
@@ -501,7 +502,7 @@ def _plunges(step: Step) -> bool:
 
 
 def _comes_down_beside(step: Step) -> bool:
-    """True if the tool comes down beside the stock at every run."""
+    """Return True if the tool comes down beside the stock at every run."""
     stock = step.setting.stock
     if stock is None or stock.box_mm is None:
         return False
@@ -556,13 +557,13 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
 
 
 def peak_mm(tool: Tool, step_over: float) -> float:
-    """Height of the highest peaks on a floor, mm: at square corners of rings, which are farther
-    apart there."""
+    """Return the height of the highest peaks on a floor, mm: at square corners of rings, which
+    are farther apart there."""
     return ridge_mm(tool, min(CORNER_GAP * step_over, 1.0))
 
 
 def ridge_mm(tool: Tool, step_over: float) -> float:
-    """Height of the ridges that a nose of radius r leaves on a floor, mm.
+    """Return the height of the ridges that a nose of radius r leaves on a floor, mm.
 
     Halfway between two paths the floor is x = ½ (step − flat) beside the flat of the tool; the
     nose is r − √(r² − x²) above its tip there.
@@ -573,7 +574,7 @@ def ridge_mm(tool: Tool, step_over: float) -> float:
 
 
 def _is_beyond(value: float, limits: tuple[float, float] | None) -> bool:
-    """True if a number is out of its limits, by more than rounding."""
+    """Return True if a number is out of its limits, by more than rounding."""
     if limits is None:
         return False
     min_value, max_value = limits
@@ -581,5 +582,5 @@ def _is_beyond(value: float, limits: tuple[float, float] | None) -> bool:
 
 
 def deepest_pass(setting: Setting) -> float:
-    """Depth of the deepest pass, mm."""
+    """Return the depth of the deepest pass, mm."""
     return float(-np.diff([0.0, *setting.levels_mm]).min())

@@ -96,7 +96,7 @@ class Steps(Struct, frozen=True):
 
 
 def ring_cells(region: Polylines, steps: Steps) -> Cell:
-    """The tree of regions of one connected tool centre region.
+    """Return the tree of regions of one connected tool centre region.
 
     The region is shrunk again and again by the step s, and each boundary is a ring. What lies
     between two rings is nearer than s to the outer one; so for s up to the tool's radius r nothing
@@ -119,7 +119,8 @@ def ring_cells(region: Polylines, steps: Steps) -> Cell:
 
 
 def _next_ring(region: Polylines, steps: Steps) -> tuple[Polylines, list[Polyline]]:
-    """The region shrunk by a step, and the tips; by a shorter step where that saves the tips."""
+    """Return the region shrunk by a step, and the tips; by a shorter step where that saves the
+    tips."""
     shrunk = offset_shape(region, steps.step_mm)
     if steps.step_mm <= steps.radius_mm + POSITION_EPS_MM:
         return shrunk, []
@@ -143,8 +144,8 @@ def _tips(core: Polylines, shrunk: Polylines, steps: Steps) -> list[Polyline]:
 
 
 def ring_paths(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
-    """(n, 3) x, y, bulge: an open path over all rings, and the cell that it begins in. A region is
-    cut after all that came of it.
+    """Return (n, 3) x, y, bulge: an open path over all rings, and the cell that it begins in. A
+    region is cut after all that came of it.
 
     Several paths only where rounding hides the link from one ring to the next (`LinkedPath`).
     """
@@ -160,7 +161,7 @@ def ring_paths(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
 
 
 def _inside_out(root: Cell, linked: LinkedPath) -> Iterator[tuple[Cell, Cell]]:
-    """All cells, each after its inner ones, with the cell in which the tool can come to it.
+    """Yield all cells, each after its inner ones, with the cell in which the tool can come to it.
 
     The highest first; later the one nearest to the end of the path so far, which grows meanwhile.
     """
@@ -179,7 +180,7 @@ def _inside_out(root: Cell, linked: LinkedPath) -> Iterator[tuple[Cell, Cell]]:
 
 
 def _pick(cells: list[Cell], tool_place: Floats | None) -> int:
-    """The cell nearest to a place; the highest when the tool is nowhere yet."""
+    """Return the cell nearest to a place; the highest when the tool is nowhere yet."""
     if tool_place is None:
         return max(range(len(cells)), key=lambda row: (cells[row].height, -row))
     distances = [
@@ -211,7 +212,7 @@ class Strokes(Struct, frozen=True, eq=False):
 
 
 def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
-    """(n, 3) x, y, bulge: an open path over all strokes and rings of one connected region.
+    """Return (n, 3) x, y, bulge: an open path over all strokes and rings of one connected region.
 
     The region is shrunk by a margin m and cut by parallel lines, h apart. Their pieces within it
     are the strokes; then the boundary of the whole region is followed, which takes the margin off
@@ -240,7 +241,7 @@ def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
 
 
 def strokes_of(region: Polylines, scan: Scan) -> Strokes:
-    """The pieces of equally spaced lines, no farther apart than the step, in a region."""
+    """Return the pieces of equally spaced lines, no farther apart than the step, in a region."""
     level_region = Polylines.of([rotate(path, -scan.angle_rad) for path in region])
     (left_x, right), (low, high) = extents(level_region).tolist()
     count = max(1, math.ceil((high - low) / scan.step_mm))
@@ -256,7 +257,7 @@ def strokes_of(region: Polylines, scan: Scan) -> Strokes:
 
 
 def _order(strokes: Strokes) -> list[tuple[int, bool]]:
-    """Every stroke once, each with whether it is cut from its end.
+    """Return every stroke once, each with whether it is cut from its end.
 
     From a stroke on to one beside it, as long as there is one; else to the nearest end of any
     that has at most one neighbour left, so that no row of strokes is interrupted.
@@ -285,8 +286,8 @@ def _order(strokes: Strokes) -> list[tuple[int, bool]]:
 def _next(
     last: int, onward: int, strokes: Strokes, neighbours: list[list[int]], remaining: set[int]
 ) -> list[int]:
-    """The strokes that may follow the last one, which went on to the next line or the one before
-    (`onward` 1 or −1)."""
+    """Return the strokes that may follow the last one, which went on to the next line or the
+    one before (`onward` 1 or −1)."""
     candidates = [index for index in neighbours[last] if index in remaining]
     onward_ones = [
         index for index in candidates if strokes.row[index] - strokes.row[last] == onward
@@ -313,8 +314,8 @@ def _neighbours(strokes: Strokes) -> list[list[int]]:
 
 
 def slot_paths(region: Polylines, tool_radius_mm: float) -> list[Floats]:
-    """(n, 3) x, y, bulge: open paths along the centre lines of slots as wide as the tool, where
-    the tool centre region is a line and has no area.
+    """Return (n, 3) x, y, bulge: open paths along the centre lines of slots as wide as the tool,
+    where the tool centre region is a line and has no area.
 
     With a tool thinner by a hair the tool centre region is a band as thin as that hair. What of it
     lies beyond the region of the true tool is a slot. Of the hairs that show all of the slots the
@@ -337,7 +338,8 @@ def slot_paths(region: Polylines, tool_radius_mm: float) -> list[Floats]:
 
 
 def _bands(region: Polylines, radius: float, hair_mm: float) -> list[Polyline]:
-    """The edges of the bands that a tool thinner by a hair shows beyond the true tool's region."""
+    """Return the edges of the bands that a tool thinner by a hair shows beyond the true tool's
+    region."""
     thinner = offset_shape(region, radius - hair_mm)
     true = offset_shape(region, radius)
     if len(true):
@@ -348,7 +350,7 @@ def _bands(region: Polylines, radius: float, hair_mm: float) -> list[Polyline]:
 
 
 def _covered(path: Polyline, other_paths: list[Polyline], near_mm: float) -> bool:
-    """True if all of a path runs beside others: it is the other edge of a band."""
+    """Return True if all of a path runs beside others: it is the other edge of a band."""
     if not other_paths:
         return False
     points = sample(path, length(path) / BAND_PLACES)
@@ -358,7 +360,8 @@ def _covered(path: Polyline, other_paths: list[Polyline], near_mm: float) -> boo
 
 
 def _along_band(band: Polyline, near_mm: float) -> Polyline:
-    """An open path along a band: one side of it where the other one is beside it; else round."""
+    """Return an open path along a band: one side of it where the other one is beside it; else
+    round."""
     if not band.closed:
         return band
     along = MeasuredPath.of(band)
@@ -373,7 +376,8 @@ def _along_band(band: Polyline, near_mm: float) -> Polyline:
 
 
 def _without_specks(vertices: Floats, speck_mm: float) -> Floats:
-    """An open path (n, 3) without segments as short as a band is wide: they lead across it."""
+    """Return an open path (n, 3) without segments as short as a band is wide: they lead across
+    it."""
     step = np.hypot(*np.diff(vertices[:, :2], axis=0).T)
     return np.asarray(vertices[np.concatenate([step > speck_mm, [True]])])
 
@@ -443,12 +447,13 @@ class LinkedPath:
         return path.start if self.begin is None else self.begin
 
     def paths(self) -> list[Floats]:
-        """(n, 3) open paths; several only where the tool has to come up."""
+        """Return (n, 3) open paths; several only where the tool has to come up."""
         return [*self._done, _chained(self._parts)] if self._parts else self._done
 
 
 def _from_nearest(along: MeasuredPath, place: Floats) -> tuple[float, float]:
-    """Distance of a place from where a path may begin, and the length along it to there."""
+    """Return the distance of a place from where a path may begin, and the length along it to
+    there."""
     if along.path.closed:
         return closest(along, place)
     to_start, to_end = np.hypot(*(along.path.vertices[[0, -1], :2] - place).T).tolist()
@@ -476,7 +481,7 @@ class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
         return [MeasuredPath.of(path) for path in self.boundary]
 
     def holds(self, points: Floats) -> Bools:
-        """(P,) true for points (P, 2) in the region or on its boundary."""
+        """Return (P,) true for points (P, 2) in the region or on its boundary."""
         is_inside = inside(points, self.segments)
         not_inside = np.flatnonzero(~is_inside)
         if len(not_inside):
@@ -486,7 +491,8 @@ class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
         return is_inside
 
     def place(self, point: Floats) -> tuple[int, float]:
-        """The path nearest to a point (2,), and the length along it to its nearest place."""
+        """Return the path nearest to a point (2,), and the length along it to its nearest
+        place."""
         row = int(points_to_segments(point[None, :], self.segments)[0].argmin())
         path = int(self.segments.path[row])
         first = int(np.searchsorted(self.segments.path, path))
@@ -494,14 +500,15 @@ class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
 
 
 def closest(along: MeasuredPath, point: Floats) -> tuple[float, float]:
-    """Distance of a point (2,) from a path, and the length along it to the nearest place."""
+    """Return the distance of a point (2,) from a path, and the length along it to the nearest
+    place."""
     distances = points_to_segments(point[None, :], along.segments)[0]
     row = int(distances.argmin())
     return float(distances[row]), float(along.reach[row]) + _length_to(point, along.segments, row)
 
 
 def _length_to(point: Floats, segments: Segments, row: int) -> float:
-    """Length along a segment to its place nearest to a point (2,), mm."""
+    """Return the length along a segment to its place nearest to a point (2,), mm."""
     one = segments[np.array([row])]
     if one.is_arc[0]:
         # Measured from the midpoint of the arc, no angle is near to half a turn.
@@ -519,14 +526,14 @@ def _length_to(point: Floats, segments: Segments, row: int) -> float:
 
 
 def route(start: Floats, end: Floats, region: ConnectedRegion) -> Floats | None:
-    """(k, 3) x, y, bulge from one place (2,) of a connected region to another, staying in it, as
-    `routes` has it."""
+    """Return (k, 3) x, y, bulge from one place (2,) of a connected region to another, staying
+    in it, as `routes` has it."""
     return routes(start[None, :], end[None, :], region)[0]
 
 
 def routes(starts: Floats, ends: Floats, region: ConnectedRegion) -> list[Floats | None]:
-    """(k, 3) x, y, bulge each: from places (J, 2) of a connected region to others (J, 2), staying
-    in it.
+    """Return (k, 3) x, y, bulge each: from places (J, 2) of a connected region to others (J, 2),
+    staying in it.
 
     A straight line leaves a region through one of its paths and comes back through the same one:
     each path has the region on its left and one connected piece of what is not the region on its
@@ -593,7 +600,7 @@ def _outside(
 
 
 def _along(along: MeasuredPath, begin: float, end: float) -> Floats:
-    """The piece of a closed path between two lengths, in the shorter direction."""
+    """Return the piece of a closed path between two lengths, in the shorter direction."""
     forth = (end - begin) % along.total_mm
     length_back = along.total_mm - forth
     return (
@@ -604,7 +611,8 @@ def _along(along: MeasuredPath, begin: float, end: float) -> Floats:
 
 
 def tidy(vertices: Floats) -> Floats:
-    """Vertices (k, 3) of an open path without steps up to POSITION_EPS_MM; both ends stay."""
+    """Return vertices (k, 3) of an open path without steps up to POSITION_EPS_MM; both ends
+    stay."""
     step = np.hypot(*np.diff(vertices[:, :2], axis=0).T)
     keep: Ints = np.flatnonzero(np.concatenate([step > POSITION_EPS_MM, [True]]))
     vertices_kept = vertices[keep].copy()
@@ -613,8 +621,8 @@ def tidy(vertices: Floats) -> Floats:
 
 
 def parts_of(lines: Polylines) -> list[Polylines]:
-    """The connected parts of a region whose paths are oriented already: each outer path (CCW) with
-    the holes (CW) in it, the smallest outer one around each."""
+    """Return the connected parts of a region whose paths are oriented already: each outer path
+    (CCW) with the holes (CW) in it, the smallest outer one around each."""
     if len(lines) == 0:
         return []
     areas = signed_areas(lines)
@@ -635,7 +643,7 @@ def parts_of(lines: Polylines) -> list[Polylines]:
 
 
 def pole(region: Polylines) -> Floats:
-    """(2,) a place of a connected region about as far from its boundary as any."""
+    """Return (2,) a place of a connected region about as far from its boundary as any."""
     import shapely
 
     outer = int(signed_areas(region).argmax())
@@ -664,7 +672,7 @@ def outside_parts(lines: Polylines, region: Polylines) -> list[Polyline]:
 
 
 def _marks(along: MeasuredPath, border: Segments) -> Floats:
-    """The lengths along a path, ascending, where it meets the border, and both its ends."""
+    """Return the lengths along a path, ascending, where it meets the border, and both its ends."""
     common = crossings(along.segments, border)
     lengths = segment_lengths(along.segments)
     meeting_lengths = along.reach[common.row_a] + common.ta * lengths[common.row_a]
@@ -676,7 +684,7 @@ def _marks(along: MeasuredPath, border: Segments) -> Floats:
 
 
 def _runs(along: MeasuredPath, marks: Floats, is_wanted: Bools) -> list[Polyline]:
-    """The pieces between marks that are wanted, neighbours as one."""
+    """Return the pieces between marks that are wanted, neighbours as one."""
     if is_wanted.all():
         return [along.path]
     begin, end = marks[:-1], marks[1:]

@@ -121,7 +121,7 @@ def _path_offsets(
 
 
 def _vertex_rows(lines: Polylines, selection: Ints) -> Ints:
-    """The vertices of the chosen paths, in their order."""
+    """Return the vertices of the chosen paths, in their order."""
     counts = np.diff(lines.offsets)[selection]
     begin = lines.offsets[:-1][selection]
     steps = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -129,7 +129,7 @@ def _vertex_rows(lines: Polylines, selection: Ints) -> Ints:
 
 
 def _points(toolpath: Toolpath, rows: Ints) -> Floats:
-    """(R · P, 2) mm: the places on each row, one row after the other."""
+    """Return (R · P, 2) mm: the places on each row, one row after the other."""
     share = np.array(PLACES)
     begin, end = toolpath.starts_of(rows)[:, None, :2], toolpath.end[rows, None, :2]
     points = begin + share[:, None] * (end - begin)
@@ -155,8 +155,8 @@ class _Edges(Struct, frozen=True, eq=False):
 
 
 def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
-    """The edges that a step cuts; `later` is the step after this one. What is finished behind it
-    is made by that."""
+    """Return the edges that a step cuts; `later` is the step after this one. What is finished
+    behind it is made by that."""
     no_rows = np.empty(0, dtype=np.bool_)
     operation = step.operation
     is_finished = operation.stage == "rough" and later and later.operation.stage == "finish"
@@ -178,8 +178,8 @@ def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
 
 
 def _beside_or_on(step: Step, contours: Sequence[Contour], drawn: Floats) -> _Edges:
-    """The edges of contours beside their lines, or on them; `drawn` (M, 2, 2): the boxes of what
-    is drawn."""
+    """Return the edges of contours beside their lines, or on them; `drawn` (M, 2, 2): the boxes
+    of what is drawn."""
     used_contours = distinct(step.owner).tolist()
     centres = path_extents(Polylines.of(contours[k].path for k in used_contours))
     source = np.array([contours[k].source for k in used_contours])
@@ -195,7 +195,7 @@ def _beside_or_on(step: Step, contours: Sequence[Contour], drawn: Floats) -> _Ed
 
 
 def _cut_radius(setting: Setting) -> float:
-    """Radius of what the tool cuts at the surface in its deepest pass, mm."""
+    """Return the radius of what the tool cuts at the surface in its deepest pass, mm."""
     return setting.operation.tool.radius_at(-setting.levels_mm[-1])
 
 
@@ -223,8 +223,8 @@ def _boxes(contour: Contour, drawn: Floats, centre: Floats) -> tuple[Floats, Flo
 
 
 def _wall_box(contour: Contour, drawn: Floats) -> Floats:
-    """(2, 2) mm: the box of the wall that the tool leaves on the side of a contour where material
-    stays; the middle of what is drawn where nothing is left of it."""
+    """Return (2, 2) mm: the box of the wall that the tool leaves on the side of a contour where
+    material stays; the middle of what is drawn where nothing is left of it."""
     from camtool.geometry.offset import offset_shape
 
     path = contour.path if contour.material_left else reverse(contour.path)
@@ -235,7 +235,8 @@ def _wall_box(contour: Contour, drawn: Floats) -> Floats:
 
 
 def _cleared_boxes(runs: Runs, tool: Tool) -> Floats:
-    """(R, 2, 2) mm: the box of what the tool removes at the surface in each run, exact with arcs.
+    """Return (R, 2, 2) mm: the box of what the tool removes at the surface in each run, exact with
+    arcs.
 
     It is that of the discs as wide as the tool is at the surface. Along a move their radius
     changes evenly, by d over an arc of radius R and sweep s: seen in the direction a, their edge
@@ -272,7 +273,7 @@ def _cleared_boxes(runs: Runs, tool: Tool) -> Floats:
 
 
 def kept_of(steps: Sequence[Step]) -> tuple[ProtectedRegion, ...]:
-    """All runs of a plan, with what they must leave of the material, as the drawing has it.
+    """Return all runs of a plan, with what they must leave of the material, as the drawing has it.
 
     A profile leaves the part, a pocket and a carving what is outside of their region; engraving,
     drilling and chamfers leave nothing in particular. Where reliefs go into the corners of the

@@ -66,8 +66,9 @@ round which it does not get."""
 
 
 def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]:
-    """Those of the findings that this stage of an operation has to say. A profile that is roughed
-    runs farther from its own wall than it is finished, and so nearer to its neighbours."""
+    """Return those of the findings that this stage of an operation has to say. A profile that
+    is roughed runs farther from its own wall than it is finished, and so nearer to its
+    neighbours."""
     if not operation.stage:
         return list(findings)
     if operation.stage == "rough":
@@ -81,7 +82,8 @@ def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]
 def along_walls(
     paths: Polylines, setting: Setting, names: Sequence[str], sources: Sequence[int]
 ) -> list[Contour]:
-    """Contours on the boundary of tool centre regions, which are on the left of their paths."""
+    """Return contours on the boundary of tool centre regions, which are on the left of their
+    paths."""
     conventional = setting.operation.direction == "conventional"
     lines = reverse_lines(paths) if conventional else paths
     return [
@@ -93,8 +95,8 @@ def along_walls(
 def in_passes(
     contours: list[Contour], setting: Setting, rough: Step
 ) -> tuple[list[Contour], list[Finding]]:
-    """The contours of a finishing pass; at the levels of the roughing where that has left more
-    than the tool takes at once."""
+    """Return the contours of a finishing pass; at the levels of the roughing where that has
+    left more than the tool takes at once."""
     operation = setting.operation
     if not contours:
         return contours, []
@@ -159,7 +161,7 @@ def _engaged(contours: list[Contour], operation: Operation, rough: Step) -> tupl
 
 
 def _paths(step: Step) -> Segments:
-    """Segments along which the tool of a step ran, seen from above."""
+    """Return segments along which the tool of a step ran, seen from above."""
     vertices, first = step.runs.vertices, step.runs.first
     start, end = vertices[:-1], vertices[1:]
     goes = np.hypot(*(end - start)[:, :2].T) > 0.0

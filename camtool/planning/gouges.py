@@ -58,7 +58,8 @@ SAMPLES_ROUND = 500
 
 
 def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:
-    """Findings on the sides of an operation: gouges, and sides that follow from uncut contours."""
+    """Return findings on the sides of an operation: gouges, and sides that follow from uncut
+    contours."""
     if operation.contract.clears:
         cleared = list(_cleared_away(chosen, sides, operation))
         pocket_findings = list(_beside_pocket(sides, operation)) if operation.beyond_mm else []
@@ -80,8 +81,8 @@ def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation
 def branch_findings(
     branches: Sequence[Branch], chosen: Chosen, sides: Sides, operation: Operation
 ) -> list[Finding]:
-    """Errors where an operation needs to know what contours enclose that pass `branches` of the
-    placed drawing at which that is a choice: its own, and those that decide its sides."""
+    """Return errors where an operation needs to know what contours enclose that pass `branches`
+    of the placed drawing at which that is a choice: its own, and those that decide its sides."""
     is_beside = runs_beside(operation)
     if not (is_beside or operation.contract.cuts == "within"):
         return []
@@ -132,8 +133,8 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     count, reported_pairs = 0, set[tuple[int, int]]()
 
     def is_measured(one: int, wall_row: int) -> bool:
-        """True if the distance of a path from a wall may be a finding: not of its own contour, and
-        where there are many, only an error."""
+        """Return True if the distance of a path from a wall may be a finding: not of its own
+        contour, and where there are many, only an error."""
         other = int(wall_rows[wall_row])
         is_error = sided[other] and (operation.side == "auto" or other not in own_rows)
         return beside_items[one][0].source != other and bool(is_error or count < MAX_COUNTED)
@@ -234,13 +235,13 @@ def _beside_pocket(sides: Sides, pocket: Operation) -> Iterator[Finding]:
 
 
 def _witnesses(path: Polyline) -> Floats:
-    """(P, 2) the vertices of a path and the midpoints of its segments."""
+    """Return (P, 2) the vertices of a path and the midpoints of its segments."""
     return np.concatenate([path.vertices[:, :2], midpoints(Segments.of(path))])
 
 
 def _parts(path: Polyline, wall: Polyline) -> tuple[Bools, Floats]:
-    """(P,), (P,) of the witnesses of a path: whether each is within a closed one, and how far
-    from its line, mm."""
+    """Return (P,), (P,) of the witnesses of a path: whether each is within a closed one, and
+    how far from its line, mm."""
     return _side_and_distance(_witnesses(path), wall)
 
 
@@ -250,13 +251,13 @@ def _side_and_distance(points: Floats, wall: Polyline) -> tuple[Bools, Floats]:
 
 
 def _lies_in(path: Polyline, wall: Polyline) -> bool:
-    """True if a path lies within a closed one."""
+    """Return True if a path lies within a closed one."""
     is_inside, distances = _parts(path, wall)
     return bool((is_inside | (distances <= GOUGE_TOLERANCE_MM)).all())
 
 
 def _cross(one: Polyline, other: Polyline) -> bool:
-    """True if two closed paths cross, and not only touch."""
+    """Return True if two closed paths cross, and not only touch."""
     for path, wall in ((one, other), (other, one)):
         is_inside, distances = _parts(path, wall)
         clear = distances > GOUGE_TOLERANCE_MM
@@ -266,8 +267,8 @@ def _cross(one: Polyline, other: Polyline) -> bool:
 
 
 def _overshoot(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
-    """Greatest distance of the tool's centre across a closed line, mm; the side on which most of
-    the drawn contour lies is this side of it."""
+    """Return the greatest distance of the tool's centre across a closed line, mm; the side on
+    which most of the drawn contour lies is this side of it."""
     length = float(path_lengths(Polylines.of([path]))[0])
     is_inside, distances = _side_and_distance(sample(path, length / SAMPLES_ROUND), wall)
     home, clear = _parts(drawn, wall)
@@ -276,8 +277,8 @@ def _overshoot(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
 
 
 def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[Finding]:
-    """Parts that another operation keeps, in what a pocket (or a bore) clears as deep as that, or
-    deeper."""
+    """Yield parts that another operation keeps, in what a pocket (or a bore) clears as deep as
+    that, or deeper."""
     is_kept = sides.kept_from(pocket)
     is_kept[chosen.source] = False
     rows = np.flatnonzero(is_kept)

@@ -60,8 +60,8 @@ class Hole(Struct, frozen=True):
 def refuse_endless_pecks(
     depth_mm: float, peck_mm: float, holes: Sequence[Hole], operation: Operation
 ) -> None:
-    """OptionError for pecks so small that the holes take too many moves; a bore has its pecks from
-    the step down."""
+    """Raise OptionError for pecks so small that the holes take too many moves; a bore has its
+    pecks from the step down."""
     key = "peck" if operation.contract.descent == "pecks" else "step_down"
     refuse_endless(
         MOVES_OF_PECK * depth_mm / peck_mm * len(holes),
@@ -73,7 +73,8 @@ def refuse_endless_pecks(
 
 
 def circle_of(path: Polyline) -> tuple[tuple[float, float], float] | None:
-    """Centre (x, y) mm and diameter mm of a closed path that is a full circle, else None."""
+    """Return the centre (x, y) mm and diameter mm of a closed path that is a full circle, else
+    None."""
     if not path.closed:
         return None
     (xmin, xmax), (ymin, ymax) = _box(path)
@@ -88,7 +89,7 @@ def circle_of(path: Polyline) -> tuple[tuple[float, float], float] | None:
 
 
 def _turns_once(sweep: Floats) -> bool:
-    """True if arcs that all turn in one direction make one full turn, and not two."""
+    """Return True if arcs that all turn in one direction make one full turn, and not two."""
     one_way = bool((sweep > 0.0).all() or (sweep < 0.0).all())
     return one_way and round(abs(float(sweep.sum())) / (2.0 * math.pi)) == 1
 
@@ -99,8 +100,8 @@ def _box(path: Polyline) -> list[list[float]]:
 
 
 def each_once(holes: list[Hole], drill_mm: float) -> list[Hole]:
-    """The holes in their order without those at a place that another one has; circles go before
-    marks, and of circles that whose diameter is nearest to the drill's."""
+    """Return the holes in their order without those at a place that another one has; circles go
+    before marks, and of circles that whose diameter is nearest to the drill's."""
 
     def misfit(index: int) -> tuple[float, int]:
         diameter = holes[index].diameter_mm
@@ -130,8 +131,9 @@ def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
 def pecks(
     at_mm: tuple[float, float], depths: Sequence[float], setting: Setting
 ) -> tuple[Floats, list[float]]:
-    """The vertices (n, 4) of a tool that goes down at a place, and the feeds between them: it cuts
-    a peck, comes out as a rapid, goes back as a rapid to just above it, and so on."""
+    """Return the vertices (n, 4) of a tool that goes down at a place, and the feeds between
+    them: it cuts a peck, comes out as a rapid, goes back as a rapid to just above it, and so
+    on."""
     top = min(PECK_TOP_MM, setting.safe_z_mm)
     above = min(PECK_CLEARANCE_MM, 0.5 * depths[0])
     heights, feeds = [-depths[0]], list[float]()
@@ -142,7 +144,7 @@ def pecks(
 
 
 def circles_of(chosen: Chosen) -> tuple[list[Hole], list[str]]:
-    """The full circles of the paths, and the names of the other paths."""
+    """Return the full circles of the paths, and the names of the other paths."""
     holes, other_names = [], []
     for path, source, name in zip(chosen.lines, chosen.source, chosen.names, strict=True):
         circle = circle_of(path)
@@ -177,6 +179,6 @@ def drilled_holes(
 
 
 def named(names: list[str]) -> str:
-    """The first few names, and how many more there are."""
+    """Return the first few names, and how many more there are."""
     extra = len(names) - NAMES_SHOWN
     return ", ".join(names[:NAMES_SHOWN]) + (f" and {extra} more" if extra > 0 else "")

@@ -89,7 +89,7 @@ class Runs(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, runs: Iterable[CutRun]) -> Runs:
-        """Columns from single runs."""
+        """Return columns from single runs."""
         each = list(runs)
         feeds = [np.append(run.feed_mm_min, RAPID) for run in each]
         return cls(
@@ -103,7 +103,7 @@ class Runs(Struct, frozen=True, eq=False):
 
     @classmethod
     def joined(cls, parts: Sequence[Runs]) -> Runs:
-        """The runs of all parts, one part after the other."""
+        """Return the runs of all parts, one part after the other."""
         if len(parts) == 1:
             return parts[0]
         before = np.cumsum([0, *(len(part.vertices) for part in parts)], dtype=np.int64)

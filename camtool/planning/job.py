@@ -202,8 +202,8 @@ drawings larger than any machine; parts, copies and cuts that lie beside the sto
 def refuse_endless(
     moves: float, where: str, request: str, mend: str, *, is_long: bool = False
 ) -> None:
-    """OptionError when more than MAX_MOVES moves (MAX_LONG_MOVES if `is_long`) are estimated to
-    result from a `request` such as "10000 passes"."""
+    """Raise OptionError when more than MAX_MOVES moves (MAX_LONG_MOVES if `is_long`) are
+    estimated to result from a `request` such as "10000 passes"."""
     max_moves = MAX_LONG_MOVES if is_long else MAX_MOVES
     if moves > max_moves:
         meant = f", or --allow long if it is meant (up to {MAX_LONG_MOVES:,})"
@@ -370,7 +370,8 @@ class Tool(FrozenRecord):
         return feed_mm_min / (rpm * self.flutes) if rpm and self.flutes else None
 
     def edge_speed_m_min(self, rpm: float | None) -> float | None:
-        """Speed of its edge where it is widest, m/min; None without a speed, and for a point."""
+        """Return the speed of its edge where it is widest, m/min; None without a speed, and for
+        a point."""
         return math.pi * self.diameter_mm * rpm / 1000.0 if rpm and self.diameter_mm else None
 
     @property
@@ -638,8 +639,8 @@ class Operation(FrozenRecord):
             )
 
     def after(self, others: Sequence[Operation]) -> Operation:
-        """The operation with what it clears the rest of, found by its name among others, those
-        before it and then those behind it; itself where it names none.
+        """Return the operation with what it clears the rest of, found by its name among others,
+        those before it and then those behind it; itself where it names none.
 
         It takes the paths of that one, and is as deep. OptionError for what leaves no rest.
         """
@@ -710,11 +711,11 @@ class Operation(FrozenRecord):
             )
 
     def stages(self) -> tuple[Operation, ...]:
-        """The operation, or the two that its finishing pass makes of it: one that leaves this on
-        the wall, and one along the wall, which comes in and leaves on quarter arcs as large as
-        what was left: from where the tool of the first ran. A trochoidal slot has the latter
-        always, for its cusps. OptionError for a feed or a tool of
-        a pass that there is not, and for a tool that cannot cut as far beyond the line."""
+        """Return the operation, or the two that its finishing pass makes of it: one that leaves
+        this on the wall, and one along the wall, which comes in and leaves on quarter arcs as
+        large as what was left: from where the tool of the first ran. A trochoidal slot has the
+        latter always, for its cusps. OptionError for a feed or a tool of a pass that there is
+        not, and for a tool that cannot cut as far beyond the line."""
         self._refuse_beyond()
         left_mm = self.finish_mm
         if left_mm is None and self.makes_slots and self.side != "on" and not self.stage:
@@ -791,9 +792,9 @@ class Operation(FrozenRecord):
             )
 
     def through(self, stock: Stock | None) -> Operation:
-        """The operation with the depth that its breakthrough makes in this stock; itself without
-        one. A pointed drill, or a round nose, goes through with its whole diameter. OptionError
-        for a stock that is not known, or that lies on too thin a board."""
+        """Return the operation with the depth that its breakthrough makes in this stock; itself
+        without one. A pointed drill, or a round nose, goes through with its whole diameter.
+        OptionError for a stock that is not known, or that lies on too thin a board."""
         extra = self.breakthrough_mm
         if extra is None:
             return self
@@ -830,7 +831,7 @@ class Operation(FrozenRecord):
         return kind_named(self.kind)
 
     def own_value(self, name: str) -> Any:
-        """The value of a key that its kind alone has, or its default."""
+        """Return the value of a key that its kind alone has, or its default."""
         key = self.contract.own[name]
         return dict(self.own).get(key.field, key.default)
 
@@ -879,8 +880,8 @@ class Operation(FrozenRecord):
         return bool(self.select or self.entities or self.size_mm or self.area_mm2)
 
     def takes(self, layer: str, colour: str) -> bool:
-        """True if paths of this layer and colour are cut, as far as it does not select them by
-        what they are."""
+        """Return True if paths of this layer and colour are cut, as far as it does not select
+        them by what they are."""
         return (
             self.contract.takes_drawn
             and (not self.layers or matches(self.layers, layer))
@@ -895,8 +896,8 @@ def _selection_of(operation: Operation) -> dict[str, Any]:
 
 
 def rested(operations: Sequence[Operation]) -> list[Operation]:
-    """The operations with what they clear the rest of. That of a pocket comes after it; a carved
-    floor may be cleared before or after its walls."""
+    """Return the operations with what they clear the rest of. That of a pocket comes after it;
+    a carved floor may be cleared before or after its walls."""
     settled = []
     for row, each in enumerate(operations):
         later = [other for other in operations[row + 1 :] if other.contract.rest == "floor"]
@@ -1239,13 +1240,14 @@ class Job(FrozenRecord):
         return tuple(dict.fromkeys(every))
 
     def takes(self, layer: str, colour: str) -> bool:
-        """True if any operation cuts the paths of this layer and colour."""
+        """Return True if any operation cuts the paths of this layer and colour."""
         return any(operation.takes(layer, colour) for operation in self.operations)
 
 
 def job_of(**settings: Any) -> Job:
-    """The job of one operation: fields of Operation, Job and Placement by name, those of its
-    Tool with `tool_` before them (`tool_diameter_mm=0.2`). TypeError for a name none of them has.
+    """Return the job of one operation: fields of Operation, Job and Placement by name, those of
+    its Tool with `tool_` before them (`tool_diameter_mm=0.2`). TypeError for a name none of
+    them has.
     """
     tool = {
         key.removeprefix("tool_"): settings.pop(key)
@@ -1262,8 +1264,8 @@ def job_of(**settings: Any) -> Job:
 
 
 def operation_of(**settings: Any) -> Operation:
-    """The operation of these fields; those that its kind alone has (without a kind: any kind) go
-    into `own_fields`. TypeError for a name that it does not have."""
+    """Return the operation of these fields; those that its kind alone has (without a kind: any
+    kind) go into `own_fields`. TypeError for a name that it does not have."""
     named = [kind_named(settings["kind"])] if "kind" in settings else installed_kinds().values()
     own_names = {key.field for kind in named for key in kind.own.values()} - _names(Operation)
     own_fields = tuple(sorted((name, settings.pop(name)) for name in own_names & settings.keys()))

@@ -90,7 +90,7 @@ class Border(Struct, frozen=True, eq=False):
         return near_lines
 
     def allows(self, lead: Segments, near_segments: Segments) -> bool:
-        """True if the tool cuts no wanted material along this one line or arc."""
+        """Return True if the tool cuts no wanted material along this one line or arc."""
         distance, _ = paired_distances(
             lead[np.zeros(len(near_segments), dtype=np.int64)], near_segments
         )
@@ -101,7 +101,7 @@ class Border(Struct, frozen=True, eq=False):
         return is_far and (self.free_left is None or self._is_beside(lead))
 
     def _is_beside(self, lead: Segments) -> bool:
-        """True if no piece of the lead lies on the side of the contour that is not free."""
+        """Return True if no piece of the lead lies on the side of the contour that is not free."""
         common = crossings(lead, Segments.of(self.line))
         parts = distinct(np.concatenate([[0.0, 1.0], common.ta]))
         rows = np.zeros(len(parts) - 1, dtype=np.int64)
@@ -156,7 +156,7 @@ def leads_of(
 
 
 def _lead_bulge(sign: float, material_left: bool | None) -> float:
-    """Bulge of a lead that goes away from the contour: a quarter arc to the free side.
+    """Return the bulge of a lead that goes away from the contour: a quarter arc to the free side.
 
     Seen away from the contour, what is free on the right of the travel is on the right of a
     lead-out too, and on the left of a lead-in, which is seen backwards.
@@ -187,7 +187,8 @@ def _longest_lead(
 
 
 def runs_back(path: Polyline, other: Polyline) -> bool:
-    """True if `other`, a part of the path or all of it, is travelled in the other direction."""
+    """Return True if `other`, a part of the path or all of it, is travelled in the other
+    direction."""
     other_along = MeasuredPath.of(other)
     middle = 0.5 * other_along.reach[1:2]
     point, heading = other_along.at(middle), other_along.directions(middle)

@@ -46,7 +46,7 @@ def link(
     machine: Machine,
     approaches: Callable[[], Approach] | None = None,
 ) -> ToolpathBuilder:
-    """All moves of a program: the tool starts at part zero on the stock and ends above it,
+    """Return all moves of a program: the tool starts at part zero on the stock and ends above it,
     where the machine parks.
 
     `worked`: operations, each with its runs in order of cutting. Rows know their run, counted

@@ -74,7 +74,7 @@ class Choices(Struct, frozen=True, eq=False):
                 raise ValueError(f"{name} is not (S, 2) of finite numbers")
 
     def __len__(self) -> int:
-        """The number of items."""
+        """Return the number of items."""
         return int(self.owner[-1]) + 1 if len(self.owner) else 0
 
     @property
@@ -111,7 +111,7 @@ def chosen_paths(contours: Sequence[Contour], choices: Choices, rows: Ints) -> P
 
 
 def drawn_order(choices: Choices) -> Ints:
-    """Rows (M,): all items in the order in which they come, each in its first variant."""
+    """Return rows (M,): all items in the order in which they come, each in its first variant."""
     return choices.first[:-1]
 
 

@@ -218,7 +218,7 @@ class Cuts(Struct, frozen=True, eq=False):
 
 
 def joints(lines: Polylines) -> Bools:
-    """Mask (N,) of the vertices of closed paths where one move ends and another begins.
+    """Return the mask (N,) of the vertices of closed paths where one move ends and another begins.
 
     For a circle every vertex is as good, and all are true; so are those of open paths.
     """
@@ -268,8 +268,8 @@ def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
 
 
 def _begins_move(segments: Segments, goes_on: Bools) -> Bools:
-    """Mask (n,) of the segments with which a move begins, `goes_on` (n−1,) where one may go on in
-    the next: an arc sweeps no more than one may, or a whole circle."""
+    """Return the mask (n,) of the segments with which a move begins, `goes_on` (n−1,) where one
+    may go on in the next: an arc sweeps no more than one may, or a whole circle."""
     begins = np.ones(len(segments), dtype=np.bool_)
     begin, swept, last = 0, 0.0, -1
     for row in (np.flatnonzero(goes_on) + 1).tolist():
@@ -285,7 +285,8 @@ def _begins_move(segments: Segments, goes_on: Bools) -> Bools:
 
 
 def _is_single_arc(segments: Segments, begin: int, last: int, swept: float) -> bool:
-    """True if the rows from `begin` to `last` sweep no more than an arc may, or a whole circle."""
+    """Return True if the rows from `begin` to `last` sweep no more than an arc may, or a whole
+    circle."""
     if abs(swept) <= MAX_PART_SWEEP_RAD:
         return True
     gap = segments.end[last] - segments.start[begin]
@@ -293,7 +294,8 @@ def _is_single_arc(segments: Segments, begin: int, last: int, swept: float) -> b
 
 
 def _continues(segments: Segments, rise: Floats, feed: Floats) -> Bools:
-    """Mask (n−1,) of the segments that go on in the next: one run, circle, slope and feed."""
+    """Return the mask (n−1,) of the segments that go on in the next: one run, circle, slope and
+    feed."""
     continues = _same_arc(segments[:-1], segments[1:]) & (feed[:-1] == feed[1:])
     continues &= np.diff(segments.path) == 0
     pairs = np.flatnonzero(continues)
@@ -310,7 +312,8 @@ def _slopes(segments: Segments, rise: Floats, rows: Ints) -> Floats:
 
 
 def _same_arc(one: Segments, other: Segments) -> Bools:
-    """Mask (K,) of the rows of which both are arcs of one circle in the same direction."""
+    """Return the mask (K,) of the rows of which both are arcs of one circle in the same
+    direction."""
     is_same = one.is_arc & (np.sign(one.bulge) == np.sign(other.bulge))
     rows = np.flatnonzero(is_same)
     one, other = one[rows], other[rows]

@@ -88,7 +88,7 @@ class Plan(Struct, frozen=True, eq=False):
 
 
 def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
-    """The toolpath that cuts the drawing, work frame, with the findings of planning.
+    """Return the toolpath that cuts the drawing, work frame, with the findings of planning.
 
     OptionError for what the job asks and the drawing or the machine cannot give.
     """
@@ -141,7 +141,8 @@ def _with_all_setups(job: Job) -> Job:
 def _linked(
     plan: Plan, drawing: Drawing, full_job: Job, machine: Machine, *, undivided: bool
 ) -> Plan:
-    """The plan with the toolpath of its steps; its job may be a part of the `full_job` one."""
+    """Return the plan with the toolpath of its steps; its job may be a part of the `full_job`
+    one."""
     job, placed_drawing, steps = plan.job, plan.placed, plan.steps
     worked = [(step.setting, step.runs) for step in steps]
     approaches = None
@@ -170,14 +171,14 @@ def _linked(
 
 
 def _tabs(steps: Sequence[Step]) -> tuple[tuple[float, float], ...]:
-    """The places of all tabs, each once."""
+    """Return the places of all tabs, each once."""
     places = [tuple(bridge.centre.tolist()) for step in steps for bridge in step.bridges]
     return tuple(dict.fromkeys((float(x), float(y)) for x, y in places))
 
 
 def turns_of_tools(plan: Plan) -> list[list[int]]:
-    """The steps of the plan, by their index, parted where another tool has its turn; what cuts
-    nothing has no turn of its own."""
+    """Return the steps of the plan, by their index, parted where another tool has its turn;
+    what cuts nothing has no turn of its own."""
     turns: list[list[int]] = [[]]
     tool: Tool | None = None
     for index, step in enumerate(plan.steps):
@@ -201,8 +202,8 @@ def parted(
     *,
     undivided: bool = False,
 ) -> tuple[Plan, ...]:
-    """A plan for each of the `turns`, in the frame of the whole one, with its cuts: what its steps
-    leave standing for each other, and on which side they cut, they know from it."""
+    """Return a plan for each of the `turns`, in the frame of the whole one, with its cuts: what
+    its steps leave standing for each other, and on which side they cut, they know from it."""
     parts = []
     for turn in turns:
         steps = tuple(plan.steps[index] for index in turn)
@@ -296,7 +297,8 @@ def _step(
 def _text_as_edge(
     placed_drawing: Drawing, chosen: Chosen, operation: Operation, findings: Sequence[Finding]
 ) -> Iterator[Finding]:
-    """Outlines of text that are cut as edges, where the tool has no room beside some of them."""
+    """Yield outlines of text that are cut as edges, where the tool has no room beside some of
+    them."""
     if not runs_beside(operation):
         return
     text = [
@@ -313,7 +315,7 @@ def _text_as_edge(
 
 
 def _is_divided(job: Job, operation: Operation) -> bool:
-    """True if contours of the operation are cut as runs, against reversals."""
+    """Return True if contours of the operation are cut as runs, against reversals."""
     if job.minimise != "reversals":
         return False
     from camtool.planning.reversing import may_divide
@@ -322,7 +324,7 @@ def _is_divided(job: Job, operation: Operation) -> bool:
 
 
 def _sparing(steps: list[Step]) -> list[Step]:
-    """The steps, their runs raised over the bridges that any of them leaves."""
+    """Return the steps, their runs raised over the bridges that any of them leaves."""
     bridges = [bridge for step in steps for bridge in step.bridges]
     if not bridges:
         return steps
@@ -335,7 +337,7 @@ def _sparing(steps: list[Step]) -> list[Step]:
 
 
 def _rested(steps: list[Step]) -> list[Step]:
-    """The steps; what one of them leaves for another to clear is said by that one alone."""
+    """Return the steps; what one of them leaves for another to clear is said by that one alone."""
     rest_names = [step.operation.rest for step in steps if step.operation.rest_of is not None]
     codes = (PlanningCode.UNREACHED, PlanningCode.DEPTH_LIMITED)
     return [
@@ -347,7 +349,7 @@ def _rested(steps: list[Step]) -> list[Step]:
 
 
 def _refuse_endless(items: Items, setting: Setting) -> None:
-    """OptionError for passes, or an overlap, that go round what is drawn too often."""
+    """Raise OptionError for passes, or an overlap, that go round what is drawn too often."""
     operation, passes = setting.operation, len(setting.levels_mm)
     paths = [contour.path for contour in contours_of(items)]
     if passes > 1:
@@ -372,8 +374,8 @@ def _refuse_endless(items: Items, setting: Setting) -> None:
 
 
 def _walls(placed_drawing: Drawing, sides: Sides, operation: Operation) -> KeepOut:
-    """The closed lines that leads of a contour must keep away from: those of the operation itself,
-    and those that any operation makes walls of."""
+    """Return the closed lines that leads of a contour must keep away from: those of the
+    operation itself, and those that any operation makes walls of."""
     count = len(placed_drawing.paths)
     makers = [each.contract.leaves_walls for each in sides.operations]
     is_own, walls = sides.taken_by(operation)[:count], sides.cuts[makers, :count].any(axis=0)
@@ -394,8 +396,8 @@ def _with_starts(contours: list[Contour]) -> list[Contour]:
 
 
 def _begun_between_tabs(contours: list[Contour]) -> list[Contour]:
-    """The contours, those with tabs by hand beginning farthest from these, if nothing says where:
-    no tab can stand where a contour begins."""
+    """Return the contours, those with tabs by hand beginning farthest from these, if nothing
+    says where: no tab can stand where a contour begins."""
     contours_made = []
     for contour in contours:
         tabs = contour.setting.operation.tabs

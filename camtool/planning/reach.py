@@ -79,7 +79,7 @@ def opened(region: Polylines, tool_radius_mm: float) -> Polylines:
 
 
 def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
-    """The pieces of a region that a disc within it does not cover, the largest first.
+    """Return the pieces of a region that a disc within it does not cover, the largest first.
 
     The region is on the left of its closed paths, which may also be the holes of an endless one.
     Pieces smaller than MIN_FOOT_SHARE of the disc's area are left out. GeometryError for open
@@ -102,7 +102,8 @@ def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
 
 
 def _far_places(pieces: Sequence[Polylines], reached: Polylines) -> list[tuple[float, float]]:
-    """The vertex of each piece farthest from what is reached; its centre when nothing is."""
+    """Return the vertex of each piece farthest from what is reached; its centre when nothing
+    is."""
     if len(reached) == 0 or not pieces:
         centres = [extents(piece).mean(axis=1).tolist() for piece in pieces]
         return [(x, y) for x, y in centres]
@@ -121,7 +122,7 @@ def _far_places(pieces: Sequence[Polylines], reached: Polylines) -> list[tuple[f
 def _difference(
     region: Polylines, reached: Polylines, least_mm2: float, parting_mm: float
 ) -> Polylines:
-    """The closed paths around what is in the region and not in `reached`, a part of it.
+    """Return the closed paths around what is in the region and not in `reached`, a part of it.
 
     Pieces that are surely smaller than `least_mm2` may be left out.
     """
@@ -135,7 +136,8 @@ def _difference(
 
 
 def _separate_sections(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polyline]:
-    """The sections of closed paths that do not run together with others: closed where whole.
+    """Return the sections of closed paths that do not run together with others: closed where
+    whole.
 
     They begin and end at vertices, their own and those of the others that are on a path: where
     the one parts from the other, so does the other from the one. One that leads h away, and is l
@@ -170,7 +172,8 @@ class _Parts(Struct, frozen=True, eq=False):
     is_wanted: Bools
 
     def sections(self, path: Polyline, least_mm2: float) -> list[Polyline]:
-        """The runs of wanted parts, but those that surely go round less than `least_mm2`."""
+        """Return the runs of wanted parts, but those that surely go round less than
+        `least_mm2`."""
         if self.is_wanted.all():
             return [path]
         turn = int(np.argmin(self.is_wanted))
@@ -191,7 +194,8 @@ class _Parts(Struct, frozen=True, eq=False):
 
 
 def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
-    """Rows and the parts from .. to (in fractions) into which the points on them divide them."""
+    """Return rows and the parts from .. to (in fractions) into which the points on them divide
+    them."""
     curves, points = IndexedCurves.of(segments), np.ascontiguousarray(points)
     distances = nearest_distances(points, curves.rows, curves.tree)
     is_on = (distances <= TOGETHER_MM) & ~_at_any(points, segments.start)
@@ -212,13 +216,13 @@ def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
 
 
 def _distances(points: Floats, segments: Segments) -> Floats:
-    """(P,) distance of each point (P, 2) from the nearest segment."""
+    """Return (P,) distance of each point (P, 2) from the nearest segment."""
     curves = IndexedCurves.of(segments)
     return nearest_distances(np.ascontiguousarray(points), curves.rows, curves.tree)
 
 
 def _at_any(points: Floats, other_points: Floats) -> Bools:
-    """(P,) which of the points (P, 2) are at one of the others (N, 2)."""
+    """Return (P,) which of the points (P, 2) are at one of the others (N, 2)."""
     node, _ = merge_points(np.concatenate([points, other_points]), TOGETHER_MM)
     return np.isin(node[: len(points)], node[len(points) :])
 
@@ -257,14 +261,14 @@ def _closed(sections: list[Polyline], parting_mm: float) -> list[Polyline]:
 
 
 def _turn(arriving: Frames, leaving_frames: Frames) -> float:
-    """The angle from the end of one section to the start of another, left positive."""
+    """Return the angle from the end of one section to the start of another, left positive."""
     x, y = arriving.tangent_at(np.ones(len(arriving.length)))[-1]
     u, v = leaving_frames.tangent[0]
     return float(np.arctan2(x * v - y * u, x * u + y * v))
 
 
 def _joined(sections: list[Polyline]) -> list[Polyline]:
-    """Sections that follow each other as one closed path; none when it is but a speck."""
+    """Return sections that follow each other as one closed path; none when it is but a speck."""
     vertices = np.concatenate([path.vertices for path in sections])
     step = np.roll(vertices[:, :2], -1, axis=0) - vertices[:, :2]
     vertices = vertices[np.hypot(*step.T) > SAME_PLACE_MM]

@@ -135,7 +135,8 @@ def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner:
 
 
 def _is_clear(move: Floats, corner: Floats, other_walls: Segments, near_mm: float) -> bool:
-    """True if a tool that makes this move cuts into no wanted line but those at the corner."""
+    """Return True if a tool that makes this move cuts into no wanted line but those at the
+    corner."""
     low, high = move.min(axis=0) - near_mm, move.max(axis=0) + near_mm
     boxes = segment_boxes(other_walls)
     rows = np.flatnonzero(((boxes[:, :2] < high) & (boxes[:, 2:] > low)).all(axis=1))

@@ -147,14 +147,14 @@ def _reversals(
 
 
 def _keeps_direction(contour: Contour) -> bool:
-    """True if the job fixes the side on which the teeth cut, and the contour has one."""
+    """Return True if the job fixes the side on which the teeth cut, and the contour has one."""
     operation = contour.setting.operation
     wide = operation.tool.diameter_mm > 0.0 and contour.material_left is not None
     return operation.direction != "drawn" and wide
 
 
 def may_divide(operation: Operation) -> bool:
-    """True if contours of this operation may be cut as several runs."""
+    """Return True if contours of this operation may be cut as several runs."""
     return not _stays_whole(operation)
 
 
@@ -279,7 +279,7 @@ class Division(Struct, frozen=True, eq=False):
         )
 
     def pieces(self) -> list[RunPiece]:
-        """The runs of the path in its order; together they are the path."""
+        """Return the runs of the path in its order; together they are the path."""
         if not self.parts.path.closed:
             return _cheapest(self, 0)[1]
         reversals = [(t.first, t.last) for t in self.reversals if len(t)]
@@ -291,7 +291,7 @@ class Division(Struct, frozen=True, eq=False):
         return min((_cheapest(self, begin) for begin in begins), key=lambda each: each[0])[1]
 
     def variants(self, first: int, last: int) -> list[RunPiece]:
-        """The piece between two places between which no axis reverses, in each direction in
+        """Return the piece between two places between which no axis reverses, in each direction in
         which it may be cut."""
         directions = (1, -1) if self.either_direction else (1,)
         return [self._piece(first, last, direction) for direction in directions]
@@ -311,10 +311,10 @@ class Division(Struct, frozen=True, eq=False):
 
 
 def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
-    """(A, 2, 2) mm: how far each part comes from the path when X is driven towards −, + and Y
-    towards −, +: the points of the part, moved by the residual errors, to the part and to the
-    ones before and after it. (The path may pass nearer elsewhere, where it is as fine as the
-    errors.)"""
+    """Return (A, 2, 2) mm: how far each part comes from the path when X is driven towards −, +
+    and Y towards −, +: the points of the part, moved by the residual errors, to the part and to
+    the ones before and after it. (The path may pass nearer elsewhere, where it is as fine as
+    the errors.)"""
     count, segments = len(parts), parts.segments
     rows = np.repeat(np.arange(count), SAMPLES)
     points = point_at(segments, rows, np.tile(np.linspace(0.0, 1.0, SAMPLES), count))
@@ -333,7 +333,7 @@ def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
 
 
 def drawn_error_mm(division: Division) -> float:
-    """The greatest predicted error when the path is cut as it is drawn, in one go."""
+    """Return the greatest predicted error when the path is cut as it is drawn, in one go."""
     columns = []
     for axis, reversals in enumerate(division.reversals):
         sense, better = reversals.sense, division.residual[axis].better
@@ -350,7 +350,7 @@ Cost = tuple[int, float, float]
 
 
 def _cheapest(division: Division, begin: int) -> tuple[tuple[int, Cost], list[RunPiece]]:
-    """The best division of the path from place `begin` once around, or to the end, with its
+    """Return the best division of the path from place `begin` once around, or to the end, with its
     greatest error in ALIKE_MM and its cost."""
     places = _division_places(division, begin, begin + len(division.parts))
     pieces = list(_possible_pieces(division, places))
@@ -435,7 +435,7 @@ class Parts(Struct, frozen=True, eq=False, dict=True):
         return Segments.between(self.places[:-1], self.places[1:], bulge)
 
     def subpath(self, first: int, last: int) -> Polyline:
-        """The open path from place `first` to place `last`; beyond A a closed path goes on.
+        """Return the open path from place `first` to place `last`; beyond A a closed path goes on.
 
         Parts of one segment are one segment again.
         """
@@ -558,8 +558,8 @@ def reversals_along(values: Floats, closed: bool, least_mm: float) -> AxisRevers
 
 
 def _extremes(values: list[float], least_mm: float) -> list[int]:
-    """The places where the motion begins, reverses, and is furthest at last; [] when it is shorter
-    than `least_mm` throughout."""
+    """Return the places where the motion begins, reverses, and is furthest at last; [] when it
+    is shorter than `least_mm` throughout."""
     low = high = furthest = sense = 0
     extremes: list[int] = []
     for place, value in enumerate(values):
@@ -578,8 +578,8 @@ def _extremes(values: list[float], least_mm: float) -> list[int]:
 
 
 def _flat(values: list[float], extreme: int, closed: bool, least_mm: float) -> tuple[int, int]:
-    """The places before and after `extreme` up to which the values stay within `least_mm`; those
-    of a closed path go on before 0 and beyond its end."""
+    """Return the places before and after `extreme` up to which the values stay within
+    `least_mm`; those of a closed path go on before 0 and beyond its end."""
     count = len(values) - 1
     low = high = extreme
     while (closed or low > 0) and abs(values[(low - 1) % count] - values[extreme]) < least_mm:
@@ -709,7 +709,7 @@ class Residual(Struct, frozen=True):
     better: int
 
     def error_mm(self, sense: int) -> float:
-        """The error when driven towards `sense` ±1."""
+        """Return the error when driven towards `sense` ±1."""
         return self.plus_mm if sense > 0 else self.minus_mm
 
 

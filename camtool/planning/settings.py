@@ -34,7 +34,7 @@ class Cone(Struct, frozen=True):
 
     @classmethod
     def of(cls, operation: Operation) -> Cone:
-        """The V bit of an operation; OptionError when its tool is none."""
+        """Return the V bit of an operation; OptionError when its tool is none."""
         tool = operation.tool
         if tool.kind != "v" or tool.tip_angle_rad is None:
             raise OptionError(
@@ -46,17 +46,17 @@ class Cone(Struct, frozen=True):
         return cls(math.tan(0.5 * tool.tip_angle_rad), 0.5 * tool.tip_diameter_mm, widest)
 
     def radius_at(self, depth_mm: float) -> float:
-        """Radius of what is cut at the surface with the tip so deep."""
+        """Return the radius of what is cut at the surface with the tip so deep."""
         return min(self.tip_mm + depth_mm * self.slope, self.widest_mm)
 
     def depth_of(self, rho: Floats) -> Floats:
-        """Depths of the tip, mm, at which it cuts these radii at the surface."""
+        """Return depths of the tip, mm, at which it cuts these radii at the surface."""
         return np.maximum(rho - self.tip_mm, 0.0) / self.slope
 
 
 def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
-    """The operation with the machine's numbers where it gives none; OptionError when too fast,
-    and for impossible passes."""
+    """Return the operation with the machine's numbers where it gives none; OptionError when too
+    fast, and for impossible passes."""
     turns_work = operation.contract.turns_work
     depth = 0.0 if turns_work else depth_of(operation, machine)
     _check_coolant(operation, machine)
@@ -82,8 +82,9 @@ def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
 
 
 def speed_of(operation: Operation, machine: Machine) -> float | None:
-    """The operation's speed of the spindle, or the machine's, in rev/min; None where neither says
-    any, and for 0, which is off. OptionError for a speed that the spindle does not have."""
+    """Return the operation's speed of the spindle, or the machine's, in rev/min; None where
+    neither says any, and for 0, which is off. OptionError for a speed that the spindle does not
+    have."""
     spindle, rpm = machine.spindle, operation.spindle_rpm
     if rpm is None:
         return spindle.default_rpm
@@ -108,8 +109,8 @@ def speed_of(operation: Operation, machine: Machine) -> float | None:
 
 
 def _check_spindle(operation: Operation, machine: Machine) -> None:
-    """OptionError for turning on a mill, for milling on a lathe, and for feeds that should follow
-    a spindle whose turns nobody counts."""
+    """Raise OptionError for turning on a mill, for milling on a lathe, and for feeds that
+    should follow a spindle whose turns nobody counts."""
     turns_work, kind = machine.spindle.turns == "work", operation.contract
     if kind.turns_work != turns_work:
         turned, other = ("work", "tool") if turns_work else ("tool", "work")
@@ -130,7 +131,7 @@ def _check_spindle(operation: Operation, machine: Machine) -> None:
 
 
 def _check_coolant(operation: Operation, machine: Machine) -> None:
-    """OptionError for coolant that the machine has not."""
+    """Raise OptionError for coolant that the machine has not."""
     kinds_needed = ("mist", "flood") if operation.coolant == "both" else (operation.coolant,)
     for each in kinds_needed:
         if each != "off" and each not in machine.coolant.kinds:
@@ -142,13 +143,13 @@ def _check_coolant(operation: Operation, machine: Machine) -> None:
 
 
 def safe_z_of(job: Job, machine: Machine) -> float:
-    """The job's height of rapids above the stock, or the machine's, mm."""
+    """Return the job's height of rapids above the stock, or the machine's, mm."""
     return machine.defaults.safe_z_mm if job.safe_z_mm is None else job.safe_z_mm
 
 
 def depth_of(operation: Operation, machine: Machine) -> float:
-    """The operation's depth of cut below the stock top, or the machine's, mm; of a carved floor no
-    more than the bit is deep where it is widest."""
+    """Return the operation's depth of cut below the stock top, or the machine's, mm; of a
+    carved floor no more than the bit is deep where it is widest."""
     carved = operation.rest_of
     if carved is not None and carved.contract.rest == "floor":
         cone = Cone.of(carved)
@@ -158,7 +159,7 @@ def depth_of(operation: Operation, machine: Machine) -> float:
 
 
 def feeds_of(operation: Operation, machine: Machine) -> Feeds:
-    """The operation's feeds, or the machine's, none above the rates of the axes.
+    """Return the operation's feeds, or the machine's, none above the rates of the axes.
 
     A plunge feed that is not given is the machine's share of the feed of the cut (without one,
     that feed), or the highest that Z can.
@@ -192,7 +193,8 @@ def feeds_of(operation: Operation, machine: Machine) -> Feeds:
 
 
 def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
-    """Feeds of the job, or of the machine, that the rates of its axes do not allow, each once."""
+    """Yield feeds of the job, or of the machine, that the rates of its axes do not allow, each
+    once."""
     axes = machine.axes
     reported: set[tuple[str, float]] = set()
     for operation in job.operations:
@@ -219,7 +221,7 @@ def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
 
 
 def _programmable(highest_mm_min: float, machine: Machine) -> float:
-    """The highest programmable feed that is not above this one."""
+    """Return the highest programmable feed that is not above this one."""
     unit = machine.feed.unit_mm_min
     units = math.floor(highest_mm_min / unit * (1.0 + FEED_TOLERANCE))
     return units * unit or highest_mm_min
@@ -228,7 +230,7 @@ def _programmable(highest_mm_min: float, machine: Machine) -> float:
 def levels(
     depth_mm: float, step_down_mm: float | None, last_pass_mm: float | None
 ) -> tuple[float, ...]:
-    """The z of all passes, mm, downwards from the first one to −depth.
+    """Return the z of all passes, mm, downwards from the first one to −depth.
 
     Steps are equal and no larger than `step_down_mm` (None: one step); with `last_pass_mm` the
     last one is that, and the others are equal. OptionError for numbers not above 0, a last pass
@@ -271,7 +273,7 @@ def levels(
 def carved_levels(
     depth_mm: float, step_down_mm: float | None, last_pass_mm: float | None
 ) -> tuple[float, ...]:
-    """The z of all passes of a V bit, which goes inwards from the wall as it goes down.
+    """Return the z of all passes of a V bit, which goes inwards from the wall as it goes down.
 
     A pass whose tip is d deeper than the one before runs d·tan α farther in (α the half angle of
     the bit). Under its tip the earlier one has cut d less deep than its own depth, so that the

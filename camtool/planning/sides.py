@@ -87,7 +87,7 @@ class Sides(Struct, eq=False, dict=True):
 
     @classmethod
     def of(cls, placed_drawing: Drawing, job: Job, default_depth_mm: float) -> Sides:
-        """The sides of a drawing in the work frame, cut by this job."""
+        """Return the sides of a drawing in the work frame, cut by this job."""
         unchosen, lines = placed_drawing.unchosen, placed_drawing.nesting.lines
         takes = np.zeros((len(job.operations), len(lines)), dtype=np.bool_)
         names = list(zip(placed_drawing.layers, placed_drawing.colours, strict=True))
@@ -145,15 +145,15 @@ class Sides(Struct, eq=False, dict=True):
         return np.asarray(idle & ~_is_repeated(self.lines, self.worked, idle))
 
     def taken_by(self, operation: Operation) -> Bools:
-        """(M,) the contours that one of the operations takes."""
+        """Return (M,) the contours that one of the operations takes."""
         return np.asarray(self.takes[self.operations.index(operation)])
 
     def cut_by(self, operation: Operation) -> Bools:
-        """(M,) of these those that it cuts."""
+        """Return (M,) of these those that it cuts."""
         return np.asarray(self.cuts[self.operations.index(operation)])
 
     def seen_by(self, operation: Operation) -> Seen:
-        """The sides for a profile of this operation."""
+        """Return the sides for a profile of this operation."""
         depth = self._depth(operation)
         cut = self._taken(
             each.contract.runs_beside or (each.contract.clears and self._depth(each) >= depth)
@@ -170,11 +170,12 @@ class Sides(Struct, eq=False, dict=True):
         return self._known[key]
 
     def sided(self) -> Bools:
-        """(M,) the contours that a profile follows on one side, so that the other side stays."""
+        """Return (M,) the contours that a profile follows on one side, so that the other side
+        stays."""
         return self._taken(map(runs_beside, self.operations))
 
     def kept_from(self, pocket: Operation) -> Bools:
-        """(M,) the contours whose inside must stay, by profiles no deeper than a pocket."""
+        """Return (M,) the contours whose inside must stay, by profiles no deeper than a pocket."""
         is_kept = np.zeros(len(self.lines), dtype=np.bool_)
         for number, each in enumerate(self.operations):
             if runs_beside(each) and self._depth(each) <= self._depth(pocket):
@@ -182,7 +183,7 @@ class Sides(Struct, eq=False, dict=True):
         return is_kept
 
     def holds(self, profile: Operation) -> Bools:
-        """(M,) the contours within which all stays, where this profile runs beside them."""
+        """Return (M,) the contours within which all stays, where this profile runs beside them."""
         if profile.side == "auto":
             return self.seen_by(profile).rim
         return np.full(len(self.lines), profile.side == "outside")
@@ -202,14 +203,14 @@ class Sides(Struct, eq=False, dict=True):
         return np.asarray(self.nesting.levels_by(bounds).depth % 2 == 0)
 
     def _taken(self, is_chosen: Iterable[bool]) -> Bools:
-        """(M,) the closed contours that any of these operations takes."""
+        """Return (M,) the closed contours that any of these operations takes."""
         return np.asarray(self.lines.closed & self.cuts[list(is_chosen)].any(axis=0))
 
     def _depth(self, operation: Operation) -> float:
         return self.default_depth_mm if operation.depth_mm is None else operation.depth_mm
 
     def why(self, operation: Operation, row: int) -> str:
-        """Why, in a few words, an operation has its tool on this side of a contour."""
+        """Return why, in a few words, an operation has its tool on this side of a contour."""
         if not self.lines.closed[row]:
             return "it is open"
         if operation.side != "auto":
@@ -235,7 +236,7 @@ class Traits:
         self._lines = nesting.lines
 
     def selected(self, operation: Operation, rows: Bools) -> Bools:
-        """(M,) those of the rows that the operation selects."""
+        """Return (M,) those of the rows that the operation selects."""
         rows = rows.copy()
         for word in operation.select:
             rows &= self._are(word, rows)
@@ -252,7 +253,7 @@ class Traits:
         return rows
 
     def _are(self, word: str, rows: Bools) -> Bools:
-        """(M,) of which of the rows a word is true."""
+        """Return (M,) of which of the rows a word is true."""
         closed = self._lines.closed
         if word in ("circle", "not circle"):
             is_circle = circles(self._lines, rows)
@@ -273,7 +274,7 @@ class Traits:
 
 
 def circles(lines: Polylines, rows: Bools) -> Bools:
-    """(M,) which of the rows (M,) of some paths are full circles."""
+    """Return (M,) which of the rows (M,) of some paths are full circles."""
     is_circle = np.zeros(len(rows), dtype=np.bool_)
     for row in np.flatnonzero(rows & lines.closed).tolist():
         is_circle[row] = circle_of(lines[row]) is not None
@@ -281,20 +282,20 @@ def circles(lines: Polylines, rows: Bools) -> Bools:
 
 
 def _is_within(sizes: Floats, limits: tuple[float, float]) -> Bools:
-    """(M,) which sizes are in a range, its ends included; NaN is in none."""
+    """Return (M,) which sizes are in a range, its ends included; NaN is in none."""
     low, high = limits
     return np.asarray((sizes >= low * (1.0 - SIZE_SHARE)) & (sizes <= high * (1.0 + SIZE_SHARE)))
 
 
 def is_named(operation: Operation, source: str) -> bool:
-    """True if an operation takes the entity of this name, such as "CIRCLE 2F": by the whole name,
-    or by what stands behind the kind (the handle, or the id)."""
+    """Return True if an operation takes the entity of this name, such as "CIRCLE 2F": by the
+    whole name, or by what stands behind the kind (the handle, or the id)."""
     names = [source, source.partition(" ")[2]]
     return not operation.entities or any(matches(operation.entities, name) for name in names)
 
 
 def takes_mark(operation: Operation, mark: Mark) -> bool:
-    """True if an operation takes a single point: it has no size, and is a point only."""
+    """Return True if an operation takes a single point: it has no size, and is a point only."""
     if operation.size_mm is not None or operation.area_mm2 is not None:
         return False
     if operation.select and operation.select != ("point",):
@@ -317,14 +318,14 @@ def _selection(operation: Operation) -> str:
 
 
 def runs_beside(operation: Operation) -> bool:
-    """True if an operation runs beside its closed contours, not on them."""
+    """Return True if an operation runs beside its closed contours, not on them."""
     if not operation.contract.runs_beside or operation.side == "on":
         return False
     return operation.away_mm > 0.0
 
 
 def _is_repeated(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
-    """(M,) those of the uncut closed contours (`idle`) that run along one that is cut,
+    """Return (M,) those of the uncut closed contours (`idle`) that run along one that is cut,
     or along one before them."""
     is_repeat = np.zeros(len(lines), dtype=np.bool_)
     other_rows = np.flatnonzero((cut & lines.closed) | idle)
@@ -395,8 +396,8 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
 
 
 def _rim(operation: Operation, sides: Sides, index: list[int]) -> Bools:
-    """(M,) which of the chosen paths are rims of parts, for a profile that asks for it; of nets,
-    which are rims of copper: an area of its own, whatever outline lies around it."""
+    """Return (M,) which of the chosen paths are rims of parts, for a profile that asks for it;
+    of nets, which are rims of copper: an area of its own, whatever outline lies around it."""
     if operation.contract.frees_nets:
         levels = sides.nesting.among(np.array(index, dtype=np.int64)).levels
         return np.asarray(levels.depth % 2 == 0)

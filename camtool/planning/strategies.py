@@ -54,7 +54,7 @@ class SlotWidth(NamedTuple):
     is_part: bool
 
     def mm(self, diameter_mm: float) -> float:
-        """The width for a tool, mm."""
+        """Return the width for a tool, mm."""
         return self.amount * diameter_mm if self.is_part else self.amount
 
 

@@ -111,7 +111,8 @@ class Tab(Struct, frozen=True):
         return Tab(self.begin + by_mm, self.end + by_mm, self.top_mm, self.fall)
 
     def holds(self, length: float) -> bool:
-        """True if a tool that stands at this length stands on the tab; not at a straight edge."""
+        """Return True if a tool that stands at this length stands on the tab; not at a straight
+        edge."""
         return not math.isinf(self.fall) or self.begin < length < self.end
 
     def height(self, length: float) -> float:
@@ -202,7 +203,7 @@ def middle_of_longest_gap(
 
 
 def is_hole(contour: Contour) -> bool:
-    """True if the material that stays lies around a closed contour, and not within it."""
+    """Return True if the material that stays lies around a closed contour, and not within it."""
     if contour.material_left is None:
         return False
     ccw = bool(signed_areas(Polylines.of([contour.path]))[0] > 0.0)
@@ -210,7 +211,7 @@ def is_hole(contour: Contour) -> bool:
 
 
 def _is_long_enough(contour: Contour) -> bool:
-    """True if a contour is at least as long as its tabs."""
+    """Return True if a contour is at least as long as its tabs."""
     operation = contour.setting.operation
     total = float(path_lengths(Polylines.of([contour.path]))[0])
     model, foot = _model(operation, contour.setting.levels_mm[-1])
@@ -419,20 +420,20 @@ class _Fitting(Struct, frozen=True, eq=False):
         return np.asarray(places[np.lexsort([offsets < 0.0, distances])])
 
     def _is_straight(self, places: Floats) -> Bools:
-        """Mask (P,) of the lengths at which a tab, its slopes included, lies across no corner and
-        no bend."""
+        """Return the mask (P,) of the lengths at which a tab, its slopes included, lies across
+        no corner and no bend."""
         low, high = places - self._reach, places + self._reach
         bend = np.abs(self._heading(high) - self._heading(low))
         return np.asarray(self._is_off_corners(places) & (bend <= GENTLE_RAD))
 
     def _is_off_corners(self, places: Floats) -> Bools:
-        """Mask (P,) of the lengths at which a tab lies across no corner."""
+        """Return the mask (P,) of the lengths at which a tab lies across no corner."""
         corners = np.concatenate([self.corners.vertices, self.corners.arcs])
         return self._is_clear(places, self._reach, corners)
 
     def _is_bridge_off_corners(self, places: Floats) -> Bools:
-        """Mask (P,) of the lengths at which a tab lies across no sharp corner, and its bridge not
-        round one. Circles that are drawn as polygons have no sharp ones."""
+        """Return the mask (P,) of the lengths at which a tab lies across no sharp corner, and
+        its bridge not round one. Circles that are drawn as polygons have no sharp ones."""
         clear = self._is_clear(places, self._reach, self.corners.sharply)
         arcs = self.corners.sharp_arcs
         return np.asarray(clear & self._is_clear(places, self.half_width_mm, arcs))
@@ -517,7 +518,8 @@ def _half_length(along: MeasuredPath, centre: float, chord: float, room: float) 
 
 
 def _is_bridge_clear(along: MeasuredPath, tab: Tab) -> bool:
-    """True if no other part of the path comes nearer to the centre of the bridge than its ends."""
+    """Return True if no other part of the path comes nearer to the centre of the bridge than
+    its ends."""
     ends = along.at(np.array([tab.begin, tab.end]))
     other_spans = [(0.0, tab.begin), (tab.end, along.total_mm)]
     if along.path.closed:

@@ -76,8 +76,9 @@ def band_of(lines: Polylines, half_mm: float) -> Polylines:
 
 
 def middles(line: Polyline, radius_mm: float, step_mm: float) -> Floats:
-    """(N, 2) the middles of circles along a line: at its corners, and in steps between these;
-    shorter ones where it turns on arcs smaller than the circles, since cusps are higher there."""
+    """Return (N, 2) the middles of circles along a line: at its corners, and in steps between
+    these; shorter ones where it turns on arcs smaller than the circles, since cusps are higher
+    there."""
     along = MeasuredPath.of(line)
     corners = along.reach[np.flatnonzero(np.abs(along.turns) > CORNER_TURN_RAD)]
     marks = np.unique(np.concatenate([[0.0, along.total_mm], corners]))

@@ -167,7 +167,7 @@ class WiredTwin:
         return min((time_s for time_s in times if time_s is not None), default=None)
 
     def unplugged(self, now: float) -> bool:
-        """True if the plug has been pulled."""
+        """Return True if the plug has been pulled."""
         times = self.there.faults.unplug_s, self.back.faults.unplug_s
         return any(time_s is not None and now >= time_s for time_s in times)
 

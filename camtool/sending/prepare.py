@@ -389,7 +389,7 @@ def _write_rest(
 
 
 def _has_moves(path: Toolpath) -> bool:
-    """True if anything moves in the path."""
+    """Return True if anything moves in the path."""
     somewhere = (path.starts != path.end).any(axis=1) | path.is_arc
     return bool((path.is_motion & somewhere).any())
 
@@ -511,7 +511,7 @@ class _MovePairs:
         return None
 
     def _is_negligible(self, path: Toolpath, starts: Floats, row: Ints) -> bool:
-        """True if a row is no move, or one shorter than the resolution of the dialect."""
+        """Return True if a row is no move, or one shorter than the resolution of the dialect."""
         if path.is_arc[row].any():
             return False
         return not path.is_motion[row].any() or bool(
@@ -519,11 +519,12 @@ class _MovePairs:
         )
 
     def _are_near(self, ones: Floats, other_points: Floats) -> Bools:
-        """Mask (K,) of the points (K, 3) that are within the resolution of each other."""
+        """Return the mask (K,) of the points (K, 3) that are within the resolution of each
+        other."""
         return np.asarray((np.abs(ones - other_points) <= self._slack).all(axis=1))
 
     def _are_equal(self, rows: Ints, other_rows: Ints) -> Bools:
-        """Mask (K,) of equal moves."""
+        """Return the mask (K,) of equal moves."""
         wanted_path, reread = self._wanted, self._again
         deviations = np.nan_to_num(
             np.abs(wanted_path.centre[rows] - reread.centre[other_rows])
@@ -535,7 +536,7 @@ class _MovePairs:
         return is_same & self._are_near(wanted_path.end[rows], reread.end[other_rows])
 
     def _lies_on(self, row: Ints, part: Ints) -> bool:
-        """True if a line, or an arc about the same centre, is a part of a wanted move."""
+        """Return True if a line, or an arc about the same centre, is a part of a wanted move."""
         wanted_path, reread = self._wanted, self._again
         rapid = wanted_path.kind[row] == Kind.RAPID, reread.kind[part] == Kind.RAPID
         if rapid[0] != rapid[1] or not reread.is_motion[part].all():

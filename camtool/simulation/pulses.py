@@ -82,7 +82,7 @@ def row_pulses(chunks: Iterable[Chunk], clock: SampleClock, path: Toolpath) -> I
 
 
 def _added_pulses(pulses: Pulses, counts: Ints, signs: Ints, each_s: Floats) -> list[Pulses]:
-    """The `counts` (K, 3) steps that come right before each pulse, of X, then Y, then Z."""
+    """Return the `counts` (K, 3) steps that come right before each pulse, of X, then Y, then Z."""
     parts = []
     remaining = counts.sum(axis=1)
     for motor in range(counts.shape[1]):

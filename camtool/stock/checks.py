@@ -289,7 +289,7 @@ class _Checks:
         return _Points(np.concatenate(shifted), np.tile(rows[owners], 3), np.tile(axis[:, 2], 3))
 
     def _in_stock(self, points: Floats) -> Bools:
-        """True (P,) for points within the stock, where its sides are known."""
+        """Return True (P,) for points within the stock, where its sides are known."""
         box = None if self.request.stock is None else self.request.stock.box_mm
         if box is None:
             return np.ones(len(points), dtype=np.bool_)
@@ -418,7 +418,8 @@ class _Checks:
             )
 
     def _operations_of(self, row: int) -> list[int]:
-        """The operations that a row of the program may be of: its own, or all of its tool."""
+        """Return the operations that a row of the program may be of: its own, or all of its
+        tool."""
         plan = self.decoded.operations
         if plan is not None and len(plan.notes) == len(self.request.operations):
             turn = int(np.searchsorted(plan.begin, row, side="right")) - 1
@@ -427,7 +428,7 @@ class _Checks:
         return self._with_cutter(int(self.moves.tool[min(move, len(self.moves) - 1)]))
 
     def _chips_mm(self) -> Floats:
-        """The thickest chip that each move (M,) may take, mm."""
+        """Return the thickest chip that each move (M,) may take, mm."""
         operations, plan = self.request.operations, self.decoded.operations
         max_chips = np.array(list(map(_chip_mm, operations, self.request.depths_mm)))
         if plan is not None and len(plan.notes) == len(operations):
@@ -440,7 +441,7 @@ class _Checks:
         return np.asarray(np.array(of_cutter)[self.moves.tool])
 
     def _with_cutter(self, number: int) -> list[int]:
-        """The operations whose tool has the shape of this cutter."""
+        """Return the operations whose tool has the shape of this cutter."""
         cutter, operations = self.moves.cutters[number], self.request.operations
         return [k for k, each in enumerate(operations) if cutter_profile(each.tool) == cutter]
 
@@ -548,7 +549,8 @@ class _Checks:
             yield FLOOR_LEFT(where=place, measured=max(-thickness.low, 0.0), other=other)
 
     def _is_part(self, piece: LoosePiece) -> bool:
-        """True if more than half of a piece has the outline of a part as its innermost contour."""
+        """Return True if more than half of a piece has the outline of a part as its innermost
+        contour."""
         contours = self.request.contours
         if not len(contours):
             return False

@@ -214,8 +214,8 @@ def _parted(moves: StockMoves) -> tuple[StockMoves, Ints]:
 
 
 def _entry_remaining(down: Bools, length: Floats, radius: Floats) -> Floats:
-    """(M,) the length of an entry that remains where each move begins, after the last of those
-    that go down; at or below 0 where it has ended."""
+    """Return (M,) the length of an entry that remains where each move begins, after the last of
+    those that go down; at or below 0 where it has ended."""
     travelled = np.concatenate([[0.0], np.cumsum(length)])
     last = np.maximum.accumulate(np.where(down, travelled[1:], -np.inf))
     return np.asarray(last + ENTRY_TURNS * 2.0 * np.pi * radius - travelled[:-1])
@@ -228,8 +228,8 @@ def _thick_share(limit_rad: float) -> float:
 
 
 def _behind(down: Bools, length: Floats, radius: Floats) -> Bools:
-    """Mask (M,) of the moves that go down, and of those behind them up to the length of an
-    entry."""
+    """Return the mask (M,) of the moves that go down, and of those behind them up to the length
+    of an entry."""
     return np.asarray(_entry_remaining(down, length, radius) > ENDED_MM)
 
 

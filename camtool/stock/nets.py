@@ -184,7 +184,7 @@ def _pieces_of(copper: BaseGeometry, nets: list[BaseGeometry]) -> _Pieces:
 
 
 def _conducts(copper: BaseGeometry) -> bool:
-    """True if copper has room for a disc of SPECK_MM."""
+    """Return True if copper has room for a disc of SPECK_MM."""
     if copper.area < math.pi * (0.5 * SPECK_MM) ** 2:
         return False
     return not shapely.buffer(copper, -0.5 * SPECK_MM).is_empty
@@ -259,7 +259,7 @@ def _bottleneck(net: BaseGeometry, below_mm: float) -> float | None:
 
 
 def _holds(net: BaseGeometry, width_mm: float) -> bool:
-    """True if a net is one piece without half of the width at each edge."""
+    """Return True if a net is one piece without half of the width at each edge."""
     worn = shapely.buffer(net, -0.5 * width_mm)
     return sum(map(_conducts, shapely.get_parts(worn))) <= 1 and not worn.is_empty
 

@@ -286,8 +286,8 @@ class Gouges:
         return self._searched(rest, distance_mm) if rest else Trial(True)
 
     def _are_fine(self, chords: _Chords, distance_mm: float) -> Bools:
-        """True (K,) for chords along which one layer allows all that is cut, or that cut nothing
-        of the stock."""
+        """Return True (K,) for chords along which one layer allows all that is cut, or that cut
+        nothing of the stock."""
         wide = np.abs(chords.half) + self.table[chords.tool, :1]
         low, high = np.array(self.stock.box_mm).reshape(2, 2)
         is_outside = (chords.middle + wide < low) | (chords.middle - wide > high)
@@ -385,7 +385,8 @@ def _width(deep: Floats, radius: Floats, flat: Floats, corner: Floats, rise: Flo
 
 
 def _allows(layer: WantedLayer, chords: _Chords, table: Floats, distance_mm: float) -> Bools:
-    """True (K,) for chords along which a layer allows all that is cut, to within a distance."""
+    """Return True (K,) for chords along which a layer allows all that is cut, to within a
+    distance."""
     nearest, farthest = layer.along(chords.middle, chords.half)
     s, deep = nearest + distance_mm, STOCK_TOP_MM - chords.z
     radius, flat, corner, rise = (column[:, None] for column in table[chords.tool].T)
@@ -575,7 +576,8 @@ def _pieces(
     inner = asks & ~flat & ~crossed & is_in
 
     def depths(away: Floats) -> Floats:
-        """Depth that must be reached, not more than linear, where s is `away` at most."""
+        """Return the depth that must be reached, not more than linear, where s is `away` at
+        most."""
         return np.asarray(layer.base_mm + layer.rise * (away - distance_mm))
 
     square = squares[:, 2, None, None] * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])

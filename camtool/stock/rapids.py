@@ -164,8 +164,8 @@ class _Search:
         self.tools: Floats = moves.table[self.rapids.tool]
 
     def follow_a_feed(self) -> Bools:
-        """True (R,) for rapids along the line of one feed before, or above it, with a tool of the
-        same shape: they are fine."""
+        """Return True (R,) for rapids along the line of one feed before, or above it, with a
+        tool of the same shape: they are fine."""
         feeds, rapids = self.feeds, self.rapids
         fine = np.zeros(len(rapids), dtype=np.bool_)
         if not len(feeds):

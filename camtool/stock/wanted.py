@@ -129,7 +129,7 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
         return np.asarray(self.shift_mm + np.where(is_inwards, distances, -distances))
 
     def _are_inwards(self, points: Floats) -> Bools:
-        """True (N,) for points from which distances are counted inwards."""
+        """Return True (N,) for points from which distances are counted inwards."""
         if self.side == ABOUT:
             return np.zeros(len(points), dtype=np.bool_)
         bulge = np.ascontiguousarray(self.segments.bulge)
@@ -349,21 +349,21 @@ class _Layers:
         shift_mm: float = 0.0,
         reach_mm: float = math.inf,
     ) -> WantedLayer:
-        """A layer with vertical walls."""
+        """Return a layer with vertical walls."""
         return WantedLayer(
             self.name, lines, side, shift_mm, depth_mm, 0.0, depth_mm, reach_mm=reach_mm
         )
 
     def _lines(self, *, closed: bool | None = None) -> Polylines:
-        """The chosen lines; the open or the closed ones alone."""
+        """Return the chosen lines; the open or the closed ones alone."""
         lines = self.chosen.lines
         if closed is None:
             return lines
         return lines.select(np.flatnonzero(lines.closed == closed).tolist())
 
     def _region(self) -> Polylines:
-        """The region that is cleared, on the left of its closed paths: of bores the circles that
-        are wide enough, the outermost of those within each other."""
+        """Return the region that is cleared, on the left of its closed paths: of bores the
+        circles that are wide enough, the outermost of those within each other."""
         nesting = self.chosen.nesting.among(self.closed)
         if self.operation.contract.takes != "circles":
             return oriented(nesting)
@@ -405,7 +405,7 @@ class _Layers:
         return max(self._leads_mm, 0.5 * self.operation.spare_mm)
 
     def _holes(self) -> Iterator[WantedLayer]:
-        """The discs of drilled holes."""
+        """Return the discs of drilled holes."""
         holes = drilled_holes(self.chosen, self.operation)[0]
         points = [
             Polyline(np.array([[x, y, 0.0], [x + POINT_MM, y, 0.0]])) for x, y in
@@ -414,8 +414,8 @@ class _Layers:
         return self._grooves(Polylines.of(points), 0.0, is_full=True)
 
     def _carved(self, tip_mm: float, *, to_walls: bool) -> WantedLayer:
-        """The slopes of a carving, less the flat tip of its bit; `to_walls`: only as far from the
-        edge as the bit is wide, since a floor beyond that is left."""
+        """Return the slopes of a carving, less the flat tip of its bit; `to_walls`: only as far
+        from the edge as the bit is wide, since a floor beyond that is left."""
         cone = Cone.of(self.operation)
         radius = cone.radius_at(self.depth_mm)
         return WantedLayer(
@@ -430,8 +430,8 @@ class _Layers:
         )
 
     def _waste(self) -> Iterator[WantedLayer]:
-        """The waste beside the walls: as far as the tool and its leads reach, and its centre on
-        the joins of corners."""
+        """Yield the waste beside the walls: as far as the tool and its leads reach, and its
+        centre on the joins of corners."""
         operation, tool = self.operation, self.operation.tool
         reach = 2.0 * tool.radius_mm + operation.spare_mm
         if operation.joins != "round":
@@ -470,7 +470,7 @@ class _Layers:
                 yield chosen.lines.select(closed[group].tolist()), side
 
     def _centre_paths(self) -> Polylines:
-        """The paths of the tool's centre beside the walls."""
+        """Return the paths of the tool's centre beside the walls."""
         operation, paths_made = self.operation, list[Polylines]()
         joins, limit = operation.joins, operation.mitre_limit
         for lines, side in self._walls():

@@ -135,20 +135,21 @@ class Target(ABC):
 
     @abstractmethod
     def write(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Program:
-        """The program; PostError, which names the move, for what the machine or its dialect cannot
-        do."""
+        """Return the program; PostError, which names the move, for what the machine or its
+        dialect cannot do."""
 
     @abstractmethod
     def read(self, data: bytes, machine: Machine[Any, Any]) -> Toolpath:
-        """The moves as the controller decodes them; ProgramError, which names block and column."""
+        """Return the moves as the controller decodes them; ProgramError, which names block and
+        column."""
 
     def read_in(self, data: bytes, machine: Machine[Any, Any], folder: Path | None) -> Toolpath:
-        """The same for a program whose file lies in a folder (None: it has none), where the
+        """Return the same for a program whose file lies in a folder (None: it has none), where the
         controller looks for others that it calls."""
         return self.read(data, machine)
 
     def check(self, machine: Machine[Any, Any]) -> None:  # noqa: B027 - most need not
-        """MachineError for values of a machine that contradict each other."""
+        """Raise MachineError for values of a machine that contradict each other."""
 
     def grade_of(self, machine: Machine[Any, Any]) -> Grade:
         """Return what the model of this machine's controller knows, which is not the exact
@@ -156,7 +157,7 @@ class Target(ABC):
         return machine.target.grade or self.grade
 
     def model(self) -> ControllerModel[Any, Any]:
-        """The model of its controllers; needed only where `controllers` names any."""
+        """Return the model of its controllers; needed only where `controllers` names any."""
         raise NotImplementedError(f"{self.name} has no model of its controllers")
 
     def speed_loop(self, machine: Machine[Any, Any]) -> SpeedLoop | None:
@@ -173,8 +174,9 @@ class Target(ABC):
         raise NotImplementedError(f"{self.name} has no speed loop")
 
     def settings_from(self, text: str) -> Sequence[ControllerSetting] | None:
-        """The values of a machine file that the controller's own settings say; None for a text
-        that is none of these settings. MachineError for what is missing or cannot be used."""
+        """Return the values of a machine file that the controller's own settings say; None for
+        a text that is none of these settings. MachineError for what is missing or cannot be
+        used."""
         return None
 
     def dialect_from(self, data: bytes) -> SampledDialect | None:
@@ -219,32 +221,35 @@ class Target(ABC):
         return NoWire()
 
     def listing(self, data: bytes, machine: Machine[Any, Any]) -> Listing | None:
-        """The program, which `read` accepts, divided into blocks; None without such a listing."""
+        """Return the program, which `read` accepts, divided into blocks; None without such a
+        listing."""
         return None
 
     def made_elsewhere(self, data: bytes) -> bool:
-        """True if the text of the program shows that another program than camtool wrote it."""
+        """Return True if the text of the program shows that another program than camtool wrote
+        it."""
         return False
 
     def line_bytes(self, data: bytes, machine: Machine[Any, Any]) -> int:
-        """The number of bytes sent over the line to the machine, where it is not the file's
+        """Return the number of bytes sent over the line to the machine, where it is not the file's
         size."""
         return len(data)
 
     def stray_mm(self, machine: Machine[Any, Any]) -> float:
-        """The largest distance from the wanted path that the writer allows on purpose, mm."""
+        """Return the largest distance from the wanted path that the writer allows on purpose,
+        mm."""
         return 0.0
 
     def unit_mm(self, machine: Machine[Any, Any], axis: Axis) -> float:
-        """The resolution of positions in a program along an axis, mm."""
+        """Return the resolution of positions in a program along an axis, mm."""
         return max(axis.coded_step_mm, axis.resolution_mm or 0.0)
 
     def rest(
         self, data: bytes, machine: Machine[Any, Any], first: int
     ) -> tuple[bytes, int] | None:
-        """The program from one of its blocks (from 0) on, and how many of its blocks bring the
-        machine there; None: the moves are written again behind an entry. PostError where that
-        cannot be."""
+        """Return the program from one of its blocks (from 0) on, and how many of its blocks
+        bring the machine there; None: the moves are written again behind an entry. PostError
+        where that cannot be."""
         return None
 
     def twin_kind(self) -> TwinKind:

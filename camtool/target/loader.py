@@ -38,7 +38,7 @@ def resolved_table(
     user: tuple[Table, str] | None = None,
     settings: Sequence[str] = (),
 ) -> tuple[Table, str]:
-    """A target's table with the values of a `user`'s file, which has that name, and of
+    """Return a target's table with the values of a `user`'s file, which has that name, and of
     `key.key=value` settings, and the name of the last of these sources; MachineError where keys of
     `needs` are missing."""
     table, name = base, base_name
@@ -61,13 +61,13 @@ def resolved_table(
 
 
 def extended_table(target: Target, below: Table, above: Table) -> Table:
-    """The table of a file laid over that of what it extends."""
+    """Return the table of a file laid over that of what it extends."""
     return _overlaid(target, below, {key: above[key] for key in above if key != "extends"})
 
 
 def machine_of(target: Target, table: Table, name: str) -> Machine:
-    """A resolved table as a checked machine of this target; MachineError names the wrong key, and
-    `name` as the source."""
+    """Return a resolved table as a checked machine of this target; MachineError names the wrong
+    key, and `name` as the source."""
     records: Any = reduce(or_, _records(target))
     generic: Any = Machine
     kind: type[Machine] = generic[records, target.dialect, target.link]
@@ -90,12 +90,12 @@ def machine_of(target: Target, table: Table, name: str) -> Machine:
 
 
 def _records(target: Target) -> tuple[type[SlideStart], ...]:
-    """The records of `[controller]`."""
+    """Return the records of `[controller]`."""
     return (*target.controllers, PathController)
 
 
 def extended_by(user_file: Path) -> str:
-    """The target that a user's machine file extends; MachineError without one."""
+    """Return the target that a user's machine file extends; MachineError without one."""
     extends = read_table(user_file).get("extends")
     if not isinstance(extends, str):
         raise MachineError(
@@ -109,12 +109,12 @@ def extended_by(user_file: Path) -> str:
 
 
 def names_of(base: Table, base_name: str) -> TargetNames:
-    """The `[target]` of a target's table, which may lack keys of `needs`."""
+    """Return the `[target]` of a target's table, which may lack keys of `needs`."""
     return convert(base.get("target", {}), TargetNames, base_name, "target")
 
 
 def missing_keys(table: Table, name: str) -> tuple[str, ...]:
-    """The keys of `needs` that are not in the table, such as "axes.x.coded_step_mm"."""
+    """Return the keys of `needs` that are not in the table, such as "axes.x.coded_step_mm"."""
     keys = convert(table.get(NEEDS, []), list[str], name, NEEDS)
     return tuple(key for key in keys if not _has_all(table, key.split(".")))
 
@@ -128,7 +128,7 @@ def _has_all(table: Any, keys: list[str]) -> bool:
 
 
 def _refuse_incomplete(table: Table, name: str) -> None:
-    """MachineError for a table that lacks keys of `needs`."""
+    """Raise MachineError for a table that lacks keys of `needs`."""
     missing = missing_keys(table, name)
     if not missing:
         return
@@ -155,7 +155,7 @@ def _overlaid(target: Target, below: Table, above: Table) -> Table:
 
 
 def _own_options(target: Target, model: object) -> set[str]:
-    """The options of this controller model that not all controllers have."""
+    """Return the options of this controller model that not all controllers have."""
     shared = {field.name for field in msgspec.structs.fields(SlideStart)}
     return {
         field.name

@@ -60,7 +60,7 @@ NOT_SAID = "not said"
 
 
 def choices_of(record: type[msgspec.Struct]) -> Iterator[tuple[str, str]]:
-    """The name of each choice of a twin and its values, that of the default first."""
+    """Yield the name of each choice of a twin and its values, that of the default first."""
     for each in msgspec.structs.fields(record):
         values = [str(value) for value in get_args(each.type) if isinstance(value, str)]
         default = str(each.default)
@@ -102,7 +102,8 @@ class LoadedTarget(FrozenRecord):
         return () if exact else self.target.interpolators
 
     def simulate(self, toolpath: Toolpath, options: Options | None = None) -> Iterator[Chunk]:
-        """The motion that the machine's controller and mechanics make of a toolpath, in chunks.
+        """Return the motion that the machine's controller and mechanics make of a toolpath, in
+        chunks.
 
         Rows after the end of the program are not run. Raises OptionError, MachineError, and
         ProgramError, which names the block (some only when that row is run).
@@ -114,12 +115,12 @@ class LoadedTarget(FrozenRecord):
         return self.model.run(toolpath, self.machine, options)
 
     def timed(self, toolpath: Toolpath, options: Options) -> Iterator[TimedChunk]:
-        """The motion as of `simulate`, with the times of its samples."""
+        """Return the motion as of `simulate`, with the times of its samples."""
         self.check_options(options)
         return self.model.timed(toolpath, self.machine, options)
 
     def check_options(self, options: Options) -> None:
-        """OptionError for options that the machine's controller does not have."""
+        """Raise OptionError for options that the machine's controller does not have."""
         if options.chunk_steps < 1:
             raise OptionError(f"chunk_steps is {options.chunk_steps}", mend="give at least 1")
         names = self.interpolators
@@ -138,9 +139,9 @@ class LoadedTarget(FrozenRecord):
         )
 
     def twin(self, choices: Sequence[str] = ()) -> Twin:
-        """The virtual controller of this machine, with `key=value` of what its sources leave open.
-        MachineError where there is none, OptionError, which lists what can be chosen, for a choice
-        that there is not."""
+        """Return the virtual controller of this machine, with `key=value` of what its sources
+        leave open. MachineError where there is none, OptionError, which lists what can be
+        chosen, for a choice that there is not."""
         has_twin = type(self.target).twin_kind is not Target.twin_kind
         if has_twin and isinstance(self.machine.controller, PathController):
             raise MachineError(
@@ -163,19 +164,22 @@ class LoadedTarget(FrozenRecord):
         return kind.make(self.machine, choices_made)
 
     def with_settings(self, settings: Sequence[str]) -> LoadedTarget:
-        """The target with further `key.key=value` settings; MachineError names a wrong one."""
+        """Return the target with further `key.key=value` settings; MachineError names a wrong
+        one."""
         if not settings:
             return self
         table, name = resolved_table(self.target, self.table, str(self.file), None, settings)
         return replace(self, machine=machine_of(self.target, table, name), table=table)
 
     def values(self) -> dict[str, Any]:
-        """All values of the machine, by the keys of `--set`; of the dialect only those given."""
+        """Return all values of the machine, by the keys of `--set`; of the dialect only those
+        given."""
         values: dict[str, Any] = msgspec.to_builtins(self.machine)
         return values | {"dialect": self.table.get("dialect", {})}
 
     def changed_values(self) -> list[tuple[str, str, str]]:
-        """(key, value, the target's own value) of all values that differ, as `--set` takes them.
+        """Return (key, value, the target's own value) of all values that differ, as `--set` takes
+        them.
 
         Keys of `needs` always differ: the target's own value is `not said`.
         """
@@ -219,24 +223,25 @@ class ListedTarget(FrozenRecord):
 
 
 def own_names() -> list[str]:
-    """The names of all installed targets, sorted; no target is imported."""
+    """Return the names of all installed targets, sorted; no target is imported."""
     return sorted(point.name for point in entry_points(GROUP))
 
 
 def target_names() -> list[str]:
-    """The names of all installed targets and of the machines that come with them, sorted."""
+    """Return the names of all installed targets and of the machines that come with them,
+    sorted."""
     return sorted({*own_names(), *shipped_files()})
 
 
 def shipped_files() -> dict[str, Path]:
-    """The files of the machines that come with the installed targets, by their names."""
+    """Return the files of the machines that come with the installed targets, by their names."""
     modules = tuple(dict.fromkeys(point.module for point in entry_points(GROUP)))
     return dict(_shipped_files(modules))
 
 
 @cache
 def _shipped_files(modules: tuple[str, ...]) -> tuple[tuple[str, Path], ...]:
-    """(name, file) of the machines beside the targets of these modules."""
+    """Return (name, file) of the machines beside the targets of these modules."""
     machines = []
     for module in modules:
         try:
@@ -252,7 +257,7 @@ def _shipped_files(modules: tuple[str, ...]) -> tuple[tuple[str, Path], ...]:
 def load_target(
     name: str, *, machine_file: Path | None = None, settings: Sequence[str] = ()
 ) -> LoadedTarget:
-    """The target `name`, with the values of a user's machine file and of `--set`.
+    """Return the target `name`, with the values of a user's machine file and of `--set`.
 
     Raises UnknownTargetError (with the nearest names) and MachineError.
     """
@@ -263,7 +268,7 @@ def load_target(
 def loaded_target(
     name: str, user: tuple[Table, str] | None, settings: Sequence[str] = ()
 ) -> LoadedTarget:
-    """The same with the table of a user's machine file, and that file's name."""
+    """Return the same with the table of a user's machine file, and that file's name."""
     target, file = find_target(name)
     base = base_table(name, target, file)
     table, last = resolved_table(target, base, str(file), user, settings)
@@ -294,7 +299,7 @@ def _placeholders(user_table: Table, settings: Sequence[str]) -> Iterator[str]:
 
 
 def list_target(name: str) -> ListedTarget:
-    """The target `name` for a list, complete or not; raises as `load_target` does."""
+    """Return the target `name` for a list, complete or not; raises as `load_target` does."""
     target, file = find_target(name)
     table = base_table(name, target, file)
     needs, names = missing_keys(table, str(file)), names_of(table, str(file))
@@ -311,7 +316,7 @@ def grade_of(target: Target, machine: Machine) -> Grade:
 
 
 def _files_below(name: str) -> tuple[Path, ...]:
-    """The files that the file of a machine extends, the lowest first; () for a target."""
+    """Return the files that the file of a machine extends, the lowest first; () for a target."""
     if name in own_names() or name not in shipped_files():
         return ()
     below = extended_by(shipped_files()[name])
@@ -328,8 +333,8 @@ def each_target(
     prefix: str = "",
     broken: list[CamtoolError] | None = None,
 ) -> Iterator[tuple[str, Taken]]:
-    """(name, what `take` returns for it) of the targets whose names start with `prefix`, or of
-    those of `names`.
+    """Yield (name, what `take` returns for it) of the targets whose names start with `prefix`, or
+    of those of `names`.
 
     A plug-in that is broken harms no other: it is left out, and its error is appended to `broken`.
     """
@@ -345,7 +350,8 @@ def each_target(
 
 
 def own_target_of(name: str) -> str:
-    """The installed target that the machine of this name is on: its own name for a target."""
+    """Return the installed target that the machine of this name is on: its own name for a
+    target."""
     names = own_names()
     for _ in range(MAX_CHAIN):
         if name in names or name not in shipped_files():
@@ -357,8 +363,8 @@ def own_target_of(name: str) -> str:
 
 
 def base_table(name: str, target: Target, file: Path) -> Table:
-    """The table of a target, or of a machine that comes with one, laid over what it extends; with
-    keys of `needs`."""
+    """Return the table of a target, or of a machine that comes with one, laid over what it
+    extends; with keys of `needs`."""
     table = read_table(file)
     if name in own_names() or "extends" not in table:
         return table
@@ -369,13 +375,13 @@ def base_table(name: str, target: Target, file: Path) -> Table:
 
 
 def filter_target() -> str | None:
-    """The target that `camtool filter` uses by default."""
+    """Return the target that `camtool filter` uses by default."""
     targets = each_target(find_target)
     return next((name for name, (target, _) in targets if target.filter_default), None)
 
 
 def find_target(name: str) -> tuple[Target, Path]:
-    """The target of this name and its own machine file; raises as `load_target` does. For a
+    """Return the target of this name and its own machine file; raises as `load_target` does. For a
     machine that comes with a target: that target, and the machine's file."""
     if name not in own_names() and name in shipped_files():
         target, _ = _load(_entry_point(own_target_of(name)))
@@ -399,7 +405,8 @@ def _entry_point(name: str) -> EntryPoint:
 
 
 def _load(point: EntryPoint) -> tuple[Target, Path]:
-    """The target and its machine file; MachineError, which names it, for a broken plug-in."""
+    """Return the target and its machine file; MachineError, which names it, for a broken
+    plug-in."""
     try:
         target = point.load()
         if not isinstance(target, Target):

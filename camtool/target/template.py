@@ -66,8 +66,8 @@ def machine_template(
     settings: Sequence[ControllerSetting] = (),
     file: str = "",
 ) -> str:
-    """TOML text of the machine `name`, which extends the target `base`; `file` is how flags call
-    it where they do not find it by its name.
+    """Return TOML text of the machine `name`, which extends the target `base`; `file` is how flags
+    call it where they do not find it by its name.
 
     The values that are `settings` stand in it with what says them, as comments where they are in
     doubt. Every other value of the target's
@@ -143,7 +143,7 @@ def joined_text(texts: Sequence[str]) -> str:
 def _rows(
     table: str, rows: Iterable[str], settings: dict[str, ControllerSetting], needs: set[str]
 ) -> Iterator[str]:
-    """The lines of one table; what is said of it is taken out of `value_of`."""
+    """Yield the lines of one table; what is said of it is taken out of `value_of`."""
     backlash = table not in _AXES or f"{table}.backlash_mm" in settings
     for row in rows:
         key = _KEY.match(row)
@@ -177,7 +177,7 @@ def _own_keys(table: str, keys: Iterable[str]) -> list[str]:
 
 
 def _tables(text: str) -> Iterator[tuple[str, list[str]]]:
-    """The tables that a user's machine file may change, each with its lines."""
+    """Yield the tables that a user's machine file may change, each with its lines."""
     table, rows = "", list[str]()
     for line in (*text.splitlines(), "[target]"):
         heading = _TABLE.match(line)

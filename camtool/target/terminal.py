@@ -64,7 +64,7 @@ class Terminal:
         return self.stop
 
     def is_urgent(self, line: str) -> bool:
-        """True if a line stops the machine, or lets it go on, and waits for no answer."""
+        """Return True if a line stops the machine, or lets it go on, and waits for no answer."""
         return False
 
     def decode(self, data: bytes) -> list[str]:

@@ -75,7 +75,8 @@ class Forecast(Struct, frozen=True, eq=False):
         return x, y, z
 
     def seconds_of(self, block: int) -> float:
-        """The time of a block, s; blocks behind the last one that does anything take none."""
+        """Return the time of a block, s; blocks behind the last one that does anything take
+        none."""
         return float(self.seconds[block]) if block < len(self.seconds) else 0.0
 
 
@@ -171,8 +172,8 @@ class ResumePoint(Struct, frozen=True, eq=False):
         return {"journal": self.place_mm, "zero": (0.0, 0.0, 0.0)}.get(self.tool_at)
 
     def refusal(self, at_mm: Place | None, *, restarted: bool) -> str:
-        """Why the program cannot go on where the controller takes the tool to stand at a place;
-        "" where it can."""
+        """Return why the program cannot go on where the controller takes the tool to stand at a
+        place; "" where it can."""
         if self.tool_at:
             return ""
         if at_mm is not None:
@@ -204,7 +205,7 @@ class ResumePoint(Struct, frozen=True, eq=False):
 
 
 def place_words(place_mm: Place | None) -> str:
-    """A place as `X1.000 Y2.000 Z3.000`."""
+    """Return a place as `X1.000 Y2.000 Z3.000`."""
     return "" if place_mm is None else "X{:.3f} Y{:.3f} Z{:.3f}".format(*place_mm)
 
 
@@ -817,15 +818,15 @@ class Wire(ABC):
     def packets(
         self, data: bytes, machine: Machine[Any, Any], forecast: Forecast
     ) -> Sequence[Packet]:
-        """The packets of a program, which `read` accepts; MachineError and ProgramError for what
-        the line cannot carry."""
+        """Return the packets of a program, which `read` accepts; MachineError and ProgramError
+        for what the line cannot carry."""
 
     @abstractmethod
     def conversation(
         self, packets: Sequence[Packet], machine: Machine[Any, Any], manner: Manner
     ) -> Conversation:
-        """The conversation that sends these packets of a program. MachineError where the machine
-        has no command to home and the manner asks for it."""
+        """Return the conversation that sends these packets of a program. MachineError where the
+        machine has no command to home and the manner asks for it."""
 
     def command(
         self,
@@ -834,9 +835,9 @@ class Wire(ABC):
         values: Mapping[str, float],
         manner: Manner,
     ) -> Conversation:
-        """The conversation to "home", "zero", "jog" or "unlock" the machine; `values` are those of
-        axes ("x", "y", "z", mm) and the "feed" (mm/min). MachineError where the controller has no
-        such command."""
+        """Return the conversation to "home", "zero", "jog" or "unlock" the machine; `values`
+        are those of axes ("x", "y", "z", mm) and the "feed" (mm/min). MachineError where the
+        controller has no such command."""
         raise MachineError(
             f"{machine.target.name} has no command to {action} over its line",
             mend="do it at the machine",

@@ -254,7 +254,7 @@ def _as_rows(columns: Sequence[Ints | Floats | float], count: int) -> Iterator[t
 
 
 def _are_same(one: Any, rows: Any) -> bool:
-    """True if all rows have the bits of this one: NaN equals NaN, and 0 differs from −0."""
+    """Return True if all rows have the bits of this one: NaN equals NaN, and 0 differs from −0."""
     if one.dtype == np.float64:
         one, rows = one.view(np.int64), rows.view(np.int64)
     return bool((rows == one).all())

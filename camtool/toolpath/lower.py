@@ -82,8 +82,8 @@ def xy_then_z(toolpath: Toolpath) -> LoweredToolpath:
 
 
 def slope_step_mm(machine: Machine) -> float:
-    """Largest height, mm, of the steps that replace a slope: the fit tolerance of curves, and at
-    least one programmable step of Z."""
+    """Return the largest height, mm, of the steps that replace a slope: the fit tolerance of
+    curves, and at least one programmable step of Z."""
     return max(machine.defaults.fit_tolerance_mm, machine.axes.z.coded_step_mm)
 
 

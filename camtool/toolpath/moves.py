@@ -282,19 +282,19 @@ class Toolpath:
 
 
 def are_arcs(kind: Codes | Ints) -> Bools:
-    """Mask (K,) of the kinds that are ARC_CW or ARC_CCW."""
+    """Return the mask (K,) of the kinds that are ARC_CW or ARC_CCW."""
     return np.asarray((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
 
 
 def are_below_top(toolpath: Toolpath) -> Bools:
-    """Mask (N,) of rows that begin or end below the stock top."""
+    """Return the mask (N,) of rows that begin or end below the stock top."""
     heights = np.append(toolpath.start[2], toolpath.end[:, 2])
     is_low = heights < STOCK_TOP_MM - LEVEL_MM
     return np.asarray(is_low[:-1] | is_low[1:])
 
 
 def feeds_below_top(toolpath: Toolpath) -> Bools:
-    """Mask (N,) of moves at a feed that begin or end below the stock top."""
+    """Return the mask (N,) of moves at a feed that begin or end below the stock top."""
     return toolpath.is_feed & are_below_top(toolpath)
 
 
@@ -439,8 +439,8 @@ def _arc_extremes(toolpath: Toolpath, arcs: Ints) -> Floats:
 
 
 def mounted_before(toolpath: Toolpath) -> Bools:
-    """Mask (N,) of tool changes before the first move at a feed: on a machine without a tool
-    changer the operator mounts this tool before the program starts."""
+    """Return the mask (N,) of tool changes before the first move at a feed: on a machine
+    without a tool changer the operator mounts this tool before the program starts."""
     fed = np.cumsum(toolpath.is_feed) > 0
     return np.asarray((toolpath.kind == Kind.TOOL_CHANGE) & ~fed)
 

@@ -101,8 +101,8 @@ class CycleRun:
         self._turn(ProbeAnswer(self.place, touched is not None))
 
     def refusal(self, touched: Place) -> str:
-        """Why the probe cannot have touched at a place in this step, as the controller says; ""
-        where it can."""
+        """Return why the probe cannot have touched at a place in this step, as the controller
+        says; "" where it can."""
         assert self.step is not None
         for axis, before, reported in zip(AXES, self.place, touched, strict=True):
             end = self.step.axes.get(axis, before)
@@ -129,7 +129,8 @@ class CycleRun:
             self.step = step
 
     def _is_there(self, step: ProbeStep) -> bool:
-        """True for a step that would not move: controllers refuse to probe where they stand."""
+        """Return True for a step that would not move: controllers refuse to probe where they
+        stand."""
         return all(
             abs(value - self.place["xyz".index(axis)]) < SAME_MM
             for axis, value in step.axes.items()
@@ -431,8 +432,8 @@ class Box(Struct, frozen=True):
 def probed_nodes(
     x: Floats, y: Floats, holes: Sequence[Segments], boxes: Sequence[Box], margin_mm: float
 ) -> Bools:
-    """Mask (NY, NX) of the nodes that are probed: those neither in a closed contour or a box nor
-    within `margin_mm` of one. OptionError if none remains."""
+    """Return the mask (NY, NX) of the nodes that are probed: those neither in a closed contour
+    or a box nor within `margin_mm` of one. OptionError if none remains."""
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     probed = np.ones(len(points), dtype=np.bool_)
     for ring in holes:

@@ -55,7 +55,7 @@ class Surface(Struct, frozen=True, eq=False):
         return float(self.z.min()), float(self.z.max())
 
     def covers(self, points: Floats) -> Bools:
-        """Mask (K,) of the points (K, 2) on the grid."""
+        """Return the mask (K,) of the points (K, 2) on the grid."""
         low = np.array([self.x[0], self.y[0]]) - OUTSIDE_MM
         high = np.array([self.x[-1], self.y[-1]]) + OUTSIDE_MM
         return np.asarray(((points >= low) & (points <= high)).all(axis=1))
@@ -267,8 +267,9 @@ def _crossings(
 
 
 def _are_divided(toolpath: Toolpath, surface: Surface, tolerance_mm: float) -> Bools:
-    """Mask (N,) of the cuts that may have to be divided: those that leave the cell of the grid in
-    which they begin, and those along which the surface bends by more than the tolerance."""
+    """Return the mask (N,) of the cuts that may have to be divided: those that leave the cell
+    of the grid in which they begin, and those along which the surface bends by more than the
+    tolerance."""
     starts, sweeps = toolpath.starts[:, :2], toolpath.sweeps()
     ends = toolpath.end[:, :2]
     is_arc = toolpath.is_arc

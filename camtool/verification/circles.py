@@ -163,7 +163,8 @@ def circular_error(filled: Floats) -> float:
 
 
 def _surrounds(points: Floats) -> bool:
-    """True if points (J, 2) surround the origin: every angle between neighbours is below π."""
+    """Return True if points (J, 2) surround the origin: every angle between neighbours is below
+    π."""
     angle = np.sort(np.arctan2(points[:, 1], points[:, 0]))
     return bool(np.diff(angle, append=angle[0] + 2.0 * np.pi).max() < np.pi)
 

@@ -110,7 +110,7 @@ def conformance_of(
 
 
 def _equal_toolpaths(one: Toolpath, other: Toolpath) -> bool:
-    """True if two toolpaths are equal, row for row."""
+    """Return True if two toolpaths are equal, row for row."""
     names = ("kind", "end", "centre", "feed", "value", "start", "mode")
     return one.modes == other.modes and all(
         np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in names

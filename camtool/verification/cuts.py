@@ -131,7 +131,7 @@ def rapid_length_mm(toolpath: Toolpath) -> float:
 
 
 def is_flat(toolpath: Toolpath) -> bool:
-    """True when the toolpath never moves in Z."""
+    """Return True when the toolpath never moves in Z."""
     return bool(np.all(toolpath.end[:, 2] == toolpath.start[2]))
 
 

@@ -449,7 +449,7 @@ def _best_other_frame(path: _Path, lines: _Lines) -> tuple[str, _Place] | None:
 
 
 def _is_about_size(path: _Path, lines: _Lines, size: float) -> bool:
-    """True if the cuts are about `size` times as large as the drawing."""
+    """Return True if the cuts are about `size` times as large as the drawing."""
     if not len(path.boxes) or not len(lines.boxes):
         return False
     ratio = NEAR_SCALE_RATIO if 0.5 < size < 2.0 else FAR_SCALE_RATIO

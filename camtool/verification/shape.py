@@ -159,7 +159,7 @@ def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
 
 
 def _cross_too_often(segments: Segments) -> bool:
-    """True if the chords of segments cross each other more than `MAX_CROSSINGS` times."""
+    """Return True if the chords of segments cross each other more than `MAX_CROSSINGS` times."""
     boxes = segment_boxes(segments)
     looked_at = crossings = 0
     for rows in BoxIndex(boxes).pairs(boxes):

@@ -86,7 +86,7 @@ def columns_for(options: PictureOptions) -> int:
 
 
 def lanes_svg(plot: TimePlot, options: PictureOptions) -> str:
-    """SVG text of a plot; equal input gives equal bytes."""
+    """Return SVG text of a plot; equal input gives equal bytes."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     head, head_end = title_and_notes(plot.title, plot.notes, width)
     sides = MARGIN + NUMBERS, width - MARGIN
@@ -115,7 +115,7 @@ def time_unit(span_s: float, most_s: float) -> tuple[float, str]:
 def _lane(
     lane: Lane, plot: TimePlot, sides: tuple[float, float], top: float, unit_s: float
 ) -> Iterator[str]:
-    """The ground, the curves and the axis of a lane."""
+    """Yield the ground, the curves and the axis of a lane."""
     (x_low, x_high), bottom = sides, top + lane.height
     low, high = _range(lane)
     scale = lane.height / (high - low)
@@ -164,7 +164,7 @@ def _range(lane: Lane) -> tuple[float, float]:
 
 
 def _curve(curve: Trend, sides: tuple[float, float], heights: tuple[float, float, float]) -> str:
-    """The band of a curve, column by column, as one line."""
+    """Return the band of a curve, column by column, as one line."""
     (x_low, x_high), (foot, bottom, scale) = sides, heights
     step, path = (x_high - x_low) / len(curve.low), PathData()
     drawn = np.flatnonzero(np.isfinite(curve.low))
@@ -198,7 +198,7 @@ def _curve(curve: Trend, sides: tuple[float, float], heights: tuple[float, float
 
 
 def _strip(strip: Strip, sides: tuple[float, float], top: float) -> Iterator[str]:
-    """A strip of the ribbon, with its name at the left."""
+    """Yield a strip of the ribbon, with its name at the left."""
     x_low, x_high = sides
     step, path = (x_high - x_low) / len(strip.on), PathData()
     edges = np.flatnonzero(np.diff(np.concatenate([[False], strip.on, [False]]).astype(np.int8)))
@@ -224,7 +224,7 @@ def _time_ticks(
 
 
 def _times(plot: TimePlot, sides: tuple[float, float], top: float, unit: tuple[float, str]) -> str:
-    """The numbers of the time axis, from the start of the program."""
+    """Return the numbers of the time axis, from the start of the program."""
     x_high = sides[1]
     parts = [
         text.label(words, (x, top + 22.0), TextStyle(TICK_CAP, QUIET, "middle"))
@@ -235,7 +235,8 @@ def _times(plot: TimePlot, sides: tuple[float, float], top: float, unit: tuple[f
 
 
 def _legend(plot: TimePlot, top: float, width: float) -> tuple[str, float]:
-    """The names of the curves of lanes with several, below the axis, and the end of the page."""
+    """Return the names of the curves of lanes with several, below the axis, and the end of the
+    page."""
     shared = [lane for lane in plot.lanes if len(lane.curves) > 1]
     curves = {curve.name: curve for lane in shared for curve in lane.curves}
     if not curves:

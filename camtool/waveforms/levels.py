@@ -159,7 +159,7 @@ class _LevelRun:
         return LineLevels(moments, ports.astype(np.uint8), places, row)
 
     def _of_motor(self, number: int, ticks: Ints, moves: Ints) -> list[_Changes]:
-        """The changes of the lines of a motor that moves so at these ticks."""
+        """Return the changes of the lines of a motor that moves so at these ticks."""
         motor = self._board.motors[number]
         moving = np.flatnonzero(moves)
         if not len(moving):
@@ -176,8 +176,8 @@ class _LevelRun:
         return self._of_driver(motor, at, travel)
 
     def _of_driver(self, motor: StepDirection, at: Ints, travel: Ints) -> list[_Changes]:
-        """The changes of a step line and a direction line. A pulse that lasts until the next one
-        has no fall."""
+        """Return the changes of a step line and a direction line. A pulse that lasts until the
+        next one has no fall."""
         (step_port, step_bit), (way_port, way_bit) = motor.step, motor.direction
         falls = at + max(int(np.rint(motor.width_s / self._board.tick_s)), 1)
         edges = np.concatenate([falls, at])

@@ -106,7 +106,7 @@ QUANTITIES: Final = {"speed": 4, "position": 3, "error": 1}
 
 
 def _speed_lanes(verification: Verification, columns: TimeColumns) -> tuple[tuple[Lane, ...], str]:
-    """The speed along the path, with the programmed one, and those of the axes."""
+    """Return the speed along the path, with the programmed one, and those of the axes."""
     case = verification.case
     model, machine = case.target.model, case.machine
     samples, period_s = model.samples_per_speed, model.speed_period_s(machine)
@@ -140,7 +140,7 @@ def _speed_lanes(verification: Verification, columns: TimeColumns) -> tuple[tupl
 def _position_lanes(
     verification: Verification, columns: TimeColumns
 ) -> tuple[tuple[Lane, ...], str]:
-    """The predicted positions of the slides."""
+    """Return the predicted positions of the slides."""
     case, holder = verification.case, Held(columns)
     start = case.decoded.start
     holder.add(np.zeros(1), start[None, :], np.zeros(1, dtype=np.int64))
@@ -163,7 +163,7 @@ def _position_lanes(
 
 
 def _error_lanes(verification: Verification, columns: TimeColumns) -> tuple[tuple[Lane, ...], str]:
-    """The distance of the slides from the wanted path where they cut."""
+    """Return the distance of the slides from the wanted path where they cut."""
     holder = Held(columns)
     for timed, errors_mm in errors_over_time(verification.case):
         holder.add(timed.at_s, errors_mm[:, None], timed.chunk.row)
@@ -215,7 +215,7 @@ def ribbon_of(decoded: Toolpath, seconds: Floats, columns: TimeColumns) -> tuple
 
 
 def _programmed(decoded: Toolpath, seconds: Floats, columns: TimeColumns) -> Trend:
-    """The programmed feed of feed moves."""
+    """Return the programmed feed of feed moves."""
     row = _row_columns(seconds, decoded.is_feed, columns, decoded.feed)
     return Trend("programmed", PLUNGE, row.low[0], row.high[0], is_wanted=True)
 

@@ -65,8 +65,8 @@ def scope_svg(
     motors: Sequence[str] | None = None,
     options: PictureOptions = AS_USUAL,
 ) -> str:
-    """SVG text of a stretch; equal input gives equal bytes. `motors` to show; None: those that
-    move. OptionError for motors that there are not, and for too many changes."""
+    """Return SVG text of a stretch; equal input gives equal bytes. `motors` to show; None:
+    those that move. OptionError for motors that there are not, and for too many changes."""
     if len(stretch.levels.tick) > MAX_MOMENTS:
         raise OptionError(
             f"{len(stretch.levels.tick):,} changes are more than a picture shows, {MAX_MOMENTS:,}",
@@ -143,7 +143,7 @@ def _lanes(stretch: Stretch, motors: Sequence[str] | None, top: float) -> list[_
 
 
 def _lane(lane: _Lane, stretch: Stretch, sides: tuple[float, float], scale: float) -> list[str]:
-    """The trace of a line between its name and the times of its pulses."""
+    """Return the trace of a line between its name and the times of its pulses."""
     x_low, x_high = sides
     path, foot = PathData(), lane.top + LANE
 
@@ -188,7 +188,8 @@ def _pulse_times(lane: _Lane, tick_s: float) -> str:
 def _axis(
     stretch: Stretch, sides: tuple[float, float], ends: tuple[float, float], scale: float
 ) -> tuple[str, str]:
-    """The lines of the grid, and the numbers of the time axis, from the start of the stretch."""
+    """Return the lines of the grid, and the numbers of the time axis, from the start of the
+    stretch."""
     (x_low, x_high), (top, bottom) = sides, ends
     span_s = (stretch.to_tick - stretch.from_tick) * stretch.board.tick_s
     unit_s, unit = _unit(span_s)

@@ -123,7 +123,7 @@ class ServoRun:
             yield from self._figures(_joined(parts), from_s, to_s)
 
     def _figures(self, ticks: ServoTicks, from_s: float, to_s: float) -> Iterator[AxisMove]:
-        """The figures of the axes that move in one order."""
+        """Yield the figures of the axes that move in one order."""
         at_s = float(ticks.at_s[0]) - self.loop.tick_s
         if ticks.line[0] < 0 or not from_s <= at_s <= to_s:
             return
@@ -162,8 +162,8 @@ class ServoRun:
         return rendered(lambda sized: self.svg(sized, axes), name, options)
 
     def svg(self, options: PictureOptions, axes: Sequence[str] | None = None) -> str:
-        """SVG text of the stretch: ω and θ of `axes` (None: those that move) and the error along
-        the path. OptionError for an axis that there is not."""
+        """Return SVG text of the stretch: ω and θ of `axes` (None: those that move) and the
+        error along the path. OptionError for an axis that there is not."""
         from_s, to_s = self.shown_s
         columns = TimeColumns(from_s, to_s, columns_for(options), QUANTITIES * len(AXES))
         along = TimeColumns(from_s, to_s, columns.count, 1)
@@ -242,7 +242,7 @@ def steps_picture(
 def steps_svg(
     title: str, answers: Sequence[StepAnswer], tick_s: float, options: PictureOptions
 ) -> str:
-    """SVG text of the answers of axes to a step: speed, position and drive."""
+    """Return SVG text of the answers of axes to a step: speed, position and drive."""
     seconds = tick_s * len(answers[0].speed)
     lanes = []
     for answer in answers:
@@ -267,7 +267,7 @@ def steps_svg(
 
 
 def _moves(columns: TimeColumns, axis: int) -> bool:
-    """True if an axis moves or is asked to."""
+    """Return True if an axis moves or is asked to."""
     quantities = [axis, 3 + axis]
     return bool(
         (columns.high[quantities] > 0.0).any()
@@ -286,7 +286,7 @@ def _chosen(names: Sequence[str] | None, moving: list[int]) -> list[int]:
 
 
 def _axis_lanes(columns: TimeColumns, axis: int) -> Iterator[Lane]:
-    """The lanes of ω and θ of an axis."""
+    """Yield the lanes of ω and θ of an axis."""
     colour, name = LAYER_COLOURS[axis], AXES[axis]
     for first, words in (
         (0, f"speed of {name} (rpm of the motor)"),

@@ -41,7 +41,7 @@ class Flashcut(Target):
         check(machine)
 
     def unit_mm(self, machine: FlashcutMachine, axis: Axis) -> float:
-        """The last decimal of a coordinate."""
+        """Return the last decimal of a coordinate."""
         return float(10.0**-machine.dialect.decimals)
 
     def wire(self) -> NoWire:

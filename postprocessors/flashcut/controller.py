@@ -60,23 +60,23 @@ class FlashcutModel(ControllerModel[FlashcutController, FlashcutDialect]):
     """The PC of the parallel-port machine: a timer for each axis."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """The motion, chunk by chunk."""
+        """Return the motion, chunk by chunk."""
         return FlashcutRun(toolpath, machine, options).run()
 
     def timed(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> Iterator[TimedChunk]:
-        """The motion with the milliseconds of its timers."""
+        """Return the motion with the milliseconds of its timers."""
         run = FlashcutRun(toolpath, machine, options)
         return run.timed(MoveClock(run, machine))
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """The moves as the program says them, homing at machine zero: the controller keeps lengths
-        and rounds displacements, so that steps are part of its interpolation."""
+        """Return the moves as the program says them, homing at machine zero: the controller
+        keeps lengths and rounds displacements, so that steps are part of its interpolation."""
         return place_events(toolpath, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Both axes by timers of their own."""
+        """Return both axes by timers of their own."""
         return "timers"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -137,11 +137,11 @@ class FlashcutRun:
         self._samples, self._reached_s = options.chunk_steps, 0.0
 
     def run(self) -> Iterator[Chunk]:
-        """The chunks of all rows up to the end of the program."""
+        """Return the chunks of all rows up to the end of the program."""
         return map(self._chunk, self.batches())
 
     def timed(self, clock: MoveClock) -> Iterator[TimedChunk]:
-        """The chunks with the times of their samples, each of which ends its period."""
+        """Yield the chunks with the times of their samples, each of which ends its period."""
         for batch in self.batches():
             times = clock.take(batch)
             move_s = times.begin_ms[times.number] / MS_PER_S
@@ -161,7 +161,7 @@ class FlashcutRun:
             low = high
 
     def _window(self, low: int, high: int) -> Iterator[TimerBatch]:
-        """The samples of the rows low:high."""
+        """Yield the samples of the rows low:high."""
         moves = self._table.moves(low, high)
         move = done_rows = 0  # rows from `low` on whose ledger is complete
         while done_rows < high - low:
@@ -182,7 +182,7 @@ class FlashcutRun:
             done_rows = under_way
 
     def _chunk(self, batch: TimerBatch) -> Chunk:
-        """The samples of a batch, and what its rows did in them."""
+        """Return the samples of a batch, and what its rows did in them."""
         low, rows, issued, filled = batch.low, batch.rows, batch.issued, batch.filled
         row, commanded = issued.row[:filled] + low, issued.commanded[:filled]
         reversals = np.zeros((len(rows), 3), dtype=np.int64)
@@ -207,7 +207,7 @@ class FlashcutRun:
         return Chunk(row, commanded, slide, ledger)
 
     def _seconds(self, reversals: Ints, rows: Ints) -> Floats:
-        """(R,) s of the compensation steps that the reversals (R, 3) of these rows cost."""
+        """Return (R,) s of the compensation steps that the reversals (R, 3) of these rows cost."""
         steps = reversals * self._mechanics.compensation_steps
         half_xy, half_z = self._table.half_period_xy[rows], self._table.half_period_z[rows]
         if self._compensation_ms is not None:
@@ -373,8 +373,8 @@ def half_periods(
     step_mm: float,
     moves_one_axis: Callable[[Toolpath], Bools],
 ) -> Indices:
-    """(N,) ms of the longer axis of each row, for steps of `step_mm`; rapids have the shortest.
-    `moves_one_axis` gives the rows of one axis.
+    """Return (N,) ms of the longer axis of each row, for steps of `step_mm`; rapids have the
+    shortest. `moves_one_axis` gives the rows of one axis.
 
     ProgramError for feeds whose half period the controller cannot count.
     """
@@ -394,21 +394,21 @@ def half_periods(
 
 
 def _moves_one_axis(toolpath: Toolpath, x_mm: float, y_mm: float) -> Bools:
-    """Mask (N,) of the rows that move X or Y alone, by their steps of `x_mm` and `y_mm`; no
-    arcs."""
+    """Return the mask (N,) of the rows that move X or Y alone, by their steps of `x_mm` and
+    `y_mm`; no arcs."""
     travel = np.abs(toolpath.end - toolpath.starts)
     has_one_axis = np.minimum(to_steps(travel[:, 0], x_mm), to_steps(travel[:, 1], y_mm)) == 0
     return np.asarray(~toolpath.is_arc & (has_one_axis | (toolpath.kind >= Kind.HOME_XY)))
 
 
 def _rises(toolpath: Toolpath) -> Bools:
-    """(N,) true for rows that move Z."""
+    """Return (N,) true for rows that move Z."""
     lifted = toolpath.end[:, 2] != toolpath.starts[:, 2]
     return np.asarray((toolpath.kind == Kind.HOME_Z) | (toolpath.is_motion & lifted))
 
 
 def _chords(toolpath: Toolpath, per_turn: int) -> Indices:
-    """(N,) moves of X and Y that each row makes."""
+    """Return (N,) moves of X and Y that each row makes."""
     flat = (toolpath.end[:, :2] != toolpath.starts[:, :2]).any(axis=1)
     along = toolpath.is_motion & (flat | ~_rises(toolpath))
     chords = np.ceil(np.abs(toolpath.sweeps()) * (per_turn / (2.0 * np.pi)) - CHORD_GUARD)
@@ -429,7 +429,7 @@ class MoveTable(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, toolpath: Toolpath, machine: _Machine) -> MoveTable:
-        """The table of a toolpath that `place_events` gave."""
+        """Return the table of a toolpath that `place_events` gave."""
         per_turn = machine.controller.chords_per_turn
         x, y, z = (axis.coded_step_mm for axis in machine.axes)
         return cls(
@@ -441,11 +441,11 @@ class MoveTable(Struct, frozen=True, eq=False):
         )
 
     def moves_of(self, low: int, high: int) -> Ints:
-        """(R,) moves of each of the rows low:high."""
+        """Return (R,) moves of each of the rows low:high."""
         return self.chords[low:high].astype(np.int64) + self.rises[low:high]
 
     def moves(self, low: int, high: int) -> Moves:
-        """The moves of the rows low:high; `Moves.row` counts from `low`."""
+        """Return the moves of the rows low:high; `Moves.row` counts from `low`."""
         count = self.moves_of(low, high)
         row = low + np.repeat(np.arange(high - low), count)
         part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
@@ -461,8 +461,8 @@ class MoveTable(Struct, frozen=True, eq=False):
         return Moves(drives, target, half_period.astype(np.int64), row - low)
 
     def _on_arc(self, row: Ints, share: Floats) -> Floats:
-        """(J, 2) mm at these shares of the arcs' sweeps, as far from the centre as the start
-        is: r = hypot(I, J) from the angle of the start on (L1378)."""
+        """Return (J, 2) mm at these shares of the arcs' sweeps, as far from the centre as the
+        start is: r = hypot(I, J) from the angle of the start on (L1378)."""
         centre = self.toolpath.centre[row]
         spoke = self.toolpath.starts_of(row)[:, :2] - centre
         radius = np.hypot(spoke[:, 0], spoke[:, 1])

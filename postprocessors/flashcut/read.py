@@ -74,7 +74,8 @@ NOT_INCHES: Final = frozenset({"G20", "G21", "G30", "G31"})
 
 
 def read_program(data: bytes, machine: FlashcutMachine) -> Toolpath:
-    """The moves of a program; ProgramError naming block, line and column when it is none."""
+    """Return the moves of a program; ProgramError naming block, line and column when it is
+    none."""
     reader = _Reader(machine)
     for block in blocks_of(data, LEXING, reader.take):
         reader.block(block)
@@ -410,7 +411,7 @@ class _Rows:
         ), moves_one_axis
 
     def steps_too_many(self, controller: FlashcutController) -> Ints:
-        """(K,) that lines and rapids make on their shorter axis of X and Y."""
+        """Return (K,) that lines and rapids make on their shorter axis of X and Y."""
         steps = self.steps[:, :2]
         feed = np.where(self.kind == Kind.LINE, self.feed, np.inf)
         moves_one_axis = (steps == 0).any(axis=1)

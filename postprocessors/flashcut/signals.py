@@ -125,7 +125,7 @@ class _CoilRun:
         return self._released([self._states_of(each) for each in steps], safe_ms)
 
     def _compensation(self, times: MoveTimes, k: int) -> list[_Steps]:
-        """The steps of the compensation before a move, with those of the spindle."""
+        """Return the steps of the compensation before a move, with those of the spindle."""
         counts, ways = times.added[k], times.ways[k]
         row, each_ms = int(times.first_row[k]), int(times.added_step_ms[k])
         total = int(counts.sum())
@@ -188,7 +188,7 @@ class _CoilRun:
         steps.append(_Steps(SPINDLE, from_ms, to_ms, sense, row[fires], added))
 
     def _states_of(self, steps: _Steps) -> Pulses:
-        """The states of these steps."""
+        """Return the states of these steps."""
         turning = np.flatnonzero(steps.sense)
         number = np.tile(np.arange(1, self._states + 1), len(turning))
         index = np.repeat(turning, self._states)
@@ -207,7 +207,7 @@ class _CoilRun:
 
 
 def _spindle_senses(toolpath: Toolpath, *, spins_always: bool) -> Ints:
-    """(N,) the direction of the spindle in each row, 0 where it stands."""
+    """Return (N,) the direction of the spindle in each row, 0 where it stands."""
     kind = toolpath.kind
     senses = np.zeros(len(kind) + 1, dtype=np.int64)
     senses[0] = int(spins_always)

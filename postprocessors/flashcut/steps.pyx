@@ -102,7 +102,7 @@ cdef class Timers:
 
 
 cdef Int _displacement(Int axis, double target, bint sensed, Timers timers) noexcept:
-    """Steps of an axis to its target, which then is where the program is."""
+    """Return steps of an axis to its target, which then is where the program is."""
     cdef Int steps
     cdef double position
     position = timers.programmed[axis]

@@ -48,7 +48,8 @@ EVENT: Final = {
 
 
 def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be written or done."""
+    """Return the program of a toolpath; PostError names the move that cannot be written or
+    done."""
     dialect = machine.dialect
     check_plain(toolpath, machine)
     feeds, rounded_feeds = feed_units(toolpath, machine)
@@ -124,7 +125,7 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> LoweredToolpa
 
 
 def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> LoweredToolpath:
-    """Each row in `count` (N,) pieces; `steps` (N, 2) of the whole row."""
+    """Return each row in `count` (N,) pieces; `steps` (N, 2) of the whole row."""
     row = np.repeat(np.arange(len(count)), count)
     part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
     inner = np.flatnonzero(part + 1 < count[row])
@@ -149,7 +150,7 @@ def _check_reach(
 
 
 def _event_words(toolpath: Toolpath) -> dict[int, str]:
-    """The block of each event that has one, by row."""
+    """Return the block of each event that has one, by row."""
     words = {}
     for row in np.flatnonzero(~toolpath.is_motion).tolist():
         kind = Kind(int(toolpath.kind[row]))
@@ -202,7 +203,7 @@ class _Blocks:
         self._feed = self._ahead | ((changes & ~has_feed_block)[self.row] & last)
 
     def words(self, dialect: FlashcutDialect, decimals: int) -> list[WordColumn]:
-        """The words of the blocks; `decimals` of a feed."""
+        """Return the words of the blocks; `decimals` of a feed."""
         table, row = self._table, self.row
         decimals_kept = None if dialect.trailing_zeros else 1
         before, end = table.starts[row], table.end[row]

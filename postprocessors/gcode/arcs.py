@@ -77,7 +77,7 @@ class RowArcs(Struct, frozen=True, eq=False):
 
 
 def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> RowArcs:
-    """The toolpath's rows in units, arcs as this controller takes them."""
+    """Return the toolpath's rows in units, arcs as this controller takes them."""
     unit = 10.0**-dialect.decimals
     end = units_of(toolpath.end, dialect.decimals)
     kind = np.array(toolpath.kind)
@@ -136,15 +136,16 @@ def arcs_accepted(
 
 
 def sagitta_of(radius: Floats, sweep_rad: Floats) -> Floats:
-    """(K,) how far arcs rise above their chords; the radius where they turn by π or more."""
+    """Return (K,) how far arcs rise above their chords; the radius where they turn by π or
+    more."""
     half = np.minimum(np.abs(sweep_rad), math.pi) / 2.0
     # 1 − cos a = 2 sin²(a/2), which keeps its digits where a is small.
     return np.asarray(radius * 2.0 * np.sin(half / 2.0) ** 2)
 
 
 def turns_of(start_arm: Floats, end_arm: Floats, clockwise: Bools) -> Floats:
-    """(K,) in (0, 2π]: how far arcs turn from the arms `start_arm` to the arms `end_arm`, both (K,
-    2)."""
+    """Return (K,) in (0, 2π]: how far arcs turn from the arms `start_arm` to the arms
+    `end_arm`, both (K, 2)."""
     cross = start_arm[:, 0] * end_arm[:, 1] - start_arm[:, 1] * end_arm[:, 0]
     sign = np.where(clockwise, -1.0, 1.0)
     angle = np.mod(sign * np.arctan2(cross, (start_arm * end_arm).sum(axis=1)), 2.0 * math.pi)
@@ -194,7 +195,7 @@ class _Wanted(Struct, frozen=True, eq=False):
     sweep: float
 
     def at(self, parts: Floats) -> Floats:
-        """(k, 2) points at these parts (0 to 1) of the sweep."""
+        """Return (k, 2) points at these parts (0 to 1) of the sweep."""
         start_arm = self.start - self.centre
         r1, r2 = math.hypot(*start_arm), math.dist(self.end, self.centre)
         radius = r1 + (r2 - r1) * parts
@@ -207,7 +208,8 @@ class _Wanted(Struct, frozen=True, eq=False):
 def _recentre(
     arc: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> ReplacementRow | None:
-    """The arc about the nearest centre that the controller takes; None when there is none close.
+    """Return the arc about the nearest centre that the controller takes; None when there is none
+    close.
 
     The centre from which both rounded ends are equally far and which is nearest to c is
     c + ((m − c)·t) t, with m the middle of the chord and t its direction. It is hardly ever a
@@ -259,7 +261,7 @@ def _halves(
 def _keep_centre(
     arc: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> ReplacementRow | None:
-    """The arc with its own centre, if the controller takes it."""
+    """Return the arc with its own centre, if the controller takes it."""
     begin, stop = ends
     centre = units_of(arc.centre, dialect.decimals)
     points = (begin[None, :], stop[None, :], centre[None, :])
@@ -270,7 +272,7 @@ def _keep_centre(
 
 
 def _chords(arc: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> list[ReplacementRow]:
-    """The fewest equal chords within a unit of the arc: a chord over the angle a strays by
+    """Return the fewest equal chords within a unit of the arc: a chord over the angle a strays by
     R (1 − cos(a/2)) = 2 R sin²(a/4)."""
     radius = math.dist(arc.start, arc.centre)
     unit = 10.0**-dialect.decimals

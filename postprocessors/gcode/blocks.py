@@ -88,7 +88,7 @@ class ProgramLines:
         del self.data, self.octets, self.begins
 
     def text(self, number: int) -> str:
-        """A line, each byte a character."""
+        """Return a line, each byte a character."""
         begin = int(self.begins[number])
         last = number + 1 == len(self.begins)
         end = len(self.data) if last else int(self.begins[number + 1]) - 1
@@ -108,7 +108,7 @@ class PlainBlocks(Struct, frozen=True, eq=False):
         return len(self.facts)
 
     def has(self, column: int) -> Bools:
-        """(N,) whether a block has the word of this column."""
+        """Return (N,) whether a block has the word of this column."""
         return np.asarray((self.facts[:, words.MASK] >> column) & 1 == 1)
 
 
@@ -119,7 +119,7 @@ def fill_forward(has_value: Bools, values: Floats, before: float) -> Floats:
 
 
 def form_of(letters: str) -> int:
-    """The number that stands for these letters in this order (`words.FORM`)."""
+    """Return the number that stands for these letters in this order (`words.FORM`)."""
     number = 0
     for letter in letters:
         number = number * 8 + LETTERS.index(letter) + 1
@@ -193,17 +193,17 @@ class WordBlock:
         self.words = words
 
     def column(self, word: int) -> int:
-        """Column, from 1, of a word's letter."""
+        """Return the column, from 1, of a word's letter."""
         return [match.start() + 1 for match in re.finditer("[A-Z]", self.text)][word]
 
     def fail(self, message: str, *, word: int | None = None, mend: str = "") -> NoReturn:
-        """ProgramError at this block and the column of `word` (its first one when None)."""
+        """Raise ProgramError at this block and the column of `word` (its first one when None)."""
         raise _error(message, self.index, self.line, self.column(word or 0), mend)
 
 
 def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator[WordBlock]:
-    """The blocks of a program one by one, but for those that `take` has taken; ProgramError at the
-    first that is none, and for more lines than a program may have.
+    """Yield the blocks of a program one by one, but for those that `take` has taken; ProgramError
+    at the first that is none, and for more lines than a program may have.
 
     Where thousands of lines in a row are plain, Python objects for each of them would be most of
     the time; all others, and whatever `take` does not want, are given here. So `take` need not
@@ -238,7 +238,7 @@ def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator
 
 
 def check_ascii(data: bytes) -> None:
-    """ProgramError at the first byte that is no printable ASCII, tab or line end."""
+    """Raise ProgramError at the first byte that is no printable ASCII, tab or line end."""
     odd = _ODD.search(data)
     if odd:
         before = _LINE_END.split(data[: odd.start()])
@@ -250,8 +250,8 @@ def check_ascii(data: bytes) -> None:
 
 
 def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
-    """(a row of words, one word) as compiled patterns, for lines from which blanks are taken out
-    where they may stand anywhere."""
+    """Return (a row of words, one word) as compiled patterns, for lines from which blanks are
+    taken out where they may stand anywhere."""
     letters = re.escape(lexing.letters)
     blank = r"[ \t]*+" if lexing.blanks == "between" else ""
     row = rf"{blank}(?>(?:[{letters}]{_NUMBER}{blank})*)"
@@ -264,7 +264,7 @@ def _error(message: str, index: int, line: int, column: int, mend: str) -> Progr
 
 
 def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
-    """Why a line is no row of words: the first place where it stops being one."""
+    """Return why a line is no row of words: the first place where it stops being one."""
     columns = [
         position
         for position, sign in enumerate(raw)
@@ -278,7 +278,7 @@ def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
 
 
 def _explain(remainder: str, lexing: Lexing) -> tuple[str, str, int]:
-    """(message, mend, characters to pass over) for text that begins with no word."""
+    """Return (message, mend, characters to pass over) for text that begins with no word."""
     sign, shown = remainder[0], repr(remainder[:SHOWN_CHARS])
     if sign in lexing.letters:
         sign_match = re.match(r"[+-]?", remainder[1:])
@@ -301,14 +301,14 @@ def _explain(remainder: str, lexing: Lexing) -> tuple[str, str, int]:
 
 
 def listing(data: bytes, _machine: object) -> Listing:
-    """The blocks of a program that its reader takes, each as its line stands in the file: the
-    lines with a word besides their number, whichever machine it is for."""
+    """Return the blocks of a program that its reader takes, each as its line stands in the
+    file: the lines with a word besides their number, whichever machine it is for."""
     lines = (line.decode("latin-1") for line in _LINE_END.split(data))
     numbered = [(line.strip(), number) for number, line in enumerate(lines, 1) if has_words(line)]
     return Listing(tuple(line for line, _ in numbered), lines=tuple(n for _, n in numbered))
 
 
 def has_words(line: str) -> bool:
-    """True if a line is a block: it has words besides comments and a block number."""
+    """Return True if a line is a block: it has words besides comments and a block number."""
     words = _NO_WORDS.sub("", line)
     return bool(_BLOCK_NUMBER.sub("", words, count=1) if words[:1] in "Nn" else words)

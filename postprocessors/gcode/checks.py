@@ -37,8 +37,8 @@ def check(toolpath: Toolpath, machine: Machine) -> None:
 def feed_units(
     toolpath: Toolpath, machine: Machine, unit: Unit = MM
 ) -> tuple[Ints, list[Finding]]:
-    """(N,) feeds as whole units of the F word, rounded down, 0 where none; and FEED_ROUNDED when
-    one had to be."""
+    """Return (N,) feeds as whole units of the F word, rounded down, 0 where none; and
+    FEED_ROUNDED when one had to be."""
     scale = 10.0 ** (feed_decimals(machine) + unit.more_decimals) / unit.mm
     exact_units = np.where(toolpath.is_feed, toolpath.feed, 0.0) * scale
     rounded = np.rint(exact_units)

@@ -59,7 +59,7 @@ def header(
 
 
 def lacks_heading(data: bytes) -> bool:
-    """True if a program does not begin with the heading that `header` writes."""
+    """Return True if a program does not begin with the heading that `header` writes."""
     heading = f"({MAKER}".encode()
     return not any(line.startswith(heading) for line in data[:4096].splitlines()[:HEADING_LINES])
 
@@ -72,8 +72,8 @@ def comments(
     mounted: Mapping[int, Sequence[str]],
     seconds: Floats | None = None,
 ) -> tuple[Ints, Lines]:
-    """All other lines: the block (by index, from 0) that each stands before (C,), ascending, and
-    the text of the k-th.
+    """Return all other lines: the block (by index, from 0) that each stands before (C,),
+    ascending, and the text of the k-th.
 
     `of_row` (B,): the rows of the blocks; `message`: what a comment for the operator begins with;
     `mounted`: what the operator is told at the rows where a tool is changed by hand; `seconds`
@@ -113,7 +113,7 @@ def comments(
 
 
 def _message(toolpath: Toolpath, row: int, message: str) -> str:
-    """A message to the operator as a comment."""
+    """Return a message to the operator as a comment."""
     index = toolpath.value[row]
     if not (0 <= index < len(toolpath.texts)):
         raise PostError("a message without its text", where=toolpath.place(row))
@@ -123,8 +123,8 @@ def _message(toolpath: Toolpath, row: int, message: str) -> str:
 def _of_operations(
     toolpath: Toolpath, operations: Operations, unit: Unit, seconds: Floats | None
 ) -> Iterator[tuple[int, str]]:
-    """(row, comment): what each operation does, where it begins. `seconds` (N,): how long the
-    controller takes for each row; None: only the cuts are timed, at their feeds."""
+    """Yield (row, comment): what each operation does, where it begins. `seconds` (N,): how long
+    the controller takes for each row; None: only the cuts are timed, at their feeds."""
     template = "takes {}"
     if seconds is None:
         seconds, template = _feed_seconds(toolpath) * unit.mm, "cuts {} at these feeds"
@@ -214,7 +214,7 @@ def pack(parts: Sequence[str]) -> Iterator[str]:
 
 
 def duration(seconds: float) -> str:
-    """Seconds in words, rounded to the second.
+    """Return seconds in words, rounded to the second.
 
     >>> duration(3725.4)
     '1 h 2 min 5 s'
@@ -229,8 +229,8 @@ def duration(seconds: float) -> str:
 
 
 def _feed_seconds(toolpath: Toolpath) -> Floats:
-    """(N,) s that each row cuts if it has its feed from end to end, 0 for rapids and events, where
-    places are in mm."""
+    """Return (N,) s that each row cuts if it has its feed from end to end, 0 for rapids and
+    events, where places are in mm."""
 
     def seconds(part: Toolpath) -> Floats:
         begin = part.starts

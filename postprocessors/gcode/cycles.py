@@ -68,8 +68,8 @@ Cycle = CycleHole | CycleThread
 
 
 def threads_of(toolpath: Toolpath, unit_mm: float, style: NumberStyle) -> list[CycleThread]:
-    """The threads of a lathe's plan that G76 cuts with the same moves; lengths of the toolpath are
-    in a unit of so many mm, X along the axis and Y the radius."""
+    """Return the threads of a lathe's plan that G76 cuts with the same moves; lengths of the
+    toolpath are in a unit of so many mm, X along the axis and Y the radius."""
     operations = toolpath.operations
     if operations is None:
         return []
@@ -108,7 +108,8 @@ def threads_of(toolpath: Toolpath, unit_mm: float, style: NumberStyle) -> list[C
 
 
 def holes_of(toolpath: Toolpath) -> list[CycleHole]:
-    """The holes that the drilling operations of a plan make, as far as a cycle can say them."""
+    """Return the holes that the drilling operations of a plan make, as far as a cycle can say
+    them."""
     operations = toolpath.operations
     if operations is None:
         return []
@@ -122,7 +123,7 @@ def holes_of(toolpath: Toolpath) -> list[CycleHole]:
 
 
 def _holes(toolpath: Toolpath, low: int, high: int) -> Iterator[CycleHole]:
-    """Those of the rows low:high."""
+    """Yield those of the rows low:high."""
     rows = _Rows(
         toolpath.kind[low:high].tolist(),
         toolpath.end[low:high].tolist(),
@@ -154,7 +155,7 @@ class _Rows(Struct, frozen=True):
     feed: list[float]
 
     def hole(self, first: int, above: float) -> CycleHole | None:
-        """The hole that begins with a row, which comes from a height; without its dwell."""
+        """Return the hole that begins with a row, which comes from a height; without its dwell."""
         x, y, z = self.end[first]
         if self.kind[first] != Kind.RAPID or z != above:
             return None
@@ -187,9 +188,9 @@ class _Rows(Struct, frozen=True):
 def cycle_blocks(
     holes: Sequence[CycleHole], feed_words: Sequence[str], style: NumberStyle
 ) -> dict[int, tuple[str, ...]]:
-    """The blocks of each hole by its first row at a feed, whose F words are `feed_words`. Holes
-    that follow each other and look alike are one cycle with several places; behind the last of
-    them it is cancelled."""
+    """Return the blocks of each hole by its first row at a feed, whose F words are
+    `feed_words`. Holes that follow each other and look alike are one cycle with several places;
+    behind the last of them it is cancelled."""
 
     def number(value: float) -> str:
         return format_number(value, style)

@@ -115,8 +115,8 @@ MAX_BLOCKS: Final = 100
 
 
 def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) -> None:
-    """MachineError for start and end blocks that the controller would not take alone, that cut,
-    end the program, or go farther than the machine can."""
+    """Raise MachineError for start and end blocks that the controller would not take alone,
+    that cut, end the program, or go farther than the machine can."""
     import numpy as np
 
     from camtool.toolpath.moves import Kind, toolpath_extents
@@ -160,7 +160,7 @@ def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) 
 
 
 def _check_block(block: str, where: str, machine: Machine[Any, Any]) -> None:
-    """MachineError for a text that is not one plain block."""
+    """Raise MachineError for a text that is not one plain block."""
     if not block.strip() or not block.isascii() or not block.isprintable():
         raise MachineError(
             f"{block!r} is no block", file=machine.target.name, where=where, mend="such as M8"
@@ -168,9 +168,9 @@ def _check_block(block: str, where: str, machine: Machine[Any, Any]) -> None:
 
 
 def check_unit(machine: Machine, unit_mm: float, arc_spread_mm: float) -> None:
-    """MachineError where the last decimal of a coordinate, worth `unit_mm`, is more than a dialect
-    can lose: a step of the machine, or what the radii of an arc may differ by, which the rounding
-    of its numbers makes up to a unit."""
+    """Raise MachineError where the last decimal of a coordinate, worth `unit_mm`, is more than
+    a dialect can lose: a step of the machine, or what the radii of an arc may differ by, which
+    the rounding of its numbers makes up to a unit."""
     step_mm = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     if unit_mm > step_mm * (1.0 + UNIT_GUARD):
         raise MachineError(

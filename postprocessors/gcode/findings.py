@@ -79,7 +79,7 @@ NEVER_READ = Sentence(
 
 
 def simulated_as_chords(code: TargetCode) -> Sentence:
-    """The sentence of a target's own code for arcs that are not in XY."""
+    """Return the sentence of a target's own code for arcs that are not in XY."""
     return Sentence(
         code,
         "{measured:# arc|# arcs} in XZ or YZ {measured:is|are} simulated as chords that stray by "

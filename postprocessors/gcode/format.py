@@ -44,7 +44,7 @@ class NumberStyle(Struct, frozen=True):
 
 
 def units_of(values: Floats, decimals: int) -> Ints:
-    """Values (any shape) as whole units of 10^−decimals, half away from zero.
+    """Return values (any shape) as whole units of 10^−decimals, half away from zero.
 
     ValueError for what is not finite or too large to be exact.
     """
@@ -60,18 +60,19 @@ def units_of(values: Floats, decimals: int) -> Ints:
 
 
 def values_of(units: Ints, decimals: int) -> Floats:
-    """The floats nearest to the decimal numbers of the units: what a reader must find."""
+    """Return the floats nearest to the decimal numbers of the units: what a reader must find."""
     return np.asarray(units / 10.0**decimals)
 
 
 def word_of(letter: str, units: Ints, written: Bools, style: NumberStyle) -> WordColumn:
-    """The words of a letter, with numbers of whole units (M,), in the blocks that have it (M,)."""
+    """Return the words of a letter, with numbers of whole units (M,), in the blocks that have
+    it (M,)."""
     return WordColumn(letter, units, written, style.decimals, 0 if style.strip else None)
 
 
 def format_column(values: Floats, style: NumberStyle) -> list[str]:
-    """Values (N,) rounded to the style's decimals, as N texts; ValueError as `units_of`. Zero has
-    no minus."""
+    """Return values (N,) rounded to the style's decimals, as N texts; ValueError as `units_of`.
+    Zero has no minus."""
     return [
         _digits_of(value, style)
         for value in values_of(units_of(values, style.decimals), style.decimals)
@@ -84,7 +85,7 @@ def _digits_of(value: float, style: NumberStyle) -> str:
 
 
 def format_number(value: float, style: NumberStyle) -> str:
-    """A single number; ValueError as `units_of`."""
+    """Return a single number; ValueError as `units_of`."""
     return format_column(np.array([value]), style)[0]
 
 

@@ -227,7 +227,7 @@ class PartMoves:
         )
 
     def _program(self, place: Point) -> Point:
-        """A place in the frame of the part in the coordinates of the program."""
+        """Return a place in the frame of the part in the coordinates of the program."""
         x, y, z = (place[1], place[2], place[0]) if self._is_lathe else place
         if not self._same:
             (cos, sin), (dx, dy, dz) = self._turn, self._shift
@@ -255,5 +255,5 @@ def turn_of(
 
 
 def too_many(subject: str) -> str:
-    """The message for a program of too many moves."""
+    """Return the message for a program of too many moves."""
     return f"with {subject} the program has more than {bounds.MAX_MOVES} moves"

@@ -50,7 +50,8 @@ RECENTRE_REACH: Final = 2
 
 
 def check_plain(toolpath: Toolpath, machine: Machine) -> None:
-    """PostError for the first row that has no meaning there, named as the toolpath numbers it."""
+    """Raise PostError for the first row that has no meaning there, named as the toolpath
+    numbers it."""
     check(toolpath, machine)
     for row in np.flatnonzero(~toolpath.is_motion).tolist():
         kind = Kind(int(toolpath.kind[row]))
@@ -138,7 +139,8 @@ class PlainRows(Struct, frozen=True, eq=False):
 
 
 def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
-    """The rows of a toolpath (in the program's own lengths) in units, arcs made consistent."""
+    """Return the rows of a toolpath (in the program's own lengths) in units, arcs made
+    consistent."""
     halved = _halve_circles(toolpath, rules)
     path = halved.toolpath
     rows = np.flatnonzero(path.is_arc)

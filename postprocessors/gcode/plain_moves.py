@@ -128,8 +128,8 @@ class PlainMoves:
 
 
 def sure_arcs(start: Floats, end: Floats, centre: Floats, rule: ArcRule) -> Bools:
-    """(K,) which arcs surely have one radius, and turn by more than what is taken for a full
-    circle or end where they start."""
+    """Return (K,) which arcs surely have one radius, and turn by more than what is taken for a
+    full circle or end where they start."""
     start_arm, end_arm = start - centre, end - centre
     r1, r2 = np.hypot(start_arm[:, 0], start_arm[:, 1]), np.hypot(end_arm[:, 0], end_arm[:, 1])
     cross = start_arm[:, 0] * end_arm[:, 1] - start_arm[:, 1] * end_arm[:, 0]

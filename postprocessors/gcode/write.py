@@ -116,7 +116,8 @@ class ProgramStyle(Struct, frozen=True, eq=False):
 
 
 def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be written or done."""
+    """Return the program of a toolpath; PostError names the move that cannot be written or
+    done."""
     check(toolpath, machine)
     unit = UNITS[style.dialect.units]
     feeds, rounded_feeds = feed_units(toolpath, machine, unit)
@@ -185,8 +186,8 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
 
 
 def first_change(toolpath: Toolpath, events: Events) -> int:
-    """The row of the first tool change where nothing but rapids straight up is before it; else 0.
-    Behind the change the tool goes to its height anyway."""
+    """Return the row of the first tool change where nothing but rapids straight up is before
+    it; else 0. Behind the change the tool goes to its height anyway."""
     row = events.changes[0] if events.changes else 0
     motion = toolpath.is_motion[:row]
     is_upward = (toolpath.kind[:row] == Kind.RAPID) & (toolpath.end[:row, 2] >= toolpath.start[2])
@@ -195,8 +196,8 @@ def first_change(toolpath: Toolpath, events: Events) -> int:
 
 
 def _seconds(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Floats | None:
-    """(N,) s that the controller takes for each row; None where nobody knows, or nobody asks. What
-    its model cannot follow is told when the program is verified."""
+    """Return (N,) s that the controller takes for each row; None where nobody knows, or nobody
+    asks. What its model cannot follow is told when the program is verified."""
     exact = isinstance(machine.controller, PathController)
     model: ControllerModel[Any, Any] | None = PathModel() if exact else style.model
     if model is None or style.dialect.comments in ("none", "header"):
@@ -207,7 +208,7 @@ def _seconds(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Float
 
 
 def _feed_texts(feeds: Ints, holes: Sequence[CycleHole], decimals: int) -> list[str]:
-    """The number of the F word of each hole."""
+    """Return the number of the F word of each hole."""
     cut = feeds[[hole.cut for hole in holes]]
     return format_column(values_of(cut, decimals), NumberStyle(decimals, strip=True))
 
@@ -215,7 +216,7 @@ def _feed_texts(feeds: Ints, holes: Sequence[CycleHole], decimals: int) -> list[
 def in_units(
     toolpath: Toolpath, dialect: GcodeDialect, unit: Unit
 ) -> tuple[Toolpath, GcodeDialect]:
-    """The places of a toolpath, and the lengths and decimals of its dialect, in a unit."""
+    """Return the places of a toolpath, and the lengths and decimals of its dialect, in a unit."""
     if unit.mm == 1.0:
         return toolpath, dialect
     places = {name: getattr(toolpath, name) / unit.mm for name in ("end", "centre", "start")}
@@ -230,8 +231,8 @@ def in_units(
 def _path_modes(
     toolpath: Toolpath, rows_sent: Sent, style: ProgramStyle
 ) -> tuple[tuple[str, ...], dict[int, str]]:
-    """The path mode to begin with, and the blocks that change it, by the place among the rows
-    that are sent; none for dialects that know no such thing."""
+    """Return the path mode to begin with, and the blocks that change it, by the place among the
+    rows that are sent; none for dialects that know no such thing."""
     if style.path_mode is None or style.own_mode is None:
         return (), {}
     written = [style.path_mode(mode) for mode in (*toolpath.modes, style.own_mode)]
@@ -257,12 +258,12 @@ class BlockOrder:
         self._others += [(index, block, row) for block in blocks]
 
     def _sorted(self) -> tuple[list[tuple[int, str, int]], Ints]:
-        """The others in order, and how many motions are in front of each."""
+        """Return the others in order, and how many motions are in front of each."""
         other_blocks = sorted(self._others, key=lambda other: other[0])
         return other_blocks, self._before[[index for index, _, _ in other_blocks]]
 
     def rows(self, row: Ints) -> Ints:
-        """(B,) the toolpath's row of each block; `row` (M,) of those that are sent."""
+        """Return (B,) the toolpath's row of each block; `row` (M,) of those that are sent."""
         other_blocks, before = self._sorted()
         return np.insert(row[self._is_motion], before, [one for _, _, one in other_blocks])
 
@@ -275,8 +276,8 @@ class BlockOrder:
         numbers: LineNumbers | None = None,
         blanks: bool = True,
     ) -> bytes:
-        """All blocks, those of motions by `columns` of M rows, with C lines of comments ("" for
-        none), the k-th before block commented[k] (from 0); these ascend."""
+        """Return all blocks, those of motions by `columns` of M rows, with C lines of comments
+        ("" for none), the k-th before block commented[k] (from 0); these ascend."""
         other_blocks, before = self._sorted()
         indices = np.array([indices for indices, _, _ in other_blocks], dtype=np.int64)
         number = before + np.arange(len(other_blocks))
@@ -404,10 +405,10 @@ def sent_rows(
     *,
     raises: bool = True,
 ) -> Sent:
-    """All rows with pieces in place of arcs, without moves that move nothing, and without motions
-    among the first `unmoved` rows. `changes`: the rows of tool changes that have a block; each of
-    `cycles` is one block. `raises`: behind a change of tools the tool is sent to its height once
-    more."""
+    """Return all rows with pieces in place of arcs, without moves that move nothing, and
+    without motions among the first `unmoved` rows. `changes`: the rows of tool changes that
+    have a block; each of `cycles` is one block. `raises`: behind a change of tools the tool is
+    sent to its height once more."""
     origins, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
     if arcs.pieces:
         piece_counts = np.ones(len(toolpath), dtype=np.int64)
@@ -479,8 +480,8 @@ def sent_rows(
 
 
 def _raised_again(kind: Codes, end: Ints, is_changed: Bools) -> list[int]:
-    """The rows before which the tool must be sent to its height once more: those behind a change
-    of tools that stands between moves, unless the next move is a rapid in Z anyway."""
+    """Return the rows before which the tool must be sent to its height once more: those behind
+    a change of tools that stands between moves, unless the next move is a rapid in Z anyway."""
     motions = np.flatnonzero(kind <= Kind.ARC_CCW)
     raised = []
     for index in np.flatnonzero(is_changed).tolist():
@@ -493,14 +494,16 @@ def _raised_again(kind: Codes, end: Ints, is_changed: Bools) -> list[int]:
 
 
 def _differ(ends: Ints | Floats, start: Floats) -> Bools:
-    """(M, 3) where ends (M, 3) are not those of the row before, of the first not the start."""
+    """Return (M, 3) where ends (M, 3) are not those of the row before, of the first not the
+    start."""
     differ = np.empty(ends.shape, dtype=np.bool_)
     differ[:1], differ[1:] = ends[:1] != start, ends[1:] != ends[:-1]
     return differ
 
 
 def _not_yet_written(written: Bools, home: Bools) -> Bools:
-    """(M,) true where nothing was written before the row since the start, or since homing."""
+    """Return (M,) true where nothing was written before the row since the start, or since
+    homing."""
     is_first = np.ones(len(written), dtype=np.bool_)
     for begin, end in pairwise([0, *np.flatnonzero(home).tolist(), len(written)]):
         if written[begin:end].any():
@@ -509,7 +512,8 @@ def _not_yet_written(written: Bools, home: Bools) -> Bools:
 
 
 def _first_after(home: Bools, motion: Bools) -> Bools:
-    """(M,) true for the first motion behind each homing, of several in a row behind the last."""
+    """Return (M,) true for the first motion behind each homing, of several in a row behind the
+    last."""
     is_first = np.zeros(len(home), dtype=np.bool_)
     homes = np.flatnonzero(home)
     if len(homes):
@@ -524,7 +528,8 @@ G33: Final = 33
 
 
 def _pitches(toolpath: Toolpath) -> Floats:
-    """(N,) the feed for each turn of the spindle where it is to be followed, 0 elsewhere."""
+    """Return (N,) the feed for each turn of the spindle where it is to be followed, 0
+    elsewhere."""
     pitch = np.zeros(len(toolpath))
     operations = toolpath.operations
     if operations is not None:
@@ -544,8 +549,8 @@ def motion_words(
     style: ProgramStyle | None = None,
     pitch: Floats | None = None,
 ) -> list[WordColumn]:
-    """The words of the motions among the rows, in the letters of a `style`; `pitch` (N,) of the
-    toolpath's rows that follow the spindle."""
+    """Return the words of the motions among the rows, in the letters of a `style`; `pitch` (N,)
+    of the toolpath's rows that follow the spindle."""
     motion = rows_sent.is_motion
     rows = np.flatnonzero(motion)
     number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
@@ -581,7 +586,8 @@ def motion_words(
 
 
 def changes_of(values: Ints, counts: Bools) -> Bools:
-    """(M,) true where a row that counts has another value than the last one that counted."""
+    """Return (M,) true where a row that counts has another value than the last one that
+    counted."""
     rows = np.flatnonzero(counts)
     is_changed = np.zeros(len(values), dtype=bool)
     is_changed[rows] = np.diff(values[rows], prepend=-1) != 0
@@ -603,7 +609,7 @@ class Event(Struct, frozen=True):
     cools: bool = False
 
     def refuse(self, message: str, mend: str = "") -> PostError:
-        """The error for an event that cannot be sent."""
+        """Return the error for an event that cannot be sent."""
         return PostError(message, where=self.where, mend=mend)
 
 
@@ -618,7 +624,7 @@ class Events(Struct, frozen=True):
 
 
 def events_of(toolpath: Toolpath, words: EventWords) -> Events:
-    """The blocks of all events but END and messages."""
+    """Return the blocks of all events but END and messages."""
     blocks: dict[int, Sequence[str]] = {}
     rounded: list[int] = []
     spindle_on = cools = False
@@ -656,7 +662,8 @@ def events_of(toolpath: Toolpath, words: EventWords) -> Events:
 
 
 def common_words(event: Event) -> tuple[str, ...]:
-    """The block of a dwell, spindle, coolant or homing; PostError for values that none can say.
+    """Return the block of a dwell, spindle, coolant or homing; PostError for values that none can
+    say.
 
     Homing is a rapid in machine coordinates, `G53 G0`: G28 would go where the operator's memory
     of it points.
@@ -680,7 +687,7 @@ def common_words(event: Event) -> tuple[str, ...]:
 
 
 def tool_number(event: Event) -> int:
-    """The tool of a change; PostError when it is no whole number from 0."""
+    """Return the tool of a change; PostError when it is no whole number from 0."""
     if not (event.value >= 0.0 and event.value == math.floor(event.value)):
         raise event.refuse(f"{event.value:g} is no tool number", "tools are 0, 1, 2 …")
     return int(event.value)

@@ -47,11 +47,11 @@ class Grbl(Target):
             check_blocks(machine, partial(self.read, machine=machine))
 
     def unit_mm(self, machine: GrblMachine, axis: Axis) -> float:
-        """The last decimal of a coordinate."""
+        """Return the last decimal of a coordinate."""
         return last_decimal_mm(machine.dialect)
 
     def twin_kind(self) -> TwinKind:
-        """The virtual controller; docs/wires/grbl.md."""
+        """Return the virtual controller; docs/wires/grbl.md."""
         from .twin import GrblTwin, GrblTwinSettings
 
         return TwinKind(GrblTwinSettings, GrblTwin)

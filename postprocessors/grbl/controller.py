@@ -83,7 +83,7 @@ class GrblModel(SampledModel[GrblController, GrblDialect]):
         return Mechanics(machine, start_mm, options.effects)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Chords, and Bresenham lines."""
+        """Return chords, and Bresenham lines."""
         return "chords"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -211,7 +211,7 @@ class GrblSamples:
         )
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Row and position of the events low:high."""
+        """Return the row and position of the events low:high."""
         blocks = self._blocks
         begin = int(np.searchsorted(self._offsets, low, side="right")) - 1
         end = int(np.searchsorted(self._offsets, high, side="left"))
@@ -237,7 +237,7 @@ class GrblSamples:
         return np.asarray(begin_s[block] + plan.moments_s(self._planned.squares, block, way_mm))
 
     def steps(self, bounds: Ints) -> Ints:
-        """Steps of each axis between events."""
+        """Return steps of each axis between events."""
         block = np.searchsorted(self._offsets, bounds, side="right") - 1
         begin = int(block[0])
         travel = self._blocks.way[begin : int(block[-1]) + 1].astype(np.int64)
@@ -251,7 +251,7 @@ class GrblSamples:
 
 
 def _controller(machine: _Machine) -> GrblController:
-    """The machine's controller; MachineError for a compensation that grbl does not do."""
+    """Return the machine's controller; MachineError for a compensation that grbl does not do."""
     for name, axis in zip("xyz", machine.axes, strict=True):
         if axis.compensation_mm > 0.0:
             raise MachineError(
@@ -336,8 +336,8 @@ def join_blocks(parts: list[Blocks]) -> Blocks:
 
 
 def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Iterator[Blocks]:
-    """The blocks of a program, `ROWS_AT_ONCE` at a time; ProgramError for positions beyond all
-    that grbl can count."""
+    """Yield the blocks of a program, `ROWS_AT_ONCE` at a time; ProgramError for positions
+    beyond all that grbl can count."""
     begin, target_count = _nearest_steps(path.start[None, :].astype(np.float32), machine), 0
     for low in range(0, len(path), ROWS_AT_ONCE):
         rows = np.arange(low, min(low + ROWS_AT_ONCE, len(path)))
@@ -349,8 +349,8 @@ def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> 
 def blocks_from(
     begin: Ints, path: Toolpath, rows: Ints, machine: _Machine, controller: GrblController
 ) -> tuple[Blocks, Ints, int]:
-    """The blocks of rows (R,), which follow one another, from `begin` (1, 3) steps on; where the
-    last of them ends; and how many targets there are."""
+    """Return the blocks of rows (R,), which follow one another, from `begin` (1, 3) steps on;
+    where the last of them ends; and how many targets there are."""
     targets = targets_of(path, rows, machine, controller)
     stop = _nearest_steps(targets.mm, machine)
     is_far = (np.abs(stop) > MAX_STEPS).any(axis=1)
@@ -370,7 +370,7 @@ def blocks_from(
 
 
 def _nearest_steps(mm: Singles, machine: _Machine) -> Ints:
-    """(..., 3) steps: the 32-bit product, to the nearest whole, halves away from zero."""
+    """Return (..., 3) steps: the 32-bit product, to the nearest whole, halves away from zero."""
     steps_per_mm = np.array([1.0 / axis.coded_step_mm for axis in machine.axes], dtype=np.float32)
     product = (mm * steps_per_mm).astype(np.float64)
     return np.asarray(np.copysign(np.floor(np.abs(product) + 0.5), product).astype(np.int64))
@@ -439,7 +439,7 @@ class Stops(Struct, frozen=True, eq=False):
     lit: Bools | None
 
     def before(self, blocks: Blocks) -> Bools:
-        """Mask (B,) of the blocks before which the machine stands."""
+        """Return the mask (B,) of the blocks before which the machine stands."""
         if not len(blocks):
             return np.zeros(0, dtype=np.bool_)
         first, last = int(blocks.row[0]), int(blocks.row[-1])
@@ -451,9 +451,9 @@ class Stops(Struct, frozen=True, eq=False):
 
 
 def stops_of(path: Toolpath, controller: GrblController) -> Stops:
-    """Events that say what holds already stop nothing. In laser mode neither does another power,
-    but a target without a step stops a laser of constant power (M3), which is then set at once
-    (`mc_line`)."""
+    """Return events that say what holds already stop nothing. In laser mode neither does
+    another power, but a target without a step stops a laser of constant power (M3), which is
+    then set at once (`mc_line`)."""
     rows = np.isin(path.kind, EVENTS_AT_REST)
     coolant = np.flatnonzero(np.isin(path.kind, COOLANT))
     kind = np.append(Kind.COOLANT_OFF, path.kind[coolant])
@@ -576,8 +576,8 @@ class _Chords:
         self._turn = np.where(clockwise, downward, upward).astype(np.float32)
 
     def segments(self, controller: GrblController) -> Ints:
-        """(J,) chords of each: ⌊|½ φ r| / √(δ (2r − δ))⌋, δ the arc tolerance; at least the one
-        to the end."""
+        """Return (J,) chords of each: ⌊|½ φ r| / √(δ (2r − δ))⌋, δ the arc tolerance; at least
+        the one to the end."""
         tolerance = np.float32(controller.arc_tolerance_mm)
         half = tolerance * (np.float32(2.0) * self._radius - tolerance)
         arc_length = np.abs(np.float32(0.5) * self._turn * self._radius)

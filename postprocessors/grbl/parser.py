@@ -100,7 +100,7 @@ SPINDLE: Final = {3: Kind.SPINDLE_CW, 4: Kind.SPINDLE_CCW, 5: None}
 
 
 def error(number: int, place: int | str | None, subject: str = "", mend: str = "") -> LineFault:
-    """A line that grbl answers with this error."""
+    """Return a line that grbl answers with this error."""
     return LineFault(f"{WHY[number].format(subject)} (error:{number})", place, mend)
 
 
@@ -185,7 +185,7 @@ class GrblParser:
         self._use_frame()
 
     def _machine(self, place: tuple[float, float, float]) -> list[float]:
-        """A place that is given from machine zero."""
+        """Return a place that is given from machine zero."""
         return [a + b for a, b in zip(place, self._zero, strict=True)]
 
     @property
@@ -320,7 +320,7 @@ class GrblParser:
     def _plain_g_word(
         self, block: GrblBlock, number: int, name: str, column: int
     ) -> tuple[str, int]:
-        """The group of a G word without decimals, and what it sets."""
+        """Return the group of a G word without decimals, and what it sets."""
         if number in (4, 10, 53):
             block.once = f"G{number}"
             return "one block", number
@@ -413,7 +413,7 @@ class GrblParser:
             raise error(33, None, "a probing move that ends where it starts")
 
     def _feed_of(self, block: GrblBlock, mm: float, *, jogs: bool) -> float:
-        """The feed of the block: mm/min, or in G93 turns of its move a minute."""
+        """Return the feed of the block: mm/min, or in G93 turns of its move a minute."""
         numbers, modes = block.numbers, block.modes
         if jogs:
             if "F" not in numbers:
@@ -464,7 +464,7 @@ class GrblParser:
     def _arc(
         self, block: GrblBlock, target: list[float], axes: list[int], mm: float, unused: set[str]
     ) -> tuple[float, float]:
-        """The centre of an arc on the machine, in the order of its plane."""
+        """Return the centre of an arc on the machine, in the order of its plane."""
         numbers, modes = block.numbers, block.modes
         first, second, _ = PLANES[modes.plane * 10]
         if not axes:
@@ -489,8 +489,8 @@ class GrblParser:
     def _by_radius(
         self, block: GrblBlock, x: float, y: float, radius: float, target: list[float]
     ) -> tuple[float, float]:
-        """The offset of the centre: on the left of the chord for a counter-clockwise arc of at
-        most half a turn, on the other side for a negative R."""
+        """Return the offset of the centre: on the left of the chord for a counter-clockwise arc
+        of at most half a turn, on the other side for a negative R."""
         column = block.at["R"]
         if target == self.position:
             raise error(33, column, "an arc by its radius that ends where it starts")
@@ -586,8 +586,8 @@ class GrblParser:
 
     @staticmethod
     def _relights(block: GrblBlock, before: ParserModes) -> bool:
-        """True if, in laser mode, a block without motion goes from cuts to rapids, or back, under
-        constant power (M3), which switches the power."""
+        """Return True if, in laser mode, a block without motion goes from cuts to rapids, or
+        back, under constant power (M3), which switches the power."""
         cuts = (1, 2, 3)
         return before.spindle == Kind.SPINDLE_CW and (
             (before.motion in cuts) != (block.modes.motion in cuts)
@@ -776,12 +776,12 @@ def _coolant_kind(modes: ParserModes) -> Kind:
 
 
 def target_length(block: GrblBlock, mm: float) -> float:
-    """The length of the tool that G43.1 and G49 set, mm."""
+    """Return the length of the tool that G43.1 and G49 set, mm."""
     return block.numbers["Z"] * mm if block.length == "set" else 0.0
 
 
 def _number(text: str) -> float:
-    """A number as grbl reads it: its first eight digits count."""
+    """Return a number as grbl reads it: its first eight digits count."""
     if len(text) <= MAX_DIGITS:
         return float(text)
     digits, digits_read = 0, []

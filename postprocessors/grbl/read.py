@@ -50,7 +50,8 @@ COMMENT: Final = re.compile(r"\([^)]*\)?|;.*")
 
 
 def read_program(data: bytes, machine: GrblMachine) -> Toolpath:
-    """The moves of a program; ProgramError with block, line and column, and grbl's error."""
+    """Return the moves of a program; ProgramError with block, line and column, and grbl's
+    error."""
     bounds.check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     check_ascii(data)  # bytes above 7F are commands to grbl, wherever they stand
     path = _Reader(data, machine).read()

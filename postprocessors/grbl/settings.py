@@ -54,7 +54,7 @@ _MORE = {
 
 
 def settings_of(text: str) -> list[ControllerSetting] | None:
-    """The values of a machine file that a listing says, None for a text without settings;
+    """Return the values of a machine file that a listing says, None for a text without settings;
     MachineError for a setting that is missing, doubled, or no number."""
     values: dict[int, tuple[str, int]] = {}
     for line, row in enumerate(text.splitlines(), 1):
@@ -89,8 +89,8 @@ def settings_of(text: str) -> list[ControllerSetting] | None:
 
 
 def _doubt(setting: ControllerSetting) -> str:
-    """Why a setting of a machine with a spindle says nothing of it; "" where it does. Of a laser
-    the same number is the usual full power."""
+    """Return why a setting of a machine with a spindle says nothing of it; "" where it does. Of
+    a laser the same number is the usual full power."""
     never_set = setting.said == f"${FULL_SPEED}" and setting.value == FACTORY_FULL_SPEED
     return NEVER_SET if never_set else ""
 
@@ -167,8 +167,9 @@ NEAR_MM = 0.005
 
 
 def beyond_travel(text: str, zero_mm: Place, reach_mm: tuple[Place, Place]) -> str:
-    """Why a program is certain to end in ALARM:2, by a listing and the work zero on the machine;
-    "" where it is not. With soft limits ($20) grbl stays between −travel and 0 of each axis."""
+    """Return why a program is certain to end in ALARM:2, by a listing and the work zero on the
+    machine; "" where it is not. With soft limits ($20) grbl stays between −travel and 0 of each
+    axis."""
     numbers = {int(number): float(value) for number, value in _SETTING.findall(text)}
     if not numbers.get(20):
         return ""
@@ -188,7 +189,7 @@ def beyond_travel(text: str, zero_mm: Place, reach_mm: tuple[Place, Place]) -> s
 def _difference(
     setting: ControllerSetting, expected: float | None, inverse: bool = False
 ) -> list[str]:
-    """A sentence where a setting is not what the machine file says, if it says anything."""
+    """Return a sentence where a setting is not what the machine file says, if it says anything."""
     value = float(setting.value)  # type: ignore[arg-type]
     shown = 1.0 / value if inverse else value
     if expected is None or abs(shown - expected) <= LISTED_TOLERANCE:

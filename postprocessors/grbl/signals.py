@@ -125,7 +125,7 @@ class _Clock:
 
 
 def _segments(planned: PlannedBlocks) -> Segments:
-    """The segments of the blocks of a window."""
+    """Return the segments of the blocks of a window."""
     count, plan = len(planned.blocks), planned.plan
     squares = (planned.squares * MIN_PER_S**2).astype(np.float32)
 
@@ -143,9 +143,9 @@ def _segments(planned: PlannedBlocks) -> Segments:
 
 
 def _steps_of(blocks: Blocks, stretch: _Stretch, end: int) -> Pulses:
-    """The steps of a stretch. A block of n steps of an axis in N events has its step j in the
-    eighth ⌊4 N (2 j − 1) / n⌋ + 1 of a step of N: where the counter, which begins at half, first
-    exceeds the whole."""
+    """Return the steps of a stretch. A block of n steps of an axis in N events has its step j
+    in the eighth ⌊4 N (2 j − 1) / n⌋ + 1 of a step of N: where the counter, which begins at
+    half, first exceeds the whole."""
     first = np.flatnonzero(np.diff(stretch.block, prepend=-1))
     block = stretch.block[first]
     ends = stretch.ends[np.append(first[1:], len(stretch.block)) - 1]

@@ -22,7 +22,8 @@ from camtool.arrays import Floats, Ints
 
 
 def steps_taken(travel: Ints, events: Ints) -> Ints:
-    """(B, 3) signed steps of blocks of `travel` (B, 3) steps after `events` (B,) events of each."""
+    """Return (B, 3) signed steps of blocks of `travel` (B, 3) steps after `events` (B,) events
+    of each."""
     size = np.abs(travel)
     event_count = np.maximum(size.max(axis=1, initial=0), 1)[:, None]
     step_count = (event_count + 2 * size * events[:, None] - 1) // (2 * event_count)
@@ -91,9 +92,9 @@ cdef float HALF = 0.5, TWO = 2.0, ZERO = 0.0
 
 
 cdef class Segments:
-    """The segments of B blocks, from the first on. Columns (B,), 32-bit: length mm, acceleration
-    mm/min², squares of the speeds at start and end (mm/min)², highest speed mm/min; and the steps
-    of the longest axis."""
+    """Return the segments of B blocks, from the first on. Columns (B,), 32-bit: length mm,
+    acceleration mm/min², squares of the speeds at start and end (mm/min)², highest speed
+    mm/min; and the steps of the longest axis."""
 
     cdef float[::1] length, acceleration, entry, exit, nominal
     cdef int[::1] events

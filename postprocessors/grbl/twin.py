@@ -1241,7 +1241,8 @@ class GrblTwin(Twin):
         return OK
 
     def _is_beyond_travel(self, target: Sequence[float]) -> bool:
-        """True if a place is beyond the travel, which begins at machine zero and goes down."""
+        """Return True if a place is beyond the travel, which begins at machine zero and goes
+        down."""
         travel = [self._memory.settings[130 + k] for k in range(3)]
         return any(
             value > 0.0 or value < -travel_mm
@@ -1331,22 +1332,24 @@ class GrblTwin(Twin):
         return [each != self._is_set(5) for each in closed]
 
     def _beyond_switches(self, mm: Floats, ends_mm: tuple[Floats, Floats]) -> Bools:
-        """Mask (…, 3) of the axes whose slides at `mm` lie beyond the switches at their ends."""
+        """Return the mask (…, 3) of the axes whose slides at `mm` lie beyond the switches at
+        their ends."""
         (low, high), eps = ends_mm, 0.5 * self._slide_step_mm
         return np.asarray((mm > high + eps) | (mm < low - eps))
 
     def _touches_probe(self) -> bool:
-        """True if the probe counts as touching; $6, and G38.4 and G38.5, invert it."""
+        """Return True if the probe counts as touching; $6, and G38.4 and G38.5, invert it."""
         closed = bool(self._closes_probe(self.slides.commanded_mm))
         return (closed != self._is_set(6)) != self._away
 
     def _closes_probe(self, mm: Floats) -> Bools:
-        """Mask (…) of the places (…, 3) at which the probe is on the blank, or in it."""
+        """Return the mask (…) of the places (…, 3) at which the probe is on the blank, or in
+        it."""
         machine_zero = np.array(self._machine.controller.machine_zero_mm)
         return self._choices.closes(mm - machine_zero, 0.5 * float(self._slide_step_mm[2]))
 
     def _has_touched(self) -> bool:
-        """True once the probing move under way has ended at the probe."""
+        """Return True once the probing move under way has ended at the probe."""
         return self._probing is None
 
     def _probe(self, path: Toolpath, motion: int, stood: list[float]) -> Wait:

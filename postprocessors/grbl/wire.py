@@ -205,7 +205,7 @@ class GrblWire(Wire):
     )
 
     def packets(self, data: bytes, machine: GrblMachine, forecast: Forecast) -> Sequence[Packet]:
-        """A packet is a line with words, without blanks and comments."""
+        """Return a packet for each line with words, without blanks and comments."""
         packets = list(_packets(data, forecast))
         for packet in packets:
             if len(packet.data) > BUFFER_BYTES - len(PROBE):
@@ -218,7 +218,7 @@ class GrblWire(Wire):
     def conversation(
         self, packets: Sequence[Packet], machine: GrblMachine, manner: Manner
     ) -> GrblConversation:
-        """The conversation that sends these lines."""
+        """Return the conversation that sends these lines."""
         return GrblConversation(packets, machine, manner)
 
     def terminal(self, machine: GrblMachine) -> GrblTerminal:
@@ -256,7 +256,7 @@ class GrblWire(Wire):
         return GrblSettings(machine, manner, changes)
 
     def recognised(self, heard: str) -> str:
-        """Its version, which it says when the port resets it, and how it stands."""
+        """Return its version, which it says when the port resets it, and how it stands."""
         version = _VERSION.search(heard)
         status = _STATUS.search(heard)
         words = [version[0]] if version else ["grbl"]
@@ -270,8 +270,8 @@ class GrblWire(Wire):
 
 
 def _packets(data: bytes, forecast: Forecast) -> Iterator[Packet]:
-    """The lines that are blocks, as their reader counts them; a line that stops the program has
-    the comments since the last block as its note."""
+    """Yield the lines that are blocks, as their reader counts them; a line that stops the
+    program has the comments since the last block as its note."""
     block, notes = 0, list[str]()
     for line in re.split(r"\r\n|\n|\r", data.decode("latin-1")):
         notes += [(one or other).strip() for one, other in _COMMENT.findall(line)]
@@ -588,7 +588,8 @@ class GrblConversation(Conversation):
             self._tell(f"{message} {startup[1]}")
 
     def _unknown(self) -> str:
-        """Why it fails where nothing was understood: what was heard, and what that may be."""
+        """Return why it fails where nothing was understood: what was heard, and what that may
+        be."""
         text = "".join(chr(octet) if 0x20 <= octet < 0x7F else " " for octet in self._heard)
         text, strange = (
             " ".join(text.split())[:60],
@@ -619,7 +620,7 @@ class GrblConversation(Conversation):
         return "".join(f"; {each}" for each in reasons)
 
     def _advice(self) -> str:
-        """Why it is locked and what to do, by its settings."""
+        """Return why it is locked and what to do, by its settings."""
         values = dict(each[1:].split("=", 1) for each in self._listing)
         if set(self._closed) & set("XYZ"):
             mend = "move it off the switch by hand, or set $5 if it is not pressed, then --unlock"
@@ -983,7 +984,7 @@ class GrblConversation(Conversation):
         self._write(RESET)
 
     def _stops(self) -> bool:
-        """True if a block that stops the program is among those under way."""
+        """Return True if a block that stops the program is among those under way."""
         texts = (packet.data.decode("latin-1") for packet in self._under_way())
         return any(_PAUSES.search(text) for text in texts)
 
@@ -1453,7 +1454,7 @@ class GrblTerminal(Terminal):
         return RESET
 
     def is_urgent(self, line: str) -> bool:
-        """True for holds, resets and the command to go on."""
+        """Return True for holds, resets and the command to go on."""
         return line.strip().lower() in ("!", "~", "^x", r"\x18", r"\x84", r"\x85")
 
     def decode(self, data: bytes) -> list[str]:
@@ -1524,5 +1525,5 @@ SWITCHES: Final = {
 
 
 def _switches(letters: str) -> str:
-    """Words for the letters of `Pn:`."""
+    """Return words for the letters of `Pn:`."""
     return ", ".join(SWITCHES.get(letter, f"limit of {letter}") for letter in letters)

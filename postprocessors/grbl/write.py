@@ -33,7 +33,7 @@ BY_HAND = ("the spindle does not stop by itself: stop it",)
 
 
 def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
-    """The program; PostError names the move that cannot be written or done."""
+    """Return the program; PostError names the move that cannot be written or done."""
     dialect = machine.dialect
     before = BY_HAND if machine.spindle.switched == "hand" else ()
 
@@ -68,7 +68,7 @@ def _by_hand(toolpath: Toolpath, dialect: GrblDialect) -> Iterator[Finding]:
 
 
 def _words(event: Event, dialect: GrblDialect) -> tuple[str, ...]:
-    """The blocks of an event."""
+    """Return the blocks of an event."""
     if event.kind == Kind.TOOL_CHANGE:
         return _change(event, dialect)
     blocks = common_words(event)
@@ -82,8 +82,8 @@ def _words(event: Event, dialect: GrblDialect) -> tuple[str, ...]:
 
 
 def _change(event: Event, dialect: GrblDialect) -> tuple[str, ...]:
-    """A stop for another tool, spindle and coolant off; nothing for the tool that is mounted
-    before the program."""
+    """Return a stop for another tool, spindle and coolant off; nothing for the tool that is
+    mounted before the program."""
     if event.mounted_before and dialect.tool_change != "pause":
         return ()
     if dialect.tool_change == "refuse":

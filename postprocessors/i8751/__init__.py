@@ -36,13 +36,13 @@ class I8751(Target):
         return machine.dialect.tolerance_mm + machine.dialect.arc_tolerance_mm
 
     def twin_kind(self) -> TwinKind:
-        """The virtual controller; docs/wires/i8751.md."""
+        """Return the virtual controller; docs/wires/i8751.md."""
         from .twin import I8751Twin, I8751TwinSettings
 
         return TwinKind(I8751TwinSettings, I8751Twin)
 
     def line_bytes(self, data: bytes, machine: I8751Machine) -> int:
-        """The bytes of the packets, whatever the form of the file."""
+        """Return the bytes of the packets, whatever the form of the file."""
         from .stream import stream_of
 
         return len(stream_of(data, machine))

@@ -41,7 +41,7 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
     """The Intel 8751: a dog-leg of X and Y, then Z."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """The motion, chunk by chunk."""
+        """Return the motion, chunk by chunk."""
         legs, blocks = _leg_run(toolpath, machine, options)
         return legs.run(blocks)
 
@@ -51,7 +51,7 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
         return legs.fused_run(blocks)
 
     def clock(self, toolpath: Toolpath, machine: _Machine) -> SampleClock:
-        """The ramps, pulse by pulse."""
+        """Return the ramps, pulse by pulse."""
         path, times = self.quantised(toolpath, machine), PulseTimes(machine.dialect)
         travel = np.rint(
             np.diff(path.end, axis=0, prepend=path.start[None, :]) / coded_steps_mm(machine)
@@ -63,7 +63,8 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
         return SampleClock(path, machine, waits)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """The same with start and ends at their nearest steps; ProgramError for arcs, homing."""
+        """Return the same with start and ends at their nearest steps; ProgramError for arcs,
+        homing."""
         _check(toolpath, machine)
         step_mm = coded_steps_mm(machine)
         start = _in_steps(toolpath.start[None, :], machine)[0] * step_mm
@@ -71,7 +72,7 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
         return with_ends(toolpath, start, end)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """A diagonal and the rest along an axis; there are no arcs."""
+        """Return a diagonal and the rest along an axis; there are no arcs."""
         return "dog-leg"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -107,7 +108,7 @@ def _check(toolpath: Toolpath, machine: _Machine) -> None:
 
 
 def _in_steps(points: Floats, machine: _Machine) -> Ints:
-    """Points (N, 3) mm in steps."""
+    """Return points (N, 3) mm in steps."""
     columns = [
         to_steps(points[:, column], axis.coded_step_mm) for column, axis in enumerate(machine.axes)
     ]
@@ -115,7 +116,7 @@ def _in_steps(points: Floats, machine: _Machine) -> Ints:
 
 
 def _blocks(toolpath: Toolpath, machine: _Machine, times: PulseTimes) -> Iterator[Legs]:
-    """The legs of all rows: X and Y together, one of them alone, Z."""
+    """Yield the legs of all rows: X and Y together, one of them alone, Z."""
     for low in range(0, len(toolpath), ROWS_AT_ONCE):
         part = toolpath.part(low, min(low + ROWS_AT_ONCE, len(toolpath)))
         points = np.concatenate([part.start[None, :], part.end])

@@ -44,7 +44,8 @@ FREE: Final = -1
 
 
 def reaches(steps: Ints, step_mm: tuple[float, float], tolerance_mm: float) -> Ints:
-    """(N,) the reach of lines of (N, 2) steps: the greatest |D·b − M·d| within the tolerance.
+    """Return (N,) the reach of lines of (N, 2) steps: the greatest |D·b − M·d| within the
+    tolerance.
 
     Not below a // 2, which rounding alone could take from it; see the module.
     """
@@ -54,7 +55,7 @@ def reaches(steps: Ints, step_mm: tuple[float, float], tolerance_mm: float) -> I
 
 
 def elbows(steps: Ints) -> Ints:
-    """(N,) b·d of lines of (N, 2) steps: what their elbow takes of the reach."""
+    """Return (N,) b·d of lines of (N, 2) steps: what their elbow takes of the reach."""
     size = np.abs(steps)
     shorter = size.min(axis=1, initial=np.iinfo(np.int64).max)
     return np.asarray(shorter * (size.max(axis=1, initial=0) - shorter))
@@ -83,7 +84,7 @@ class StepLine(Struct, frozen=True):
         return pieces
 
     def _even_runs(self, diagonals: int, singles: int, max_steps: int) -> list[tuple[int, int]]:
-        """The fewest records that are found, as near to the line as so many can be."""
+        """Return the fewest records that are found, as near to the line as so many can be."""
         if self.reach == FREE:
             return _runs(diagonals, singles, diagonals * singles, max_steps)
         runs = _runs(diagonals, singles, self.reach, max_steps)

@@ -62,7 +62,7 @@ class Firmware(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return 1 if self.first_pulse == "repeats" else 0
 
     def pulses(self, steps: Ints) -> Ints:
-        """Pulses that steps of either sign take, of any shape."""
+        """Return pulses that steps of either sign take, of any shape."""
         return np.where(steps != 0, np.abs(steps) + self.lost_pulses, 0)
 
 
@@ -81,11 +81,11 @@ class PulseTimes:
         self._ramp_s = float(periods[:-1].sum())
 
     def alone_s(self, steps: Ints) -> Floats:
-        """(N,) s for moves of one motor by `steps` (N,)."""
+        """Return (N,) s for moves of one motor by `steps` (N,)."""
         return self._run_s(self._firmware.pulses(steps))
 
     def legs_s(self, steps: Ints) -> Floats:
-        """(N, 2) s for records of `steps` (N, 2): both motors together, and one alone.
+        """Return (N, 2) s for records of `steps` (N, 2): both motors together, and one alone.
 
         Where one ramp serves both ("flows"), each has the part of the time that it has of the
         pulses.

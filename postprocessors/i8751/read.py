@@ -74,19 +74,20 @@ class ByteFault(Exception):
 
 
 def read_program(data: bytes, machine: I8751Machine) -> Toolpath:
-    """The moves of a program; ProgramError naming record and byte, or line and column."""
+    """Return the moves of a program; ProgramError naming record and byte, or line and column."""
     return _toolpath(decoded_records(data, machine), machine, np.zeros(3, dtype=np.int64))
 
 
 def read_packet(records: bytes, machine: I8751Machine, start_steps: Ints) -> Toolpath:
-    """The moves of the records of one packet, of a machine that stands `start_steps` (3,) steps
-    from part zero; ProgramError as `read_program`."""
+    """Return the moves of the records of one packet, of a machine that stands `start_steps`
+    (3,) steps from part zero; ProgramError as `read_program`."""
     stream = bytes([ACCESS]) + records + bytes([PACKET_END, DATA_END])
     return _toolpath(_read_packets(stream, machine.dialect), machine, start_steps)
 
 
 def decoded_records(data: bytes, machine: I8751Machine) -> Decoded:
-    """The records of a program in any of its three forms; ProgramError as `read_program`."""
+    """Return the records of a program in any of its three forms; ProgramError as
+    `read_program`."""
     dialect = machine.dialect
     if not data:
         raise ProgramError("the program is empty", mend="give a file of i8751 packets")
@@ -113,7 +114,8 @@ def _read_packets(data: bytes, dialect: I8751Dialect) -> Decoded:
 
 
 def _toolpath(decoded: Decoded, machine: I8751Machine, start_steps: Ints) -> Toolpath:
-    """Rows of all records, then END; the first begins `start_steps` (3,) steps from part zero."""
+    """Return rows of all records, then END; the first begins `start_steps` (3,) steps from part
+    zero."""
     dialect = machine.dialect
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
     x, y, z = (start_steps * step_mm).tolist()
@@ -162,7 +164,7 @@ def _kinds(ends: Ints, steps: Ints, slot: Ints, *, goes_below: bool) -> Ints:
 
 
 def _feeds(steps: Ints, step_mm: Floats, times: PulseTimes) -> list[Floats]:
-    """Feeds (R,) in X and Y, and in Z, mm/min; NaN where nothing moves."""
+    """Return feeds (R,) in X and Y, and in Z, mm/min; NaN where nothing moves."""
     travel_xy = np.hypot(*(steps[:, :2] * step_mm[:2]).T)
     travel_z = np.abs(steps[:, 2]) * step_mm[2]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -220,7 +222,7 @@ class PacketReader:
         """Count of the records of the packet read so far."""
 
     def read(self) -> Decoded:
-        """All records of the stream."""
+        """Return all records of the stream."""
         self._take_key()
         while True:
             self._records_in_a_row()
@@ -261,7 +263,7 @@ class PacketReader:
             check_count(self._records, "record")
 
     def _peek(self, expected: str) -> int:
-        """The byte here; a fault when there is none."""
+        """Return the byte here; a fault when there is none."""
         if self._at >= len(self._data):
             raise self._fault(self._at, f"the program breaks off: wanted {expected}")
         return self._data[self._at]
@@ -274,7 +276,7 @@ class PacketReader:
         self._at += 1
 
     def _refuse_record(self, byte: int) -> NoReturn:
-        """ByteFault at the first byte that keeps a record from being one."""
+        """Raise ByteFault at the first byte that keeps a record from being one."""
         if self._inside == RECORDS_PER_PACKET:
             raise self._fault(
                 self._at,
@@ -385,7 +387,7 @@ class ListingReader:
         self._line = 0
 
     def read(self, data: bytes) -> Decoded:
-        """All records of a listing."""
+        """Return all records of a listing."""
         check_count(_line_ends(data), "line")
         lines = text_lines(data)
         is_ended = False
@@ -490,7 +492,7 @@ class _Run(NamedTuple):
 
 
 def read_dump(data: bytes, dialect: I8751Dialect) -> Decoded:
-    """The records of a hex dump; ProgramError with record, byte, line and column."""
+    """Return the records of a hex dump; ProgramError with record, byte, line and column."""
     check_count(_line_ends(data) // LINES_OF_RECORD, "record")
     lines = text_lines(data)
     runs, stream = _runs(lines)
@@ -511,7 +513,7 @@ def read_dump(data: bytes, dialect: I8751Dialect) -> Decoded:
 
 
 def _runs(lines: list[str]) -> tuple[list[_Run], bytes]:
-    """The lines with bytes, and all bytes in order."""
+    """Return the lines with bytes, and all bytes in order."""
     runs: list[_Run] = []
     stream = bytearray()
     for number, line in enumerate(lines, 1):
@@ -558,7 +560,7 @@ def _line_error(number: int, line: str) -> ProgramError:
 
 
 def _place_by_offset(fault: ByteFault, runs: list[_Run], lines: list[str]) -> ProgramError:
-    """The fault of a byte with the line and column in which the byte stands."""
+    """Return the fault of a byte with the line and column in which the byte stands."""
     run = runs[bisect_right([run.offset for run in runs], fault.offset) - 1]
     inside = fault.offset - run.offset
     column = run.column
@@ -594,8 +596,8 @@ def _check_replies(runs: list[_Run], expected: list[str]) -> None:
 
 
 def text_lines(data: bytes) -> list[str]:
-    """The lines of a text without their ends (CR LF, LF or CR); ProgramError at the first byte
-    that is no printable ASCII."""
+    """Return the lines of a text without their ends (CR LF, LF or CR); ProgramError at the
+    first byte that is no printable ASCII."""
     odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
     if odd:
         lines = re.split(rb"\r\n|\n|\r", data[: odd.start()])

@@ -37,7 +37,7 @@ REFUSED: Final = {
 
 
 def check_toolpath(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect) -> None:
-    """PostError for the first row that this machine cannot do."""
+    """Raise PostError for the first row that this machine cannot do."""
     refuse_start(toolpath)
     _check_events(toolpath)
     _check_coordinates(toolpath, machine)
@@ -140,7 +140,8 @@ class Records(Struct, frozen=True, eq=False):
 
 
 def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect) -> Records:
-    """The records of a checked toolpath; PostError when it moves nothing, or far too much."""
+    """Return the records of a checked toolpath; PostError when it moves nothing, or far too
+    much."""
     counts = Counts()
     path, row = _lower(toolpath, slope_step_mm(machine), dialect, counts)
     deltas = np.diff(
@@ -195,7 +196,7 @@ def _lower(
 
 
 def _nearest_steps(toolpath: Toolpath, machine: I8751Machine) -> Ints:
-    """(N, 3) ends in whole steps, half away from zero."""
+    """Return (N, 3) ends in whole steps, half away from zero."""
     scaled = toolpath.end / np.array([axis.coded_step_mm for axis in machine.axes])
     return np.asarray((np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64))
 
@@ -203,7 +204,8 @@ def _nearest_steps(toolpath: Toolpath, machine: I8751Machine) -> Ints:
 def _cut_rows(
     toolpath: Toolpath, deltas: Ints, machine: I8751Machine, dialect: I8751Dialect, counts: Counts
 ) -> dict[int, Ints]:
-    """The rows that need more than one record, each with the steps (k, 3) of its records."""
+    """Return the rows that need more than one record, each with the steps (k, 3) of its
+    records."""
     xy = deltas[:, :2]
     # A step aside (`_with_x_steps`) comes on top.
     max_steps = dialect.most_steps - (1 if dialect.z_alone == "with-step" else 0)
@@ -229,7 +231,7 @@ def _cut_rows(
 
 
 def _refuse_too_many(each: Floats) -> None:
-    """PostError for rows (N,) that need about so many records, or more."""
+    """Raise PostError for rows (N,) that need about so many records, or more."""
     total = float(np.maximum(each, 1.0).sum())
     if total > MAX_RECORDS:
         raise PostError(
@@ -274,7 +276,7 @@ class _Plain(Struct, frozen=True, eq=False):
     counts: Counts
 
     def with_waits(self, row: Ints, first: Ints) -> Records:
-        """The records with waits, messages and end; `first` (N,) is the record of each row.
+        """Return the records with waits, messages and end; `first` (N,) is the record of each row.
 
         A wait follows in T2 of the record before it; what that cannot hold, or what comes before
         the first record, goes into records of their own that move nothing.
@@ -329,7 +331,7 @@ class _Plain(Struct, frozen=True, eq=False):
         )
 
     def _whole_seconds(self, index: int) -> int:
-        """A dwell rounded up: it is at least as long as wanted."""
+        """Return a dwell rounded up: it is at least as long as wanted."""
         seconds = float(self.lowered.value[index])
         self.counts.dwells_rounded += seconds != math.floor(seconds)
         return math.ceil(seconds)

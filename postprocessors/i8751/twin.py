@@ -155,7 +155,7 @@ class I8751Twin(Twin):
         self._execute(records)
 
     def _record(self) -> Generator[None, int, bytes]:
-        """A record whose first byte has come."""
+        """Yield a record whose first byte has come."""
         record = bytearray()
         for motor in (1, 2, 3):
             if motor > 1:

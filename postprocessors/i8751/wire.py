@@ -75,7 +75,8 @@ class I8751Wire(Wire):
     )
 
     def packets(self, data: bytes, machine: I8751Machine, forecast: Forecast) -> Sequence[Packet]:
-        """The packets of up to five records, the first with the key; then the end of the data."""
+        """Return the packets of up to five records, the first with the key; then the end of the
+        data."""
         packets, record = [], 0
         for part in _parts(stream_of(data, machine), machine):
             seconds = float(forecast.seconds[record : record + part.records].sum())
@@ -88,7 +89,7 @@ class I8751Wire(Wire):
     def conversation(
         self, packets: Sequence[Packet], machine: I8751Machine, manner: Manner
     ) -> I8751Conversation:
-        """The conversation that sends these packets."""
+        """Return the conversation that sends these packets."""
         if manner.home:
             raise MachineError(
                 "the controller homes at a reset alone",
@@ -108,8 +109,8 @@ class I8751Wire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> I8751Conversation:
-        """A jog is a program of its steps; the machine has one speed. To home is a program of
-        nothing, behind a reset."""
+        """Return a jog is a program of its steps; the machine has one speed. To home is a
+        program of nothing, behind a reset."""
         if action == "home":
             return self._homing(machine, manner)
         if action != "jog":
@@ -202,7 +203,7 @@ class _Part(Struct, frozen=True):
 
 
 def _parts(stream: bytes, machine: I8751Machine) -> Iterator[_Part]:
-    """The packets of a stream that its reader accepts, or that the writer has made."""
+    """Yield the packets of a stream that its reader accepts, or that the writer has made."""
     dialect: I8751Dialect = machine.dialect
     assert isinstance(machine.link, I8751Link)
     begin = offset = records = 0

@@ -95,7 +95,8 @@ BYTES_WIDTH: Final = 24
 
 
 def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be written or done."""
+    """Return the program of a toolpath; PostError names the move that cannot be written or
+    done."""
     dialect = machine.dialect
     check_toolpath(toolpath, machine, dialect)
     records = records_of(toolpath, machine, dialect)
@@ -125,7 +126,8 @@ def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
 
 
 def packet_bytes(steps: Ints, waits: Ints, dialect: I8751Dialect) -> bytes:
-    """The whole stream that the computer sends for records of steps (R, 3) and waits (R, 2)."""
+    """Return the whole stream that the computer sends for records of steps (R, 3) and waits (R,
+    2)."""
     parts = []
     for low in range(0, len(steps), RECORDS_AT_ONCE):
         rows = slice(low, low + RECORDS_AT_ONCE)
@@ -136,7 +138,8 @@ def packet_bytes(steps: Ints, waits: Ints, dialect: I8751Dialect) -> bytes:
 
 
 def byte_table(steps: Ints, waits: Ints, dialect: I8751Dialect) -> tuple[Bytes, Bools]:
-    """(R, COLUMNS) bytes of records of steps (R, 3) and waits (R, 2), and which are sent."""
+    """Return (R, COLUMNS) bytes of records of steps (R, 3) and waits (R, 2), and which are
+    sent."""
     count = len(steps)
     table = np.zeros((count, COLUMNS), dtype=np.uint8)
     is_used = np.ones((count, COLUMNS), dtype=np.bool_)
@@ -176,13 +179,13 @@ def decimals_of(machine: I8751Machine) -> int:
 
 
 def safe_text(text: str) -> str:
-    """A text from outside as part of a comment: printable ASCII, one line, short."""
+    """Return a text from outside as part of a comment: printable ASCII, one line, short."""
     cleaned = re.sub(r"[^A-Za-z0-9 _.,:+/#-]+", " ", text)
     return " ".join(cleaned.split())[:MAX_MESSAGE_CHARS]
 
 
 def listing_text(records: Records, machine: I8751Machine) -> str:
-    """The listing, one record a line, END last."""
+    """Return the listing, one record a line, END last."""
     step_x, step_y, step_z = (axis.coded_step_mm for axis in machine.axes)
     digits = decimals_of(machine)
     form = f"X%+.{digits}f Y%+.{digits}f T%d Z%+.{digits}f T%d"
@@ -199,7 +202,7 @@ def listing_text(records: Records, machine: I8751Machine) -> str:
 
 
 def dump_text(records: Records, machine: I8751Machine, dialect: I8751Dialect) -> str:
-    """The hex dump of the packets: offset, bytes, meaning, expected replies."""
+    """Return the hex dump of the packets: offset, bytes, meaning, expected replies."""
     lines = ["; i8751 packets: offset, bytes, meaning <- expected replies"]
     offset = 0
     for data, meaning in _Dump(records, machine, dialect).parts():
@@ -224,7 +227,7 @@ class _Dump:
         self._table, self._used = byte_table(records.steps, records.waits, dialect)
 
     def parts(self) -> Iterator[tuple[bytes, str]]:
-        """All runs in order."""
+        """Yield all runs in order."""
         messages = list(self._records.messages)
         rows = [bytes(row) for row in self._table]
         for record, (row, steps) in enumerate(

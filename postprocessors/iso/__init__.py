@@ -49,13 +49,13 @@ class Iso(Target):
         return machine.target.grade or ("path only" if planner is None else planner.grade)
 
     def stray_mm(self, machine: IsoMachine) -> float:
-        """The distance that lines may have from the arcs that they replace."""
+        """Return the distance that lines may have from the arcs that they replace."""
         arcs = machine.dialect.arcs
         replaced = arcs.form == "chords" or not arcs.helices
         return machine.defaults.fit_tolerance_mm if replaced else 0.0
 
     def unit_mm(self, machine: IsoMachine, axis: Axis) -> float:
-        """The last decimal of a coordinate."""
+        """Return the last decimal of a coordinate."""
         return machine.dialect.last_decimal_mm
 
 

@@ -85,7 +85,8 @@ def model_of(machine: AnyMachine) -> ControllerModel[Any, Any]:
 
 
 def seconds_of(toolpath: Toolpath, machine: AnyMachine) -> Floats | None:
-    """(N,) s that the controller takes for each row; None where nobody knows, or nobody asks."""
+    """Return (N,) s that the controller takes for each row; None where nobody knows, or nobody
+    asks."""
     if machine.dialect.comments.show in ("none", "header"):
         return None
     with suppress(CamtoolError):

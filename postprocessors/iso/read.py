@@ -97,7 +97,7 @@ Point = tuple[float, float, float]
 
 
 def read_program(data: bytes, machine: IsoMachine) -> Toolpath:
-    """The moves of a program; ProgramError with block, line and column."""
+    """Return the moves of a program; ProgramError with block, line and column."""
     return _Reader(machine).read(data)
 
 
@@ -779,13 +779,14 @@ class _Execution:
 
 
 def _agree(event: EventPattern, texts: list[str]) -> bool:
-    """True if fields of the same name, such as the tool and its length, have the same text."""
+    """Return True if fields of the same name, such as the tool and its length, have the same
+    text."""
     pairs = {(name, text) for (name, _), text in zip(event.fields, texts, strict=True)}
     return len(pairs) == len({name for name, _ in pairs})
 
 
 def _is_known(word: _Word, cycles: dict[int, CycleWords]) -> bool:
-    """True if a code means something by itself."""
+    """Return True if a code means something by itself."""
     if word.letter == "M":
         return word.value in KNOWN_M
     code = round(word.value * 10.0)

@@ -75,7 +75,7 @@ _EVENT_KEYS: Final = {
 
 
 def write_program(toolpath: Toolpath, machine: IsoMachine) -> Program:
-    """The program; PostError names the move that cannot be written or done."""
+    """Return the program; PostError names the move that cannot be written or done."""
     check(toolpath, machine)
     form = TextForm(machine)
     dialect, unit = machine.dialect, machine.dialect.unit
@@ -153,7 +153,7 @@ def write_program(toolpath: Toolpath, machine: IsoMachine) -> Program:
 
 
 def _lowered(toolpath: Toolpath, machine: IsoMachine) -> tuple[LoweredToolpath, list[Finding]]:
-    """Arcs that the dialect does not have as lines, and long ones in parts."""
+    """Return arcs that the dialect does not have as lines, and long ones in parts."""
     rules = machine.dialect.arcs
     same = LoweredToolpath(toolpath, np.arange(len(toolpath)))
     is_arc = toolpath.is_arc
@@ -292,7 +292,7 @@ def _texts(column: WordColumn) -> list[str]:
 
 
 def _columns(sent: Sent, path: Toolpath, machine: IsoMachine, form: TextForm) -> list[WordColumn]:
-    """The words of the motions among the rows."""
+    """Return the words of the motions among the rows."""
     dialect, motion = machine.dialect, sent.is_motion
     rows = np.flatnonzero(motion)
     turns = np.zeros(len(motion), dtype=np.bool_)
@@ -344,8 +344,8 @@ def _centre_words(
 
 
 def _feeds(path: Toolpath, machine: IsoMachine) -> tuple[Ints, list[Finding]]:
-    """(N,) feeds in whole units of the F word, 0 where none; those of inverse times are of each
-    minute, and `_inverse_times` makes them."""
+    """Return (N,) feeds in whole units of the F word, 0 where none; those of inverse times are
+    of each minute, and `_inverse_times` makes them."""
     feeds = machine.dialect.feeds
     if feeds.mode == "inverse-time":
         return np.where(path.is_feed, 1, 0).astype(np.int64), []
@@ -375,7 +375,7 @@ def _refuse_none(path: Toolpath, is_bad: Bools) -> None:
 
 
 def _speeds(path: Toolpath) -> Floats:
-    """(N,) rev/min in force at each row; 0 where the spindle stands."""
+    """Return (N,) rev/min in force at each row; 0 where the spindle stands."""
     kinds = (Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.SPINDLE_OFF)
     switched = np.isin(path.kind, kinds)
     values = np.where(path.kind == Kind.SPINDLE_OFF, 0.0, path.value)
@@ -384,7 +384,7 @@ def _speeds(path: Toolpath) -> Floats:
 
 
 def _inverse_times(sent: Sent, path: Toolpath, machine: IsoMachine, form: TextForm) -> Ints:
-    """(M,) the feed over the length of each cut, 1/min, in units of the F word."""
+    """Return (M,) the feed over the length of each cut, 1/min, in units of the F word."""
     unit = 10.0**-form.decimals
     start = np.concatenate([units_of(path.start, form.decimals)[None, :], sent.end[:-1]])
     travel = (sent.end - start) * unit
@@ -455,7 +455,8 @@ class _EventWords:
             raise event.refuse(f"a {event.kind.name} without a value of 0 or more")
 
     def _spindle(self, event: Event, templates: Sequence[str]) -> list[str]:
-        """The blocks that start the spindle; without a speed those words that do not say it."""
+        """Return the blocks that start the spindle; without a speed those words that do not say
+        it."""
         if math.isnan(event.value):
             blocks_without = [_without_fields(template) for template in templates]
             if any("{" in template for template in blocks_without):
@@ -493,7 +494,7 @@ def _without_fields(template: str) -> str:
 
 
 def _head(form: TextForm, dialect: IsoDialect) -> tuple[list[str], list[str]]:
-    """The blocks of the head, and its lines that are no blocks."""
+    """Return the blocks of the head, and its lines that are no blocks."""
     lines = [form.frame_line(template) for template in dialect.program.head]
     names = [line for line in lines if _UNNAMED_LINE.match(line)]
     return [line for line in lines if not _UNNAMED_LINE.match(line)], names
@@ -518,7 +519,7 @@ def _footer(path: Toolpath, form: TextForm, dialect: IsoDialect, *, spindle_on: 
 
 
 def _measures_lengths(dialect: IsoDialect) -> bool:
-    """True if the length of a tool counts from its change on."""
+    """Return True if the length of a tool counts from its change on."""
     return dialect.events.first_tool == "program" and any(
         "G43" in template for template in dialect.events.tool_change
     )
@@ -570,7 +571,7 @@ class _Remarks:
 
 
 def _holes(path: Toolpath, dialect: IsoDialect) -> list[CycleHole]:
-    """The holes that the dialect has a cycle for."""
+    """Return the holes that the dialect has a cycle for."""
     if not dialect.cycles.use:
         return []
     return [hole for hole in holes_of(path) if _template(hole, dialect)]
@@ -590,8 +591,8 @@ def _constant(text: str) -> Callable[[str], str]:
 def _cycle_blocks(
     holes: Sequence[CycleHole], feeds: Ints, machine: IsoMachine, form: TextForm
 ) -> dict[int, Sequence[str]]:
-    """The blocks of each hole by its first row at a feed. Holes that follow each other and look
-    alike are one cycle with several places."""
+    """Return the blocks of each hole by its first row at a feed. Holes that follow each other
+    and look alike are one cycle with several places."""
     cycles = machine.dialect.cycles
     unit = 10.0**-form.decimals
     bites = np.array([hole.bite or 0.0 for hole in holes])

@@ -52,7 +52,8 @@ class Linuxcnc(Target):
             check_blocks(machine, partial(self.read, machine=machine))
 
     def read(self, data: bytes, machine: LinuxcncMachine) -> Toolpath:
-        """The moves as the controller decodes them; ProgramError with block, line and column."""
+        """Return the moves as the controller decodes them; ProgramError with block, line and
+        column."""
         return self.read_in(data, machine, None)
 
     def read_in(self, data: bytes, machine: LinuxcncMachine, folder: Path | None) -> Toolpath:
@@ -70,13 +71,13 @@ class Linuxcnc(Target):
         )
 
     def twin_kind(self) -> TwinKind:
-        """The virtual controller; docs/wires/linuxcnc.md."""
+        """Return the virtual controller; docs/wires/linuxcnc.md."""
         from .twin import LinuxcncTwin, LinuxcncTwinSettings
 
         return TwinKind(LinuxcncTwinSettings, LinuxcncTwin)
 
     def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
-        """The last decimal of a coordinate."""
+        """Return the last decimal of a coordinate."""
         return last_decimal_mm(machine.dialect)
 
 

@@ -90,7 +90,7 @@ class Compensation:
     # Moves; each gives where the cutter's centre comes to stand
 
     def line(self, kind: Kind, target: list[float], centre: list[float]) -> list[float]:
-        """A straight move to a programmed point, from where the centre stands."""
+        """Return a straight move to a programmed point, from where the centre stands."""
         return (self._entry_line if self.first else self._line)(kind, target, centre)
 
     def _entry_line(self, kind: Kind, target: list[float], centre: list[float]) -> list[float]:
@@ -184,7 +184,7 @@ class Compensation:
         return cx + old * math.cos(angle), cy + old * math.sin(angle)
 
     def arc(self, arc: ProgrammedArc, centre: list[float], spread: float) -> list[float]:
-        """An arc, from where the centre stands."""
+        """Return an arc, from where the centre stands."""
         return self._entry_arc(arc, centre, spread) if self.first else self._arc(arc, centre)
 
     def _entry_arc(self, arc: ProgrammedArc, centre: list[float], spread: float) -> list[float]:
@@ -330,7 +330,7 @@ class Compensation:
 
 
 def sweep_of(start: Flat, centre: Flat, turn: int, end: Flat) -> float:
-    """Signed sweep of an arc, rad, full turns included; positive counter-clockwise."""
+    """Return the signed sweep of an arc, rad, full turns included; positive counter-clockwise."""
     alpha = math.atan2(start[1] - centre[1], start[0] - centre[0])
     beta = math.atan2(end[1] - centre[1], end[0] - centre[0])
     if turn > 0:

@@ -199,7 +199,7 @@ class LatheContour:
         self.segments = [segments[0]] + [each for each in segments[1:] if each.size >= SHORT]
 
     def check_monotonic(self) -> None:
-        """Fault where Z rises along the contour."""
+        """Raise Fault where Z rises along the contour."""
         first = self.segments[0]
         if (first.end - first.start).real > 0.0:
             first.start = complex(first.end.real, first.start.imag)

@@ -89,7 +89,7 @@ class LinuxcncModel(SampledModel[LinuxcncController, LinuxcncDialect]):
     samples_per_speed = 1
 
     def speed_period_s(self, machine: _Machine) -> float:
-        """The period in which its trajectory planner runs."""
+        """Return the period in which its trajectory planner runs."""
         return machine.controller.servo_period_s
 
     def sampled(self, path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
@@ -97,7 +97,7 @@ class LinuxcncModel(SampledModel[LinuxcncController, LinuxcncDialect]):
         return _rows_to_end(path, machine)
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
-        """A coded step, or what a million samples of the whole program allow."""
+        """Return a coded step, or what a million samples of the whole program allow."""
         return sample_spacing_mm(toolpath, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
@@ -153,7 +153,7 @@ class _Run:
     """
 
     def __init__(self, path: Toolpath, machine: _Machine) -> None:
-        """MachineError for missing limits."""
+        """Raise MachineError for missing limits."""
         self._path, self._machine = path, machine
         self._rules = _rules(_modes(path, machine), machine)
         self._begins, length = begins_of(path, self._rules.modes)
@@ -162,7 +162,7 @@ class _Run:
         self._passed_mm = 0.0, 0.0  # before the rows of a block: by rows, and by moves
 
     def blocks(self) -> Iterator[SampledRows]:
-        """All rows."""
+        """Yield all rows."""
         first_places = 2 * np.arange(0, len(self._path), ROWS_AT_ONCE)
         first = sorted(
             {self._move_at_row(int(k)) for k in np.searchsorted(self._begins, first_places)}
@@ -178,7 +178,7 @@ class _Run:
         return move
 
     def _block(self, low: int, high: int) -> SampledRows:
-        """The rows of the moves low:high."""
+        """Return the rows of the moves low:high."""
         base, rows = self._place(low - MOVES_BEFORE), 2 * len(self._path)
         before = min(low, MOVES_BEFORE)
         own_moves = slice(before, before + high - low)
@@ -232,9 +232,9 @@ class _Run:
         overlaps_and_cuts: tuple[Floats, Bools],
         done_count: int,
     ) -> Floats:
-        """(N,) s of each block, less its overlap (N,) with the next; from rest to rest it takes
-        whole servo periods, and `REST_PERIODS`. Short ones of the cuts (N,) change their speed
-        evenly. The next plan begins behind the first `done_count` of these."""
+        """Return (N,) s of each block, less its overlap (N,) with the next; from rest to rest
+        it takes whole servo periods, and `REST_PERIODS`. Short ones of the cuts (N,) change
+        their speed evenly. The next plan begins behind the first `done_count` of these."""
         overlaps, cuts = overlaps_and_cuts
         period_s = self._machine.controller.servo_period_s
         seconds = plan.seconds(squares)
@@ -292,23 +292,23 @@ class LinuxcncSamples(CountedSamples):
             )
 
     def passed_mm(self, move: int) -> tuple[float, float]:
-        """The lengths of all rows, and of all moves, before a move."""
+        """Return the lengths of all rows, and of all moves, before a move."""
         row = self._row[move] if len(self._row) else 0
         return float(self._by_rows[row]), float(self._by_moves[move])
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Row and position of the samples low:high."""
+        """Return the row and position of the samples low:high."""
         row, points = super().window(low, high)
         return self._origin[row], points
 
     def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
-        """(K,) s from the starts of their rows to the samples low:high."""
+        """Return (K,) s from the starts of their rows to the samples low:high."""
         row, share = self.places(low, high)
         along = self._into[row] + share * self._row_length[row]
         return self._profile.moments_s(row, self._into[row], along)
 
     def points(self, row: Ints, share: Floats) -> Floats:
-        """(K, 3) mm: the points at shares (K,) of the ways of rows (K,), blended."""
+        """Return (K, 3) mm: the points at shares (K,) of the ways of rows (K,), blended."""
         points = super().points(row, share)
         if self._blends is not None:
             self._blends.put(row, share, points)
@@ -336,9 +336,9 @@ def _corner_columns(corners: PlannerCorners) -> Floats:
 def _speeds(
     window_plan: PlannedWindow, places: slice, rules: CornerRules, before: EntryState
 ) -> tuple[Bools, SpeedPlan]:
-    """Blends and moves as blocks of their own. At even places of all (2 M,) stands the blend
-    before a move, then the move: which of them last and lie in `places`, and these. A line that
-    joins the blend at its end is no block of its own. No block is faster than its length in
+    """Return blends and moves as blocks of their own. At even places of all (2 M,) stands the
+    blend before a move, then the move: which of them last and lie in `places`, and these. A line
+    that joins the blend at its end is no block of its own. No block is faster than its length in
     `MIN_PERIODS` (`tpComputeOptimalVelocity`).
 
     In the mode "blend" the last move before a wait accelerates by half: it was kept ready for a
@@ -403,8 +403,8 @@ class _Profile(Struct, frozen=True, eq=False):
         squares: Floats,
         lasting: Bools,
     ) -> _Profile:
-        """The times with what each blend and move takes, `part_seconds` (2 M + 1,); `lasting`
-        (2 M,): those that are blocks of the plan."""
+        """Return the times with what each blend and move takes, `part_seconds` (2 M + 1,);
+        `lasting` (2 M,): those that are blocks of the plan."""
         begin_s, end_s = _blend_seconds(window_plan, part_seconds)
         own_s = part_seconds[1::2]
         path, moves = window_plan.tangents.path, window_plan.moves
@@ -419,8 +419,8 @@ class _Profile(Struct, frozen=True, eq=False):
         return cls(window_plan, begin_s, own_s, end_s, rows_s, origin_s, plan, squares, block)
 
     def moments_s(self, row: Ints, into: Floats, along: Floats) -> Floats:
-        """(K,) s from the starts of the program's rows to `along` (K,) mm of the moves of rows
-        (K,) of the path, which begin `into` (K,) mm of these."""
+        """Return (K,) s from the starts of the program's rows to `along` (K,) mm of the moves
+        of rows (K,) of the path, which begin `into` (K,) mm of these."""
         moves, corners = self.window_plan.moves, self.window_plan.corners
         move = moves.row_of[row]
         reach, length = np.append(corners.reach, 0.0), moves.length[move]
@@ -464,15 +464,15 @@ class _Profile(Struct, frozen=True, eq=False):
 
 
 def _part_of(reached: Floats, length: Floats) -> Floats:
-    """(K,) the part 0 … 1 of `length` (K,) that `reached` (K,) is; 1 of nothing."""
+    """Return (K,) the part 0 … 1 of `length` (K,) that `reached` (K,) is; 1 of nothing."""
     parts = np.ones(len(length))
     np.divide(reached, length, out=parts, where=length > 0.0)
     return np.clip(parts, 0.0, 1.0)
 
 
 def _blend_seconds(window_plan: PlannedWindow, part_seconds: Floats) -> tuple[Floats, Floats]:
-    """(M,), (M,) s of the blends at the start and at the end of each move, with what each blend
-    and move takes, `part_seconds` (2 M + 1,).
+    """Return (M,), (M,) s of the blends at the start and at the end of each move, with what each
+    blend and move takes, `part_seconds` (2 M + 1,).
 
     Half of a blend belongs to the row on either side, and a line that joins it to the row before;
     the rows of a merged line share its time by their lengths.
@@ -488,7 +488,7 @@ def _blend_seconds(window_plan: PlannedWindow, part_seconds: Floats) -> tuple[Fl
 
 
 def _in_turns(blends: Floats | float, moves: Floats) -> Floats:
-    """(2 M,) of the blends before moves (M,), and of the moves."""
+    """Return (2 M,) of the blends before moves (M,), and of the moves."""
     values = np.empty(2 * len(moves))
     values[0::2], values[1::2] = blends, moves
     return values
@@ -523,19 +523,19 @@ class CornerModes(Struct, frozen=True, eq=False):
     table: Floats
 
     def blend(self, mode: Ints) -> Bools:
-        """(K,) whether the corners behind moves of a mode (K,) are blended."""
+        """Return (K,) whether the corners behind moves of a mode (K,) are blended."""
         return np.asarray(self.table[:, 0][mode] > 0.0)
 
     def stop(self, mode: Ints) -> Bools:
-        """(K,) whether they are met with a stop."""
+        """Return (K,) whether they are met with a stop."""
         return np.asarray(self.table[:, 1][mode] > 0.0)
 
     def tolerance_mm(self, mode: Ints) -> Floats:
-        """(K,) how far blends may leave them; inf: as far as the moves allow."""
+        """Return (K,) how far blends may leave them; inf: as far as the moves allow."""
         return np.asarray(self.table[:, 2][mode])
 
     def merging_mm(self, mode: Ints) -> Floats:
-        """(K,) within which lines are merged; 0: never."""
+        """Return (K,) within which lines are merged; 0: never."""
         return np.asarray(self.table[:, 3][mode])
 
 
@@ -628,8 +628,8 @@ def halve_arcs(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
 
 
 def merge_rows(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
-    """The rows with the ends of merged lines on their common line, and the line of each row (N,);
-    `tolerance_mm` (N,) of each row, 0: it is not merged.
+    """Return the rows with the ends of merged lines on their common line, and the line of each row
+    (N,); `tolerance_mm` (N,) of each row, 0: it is not merged.
 
     Only feed moves with one feed and one path mode, and nothing but moves of no length between
     them, are merged; any event, an MSG comment too, ends a line.
@@ -649,8 +649,8 @@ def merge_rows(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
 
 
 def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
-    """The places where moves begin (M,), the first at 0, and the length of each row with its end
-    where `merge_rows` leaves it (N,)."""
+    """Return the places where moves begin (M,), the first at 0, and the length of each row with
+    its end where `merge_rows` leaves it (N,)."""
     length, begins = np.zeros(len(path)), [np.zeros(1, dtype=np.int32)]
     low, end = 0, 2 * len(path)
     at_once = max(ROWS_AT_ONCE, MAX_CHAIN_POINTS + 2)  # more than one line has
@@ -704,9 +704,9 @@ class PlannerMoves(Struct, frozen=True, eq=False):
         return np.append(self.waits[1:], np.ones(min(len(self.waits), 1), dtype=np.bool_))
 
     def tangential(self, indices: Ints, overall: Floats) -> tuple[Floats, Floats]:
-        """(K,) mm/s² along moves (K,) that accelerate by `overall` (K,) in all, and (K,) mm/s, the
-        highest speed with that: what turning at it leaves, where that is more than half, else
-        half (`pmCircleActualMaxVel`)."""
+        """Return (K,) mm/s² along moves (K,) that accelerate by `overall` (K,) in all, and (K,)
+        mm/s, the highest speed with that: what turning at it leaves, where that is more than
+        half, else half (`pmCircleActualMaxVel`)."""
         bend, part = self.bend[indices], NORMAL_RATIO * overall
         steep = bend > part
         tangent_share = np.sqrt(np.maximum(1.0 - (bend / overall) ** 2, 0.0))
@@ -717,7 +717,7 @@ class PlannerMoves(Struct, frozen=True, eq=False):
 
 
 def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> PlannerMoves:
-    """The moves of merged rows."""
+    """Return the moves of merged rows."""
     path, period_s = tangents.path, rules.period_s
     row_length = move_lengths(path)
     length: Floats = np.bincount(chain, row_length, minlength=len(path)).astype(np.float64)
@@ -754,7 +754,7 @@ class Tangents:
         self.arms = PolarArcs(path, path.is_arc)
 
     def arm_of(self, arcs: Ints) -> Ints:
-        """(J,) the index in `arms` of rows that are arcs."""
+        """Return (J,) the index in `arms` of rows that are arcs."""
         return np.searchsorted(self.arms.row, arcs)
 
     def at_starts(self, rows: Ints) -> Floats:
@@ -767,8 +767,9 @@ class Tangents:
         return self._at(rows, self.arms.end_radius, 1.0, level=level)
 
     def pushed_at_starts(self, rows: Ints, acceleration: Floats, speed: Floats) -> Floats:
-        """(K, 3) unit vectors of what accelerates a tool at the starts of rows (K,): along lines,
-        and of arcs along and inward, at accelerations (K,) and half of speeds (K,)."""
+        """Return (K, 3) unit vectors of what accelerates a tool at the starts of rows (K,):
+        along lines, and of arcs along and inward, at accelerations (K,) and half of speeds
+        (K,)."""
         push = self._at(rows, self.arms.radius, 0.0, level=True)
         arcs = np.flatnonzero(are_arcs(self.path.kind[rows]))
         arm = self.arm_of(rows[arcs])
@@ -798,7 +799,8 @@ class Tangents:
 def _arc_limits(
     arms: PolarArcs, arm: Ints, length: Floats, limits: tuple[Floats, Floats]
 ) -> tuple[Floats, Floats, Floats]:
-    """Highest speed of arcs, their acceleration, and how much of it turns them at that speed."""
+    """Return the highest speed of arcs, their acceleration, and how much of it turns them at
+    that speed."""
     rate, acceleration = limits
     v_xy, a_xy = rate[:2].min(), acceleration[:2].min()
     r, r_end, sweep = arms.radius[arm], arms.end_radius[arm], np.abs(arms.sweep[arm])
@@ -816,14 +818,15 @@ def _arc_limits(
 
 
 def _covered_share(x: Floats, ramp: Floats) -> Floats:
-    """Fraction of its length that the second of two overlapping moves has covered after the
-    fraction x of the time, if it accelerates during the first fraction `ramp`."""
+    """Return the fraction of its length that the second of two overlapping moves has covered
+    after the fraction x of the time, if it accelerates during the first fraction `ramp`."""
     return np.where(x < ramp, x**2 / (2.0 * ramp), x - 0.5 * ramp) / (1.0 - 0.5 * ramp)
 
 
 def _turn_of(before: Floats, after: Floats, ramp: Floats) -> Floats:
-    """(M,) the part x of the time of an overlap at which the first move lacks as much as the
-    second has gone: there the tool is nearest to the corner, and one ends and the other begins.
+    """Return (M,) the part x of the time of an overlap at which the first move lacks as much as
+    the second has gone: there the tool is nearest to the corner, and one ends and the other
+    begins.
 
     (1 − x)² before falls, and gone(x) behind grows, so that they meet once: by bisection. 0.5
     where nothing overlaps.
@@ -842,9 +845,10 @@ TURN_ROUNDS = 40
 
 
 def _turning_radius(r: Floats, growth: Floats, rise: Floats) -> Floats:
-    """The radius by which the planner bounds the speed of arcs of radius r at their start, which
-    grow by `growth` a radian (`pmCircleEffectiveMinRadius`, blendmath.c). It takes the whole rise
-    for that of a radian, so that helices may be faster than their curvature says."""
+    """Return the radius by which the planner bounds the speed of arcs of radius r at their
+    start, which grow by `growth` a radian (`pmCircleEffectiveMinRadius`, blendmath.c). It takes
+    the whole rise for that of a radian, so that helices may be faster than their curvature
+    says."""
     inner = growth**2 + r**2
     spiral = inner**1.5 / (inner + growth**2)
     return np.asarray(spiral + rise**2 / spiral)
@@ -997,9 +1001,9 @@ def _meet(
     joinable: Bools,
     rules: CornerRules,
 ) -> PlannerCorners:
-    """All corners, where blends at the starts of moves use so much (M,) mm of them. Lines that
-    overlap with the move before, or wait for the spindle behind a rapid, are not `joinable` (M,)
-    (`tcCanConsume`)."""
+    """Return all corners, where blends at the starts of moves use so much (M,) mm of them.
+    Lines that overlap with the move before, or wait for the spindle behind a rapid, are not
+    `joinable` (M,) (`tcCanConsume`)."""
     count = len(moves.length)
     zeros = [np.zeros(count) for _ in range(10)]
     corners = PlannerCorners(
@@ -1105,8 +1109,9 @@ def _overlaps(
 def _worth(
     moves: PlannerMoves, tangents: Tangents, rows: Ints, used_mm: Floats, rules: CornerRules
 ) -> Floats:
-    """(K,) mm/s that the planner thinks an overlap is worth, before it knows the next corner: half
-    of each move may be gone by then, bends take their part, and arcs keep half for turning."""
+    """Return (K,) mm/s that the planner thinks an overlap is worth, before it knows the next
+    corner: half of each move may be gone by then, bends take their part, and arcs keep half for
+    turning."""
     rates = [
         LAST_PART * (1.0 - rules.kink_ratio) * moves.acceleration[k]
         * np.where(moves.is_arc[k], TANGENT_RATIO, 1.0)
@@ -1162,8 +1167,8 @@ def _rounds(
     planar: Floats,
     rules: CornerRules,
 ) -> _Rounds:
-    """The blends at the corners `rows` (K,) in planes of the unit normals (K, 3), which use at
-    most `longest` (K,) mm of either move; `planar` (K,) mm/s: no faster than that, or than the
+    """Return the blends at the corners `rows` (K,) in planes of the unit normals (K, 3), which use
+    at most `longest` (K,) mm of either move; `planar` (K,) mm/s: no faster than that, or than the
     axes in that plane, whichever is more (`blendParamKinematics`, `blendComputeParameters`).
 
     In the plane no axis exceeds its limit when the whole is limited to min(limit / √(1 − m²)).
@@ -1295,7 +1300,7 @@ def _side(
     *,
     ends: bool,
 ) -> _Side:
-    """The moves `rows` (K,) at corners (K,), which end there, or begin."""
+    """Return the moves `rows` (K,) at corners (K,), which end there, or begin."""
     is_arc, arms = moves.is_arc[rows], tangents.arms
     arcs = np.flatnonzero(is_arc)
     arm = tangents.arm_of(moves.row[rows[arcs]])
@@ -1397,8 +1402,8 @@ def _round_arcs(
 def _centre_of(
     corner: Floats, side_sign: Floats, radius: Floats, first: _Side, last: _Side
 ) -> Floats:
-    """(K,) the centres of circles of a radius (K,) that touch both sides, those nearest to the
-    corners; NaN where there are none."""
+    """Return (K,) the centres of circles of a radius (K,) that touch both sides, those nearest
+    to the corners; NaN where there are none."""
     distance = [side.sign * radius + side.radius for side in (first, last)]
     # A line and an arc: at `radius` beside the line, `distance` from the arc's centre.
     line_first = ~first.is_arc
@@ -1424,12 +1429,12 @@ def _centre_of(
 
 
 def _angle_between(one: Floats, other: Floats) -> Floats:
-    """(K,) rad between vectors (K, 3)."""
+    """Return (K,) rad between vectors (K, 3)."""
     across = np.linalg.norm(np.cross(one, other), axis=-1)
     return np.asarray(np.arctan2(across, (one * other).sum(axis=-1)))
 
 
 def _unit(vectors: Floats) -> Floats:
-    """(M, 3) of length 1; vectors of none stay."""
+    """Return (M, 3) of length 1; vectors of none stay."""
     length = np.linalg.norm(vectors, axis=1)
     return np.asarray(vectors / np.where(length > 0.0, length, 1.0)[:, None])

@@ -118,7 +118,7 @@ def _series_words(machine: InterpreterState) -> dict[str, float]:
 def _word(
     words: dict[str, float], inherited: dict[str, float], letter: str, name: str, key: str = ""
 ) -> float:
-    """The number of a word, or of the last block that had it."""
+    """Return the number of a word, or of the last block that had it."""
     value = words.get(letter, inherited.get(key or letter))
     if value is None:
         raise LineFault(f"a cycle without {name}", "g", f"write {letter.upper()}")
@@ -149,7 +149,7 @@ def _polar_step(place: list[float], radius: float, angle: float) -> None:
 def _bound(
     machine: InterpreterState, times: int, hole: _Hole, motion: int, inherited: dict[str, float]
 ) -> None:
-    """Fault where the holes would be more moves than a program may have."""
+    """Raise Fault where the holes would be more moves than a program may have."""
     pecks = 1.0
     if motion in WANTS_PECK:
         pecks = max((hole.r - hole.bottom) / inherited["q"], 1.0)

@@ -46,7 +46,7 @@ class Scanner:
         self._depth = 0
 
     def value(self) -> Value:
-        """A number, an expression, a parameter or a function."""
+        """Return a number, an expression, a parameter or a function."""
         text, begin = self.text, self.at
         sign, after = text[begin : begin + 1], text[begin + 1 : begin + 2]
         if sign == "[":
@@ -67,7 +67,7 @@ class Scanner:
         return self.number()
 
     def number(self) -> float:
-        """A plain number."""
+        """Return a plain number."""
         match = NUMBER.match(self.text, self.at)
         assert match is not None  # it matches nothing too
         text = match[0]
@@ -191,7 +191,7 @@ def evaluate(value: Value, parameters: Parameters) -> float:
 
 
 def finite(value: float, column: int) -> float:
-    """The number; Fault for one that is none."""
+    """Return the number; Fault for one that is none."""
     if value - value != 0.0:
         raise LineFault("the result of a calculation is no number", column)
     return value
@@ -208,7 +208,7 @@ def whole_number(value: float, column: int) -> int:
 
 
 def check_index(index: int, column: int) -> int:
-    """The number of a parameter; Fault where there is none of it."""
+    """Return the number of a parameter; Fault where there is none of it."""
     if not 1 <= index < MAX_PARAMETERS:
         raise LineFault(f"there is no parameter #{index} (1 to {MAX_PARAMETERS - 1})", column)
     return index

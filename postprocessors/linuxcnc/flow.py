@@ -135,7 +135,7 @@ class Flow:
     # Reading
 
     def step(self, within: int = 0) -> ParsedLine | None:
-        """The next line of words; None at the % that ends the program, and behind an O word
+        """Return the next line of words; None at the % that ends the program, and behind an O word
         that leaves fewer than `within` calls under way."""
         while True:
             if self.at >= self.text.count:
@@ -216,7 +216,7 @@ class Flow:
         return program_calls[-1].line if program_calls else 0
 
     def fail(self, fault: LineFault) -> NoReturn:
-        """ProgramError with the place of the line that was read last."""
+        """Raise ProgramError with the place of the line that was read last."""
         text, number = self.here.text, min(self.here.line, max(self.here.text.count - 1, 0))
         begin, end = int(text.begins[number]), None
         if number + 1 < len(text.begins):
@@ -254,8 +254,8 @@ class Flow:
     # O words
 
     def _is_of_flow(self, line: ParsedLine) -> bool:
-        """True if the O word, M98 or M99 at the start of the line changes the flow. M99 of the
-        program itself does not; it ends the program."""
+        """Return True if the O word, M98 or M99 at the start of the line changes the flow. M99
+        of the program itself does not; it ends the program."""
         assert line.flow is not None
         return not line.text.startswith("m99", line.flow) or self.level > 0
 
@@ -567,7 +567,7 @@ class Flow:
 
 
 def _word_of(line: ParsedLine) -> _Word:
-    """The O word, M98 or M99 with which a line begins."""
+    """Return the O word, M98 or M99 with which a line begins."""
     text, begin = line.text, line.flow
     assert begin is not None
     if text[begin] == "m":
@@ -602,7 +602,7 @@ def _word_of(line: ParsedLine) -> _Word:
 
 
 def _check_rest(line: ParsedLine, word: _Word) -> None:
-    """Fault where more than comments stands behind an O word."""
+    """Raise Fault where more than comments stands behind an O word."""
     position = word.rest
     while position < len(line.text) and line.text[position] != ";":
         if line.text[position] != "(":

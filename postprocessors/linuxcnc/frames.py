@@ -50,7 +50,7 @@ class FrameCodes(InterpreterState, ABC):
 
     @abstractmethod
     def _names(self) -> dict[str, Callable[[], float]]:
-        """The names by which expressions ask for the state."""
+        """Return the names by which expressions ask for the state."""
 
     def _known_parameters(self) -> dict[int, float]:
         """Return the parameters that the machine has stored, in its units: frames, homes,
@@ -107,13 +107,13 @@ class FrameCodes(InterpreterState, ABC):
         self.canon.set_frame(ProgramFrame((x, y, z), self._rotation, (dx, dy, dz)))
 
     def _on_machine(self) -> list[float]:
-        """The position of the tip on the machine, without the tool's length."""
+        """Return the position of the tip on the machine, without the tool's length."""
         x, y, z = (a + b for a, b in zip(self.position, self._axis_offset, strict=True))
         x, y = rotate(x, y, self._rotation)
         return [a + b for a, b in zip((x, y, z), self._origin, strict=True)]
 
     def _in_frame(self, place: list[float]) -> list[float]:
-        """A place on the machine in coordinates of the program."""
+        """Return a place on the machine in coordinates of the program."""
         x, y, z = (a - b for a, b in zip(place, self._origin, strict=True))
         x, y = rotate(x, y, -self._rotation)
         return [a - b for a, b in zip((x, y, z), self._axis_offset, strict=True)]

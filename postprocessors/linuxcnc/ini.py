@@ -51,17 +51,18 @@ class _Ini:
                 self.entries.setdefault((section, entry[1].upper()), (entry[2].strip(), line))
 
     def text(self, section: str, key: str) -> str | None:
-        """The text of an entry; None without it."""
+        """Return the text of an entry; None without it."""
         entry = self.entries.get((section, key))
         return None if entry is None else entry[0]
 
     def where(self, section: str, key: str) -> str:
-        """The place of an entry."""
+        """Return the place of an entry."""
         entry = self.entries.get((section, key))
         return ("" if entry is None else f"line {entry[1]}, ") + f"[{section}] {key}"
 
     def number(self, section: str, key: str) -> float | None:
-        """The number of an entry, behind which may stand a comment; None without the entry."""
+        """Return the number of an entry, behind which may stand a comment; None without the
+        entry."""
         text = self.text(section, key)
         if text is None:
             return None
@@ -72,7 +73,7 @@ class _Ini:
 
 
 def settings_of(text: str) -> list[ControllerSetting] | None:
-    """The values of a machine file that an INI file says, None for a text that is none;
+    """Return the values of a machine file that an INI file says, None for a text that is none;
     MachineError for what is missing or cannot be used."""
     ini = _Ini(text)
     if not ini.includes and not any(section in _SECTIONS for section, _ in ini.entries):
@@ -119,7 +120,7 @@ def _unit_mm(ini: _Ini) -> float:
 
 
 def _joints(ini: _Ini) -> dict[str, int]:
-    """The first joint of each axis."""
+    """Return the first joint of each axis."""
     name, *options = (ini.text("KINS", "KINEMATICS") or _KINEMATICS).split()
     if name != _KINEMATICS:
         raise MachineError(
@@ -182,7 +183,7 @@ def _axis(ini: _Ini, letter: str, joint: str, unit: float) -> list[ControllerSet
 
 
 def _limit(ini: _Ini, axis: str, joint: str, key: str) -> tuple[float, str] | None:
-    """A limit of the axis, or of its joint where that says none, and the section."""
+    """Return a limit of the axis, or of its joint where that says none, and the section."""
     for section in (axis, joint):
         value = ini.number(section, key)
         if value is not None:

@@ -115,7 +115,7 @@ def close_up(text: str) -> str:
 
 
 def column_of(text: str, place: int) -> int:
-    """The column, from 1, of a place in the closed text of a line."""
+    """Return the column, from 1, of a place in the closed text of a line."""
     signs, column, comment = 0, 1, ""
     for column, sign in enumerate(text, 1):
         blank = not comment and sign in " \t\r"
@@ -188,7 +188,7 @@ class ParsedLine:
         return bool(remainder) and remainder[0] != ";"
 
     def block(self, parameters: Parameters) -> LinuxcncBlock:
-        """Its words; Fault where LinuxCNC would stop while it reads them."""
+        """Return its words; Fault where LinuxCNC would stop while it reads them."""
         if self._block is not None:
             return self._block
         if not self._parse_value:
@@ -340,7 +340,7 @@ def group_words(items: list[Item], comment: str | None) -> LinuxcncBlock:
 
 
 def g_code(value: float, column: int) -> int:
-    """The tenfold code of a G word."""
+    """Return the tenfold code of a G word."""
     tenfold = 10.0 * value
     code = int(tenfold // 1)
     excess = tenfold - code
@@ -354,7 +354,7 @@ def g_code(value: float, column: int) -> int:
 
 
 def m_code(value: float, column: int) -> int:
-    """The code of an M word."""
+    """Return the code of an M word."""
     try:
         code = _whole_number(value, column)
     except LineFault:

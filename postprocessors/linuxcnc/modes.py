@@ -77,12 +77,12 @@ def _block(machine: InterpreterState, text: str) -> LinuxcncBlock:
 
 
 def spindle_word(kind: Kind | None) -> int:
-    """The M word of a turning, or of a standing, spindle."""
+    """Return the M word of a turning, or of a standing, spindle."""
     return 5 if kind is None else 3 if kind == Kind.SPINDLE_CW else 4
 
 
 def modes_of(state: InterpreterState) -> ActiveModes:
-    """The modes in force."""
+    """Return the modes in force."""
     side = state._compensation.side if state._compensation is not None else 0
     frame = next(code for code, number in FRAMES.items() if number == state._frame)
     g = {
@@ -109,7 +109,7 @@ def modes_of(state: InterpreterState) -> ActiveModes:
 
 
 def names_of(state: FrameCodes) -> dict[str, Callable[[], float]]:
-    """The names that show the modes (interp_namedparams.cc)."""
+    """Return the names that show the modes (interp_namedparams.cc)."""
 
     def matches_mode(name: str, value: Any) -> Callable[[], float]:
         return lambda: float(getattr(state, name) == value)

@@ -112,7 +112,7 @@ class BlockMoves(FrameCodes):
             self._spline_move(motion, block, words)
 
     def _rate(self, block: LinuxcncBlock, length: Callable[[], float] | None = None) -> float:
-        """The feed of a move, mm/min; Fault where none is in force."""
+        """Return the feed of a move, mm/min; Fault where none is in force."""
         mm = self.canon.mm
         if self.feed_mode == 930:
             if "f" not in block.words:
@@ -283,7 +283,7 @@ class BlockMoves(FrameCodes):
         letters: list[str],
         offsets: dict[str, float],
     ) -> tuple[float, float]:
-        """The centre that I, J and K give; Fault where its radii are none of one arc."""
+        """Return the centre that I, J and K give; Fault where its radii are none of one arc."""
         first, second = (offsets.get(letter, 0.0) for letter in letters[:2])
         if self.absolute_centres:
             x, y = first, second
@@ -312,9 +312,9 @@ class BlockMoves(FrameCodes):
     def _centre_of_radius(
         self, begin: list[float], end: list[float], radius: float, ccw: bool
     ) -> tuple[float, float]:
-        """The centre of an arc by its radius: beside the middle of its chord, on the left of it
-        for a counter-clockwise arc of at most half a turn; a negative R asks for more than that,
-        whose centre is on the other side."""
+        """Return the centre of an arc by its radius: beside the middle of its chord, on the
+        left of it for a counter-clockwise arc of at most half a turn; a negative R asks for
+        more than that, whose centre is on the other side."""
         dx, dy = end[0] - begin[0], end[1] - begin[1]
         if dx == 0.0 and dy == 0.0:
             raise LineFault("an arc by its radius that ends where it starts has no centre", "r")

@@ -51,7 +51,7 @@ USES: Final[Mapping[str, tuple[Codes, Codes, Codes, Codes]]] = {
 
 
 def motion_of(state: InterpreterState, block: LinuxcncBlock) -> int | None:
-    """The motion that a block asks for (enhance_block)."""
+    """Return the motion that a block asks for (enhance_block)."""
     words, g = block.words, block.g
     polar = "@" in words or "^" in words
     axes = any(letter in words for letter in (*AXES, *RELATIVE))
@@ -152,7 +152,7 @@ def _check_g10(words: dict[str, float]) -> None:
 
 
 def _check_use(letter: str, block: LinuxcncBlock, motion: int | None) -> None:
-    """Fault where nothing in the block uses a letter."""
+    """Raise Fault where nothing in the block uses a letter."""
     motions, one_shots, m, other_codes = USES[letter]
     is_used = (
         motion in motions

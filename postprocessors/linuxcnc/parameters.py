@@ -124,8 +124,8 @@ class Parameters:
         self._values[index] = value
 
     def enter(self, arguments: Iterable[float] | None) -> dict[int, float | None] | None:
-        """A call begins: names of its own, and its arguments in #1 to #30, where it has some (M98
-        has none). What they were before is given."""
+        """Return a call begins: names of its own, and its arguments in #1 to #30, where it has
+        some (M98 has none). What they were before is given."""
         self._locals.append({})
         if arguments is None:
             return None

@@ -63,8 +63,8 @@ BRANCHES: Final = re.compile(rb"(?im)^[ \t]*/?[ \t]*(?:n[\d. \t]*)?(?:o|m[ \t]*9
 
 
 def read_program(data: bytes, machine: LinuxcncMachine, folder: Path | None = None) -> Toolpath:
-    """The moves of a program, whose subs lie in `folder`; ProgramError with block, line, column,
-    and the call that led there."""
+    """Return the moves of a program, whose subs lie in `folder`; ProgramError with block, line,
+    column, and the call that led there."""
     count = data.count(b"\n")
     bounds.check_count(count, "line")
     reader = _Reader(data, machine, folder)
@@ -108,7 +108,7 @@ class _Reader:
         self._empty, self._cut_off = True, False
 
     def read(self) -> Toolpath:
-        """The moves, with the findings."""
+        """Return the moves, with the findings."""
         flow = self.flow
         try:
             self._begin()
@@ -295,7 +295,7 @@ def _lengths(mounted: list[Mounted], path: Toolpath) -> Iterator[Finding]:
 
 
 def _has_text(text: str) -> bool:
-    """True if a line has more than blanks, a % and comments."""
+    """Return True if a line has more than blanks, a % and comments."""
     return text.strip()[:1] not in ("", "%", "(", ";")
 
 

@@ -42,7 +42,7 @@ class SplinePiece(Struct, frozen=True):
 
 
 def pieces_of(points: Sequence[tuple[float, float, float]], order: int) -> Iterator[SplinePiece]:
-    """The lines and arcs of a spline with control points (x, y, weight)."""
+    """Yield the lines and arcs of a spline with control points (x, y, weight)."""
     if len(points) > MAX_CONTROL_POINTS:
         raise LineFault(f"a spline of more than {MAX_CONTROL_POINTS} control points")
     count = PIECES * len(points)
@@ -63,7 +63,7 @@ def pieces_of(points: Sequence[tuple[float, float, float]], order: int) -> Itera
 
 
 def _places(points: Floats, order: int, parameters: Floats) -> Floats:
-    """(N, 2) the points of the spline at these parameters (N,), by Cox and de Boor."""
+    """Return (N, 2) the points of the spline at these parameters (N,), by Cox and de Boor."""
     last = len(points) - 1
     knots = np.clip(np.arange(last + order + 1) - order + 1, 0, last - order + 2).astype(float)
     basis = np.zeros((len(parameters), last + order))
@@ -112,7 +112,7 @@ def _two_arcs(
 
 
 def _arc(start: Flat, end: Flat, direction: Flat) -> SplinePiece:
-    """The arc from here to there that leaves along a direction."""
+    """Return the arc from here to there that leaves along a direction."""
     x, y = end[0] - start[0], end[1] - start[1]
     across = 2.0 * (y * direction[0] - x * direction[1])
     if abs(across) <= STRAIGHT:

@@ -209,7 +209,8 @@ class InterpreterState:
         self._waited = self.canon.moves
 
     def _tool_of(self, number: int, letter: str) -> ToolTableEntry:
-        """A tool of the table; where there is no table, any tool, of which nothing is known."""
+        """Return a tool of the table; where there is no table, any tool, of which nothing is
+        known."""
         if number == 0:
             return ToolTableEntry()
         tool = self._tools.get(number)
@@ -261,7 +262,7 @@ class InterpreterState:
         return list(self.position)
 
     def _flat(self, place: list[float] | None = None) -> list[float]:
-        """A place, or the position, in the order of the plane."""
+        """Return a place, or the position, in the order of the plane."""
         source = self.position if place is None else place
         return [source[axis] for axis in PLANES[self.plane]]
 

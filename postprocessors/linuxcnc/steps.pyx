@@ -37,7 +37,7 @@ cdef inline double _share(double[:, ::1] points, Int base, Int end, Int point) n
 
 
 cdef bint _joins(double[:, ::1] points, Int base, Int new, double tolerance) noexcept:
-    """True if point `new` may be the end of the chain that begins at point `base`."""
+    """Return True if point `new` may be the end of the chain that begins at point `base`."""
     cdef Int k, axis
     cdef bint same
     cdef double square
@@ -63,8 +63,8 @@ cpdef void merge_lines(
     double[:, ::1] points, uint8_t[::1] breaks, double[:] tolerance, Int[::1] chain,
     double[:, ::1] moved
 ) noexcept:
-    """The chain of each of N moves, `chain` (N,), numbered from 0, and where the moves then end,
-    `moved` (N, 3): on the chain's line, never back.
+    """Return the chain of each of N moves, `chain` (N,), numbered from 0, and where the moves then
+    end, `moved` (N, 3): on the chain's line, never back.
 
     `points` (N+1, 3): the start and all ends; `breaks` (N,): moves that do not join the one before;
     `tolerance` (N,): within which a move joins.
@@ -106,9 +106,10 @@ cpdef enum:
 
 
 cdef class Blends:
-    """The corners (M + 1, 17) at the starts of M moves and behind the last; of each move the
-    `length` (M,) mm, the unit tangent at its start (M, 3) and the first row (M,) of it. Of each row
-    of `ways` its move (N,), and how far into that it begins and how long it is (N,), mm."""
+    """Return the corners (M + 1, 17) at the starts of M moves and behind the last; of each move
+    the `length` (M,) mm, the unit tangent at its start (M, 3) and the first row (M,) of it. Of
+    each row of `ways` its move (N,), and how far into that it begins and how long it is (N,),
+    mm."""
 
     cdef Ways ways
     cdef double[:, ::1] corners, tangent

@@ -49,7 +49,7 @@ class ProgramText(ProgramLines):
         return text.rstrip(" \t\v\f")
 
     def line(self, number: int, *, keep: bool) -> ParsedLine:
-        """A line, compiled once where it may be read again (`keep`)."""
+        """Return a line, compiled once where it may be read again (`keep`)."""
         line = self._lines.get(number)
         if line is None:
             line = ParsedLine(self.raw(number))
@@ -76,7 +76,8 @@ class Folder:
         self._found: dict[str, ProgramText | None] = {}
 
     def find(self, label: str) -> ProgramText | None:
-        """The file of a sub, None where there is none; Fault for a place that is not opened."""
+        """Return the file of a sub, None where there is none; Fault for a place that is not
+        opened."""
         if label in self._found:
             return self._found[label]
         if len(self._found) >= MAX_FILES:
@@ -112,7 +113,7 @@ class Folder:
 
 
 def _check_bytes(data: bytes, name: str) -> None:
-    """ProgramError at the first byte that no program has."""
+    """Raise ProgramError at the first byte that no program has."""
     odd = _CONTROL.search(data)
     if odd is not None:
         before = data[: odd.start()].split(b"\n")

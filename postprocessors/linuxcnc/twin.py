@@ -187,7 +187,7 @@ class LinuxcncTwin(Twin):
         return bool(self._choices.closes(self.slides.commanded_mm - home, PROBE_PART_MM))
 
     def _line(self) -> int:
-        """The line that it is at, from 1; behind the end the last that moved."""
+        """Return the line that it is at, from 1; behind the end the last that moved."""
         if not len(self._lines):
             return 0
         index = int(np.searchsorted(self._line_ends, self._program_s(), side="right"))
@@ -490,7 +490,7 @@ def _jog_travel(start: Floats, target: Floats, speeds: dict[int, float]) -> Trav
 def _straight(
     start: Floats, target: Floats, speed: float = HOMING_MM_S, part_mm: float = 0.01
 ) -> Travel:
-    """A line, in parts of `part_mm` at most."""
+    """Return a line, in parts of `part_mm` at most."""
     length = float(np.linalg.norm(target - start))
     count = max(int(np.ceil(length / part_mm)), 1)
     share = np.arange(1, count + 1)[:, None] / count

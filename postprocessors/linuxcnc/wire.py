@@ -127,8 +127,8 @@ class LinuxcncWire(Wire):
     def packets(
         self, data: bytes, machine: LinuxcncMachine, forecast: Forecast
     ) -> Sequence[Packet]:
-        """A packet is a line that is a block; nothing of it goes over the line. One that stops has
-        the comments since the last motion as its note."""
+        """Return a packet for each line that is a block; nothing of it goes over the wire. One
+        that stops has the comments since the last motion as its note."""
         packets: list[Packet] = []
         notes: list[str] = []
         steady = bool((np.diff(forecast.decoded.block) >= 0).all())
@@ -755,7 +755,7 @@ class LinuxcncTerminal(Terminal):
         return super().halt()
 
     def is_urgent(self, line: str) -> bool:
-        """True for the commands that stop the machine."""
+        """Return True for the commands that stop the machine."""
         return line.lower().split() in (["set", "abort"], ["set", "estop", "on"])
 
     def meaning(self, line: str) -> str:

@@ -27,7 +27,7 @@ TOLERANCE: Final = NumberStyle(6, strip=True)
 
 
 def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
-    """The program; PostError names the move that cannot be written or done."""
+    """Return the program; PostError names the move that cannot be written or done."""
     dialect, unit = machine.dialect, UNITS[machine.dialect.units]
     # The length in force goes with the tool in the spindle, and with a zero set by that tool.
     no_length = "" if dialect.tool_lengths else " G49"
@@ -54,7 +54,7 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
 
 
 def _path_mode(mode: PathMode, unit: Unit) -> str:
-    """The block that asks for it, in a program of that unit."""
+    """Return the block that asks for it, in a program of that unit."""
     if mode.corners == "exact-path":
         return "G61"
     if mode.corners == "exact-stop":
@@ -70,7 +70,7 @@ def _path_mode(mode: PathMode, unit: Unit) -> str:
 
 
 def _words(event: Event, dialect: LinuxcncDialect) -> tuple[str, ...]:
-    """The blocks of an event."""
+    """Return the blocks of an event."""
     if event.kind != Kind.TOOL_CHANGE:
         return common_words(event)
     number = tool_number(event)

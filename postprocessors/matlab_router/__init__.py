@@ -56,7 +56,7 @@ class MatlabRouter(Target):
         dialect_of(machine)
 
     def model(self) -> MatlabRouterModel:
-        """The model of its controller."""
+        """Return the model of its controller."""
         model: MatlabRouterModel = _controller().MatlabRouterModel()
         return model
 
@@ -85,13 +85,14 @@ class MatlabRouter(Target):
     def rest(
         self, data: bytes, machine: MatlabRouterMachine, first: int
     ) -> tuple[bytes, int] | None:
-        """The arrays from a line on: going home, to its start and down is what each job does."""
+        """Return the arrays from a line on: going home, to its start and down is what each job
+        does."""
         from .wire import rest_of
 
         return rest_of(data, machine, first)
 
     def twin_kind(self) -> TwinKind:
-        """The virtual controller; docs/wires/matlab-router.md."""
+        """Return the virtual controller; docs/wires/matlab-router.md."""
         from .twin import MatlabRouterTwin, MatlabRouterTwinSettings
 
         return TwinKind(MatlabRouterTwinSettings, MatlabRouterTwin)

@@ -75,7 +75,7 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
     """The slaves of the Matlab router: a servo for each axis."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """The motion, chunk by chunk."""
+        """Return the motion, chunk by chunk."""
         return _Run(self.quantised(toolpath, machine), machine, options).run()
 
     samples_per_speed = 1
@@ -83,7 +83,8 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
     def timed(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> Iterator[TimedChunk]:
-        """The motion at each tick; dwells and the numbers of a job on their way come before."""
+        """Yield the motion at each tick; dwells and the numbers of a job on their way come
+        before."""
         run = _Run(self.quantised(toolpath, machine), machine, options)
         ticks = 0
         for chunk in run.run():
@@ -93,8 +94,9 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
             ticks += len(tick)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """The same with all ends on whole counts from home, homing at home. ProgramError for arcs,
-        which no slave has, and for what lies farther from home than the program can say."""
+        """Return the same with all ends on whole counts from home, homing at home. ProgramError
+        for arcs, which no slave has, and for what lies farther from home than the program can
+        say."""
         mend = "post the drawing for it: arcs become lines then"
         refuse(toolpath, toolpath.is_arc, "this machine has no arcs", mend)
         home = np.array(machine.controller.machine_zero_mm)
@@ -108,8 +110,8 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
         return replace(toolpath, end=home + np.column_stack(columns))
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
-        """Longest travel of an axis in one tick, mm, at the highest feed of the machine or of the
-        program."""
+        """Return the longest travel of an axis in one tick, mm, at the highest feed of the
+        machine or of the program."""
         feeds = toolpath.feed[np.isfinite(toolpath.feed)]
         fastest = min(float(feeds.max(initial=0.0)), machine.max_feed_mm_min)
         rapid = machine.rapid_mm_min if np.isfinite(machine.rapid_mm_min) else 0.0
@@ -117,7 +119,7 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
         return max(step, max(fastest, rapid) / 60.0 * TICK_S)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Each axis by itself, by its speed loop."""
+        """Return each axis by itself, by its speed loop."""
         return "servo"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -167,7 +169,7 @@ class _Run:
         self._homes = np.tile(self._home, self._samples)
 
     def run(self) -> Iterator[Chunk]:
-        """The chunks of all rows up to the end of the program."""
+        """Yield the chunks of all rows up to the end of the program."""
         complete, finished = 0, False
         while not finished:
             positions = np.empty((self._samples, 3), dtype=np.int64)
@@ -185,7 +187,7 @@ class _Run:
             complete = next_row
 
     def ticks(self) -> Iterator[ServoTicks]:
-        """The passes of the slaves' interrupts, read from the compiled loop tick by tick."""
+        """Yield the passes of the slaves' interrupts, read from the compiled loop tick by tick."""
         start, travel, goal = self._ordered_motion()
         orders, top = self._lines.orders, int(self._program.table[-1])
         motors, slaves = self._state.motors, self._state.slaves
@@ -257,8 +259,8 @@ class _Run:
         return start, end - start, np.sign(end - start) * speed
 
     def _chunk(self, span: tuple[int, int, int], row: Ints, count: Ints) -> Chunk:
-        """The samples of a chunk; `span`: rows up to the first are accounted for already, those up
-        to the second are complete, those up to the third have samples."""
+        """Return the samples of a chunk; `span`: rows up to the first are accounted for
+        already, those up to the second are complete, those up to the third have samples."""
         first, complete, last = span
         first = min(first, int(row[0])) if len(row) else first
         rows = np.arange(first, last)
@@ -346,7 +348,7 @@ class MasterOrders(Struct, frozen=True, eq=False):
 
 
 def lines_of(path: Toolpath, rows: int, machine: _Machine) -> MasterOrders:
-    """The orders for the first `rows` rows of a quantised toolpath.
+    """Return the orders for the first `rows` rows of a quantised toolpath.
 
     Raises ProgramError for a line without a feed above 0, a dwell without its seconds, and part
     zero set anew away from part zero.
@@ -396,7 +398,7 @@ def _to_int32(orders: Ints) -> Indices:
 
 
 def _check(path: Toolpath, rows: int) -> None:
-    """ProgramError for what cannot be followed."""
+    """Raise ProgramError for what cannot be followed."""
     running = np.arange(len(path)) < rows
     with np.errstate(invalid="ignore"):
         no_feed = path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
@@ -411,8 +413,8 @@ def _check(path: Toolpath, rows: int) -> None:
 
 
 def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
-    """Mask (R,) of the rows that go home: homing, and rapids that end there on all axes that
-    move."""
+    """Return the mask (R,) of the rows that go home: homing, and rapids that end there on all
+    axes that move."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     distance = np.abs(path.end[: len(way_mm)] - np.array(machine.controller.machine_zero_mm))
     ends_home = ((distance <= ON_HOME_COUNTS * coded) | (way_mm == 0.0)).all(axis=1)
@@ -422,8 +424,8 @@ def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
 
 
 def _are_tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
-    """Mask (L,) of those of the rows `first` that continue the line before them: one axis of a
-    line of the program goes on alone."""
+    """Return the mask (L,) of those of the rows `first` that continue the line before them: one
+    axis of a line of the program goes on alone."""
     block, travel = path.block[first], way_mm[first]
     flat = (path.kind[first] == Kind.LINE) & (travel[:, 2] == 0.0)
     tail = np.zeros(len(first), dtype=np.bool_)
@@ -447,7 +449,7 @@ def _axis_beyond(path: Toolpath, first: Ints, second: Ints, machine: _Machine) -
 
 
 def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: _Machine) -> Ints:
-    """(L, 3) counts in a tick of the axes of the rows `first`."""
+    """Return (L, 3) counts in a tick of the axes of the rows `first`."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     travel = np.abs(way_mm[first])
     feed = path.feed[first] / (60.0 * TICKS_PER_S)
@@ -507,8 +509,8 @@ def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: _Machine) -> Int
 
 
 def _ends(header: Bools, homing: Bools, machine: _Machine) -> Bools:
-    """(L,) lines that are the last of their job: the last cut, or, where the master raises the
-    tool and goes home behind it, that."""
+    """Return (L,) lines that are the last of their job: the last cut, or, where the master
+    raises the tool and goes home behind it, that."""
     ends: Bools = ~header & np.append(header[1:], True)
     if dialect_of(machine).end == "raise":
         behind_cuts = np.cumsum(~header) > 0
@@ -519,15 +521,15 @@ def _ends(header: Bools, homing: Bools, machine: _Machine) -> Bools:
 
 
 def _pauses(header: Bools, ends: Bools, router: MatlabRouterController) -> Floats:
-    """(L,) s behind each line; negative behind the last of a job, since the next begins by a reset
-    of the master, which knows nothing of the slaves' ticks: on a tick, ours."""
+    """Return (L,) s behind each line; negative behind the last of a job, since the next begins
+    by a reset of the master, which knows nothing of the slaves' ticks: on a tick, ours."""
     pauses = np.where(header, router.pause_s, router.turnaround_s)
     settle = SETTLE_TAUS * max(router.time_constant_s)
     return np.where(ends, -np.maximum(settle, pauses), pauses)
 
 
 def _link(header: Bools, first: Ints, rows: int, router: MatlabRouterController) -> Floats:
-    """(R,) s of the numbers of each job, at the first row of its way home."""
+    """Return (R,) s of the numbers of each job, at the first row of its way home."""
     extra = np.zeros(rows)
     opens = np.flatnonzero(header & ~np.concatenate([[False], header[:-1]]))
     lines = np.add.reduceat(~header, opens) if len(opens) else np.zeros(0)
@@ -626,7 +628,7 @@ def program_of(orders: Indices, pauses_s: Floats, thin: Bools, machine: _Machine
 
 
 def state_of(start_mm: Floats, machine: _Machine) -> State:
-    """All motors at rest at a place."""
+    """Return all motors at rest at a place."""
     router = machine.controller
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     place = np.rint((start_mm - np.array(machine.controller.machine_zero_mm)) * SIGNS / coded)

@@ -196,7 +196,8 @@ MatlabRouterMachine = Machine[SlideStart, MatlabRouterDialect]
 
 
 def dialect_of(machine: MatlabRouterMachine) -> ResolvedDialect:
-    """Every choice that the machine's `[dialect]` makes; MachineError where it makes none."""
+    """Return every choice that the machine's `[dialect]` makes; MachineError where it makes
+    none."""
     table = machine.dialect
     choices = {
         name: value

@@ -82,7 +82,7 @@ class ReadJob(Struct, frozen=True, eq=False):
 
 
 def fail(where: str, message: str, mend: str = "") -> NoReturn:
-    """ProgramError at a place."""
+    """Raise ProgramError at a place."""
     raise ProgramError(message, where=where, mend=mend)
 
 
@@ -97,7 +97,7 @@ def check_count(count: int, place_of: Where, dialect: ResolvedDialect) -> None:
 
 
 def check_job(job: ReadJob, dialect: ResolvedDialect) -> None:
-    """ProgramError for the first number with which the machine would run away or stop."""
+    """Raise ProgramError for the first number with which the machine would run away or stop."""
     for name, table in (("lxy", job.length), ("velxy", job.speed)):
         _refuse(job, name, np.abs(table) > MAX_NUMBER, "is beyond an int16")
     _refuse(job, "lxy", job.length < 0, "is negative: the sign belongs in velxy")
@@ -148,7 +148,7 @@ class _Value(Struct, frozen=True, eq=False):
 
 
 def read_text(data: bytes, dialect: ResolvedDialect) -> Iterator[ReadJob]:
-    """The jobs of a .m file, checked; ProgramError naming line and column."""
+    """Yield the jobs of a .m file, checked; ProgramError naming line and column."""
     text = _Text(data)
     values: dict[str, _Value] = {}
     number = 0
@@ -180,7 +180,7 @@ def read_text(data: bytes, dialect: ResolvedDialect) -> Iterator[ReadJob]:
 def _job_of_arrays(
     text: _Text, number: int, values: dict[str, _Value], dialect: ResolvedDialect
 ) -> ReadJob:
-    """The six values as one job, once they agree."""
+    """Return the six values as one job, once they agree."""
     scalar = {name: int(values[name].table[0, 0]) for name in NAMES if name not in TABLES}
 
     def place_of(name: str, row: int, column: int) -> str:
@@ -249,11 +249,11 @@ class _Text:
         return self.at == len(self.text)
 
     def fail(self, offset: int, message: str, mend: str = "") -> None:
-        """ProgramError at an offset; never returns."""
+        """Raise ProgramError at an offset; never returns."""
         fail(self._where(offset), message, mend)
 
     def where_in(self, value: _Value, row: int, column: int) -> str:
-        """Line and column of a number of a table."""
+        """Return the line and column of a number of a table."""
         number = row * value.table.shape[1] + column
         for index, match in enumerate(_TOKEN.finditer(self.text, value.offset)):
             if index == number:
@@ -288,7 +288,7 @@ class _Text:
         self._finish(match.end())
 
     def table(self) -> _Value:
-        """Numbers in brackets, in rows of one length, and the end of the statement."""
+        """Return numbers in brackets, in rows of one length, and the end of the statement."""
         match = _ROWS.match(self.text, self.at)
         if match is None:
             self._fail_rows()
@@ -323,12 +323,13 @@ class _Text:
         return _Value(table, begin)
 
     def _refuse_words(self, begin: int, end: int) -> None:
-        """ProgramError at the first word between two places that is no number of an int16."""
+        """Raise ProgramError at the first word between two places that is no number of an
+        int16."""
         for match in _TOKEN.finditer(self.text, begin, end):
             self._int(match[0], match.start())
 
     def _int(self, word: str, offset: int) -> int:
-        """A word at an offset as a whole number."""
+        """Return a word at an offset as a whole number."""
         if _TEXT_NUMBER.fullmatch(word) is None or abs(int(word)) > MAX_NUMBER:
             self.fail(offset, f"{word[:SHOWN_CHARS]!r} is no whole number of an int16")
         return int(word)
@@ -374,7 +375,7 @@ class _Text:
 
 
 def read_stream(data: bytes, dialect: ResolvedDialect) -> Iterator[ReadJob]:
-    """The jobs of a stream, checked; ProgramError naming job, number and byte."""
+    """Yield the jobs of a stream, checked; ProgramError naming job, number and byte."""
     if not data:
         raise ProgramError("the stream is empty", mend="a stream begins with the count of lines")
     check_size(data.count(b"\r") // NUMBERS_PER_LINE, "line")
@@ -399,7 +400,7 @@ def read_stream(data: bytes, dialect: ResolvedDialect) -> Iterator[ReadJob]:
 def _job_of_words(
     words: list[bytes], first: int, number: int, dialect: ResolvedDialect
 ) -> ReadJob:
-    """The job whose header begins at this word."""
+    """Return the job whose header begins at this word."""
 
     def place(word: int) -> str:
         byte = sum(map(len, words[: first + word])) + first + word + 1
@@ -472,7 +473,7 @@ def _first_y(word: bytes, place: Callable[[int], str], dialect: ResolvedDialect)
 
 
 def listing(data: bytes, machine: MatlabRouterMachine) -> Listing:
-    """The blocks of a program that its reader takes."""
+    """Return the blocks of a program that its reader takes."""
     dialect = dialect_of(machine)
     if dialect.format == "stream":
         jobs = [_stream_numbers(words) for words in _words_of(data, read_stream(data, dialect))]
@@ -485,7 +486,7 @@ def listing(data: bytes, machine: MatlabRouterMachine) -> Listing:
 
 
 def _arrays(job: ReadJob) -> list[str]:
-    """The first point, then a column of `xy`, `lxy` and `velxy` for each line."""
+    """Return the first point, then a column of `xy`, `lxy` and `velxy` for each line."""
     x, y = job.first.tolist()
     points = (job.first[:, None] + job.steps.cumsum(axis=1)).T.tolist()
     lengths, speeds = job.length.T.tolist(), job.speed.T.tolist()
@@ -503,7 +504,8 @@ def _arrays(job: ReadJob) -> list[str]:
 
 
 def _words_of(data: bytes, jobs: Iterator[ReadJob]) -> Iterator[list[str]]:
-    """The numbers of each job as they are sent; a character that cannot be shown as its code."""
+    """Yield the numbers of each job as they are sent; a character that cannot be shown as its
+    code."""
     escaped = data.decode("latin-1").encode("unicode_escape").decode("ascii")
     words = escaped.split(r"\r")
     begin = 0

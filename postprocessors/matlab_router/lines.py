@@ -74,7 +74,7 @@ class SlaveLines(Struct, frozen=True, eq=False):
     stroke: Ints
 
     def chosen(self, keep: Bools) -> SlaveLines:
-        """The lines where `keep` (L,) is true."""
+        """Return the lines where `keep` (L,) is true."""
         return SlaveLines(
             self.start[keep], self.end[keep], self.feed[keep], self.row[keep], self.stroke[keep]
         )
@@ -92,7 +92,7 @@ class Jobs(Struct, frozen=True, eq=False):
 def jobs_of(
     cuts: CutLines, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: ResolvedDialect
 ) -> tuple[Jobs, LineChanges]:
-    """The jobs, and what was changed for them.
+    """Return the jobs, and what was changed for them.
 
     PostError for what lies outside of the area or has a feed that cannot be written.
     """
@@ -119,12 +119,12 @@ class _Maker:
         )
 
     def lines(self, cuts: CutLines) -> SlaveLines:
-        """The cuts as lines that the slaves can run."""
+        """Return the cuts as lines that the slaves can run."""
         return self._straight(self._mend(self._on_grid(cuts)))
 
     def _on_grid(self, cuts: CutLines) -> SlaveLines:
-        """Vertices at the nearest point of the grid, the first one of a stroke not nearer to home
-        than a chunk; PostError for those outside the area."""
+        """Return vertices at the nearest point of the grid, the first one of a stroke not
+        nearer to home than a chunk; PostError for those outside the area."""
         grid, count = self._dialect.grid_units, len(cuts.row)
         rows = np.concatenate([cuts.row, cuts.row])
         exact = (np.concatenate([cuts.start, cuts.end]) - self._zero) * UNITS_PER_MM
@@ -194,7 +194,8 @@ class _Maker:
         return replace(lines, start=np.array(starts), end=np.array(ends))
 
     def _majors(self, lines: SlaveLines) -> tuple[Ints, Floats, Ints]:
-        """Distances (L, 2); the larger of each line as a float (L,); its speed in counts (L,)."""
+        """Return distances (L, 2); the larger of each line as a float (L,); its speed in counts
+        (L,)."""
         distance = np.abs(lines.end - lines.start)
         larger = distance.max(axis=1).astype(np.float64)
         slant = np.hypot(*distance.T) / larger
@@ -226,8 +227,8 @@ class _Maker:
             )
 
     def speeds(self, lines: SlaveLines) -> Ints:
-        """(L, 2) signed counts: the larger distance at its speed, the other one in proportion,
-        by the same operations as the listing (L4444-4515) so that ties fall alike."""
+        """Return (L, 2) signed counts: the larger distance at its speed, the other one in
+        proportion, by the same operations as the listing (L4444-4515) so that ties fall alike."""
         distance, larger, counts = self._majors(lines)
         with np.errstate(divide="ignore"):
             factor = larger[:, None] / distance
@@ -237,7 +238,7 @@ class _Maker:
         return np.asarray(np.where(lines.end < lines.start, -speed, speed))
 
     def _straight(self, lines: SlaveLines) -> SlaveLines:
-        """Lines that whole speeds would bend too much, or stop, in pieces."""
+        """Return lines that whole speeds would bend too much, or stop, in pieces."""
         distance, larger, counts = self._majors(lines)
         limits = LineLimits(
             self._dialect.bend_tolerance_mm * UNITS_PER_MM, self._dialect.grid_units, self._least
@@ -316,7 +317,7 @@ class LineLimits(Struct, frozen=True):
 
 
 def bends(larger: Floats, smaller: Ints, counts: Ints, tolerance: float) -> Bools:
-    """(n,) which lines stop (v = 0) or bend by more than the tolerance (units)."""
+    """Return (n,) which lines stop (v = 0) or bend by more than the tolerance (units)."""
     slanted = smaller > 0
     exact = counts * smaller / larger
     rounded = np.floor(exact + 0.5)
@@ -329,7 +330,7 @@ def bends(larger: Floats, smaller: Ints, counts: Ints, tolerance: float) -> Bool
 def split_line(
     start: list[int], end: list[int], counts: int, limits: LineLimits
 ) -> list[list[int]]:
-    """The ends of the pieces of one line from `start` to `end` (x, y), its own end last."""
+    """Return the ends of the pieces of one line from `start` to `end` (x, y), its own end last."""
     travel = (end[0] - start[0], end[1] - start[1])
     major = 0 if abs(travel[0]) >= abs(travel[1]) else 1
     place = list(start)
@@ -354,7 +355,7 @@ def _bend(longer: int, shorter: int, counts: int) -> float:
 
 
 def _pieces(longer: int, shorter: int, counts: int, limits: LineLimits) -> list[tuple[int, int]]:
-    """A line of these distances as pieces (along, across) that do not bend too much."""
+    """Return a line of these distances as pieces (along, across) that do not bend too much."""
     bend = _bend(longer, shorter, counts)
     if bend <= limits.tolerance:
         return [(longer, shorter)]

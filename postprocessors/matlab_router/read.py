@@ -55,12 +55,12 @@ _STREAM: Final = re.compile(rb"-?\d+\r(?!\n)")
 
 
 def read_program(data: bytes, machine: MatlabRouterMachine) -> Toolpath:
-    """The moves of a program; ProgramError naming the place when it is none."""
+    """Return the moves of a program; ProgramError naming the place when it is none."""
     return path_of(read_jobs(data, machine), machine)
 
 
 def read_jobs(data: bytes, machine: MatlabRouterMachine) -> Iterator[ReadJob]:
-    """The jobs of a program, checked; ProgramError naming the place when it is none."""
+    """Yield the jobs of a program, checked; ProgramError naming the place when it is none."""
     dialect = dialect_of(machine)
     streamed = _STREAM.match(data) is not None
     if streamed != (dialect.format == "stream"):
@@ -73,7 +73,7 @@ def read_jobs(data: bytes, machine: MatlabRouterMachine) -> Iterator[ReadJob]:
 
 
 def path_of(jobs: Iterable[ReadJob], machine: MatlabRouterMachine) -> Toolpath:
-    """The moves of checked jobs."""
+    """Return the moves of checked jobs."""
     moves = _Moves(machine, dialect_of(machine))
     for job in jobs:
         moves.add(job)
@@ -116,7 +116,7 @@ class _Moves:
             self._go_home()
 
     def finish(self) -> Toolpath:
-        """The toolpath of all jobs."""
+        """Return the toolpath of all jobs."""
         self._path.block = max(0, self._blocks - 1)
         return self._path.event(Kind.END).finish(self._findings.findings())
 
@@ -242,7 +242,8 @@ class DrivenLines:
 
 
 def _lag(distance: Floats, took: Floats, share: Floats) -> Floats:
-    """(n,) units by which a line bends: what is left of the later axis, seen across the line."""
+    """Return (n,) units by which a line bends: what is left of the later axis, seen across the
+    line."""
     later = took.argmax(axis=1)
     remaining = distance[np.arange(len(distance)), later] * (1.0 - share)
     other = distance[np.arange(len(distance)), 1 - later]

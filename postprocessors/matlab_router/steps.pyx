@@ -148,7 +148,7 @@ cdef Int _seen_way(Int* slave, double* axis, Int up) noexcept:
 
 
 cdef Int to_go_of(Int* slave, double* axis, Int sense) noexcept:
-    """Counts in the direction `sense` until the loop that the slave is in ends.
+    """Return counts in the direction `sense` until the loop that the slave is in ends.
 
     Posi does not fall: within the turn number k it is c + 1023 k, c = 0 … 1023. It first reaches
     T in the turn k' = ⌈T / 1023⌉ − 1, or in the present one, at c' = max(T − 1023 k', 0).
@@ -178,7 +178,7 @@ cdef Int to_go_of(Int* slave, double* axis, Int sense) noexcept:
 
 
 cdef void next_stage(double* motor, Int* slave, double moment) noexcept:
-    """The count that the slave waited for has come."""
+    """Begin the next stage of a motor, when the count that its slave waited for has come."""
     if slave[STAGE] == CRUISING and slave[LEFT] > 1:
         slave[LEFT] -= 1
         slave[WRAPS] = 0
@@ -270,7 +270,7 @@ cdef double _moment(double travel, double speed, double aim, double tau, double 
 
 
 cdef inline Int _floor(double value) noexcept:
-    """The greatest whole number below or at a value that an Int holds."""
+    """Return the greatest whole number below or at a value that an Int holds."""
     cdef Int integer = <Int>value
     return integer - (value < <double>integer)
 
@@ -447,7 +447,7 @@ cdef class Slaves:
 
 
 cdef void _open(Slaves all_, Int line) noexcept:
-    """The slaves wait for the word to run a line."""
+    """Return the slaves wait for the word to run a line."""
     cdef Int index
     cdef int[:, ::1] lines
     cdef Int[:, ::1] slaves
@@ -463,7 +463,7 @@ cdef void _open(Slaves all_, Int line) noexcept:
 
 
 cdef void _close(Slaves all_, Int line, Int tick) noexcept:
-    """All slaves have answered: account for the line, and tell when the next one begins."""
+    """Account for a line that all slaves have answered, and set when the next one begins."""
     cdef int[:, ::1] lines
     cdef double[:, ::1] motors
     cdef double[::1] begin
@@ -501,7 +501,7 @@ cdef Int _row(Slaves all_, Int line, Int tick) noexcept:
 
 
 cdef bint _all_still(Int[:, ::1] slaves) noexcept:
-    """True if all slaves have answered."""
+    """Return True if all slaves have answered."""
     cdef bint moving
     moving = slaves[0, STAGE] != STILL or slaves[1, STAGE] != STILL or slaves[2, STAGE] != STILL
     return not moving
@@ -518,8 +518,8 @@ cdef void _given_up(double[:, ::1] motors, Int[:, ::1] slaves, Int tick) noexcep
 
 
 cdef inline bint _goes_on(Int* moves, Int* ways) noexcept:
-    """True if no axis turns; `ways` (3,) then has the sense of each, 0 of one that has not moved.
-    Else these are the senses of the `moves` (3,)."""
+    """Return True if no axis turns; `ways` (3,) then has the sense of each, 0 of one that has
+    not moved. Else these are the senses of the `moves` (3,)."""
     cdef Int axis
     cdef bint turns = False
     for axis in range(3):
@@ -531,7 +531,7 @@ cdef inline bint _goes_on(Int* moves, Int* ways) noexcept:
 
 
 cdef inline bint _is_at_rest(double* motor, Int* slave, double* axis, Int tick) noexcept:
-    """True if neither the loop nor the motor changes anything in this tick: the axis stands
+    """Return True if neither the loop nor the motor changes anything in this tick: the axis stands
     without drive, waits for no word that comes within the tick, and has been seen to stand."""
     cdef Int phase
     if motor[SPEED] != 0.0 or motor[DRIVE] != 0.0 or slave[REF] != 0:
@@ -638,8 +638,8 @@ cdef Int _goes_alone(
 
 
 cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1] row):
-    """Counts of the axes at each tick into `out` (n, 3), the rows that they belong to into `row`
-    (n,), until these are full or all lines have run and their last pause is over.
+    """Return counts of the axes at each tick into `out` (n, 3), the rows that they belong to into
+    `row` (n,), until these are full or all lines have run and their last pause is over.
 
     Of thin rows a sample takes the place of the one before, unless an axis turned there. `state`
     goes on from call to call; `account` grows. Returns samples filled, and whether that was all.

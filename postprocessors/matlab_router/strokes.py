@@ -43,7 +43,7 @@ class CutLines(Struct, frozen=True, eq=False):
 def cuts_of(
     toolpath: Toolpath, machine: MatlabRouterMachine, dialect: ResolvedDialect
 ) -> tuple[CutLines, list[Finding]]:
-    """The strokes of a toolpath, and what had to be changed to have them."""
+    """Return the strokes of a toolpath, and what had to be changed to have them."""
     findings = _events(toolpath)
     flat_and_deep = xy_then_z(toolpath)
     lowered_path = arcs_to_lines(

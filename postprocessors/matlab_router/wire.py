@@ -87,7 +87,7 @@ class MatlabRouterWire(Wire):
     def conversation(
         self, packets: Sequence[Packet], machine: MatlabRouterMachine, manner: Manner
     ) -> MatlabRouterConversation:
-        """The conversation that sends these jobs."""
+        """Return the conversation that sends these jobs."""
         if manner.home:
             raise MachineError("each job goes home by itself", where="--home", mend="leave it out")
         return MatlabRouterConversation(packets, machine, manner)
@@ -108,7 +108,7 @@ class MatlabRouterTerminal(Terminal):
 
 
 def _streams(jobs: Sequence[ReadJob], data: bytes, machine: MatlabRouterMachine) -> list[bytes]:
-    """The bytes of each job on the line."""
+    """Return the bytes of each job on the line."""
     dialect = dialect_of(machine)
     if dialect.format != "stream":
         return [stream_of([_numbers(job, job.first, 0)], dialect) for job in jobs]
@@ -132,8 +132,8 @@ def _numbers(job: ReadJob, first: Ints, line: int) -> JobNumbers:
 
 
 def rest_of(data: bytes, machine: MatlabRouterMachine, first: int) -> tuple[bytes, int]:
-    """The program from one of its blocks (from 0) on; how many blocks bring the machine there: a
-    job has one for going home, to its first point and down, and one for each line."""
+    """Return the program from one of its blocks (from 0) on; how many blocks bring the machine
+    there: a job has one for going home, to its first point and down, and one for each line."""
     dialect, jobs = dialect_of(machine), list(read_jobs(data, machine))
     begins = np.cumsum([0, *(job.length.shape[1] + 1 for job in jobs)])
     job_index = int(np.searchsorted(begins, first, side="right")) - 1
@@ -246,7 +246,8 @@ class MatlabRouterConversation(PacketByPacket):
             self._next_number(now)
 
     def _halt(self, now: float, *, unsent: bool) -> bool:
-        """A job whose numbers are not complete is never begun."""
+        """Return True: the machine stands, for a job whose numbers are not complete never begins;
+        False while it moves."""
         if self._moving and not unsent:
             return False
         self._moving = False

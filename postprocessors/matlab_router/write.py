@@ -35,7 +35,7 @@ CARRIAGE_RETURN: Final = 13
 
 
 def write_program(toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
-    """The program; PostError for the first thing that this machine cannot do."""
+    """Return the program; PostError for the first thing that this machine cannot do."""
     dialect = dialect_of(machine)
     cuts, findings = cuts_of(toolpath, machine, dialect)
     jobs, changes = jobs_of(cuts, toolpath, machine, dialect)
@@ -72,7 +72,7 @@ class JobNumbers(Struct, frozen=True):
 
 
 def _numbers_of(jobs: Jobs) -> Iterator[JobNumbers]:
-    """All jobs as plain numbers."""
+    """Yield all jobs as plain numbers."""
     lines = jobs.lines
     for low, high in pairwise(jobs.offsets):
         start, end = lines.start[low:high], lines.end[low:high]
@@ -126,8 +126,8 @@ def _matrix(name: str, rows: Pair) -> list[str]:
 
 
 def stream_of(jobs: Iterable[JobNumbers], dialect: ResolvedDialect) -> bytes:
-    """Each number in digits and a carriage return: lines, first x and y, all lx, ly, velx, vely
-    (L4294-4360)."""
+    """Return each number in digits and a carriage return: lines, first x and y, all lx, ly,
+    velx, vely (L4294-4360)."""
     parts = []
     for number, job in enumerate(jobs, 1):
         body = job.lxy[0] + job.lxy[1] + job.velxy[0] + job.velxy[1]

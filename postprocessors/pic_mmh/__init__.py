@@ -38,7 +38,7 @@ class PicMmh(Target):
     wire = lazy_call("camtool_postprocessors.pic_mmh.wire:PicMmhWire")
 
     def unit_mm(self, machine: PicMmhMachine, axis: Axis) -> float:
-        """The coarser of the last decimal of a coordinate and a step."""
+        """Return the coarser of the last decimal of a coordinate and a step."""
         from .numbers import UNITS_PER_MM
 
         steps = (each.coded_step_mm for each in machine.axes)
@@ -58,7 +58,7 @@ class PicMmh(Target):
         return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks), lines=tuple(lines))
 
     def twin_kind(self) -> TwinKind:
-        """The virtual controller; docs/wires/pic-mmh.md."""
+        """Return the virtual controller; docs/wires/pic-mmh.md."""
         from .twin import PicMmhTwin, PicMmhTwinSettings
 
         return TwinKind(PicMmhTwinSettings, PicMmhTwin)

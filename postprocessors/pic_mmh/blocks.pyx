@@ -27,7 +27,8 @@ cdef inline bint _is_blank(Int sign) noexcept:
 
 
 cdef inline Int _digits(const unsigned char[::1] data, Int at, Int count, Int number) noexcept:
-    """The number with so many digits more, −1 where they are none; they lie within the data."""
+    """Return the number with so many digits more, −1 where they are none; they lie within the
+    data."""
     cdef Int k
     for k in range(at, at + count):
         if not _ZERO <= data[k] < _ZERO + 10:

@@ -67,11 +67,11 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
     """The PIC18F8720: lines by DDA, arcs by direct search, DDA or stairs."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """The motion, chunk by chunk."""
+        """Return the motion, chunk by chunk."""
         return PicMmhRun(toolpath, machine, options).run()
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """The same with start, ends and arc centres at their nearest steps."""
+        """Return the same with start, ends and arc centres at their nearest steps."""
         coded_mm = [axis.coded_step_mm for axis in machine.axes]
         start = _on_grid(toolpath.start[None, :], coded_mm)[0]
         end = read_only(toolpath.by_parts(lambda part: _on_grid(part.end, coded_mm)))
@@ -84,7 +84,7 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
     def timed(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> Iterator[TimedChunk]:
-        """The motion with the times of its outputs."""
+        """Return the motion with the times of its outputs."""
         return super().timed(toolpath, machine, options_by_pass(machine, options))
 
     def clock(self, toolpath: Toolpath, machine: _Machine) -> SampleClock:
@@ -114,7 +114,7 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
     def findings(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> tuple[Finding, ...]:
-        """Arcs that do not end alike by every reading of the thesis."""
+        """Return arcs that do not end alike by every reading of the thesis."""
         if self.interpolation(toolpath, machine, options) != "dsm" or not toolpath.is_arc.any():
             return ()
 
@@ -125,8 +125,8 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
     def fused_run(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> FusedLegs | None:
-        """The same motion as that of `run`, judged as it is made, without chunks; None where the
-        mechanics needs these. Raises as `run` does, all at once."""
+        """Return the same motion as that of `run`, judged as it is made, without chunks; None
+        where the mechanics needs these. Raises as `run` does, all at once."""
         return PicMmhRun(toolpath, machine, options).fused_run()
 
 
@@ -138,7 +138,7 @@ def options_by_pass(machine: _Machine, options: Options) -> Options:
 
 
 def _on_grid(points: Floats, coded_mm: list[float]) -> Floats:
-    """Points (J, A) mm, each coordinate at its nearest step."""
+    """Return points (J, A) mm, each coordinate at its nearest step."""
     columns = [to_steps(points[:, axis], step) * step for axis, step in enumerate(coded_mm)]
     return np.column_stack(columns)
 
@@ -214,7 +214,7 @@ class PicMmhRun:
         self._buffer = np.empty((options.chunk_steps, 2), dtype=np.int64)
 
     def run(self) -> Iterator[Chunk]:
-        """The chunks of all rows up to the end of the program."""
+        """Yield the chunks of all rows up to the end of the program."""
         for row, number in enumerate(self._toolpath.kind.tolist()):
             kind = Kind(number)
             if self._compensations is not None:
@@ -233,7 +233,7 @@ class PicMmhRun:
                 return
 
     def fused_run(self) -> FusedLegs | None:
-        """All rows up to the end of the program as legs."""
+        """Return all rows up to the end of the program as legs."""
         if not self._mechanics.plain or self._compensations is not None:
             return None
         toolpath = self._toolpath
@@ -255,9 +255,9 @@ class PicMmhRun:
         )
 
     def _stop_samples(self) -> Ints:
-        """(N,) samples of each arc up to its stop, by `controller.arc_end`; −1 for other rows, and
-        where it is "equal". The ends of arcs become their stops: the controller counts steps, and
-        goes on from where it is."""
+        """Return (N,) samples of each arc up to its stop, by `controller.arc_end`; −1 for other
+        rows, and where it is "equal". The ends of arcs become their stops: the controller
+        counts steps, and goes on from where it is."""
         toolpath, controller = self._toolpath, self._controller
         if controller.arc_end == "equal" or not toolpath.is_arc.any():
             return np.broadcast_to(np.int64(-1), len(toolpath))
@@ -277,7 +277,8 @@ class PicMmhRun:
         return stops
 
     def arcs_as_said(self) -> Ints:
-        """(L, 14) legs of the arcs up to the end of the program as if each stopped on its end."""
+        """Return (L, 14) legs of the arcs up to the end of the program as if each stopped on
+        its end."""
         toolpath = self._toolpath
         places = positions(toolpath, self._position, self._said, self._home)
         unknown = np.full(len(toolpath), -1, dtype=np.int64)
@@ -289,7 +290,7 @@ class PicMmhRun:
         return np.concatenate(parts)
 
     def _suspect(self, places: Ints) -> Bools:
-        """(N,) true for the rows that `_check` has to look at."""
+        """Return (N,) true for the rows that `_check` has to look at."""
         kind, feed = self._toolpath.kind, self._toolpath.feed
         with np.errstate(invalid="ignore"):
             no_feed = self._toolpath.is_feed & ~((feed > 0.0) & np.isfinite(feed))
@@ -297,7 +298,7 @@ class PicMmhRun:
         return np.asarray(no_feed | is_moved | (kind == Kind.DWELL))
 
     def _check(self, row: int, position: Ints) -> None:
-        """ProgramError for a row that cannot be followed from `position` (3,) steps."""
+        """Raise ProgramError for a row that cannot be followed from `position` (3,) steps."""
         kind = Kind(int(self._toolpath.kind[row]))
         if kind <= Kind.ARC_CCW:
             self._period(row, kind, 0)
@@ -324,7 +325,7 @@ class PicMmhRun:
             yield from self._emit(row, self._line((2,), target, self._period(row, kind, 2)))
 
     def _period(self, row: int, kind: Kind, axis: int) -> float:
-        """Seconds between two outputs of a row on an axis."""
+        """Return seconds between two outputs of a row on an axis."""
         if kind not in (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW):
             return self._rapid_period_s
         feed = float(self._toolpath.feed[row])
@@ -337,7 +338,7 @@ class PicMmhRun:
         return max(60.0 * float(self._coded_mm[axis]) / feed, self._least_period_s)
 
     def _line(self, axes: tuple[int, ...], target: Ints, period_s: float) -> _Leg:
-        """A DDA line of one or two axes from here to `target`."""
+        """Return a DDA line of one or two axes from here to `target`."""
         travel = [int(target[axis] - self._position[axis]) for axis in axes]
         a, b = abs(travel[0]), abs(travel[1]) if len(travel) > 1 else 0
         return _Leg(
@@ -350,7 +351,7 @@ class PicMmhRun:
         )
 
     def _arc(self, row: int, kind: Kind, target: Ints) -> _Leg:
-        """The arc of a row, about its rounded centre, as far as it will go."""
+        """Return the arc of a row, about its rounded centre, as far as it will go."""
         centre_x, centre_y = self._centres[row].tolist()
         x, y = int(self._position[0]) - centre_x, int(self._position[1]) - centre_y
         arc = StepArc(
@@ -370,7 +371,7 @@ class PicMmhRun:
         return _Leg(fill, samples, (0, 1), origin, sign, period_s, ended=is_met)
 
     def _emit(self, row: int, leg: _Leg) -> Iterator[Chunk]:
-        """The samples of a leg in chunks; an empty one when it has none and never ends."""
+        """Yield the samples of a leg in chunks; an empty one when it has none and never ends."""
         remaining, is_done = leg.samples, leg.samples == 0
         if is_done and not leg.ended:
             yield one_row(row, NO_SAMPLES, NO_SAMPLES, ended=False)
@@ -424,7 +425,7 @@ class PicMmhRun:
         return one_row(row, NO_SAMPLES, NO_SAMPLES, duration_s=seconds)
 
     def _arc_centres(self) -> Ints:
-        """(N, 2) steps; 0 where the row is no arc."""
+        """Return (N, 2) steps; 0 where the row is no arc."""
         toolpath = self._toolpath
         if not toolpath.is_arc.any():
             return np.broadcast_to(np.int64(0), (len(toolpath), 2))
@@ -433,7 +434,7 @@ class PicMmhRun:
         return self._steps(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), range(2))
 
     def _steps(self, points: Floats, axes: range, *, named: bool = True) -> Ints:
-        """(N, len(axes)) steps of points in mm; ProgramError beyond `MAX_STEPS`."""
+        """Return (N, len(axes)) steps of points in mm; ProgramError beyond `MAX_STEPS`."""
         coded_mm = self._coded_mm[list(axes)]
         is_far = (np.abs(points) > MAX_STEPS * coded_mm).any(axis=1)
         if is_far.any():
@@ -529,7 +530,7 @@ class StepArc(Struct, frozen=True):
 
 
 def line_filler(a: int, b: int) -> Filler:
-    """A DDA line of a ≥ 0 and b ≥ 0 steps."""
+    """Return a DDA line of a ≥ 0 and b ≥ 0 steps."""
     registers, counters = np.zeros(2), np.zeros(2, dtype=np.int64)
 
     def fill(buffer: Ints) -> tuple[int, int, bool]:
@@ -540,8 +541,8 @@ def line_filler(a: int, b: int) -> Filler:
 
 
 def arc_filler(arc: StepArc, method: str, *, rounded: bool) -> Filler:
-    """An arc whose start is not its centre; `rounded`: the error at the start is that against
-    the circle of the rounded radius (DSM and stairs), else 0."""
+    """Return an arc whose start is not its centre; `rounded`: the error at the start is that
+    against the circle of the rounded radius (DSM and stairs), else 0."""
     state: Ints
     if method == "dda":
         state = dda_arc_start(arc.x, arc.y, arc.clockwise)
@@ -629,7 +630,7 @@ def arc_end_findings(toolpath: Toolpath, machine: _Machine, arcs: Ints) -> tuple
 
 
 def _stops(arcs: Ints, rounded: bool, reading: int) -> Ints:
-    """(L, 4) of `steps`, by direct search."""
+    """Return (L, 4) of `steps`, by direct search."""
     stops = np.empty((len(arcs), loops.STOP_COLUMNS), dtype=np.int64)
     loops.arc_stops(np.ascontiguousarray(arcs), (loops.DSM, rounded, reading), stops)
     return stops

@@ -27,7 +27,8 @@ METHODS: Final = {"dsm": loops.DSM, "stairs": loops.STAIRS, "dda": loops.DDA}
 
 
 def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
-    """(N + 1, 3) steps where the controller stands before each row and after the last one."""
+    """Return (N + 1, 3) steps where the controller stands before each row and after the last
+    one."""
     kind, count = toolpath.kind, len(toolpath)
     places = np.empty((count + 1, 3), dtype=np.int64)
     for axis, homing in enumerate((Kind.HOME_XY, Kind.HOME_XY, Kind.HOME_Z)):
@@ -51,7 +52,7 @@ class CommandedPath(Struct, frozen=True, eq=False):
     stops: Ints
 
     def legs(self, low: int, high: int) -> Ints:
-        """(L, 14) legs of `steps` of the rows low:high."""
+        """Return (L, 14) legs of `steps` of the rows low:high."""
         places, centres = self.places[low : high + 1], self.centres[low:high]
         kind = self.toolpath.kind[low:high]
         begin, travel = places[:-1], np.diff(places, axis=0)
@@ -89,7 +90,7 @@ class Periods(Struct, frozen=True, eq=False):
     step_mm: Floats
 
     def of(self, toolpath: Toolpath, low: int, high: int) -> Floats:
-        """(high − low, 2) s of the rows low:high in XY and in Z."""
+        """Return (high − low, 2) s of the rows low:high in XY and in Z."""
         with np.errstate(divide="ignore", invalid="ignore"):
             feed_s = 60.0 * self.step_mm[None, :] / toolpath.feed[low:high, None]
             feed_s = np.maximum(feed_s, self.least_s)

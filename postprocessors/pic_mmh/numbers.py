@@ -64,7 +64,7 @@ class UnitGrid(Struct, frozen=True):
 
     @classmethod
     def of(cls, dialect: PicMmhDialect, step_mm: float) -> UnitGrid:
-        """The grid of a form for an axis whose coded step is `step_mm`."""
+        """Return the grid of a form for an axis whose coded step is `step_mm`."""
         return cls(UNITS_PER_MM[dialect.form], MAX_UNITS[dialect.form], step_mm)
 
     @property
@@ -73,12 +73,12 @@ class UnitGrid(Struct, frozen=True):
         return max(1.0 / self.units_per_mm, self.step_mm)
 
     def fits(self, values_mm: Floats) -> Bools:
-        """Mask of the values that are finite and have no more digits than the form."""
+        """Return the mask of the values that are finite and have no more digits than the form."""
         with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(np.abs(values_mm) * self.units_per_mm < self.most_units + 0.5)
 
     def units(self, values_mm: Floats) -> Ints:
-        """Values (mm, any shape) as whole units; they must fit.
+        """Return values (mm, any shape) as whole units; they must fit.
 
         A value that would lie half-way between two steps is written one unit farther from zero:
         the step stays the same, and no longer depends on the last bit of the controller's
@@ -91,12 +91,13 @@ class UnitGrid(Struct, frozen=True):
         return np.asarray(units + np.where(halfway, np.sign(units), 0))
 
     def steps(self, units: Ints) -> Ints:
-        """The steps at which the controller stands after being sent these units."""
+        """Return the steps at which the controller stands after being sent these units."""
         in_steps = np.abs(units) / (self.units_per_mm * self.step_mm)
         return np.asarray((np.sign(units) * np.floor(in_steps + 0.5)).astype(np.int64))
 
     def nearest_units(self, steps: Ints) -> Ints:
-        """The units nearest to these steps; where any whole unit means a step, it is this one."""
+        """Return the units nearest to these steps; where any whole unit means a step, it is
+        this one."""
         scaled = steps * (self.units_per_mm * self.step_mm)
         return np.asarray(np.rint(scaled).astype(np.int64))
 
@@ -190,7 +191,8 @@ def _check_coordinates(toolpath: Toolpath, grids: tuple[UnitGrid, UnitGrid, Unit
 
 
 def far_arcs(toolpath: Toolpath, machine: PicMmhMachine, dialect: PicMmhDialect) -> Bools:
-    """(N,) true for arcs whose centre has more than five digits of µm: nearly straight ones."""
+    """Return (N,) true for arcs whose centre has more than five digits of µm: nearly straight
+    ones."""
     grids = (UnitGrid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     fits = [grid.fits(values) for grid, values in zip(grids, toolpath.centre.T, strict=False)]
     return np.asarray(toolpath.is_arc & ~(fits[0] & fits[1]))
@@ -234,7 +236,8 @@ def _feed_units(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[Ints, Findi
 
 
 def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
-    """The blocks of a dwell, spindle or tool event, and whether its value had to be rounded.
+    """Return the blocks of a dwell, spindle or tool event, and whether its value had to be
+    rounded.
 
     Dwells are whole seconds of two digits (L3359-3366), rounded up and split; spindle speeds have
     four digits (L3418-3426), tools two (L3455-3464).

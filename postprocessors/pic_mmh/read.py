@@ -90,7 +90,7 @@ EVENTS: Final = {
 
 
 def read_program(data: bytes, machine: PicMmhMachine) -> Toolpath:
-    """The moves of a program; ProgramError naming block and column when it is none."""
+    """Return the moves of a program; ProgramError naming block and column when it is none."""
     check_count(data.count(b";"), "block")
     _check_bytes(data)
     reader = _Reader(machine)
@@ -119,12 +119,13 @@ def read_program(data: bytes, machine: PicMmhMachine) -> Toolpath:
 
 
 def _fail(index: int, column: int, message: str, mend: str = "") -> NoReturn:
-    """ProgramError at a block (index from 0) and a column (from 1, from its first character)."""
+    """Raise ProgramError at a block (index from 0) and a column (from 1, from its first
+    character)."""
     raise ProgramError(message, where=f"block {index + 1}, column {column}", mend=mend)
 
 
 def _check_bytes(data: bytes) -> None:
-    """ProgramError at the first byte that is no printable ASCII and no line end."""
+    """Raise ProgramError at the first byte that is no printable ASCII and no line end."""
     odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
     if odd:
         before = data[: odd.start()]
@@ -311,7 +312,7 @@ def patterns(form: str) -> Patterns:
 
 
 def fault_of(text: str, form: str) -> BlockFault:
-    """Why a block (without its `;`) is none in this form."""
+    """Return why a block (without its `;`) is none in this form."""
     if not text:
         return BlockFault(1, "an empty block", "remove the ; that has nothing before it")
     if _INTERACTIVE.fullmatch(text):
@@ -345,7 +346,7 @@ def _value(kind: str, form: str) -> str:
 
 
 def _walk(text: str, shape: Shape, form: str) -> BlockFault:
-    """The first word of the shape that the block does not have."""
+    """Return the first word of the shape that the block does not have."""
     offset = 3
     for letter, kind in shape:
         match = re.compile(letter + _value(kind, form)).match(text, offset)

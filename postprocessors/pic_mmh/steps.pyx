@@ -79,7 +79,7 @@ cpdef Int expected_quadrants(Int x, Int y, bint clockwise, Int end_x, Int end_y)
 
 
 def approach_start(x: int, y: int, end_x: int, end_y: int, low: int) -> Ints:
-    """The tracker (6,): x, y, quadrants entered, samples seen, nearest sample, its squared
+    """Return the tracker (6,): x, y, quadrants entered, samples seen, nearest sample, its squared
     distance (−1 while there is none); sample 0 is the start itself."""
     square = (x - end_x) ** 2 + (y - end_y) ** 2
     return np.array([x, y, 0, 0, 0, square if low <= 0 else -1], dtype=np.int64)
@@ -219,7 +219,7 @@ cdef inline (Int, Int, Int, Int, Int, Int, Int) _advance(
 
 
 def direct_search_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints:
-    """The state (5,) at the start (x, y) ≠ (0, 0) of an arc."""
+    """Return the state (5,) at the start (x, y) ≠ (0, 0) of an arc."""
     sx, sy = heading(x, y, clockwise)
     return np.array([x, y, error, sx, sy], dtype=np.int64)
 
@@ -240,8 +240,8 @@ cdef Int _run_length(Int m, Int n, Int sense, Int error, Int room) noexcept:
 cdef wide _run(
     Int m, Int n, Int sense, Int error, Int[::1] out_m, Int[::1] out_n, Int low, Int high
 ) noexcept:
-    """The positions that follow M, N while M runs `sense`, by the closed form, into the rows
-    low … high − 1."""
+    """Return the positions that follow M, N while M runs `sense`, by the closed form, into the
+    rows low … high − 1."""
     cdef Int first, k, size
     cdef double position, invariant
     invariant = float(m * m + n * n - error)
@@ -341,8 +341,8 @@ cpdef void skip(Int[::1] state, Int count) noexcept:
 
 
 cpdef Int first_at(Int[::1] state, Int end_x, Int end_y, Int limit) noexcept:
-    """The first iteration, 1 … limit, from `state` on at which the position equals the end, or −1;
-    `state` runs on to there.
+    """Return the first iteration, 1 … limit, from `state` on at which the position equals the end,
+    or −1; `state` runs on to there.
 
     This is the controller's stop test, done after each iteration: an end at the start is met
     after a whole turn. No coordinate changes by more than one an iteration, so the end is not
@@ -361,8 +361,9 @@ cpdef Int first_at(Int[::1] state, Int end_x, Int end_y, Int limit) noexcept:
 
 
 cpdef (Int, Int) nearest_to(Int[::1] state, Int end_x, Int end_y, Int low, Int high) noexcept:
-    """The iteration in low … high (both included) nearest to the end, the first one on ties, and
-    its squared distance in steps²; (−1, −1) when the range is empty. `state` runs on to `high`.
+    """Return the iteration in low … high (both included) nearest to the end, the first one on
+    ties, and its squared distance in steps²; (−1, −1) when the range is empty. `state` runs on to
+    `high`.
 
     As in `first_at`; what is to be no farther than d has come nearer by apart − d. Long strides
     show first how near it comes at least.
@@ -414,7 +415,7 @@ cpdef (Int, Int) nearest_to(Int[::1] state, Int end_x, Int end_y, Int low, Int h
 
 
 def stairs_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints:
-    """The state (5,) at the start (x, y) ≠ (0, 0) of an arc: x, y, D, sx, sy."""
+    """Return the state (5,) at the start (x, y) ≠ (0, 0) of an arc: x, y, D, sx, sy."""
     sx, sy = heading(x, y, clockwise)
     return np.array([x, y, error, sx, sy], dtype=np.int64)
 
@@ -533,7 +534,8 @@ cdef (Int, Int, bint) _dda_line(
 
 
 def dda_arc_start(x: int, y: int, clockwise: bool) -> Ints:
-    """The state (8,) at the start (x, y) ≠ (0, 0): x, y, sx, sy, R, Qg, Qs, whether x grows."""
+    """Return the state (8,) at the start (x, y) ≠ (0, 0): x, y, sx, sy, R, Qg, Qs, whether x
+    grows."""
     sx, sy = heading(x, y, clockwise)
     radius = rounded_radius(x, y)
     return np.array([x, y, sx, sy, radius, 0, 0, 1 if x * sx >= 0 else 0], dtype=np.int64)
@@ -868,7 +870,7 @@ cpdef void run_on(
     Int[::1] moves, Int[::1] start, Int[:, ::1] ends, Int[:, ::1] centres, (Int, bint, Int) how,
     Int[::1] samples
 ):
-    """The rows of a program, each from where the one before has really stopped.
+    """Return the rows of a program, each from where the one before has really stopped.
 
     `moves` (N,): 0 where X and Y stay, 1 for a line, 2 and 3 for an arc counter-clockwise and
     clockwise; `start` (2,), `ends` (N, 2), `centres` (N, 2) steps. Ends of arcs become their
@@ -1016,7 +1018,7 @@ cdef (Int, Int) _ways(
 
 
 cdef inline bint _is_near(Int low, Int high, Int end) noexcept:
-    """True if low … high, in either order, comes within `NEAR_STEPS` of the end."""
+    """Return True if low … high, in either order, comes within `NEAR_STEPS` of the end."""
     return min(low, high) <= end + NEAR_STEPS and max(low, high) >= end - NEAR_STEPS
 
 
@@ -1227,7 +1229,7 @@ cdef class LandingSearch:
 cpdef land(
     Int[:, ::1] arcs, double[::1] sweeps, double units_per_step, Int most_units, double sagitta
 ):
-    """(N, 3) landings of arcs (N, 7) with wanted sweeps (N,) > 0 rad: where to end each.
+    """Return (N, 3) landings of arcs (N, 7) with wanted sweeps (N,) > 0 rad: where to end each.
 
     At its end if all paths meet it; otherwise in this order: the last step from which the closing
     line goes on without turning an axis round (each such reversal costs the machine a whole
@@ -1273,9 +1275,9 @@ cdef void _begin(Int[::1] arc, Int error, Int[::1] state) noexcept:
 
 
 cdef Int _hits(Int[::1] arc, Int x, Int y, Int low, Int high, Int[::1] state) noexcept:
-    """The iteration in low … high at which the controller, D = 0 at the start, would stop if the
-    block's end were (x, y); −1 when it would not, or not about there with the other start of D,
-    which is that against the rounded radius."""
+    """Return the iteration in low … high at which the controller, D = 0 at the start, would
+    stop if the block's end were (x, y); −1 when it would not, or not about there with the other
+    start of D, which is that against the rounded radius."""
     cdef Int met, other, radius, error
     _begin(arc, 0, state)
     met = first_at(state, x, y, high)
@@ -1292,7 +1294,7 @@ cdef Int _hits(Int[::1] arc, Int x, Int y, Int low, Int high, Int[::1] state) no
 
 
 cdef bint _represents(Int steps, LandingSearch search) noexcept:
-    """True if a whole number of units means this step."""
+    """Return True if a whole number of units means this step."""
     cdef Int size, units
     size = abs(steps)
     units = int(size * search.units_per_step + 0.5)
@@ -1300,8 +1302,8 @@ cdef bint _represents(Int steps, LandingSearch search) noexcept:
 
 
 cdef bint _lands(Int[::1] arc, Int row, Int first, LandingSearch search) noexcept:
-    """True if position `row` of the path, which began behind iteration `first`, can be written and
-    the controller stops there and not earlier, whatever D was."""
+    """Return True if position `row` of the path, which began behind iteration `first`, can be
+    written and the controller stops there and not earlier, whatever D was."""
     cdef Int x, y, iteration
     x, y = search.path_x[row], search.path_y[row]
     if not _represents(x + arc[CENTRE_X], search) or not _represents(y + arc[CENTRE_Y], search):

@@ -206,7 +206,7 @@ class PicMmhTwin(Twin):
         self._said = home - self._zero
 
     def _steps(self, travels: Ints, hz: float) -> Travel:
-        """Travels (L, 3) or (3,) in steps, one after the other, each an output a period."""
+        """Return travels (L, 3) or (3,) in steps, one after the other, each an output a period."""
         most_hz = self._machine.limits.max_step_rate_hz
         period = 1.0 / min(hz, hz if most_hz is None else most_hz)
         parts = [self.slides.commanded_mm[None, :]]
@@ -242,7 +242,7 @@ class PicMmhTwin(Twin):
 
 
 def _senses(text: bytes) -> Ints:
-    """(3,) of X, Y and Z in a text such as X+Y-: 1, −1, or 0 where it is not named."""
+    """Return (3,) of X, Y and Z in a text such as X+Y-: 1, −1, or 0 where it is not named."""
     senses = np.zeros(3, dtype=np.int64)
     for axis, sense in zip(text[::2], text[1::2], strict=True):
         senses[b"XYZ".index(axis)] = -1 if sense == ord("-") else 1

@@ -81,9 +81,9 @@ class PicMmhWire(Wire):
     zeroes_each = False
 
     def packets(self, data: bytes, machine: PicMmhMachine, forecast: Forecast) -> Sequence[Packet]:
-        """The compensations, then the blocks; by region, a compensation before each block for
-        which it changes. Whether M06 waits the thesis does not say: the user is asked before it
-        goes out."""
+        """Return the compensations, then the blocks; by region, a compensation before each
+        block for which it changes. Whether M06 waits the thesis does not say: the user is asked
+        before it goes out."""
         fixed_mm = tuple(axis.compensation_mm for axis in machine.axes)[:2]
         decoded = forecast.decoded
         by_block = _by_block(decoded, machine)
@@ -116,7 +116,7 @@ class PicMmhWire(Wire):
     def conversation(
         self, packets: Sequence[Packet], machine: PicMmhMachine, manner: Manner
     ) -> PicMmhConversation:
-        """The conversation that sends these blocks."""
+        """Return the conversation that sends these blocks."""
         if manner.home:
             raise MachineError(
                 "homing leaves part zero unknown to it",
@@ -240,7 +240,7 @@ def _reports(
 
 
 def _steps(letter: str, way_mm: float, step_mm: float) -> list[tuple[bytes, int]]:
-    """The strings that move an axis, each with its steps."""
+    """Return the strings that move an axis, each with its steps."""
     remaining, sense = round(abs(way_mm) / step_mm), "-" if way_mm < 0.0 else "+"
     parts = [MAX_STEPS] * (remaining // MAX_STEPS) + [remaining % MAX_STEPS] * (
         remaining % MAX_STEPS > 0
@@ -472,7 +472,7 @@ class PicMmhConversation(PacketByPacket):
             self._count_on(now)
 
     def _halt(self, now: float, *, unsent: bool) -> bool:
-        """Any character stops it; A; is one that it knows."""
+        """Stop the machine by `A;`: any character stops it, this one is a command of its own."""
         self._halting, self._told = True, now
         self._ends = 2 if self._echo and not unsent else 1
         self._write(ALTO)
@@ -524,7 +524,7 @@ class PicMmhTerminal(Terminal):
         return data
 
     def halt(self) -> bytes:
-        """Any character stops it; A; has come back when it stands."""
+        """Return `A;`, which stops it as any character does, and has come back when it stands."""
         stop = super().halt()
         self._ends = 1 + self._echo.count(self.end)
         self._echo += stop if self._link.echo == "echo" else b""
@@ -532,7 +532,7 @@ class PicMmhTerminal(Terminal):
         return stop
 
     def is_urgent(self, line: str) -> bool:
-        """True for the command that stops the machine."""
+        """Return True for the command that stops the machine."""
         return line.strip().rstrip(";") == "A"
 
     def decode(self, data: bytes) -> list[str]:
@@ -567,7 +567,7 @@ class PicMmhTerminal(Terminal):
         return [f"{count} × {step}" for step, count in steps]
 
     def _output(self, octet: int) -> str:
-        """The axes of an output and their senses; "" for a byte that reports none."""
+        """Return the axes of an output and their senses; "" for a byte that reports none."""
         if self._link.step_byte == "letters" and chr(octet) in "XYZxyz":
             return f"{chr(octet).upper()}{'+' if chr(octet).isupper() else '-'}"
         if self._link.step_byte != "bits" or not 0x40 < octet < 0x80:

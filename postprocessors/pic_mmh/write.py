@@ -51,14 +51,15 @@ _TURN: Final = 2.0 * math.pi
 
 
 def write_program(toolpath: Toolpath, machine: PicMmhMachine) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be written or done."""
+    """Return the program of a toolpath; PostError names the move that cannot be written or
+    done."""
     writer = _Writer(toolpath, machine)
     data, rows = writer.blocks()
     return Program.of_text(data, machine, rows, writer.findings(data))
 
 
 def _refuse_chords(place: str) -> NoReturn:
-    """PostError for an arc that passes where no coordinate can be written."""
+    """Raise PostError for an arc that passes where no coordinate can be written."""
     raise PostError(
         "an arc that has to be written as lines leaves the five digits of a coordinate",
         where=place,
@@ -118,8 +119,8 @@ class _Writer:
         return self._numbers.grids[0]
 
     def blocks(self) -> tuple[bytes, Ints]:
-        """All blocks as text, and the row of the wanted toolpath of each, −1 for the dialect's
-        own."""
+        """Return all blocks as text, and the row of the wanted toolpath of each, −1 for the
+        dialect's own."""
         points = self._points()
         events = self._events(points)
         is_sent = points.is_sent
@@ -151,7 +152,7 @@ class _Writer:
         return self._wanted.place(int(self._row[row]))
 
     def _words(self, points: Points) -> list[WordColumn]:
-        """The words of all points, none where nothing is sent."""
+        """Return the words of all points, none where nothing is sent."""
         row, is_sent = points.row, points.is_sent
         flat = is_sent & ~points.is_deep
         arc = flat & points.is_arc
@@ -178,9 +179,9 @@ class _Writer:
     # Where blocks may bring the tool.
 
     def _points(self) -> Points:
-        """All points, and what of them is sent. The numbers of a step may differ by less than a
-        step, and so may the number that an arc starts from, whose landing may then be no landing:
-        as many passes as it takes until none is."""
+        """Return all points, and what of them is sent. The numbers of a step may differ by less
+        than a step, and so may the number that an arc starts from, whose landing may then be no
+        landing: as many passes as it takes until none is."""
         arcs = self._arcs()
         is_refused = np.zeros(len(arcs.row), dtype=np.bool_)
         while True:
@@ -194,7 +195,8 @@ class _Writer:
         return points
 
     def _arcs(self) -> StepArcs:
-        """The arcs as this controller takes them from where it stands, and their landings."""
+        """Return the arcs as this controller takes them from where it stands, and their
+        landings."""
         numbers, path = self._numbers, self._toolpath
         is_deep = numbers.end_steps[:, 2] != self._before[:, 2]
         rows = np.flatnonzero(path.is_arc & ~is_deep)
@@ -217,7 +219,7 @@ class _Writer:
         return StepArcs(rows[~is_empty], table, sweep[~is_empty], landing, rows[is_empty])
 
     def _points_of(self, arcs: StepArcs, is_refused: Bools) -> Points:
-        """All points when the landings of `is_refused` (J,) are none."""
+        """Return all points when the landings of `is_refused` (J,) are none."""
         numbers, path, grid = self._numbers, self._toolpath, self._grid
         landed = arcs.landed & ~is_refused
         chords = self._chords(arcs, landed)
@@ -267,8 +269,8 @@ class _Writer:
         )
 
     def _refused_landings(self, arcs: StepArcs, points: Points) -> Bools:
-        """Mask (J,) of landings with which a reader would take the block for another arc: short
-        arcs can turn into almost full circles by the rounding of their numbers."""
+        """Return the mask (J,) of landings with which a reader would take the block for another
+        arc: short arcs can turn into almost full circles by the rounding of their numbers."""
         numbers, grid = self._numbers, self._grid
         units = np.where(
             arcs.at_end[:, None],
@@ -281,7 +283,7 @@ class _Writer:
         return np.asarray(arcs.landed & (full_turns(read, arcs.expected_rad) != 0.0))
 
     def _chords(self, arcs: StepArcs, landed: Bools) -> Chords:
-        """Lines along the rest of each arc from its landing, or along all of it."""
+        """Return lines along the rest of each arc from its landing, or along all of it."""
         path, grid = self._toolpath, self._grid
         centre = path.centre[arcs.row]
         places = np.where(landed[:, None], arcs.stop * grid.step_mm, path.starts[arcs.row, :2])
@@ -325,8 +327,8 @@ class _Writer:
     # Events, of which there are few.
 
     def _events(self, points: Points) -> list[tuple[int, str]]:
-        """The blocks of all events, each with its row; PostError for the first row that cannot be
-        sent. Messages have no word in the dialect and are not sent."""
+        """Return the blocks of all events, each with its row; PostError for the first row that
+        cannot be sent. Messages have no word in the dialect and are not sent."""
         blocks = []
         last = len(self._toolpath) - (1 if self._ended else 0)
         for row in np.flatnonzero(~self._toolpath.is_motion).tolist():
@@ -339,7 +341,7 @@ class _Writer:
         return blocks
 
     def _event(self, row: int) -> list[str]:
-        """The blocks of one event."""
+        """Return the blocks of one event."""
         kind, before = Kind(int(self._toolpath.kind[row])), self._before[row].copy()
         blocks: list[str] = []
         if kind == Kind.END:
@@ -370,7 +372,7 @@ class _Writer:
         return blocks
 
     def _home(self, axes: tuple[int, ...]) -> tuple[Ints, Ints]:
-        """Steps and units of machine zero in these axes."""
+        """Return steps and units of machine zero in these axes."""
         zero = self._machine.controller.machine_zero_mm
         grids = [self._numbers.grids[axis] for axis in axes]
         units = [
@@ -463,8 +465,8 @@ class Chords(Struct, frozen=True, eq=False):
 
 
 def turned_rad(start_arm: Floats | Ints, end_arm: Floats | Ints, clockwise: Bools) -> Floats:
-    """(J,) the sweep from the arms `start_arm` to the arms `end_arm` ((J, 2) each), in (0, 2π]; a
-    full turn when the two are one."""
+    """Return (J,) the sweep from the arms `start_arm` to the arms `end_arm` ((J, 2) each), in
+    (0, 2π]; a full turn when the two are one."""
     cross = start_arm[:, 0] * end_arm[:, 1] - start_arm[:, 1] * end_arm[:, 0]
     dot = start_arm[:, 0] * end_arm[:, 0] + start_arm[:, 1] * end_arm[:, 1]
     angle = np.mod(np.arctan2(np.where(clockwise, -cross, cross), dot), _TURN)
@@ -477,7 +479,7 @@ def full_turns(turn_rad: Floats, expected_rad: Floats) -> Floats:
 
 
 def chord_ends(start: Floats, centre: Floats, sweep_rad: Floats, sagitta_mm: float) -> Chords:
-    """The fewest equal chords within `sagitta_mm` of each arc.
+    """Return the fewest equal chords within `sagitta_mm` of each arc.
 
     `start`, `centre` (J, 2) mm; signed sweeps (J,). A chord over the angle a strays by
     R (1 − cos(a/2)); no chord turns by more than a right angle.

@@ -38,12 +38,12 @@ class Valcnc(Target):
         check(machine)
 
     def unit_mm(self, machine: ValcncMachine, axis: Axis) -> float:
-        """The last decimal of a coordinate, on the axis where it is the most."""
+        """Return the last decimal of a coordinate, on the axis where it is the most."""
         dialect = machine.dialect
         return float(10.0**-dialect.decimals / scales_of(machine, dialect).min())
 
     def twin_kind(self) -> TwinKind:
-        """The virtual controller; docs/wires/valcnc.md."""
+        """Return the virtual controller; docs/wires/valcnc.md."""
         from .twin import ValcncTwin, ValcncTwinSettings
 
         return TwinKind(ValcncTwinSettings, ValcncTwin)

@@ -58,7 +58,7 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
     """The PIC18F4550 of ValCNC: lines by a counter, arcs as lines."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """The motion, chunk by chunk."""
+        """Return the motion, chunk by chunk."""
         pieces = _Pieces(toolpath, machine)
         return _leg_run(pieces, toolpath, machine, options).run(pieces.legs())
 
@@ -70,13 +70,15 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
     def run_on(
         self, drawn: DrawingProgress, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> tuple[list[Chunk], DrawingProgress]:
-        """The motion of rows that follow others, which ended at `drawn`; and where these end."""
+        """Return the motion of rows that follow others, which ended at `drawn`; and where these
+        end."""
         pieces = _Pieces(toolpath, machine, drawn)
         chunks = list(_leg_run(pieces, toolpath, machine, options).run(pieces.legs()))
         return chunks, pieces.drawn
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """The moves with their ends on whole steps, and arcs about centres as far from both.
+        """Return the moves with their ends on whole steps, and arcs about centres as far from
+        both.
 
         ProgramError for what the controller cannot follow.
         """
@@ -176,7 +178,7 @@ class _Pieces:
         return int((is_near & (points != 0.0)).sum())
 
     def legs(self) -> Iterator[Legs]:
-        """The legs, some thousands at a time."""
+        """Yield the legs, some thousands at a time."""
         period_s = 1.0 / self._controller.step_rate_hz
         before, places_before = self.drawn.point[None, :], self.drawn.steps[None, :]
         for low in range(0, int(self._first[-1]), PIECES_AT_ONCE):
@@ -193,7 +195,7 @@ class _Pieces:
             yield Legs(row[moves], travel[moves], passes[moves] * period_s)
 
     def _points(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Row (J,) and end (J, 3) mm of the pieces low:high."""
+        """Return the row (J,) and end (J, 3) mm of the pieces low:high."""
         index = np.arange(low, high)
         row = np.searchsorted(self._first, index, side="right") - 1
         part, parts = index - self._first[row] + 1, self._first[row + 1] - self._first[row]
@@ -251,7 +253,7 @@ class _Pieces:
                 raise ProgramError(message, where=block_of(toolpath, int(rows[is_bad.argmax()])))
 
     def _parts(self, arcs: Floats) -> Ints:
-        """(J,) pieces of arcs (J, 5)."""
+        """Return (J,) pieces of arcs (J, 5)."""
         if self._controller.arc_segments is not None:
             return np.full(len(arcs), self._controller.arc_segments)
         length = arcs[:, 2] * np.abs(arcs[:, 4]) / self._controller.arc_segment_mm

@@ -85,7 +85,7 @@ def check(machine: ValcncMachine) -> None:
 
 
 def scales_of(machine: Machine, dialect: ValcncDialect) -> Floats:
-    """(3,) units of the program per mm on X, Y and Z.
+    """Return (3,) units of the program per mm on X, Y and Z.
 
     The controller makes 1 / (coord_scale · nominal_step_mm) steps of a unit, whatever the axis;
     where a step is coded_step_mm, a millimetre is coord_scale · nominal_step_mm / coded_step_mm.

@@ -45,15 +45,16 @@ Point = tuple[float, float, float]
 
 
 def read_program(data: bytes, machine: ValcncMachine) -> Toolpath:
-    """The moves of a program; ProgramError naming block, line and column when it is none."""
+    """Return the moves of a program; ProgramError naming block, line and column when it is
+    none."""
     reader = _Reader(machine)
     reader.read(data)
     return reader.path.finish(reader.findings())
 
 
 def read_block(data: bytes, machine: ValcncMachine, start: Point) -> tuple[Toolpath, Point]:
-    """The moves of one block that follows others, which ended `start` a place in the program's
-    units; and where it ends. ProgramError when it is none."""
+    """Return the moves of one block that follows others, which ended `start` a place in the
+    program's units; and where it ends. ProgramError when it is none."""
     reader = _Reader(machine, start)
     reader.read(data)
     return reader.path.finish(), reader.at
@@ -169,7 +170,7 @@ class _Reader:
         )
 
     def _check_words(self, block: WordBlock, letters: str) -> None:
-        """ProgramError for an unknown code, for a word that stands twice, and for tabs."""
+        """Raise ProgramError for an unknown code, for a word that stands twice, and for tabs."""
         first = "".join(block.words[0])
         if letters[0] != "G" or block.words[0][1] not in CODES:
             codes = " ".join(f"G{code}" for code in CODES)
@@ -187,7 +188,8 @@ class _Reader:
                 )
 
     def findings(self) -> Iterator[Finding]:
-        """The scale that was taken, and arcs that the controller's angle does not bring home."""
+        """Yield the scale that was taken, and arcs that the controller's angle does not bring
+        home."""
         if not self._dialect.coord_scale_checked:
             yield COORDINATES_SCALED_READ(measured=self._dialect.coord_scale)
         if self._missed.count:
@@ -231,7 +233,7 @@ class _Reader:
                 self.path.line(x, y, z, feed=self._feed)
 
     def _in_order(self, block: WordBlock, end: Point) -> Point | None:
-        """The corner between the parts along Z and in XY, if they are apart."""
+        """Return the corner between the parts along Z and in XY, if they are apart."""
         old, order = self.at, self._dialect.z_order
         if end[:2] == old[:2] or end[2] == old[2] or order == "together":
             return None
@@ -321,6 +323,6 @@ class _Reader:
 
 
 def _fail_at_i(block: WordBlock, message: str, mend: str) -> NoReturn:
-    """ProgramError at the I word of an arc."""
+    """Raise ProgramError at the I word of an arc."""
     word = next(index for index, (letter, _) in enumerate(block.words) if letter == "I")
     block.fail(message, word=word, mend=mend)

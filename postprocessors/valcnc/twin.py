@@ -50,8 +50,9 @@ class ValcncTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True
 def _with_all_defined(
     machine: Machine[ValcncController, ValcncDialect],
 ) -> Machine[ValcncController, ValcncDialect]:
-    """The machine with a meaning for what `[dialect]` refuses because the thesis gives it none: a
-    controller does something all the same. What ours does is in the page of its wire."""
+    """Return the machine with a meaning for what `[dialect]` refuses because the thesis gives
+    it none: a controller does something all the same. What ours does is in the page of its
+    wire."""
     dialect = machine.dialect
     meant = {"z_order": "before", "missing_words": "keep", "full_circles": "whole"}
     defined: dict[str, Any] = {

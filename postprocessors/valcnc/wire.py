@@ -80,7 +80,7 @@ class ValcncWire(Wire):
     def conversation(
         self, packets: Sequence[Packet], machine: ValcncMachine, manner: Manner
     ) -> ValcncConversation:
-        """The conversation that sends these blocks."""
+        """Return the conversation that sends these blocks."""
         if manner.home:
             raise MachineError("the controller has no command to home", where="--home")
         assert isinstance(machine.link, ValcncLink)
@@ -97,7 +97,8 @@ class ValcncWire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> Conversation:
-        """A jog is a program of one block, or of two where Z moves too: up first, down last."""
+        """Return a jog is a program of one block, or of two where Z moves too: up first, down
+        last."""
         if action == "zero":
             raise MachineError(
                 f"{machine.target.name} has no command to zero over its line",
@@ -125,7 +126,7 @@ class ValcncWire(Wire):
         return self.conversation(packets, machine, manner)
 
     def hand(self, machine: ValcncMachine, manner: Manner) -> ValcncHand:
-        """The conversation that jogs from place to place."""
+        """Return the conversation that jogs from place to place."""
         return ValcncHand(self, machine, manner)
 
 

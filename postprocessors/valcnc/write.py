@@ -52,7 +52,8 @@ MAX_UNITS: Final = 99_999.0
 
 
 def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
-    """The program of a toolpath; PostError names the move that cannot be written or done."""
+    """Return the program of a toolpath; PostError names the move that cannot be written or
+    done."""
     dialect = machine.dialect
     check_plain(toolpath, machine)
     _check_tools(toolpath)
@@ -118,7 +119,7 @@ def _in_units(toolpath: Toolpath, scales: Floats) -> Toolpath:
 
 
 def _text(rows: PlainRows, dialect: ValcncDialect) -> bytes:
-    """The blocks of all rows that move."""
+    """Return the blocks of all rows that move."""
     style = NumberStyle(dialect.decimals)
     is_sent = rows.moves
     arc = is_sent & rows.is_arc

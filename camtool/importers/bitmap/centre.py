@@ -52,7 +52,7 @@ Pixel = tuple[int, int]
 
 
 def thin(dark: Bools) -> Bools:
-    """(H, W) the pixels that remain of the dark ones."""
+    """Return (H, W) the pixels that remain of the dark ones."""
     height, width = dark.shape
     wide = width + 2
     pixels = np.zeros((height + 2) * wide, dtype=np.bool_)
@@ -72,7 +72,7 @@ def thin(dark: Bools) -> Bools:
 
 
 def _edge(pixels: Ints, pixels_set: Bools, neighbours: Ints) -> Ints:
-    """Those with a light pixel beside them."""
+    """Return those with a light pixel beside them."""
     inner = np.ones(len(pixels), dtype=np.bool_)
     for step in neighbours:
         inner &= pixels_set[pixels + step]
@@ -80,8 +80,8 @@ def _edge(pixels: Ints, pixels_set: Bools, neighbours: Ints) -> Ints:
 
 
 def _removable(neighbours: Bools, turn: int) -> Bools:
-    """(N,) which pixels may go at once, by their neighbours (N, 8): clockwise from above. In one
-    turn those on the lower right, in the other those on the upper left."""
+    """Return (N,) which pixels may go at once, by their neighbours (N, 8): clockwise from
+    above. In one turn those on the lower right, in the other those on the upper left."""
     p2, p3, p4, p5, p6, p7, p8, p9 = neighbours.T
     pairs = ((p2, p3, p4), (p4, p5, p6), (p6, p7, p8), (p8, p9, p2))
     runs = sum((~one & (b | c)).astype(np.int8) for one, b, c in pairs)
@@ -169,8 +169,8 @@ class _Graph:
 
 
 def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
-    """The centre lines: points (n, 2) in pixels as in `outline`, and whether they are closed; and
-    how many dots are left out, which have no length."""
+    """Return the centre lines: points (n, 2) in pixels as in `outline`, and whether they are
+    closed; and how many dots are left out, which have no length."""
     graph = _Graph(thin(dark), dark)
     _prune(graph)
     dots = sum(1 for links in graph.links.values() if not links)
@@ -220,7 +220,7 @@ def _prune(graph: _Graph) -> None:
 
 
 def _without_hook(chain: list[Pixel], graph: _Graph) -> list[Pixel]:
-    """A chain without what leads at its begin into a corner of the stroke."""
+    """Return a chain without what leads at its begin into a corner of the stroke."""
     widths = [graph.half_width(chain[0])]
     for pixel in chain[1:]:
         widths.append(graph.half_width(pixel))
@@ -319,7 +319,7 @@ def _points(
     middles: dict[int, tuple[float, float]],
     height: int,
 ) -> Floats:
-    """The centres of the pixels of a path, (n, 2), and the middles of its junctions."""
+    """Return the centres of the pixels of a path, (n, 2), and the middles of its junctions."""
     places: list[tuple[float, float]] = []
     for chain, is_reversed in path:
         pixels = chains[chain][::-1] if is_reversed else chains[chain]

@@ -55,7 +55,7 @@ def crossings(ink: Ink, level: float) -> int:
 
 
 def outlines(ink: Ink, level: float) -> list[Floats]:
-    """The lines, closed, points (n, 2) each; n ≥ 4."""
+    """Return the lines, closed, points (n, 2) each; n ≥ 4."""
     height, width = ink.shape
     field = np.zeros((height + 2, width + 2), dtype=np.float32)
     field[1:-1, 1:-1] = ink
@@ -82,8 +82,8 @@ def outlines(ink: Ink, level: float) -> list[Floats]:
 
 
 def _directed(field: Ink, dark: Bools, level: float) -> tuple[Ints, Ints]:
-    """(K,), (K,) the sides of squares at which lines enter and leave them: numbers of the sides
-    between neighbours in a row, then of those between neighbours in a column."""
+    """Return (K,), (K,) the sides of squares at which lines enter and leave them: numbers of
+    the sides between neighbours in a row, then of those between neighbours in a column."""
     width = field.shape[1]
     corners = [dark[:-1, :-1], dark[:-1, 1:], dark[1:, 1:], dark[1:, :-1]]
     code = np.zeros(corners[0].shape, dtype=np.uint8)
@@ -115,7 +115,8 @@ def _directed(field: Ink, dark: Bools, level: float) -> tuple[Ints, Ints]:
 
 
 def _places(field: Ink, side: Ints, level: float) -> Floats:
-    """(K, 2) where lines cross these sides: column and row, between the centres of pixels."""
+    """Return (K, 2) where lines cross these sides: column and row, between the centres of
+    pixels."""
     is_vertical = side >= field.size
     start_pixels = np.where(is_vertical, side - field.size, side)
     row, column = np.divmod(start_pixels, field.shape[1])
@@ -126,6 +127,6 @@ def _places(field: Ink, side: Ints, level: float) -> Floats:
 
 
 def enclosed_area(points: Floats) -> float:
-    """The area inside a closed line, positive where that is dark."""
+    """Return the area inside a closed line, positive where that is dark."""
     x, y = (points - points[0]).T
     return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())

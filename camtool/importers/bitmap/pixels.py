@@ -54,7 +54,7 @@ class PixelPicture:
 
 
 def picture(data: bytes, file: str) -> PixelPicture:
-    """The picture in a file; DrawingError where it is broken or too large."""
+    """Return the picture in a file; DrawingError where it is broken or too large."""
     from PIL import Image, ImageOps
 
     with warnings.catch_warnings():
@@ -78,7 +78,7 @@ def picture(data: bytes, file: str) -> PixelPicture:
 
 
 def _ink(image: Any) -> Ink:
-    """The darkness of the pixels of an image of any mode."""
+    """Return the darkness of the pixels of an image of any mode."""
     from PIL import Image
 
     if image.mode.startswith(("I", "F")):
@@ -106,7 +106,7 @@ def _dpi(dpi: Any) -> tuple[float, float] | None:
 
 
 def is_square(dpi: tuple[float, float]) -> bool:
-    """True if pixels of this density are square."""
+    """Return True if pixels of this density are square."""
     return abs(dpi[0] - dpi[1]) <= SQUARE_SHARE * max(dpi)
 
 

@@ -38,8 +38,8 @@ BINS = 256
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
-    """The Drawing of a PNG or JPEG; DrawingError for one that is broken or shows nothing, and for
-    one whose size nothing says."""
+    """Return the Drawing of a PNG or JPEG; DrawingError for one that is broken or shows
+    nothing, and for one whose size nothing says."""
     pixels = picture(data, file)
     units = _units(pixels, file, options)
     ink = np.float32(1.0) - pixels.ink if options.invert else pixels.ink
@@ -123,7 +123,7 @@ def _units(pixels: PixelPicture, file: str, options: ReadOptions) -> Units:
 
 
 def _check_tones(ink: Ink, options: ReadOptions, file: str) -> None:
-    """DrawingError where no pixel, or every one, is dark."""
+    """Raise DrawingError where no pixel, or every one, is dark."""
     lightest, darkest = float(ink.min()), float(ink.max())
     if lightest < options.threshold <= darkest:
         return
@@ -142,7 +142,8 @@ def _check_tones(ink: Ink, options: ReadOptions, file: str) -> None:
 
 
 def _otsu_threshold(ink: Ink) -> float:
-    """The darkness that divides pixels into two kinds whose means differ most (Otsu 1979)."""
+    """Return the darkness that divides pixels into two kinds whose means differ most (Otsu
+    1979)."""
     counts, edges = np.histogram(ink, BINS, (0.0, 1.0))
     tones = 0.5 * (edges[1:] + edges[:-1])
     below, sums = np.cumsum(counts), np.cumsum(counts * tones)
@@ -157,7 +158,7 @@ def _otsu_threshold(ink: Ink) -> float:
 
 
 def _is_large_enough(area: float, options: ReadOptions) -> bool:
-    """True if a contour that encloses this area, pixels, is large enough to be drawn."""
+    """Return True if a contour that encloses this area, pixels, is large enough to be drawn."""
     return abs(area) >= options.speckle_px
 
 

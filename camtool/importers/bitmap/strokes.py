@@ -82,14 +82,14 @@ class _Shape(Struct, frozen=True, eq=False):
     mean: float
 
     def nearest(self, place: Floats) -> Floats:
-        """Its place nearest to another one."""
+        """Return its place nearest to another one."""
         arm = place - self.place
         if self.radius == 0.0:
             return self.place + float(arm @ self.direction) * self.direction
         return self.place + arm * (self.radius / (math.hypot(*arm) or 1.0))
 
     def squares(self, points: Floats) -> Floats:
-        """(n,) the squares of the distances of points from it."""
+        """Return (n,) the squares of the distances of points from it."""
         x, y = (points - self.place).T
         if self.radius > 0.0:
             return np.asarray((np.hypot(x, y) - self.radius) ** 2)
@@ -107,8 +107,8 @@ class PixelStrokes(Struct, frozen=True, eq=False):
 
 
 def strokes(points: Floats, limit: float, *, closed: bool) -> PixelStrokes:
-    """Lines and arcs within `limit` of the points (n, 2); an open path keeps its ends, a closed
-    one about its area: the limit is less for thinner shapes."""
+    """Return lines and arcs within `limit` of the points (n, 2); an open path keeps its ends, a
+    closed one about its area: the limit is less for thinner shapes."""
     if not closed:
         return _chain_of_shapes(points, _runs(points, limit), limit, closed=False)
     circle = _circle(points)
@@ -130,7 +130,8 @@ def strokes(points: Floats, limit: float, *, closed: bool) -> PixelStrokes:
 def _begin_at_best_division(
     ring: Floats, ends: list[int], limit: float
 ) -> tuple[Floats, list[int]]:
-    """A closed path and its runs, begun where the last run and the first leave the least."""
+    """Return a closed path and its runs, begun where the last run and the first leave the
+    least."""
     if len(ends) < 3:
         return ring, [0, len(ring) // 2, len(ring)]
     before, after = len(ring) - ends[-2], ends[1]
@@ -142,7 +143,7 @@ def _begin_at_best_division(
 
 
 def _sharpest(points: Floats) -> int:
-    """The point at which a closed path turns most."""
+    """Return the point at which a closed path turns most."""
     arm = max(min(CORNER_POINTS, len(points) // 4), 1)
     before, after = (points - np.roll(points, arm * k, axis=0) for k in (1, -1))
     lengths = np.hypot(*before.T) * np.hypot(*after.T)
@@ -151,7 +152,7 @@ def _sharpest(points: Floats) -> int:
 
 
 def _circle(points: Floats) -> PixelStrokes | None:
-    """All points as a circle of two halves."""
+    """Return all points as a circle of two halves."""
     circle = _centre(points)
     if circle is None:
         return None
@@ -166,8 +167,8 @@ def _circle(points: Floats) -> PixelStrokes | None:
 
 
 def _centre(points: Floats) -> tuple[Floats, float] | None:
-    """Centre and radius of the circle through points, least squares (Kåsa's); None for points on a
-    line."""
+    """Return the centre and radius of the circle through points, least squares (Kåsa's); None
+    for points on a line."""
     middle = points.sum(axis=0) / len(points)
     x, y = (points - middle).T
     square = x * x + y * y
@@ -182,7 +183,7 @@ def _centre(points: Floats) -> tuple[Floats, float] | None:
 
 
 def _line(points: Floats) -> _Shape:
-    """The line of least squares through points, in their direction."""
+    """Return the line of least squares through points, in their direction."""
     middle = points.sum(axis=0) / len(points)
     if len(points) == 1:
         return _Shape(middle, np.zeros(2), 0.0, 0.0, 0.0, 0.0)
@@ -203,7 +204,7 @@ def _line(points: Floats) -> _Shape:
 
 
 def _arc(points: Floats) -> _Shape | None:
-    """The arc of least squares along points; None where they run along none."""
+    """Return the arc of least squares along points; None where they run along none."""
     circle = _centre(points) if len(points) > MIN_RUN_POINTS else None
     if circle is None:
         return None
@@ -224,7 +225,7 @@ def _arc(points: Floats) -> _Shape | None:
 
 
 def _best(points: Floats, limit: float) -> _Shape | None:
-    """The line, or else the arc, along points within the limit."""
+    """Return the line, or else the arc, along points within the limit."""
     line = _line(points)
     if line.largest <= FLAT_SHARE * limit:
         return line
@@ -241,7 +242,7 @@ def _best(points: Floats, limit: float) -> _Shape | None:
 
 
 def _goes_back(points: Floats, line: _Shape) -> bool:
-    """True if the points turn back along the line by more than BACK_PX."""
+    """Return True if the points turn back along the line by more than BACK_PX."""
     along = points @ line.direction
     return bool((np.maximum.accumulate(along) - along).max() > BACK_PX)
 
@@ -272,7 +273,7 @@ def _division_index(points: Floats, index: int, limit: float) -> int:
 
 
 def _reach(points: Floats, first: int, limit: float) -> int:
-    """The end of the longest run from `first` on: by doubling, then by halving."""
+    """Return the end of the longest run from `first` on: by doubling, then by halving."""
     last = len(points)
     reached, step = min(first + MIN_RUN_POINTS, last), MIN_RUN_POINTS
     too_long = last + 1
@@ -294,8 +295,8 @@ def _reach(points: Floats, first: int, limit: float) -> int:
 def _chain_of_shapes(
     points: Floats, ends: list[int], limit: float, *, closed: bool
 ) -> PixelStrokes:
-    """The chain of the shapes of these runs. Where one of them does not suit its points from
-    meeting to meeting, it begins and ends where they do."""
+    """Return the chain of the shapes of these runs. Where one of them does not suit its points
+    from meeting to meeting, it begins and ends where they do."""
     runs = [
         _Run(part := points[low:high], _best(part, limit) or _line(part))
         for low, high in pairwise(ends)
@@ -350,7 +351,7 @@ class _Run(Struct, frozen=True, eq=False):
     shape: _Shape
 
     def rows(self, begin: Floats, end: Floats) -> Floats:
-        """Its vertices (n, 3) between two places, that of the end last."""
+        """Return its vertices (n, 3) between two places, that of the end last."""
         shape, bulge = self.shape, 0.0
         if shape.radius > 0.0:
             one, last = begin - shape.place, end - shape.place
@@ -364,7 +365,8 @@ class _Run(Struct, frozen=True, eq=False):
         return float(furthest_off(np.ascontiguousarray(self.part), self.rows(begin, end)))
 
     def suits(self, begin: Floats, end: Floats, limit: float) -> bool:
-        """True if the points lie within the limit of the shape, which runs in their direction."""
+        """Return True if the points lie within the limit of the shape, which runs in their
+        direction."""
         if abs(self.shape.sweep) < 0.5 * math.pi:
             chord = self.part[-1] - self.part[0]
             if float((end - begin) @ chord) < 0.0:
@@ -374,8 +376,8 @@ class _Run(Struct, frozen=True, eq=False):
     def segments(
         self, begin: Floats, end: Floats, limit: float
     ) -> tuple[list[list[float]], list[list[float]]]:
-        """The rows without the end, none where that is the begin, and how far points are from
-        each; those of its halves, at last its points, where they are too far."""
+        """Return the rows without the end, none where that is the begin, and how far points are
+        from each; those of its halves, at last its points, where they are too far."""
         if math.hypot(*(end - begin)) <= MIN_SEGMENT_PX:
             return [], []
         half = len(self.part) // 2

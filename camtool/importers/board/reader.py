@@ -83,7 +83,7 @@ class _Part(Struct):
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
-    """The Drawing of a board; DrawingError naming the file of an archive, and the line."""
+    """Return the Drawing of a board; DrawingError naming the file of an archive, and the line."""
     if options.units is not None:
         raise DrawingError(
             "says its own unit", file=file, mend="leave --units out; --scale changes its size"

@@ -54,7 +54,7 @@ class Bulk(Struct, frozen=True, eq=False):
 
     @classmethod
     def none(cls, tags: Tags) -> Bulk:
-        """All tags are left to ezdxf."""
+        """Return the value that leaves all tags to ezdxf."""
         return cls(np.ones(len(tags.codes), dtype=np.bool_))
 
     @classmethod
@@ -76,7 +76,8 @@ class Bulk(Struct, frozen=True, eq=False):
         return bulk if bulk._is_plain(tags, frame) else cls.none(tags)
 
     def _is_plain(self, tags: Tags, frame: DxfSections) -> bool:
-        """True if each handle names one entity, and no hatch refers to a LINE that is left out."""
+        """Return True if each handle names one entity, and no hatch refers to a LINE that is
+        left out."""
         followers = {handle for each in self.lines.values() for handle in each.handles}
         names = {*followers, *self.lines, *self.vertices}
         has_handle = np.isin(tags.codes, _HANDLES)
@@ -95,8 +96,8 @@ class Bulk(Struct, frozen=True, eq=False):
 
 
 def _lines(tags: Tags, marks: Ints, is_line: Bools, is_other: Bools) -> dict[str, BulkLines]:
-    """The LINEs that follow another one and say the same, by the handle of the first; their tags
-    leave `is_other`. Entity k stands from marks[k] to marks[k + 1]."""
+    """Return the LINEs that follow another one and say the same, by the handle of the first;
+    their tags leave `is_other`. Entity k stands from marks[k] to marks[k + 1]."""
     sizes = np.diff(marks)
     follows = np.zeros(len(sizes) + 1, dtype=np.bool_)
     follows[1:-1] = is_line[1:] & is_line[:-1] & (sizes[1:] == sizes[:-1])
@@ -132,8 +133,8 @@ def _lines(tags: Tags, marks: Ints, is_line: Bools, is_other: Bools) -> dict[str
 
 
 def _say_the_same(tags: Tags, rows: Ints, size: int) -> Bools:
-    """(K,) whether the entities of so many tags, which begin at these rows (K,), have the codes
-    and values of those just before them, save handle and ends."""
+    """Return (K,) whether the entities of so many tags, which begin at these rows (K,), have
+    the codes and values of those just before them, save handle and ends."""
     table = tags.codes[rows[:, None] + np.arange(size)]
     is_same = np.asarray((table == tags.codes[rows[:, None] + np.arange(-size, 0)]).all(axis=1))
     for k in range(size):
@@ -149,8 +150,8 @@ def _say_the_same(tags: Tags, rows: Ints, size: int) -> Bools:
 
 
 def _is_simple(codes: tuple[int, ...]) -> bool:
-    """True if a LINE of these group codes has one handle and two ends, each with its coordinates
-    in consecutive groups."""
+    """Return True if a LINE of these group codes has one handle and two ends, each with its
+    coordinates in consecutive groups."""
     if codes.count(_HANDLE) != 1 or _HANDLES[1] in codes:
         return False
     if not {*codes[: codes.index(_HANDLE)]}.isdisjoint(_DIVISIONS):
@@ -166,7 +167,7 @@ def _is_simple(codes: tuple[int, ...]) -> bool:
 
 
 def _vertices(tags: Tags, begins: Ints, ends: Ints, is_other: Bools) -> dict[str, Floats]:
-    """The vertices (K, 5) of the larger ones of the LWPOLYLINEs that stand there, by their
+    """Return the vertices (K, 5) of the larger ones of the LWPOLYLINEs that stand there, by their
     handles; their tags leave `is_other`."""
     rows_by_handle: dict[str, Floats] = {}
     for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):

@@ -53,7 +53,7 @@ _VALUES = {
 def callout(
     entity: Any, frame: WorldMap, mm_per_unit: float, *, layer: str, source: str, paper: bool
 ) -> Callout:
-    """The callout of a DIMENSION in mm; Unusable, with the reason, for what is none.
+    """Return the callout of a DIMENSION in mm; Unusable, with the reason, for what is none.
 
     `mm_per_unit`: the unit of the drawing. `paper`: it is in a layout, where a negative DIMLFAC
     applies too.
@@ -130,8 +130,8 @@ def _measured_places(
 
 
 def _style(entity: Any) -> dict[str, Any]:
-    """The values of its style, and over them those of the entity itself (the list DSTYLE in its
-    data of ACAD)."""
+    """Return the values of its style, and over them those of the entity itself (the list DSTYLE
+    in its data of ACAD)."""
     values: dict[str, Any] = {}
     name = entity.dxf.dimstyle
     styles = entity.doc.dimstyles
@@ -150,7 +150,7 @@ def _style(entity: Any) -> dict[str, Any]:
 
 
 def _number(style: Mapping[str, Any], name: str, otherwise: float) -> float:
-    """A value of the style; Unusable where it is no finite number."""
+    """Return a value of the style; Unusable where it is no finite number."""
     try:
         value = float(style.get(name, otherwise))
     except (TypeError, ValueError, OverflowError):
@@ -169,7 +169,8 @@ def _factor(style: Mapping[str, Any], paper: bool) -> float:
 
 
 def _unit(factor: float, own_mm: float, mm_per_unit: float) -> tuple[float, float]:
-    """The unit of its numbers, mm, and how many times larger than drawn it says things are."""
+    """Return the unit of its numbers, mm, and how many times larger than drawn it says things
+    are."""
     shown_mm = own_mm / factor
     for unit_mm in (mm_per_unit, 1.0, 25.4):
         if abs(shown_mm / unit_mm - 1.0) <= SCALE_SHARE:
@@ -178,7 +179,7 @@ def _unit(factor: float, own_mm: float, mm_per_unit: float) -> tuple[float, floa
 
 
 def _deviations(style: Mapping[str, Any], unit_mm: float) -> tuple[float | None, float | None]:
-    """Upper and lower, mm; None where the style shows none. DIMTM counts downwards."""
+    """Return the upper and lower, mm; None where the style shows none. DIMTM counts downwards."""
     if not (_number(style, "dimtol", 0.0) or _number(style, "dimlim", 0.0)):
         return None, None
     upper, lower = _number(style, "dimtp", 0.0), -_number(style, "dimtm", 0.0)
@@ -186,7 +187,7 @@ def _deviations(style: Mapping[str, Any], unit_mm: float) -> tuple[float | None,
 
 
 def _text(entity: Any, style: Mapping[str, Any]) -> str:
-    """Its text without codes, "<>" for what it measures; "" where it shows only that."""
+    """Return its text without codes, "<>" for what it measures; "" where it shows only that."""
     raw = str(entity.dxf.get("text", ""))
     post = str(style.get("dimpost", "") or "")
     if len(raw) + len(post) > MAX_TEXT_LENGTH:

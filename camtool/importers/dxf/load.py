@@ -64,8 +64,8 @@ class Loaded(Struct, frozen=True):
 
 
 def load(data: bytes, file: str, *, plain: bool = False) -> Loaded:
-    """The document in `data`; DrawingError when it is no DXF, cut off or beyond repair. `plain`: a
-    `PlainDocument` will do, where the file is no more."""
+    """Return the document in `data`; DrawingError when it is no DXF, cut off or beyond repair.
+    `plain`: a `PlainDocument` will do, where the file is no more."""
     _check_bytes(data, file)
     tags = binary_tags(data, file) if data.startswith(BINARY_DXF) else ascii_tags(data, file)
     if len(tags.codes) > MAX_TAGS:
@@ -124,7 +124,7 @@ def quiet() -> Iterator[list[str]]:
 
 
 def printable(text: str) -> str:
-    """The text with "?" for bytes that are no text in the file's encoding."""
+    """Return the text with "?" for bytes that are no text in the file's encoding."""
     return text.encode("utf-8", errors="replace").decode("utf-8")
 
 
@@ -141,7 +141,7 @@ def without_collector() -> Iterator[None]:
 
 
 def _check_bytes(data: bytes, file: str) -> None:
-    """DrawingError for what needs no reading to be refused."""
+    """Raise DrawingError for what needs no reading to be refused."""
     if not data.strip():
         raise DrawingError("is empty", file=file, mend=AGAIN)
     if len(data) > MAX_BYTES:
@@ -167,7 +167,7 @@ def _too_large(subject: str, limit: int, file: str) -> DrawingError:
 
 
 def _check_whole(tags: Tags, frame: DxfSections, file: str) -> list[str]:
-    """A note when the file ends early; DrawingError unless all its entities are there."""
+    """Return a note when the file ends early; DrawingError unless all its entities are there."""
     if not frame.sections:
         raise DrawingError("is no DXF: it has no section", file=file, mend=AGAIN)
     if frame.eof is not None:
@@ -184,8 +184,8 @@ def _check_whole(tags: Tags, frame: DxfSections, file: str) -> list[str]:
 
 
 def _load_with_ezdxf(tags: Tags, bulk: Bulk, notes: list[str]) -> Any:
-    """The document of ezdxf's ordinary reader, without what is read in bulk; None when it fails
-    or finds fault, as `notes`."""
+    """Return the document of ezdxf's ordinary reader, without what is read in bulk; None when
+    it fails or finds fault, as `notes`."""
     from ezdxf.document import Drawing
     from ezdxf.lldxf.types import DXFBinaryTag, DXFTag
 
@@ -211,7 +211,7 @@ def _add_vertices(document: Any, bulk: Bulk) -> None:
 
 
 def _recover(tags: Tags, notes: list[str], file: str) -> Any:
-    """The document of ezdxf's recovery, its repairs added to the notes."""
+    """Return the document of ezdxf's recovery, its repairs added to the notes."""
     from ezdxf.document import Drawing
     from ezdxf.recover import Recover
 
@@ -234,7 +234,8 @@ def _recover(tags: Tags, notes: list[str], file: str) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """The message of an error that ezdxf raises on purpose; that of any other would not help."""
+    """Return the message of an error that ezdxf raises on purpose; that of any other would not
+    help."""
     from ezdxf.lldxf.const import DXFStructureError, DXFVersionError
 
     on_purpose = isinstance(error, (DXFStructureError, DXFVersionError))

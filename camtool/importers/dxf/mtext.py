@@ -79,7 +79,8 @@ def write_mtext(
 
 
 def _without_codes(content: str) -> str:
-    """Codes that MTextParser takes for others: carets that are no control code, and %%nnn."""
+    """Return codes that MTextParser takes for others: carets that are no control code, and
+    %%nnn."""
     content = _STACK_CARET.sub(r"\1^ ", content)
     content = _BARE_CARET.sub("^ ", content)
     return NUMBERED.sub(
@@ -88,8 +89,8 @@ def _without_codes(content: str) -> str:
 
 
 def plain_text(content: str) -> str:
-    """The text without its codes; stacked parts stand beside one another, "+0.1/-0.2", and those
-    of a fraction with its own sign, "1⁄2". Unusable for codes that cannot be read."""
+    """Return the text without its codes; stacked parts stand beside one another, "+0.1/-0.2",
+    and those of a fraction with its own sign, "1⁄2". Unusable for codes that cannot be read."""
     from ezdxf.tools.text import MTextParser, TokenType
 
     text = ""
@@ -129,7 +130,7 @@ class _Reader:
         self.fonts: list[tuple[str, str]] = []
 
     def paragraphs(self, content: str, share: float) -> Iterator[Paragraph]:
-        """All paragraphs, aligned at `share` of their width unless they say otherwise."""
+        """Yield all paragraphs, aligned at `share` of their width unless they say otherwise."""
         from ezdxf.tools.text import MTextContext, MTextParser, TokenType
 
         start = MTextContext()
@@ -188,7 +189,7 @@ class _Reader:
         )
 
     def _dressed(self, context: Any) -> TextLook:
-        """The look that the codes make."""
+        """Return the look that the codes make."""
         key = context.font_face
         if key not in self._known:
             request = self._wanted
@@ -305,7 +306,7 @@ class Pitch(Struct, frozen=True, eq=False):
     exact: float = 0.0
 
     def drop(self, above: float, below: float) -> float:
-        """Distance of the baselines of two lines of these heights."""
+        """Return the distance of the baselines of two lines of these heights."""
         if self.exact:
             return LINE_PITCH * self.factor * self.exact
         return LINE_PITCH * self.factor * above - above + below
@@ -320,7 +321,8 @@ class Placed(Struct, frozen=True, eq=False):
 
 
 def wrap_paragraph(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
-    """The lines of a paragraph, no wider than `width` where words allow that (0: one line)."""
+    """Yield the lines of a paragraph, no wider than `width` where words allow that (0: one
+    line)."""
     first_indent, following, margin = paragraph.indents
     limit = (width - margin) + WRAP_SLACK * width
     x = first_indent
@@ -350,7 +352,7 @@ def wrap_paragraph(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
 
 
 def _unbreakable(cells: Sequence[MTextCell]) -> Iterator[tuple[MTextCell, ...]]:
-    """Runs of words and hard spaces; each space and tab alone."""
+    """Yield runs of words and hard spaces; each space and tab alone."""
     run: list[MTextCell] = []
     for cell in cells:
         if cell.glue in (Glue.SPACE, Glue.TAB):
@@ -376,7 +378,7 @@ def _tab_position(x: float, text_width: float, paragraph: Paragraph) -> float:
 def _line(
     paragraph: Paragraph, row: list[tuple[float, MTextCell]], left_edge: float, *, stretch: bool
 ) -> MTextLine:
-    """A line without the spaces at its end."""
+    """Return a line without the spaces at its end."""
     count = len(row)
     while count and row[count - 1][1].glue is Glue.SPACE:
         count -= 1

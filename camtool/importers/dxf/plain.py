@@ -73,7 +73,7 @@ class _Attributes(SimpleNamespace):
     flags: ClassVar[Any] = 0
 
     def hasattr(self, name: str) -> bool:
-        """True if the file says this attribute."""
+        """Return True if the file says this attribute."""
         return name in vars(self)
 
     def get(self, name: str, default: Any = None) -> Any:
@@ -95,11 +95,11 @@ class _Entity(SimpleNamespace):
         return bool(self.dxf.flags & 1)
 
     def is_frozen(self) -> bool:
-        """True if the flag of frozen layers is set."""
+        """Return True if the flag of frozen layers is set."""
         return bool(self.dxf.flags & 1)
 
     def is_off(self) -> bool:
-        """True if the colour of a layer is negative."""
+        """Return True if the colour of a layer is negative."""
         return int(self.dxf.get("color", 0)) < 0
 
 
@@ -173,7 +173,7 @@ def _pairs(tags: Tags, rows: Any) -> list[tuple[int, str]]:
 
 
 def _check_version(tags: Tags, bounds: tuple[int, int]) -> None:
-    """ValueError for a version that ezdxf converts."""
+    """Raise ValueError for a version that ezdxf converts."""
     rows = np.arange(*bounds)
     values = [*map(str, tags.values(rows))]
     if values.count("$ACADVER") != 1 or values[-1] == "$ACADVER":
@@ -183,7 +183,7 @@ def _check_version(tags: Tags, bounds: tuple[int, int]) -> None:
 
 
 def _check_blocks(tags: Tags, entities: list[tuple[str, int, int]]) -> None:
-    """ValueError for entities in a block that is the content of a layout."""
+    """Raise ValueError for entities in a block that is the content of a layout."""
     for (kind, begin, end), (following, _, _) in pairwise(entities):
         if kind == "BLOCK" and following != "ENDBLK":
             names = [value for code, value in _pairs(tags, np.arange(begin, end)) if code == _NAME]
@@ -241,7 +241,7 @@ def _point(pairs: list[tuple[int, str]], k: int) -> tuple[float, float, float]:
 
 
 def _check_attributes(kind: str, attributes: dict[str, Any]) -> None:
-    """ValueError for attributes that ezdxf mends."""
+    """Raise ValueError for attributes that ezdxf mends."""
     colour = attributes.get("color", 1)
     if kind == "LAYER":
         is_valid = 0 < abs(colour) < _MAX_COLOUR - 1 and "name" in attributes

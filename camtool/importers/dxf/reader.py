@@ -31,8 +31,8 @@ REPAIRS_NAMED = 3
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
-    """The Drawing in model space or in `options.layout`; DrawingError naming layer and entity
-    when it cannot be read."""
+    """Return the Drawing in model space or in `options.layout`; DrawingError naming layer and
+    entity when it cannot be read."""
     with without_collector():
         loaded = load(data, file, plain=options.layout is None)
         content = walk_space(
@@ -94,7 +94,7 @@ def _not_applied_findings(lacking: Counter[tuple[str, str]]) -> list[Finding]:
 
 
 def _not_callouts(unread: Counter[tuple[str, str]]) -> list[Finding]:
-    """The dimensions that say nothing of what can be inspected, with the reason."""
+    """Return the dimensions that say nothing of what can be inspected, with the reason."""
     return [
         CALLOUT_NOT_READ(measured=count, kind=kind, reason=reason)
         for (kind, reason), count in unread.items()
@@ -147,7 +147,7 @@ _GUESSES = {
 
 
 def units_of(header: Mapping[str, Any], options: ReadOptions) -> tuple[Units, list[Finding]]:
-    """The unit, and a finding when the file does not say it."""
+    """Return the unit, and a finding when the file does not say it."""
     code, measurement = (
         _header_number(header.get(name)) for name in ("$INSUNITS", "$MEASUREMENT")
     )
@@ -169,7 +169,7 @@ def units_of(header: Mapping[str, Any], options: ReadOptions) -> tuple[Units, li
 
 
 def _header_number(value: Any) -> int | None:
-    """A header's number; None when the file does not say it."""
+    """Return a header's number; None when the file does not say it."""
     try:
         return int(float(value))
     except (TypeError, ValueError, OverflowError):

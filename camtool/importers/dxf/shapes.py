@@ -79,14 +79,14 @@ class Plane(Struct, frozen=True, eq=False, dict=True):
         return math.atan2(float(self.u[1]), float(self.u[0]))
 
     def at(self, elevation: float) -> Plane:
-        """The parallel plane at this elevation over the one here."""
+        """Return the parallel plane at this elevation over the one here."""
         if not elevation or not self.rise.any():
             return self
         origin = self.origin + elevation * self.rise
         return Plane(self.u, self.v, origin, self.scale, self.sign, self.rise)
 
     def points(self, local: Floats) -> Floats:
-        """Local (n, 2) to (n, 2) mm."""
+        """Return the local (n, 2) to (n, 2) mm."""
         return np.asarray(self.origin + local[:, :1] * self.u + local[:, 1:2] * self.v)
 
 
@@ -102,7 +102,7 @@ class WorldMap(Struct, frozen=True, eq=False):
         return WorldMap(linear @ self.linear, offset @ self.linear + self.offset)
 
     def flat(self, points: Floats) -> Floats:
-        """Points (n, 3) as (n, 2) mm; Unusable when they rise."""
+        """Return points (n, 3) as (n, 2) mm; Unusable when they rise."""
         flat, is_flat = self.flat_each(points[None])
         if not is_flat[0]:
             raise Unusable("is not flat")
@@ -116,14 +116,14 @@ class WorldMap(Struct, frozen=True, eq=False):
         return world_points[..., :2], rise <= np.maximum(FLAT_TILT * width, POSITION_EPS_MM)
 
     def plane(self, extrusion: Any, elevation: float) -> Plane:
-        """The plane of an OCS at this elevation; Unusable when it is tilted."""
+        """Return the plane of an OCS at this elevation; Unusable when it is tilted."""
         normal = tuple(extrusion)
         if normal not in self._planes:
             self._planes[normal] = self._plane(normal)
         return self._planes[normal].at(elevation)
 
     def _plane(self, normal: tuple[float, ...]) -> Plane:
-        """The plane of an OCS through the world's origin."""
+        """Return the plane of an OCS through the world's origin."""
         z = numbers(normal)
         if not z.any():
             raise Unusable("has an extrusion of 0")
@@ -144,24 +144,25 @@ class DxfShape(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, fit: Fit) -> DxfShape:
-        """The arcs that stand for a curve."""
+        """Return the arcs that stand for a curve."""
         return cls(fit.vertices, False, fit.off_mm)
 
     def ring(self) -> DxfShape:
-        """The same closed, whose last vertex is its first one."""
+        """Return the same closed, whose last vertex is its first one."""
         errors = None if self.off_mm is None else self.off_mm[:-1]
         return DxfShape(self.vertices[:-1], True, errors, self.lacks)
 
 
 def require(entity: Any, names: tuple[str, ...]) -> None:
-    """Unusable when the file does not say one of these attributes: ezdxf would make one up."""
+    """Raise Unusable when the file does not say one of these attributes: ezdxf would make one
+    up."""
     for name in names:
         if not entity.dxf.hasattr(name):
             raise Unusable(f"lacks its {name.replace('_', ' ')}")
 
 
 def numbers(values: Any) -> Floats:
-    """Any numbers as an array; DrawingError when one of them is none."""
+    """Return any numbers as an array; DrawingError when one of them is none."""
     is_array = isinstance(values, (list, np.ndarray))
     result = np.array(values if is_array else tuple(values), dtype=np.float64)
     if not np.isfinite(result).all():
@@ -172,12 +173,12 @@ def numbers(values: Any) -> Floats:
 
 
 def straight(points: Floats) -> Floats:
-    """Points (n, 2) as vertices (n, 3) of lines."""
+    """Return points (n, 2) as vertices (n, 3) of lines."""
     return np.column_stack([points, np.zeros(len(points))])
 
 
 def fit_arcs(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
-    """Arcs for a curve whose place and size these numbers give."""
+    """Return arcs for a curve whose place and size these numbers give."""
     furthest = float(np.abs(size).max())
     if not furthest <= MAX_COORDINATE_MM:  # nor is NaN
         raise DrawingError(
@@ -243,7 +244,7 @@ def arc(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
 def _round(
     entity: Any, frame: WorldMap, tolerance_mm: float, start: float, sweep: float
 ) -> DxfShape:
-    """A circle or an arc."""
+    """Return a circle or an arc."""
     dxf = entity.dxf
     x, y, z, radius = numbers((*dxf.center, dxf.radius)).tolist()
     if radius <= 0.0:
@@ -285,14 +286,15 @@ def ellipse(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]
 
 
 def whole_turn(sweep: float) -> float:
-    """A sweep within one turn, and exactly one turn when it all but is."""
+    """Return a sweep within one turn, and exactly one turn when it all but is."""
     sweep %= 2.0 * math.pi
     nearly = sweep <= FULL_TURN_RAD or sweep >= 2.0 * math.pi - FULL_TURN_RAD
     return 2.0 * math.pi if nearly else sweep
 
 
 def elliptic(axes: Floats, start: float, sweep: float, tolerance_mm: float) -> DxfShape:
-    """Centre and half axes (3, 2): circles and arcs of them exactly, ellipses fitted."""
+    """Return the centre and half axes (3, 2): circles and arcs of them exactly, ellipses
+    fitted."""
     centre, u, v = axes
     closed = abs(sweep) == 2.0 * math.pi
     plane = Plane.of(np.append(u, 0.0), np.append(v, 0.0), np.append(centre, 0.0))
@@ -348,8 +350,8 @@ def _with_width(shape: DxfShape) -> DxfShape:
 def polyline_with_bulges(
     local: Floats, closed: bool, plane: Plane, tolerance_mm: float
 ) -> DxfShape:
-    """A polyline (n, 3) of x, y, bulge in its own plane: exact, or its arcs fitted where the plane
-    squeezes circles."""
+    """Return a polyline (n, 3) of x, y, bulge in its own plane: exact, or its arcs fitted where
+    the plane squeezes circles."""
     if len(local) == 0:
         raise Unusable("has no vertices")
     rows = np.empty(local.shape)
@@ -435,8 +437,8 @@ def spline_through(
 def spline_of(
     degree: int, knots: Floats, control: Floats, weights: Floats, tolerance_mm: float
 ) -> DxfShape:
-    """The spline of control points (n, 2) mm; no `weights` are equal ones. Unusable when these
-    do not belong together."""
+    """Return the spline of control points (n, 2) mm; no `weights` are equal ones. Unusable when
+    these do not belong together."""
     if degree > MAX_DEGREE:
         raise Unusable(f"has degree {degree}, at most {MAX_DEGREE} is read")
     if not len(control):
@@ -479,7 +481,8 @@ _DRAWN_ORDER = (0, 1, 3, 2)  # SOLID and TRACE keep their corners in the order o
 
 
 def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
-    """The boundary paths of HATCH and MPOLYGON; edges of one path come as paths of their own.
+    """Return the boundary paths of HATCH and MPOLYGON; edges of one path come as paths of their
+    own.
 
     A boundary that follows other entities of the drawing is left to them.
     """
@@ -503,7 +506,7 @@ def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
 
 
 def _is_boundary_of_entities(path: Any, entity: Any) -> bool:
-    """True if the path is the boundary of a hatch that is associated with entities of the
+    """Return True if the path is the boundary of a hatch that is associated with entities of the
     drawing."""
     handles = path.source_boundary_objects
     database = entity.doc.entitydb if entity.doc is not None else {}
@@ -513,7 +516,7 @@ def _is_boundary_of_entities(path: Any, entity: Any) -> bool:
 
 
 def _stands_beside(source: Any, entity: Any) -> bool:
-    """True if `source` stands in the same layout or block as the entity."""
+    """Return True if `source` stands in the same layout or block as the entity."""
     return source is not None and source.dxf.get("owner") == entity.dxf.get("owner")
 
 
@@ -540,7 +543,7 @@ def _edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
 
 
 def _spline_edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
-    """A spline edge by its control points, or through its fit points."""
+    """Return a spline edge by its control points, or through its fit points."""
     control = numbers([tuple(point)[:2] for point in edge.control_points]).reshape(-1, 2)
     weights = numbers([*edge.weights])
     if len(control):

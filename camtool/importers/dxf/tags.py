@@ -73,26 +73,28 @@ class Tags(ABC):
 
     @abstractmethod
     def raw(self, rows: Ints) -> Iterator[Any]:
-        """The values of these tags as the file has them: of ASCII the bytes of their lines."""
+        """Return the values of these tags as the file has them: of ASCII the bytes of their
+        lines."""
 
     @abstractmethod
     def values(self, rows: Ints) -> Iterator[Any]:
-        """The values of these tags: of ASCII the text, of binary DXF strings, numbers, bytes."""
+        """Return the values of these tags: of ASCII the text, of binary DXF strings, numbers,
+        bytes."""
 
     @abstractmethod
     def code_as_said(self, row: int) -> str:
-        """The group code of a tag as the file has it, for messages."""
+        """Return the group code of a tag as the file has it, for messages."""
 
     @abstractmethod
     def ended(self, count: int) -> Tags:
-        """The first `count` tags and an end mark."""
+        """Return the first `count` tags and an end mark."""
 
     def value(self, row: int) -> Any:
-        """The value of one tag."""
+        """Return the value of one tag."""
         return next(self.values(np.array([row])))
 
     def numbers(self, rows: Ints) -> Floats:
-        """(K,) the values of these tags as numbers; ValueError when one is none."""
+        """Return (K,) the values of these tags as numbers; ValueError when one is none."""
         return np.fromiter(map(float, self.raw(rows)), dtype=np.float64, count=len(rows))
 
     def pairs(self, rows: Ints) -> Iterator[tuple[int, Any]]:
@@ -101,7 +103,7 @@ class Tags(ABC):
             yield from zip(self.codes[part].tolist(), self.values(part), strict=True)
 
     def where(self, row: int) -> str:
-        """The place of a tag for messages."""
+        """Return the place of a tag for messages."""
         return f"line {2 * row + 1}" if self.is_text else f"tag {row + 1}"
 
     @cached_property
@@ -116,7 +118,7 @@ class Tags(ABC):
 
 
 def lots(rows: Ints) -> Iterator[Ints]:
-    """The rows in lots of `AT_ONCE`."""
+    """Return the rows in lots of `AT_ONCE`."""
     return (rows[first : first + AT_ONCE] for first in range(0, len(rows), AT_ONCE))
 
 
@@ -129,17 +131,17 @@ class BinaryTags(Tags):
     is_text = False
 
     def raw(self, rows: Ints) -> Iterator[Any]:
-        """The values of these tags."""
+        """Return the values of these tags."""
         return map(self.held.__getitem__, rows.tolist())
 
     values = raw
 
     def code_as_said(self, row: int) -> str:
-        """The group code of a tag."""
+        """Return the group code of a tag."""
         return str(self.codes[row])
 
     def ended(self, count: int) -> Tags:
-        """The first `count` tags and an end mark."""
+        """Return the first `count` tags and an end mark."""
         return BinaryTags(np.append(self.codes[:count], _MARK), (), [*self.held[:count], "EOF"])
 
 
@@ -156,14 +158,14 @@ class TextTags(Tags):
     is_text = True
 
     def raw(self, rows: Ints) -> Iterator[bytes]:
-        """The lines of the values of these tags."""
+        """Yield the lines of the values of these tags."""
         data = self.data
         for part in lots(rows):
             ends = zip(self.at[2 * part + 1].tolist(), self.at[2 * part + 2].tolist(), strict=True)
             yield from [data[begin : end - 1] for begin, end in ends]
 
     def values(self, rows: Ints) -> Iterator[str]:
-        """The values of these tags."""
+        """Yield the values of these tags."""
         for part in lots(rows):
             texts = [
                 line.decode(self.encoding, "surrogateescape").rstrip("\r")
@@ -172,12 +174,12 @@ class TextTags(Tags):
             yield from _without_escapes(texts) if self.escaped else texts
 
     def code_as_said(self, row: int) -> str:
-        """The line of the group code of a tag."""
+        """Return the line of the group code of a tag."""
         line = self.data[self.at[2 * row] : self.at[2 * row + 1] - 1]
         return repr(line.decode(self.encoding, "surrogateescape").strip()[:20])
 
     def ended(self, count: int) -> Tags:
-        """The first `count` tags and an end mark."""
+        """Return the first `count` tags and an end mark."""
         lines = self.at[: 2 * count + 1]
         return replace(
             self,
@@ -187,7 +189,7 @@ class TextTags(Tags):
         )
 
     def values_with(self, letters: Bools) -> Ints:
-        """The tags whose values have one of these bytes (of `data`)."""
+        """Return the tags whose values have one of these bytes (of `data`)."""
         lines = np.searchsorted(self.at, np.flatnonzero(letters), side="right") - 1
         rows = distinct(lines[lines % 2 == 1] // 2)
         return rows[rows < len(self.codes)]
@@ -212,7 +214,7 @@ class DxfSections(Struct, frozen=True):
     faults: tuple[str, ...]
 
     def is_complete(self, name: str) -> bool:
-        """True if there is a section of this name, and each of that name has its end."""
+        """Return True if there is a section of this name, and each of that name has its end."""
         ends = [part.end for part in self.sections if part.name == name]
         return bool(ends) and None not in ends
 
@@ -238,7 +240,7 @@ def binary_tags(data: bytes, file: str) -> Tags:
 
 
 def ascii_tags(data: bytes, file: str) -> Tags:
-    """The tags of ASCII DXF up to its end mark; DrawingError when a group code is none."""
+    """Return the tags of ASCII DXF up to its end mark; DrawingError when a group code is none."""
     data, encoding, notes = _plain_lines(data)
     letters = np.frombuffer(data, dtype=np.uint8)
     feeds = np.flatnonzero(letters == ord("\n")).astype(np.int32)
@@ -267,7 +269,7 @@ def ascii_tags(data: bytes, file: str) -> Tags:
 
 
 def frame_of(tags: Tags) -> DxfSections:
-    """Sections and end mark, and faults of their order."""
+    """Return sections and end mark, and faults of their order."""
     sections: list[Section] = []
     faults: list[str] = []
     begin: int | None = None
@@ -333,7 +335,7 @@ def _lost_vertices(tags: Tags) -> list[str]:
 
 
 def header_of(tags: Tags, frame: DxfSections) -> dict[str, Any]:
-    """The variables of the header that the file itself says, each with its first value."""
+    """Return the variables of the header that the file itself says, each with its first value."""
     variables: dict[str, Any] = {}
     for section in frame.sections:
         if section.name == "HEADER":
@@ -345,8 +347,8 @@ def header_of(tags: Tags, frame: DxfSections) -> dict[str, Any]:
 
 
 def _plain_lines(data: bytes) -> tuple[bytes, str, tuple[str, ...]]:
-    """The same text with line feeds, in an encoding in which these are single bytes; and its
-    faults. The encoding is that of its mark, or of its header."""
+    """Return the same text with line feeds, in an encoding in which these are single bytes; and
+    its faults. The encoding is that of its mark, or of its header."""
     notes: tuple[str, ...] = ()
     if data.startswith(_UTF16_MARKS):
         encoding, otherwise = "utf-16", "replace"
@@ -380,7 +382,7 @@ def _encoding(head: bytes) -> str:
 
 
 def _check_codes(tags: Tags, file: str) -> None:
-    """DrawingError for the first group code that is none."""
+    """Raise DrawingError for the first group code that is none."""
     codes = tags.codes
     unused = (UNUSED_CODES.start <= codes) & (codes < UNUSED_CODES.stop)
     odd = np.flatnonzero((codes < 0) | (codes > MAX_CODE) | unused)
@@ -395,7 +397,7 @@ def _check_codes(tags: Tags, file: str) -> None:
 
 
 def check_numbers(tags: Tags, file: str, rows: Ints) -> None:
-    """DrawingError for a value of these tags that must be a number and is none."""
+    """Raise DrawingError for a value of these tags that must be a number and is none."""
     is_number = {code: _is_number(code) for code in distinct(tags.codes[rows]).tolist()}
     for row, (code, value) in zip(rows.tolist(), tags.pairs(rows), strict=True):
         if is_number[code] and not _NUMBER.fullmatch(str(value)):
@@ -408,12 +410,12 @@ def check_numbers(tags: Tags, file: str, rows: Ints) -> None:
 
 
 def _is_number(code: int) -> bool:
-    """True if values of this group code are numbers."""
+    """Return True if values of this group code are numbers."""
     return any(first <= code < end for first, end in _NUMERIC_CODES)
 
 
 def _without_escapes(values: list[str]) -> list[str]:
-    """The signs that ASCII cannot say, written as \\U+00D6 or \\M+1…, as themselves."""
+    """Return the signs that ASCII cannot say, written as \\U+00D6 or \\M+1…, as themselves."""
     from ezdxf.lldxf.encoding import (
         decode_dxf_unicode,
         decode_mif_to_unicode,
@@ -428,13 +430,13 @@ def _without_escapes(values: list[str]) -> list[str]:
 
 
 def _section_name(tags: Tags, begin: int) -> str:
-    """The name in the tag behind 0 SECTION; "" when that is no name."""
+    """Return the name in the tag behind 0 SECTION; "" when that is no name."""
     named = tags.codes[begin + 1 : begin + 2].tolist() == [2]
     return str(tags.value(begin + 1)).strip() if named else ""
 
 
 def _wrong_names(tags: Tags, sections: list[Section]) -> list[str]:
-    """Sections that are unknown or stand twice, in words."""
+    """Return sections that are unknown or stand twice, in words."""
     faults: list[str] = []
     names_so_far: set[str] = set()
     for section in sections:

@@ -107,7 +107,7 @@ class _Place(Struct, frozen=True, eq=False):
 
 
 def _text(entity: Any, mode: str) -> TextShape:
-    """A text on one line."""
+    """Return a text on one line."""
     require(entity, ("insert", "height"))
     dxf = entity.dxf
     raw = dxf.tag if entity.dxftype() == "ATTDEF" and not entity.is_const else dxf.text
@@ -134,8 +134,8 @@ def _text(entity: Any, mode: str) -> TextShape:
 
 
 def _runs(raw: str) -> list[tuple[str, Rule]]:
-    """The text without its codes: %%c %%d %%p %%% %%nnn are signs; %%u %%o %%k begin and end
-    lines along it."""
+    """Return the text without its codes: %%c %%d %%p %%% %%nnn are signs; %%u %%o %%k begin and
+    end lines along it."""
     rules, runs, position = Rule.NONE, [], 0
     text = "".join(c if c >= " " else " " for c in _CARET.sub(_control, raw))
     for code in [*_CODE.finditer(text), None]:
@@ -206,7 +206,7 @@ def _start(entity: Any, look: TextLook, width: float) -> tuple[float, float]:
 
 
 def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
-    """A text of any number of lines."""
+    """Return a text of any number of lines."""
     require(entity, ("insert", "char_height"))
     content = _checked(entity.all_columns_raw_content())
     style = _style(entity, document)
@@ -229,7 +229,7 @@ def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
 
 
 def _block(entity: Any) -> _Place:
-    """The plane of an MTEXT, its insertion point at (0, 0)."""
+    """Return the plane of an MTEXT, its insertion point at (0, 0)."""
     insert = np.array(finite(*entity.dxf.insert))
     normal, along = (finite(*v) for v in (entity.dxf.extrusion, entity.get_text_direction()))
     rise = np.cross(normal, along)
@@ -256,7 +256,7 @@ def _checked(raw: str) -> str:
 
 
 def _style(entity: Any, document: Any) -> Any:
-    """The text style that the entity names, None when there is no such style."""
+    """Return the text style that the entity names, None when there is no such style."""
     if document is None:
         return None
     name = entity.dxf.get("style", "Standard")
@@ -264,7 +264,7 @@ def _style(entity: Any, document: Any) -> Any:
 
 
 def _wanted_font(style: Any) -> WantedFont:
-    """The font that a text style names."""
+    """Return the font that a text style names."""
     if style is None:
         return WantedFont()
     family, italic, bold = style.get_extended_font_data()

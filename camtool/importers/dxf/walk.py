@@ -118,7 +118,7 @@ class DxfWalk:
             self._lines(lines, scope)
 
     def _check_shown(self, kind: str, attributes: dict[str, Any], look: DxfLook) -> None:
-        """Unusable when the entity does not show."""
+        """Raise Unusable when the entity does not show."""
         # An INSERT on a layer that is off still shows what its block has on other layers.
         if look.hidden and (kind != "INSERT" or look.frozen):
             raise Unusable(look.hidden)
@@ -151,7 +151,7 @@ class DxfWalk:
         return self.loaded.lines.get(entity.dxf.handle, _NO_LINES)
 
     def _count_with(self, entity: Any) -> int:
-        """The entity and those that follow it."""
+        """Return the entity and those that follow it."""
         return 1 + len(self._following(entity).handles)
 
     def _lines(self, lines: list[tuple[int, Any, DxfLook]], scope: DxfScope) -> None:
@@ -292,7 +292,7 @@ class DxfWalk:
         self._entities(insert.attribs, scope)
 
     def _count(self, insert: Any, scope: DxfScope) -> None:
-        """DrawingError before the blocks of a space become too many."""
+        """Raise DrawingError before the blocks of a space become too many."""
         if not scope.blocks:
             self._inserted += self._sizes.inserted(insert)
         if self._inserted > MAX_INSERTED:
@@ -312,14 +312,14 @@ class DxfWalk:
         self.skipped[kind, printable(str(reason))] += count
 
     def _placed(self, error: DrawingError, entity: Any, look: DxfLook) -> DrawingError:
-        """The error with file and place."""
+        """Return the error with file and place."""
         error.file = error.file or self.file
         error.where = error.where or f"layer {look.layer}, {_source(entity, None)}"
         return error
 
 
 def _check_nesting(name: str, scope: DxfScope) -> None:
-    """Unusable for a block that holds itself."""
+    """Raise Unusable for a block that holds itself."""
     if name in scope.blocks or len(scope.blocks) >= MAX_NESTING:
         raise Unusable("its block holds itself, or blocks too deep")
 
@@ -401,7 +401,7 @@ MAX_PARTS = 10_000
 
 
 def parts_of(entity: Any) -> list[Any]:
-    """The entities that a dimension, leader, multiple line or proxy is drawn with.
+    """Return the entities that a dimension, leader, multiple line or proxy is drawn with.
 
     Unusable when there are none. The points that define a dimension are no part of it, nor is the
     filling between multiple lines.
@@ -436,7 +436,8 @@ def _virtual(entity: Any) -> Iterable[Any]:
 def text_shapes(
     entity: Any, frame: WorldMap, tolerance_mm: float, mode: str
 ) -> tuple[list[DxfShape], str]:
-    """The lines of a text in mm, and what was wanted and could not be had ("" otherwise)."""
+    """Return the lines of a text in mm, and what was wanted and could not be had (""
+    otherwise)."""
     from camtool.importers.dxf.text import text_strokes
 
     text = text_strokes(entity, mode)
@@ -464,7 +465,8 @@ class BlockSizes:
         self._sizes: dict[str, int] = {}
 
     def inserted(self, insert: Any) -> int:
-        """Entities that an INSERT stands for, itself included; 1 when its block is missing."""
+        """Return entities that an INSERT stands for, itself included; 1 when its block is
+        missing."""
         if not insert.dxf.hasattr("name"):
             return 1
         name = block_key(insert.dxf.name)
@@ -480,7 +482,7 @@ class BlockSizes:
 
 
 def matrix(insert: Any) -> Floats:
-    """The map (4, 4), for row vectors, of a block's entities to where its INSERT stands.
+    """Return the map (4, 4), for row vectors, of a block's entities to where its INSERT stands.
 
     DrawingError for numbers that are not finite, Unusable when it has no plane.
     """
@@ -511,12 +513,13 @@ def member_shifts(insert: Any) -> Iterator[Floats]:
 
 
 def block_key(name: Any) -> str:
-    """Names of blocks and layers are the same in any case."""
+    """Return a name of a block or layer in the form by which names are compared: upper and lower
+    case are the same."""
     return str(name).casefold()
 
 
 def _array(insert: Any) -> tuple[int, int]:
-    """Columns and rows; without spacing all members stand on the first one."""
+    """Return columns and rows; without spacing all members stand on the first one."""
     columns = max(int(insert.dxf.column_count), 1) if insert.dxf.column_spacing else 1
     rows = max(int(insert.dxf.row_count), 1) if insert.dxf.row_spacing else 1
     return columns, rows
@@ -563,7 +566,8 @@ class DxfLooks(Struct):
         return cls({block_key(layer.dxf.name): _layer(layer) for layer in document.layers})
 
     def of_entity(self, attributes: dict[str, Any], block: DxfLook | None) -> DxfLook:
-        """The look of an entity that says these attributes, in a block placed with `block`."""
+        """Return the look of an entity that says these attributes, in a block placed with
+        `block`."""
         attribute_key = tuple(
             attributes.get(name) for name in ("layer", "color", "true_color", "linetype")
         )
@@ -594,7 +598,7 @@ class DxfLooks(Struct):
 
 
 def _layer(layer: Any) -> DxfLook:
-    """The look that a layer gives."""
+    """Return the look that a layer gives."""
     attributes = vars(layer.dxf)
     name, frozen = printable(str(layer.dxf.name)), bool(layer.is_frozen())
     state = "frozen" if frozen else "off" if layer.is_off() else ""

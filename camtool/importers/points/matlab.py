@@ -44,12 +44,12 @@ _START = re.compile(rf"^[ \t]*(?:{'|'.join(_NAMES)})[ \t]*=", re.MULTILINE)
 
 
 def is_matlab(text: str, file: str) -> bool:
-    """True if the text assigns an array of the router, or the file is named .m."""
+    """Return True if the text assigns an array of the router, or the file is named .m."""
     return _START.search(text) is not None or PurePath(file).suffix.lower() == ".m"
 
 
 def parse_matlab(text: str, file: str) -> PointTable:
-    """The router's one stroke; DrawingError naming the line."""
+    """Return the router's one stroke; DrawingError naming the line."""
     values = parse_assignments(text, file, _NAMES)
     points, line = _Job(file, values).points()
     return PointTable(
@@ -69,7 +69,8 @@ class _Job:
         self.sideways = self._is_sideways()
 
     def points(self) -> tuple[Floats, int]:
-        """The points (n, 2) in the file's unit, and the line of the array they come from."""
+        """Return the points (n, 2) in the file's unit, and the line of the array they come
+        from."""
         places = self._pair("xy")
         lengths, speeds = self._pair("lxy"), self._pair("velxy")
         if places is not None:
@@ -87,8 +88,8 @@ class _Job:
         return np.cumsum([np.array(first, dtype=np.float64), *steps], axis=0), lengths[1]
 
     def _is_sideways(self) -> bool:
-        """True if arrays of pairs are (n, 2) instead of (2, n). A (2, 2) array follows the others;
-        alone it is read as the router reads it."""
+        """Return True if arrays of pairs are (n, 2) instead of (2, n). A (2, 2) array follows
+        the others; alone it is read as the router reads it."""
         votes: dict[bool, MatlabArray] = {}
         for name in _PAIRS:
             value = self.values.get(name)
@@ -103,7 +104,7 @@ class _Job:
         return True in votes
 
     def _pair(self, name: str) -> tuple[Floats, int] | None:
-        """The array (n, 2) of this name, or of its two single rows; and its line."""
+        """Return the array (n, 2) of this name, or of its two single rows; and its line."""
         value = self.values.get(name)
         rows = [self._vector(part) for part in _PARTS[name]]
         x, y = rows
@@ -140,7 +141,7 @@ class _Job:
         return float(value.array[0, 0])
 
     def _steps(self, lengths: tuple[Floats, int], speeds: tuple[Floats, int]) -> Floats:
-        """The lines (n, 2) as displacements: lengths with the signs of the speeds."""
+        """Return the lines (n, 2) as displacements: lengths with the signs of the speeds."""
         length, speed = lengths[0], speeds[0]
         if len(length) != len(speed):
             self._fail_at("lxy and velxy differ in length", speeds[1])
@@ -158,7 +159,7 @@ class _Job:
         lengths: tuple[Floats, int] | None,
         speeds: tuple[Floats, int] | None,
     ) -> None:
-        """DrawingError when lines, directions, count or first point are not those of xy."""
+        """Raise DrawingError when lines, directions, count or first point are not those of xy."""
         steps = np.diff(points, axis=0)
         if lengths is not None and not _are_same(lengths[0], np.abs(steps)):
             self._fail_at("lxy are not the lengths of the lines of xy", lengths[1])
@@ -226,7 +227,7 @@ class _Token(Struct, frozen=True):
 
 
 def _tokens(text: str) -> Iterator[_Token]:
-    """All tokens; comments and continued lines are blanks."""
+    """Yield all tokens; comments and continued lines are blanks."""
     text = _BLOCK.sub(lambda match: "\n" * match[0].count("\n"), text)
     line, blank = 1, True
     for match in _TOKEN.finditer(text):
@@ -242,7 +243,8 @@ def _tokens(text: str) -> Iterator[_Token]:
 
 
 def parse_assignments(text: str, file: str, names: tuple[str, ...]) -> dict[str, MatlabArray]:
-    """Every assigned array by its name; DrawingError with its line for all that is no number."""
+    """Return every assigned array by its name; DrawingError with its line for all that is no
+    number."""
     return _Parser(file, text, names).values()
 
 
@@ -256,7 +258,7 @@ class _Parser:
         self._now = next(self._rest)
 
     def values(self) -> dict[str, MatlabArray]:
-        """Every assigned array by its name."""
+        """Return every assigned array by its name."""
         arrays: dict[str, MatlabArray] = {}
         while self._now.kind != "end":
             token = self._take()
@@ -296,7 +298,8 @@ class _Parser:
         return array
 
     def _matrix(self) -> Floats:
-        """The rows up to the closing bracket; a line's end ends a row as a semicolon does."""
+        """Return the rows up to the closing bracket; a line's end ends a row as a semicolon
+        does."""
         rows: list[list[float]] = [[]]
         while True:
             token = self._take()
@@ -331,7 +334,7 @@ class _Parser:
         return value
 
     def _take(self) -> _Token:
-        """The next token; at the end it stays."""
+        """Return the next token; at the end it stays."""
         token = self._now
         self._now = next(self._rest, token)
         return token

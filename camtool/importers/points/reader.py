@@ -34,7 +34,7 @@ from camtool.importers.points.tables import (
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
-    """The Drawing of a file of points; DrawingError naming line and column."""
+    """Return the Drawing of a file of points; DrawingError naming line and column."""
     table = _table(data, file)
     units = _units(table, options)
     pieces = [piece_of(stroke, units.mm_per_unit) for stroke in table.strokes]
@@ -78,7 +78,7 @@ def _decoded(data: bytes, file: str) -> str:
 
 
 def _units(table: PointTable, options: ReadOptions) -> Units:
-    """The caller's unit, else the file's, else mm."""
+    """Return the caller's unit, else the file's, else mm."""
     if options.units is None and table.unit is not None:
         size = table.mm_per_unit
         return Units(table.unit, options.mm_per(table.unit) if size is None else size, table.why)

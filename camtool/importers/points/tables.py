@@ -80,7 +80,7 @@ CHARS_AT_ONCE = 1 << 16
 
 
 def _lines_of(text: str) -> Iterator[str]:
-    """The lines of a text, as `str.splitlines` divides it."""
+    """Yield the lines of a text, as `str.splitlines` divides it."""
     begin = 0
     while begin < len(text):
         end = text.find("\n", begin + CHARS_AT_ONCE) + 1 or len(text)
@@ -89,7 +89,7 @@ def _lines_of(text: str) -> Iterator[str]:
 
 
 def parse_lines(text: str, file: str) -> PointTable:
-    """The strokes of a text of points; DrawingError naming line and column."""
+    """Return the strokes of a text of points; DrawingError naming line and column."""
     return _Lines(file).parse(text)
 
 
@@ -141,7 +141,8 @@ class _Lines(Struct):
         ]
 
     def _row(self, content: str, line: int, pattern: re.Pattern[str]) -> tuple[float, ...]:
-        """The numbers of one line; the pattern reads what is plain, and is many times faster."""
+        """Return the numbers of one line; the pattern reads what is plain, and is many times
+        faster."""
         match = pattern.fullmatch(content)
         if match is None:
             return self._diagnosed(content, line)
@@ -161,7 +162,8 @@ class _Lines(Struct):
         return values
 
     def _diagnosed(self, content: str, line: int) -> tuple[float, ...]:
-        """The numbers of one line, field by field; DrawingError naming the first bad one."""
+        """Return the numbers of one line, field by field; DrawingError naming the first bad
+        one."""
         fields = _fields(content, self.parted or "")
         if len(fields) != self.columns:
             expected = "x and y" if self.columns == 2 else "x, y and bulge"
@@ -222,7 +224,8 @@ class _Lines(Struct):
             )
 
     def _names(self, content: str, line: int) -> bool:
-        """True if the line names the columns; DrawingError if it names them in another order."""
+        """Return True if the line names the columns; DrawingError if it names them in another
+        order."""
         parted = next((sign for sign in (";", "\t", ",") if sign in content), "")
         fields = content.split(parted) if parted else content.split()
         matches = [_NAME.fullmatch(name) for name in fields]
@@ -244,7 +247,7 @@ class _Lines(Struct):
         return True
 
     def _unit(self, names: list[str], line: int) -> str | None:
-        """The unit that both names give, as in `x [in]` or `x_mm`."""
+        """Return the unit that both names give, as in `x [in]` or `x_mm`."""
         units: set[str | None] = set()
         for name in names:
             match = _UNIT.fullmatch(name)
@@ -283,14 +286,15 @@ def _separator(content: str, columns: int) -> str:
 
 
 def _row_pattern(parted: str, columns: int) -> re.Pattern[str]:
-    """A line of plain numbers in this dialect."""
+    """Return a line of plain numbers in this dialect."""
     number = f"({_REAL})" if parted == "," else f"({_REAL_COMMA})"
     sign = rf"[^\S\t]*{parted}[^\S\t]*" if parted else r"\s+"
     return re.compile(rf"\s*{sign.join([number] * columns)}\s*", re.ASCII)
 
 
 def _fields(content: str, parted: str) -> list[tuple[str, int]]:
-    """Each field without its blanks, and its column; a sign within quotes separates nothing."""
+    """Return each field without its blanks, and its column; a sign within quotes separates
+    nothing."""
     if not parted:
         return [(match[0], match.start() + 1) for match in re.finditer(r"\S+", content)]
     hidden = _QUOTED.sub(lambda match: "0" * len(match[0]), content)
@@ -318,7 +322,7 @@ _STROKE_KEYS = ("points", "closed", "layer")
 
 
 def parse_json(text: str, file: str) -> PointTable:
-    """The strokes of a JSON text and its unit; DrawingError naming the field."""
+    """Return the strokes of a JSON text and its unit; DrawingError naming the field."""
     import json
 
     try:
@@ -440,7 +444,7 @@ _SAVE = "give an array of numbers (n, 2) of x, y or (n, 3) of x, y, bulge"
 
 
 def parse_npy(data: bytes, file: str) -> PointTable:
-    """The one stroke of an .npy; DrawingError when it is no such array."""
+    """Return the one stroke of an .npy; DrawingError when it is no such array."""
     return PointTable([Stroke(_array(data, file, ""), "of the array")])
 
 
@@ -494,7 +498,7 @@ def _layer(name: str, file: str) -> str:
 
 
 def _array(data: bytes, file: str, name: str) -> Floats:
-    """The points (n, 2) or (n, 3) of one .npy."""
+    """Return the points (n, 2) or (n, 3) of one .npy."""
     where = f"array {name}" if name else None
     shape, fortran, dtype, begin = _header(data, file, where)
     check_type(shape, dtype, file, where)

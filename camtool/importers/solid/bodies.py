@@ -32,7 +32,7 @@ class Body(Struct, frozen=True, eq=False):
 
 
 def shape_bodies(shape: Any) -> list[Body]:
-    """The parts of a build123d shape with the names and colours of its tree."""
+    """Return the parts of a build123d shape with the names and colours of its tree."""
     return _tree_bodies(shape.wrapped, shape, "0", "")
 
 
@@ -55,7 +55,7 @@ def _tree_bodies(topods: Any, shape: Any, layer: str, colour: str) -> list[Body]
 
 
 def parts_in(shape: Any) -> list[Any]:
-    """All solids of a shape, and the shells, faces, wires and edges that belong to none."""
+    """Return all solids of a shape, and the shells, faces, wires and edges that belong to none."""
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID, TopAbs_WIRE
 
     kinds = (TopAbs_SOLID, TopAbs_SHELL, TopAbs_FACE, TopAbs_WIRE, TopAbs_EDGE)
@@ -66,7 +66,8 @@ def parts_in(shape: Any) -> list[Any]:
 
 
 def subshapes(shape: Any, kind: Any, outside: Any = None) -> list[Any]:
-    """All parts of this kind (`TopAbs_FACE` …), each once; with `outside` none that is in such."""
+    """Return all parts of this kind (`TopAbs_FACE` …), each once; with `outside` none that is
+    in such."""
     from OCP.TopAbs import TopAbs_SHAPE
     from OCP.TopExp import TopExp_Explorer
 
@@ -84,7 +85,7 @@ def subshapes(shape: Any, kind: Any, outside: Any = None) -> list[Any]:
 
 
 def has_edges(shape: Any) -> bool:
-    """True if the shape has an edge, so that something can be drawn."""
+    """Return True if the shape has an edge, so that something can be drawn."""
     from OCP.TopAbs import TopAbs_EDGE
     from OCP.TopExp import TopExp_Explorer
 
@@ -92,7 +93,7 @@ def has_edges(shape: Any) -> bool:
 
 
 def layer_of(label: object) -> str:
-    """The name as a layer; "" when there is none."""
+    """Return the name as a layer; "" when there is none."""
     text = "".join(sign if sign.isprintable() else "_" for sign in str(label or "")).strip()
     return "" if _NO_NAME.fullmatch(text) else text
 
@@ -107,7 +108,7 @@ def colour_of(colour: Any) -> str:
 
 
 def _as_own_class(shape: Any) -> Any:
-    """The shape as the class of its kind; the binding has other names since version 8."""
+    """Return the shape as the class of its kind; the binding has other names since version 8."""
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID, TopAbs_WIRE
     from OCP.TopoDS import TopoDS
 
@@ -139,7 +140,7 @@ MAX_DEPTH = 100
 
 
 def load_step(path: str) -> list[Body]:
-    """The bodies of a STEP file in mm, at their places in its assemblies."""
+    """Return the bodies of a STEP file in mm, at their places in its assemblies."""
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.STEPCAFControl import STEPCAFControl_Reader
     from OCP.TCollection import TCollection_ExtendedString
@@ -157,7 +158,7 @@ def load_step(path: str) -> list[Body]:
 
 
 def load_brep(path: str) -> list[Body]:
-    """The bodies of a BREP file, text or binary."""
+    """Return the bodies of a BREP file, text or binary."""
     from OCP.BinTools import BinTools
     from OCP.BRep import BRep_Builder
     from OCP.BRepTools import BRepTools
@@ -200,7 +201,8 @@ class _Tree:
         ]
 
     def _one(self, label: Any, place: Any, layer: str, colour: str, depth: int) -> list[Body]:
-        """The bodies of one part or assembly, with its own name and colour or the inherited."""
+        """Return the bodies of one part or assembly, with its own name and colour or the
+        inherited."""
         from OCP.TDF import TDF_Label
 
         original = label
@@ -244,7 +246,7 @@ class _Tree:
 
 
 def _labels() -> Any:
-    """An empty list of labels, under the name that the binding gives it since version 8."""
+    """Return an empty list of labels, under the name that the binding gives it since version 8."""
     try:
         from OCP.collections import Sequence_TDF_Label as Labels
     except ImportError:
@@ -275,7 +277,7 @@ _MEND = "correct the script"
 
 
 def run_script(data: bytes, file: str) -> list[Body]:
-    """The bodies that a script leaves; DrawingError with its line when it fails."""
+    """Return the bodies that a script leaves; DrawingError with its line when it fails."""
     names: dict[str, Any] = {"__name__": "camtool_script", "__file__": file}
     if Path(file).is_file():  # what lies beside a script it finds, as ever
         sys.path.insert(0, str(Path(file).resolve().parent))
@@ -299,13 +301,13 @@ def run_script(data: bytes, file: str) -> list[Body]:
 
 
 def is_missing(error: Exception) -> bool:
-    """True if build123d, or OpenCASCADE below it, is not installed or cannot be loaded."""
+    """Return True if build123d, or OpenCASCADE below it, is not installed or cannot be loaded."""
     name = error.name if isinstance(error, ImportError) else None
     return (name or "").partition(".")[0] in ("build123d", "OCP")
 
 
 def _script_error(message: str, error: BaseException, file: str) -> DrawingError:
-    """The error with the last line of the script that was being run."""
+    """Return the error with the last line of the script that was being run."""
     lines = [
         frame.lineno
         for frame in traceback.extract_tb(error.__traceback__)
@@ -315,7 +317,7 @@ def _script_error(message: str, error: BaseException, file: str) -> DrawingError
 
 
 def _bodies_of_result(names: dict[str, Any]) -> list[Body]:
-    """The bodies of the first of RESULTS; DrawingError when there is none."""
+    """Return the bodies of the first of RESULTS; DrawingError when there is none."""
     name = next((name for name in RESULTS if names.get(name) is not None), None)
     if name is None:
         raise DrawingError(
@@ -337,7 +339,7 @@ def _bodies_of_result(names: dict[str, Any]) -> list[Body]:
 
 
 def shapes_in(value: Any) -> list[Any]:
-    """The shapes in a builder, a shape or a list of them; TypeError naming another type."""
+    """Return the shapes in a builder, a shape or a list of them; TypeError naming another type."""
     from build123d import BuildLine, BuildPart, BuildSketch, Shape
 
     for builder, inside in ((BuildPart, "part"), (BuildSketch, "sketch"), (BuildLine, "line")):

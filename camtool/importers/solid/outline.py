@@ -47,7 +47,7 @@ class Outlines(Struct, frozen=True, eq=False):
 
 
 def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outlines:
-    """The outlines of the bodies; DrawingError when a section misses them all."""
+    """Return the outlines of the bodies; DrawingError when a section misses them all."""
     boxes = [_box(body.shape) for body in bodies]
     low, high = min(box[2] for box in boxes), max(box[5] for box in boxes)
     if height is not None and not low - POSITION_EPS_MM <= height <= high + POSITION_EPS_MM:
@@ -75,7 +75,7 @@ def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outl
 
 
 def _why_nothing_drawn(kind: str, height: float | None) -> str:
-    """Why nothing of a body is drawn."""
+    """Return why nothing of a body is drawn."""
     if height is not None:
         return "is not cut by the section"
     return "has no level face that looks up" if kind == "face" else "is not level"
@@ -109,7 +109,7 @@ def _choose_faces(
 
 
 def _level(face: Any) -> float | None:
-    """The height of a level face that looks up, else None."""
+    """Return the height of a level face that looks up, else None."""
     from OCP.BRepGProp import BRepGProp_Face
     from OCP.BRepTools import BRepTools
     from OCP.gp import gp_Pnt, gp_Vec
@@ -126,7 +126,7 @@ def _level(face: Any) -> float | None:
 
 
 def _is_plane(face: Any) -> bool:
-    """True if the surface is a plane, also where the file writes it as a spline."""
+    """Return True if the surface is a plane, also where the file writes it as a spline."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_BezierSurface, GeomAbs_BSplineSurface, GeomAbs_Plane
@@ -140,7 +140,8 @@ def _is_plane(face: Any) -> bool:
 
 
 def _section(shape: Any, box: tuple[float, ...], height: float) -> tuple[list[Any], list[Any]]:
-    """The faces that a solid shares with the level plane; of what has no inside, the edges."""
+    """Return the faces that a solid shares with the level plane; of what has no inside, the
+    edges."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Section
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.gp import gp_Ax3, gp_Dir, gp_Pln, gp_Pnt
@@ -161,7 +162,8 @@ def _section(shape: Any, box: tuple[float, ...], height: float) -> tuple[list[An
 
 
 def _wires(face: Any, tolerance: float) -> list[EdgePath]:
-    """Outer and inner wires as closed paths; the edges one by one of a wire that is no ring."""
+    """Return the outer and inner wires as closed paths; the edges one by one of a wire that is
+    no ring."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepTools import BRepTools_WireExplorer
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_WIRE
@@ -226,7 +228,8 @@ class EdgePath(Struct, frozen=True, eq=False):
 
 
 def edge_path(edge: Any, tolerance: float) -> EdgePath:
-    """The edge in its own direction, from its first point to its last, both in `vertices`."""
+    """Return the edge in its own direction, from its first point to its last, both in
+    `vertices`."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.TopAbs import TopAbs_REVERSED
 
@@ -244,7 +247,8 @@ def edge_path(edge: Any, tolerance: float) -> EdgePath:
 
 
 def reversed_vertices(vertices: Floats) -> Floats:
-    """The open path from its end to its beginning; bulges change their sign and their owner."""
+    """Return the open path from its end to its beginning; bulges change their sign and their
+    owner."""
     vertices_back = vertices[::-1].copy()
     vertices_back[:-1, 2] = -vertices[-2::-1, 2]
     vertices_back[-1, 2] = 0.0
@@ -261,19 +265,20 @@ def join_edges(edges: list[EdgePath]) -> EdgePath:
 
 
 def is_ring(edges: list[EdgePath]) -> bool:
-    """True if each edge begins where the one before ends, and the last one closes the ring."""
+    """Return True if each edge begins where the one before ends, and the last one closes the
+    ring."""
     return bool((_steps(edges) <= JOINT_MM).all())
 
 
 def _steps(edges: list[EdgePath]) -> Floats:
-    """(E,) how far from the end of each edge the next one begins."""
+    """Return (E,) how far from the end of each edge the next one begins."""
     ends = np.array([path.vertices[-1, :2] for path in edges])
     starts = np.array([path.vertices[0, :2] for path in edges])
     return np.asarray(np.hypot(*(np.roll(starts, -1, axis=0) - ends).T))
 
 
 def _exact(curve: Any, start: float, end: float) -> Floats | None:
-    """A line or a level circle; None for every other curve."""
+    """Return a line or a level circle; None for every other curve."""
     from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
 
     kind = curve.GetType()
@@ -294,7 +299,7 @@ def _exact(curve: Any, start: float, end: float) -> Floats | None:
 
 
 def _fitted_curve(curve: Any, start: float, end: float) -> Curve:
-    """The curve as `fit_curve` takes it, seen from above."""
+    """Return the curve as `fit_curve` takes it, seen from above."""
     from OCP.GeomAbs import (
         GeomAbs_BezierCurve,
         GeomAbs_BSplineCurve,
@@ -325,7 +330,7 @@ def _fitted_curve(curve: Any, start: float, end: float) -> Curve:
 
 
 def _spline(spline: Any, start: float, end: float) -> Curve:
-    """The part of a B-spline between two parameters, with its own knots and weights."""
+    """Return the part of a B-spline between two parameters, with its own knots and weights."""
     if spline.IsPeriodic():
         spline.SetNotPeriodic()
     if (spline.FirstParameter(), spline.LastParameter()) != (start, end):
@@ -343,7 +348,7 @@ def _spline(spline: Any, start: float, end: float) -> Curve:
 
 
 def _sample_curve(curve: Any, start: float, end: float) -> Curve:
-    """Any curve, point by point; it may have corners where its intervals meet."""
+    """Return any curve, point by point; it may have corners where its intervals meet."""
     from OCP.GeomAbs import GeomAbs_C1
     from OCP.gp import gp_Pnt, gp_Vec
 
@@ -367,7 +372,7 @@ def _sample_curve(curve: Any, start: float, end: float) -> Curve:
 
 
 def _reals(count: int) -> Any:
-    """An array of OpenCASCADE, under the name that its binding gives it since version 8."""
+    """Return an array of OpenCASCADE, under the name that its binding gives it since version 8."""
     try:
         from OCP.collections import Array1_double as Reals
     except ImportError:

@@ -99,7 +99,7 @@ def _kind(data: bytes, file: str, options: ReadOptions) -> tuple[str, FileUnit]:
 
 
 def _pieces(outlines: list[dict[str, Any]], scale: float) -> list[Piece]:
-    """A piece for each wire, in mm."""
+    """Return a piece for each wire, in mm."""
     pieces: list[Piece] = []
     for number, outline in enumerate(outlines, start=1):
         for wire, path in enumerate(outline["paths"], start=1):
@@ -182,7 +182,7 @@ def run_worker(data: bytes, request_items: dict[str, Any], file: str) -> dict[st
 
 
 def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
-    """The exit code of the worker, whose words go to this file descriptor."""
+    """Return the exit code of the worker, whose words go to this file descriptor."""
     try:
         process = subprocess.run(
             [sys.executable, "-P", "-c", START, str(request)],
@@ -216,7 +216,8 @@ def _answer(answer: Path, code: int, script: bool, file: str) -> dict[str, Any]:
 
 
 def _complaint(output: str) -> str:
-    """The first line in which OpenCASCADE reports an error, without its decoration; else ""."""
+    """Return the first line in which OpenCASCADE reports an error, without its decoration; else
+    ""."""
     for line in _COLOURS.sub("", output).splitlines():
         if "ERR" in line or "FAIL" in line.upper():
             return "".join(sign for sign in line if sign.isprintable()).strip(" *")
@@ -270,7 +271,7 @@ def script_unit() -> FileUnit:
 
 
 def step_unit(data: bytes) -> FileUnit:
-    """The one unit of length that all parts of a STEP file name; its reader gives mm."""
+    """Return the one unit of length that all parts of a STEP file name; its reader gives mm."""
     entities = {match[1]: match[2] for match in _ENTITY.finditer(data)}
     names = {
         _name(entities[number])

@@ -36,7 +36,8 @@ def main(request: dict[str, Any]) -> None:
 
 
 def find_outlines(request: dict[str, Any]) -> dict[str, Any]:
-    """The outlines of the model in the file `request["source"]`, as plain lists and numbers.
+    """Return the outlines of the model in the file `request["source"]`, as plain lists and
+    numbers.
 
     `kind` ("step", "brep", "script"), `height` of a section or None, `tolerance` of fitting;
     lengths in the model's mm. `file` is the model's name for messages.
@@ -84,8 +85,8 @@ def _missing_error(error: Exception) -> DrawingError:
 
 
 def _is_of_kernel(error: Exception) -> bool:
-    """True if OpenCASCADE raised the error (its exceptions have no common class), or ran out of
-    memory."""
+    """Return True if OpenCASCADE raised the error (its exceptions have no common class), or ran
+    out of memory."""
     return type(error).__module__.startswith("OCP") or isinstance(
         error, RuntimeError | MemoryError
     )
@@ -103,14 +104,14 @@ def _bodies(request: dict[str, Any]) -> list[Body]:
 
 
 def _is_valid(body: Body) -> bool:
-    """True if all faces and edges of the body fit together."""
+    """Return True if all faces and edges of the body fit together."""
     from OCP.BRepCheck import BRepCheck_Analyzer
 
     return bool(BRepCheck_Analyzer(body.shape).IsValid())
 
 
 def _as_plain_lists(result: Outlines) -> dict[str, Any]:
-    """The outlines without arrays and records."""
+    """Return the outlines without arrays and records."""
     return {
         "levels": result.levels,
         "span": result.span,

@@ -55,7 +55,7 @@ _SHORT_HEX = 4
 
 
 def parse_colour(text: str) -> str:
-    """A CSS colour as "#rrggbb"; "" for what is none of a known form (gradients, var()).
+    """Return a CSS colour as "#rrggbb"; "" for what is none of a known form (gradients, var()).
 
     >>> parse_colour("red"), parse_colour("#0af"), parse_colour("rgb(100%, 0%, 16)")
     ('#ff0000', '#00aaff', '#ff0010')

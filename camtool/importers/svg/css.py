@@ -77,7 +77,7 @@ class _Rule(Struct, frozen=True):
         return 1 if len(self.steps) == 1 else _CHAIN_COST
 
     def matches(self, node: Node) -> bool:
-        """True if the rule applies to the element; its steps are matched from the element
+        """Return True if the rule applies to the element; its steps are matched from the element
         outwards."""
         places = [node] if self.steps[0].matches(node) else []
         for child, step in zip(self.child, self.steps[1:], strict=True):
@@ -113,7 +113,7 @@ class CssRules(Struct):
                 self._add(selector.strip(), declarations)
 
     def holding(self, node: Node) -> list[Declarations]:
-        """The declarations that hold for an element, the strongest last; DrawingError
+        """Return the declarations that hold for an element, the strongest last; DrawingError
         when the sheets would take too long to apply."""
         if not self._count:
             return []
@@ -161,7 +161,8 @@ class CssRules(Struct):
 
 
 def parse_declarations(text: str, properties: frozenset[str]) -> Declarations:
-    """The wanted properties of "name: value; ..."; of two the later wins, or the important one."""
+    """Return the wanted properties of "name: value; ..."; of two the later wins, or the
+    important one."""
     declarations: Declarations = {}
     for item in text.split(";"):
         name, colon, value = item.partition(":")
@@ -175,7 +176,8 @@ def parse_declarations(text: str, properties: frozenset[str]) -> Declarations:
 
 
 def _parse_selector(selector: str) -> tuple[tuple[_Compound, ...], tuple[bool, ...]] | None:
-    """Steps and links of a selector from the element outwards, None when it has other signs."""
+    """Return steps and links of a selector from the element outwards, None when it has other
+    signs."""
     words = selector.replace(">", " > ").split()
     steps: list[_Compound] = []
     child: list[bool] = []
@@ -217,7 +219,8 @@ def _compound(word: str) -> _Compound | None:
 
 
 def _passes_test(node: Node, test: _Test) -> bool:
-    """True if the element passes a test of an attribute: [name], [name=value], [name~=value] …"""
+    """Return True if the element passes a test of an attribute: [name], [name=value],
+    [name~=value] …"""
     name, sign, value = test
     content = node.attributes.get(name)
     if content is None or not sign:
@@ -255,7 +258,7 @@ def _block_end(text: str, begin: int) -> int:
 
 
 def _without_comments(text: str) -> str:
-    """The text without `/* ... */` and the marks of old `<!-- ... -->`."""
+    """Return the text without `/* ... */` and the marks of old `<!-- ... -->`."""
     parts: list[str] = []
     offset = 0
     while (begin := text.find("/*", offset)) >= 0:

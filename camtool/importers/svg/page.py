@@ -54,7 +54,7 @@ Writer = tuple[str, float]
 
 
 def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> SvgPage:
-    """The page of the root element; DrawingError when its size or viewBox makes no sense.
+    """Return the page of the root element; DrawingError when its size or viewBox makes no sense.
 
     Without `options.dpi` a px has the size that the program `writer` gives it.
     """
@@ -76,7 +76,7 @@ def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> S
 def _by_the_file(
     root: Node, sides: tuple[_Side, _Side], box: SvgBox | None, options: ReadOptions
 ) -> SvgPage:
-    """The page by the sizes in the file."""
+    """Return the page by the sizes in the file."""
     width, height = sides
     named = width if width.size_mm is not None else height
     if named.size_mm is None:
@@ -118,7 +118,7 @@ def _page_in_unit(
 
 
 def _sizeless(box: SvgBox | None, options: ReadOptions) -> SvgPage:
-    """The page has no size: user units are taken as px."""
+    """Return the page has no size: user units are taken as px."""
     px = options.mm_per("px")
     units = Units("px", px, f"no size in the file, taken as {options.px_an_inch:g} px an inch")
     finding = _unitless("the svg has no width and height", options)
@@ -129,7 +129,8 @@ def _sizeless(box: SvgBox | None, options: ReadOptions) -> SvgPage:
 
 
 def _side(root: Node, name: str, options: ReadOptions) -> _Side:
-    """A side as the attribute says it, else as the style does (as pages for the web have it)."""
+    """Return a side as the attribute says it, else as the style does (as pages for the web have
+    it)."""
     text = (
         root.get(name)
         or parse_declarations(root.get("style"), frozenset([name])).get(name, ("",))[0]
@@ -147,7 +148,7 @@ def _side(root: Node, name: str, options: ReadOptions) -> _Side:
 
 
 def _size(width: _Side, height: _Side, px: float) -> tuple[float, float] | None:
-    """Both sides in px, where both are known."""
+    """Return both sides in px, where both are known."""
     if width.size_mm is None or height.size_mm is None:
         return None
     return width.size_mm / px, height.size_mm / px

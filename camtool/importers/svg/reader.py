@@ -42,8 +42,9 @@ from camtool.importers.svg.tree import MAX_DEPTH, Node, as_safe_utf8, parse_tree
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
-    """The Drawing of an SVG, also a gzipped one; DrawingError naming element and line when it
-    cannot be read. What is wrong in one element alone leaves that element out, with a finding."""
+    """Return the Drawing of an SVG, also a gzipped one; DrawingError naming element and line
+    when it cannot be read. What is wrong in one element alone leaves that element out, with a
+    finding."""
     try:
         content = as_safe_utf8(data)
         root = parse_tree(content)
@@ -184,7 +185,8 @@ class SvgWalk:
             self._children(node, scope)
 
     def _entered(self, node: Node, scope: SvgScope) -> SvgScope | None:
-        """The scope inside the element; None, and its shapes counted, when it shows nothing."""
+        """Return the scope inside the element; None, and its shapes counted, when it shows
+        nothing."""
         style = self._sheet.style(node, scope.style)
         if style.display == "none":
             self._count(node, "is hidden (display: none)")
@@ -314,7 +316,7 @@ class SvgWalk:
             self.notes.left_out["text", "draws nothing"] += 1
 
     def _subpaths(self, node: Node, scope: SvgScope) -> tuple[list[Subpath], str]:
-        """The shape in user units; paths that are used again are not parsed again."""
+        """Return the shape in user units; paths that are used again are not parsed again."""
         if not scope.uses or node.tag not in ("path", "polyline", "polygon"):
             return subpaths(node, self._lengths(scope, scope.style))
         if node not in self._shapes:
@@ -395,7 +397,7 @@ class SvgWalk:
 
 
 def _cost(subpaths: list[Subpath]) -> int:
-    """Curves, and hundreds of corners."""
+    """Return curves, and hundreds of corners."""
     segments = [segment for one in subpaths for segment in one.segments]
     corners = sum(len(segment.points) for segment in segments if isinstance(segment, SvgLines))
     curves = sum(not isinstance(segment, SvgLines) for segment in segments)
@@ -467,8 +469,8 @@ class CurveFitter:
         self.tolerance_mm = tolerance_mm
 
     def vertices(self, subpath: Subpath, to_mm: Affine) -> Fitted:
-        """(n, 3) x, y, bulge in mm, the last one the end, and how far the curves lie from them;
-        DrawingError when out of bounds."""
+        """Return (n, 3) x, y, bulge in mm, the last one the end, and how far the curves lie
+        from them; DrawingError when out of bounds."""
         first = subpath.segments[0]
         if len(subpath.segments) == 1 and isinstance(first, SvgLines):
             points = np.concatenate([subpath.start[None, :], first.points])
@@ -487,7 +489,7 @@ class CurveFitter:
         return _in_reach(np.concatenate(rows)), np.concatenate(errors)
 
     def _segment(self, start: Floats, segment: Segment, to_mm: Affine) -> Fitted:
-        """(n, 3) from `start` (2,) mm to the segment's end, both exact."""
+        """Return (n, 3) from `start` (2,) mm to the segment's end, both exact."""
         if isinstance(segment, SvgLines):
             points = _straight(to_mm, segment.points)
             return np.concatenate([[[start[0], start[1], 0.0]], points]), None
@@ -506,7 +508,7 @@ class CurveFitter:
         return _with_ends(vertices, ends), errors
 
     def _fitted(self, curve: Curve, bounds: Floats) -> Fitted:
-        """Arcs for a curve whose size and place `bounds` (n, 2) give."""
+        """Return arcs for a curve whose size and place `bounds` (n, 2) give."""
         _in_reach(bounds, MAX_CURVE_MM)
         try:
             fit = fit_curve(curve, self.tolerance_mm)
@@ -518,14 +520,14 @@ class CurveFitter:
 
 
 def _straight(to_mm: Affine, points: Floats) -> Floats:
-    """(n, 3) of points (n, 2) mapped, without bulges."""
+    """Return (n, 3) of points (n, 2) mapped, without bulges."""
     vertices = np.zeros((len(points), 3))
     vertices[:, :2] = to_mm.points(points)
     return vertices
 
 
 def _in_reach(vertices: Floats, limit_mm: float = MAX_COORDINATE_MM) -> Floats:
-    """The same numbers; DrawingError when one is too far away."""
+    """Return the same numbers; DrawingError when one is too far away."""
     furthest = float(np.abs(vertices).max())
     if not furthest <= limit_mm:
         raise DrawingError(
@@ -536,7 +538,7 @@ def _in_reach(vertices: Floats, limit_mm: float = MAX_COORDINATE_MM) -> Floats:
 
 
 def _circle(centre: Floats, u: Floats, v: Floats, arc: Arc) -> Floats | None:
-    """The arc's vertices when its mapped ellipse is a circle, else None."""
+    """Return the arc's vertices when its mapped ellipse is a circle, else None."""
     u_axis, v_axis = complex(*u), complex(*v)
     p, q = (u_axis - 1j * v_axis) / 2.0, (u_axis + 1j * v_axis) / 2.0
     if 2.0 * min(abs(p), abs(q)) > ROUND_EPS_MM:
@@ -547,7 +549,7 @@ def _circle(centre: Floats, u: Floats, v: Floats, arc: Arc) -> Floats | None:
 
 
 def _with_ends(vertices: Floats, ends: Floats) -> Floats:
-    """The same with its first and last point set to `ends` (2, 2), which rounding moved."""
+    """Return the same with its first and last point set to `ends` (2, 2), which rounding moved."""
     exact = vertices.copy()
     exact[[0, -1], :2] = ends
     return exact

@@ -41,7 +41,7 @@ class SvgScope(NamedTuple):
 
 
 def own_transform(node: Node, style: SvgStyle, lengths: Lengths) -> Affine:
-    """Its transform: of its style, else its attribute, about its origin; DrawingError."""
+    """Return its transform: of its style, else its attribute, about its origin; DrawingError."""
     attribute = node.get("transform")
     if style.transform:
         transform = (
@@ -56,7 +56,7 @@ def own_transform(node: Node, style: SvgStyle, lengths: Lengths) -> Affine:
 
 
 def is_for_us(node: Node) -> bool:
-    """True if the element is for English or any language, and requires no extension."""
+    """Return True if the element is for English or any language, and requires no extension."""
     if node.get("requiredExtensions"):
         return False
     languages = node.attributes.get("systemLanguage")
@@ -66,7 +66,7 @@ def is_for_us(node: Node) -> bool:
 
 
 def layer_in(node: Node, scope: SvgScope) -> str:
-    """The layer inside this element: an Inkscape layer's label, or the name of a group that
+    """Return the layer inside this element: an Inkscape layer's label, or the name of a group that
     stands right under the root."""
     if node.tag != "g":
         return scope.layer
@@ -95,7 +95,7 @@ class ClipFrame(Struct, frozen=True):
     outer: Affine
 
     def is_left_by(self, points: Floats) -> bool:
-        """True if any of the points (n, 2) mm lies outside."""
+        """Return True if any of the points (n, 2) mm lies outside."""
         if not (self.box.width and self.box.height and self.outer.determinant):
             return False
         places = self.outer.inverse.points(points)
@@ -106,7 +106,8 @@ class ClipFrame(Struct, frozen=True):
 
 
 def frame_of(node: Node, size: Node, scope: SvgScope, lengths: Lengths) -> ClipFrame | None:
-    """The frame of an inner svg or a symbol, None when nothing of it is to be seen; DrawingError.
+    """Return the frame of an inner svg or a symbol, None when nothing of it is to be seen;
+    DrawingError.
 
     `size`: the element that says how large, itself or the `use` that draws it. An svg that a `use`
     draws keeps its place and the sizes that the `use` does not name.

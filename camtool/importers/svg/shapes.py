@@ -62,8 +62,8 @@ class Subpath(Struct, frozen=True, eq=False):
 
 
 def arc_between(start: complex, end: complex, radii: complex, turn: float, flags: int) -> Arc:
-    """The arc of path data: `radii` = rx + i·ry, `turn` rad of the x axis; flags: 1 the sweep
-    flag, 2 the large-arc flag. Radii that are too short are grown. Start and end differ.
+    """Return the arc of path data: `radii` = rx + i·ry, `turn` rad of the x axis; flags: 1 the
+    sweep flag, 2 the large-arc flag. Radii that are too short are grown. Start and end differ.
     DrawingError when its radii are so unlike its chord that numbers fail.
 
     In the frame where the ellipse is the unit circle, with the chord's half h = (p1 − p0)/2,
@@ -130,7 +130,8 @@ _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 
 
 
 def parse_path(data: str) -> tuple[list[Subpath], str]:
-    """The subpaths of path data that draw something, up to the first fault, and that fault ("").
+    """Return the subpaths of path data that draw something, up to the first fault, and that fault
+    ("").
 
     DrawingError for data that cannot be drawn at all: too many or too large, or arcs without a
     shape.
@@ -172,7 +173,8 @@ def _drawn(data: str, pen: _Pen) -> str:
 
 
 def _arcs(pen: _Pen, relative: bool, text: str) -> str:
-    """A commands: their flags may stick to what follows ("a1 1 0 011 2"); the fault or ""."""
+    """Draw the arcs of an "a" command; return its fault, or "". Flags may stick to what follows
+    ("a1 1 0 011 2")."""
     start = _START.match(text)
     offset = start.end() if start else 0
     drawn = 0
@@ -307,7 +309,7 @@ def _floats(words: list[str]) -> list[float]:
 
 
 def _bounded(place: complex) -> complex:
-    """The place itself; relative steps may add up to one that is too far away."""
+    """Return the place itself; relative steps may add up to one that is too far away."""
     if not (abs(place.real) <= MAX_NUMBER and abs(place.imag) <= MAX_NUMBER):
         raise DrawingError("path data lead to a place that is too far away")
     return place
@@ -338,14 +340,15 @@ class Lengths(Struct, frozen=True):
     font_px: float = FONT_PX
 
     def along(self, node: Node, name: str, axis: str, default: float = 0.0) -> float:
-        """The attribute `name` in user units; `axis` x, y or d (diagonal) says what % are of."""
+        """Return the attribute `name` in user units; `axis` x, y or d (diagonal) says what %
+        are of."""
         text = node.get(name)
         if not text or text == "auto":
             return default
         return self.length(text, axis, name)
 
     def length(self, text: str, axis: str, name: str = "length") -> float:
-        """A length in user units; DrawingError naming it."""
+        """Return a length in user units; DrawingError naming it."""
         # Most lengths are bare numbers.
         if NUMBER.fullmatch(text):
             return in_bounds(float(text), name)

@@ -148,8 +148,8 @@ class StyleSheet:
         return self._rules.left_out
 
     def style(self, node: Node, above: SvgStyle) -> SvgStyle:
-        """The element's style under its parent's; DrawingError when the sheets would take too
-        long to apply."""
+        """Return the element's style under its parent's; DrawingError when the sheets would
+        take too long to apply."""
         attributes = node.attributes
         values = {name: attributes[name] for name in _ATTRIBUTES if name in attributes}
         strong: dict[str, str] = {}
@@ -173,7 +173,7 @@ class StyleSheet:
 
 
 def _under(above: SvgStyle, values: dict[str, str]) -> SvgStyle:
-    """The style of these values; what is missing or "inherit" comes from above."""
+    """Return the style of these values; what is missing or "inherit" comes from above."""
     fields: dict[str, Any] = dict(_BLANK)
     for name, written in values.items():
         value = written.strip().lower()
@@ -240,7 +240,7 @@ def _longhands(text: str) -> dict[str, str]:
 
 
 def _font_px(text: str, above: float) -> float | None:
-    """A font size in px, None when it is none."""
+    """Return a font size in px, None when it is none."""
     if text in _FONT_WORDS:
         return _FONT_WORDS[text]
     if text in _FONT_STEPS:

@@ -84,8 +84,8 @@ def text_of(
     lengths_of: Callable[[SvgStyle], Lengths],
     mode: str,
 ) -> Text:
-    """A `text` of this style; `style_of` gives the style of an element within it, under that of
-    its parent; mode is "outline" or "stroke".
+    """Return a `text` of this style; `style_of` gives the style of an element within it, under
+    that of its parent; mode is "outline" or "stroke".
 
     Raises Unusable with the reason when it cannot be drawn as it is shown, DrawingError for a
     place that is none.
@@ -204,7 +204,7 @@ class _Flow(Struct, eq=False):
 
 
 def _check(letter: str) -> None:
-    """Unusable for a letter whose place depends on those around it."""
+    """Raise Unusable for a letter whose place depends on those around it."""
     if unicodedata.bidirectional(letter) in _LEFTWARDS:
         raise Unusable("is written from right to left")
     if unicodedata.category(letter) in ("Mn", "Mc", "Me"):
@@ -247,7 +247,8 @@ class _Writer(Struct, eq=False):
         return TextLook(font, style.font_px / font.em, rules=rules), (font.name, other)
 
     def _font(self, style: SvgStyle) -> tuple[Font, str]:
-        """The first installed family of the list; else what stands in for the first of all."""
+        """Return the first installed family of the list; else what stands in for the first of
+        all."""
         weight = _WEIGHTS.get(style.weight, 0)
         if not weight:
             if not (style.weight.isdecimal() and 1 <= int(style.weight[:5]) <= 1000):
@@ -270,13 +271,13 @@ class _Writer(Struct, eq=False):
 
 
 def _family(name: str) -> str:
-    """The name without quotes, fit to be printed."""
+    """Return the name without quotes, fit to be printed."""
     words = " ".join(name.strip().strip("\"'").split())[:_MAX_NAME]
     return "".join(sign if sign.isprintable() else "?" for sign in words)
 
 
 def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
-    """The words between letters that have places of their own.
+    """Yield the words between letters that have places of their own.
 
     Unusable where a line goes on from letters that text-anchor moves: the standard counts from
     where they were before that, renderers from where they are.
@@ -309,9 +310,9 @@ def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
 
 
 def _draw_chunk(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[TextRun]:
-    """The words of a chunk drawn, their span [a, b] moved so that its start, middle or end lies
-    at the chunk's first letter. Unusable where a dx within it changes that span: the standard
-    takes it into account, not all renderers do."""
+    """Yield the words of a chunk drawn, their span [a, b] moved so that its start, middle or
+    end lies at the chunk's first letter. Unusable where a dx within it changes that span: the
+    standard takes it into account, not all renderers do."""
     begin = min(words.x for words in chunk)
     end = max(words.end for words in chunk)
     gaps = any(words.x != before.end for before, words in pairwise(chunk))

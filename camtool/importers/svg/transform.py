@@ -54,7 +54,7 @@ class Affine(Struct, frozen=True):
         return self.a * self.d - self.b * self.c
 
     def points(self, points: Floats) -> Floats:
-        """(n, 2) positions mapped."""
+        """Return (n, 2) positions mapped."""
         x, y = points[:, 0], points[:, 1]
         mapped = np.empty((len(points), 2))
         mapped[:, 0] = self.a * x + self.c * y + self.e
@@ -62,7 +62,7 @@ class Affine(Struct, frozen=True):
         return mapped
 
     def vectors(self, vectors: Floats) -> Floats:
-        """(n, 2) directions mapped: without the shift."""
+        """Return (n, 2) directions mapped: without the shift."""
         return np.asarray(vectors @ np.array([[self.a, self.b], [self.c, self.d]]))
 
     @property
@@ -80,17 +80,17 @@ class Affine(Struct, frozen=True):
 
 
 def translation(x: float, y: float) -> Affine:
-    """The shift by (x, y)."""
+    """Return the shift by (x, y)."""
     return Affine(e=x, f=y)
 
 
 def scaling(x: float, y: float) -> Affine:
-    """The scale about the origin."""
+    """Return the scale about the origin."""
     return Affine(a=x, d=y)
 
 
 def in_bounds(value: float, name: str) -> float:
-    """The number itself; DrawingError when it is too large."""
+    """Return the number itself; DrawingError when it is too large."""
     if not abs(value) <= MAX_NUMBER:
         raise DrawingError(f"{name} {value:g} is too large")
     return value
@@ -131,7 +131,7 @@ def parse_view_box(text: str) -> SvgBox | None:
 
 
 def view_box_map(box: SvgBox, onto: SvgBox, align: str) -> Affine:
-    """The map of viewBox `box` onto the viewport `onto` by preserveAspectRatio `align`.
+    """Return the map of viewBox `box` onto the viewport `onto` by preserveAspectRatio `align`.
 
     meet: scale = min(sx, sy), all is seen; slice: the greater one, all is covered. What is left
     over, viewport − scale · box, is shared out by Min (0), Mid (½), Max (1).
@@ -149,7 +149,7 @@ def view_box_map(box: SvgBox, onto: SvgBox, align: str) -> Affine:
 
 
 def shortened(text: str) -> str:
-    """A quoted beginning of a text, for messages."""
+    """Return a quoted beginning of a text, for messages."""
     return repr(text if len(text) <= 24 else text[:21] + "...")
 
 
@@ -172,7 +172,7 @@ Length = Callable[[str, str], float]
 
 
 def parse_transform(text: str) -> Affine:
-    """A transform list: matrix, translate, scale, rotate, skewX, skewY; DrawingError."""
+    """Return a transform list: matrix, translate, scale, rotate, skewX, skewY; DrawingError."""
     product = Affine()
     for name, inside in _functions(text):
         numbers = parse_numbers(inside, f"transform {name}")
@@ -181,7 +181,7 @@ def parse_transform(text: str) -> Affine:
 
 
 def parse_css_transform(text: str, length: Length) -> Affine:
-    """A CSS transform list in the plane, with units; DrawingError for what is none."""
+    """Return a CSS transform list in the plane, with units; DrawingError for what is none."""
     product = Affine()
     for name, inside in _functions(text):
         words = [word for word in re.split(r"[\s,]+", inside) if word]
@@ -204,7 +204,7 @@ def parse_origin(text: str, length: Length) -> tuple[float, float]:
 
 
 def about_point(origin: tuple[float, float], inner: Affine) -> Affine:
-    """The map done about a point instead of (0, 0)."""
+    """Return the map done about a point instead of (0, 0)."""
     x, y = origin
     return (translation(x, y) @ inner @ translation(-x, -y)).checked()
 
@@ -275,7 +275,7 @@ def _css_single(name: str, words: list[str], length: Length) -> Affine:
 
 
 def _with_unit(word: str, units: dict[str, float]) -> float:
-    """A number times its unit."""
+    """Return a number times its unit."""
     match = _MEASURE.fullmatch(word)
     unit = match[2].lower() if match else None
     if match is None or unit not in units:

@@ -65,7 +65,7 @@ class Node(Struct, eq=False):
         return f"{self.tag} {name}" if name else f"{self.tag} at line {self.line}"
 
     def get(self, name: str, default: str = "") -> str:
-        """An attribute without blanks around it."""
+        """Return an attribute without blanks around it."""
         value = self.attributes.get(name)
         return default if value is None else value.strip()
 
@@ -79,8 +79,8 @@ class Node(Struct, eq=False):
 
 
 def parse_tree(data: bytes) -> Node:
-    """The root of an SVG document made `as_safe_utf8`; DrawingError when it is no XML, no SVG, or
-    not safe."""
+    """Return the root of an SVG document made `as_safe_utf8`; DrawingError when it is no XML,
+    no SVG, or not safe."""
     from defusedxml.common import DefusedXmlException
 
     handler = _Builder()
@@ -286,7 +286,8 @@ def as_safe_utf8(data: bytes) -> bytes:
 
 
 def writer_dpi(head: bytes) -> tuple[str, float] | None:
-    """The program that wrote the file and the px an inch that it means, where that is not 96."""
+    """Return the program that wrote the file and the px an inch that it means, where that is
+    not 96."""
     head = head[:_HEAD_BYTES]
     inkscape = _OLD_INKSCAPE.search(head)
     if inkscape is not None:
@@ -295,7 +296,7 @@ def writer_dpi(head: bytes) -> tuple[str, float] | None:
 
 
 def _unpack(data: bytes) -> bytes:
-    """The content of a gzip file, no more than MAX_BYTES of it."""
+    """Return the content of a gzip file, no more than MAX_BYTES of it."""
     try:
         with gzip.GzipFile(fileobj=BytesIO(data)) as packed:
             content = packed.read(MAX_BYTES + 1)
@@ -316,7 +317,7 @@ def _too_large(size: int) -> DrawingError:
 
 
 def _decode(data: bytes) -> bytes:
-    """The same text as UTF-8, unless expat knows its encoding."""
+    """Return the same text as UTF-8, unless expat knows its encoding."""
     name = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
     if not name:
         declared = _DECLARED.match(data[:_HEAD_BYTES])
@@ -342,5 +343,5 @@ def _decode(data: bytes) -> bytes:
 
 
 def _blot_document_type(match: re.Match[bytes]) -> bytes:
-    """The document type without its reference; lines keep their numbers."""
+    """Return the document type without its reference; lines keep their numbers."""
     return match[1] + b"\n" * match[2].count(b"\n")

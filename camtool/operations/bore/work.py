@@ -106,7 +106,7 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
 
 
 def _walls(holes: list[Hole], setting: Setting) -> list[Contour]:
-    """The contours along the walls of the bores."""
+    """Return the contours along the walls of the bores."""
     clearance = setting.operation.away_mm
     rings = [
         helix(hole.at_mm, 0.5 * _diameter(hole) - clearance, 0.0, 0)[:4, [0, 1, 3]]
@@ -118,8 +118,8 @@ def _walls(holes: list[Hole], setting: Setting) -> list[Contour]:
 
 
 def radii(wide_mm: float, tool_mm: float, step_mm: float) -> list[float]:
-    """The radii of the rings of the tool's centre, mm, from the inside out, the last the largest
-    one; the first leaves no core, and neighbours are no farther apart than a step.
+    """Return the radii of the rings of the tool's centre, mm, from the inside out, the last the
+    largest one; the first leaves no core, and neighbours are no farther apart than a step.
 
     >>> radii(1.0, 1.5, 1.2)
     [1.0]
@@ -133,7 +133,8 @@ def radii(wide_mm: float, tool_mm: float, step_mm: float) -> list[float]:
 
 
 def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Finding]]:
-    """The runs of a bore, one for each ring; and what of them is steeper than it should be."""
+    """Return the runs of a bore, one for each ring; and what of them is steeper than it should
+    be."""
     operation = setting.operation
     wide = 0.5 * _diameter(hole) - operation.away_mm
     step = operation.step_over * operation.tool.diameter_mm
@@ -160,7 +161,7 @@ def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Findin
 
 
 def _turned_vertices(vertices: Floats, hole: Hole, operation: Operation) -> Floats:
-    """The vertices of a ring, which runs CCW, in the direction of the operation."""
+    """Return the vertices of a ring, which runs CCW, in the direction of the operation."""
     if operation.direction == "conventional":  # mirrored
         vertices[:, 1] = 2.0 * hole.at_mm[1] - vertices[:, 1]
         vertices[:, 3] *= -1.0
@@ -168,7 +169,7 @@ def _turned_vertices(vertices: Floats, hole: Hole, operation: Operation) -> Floa
 
 
 def _is_narrow(hole: Hole, operation: Operation) -> bool:
-    """True if there is no room for a useful helix: the tool plunges."""
+    """Return True if there is no room for a useful helix: the tool plunges."""
     wide = 0.5 * _diameter(hole) - operation.away_mm
     return wide < MIN_HELIX_SHARE * operation.tool.radius_mm
 
@@ -199,7 +200,7 @@ def _plunged(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Fin
 
 
 def _turns(radius_mm: float, depth_mm: float, operation: Operation) -> int:
-    """Fewest turns down of which none is too steep or too deep."""
+    """Return the fewest turns down of which none is too steep or too deep."""
     pitch = 2.0 * math.pi * radius_mm * math.tan(operation.entry.angle_rad)
     if operation.step_down_mm is not None:
         pitch = min(pitch, operation.step_down_mm)
@@ -207,8 +208,8 @@ def _turns(radius_mm: float, depth_mm: float, operation: Operation) -> int:
 
 
 def helix(centre: tuple[float, float], radius_mm: float, depth_mm: float, turns: int) -> Floats:
-    """(4 turns + 6, 4) x, y, z, bulge: CCW about a centre from the stock top to the depth in so
-    many turns, once round there, and to the centre."""
+    """Return (4 turns + 6, 4) x, y, z, bulge: CCW about a centre from the stock top to the
+    depth in so many turns, once round there, and to the centre."""
     count = 4 * turns + 4
     quarter = np.arange(count + 1)
     x = centre[0] + radius_mm * np.array([1.0, 0.0, -1.0, 0.0])[quarter % 4]
@@ -223,7 +224,7 @@ def _diameter(hole: Hole) -> float:
 
 
 def _outermost(circles: list[Hole]) -> list[Hole]:
-    """Those that lie in no other one, each once, in their order."""
+    """Return those that lie in no other one, each once, in their order."""
     if not circles:
         return []
     places = np.array([hole.at_mm for hole in circles])
@@ -254,7 +255,7 @@ def _too_small(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
 
 
 def _cut_away_between(holes: list[Hole], operation: Operation) -> list[Finding]:
-    """Bores that are cut beyond their circles, of which two leave nothing between them."""
+    """Return bores that are cut beyond their circles, of which two leave nothing between them."""
     if not operation.beyond_mm or not holes:
         return []
     max_distance, findings = 2.0 * operation.beyond_mm, list[Finding]()

@@ -33,7 +33,7 @@ from camtool.records import replace
 
 
 def chamfered(operation: Operation, _: Stock | None) -> Operation:
-    """The operation with the depth that its chamfer makes.
+    """Return the operation with the depth that its chamfer makes.
 
     A cone of half angle α and tip radius t is r(h) = t + h·tan α wide, h above its tip. Its
     tip runs an offset o below the bevel, whose lower edge is the drawn line: the axis runs
@@ -76,7 +76,8 @@ def chamfered(operation: Operation, _: Stock | None) -> Operation:
 
 
 def chamfer(chosen: Chosen, setting: Setting) -> Work:
-    """The contours of an operation of the kind chamfer; open paths are named in a finding."""
+    """Return the contours of an operation of the kind chamfer; open paths are named in a
+    finding."""
     closed = np.flatnonzero(chosen.lines.closed)
     opens = [chosen.names[k] for k in np.flatnonzero(~chosen.lines.closed).tolist()]
     findings = list[Finding]()

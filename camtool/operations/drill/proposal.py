@@ -10,7 +10,8 @@ SMALL_HOLE = 0.1
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Holes at the points, and in the circles that are small, or fit a drill or the tool."""
+    """Return holes at the points, and in the circles that are small, or fit a drill or the
+    tool."""
     tool = remaining.proposal.tool_mm
     if remaining.habit == "pocket":
         return []

@@ -121,7 +121,7 @@ def _text_beside_parts(drawing: Drawing, text: Sequence[int]) -> set[int]:
 
 
 def _cut(remaining: Remaining, part: Part, reason: str, *, always_deep: bool = False) -> Part:
-    """The part with the bit that fits between its lines, its depth, and why."""
+    """Return the part with the bit that fits between its lines, its depth, and why."""
     bits = remaining.proposal.tools("v")
     if not bits and not always_deep:
         return replace(part, why=reason)
@@ -138,7 +138,8 @@ def _cut(remaining: Remaining, part: Part, reason: str, *, always_deep: bool = F
 
 
 def _fitting(remaining: Remaining, rows: Sequence[int], bits: Sequence[Tool]) -> Tool:
-    """The bit of the widest groove that keeps what is between the lines, or else the finest."""
+    """Return the bit of the widest groove that keeps what is between the lines, or else the
+    finest."""
     lines = remaining.drawing.paths.select(rows)
     widest = sorted(bits, key=_width, reverse=True)
     if len(lines.vertices) <= MAX_POINTS:

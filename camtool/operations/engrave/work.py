@@ -40,7 +40,7 @@ WIDTH_SLACK = 0.01
 
 
 def engrave(chosen: Chosen, setting: Setting) -> Work:
-    """A contour for each path, as it is drawn.
+    """Return a contour for each path, as it is drawn.
 
     Climb and conventional are sides of a wall, and a groove has two of them: OptionError for a
     direction other than "drawn".
@@ -73,7 +73,7 @@ def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
 
 
 def leaves_all(lines: Polylines, width: float) -> bool:
-    """True if a groove of this width, mm, keeps all that is between the lines."""
+    """Return True if a groove of this width, mm, keeps all that is between the lines."""
     return not len(lines) or not _narrow_places(_chords(lines, width), lines.closed, width)
 
 
@@ -151,7 +151,8 @@ def _enclosed(lines: Any, width: float) -> Iterator[tuple[float, Any]]:
 
 
 def _connected(count: int, one: Any, other: Any) -> Any:
-    """(N,) the least index of what is connected with each of N things, by pairs of these."""
+    """Return (N,) the least index of what is connected with each of N things, by pairs of
+    these."""
     label = np.arange(count)
     while True:
         min_label = label.copy()

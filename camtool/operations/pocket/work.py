@@ -151,7 +151,7 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
 
 
 def _walls(chosen: Chosen, setting: Setting) -> Work:
-    """The contours along the walls of all regions, and what they do not reach."""
+    """Return the contours along the walls of all regions, and what they do not reach."""
     operation = setting.operation
     paths, names, sources = list[Polyline](), list[str](), list[int]()
     findings: list[Finding] = []
@@ -168,12 +168,12 @@ def _walls(chosen: Chosen, setting: Setting) -> Work:
 
 
 def kept_by(chosen: Chosen) -> Polylines:
-    """The boundary of what the pockets leave, which is on the left of its paths."""
+    """Return the boundary of what the pockets leave, which is on the left of its paths."""
     return reverse_lines(oriented(chosen.nesting))
 
 
 def pockets(chosen: Chosen) -> list[Pocket]:
-    """The regions that the closed paths enclose, each outer path with the islands in it."""
+    """Return the regions that the closed paths enclose, each outer path with the islands in it."""
     return [
         Pocket(region, chosen.names[row], int(chosen.source[row]))
         for row, region in regions(chosen.nesting)
@@ -183,7 +183,7 @@ def pockets(chosen: Chosen) -> list[Pocket]:
 def _cleared(
     slots: list[Floats], each: Pocket, setting: Setting, airs: tuple[Air, ...]
 ) -> Cleared:
-    """The runs of one region: each connected tool centre region, then the slots."""
+    """Return the runs of one region: each connected tool centre region, then the slots."""
     groups: list[list[CutRun]] = []
     changed_runs: dict[str, CutRun] = {}
     narrow: list[Polylines] = []
@@ -221,8 +221,8 @@ def _cleared(
 
 
 def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
-    """The connected tool centre regions that clear a region; where a wider tool has cleared what
-    it reached, those that clear the rest.
+    """Return the connected tool centre regions that clear a region; where a wider tool has cleared
+    what it reached, those that clear the rest.
 
     The region shrunk at once by the tool and what it leaves: where it cuts beyond the lines, a
     region that was grown first would have gaps closed that the tool must not go through.
@@ -261,7 +261,8 @@ def _without_lost_islands(region: Polylines, beyond_mm: float) -> Polylines:
 
 
 def _nearest_next(groups: list[list[CutRun]]) -> list[CutRun]:
-    """All runs, after those of one connected region those of the one whose begin is nearest."""
+    """Return all runs, after those of one connected region those of the one whose begin is
+    nearest."""
     runs: list[CutRun] = []
     remaining = list(groups)
     while remaining:
@@ -274,8 +275,8 @@ def _nearest_next(groups: list[list[CutRun]]) -> list[CutRun]:
 def clearing_paths(
     part: Polylines, operation: Operation
 ) -> Iterator[tuple[Floats, ConnectedRegion]]:
-    """The paths through one connected tool centre region, each with the region at whose pole there
-    is the most room to go down."""
+    """Yield the paths through one connected tool centre region, each with the region at whose
+    pole there is the most room to go down."""
     radius = operation.tool.radius_mm
     step = operation.step_over * operation.tool.diameter_mm
     forward = operation.direction != "conventional"
@@ -290,7 +291,7 @@ def clearing_paths(
 
 
 def _check(chosen: Chosen, operation: Operation) -> None:
-    """OptionError for what cannot be a pocket."""
+    """Raise OptionError for what cannot be a pocket."""
     operation_place = operation_name(operation)
     if operation.tool.radius_mm == 0.0 and len(chosen.lines):
         raise OptionError(
@@ -321,7 +322,7 @@ def _check(chosen: Chosen, operation: Operation) -> None:
 
 
 def _check_step(chosen: Chosen, operation: Operation) -> None:
-    """OptionError for a step-over, or a limit of engagement, that would take for ever."""
+    """Raise OptionError for a step-over, or a limit of engagement, that would take for ever."""
     step = operation.step_over * operation.tool.diameter_mm
     size = float(np.ptp(extents(chosen.lines), axis=1).max()) if len(chosen.lines) else 0.0
     if operation.engagement_rad is not None:
@@ -427,7 +428,8 @@ def down_for(
 def lowered_runs(
     path: Floats, way_down: Down, link: Link, setting: Setting, name: str
 ) -> list[CutRun]:
-    """The runs that follow a path (n, 3) at all levels: one, unless there is no link back."""
+    """Return the runs that follow a path (n, 3) at all levels: one, unless there is no link
+    back."""
     runs: list[CutRun] = []
     parts: list[Floats] = []
     for above, level in pairwise((0.0, *setting.levels_mm)):
@@ -445,7 +447,7 @@ def lowered_runs(
 def _entry(
     path: Floats, way_down: Down, link: Link, heights: tuple[float, float], setting: Setting
 ) -> Floats:
-    """(k, 4) from the floor above down to the beginning of the path."""
+    """Return (k, 4) from the floor above down to the beginning of the path."""
     above, level = heights
     begin = path[0, :2]
     drop = above - level
@@ -464,7 +466,7 @@ def _entry(
 
 
 def _ramp(path: Floats, length: float, heights: tuple[float, float]) -> Floats:
-    """(k, 4) to and fro along the beginning of the path, down to where it begins."""
+    """Return (k, 4) to and fro along the beginning of the path, down to where it begins."""
     along = MeasuredPath.of(Polyline(path))
     laps = max(1, math.ceil(0.5 * length / along.total_mm))
     reach = 0.5 * length / laps
@@ -474,20 +476,20 @@ def _ramp(path: Floats, length: float, heights: tuple[float, float]) -> Floats:
 
 
 def _descent(setting: Setting) -> float:
-    """The length of the slope, seen from above, at the deepest step, mm."""
+    """Return the length of the slope, seen from above, at the deepest step, mm."""
     drop = max(above - level for above, level in pairwise((0.0, *setting.levels_mm)))
     return drop / math.tan(setting.operation.entry.angle_rad)
 
 
 def _sloping(flat: Floats, heights: tuple[float, float]) -> Floats:
-    """(k,) z of an open path (k, 3) that slopes evenly from one height to another."""
+    """Return (k,) z of an open path (k, 3) that slopes evenly from one height to another."""
     lengths = MeasuredPath.of(Polyline(flat)).reach
     above, level = heights
     return np.asarray(above + (level - above) * lengths / lengths[-1])
 
 
 def _at_height(flat: Floats, z: float) -> Floats:
-    """(k, 4) an open path (k, 3) at one height."""
+    """Return (k, 4) an open path (k, 3) at one height."""
     return np.insert(flat, 2, z, axis=1)
 
 
@@ -498,7 +500,7 @@ def _run(parts: list[Floats], setting: Setting, name: str) -> CutRun:
 
 
 def over_floor(region: ConnectedRegion) -> Link:
-    """Links that stay in a tool centre region."""
+    """Return links that stay in a tool centre region."""
     return lambda start, end: route(start, end, region)
 
 

@@ -74,13 +74,15 @@ def propose(remaining: Remaining) -> list[Part]:
 
 
 def _inner_words(remaining: Remaining, rows: Sequence[int]) -> str:
-    """The words for contours within parts: circles are left out where none of them is one."""
+    """Return the words for contours within parts: circles are left out where none of them is
+    one."""
     other_rows = set(remaining.contours_that_are("inner", "not circle"))
     return '["inner", "not circle"]' if set(rows) <= other_rows else '["inner"]'
 
 
 def _finer(remaining: Remaining, rows: Collection[int]) -> Tool | None:
-    """The widest end mill of the library that has room beside and within all these contours."""
+    """Return the widest end mill of the library that has room beside and within all these
+    contours."""
     for mill in remaining.proposal.finer_mills if rows else ():
         if not set(remaining.crowded(mill.diameter_mm)) & set(rows):
             return mill

@@ -150,7 +150,7 @@ def _beside(walls: list[SlotWall], chosen: Chosen, operation: Operation) -> Iter
 
 
 def _refuse_endless(bands: list[_Band], setting: Setting) -> None:
-    """OptionError for more circles than any machine would make."""
+    """Raise OptionError for more circles than any machine would make."""
     operation = setting.operation
     assert operation.engagement_rad is not None
     half = 0.5 * operation.spare_mm

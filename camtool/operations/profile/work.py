@@ -76,7 +76,7 @@ class _Found(Struct, eq=False):
 
 
 def profile(chosen: Chosen, setting: Setting) -> Work:
-    """The contours of an operation of the kind profile, in the order of their paths."""
+    """Return the contours of an operation of the kind profile, in the order of their paths."""
     operation = setting.operation
     closed = np.flatnonzero(chosen.lines.closed).tolist()
     opens = np.flatnonzero(~chosen.lines.closed).tolist()
@@ -123,7 +123,7 @@ def _add_shapes(chosen: Chosen, closed: list[int], setting: Setting, line_set: _
 
 
 def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
-    """The closed paths as the boundaries of one region, or of two.
+    """Return the closed paths as the boundaries of one region, or of two.
 
     Those whose side is as they nest among themselves, and those that have the other one because
     of contours that were not chosen: windows whose plate is not, a part in a window that is not.
@@ -215,7 +215,7 @@ def _missing(
 
 
 def _offset(shape: Polylines, away_mm: float, setting: Setting) -> Polylines:
-    """The lines so far away from a shape, with the joins of the operation."""
+    """Return the lines so far away from a shape, with the joins of the operation."""
     operation = setting.operation
     return offset_shape(shape, -away_mm, joins=operation.joins, mitre_limit=operation.mitre_limit)
 
@@ -237,7 +237,7 @@ def _sources(paths: Polylines, shape: Polylines) -> list[tuple[int, ...]]:
 
 
 def _is_double(shape: Polylines, place: int) -> bool:
-    """True if an earlier path of the shape runs along all of this one."""
+    """Return True if an earlier path of the shape runs along all of this one."""
     segments = Segments.of(shape)
     own_segments, earlier = segments[segments.path == place], segments[segments.path < place]
     if len(earlier) == 0:
@@ -259,12 +259,13 @@ def _no_room(chosen: Chosen, k: int, outer: bool, setting: Setting) -> Finding:
 
 
 def _box_centre(chosen: Chosen, k: int) -> str:
-    """A path and the centre of its box."""
+    """Return a path and the centre of its box."""
     return at_place(chosen.names[k], extents(chosen.lines.select([k])).mean(axis=1))
 
 
 def _joined(chosen: Chosen, runs: list[tuple[int, ...]], setting: Setting) -> Iterator[Finding]:
-    """Findings of lines that run round several paths at once: between them nothing is cut."""
+    """Yield findings of lines that run round several paths at once: between them nothing is
+    cut."""
     room = 2.0 * setting.operation.away_mm
     several = [run for run in runs if len(run) > 1]
     path_rows = [row for run in several for row in run]
@@ -289,7 +290,7 @@ def _joined(chosen: Chosen, runs: list[tuple[int, ...]], setting: Setting) -> It
 
 
 def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Finding]) -> _Line:
-    """The line with reliefs at the sharp inner corners of the paths that it belongs to."""
+    """Return the line with reliefs at the sharp inner corners of the paths that it belongs to."""
     from camtool.planning.reliefs import add_reliefs
 
     tool, path = setting.operation.tool, line.path
@@ -307,7 +308,7 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
 
 
 def _side_contours(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contour]:
-    """The lines as the operation's direction has them: climbing, what is to stay is on the
+    """Return the lines as the operation's direction has them: climbing, what is to stay is on the
     right."""
     direction = setting.operation.direction
     paths, left_flags = (
@@ -335,7 +336,7 @@ def _side_contours(lines: list[_Line], chosen: Chosen, setting: Setting) -> list
 
 
 def _starts(path: Polyline, plain_path: Polyline | None) -> Ints:
-    """The vertices at which a path with reliefs may begin: not at the tip of one."""
+    """Return the vertices at which a path with reliefs may begin: not at the tip of one."""
     if plain_path is None:
         return NO_STARTS
     own_places = {tuple(place) for place in plain_path.vertices[:, :2].tolist()}
@@ -353,7 +354,7 @@ def _no_side(chosen: Chosen, k: int, side: str) -> Finding:
 
 
 def _far_corners(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Finding]:
-    """Corners of the tool's path that lie far from the drawn corner that they go round.
+    """Yield corners of the tool's path that lie far from the drawn corner that they go round.
 
     At a corner of the angle α the straight sides meet at away / sin(α/2) from it.
     """

@@ -109,7 +109,7 @@ def checked_parting(operation: Operation, _: Stock | None) -> Operation:
 
 
 def thread_depth_mm(operation: Operation) -> float:
-    """Depth of a thread: as given, or that of an outer ISO thread."""
+    """Return the depth of a thread: as given, or that of an outer ISO thread."""
     pitch: float = operation.own_value("thread_pitch")
     return SHARP_DEPTH * pitch if operation.depth_mm is None else operation.depth_mm
 
@@ -325,7 +325,8 @@ def _left_by_nose(
 
 
 def _overhang(section: Floats, name: str) -> Finding:
-    """The length that stands out of the chuck, over the thinnest diameter behind the end."""
+    """Return the length that stands out of the chuck, over the thinnest diameter behind the
+    end."""
     length = float(section[0, 0] - section[-1, 0])
     radii = section[:, 1]
     thin = 2.0 * float(radii[radii > POSITION_EPS_MM].min(initial=math.inf))

@@ -134,7 +134,7 @@ def _refuse_open(chosen: Chosen, operation: Operation) -> None:
 
 
 def _crossings(chosen: Chosen) -> Iterator[Finding]:
-    """The places where paths cross themselves or each other."""
+    """Yield the places where paths cross themselves or each other."""
     segments = Segments.of(chosen.lines)
     rows, zeros = np.arange(len(segments)), np.zeros(len(segments), dtype=np.int64)
     every = np.ones(len(segments), dtype=np.bool_)
@@ -163,7 +163,7 @@ def _regions(chosen: Chosen) -> Iterator[_Region]:
 
 
 def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed], list[Finding]]:
-    """The item of one region, none if the tip fits nowhere, and its findings."""
+    """Return the item of one region, none if the tip fits nowhere, and its findings."""
     boundary, trace = medial_trace(region.lines, CARVE_TOLERANCE_MM)
     limits = [cone.tip_mm, *(cone.radius_at(-level) for level in setting.levels_mm)]
     for limit in sorted(set(limits)):
@@ -195,8 +195,8 @@ def _walks(trace: MedialTrace, floor: list[Floats], band: Band, again_mm: float)
 
 
 def _passed_by(pieces: list[Floats], point: Floats) -> float:
-    """Distance of a point from the nearest of the pieces in the plane, mm; inf if there are
-    none."""
+    """Return the distance of a point from the nearest of the pieces in the plane, mm; inf if
+    there are none."""
     rows = [np.column_stack([piece[:-1], piece[1:, :2]]) for piece in pieces]
     if not rows:
         return math.inf
@@ -206,7 +206,7 @@ def _passed_by(pieces: list[Floats], point: Floats) -> float:
 
 
 def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> CutRun:
-    """The run along a path (n, 4) of x, y, rho, bulge."""
+    """Return the run along a path (n, 4) of x, y, rho, bulge."""
     vertices = np.column_stack([path[:, :2], 0.0 - cone.depth_of(path[:, 2]), path[:, 3]])
     return CutRun(
         vertices, feeds_along(vertices, setting.feeds), setting.feeds.plunge_mm_min, name
@@ -257,7 +257,7 @@ class Band(Struct, frozen=True):
 
 
 def with_level(boundary: Boundary, trace: MedialTrace, level_mm: float) -> MedialTrace:
-    """The trace with a row of exactly this radius wherever the radius passes it."""
+    """Return the trace with a row of exactly this radius wherever the radius passes it."""
     is_level = np.abs(trace.rho - level_mm) <= LEVEL_EPS_MM
     trace = _with_radius(trace, np.where(is_level, level_mm, trace.rho))
     above = np.sign(trace.rho - level_mm)
@@ -282,7 +282,7 @@ def _with_radius(trace: MedialTrace, rho: Floats) -> MedialTrace:
 
 
 def grooves(trace: MedialTrace, band: Band) -> list[Floats]:
-    """Pieces (n, 4) of x, y, rho, bulge: the axis within the band, each piece once; an arc
+    """Return pieces (n, 4) of x, y, rho, bulge: the axis within the band, each piece once; an arc
     whose radius changes changes it evenly along its sweep.
 
     `trace` has rows at both limits of the band.
@@ -306,7 +306,8 @@ def grooves(trace: MedialTrace, band: Band) -> list[Floats]:
 
 
 def walls(boundary: Boundary, trace: MedialTrace, high_mm: float) -> list[Floats]:
-    """Pieces (2, 4) of x, y, rho, bulge beside the boundary where discs are larger than high."""
+    """Return pieces (2, 4) of x, y, rho, bulge beside the boundary where discs are larger than
+    high."""
     rho = trace.rho
     low_rho, high_rho = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
     same_element = trace.element[1:] == trace.element[:-1]
@@ -354,7 +355,7 @@ def _wall(
 
 
 def _fitted(discs: Floats, tolerance_mm: float) -> Floats:
-    """Lines and arcs through some of the discs (n, 3), all others within the tolerance."""
+    """Return lines and arcs through some of the discs (n, 3), all others within the tolerance."""
     pieces, waiting = [], [(0, len(discs) - 1)]
     while waiting:
         i, j = waiting.pop()
@@ -368,7 +369,8 @@ def _fitted(discs: Floats, tolerance_mm: float) -> Floats:
 
 
 def _bulge(discs: Floats, tolerance_mm: float) -> float | None:
-    """The bulge of the line (0) or arc that stands for these discs; None if neither does."""
+    """Return the bulge of the line (0) or arc that stands for these discs; None if neither
+    does."""
     inner = discs[1:-1]
     begin, end = discs[:1], discs[-1:]
     if len(inner) == 0 or off_chord(inner, begin, end).max() <= tolerance_mm:
@@ -387,7 +389,8 @@ def _bulge(discs: Floats, tolerance_mm: float) -> float | None:
 
 
 def _off_arc(inner: Floats, begin: Floats, end: Floats, bulge: float) -> float:
-    """Distances of discs from an arc along which the radius changes evenly with the sweep."""
+    """Return distances of discs from an arc along which the radius changes evenly with the
+    sweep."""
     chord = end[:2] - begin[:2]
     normal = np.array([-chord[1], chord[0]])
     centre = 0.5 * (begin[:2] + end[:2]) + (1.0 - bulge**2) / (4.0 * bulge) * normal
@@ -408,7 +411,8 @@ class Graph(Struct, frozen=True, eq=False):
 
 
 def graph_of(pieces: list[Floats]) -> Graph:
-    """The graph of pieces (n, 4) of x, y, rho, bulge; those that go nowhere are left out."""
+    """Return the graph of pieces (n, 4) of x, y, rho, bulge; those that go nowhere are left
+    out."""
     pieces = [piece for piece in pieces if _extent(piece) > MEET_MM]
     if not pieces:
         return Graph([], np.empty((0, 2), dtype=np.int64), np.empty((0, 3)))
@@ -419,13 +423,14 @@ def graph_of(pieces: list[Floats]) -> Graph:
 
 
 def _extent(piece: Floats) -> float:
-    """Greatest distance of the points of a piece from its start; above 0 for a full turn."""
+    """Return the greatest distance of the points of a piece from its start; above 0 for a full
+    turn."""
     return float(np.hypot(*(piece[1:, :2] - piece[0, :2]).T).max())
 
 
 def pruned(graph: Graph, tolerance_mm: float) -> Graph:
-    """The graph without the side branches whose discs reach no farther than the tolerance out of
-    the disc at the other end of the branch.
+    """Return the graph without the side branches whose discs reach no farther than the tolerance
+    out of the disc at the other end of the branch.
 
     A disc (m, ρ) reaches |m − m'| + ρ − ρ' out of another one (m', ρ'); along a branch of several
     pieces these add up at most.
@@ -455,7 +460,7 @@ def pruned(graph: Graph, tolerance_mm: float) -> Graph:
 
 
 def _pieces_at(graph: Graph) -> list[list[int]]:
-    """The pieces that end at each place; twice where both ends do."""
+    """Return the pieces that end at each place; twice where both ends do."""
     at_place: list[list[int]] = [[] for _ in range(len(graph.places))]
     for row, (a, b) in enumerate(graph.ends.tolist()):
         at_place[a].append(row)
@@ -464,7 +469,7 @@ def _pieces_at(graph: Graph) -> list[list[int]]:
 
 
 def walks(graph: Graph, again_mm: float) -> list[Floats]:
-    """All pieces, joined to as few walks (n, 4) of x, y, rho, bulge as possible.
+    """Return all pieces, joined to as few walks (n, 4) of x, y, rho, bulge as possible.
 
     A connected graph in which 2k places have an odd number of ends is walked in k walks (in one
     when k is 0): it is joined by k jumps between near places to one closed walk, that is found
@@ -491,8 +496,8 @@ def walks(graph: Graph, again_mm: float) -> list[Floats]:
 
 
 def _doubled(graph: Graph, again_mm: float) -> Graph:
-    """The graph with a second one of each short piece between two places with an odd number of
-    ends; the shortest first, each place once."""
+    """Return the graph with a second one of each short piece between two places with an odd
+    number of ends; the shortest first, each place once."""
     odd = np.bincount(graph.ends.ravel(), minlength=len(graph.places)) % 2 == 1
     lengths = [float(lengths_of(piece).sum()) for piece in graph.pieces]
     repeated = []
@@ -506,7 +511,7 @@ def _doubled(graph: Graph, again_mm: float) -> Graph:
 
 
 def lengths_of(path: Floats) -> Floats:
-    """(n−1,) lengths in the plane of the lines and arcs of a path (n, 4)."""
+    """Return (n−1,) lengths in the plane of the lines and arcs of a path (n, 4)."""
     chord = np.hypot(*np.diff(path[:, :2], axis=0).T)
     bulge = path[:-1, 3]
     safe = np.where(bulge != 0.0, bulge, 1.0)
@@ -515,7 +520,7 @@ def lengths_of(path: Floats) -> Floats:
 
 
 def _jumps(graph: Graph) -> Ints:
-    """(k, 2) pairs of the places of one component that have an odd number of ends."""
+    """Return (k, 2) pairs of the places of one component that have an odd number of ends."""
     degree = np.bincount(graph.ends.ravel(), minlength=len(graph.places))
     component = _components(graph)
     odd = np.flatnonzero(degree % 2).tolist()
@@ -531,7 +536,7 @@ def _jumps(graph: Graph) -> Ints:
 
 
 def _components(graph: Graph) -> list[int]:
-    """The component of each place."""
+    """Return the component of each place."""
     root = list(range(len(graph.places)))
 
     def top(row: int) -> int:
@@ -574,7 +579,7 @@ def _circuits(ends: Ints, count: int) -> Iterator[list[tuple[int, bool]]]:
 
 
 def _cut(circuit: list[tuple[int, bool]], count: int) -> list[list[tuple[int, bool]]]:
-    """The walks between the jumps (rows from `count` on) of a closed walk."""
+    """Return the walks between the jumps (rows from `count` on) of a closed walk."""
     first = next((i for i, (row, _) in enumerate(circuit) if row >= count), None)
     if first is None:
         return [circuit]

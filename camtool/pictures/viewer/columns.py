@@ -76,8 +76,8 @@ def columns_of(content: Content, run: Playback | None) -> Columns:
 
 
 def part_columns(name: str, part: Part) -> Columns:
-    """The columns of a part of a layer, which begin with `name`: the places of dots and texts, or
-    from where to where lines and arcs go."""
+    """Return the columns of a part of a layer, which begin with `name`: the places of dots and
+    texts, or from where to where lines and arcs go."""
     if not isinstance(part, LineGroup):
         return {f"{name}_at": np.array(part.places, dtype=FLOAT).reshape(-1, 2)}
     chains = part.chains
@@ -100,8 +100,8 @@ class StockBox(Struct, frozen=True):
 
 
 def height_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
-    """The heights that the stock should have, and those that the set-ups before have left; empty
-    where they are not known, or nothing was cut before."""
+    """Return the heights that the stock should have, and those that the set-ups before have
+    left; empty where they are not known, or nothing was cut before."""
     goal, heights_before = None, None
     if stock is not None and pair is not None:
         left, low, right, _ = stock.box
@@ -132,9 +132,10 @@ def _run_columns(name: str, heights: HeightMap | None, stock: StockBox | None) -
 
 
 def slide_columns(pair: StockPair | None, rows: int, cell_mm: float) -> Columns:
-    """The moves of the tips that cut the stock: where the first one begins and each one ends, and
-    how many of them each of the `rows` of the toolpath makes. Moves between which nothing bends by
-    more than a share of `cell_mm` are one; there are MAX_POINTS at most, if need be coarser."""
+    """Return the moves of the tips that cut the stock: where the first one begins and each one
+    ends, and how many of them each of the `rows` of the toolpath makes. Moves between which
+    nothing bends by more than a share of `cell_mm` are one; there are MAX_POINTS at most, if
+    need be coarser."""
     moves = None if pair is None else pair.moves
     if moves is None or not len(moves):
         no_counts = np.empty(0, dtype=INT)
@@ -161,8 +162,8 @@ ENTRY_DEG = -1.0
 
 
 def engagement_columns(pair: StockPair | None, toolpath: Toolpath | None) -> Columns:
-    """The greatest engagement of the tool in each of N rows outside of entries, degrees: ENTRY_DEG
-    for rows of entries alone, NaN where nothing is cut; empty where no tool is known."""
+    """Return the greatest engagement of the tool in each of N rows outside of entries, degrees:
+    ENTRY_DEG for rows of entries alone, NaN where nothing is cut; empty where no tool is known."""
     result = np.full(0 if toolpath is None else len(toolpath), np.nan)
     if pair is None or toolpath is None or not len(pair.moves) or len(pair.moves) > MAX_ENGAGED:
         return {"move_engaged": result[:0].astype(FLOAT)}
@@ -181,7 +182,8 @@ Named = dict[str, tuple[str, int, int] | tuple[str, int, int, float]]
 
 
 def packed(columns: Columns) -> tuple[Named, bytes]:
-    """({name: (type, byte offset, count)}, all bytes); a column of counts has its unit besides."""
+    """Return ({name: (type, byte offset, count)}, all bytes); a column of counts has its unit
+    besides."""
     named: Named = {}
     parts: list[bytes] = []
     offset = 0
@@ -222,7 +224,8 @@ def stepped(numbers: npt.NDArray[np.integer], stride: int) -> bytes:
 
 
 def drawing_layers(drawing: Drawing) -> list[str]:
-    """The drawing's layers in the order of their first paths, then of their first points."""
+    """Return the drawing's layers in the order of their first paths, then of their first
+    points."""
     return list(dict.fromkeys((*drawing.layers, *(mark.layer for mark in drawing.marks))))
 
 
@@ -285,8 +288,8 @@ def _moves(scene: Scene, run: Playback | None) -> Columns:
 
 
 def _wide(scene: Scene, toolpath: Toolpath) -> npt.NDArray[np.generic]:
-    """(N, 2) mm: how wide the tool cuts on each side at the start and the end of each feed, where
-    that changes with its depth or from tool to tool; (0, 2) where it does not."""
+    """Return (N, 2) mm: how wide the tool cuts on each side at the start and the end of each
+    feed, where that changes with its depth or from tool to tool; (0, 2) where it does not."""
     turns = scene.turns if scene.nose is None else ((0, scene.nose),)
     if not turns:
         return np.empty((0, 2), dtype=FLOAT)
@@ -312,8 +315,8 @@ def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
 
 
 def _wanted_columns(wanted_path: Segments | None) -> Columns:
-    """The wanted path: where each line or arc ends, and where those begin that do not begin at the
-    end of the one before."""
+    """Return the wanted path: where each line or arc ends, and where those begin that do not
+    begin at the end of the one before."""
     if wanted_path is None or not len(wanted_path):
         zeros = np.empty(0)
         return {
@@ -364,8 +367,8 @@ class Traced(Struct, frozen=True, eq=False):
 
 
 def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
-    """The predicted path of a scene, in colours of a map that ends at `top_um`. ValueError when
-    the playback does not have a row for each of its points."""
+    """Return the predicted path of a scene, in colours of a map that ends at `top_um`.
+    ValueError when the playback does not have a row for each of its points."""
     worst = np.array(scene.worst, dtype=np.float64).reshape(-1, 2)
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or run is None or not len(run.trace_row):
@@ -392,8 +395,8 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
 
 
 def _offsets(points: Floats, is_chosen: np.ndarray, wanted_path: Segments | None) -> Floats:
-    """(T, 2) mm: the vector from the nearest point of the wanted path to each chosen point, else
-    0."""
+    """Return (T, 2) mm: the vector from the nearest point of the wanted path to each chosen
+    point, else 0."""
     offsets = np.zeros_like(points)
     if wanted_path is not None and len(wanted_path) and is_chosen.any():
         offsets[is_chosen] = points[is_chosen] - nearest_points(points[is_chosen], wanted_path)
@@ -457,8 +460,8 @@ def finest_mm(largest_mm: float) -> float:
 
 
 def _halved(points: Floats, bins: Ints, kept_rows: Ints, near_mm: float) -> Ints:
-    """The rows without those of the 2nd, 4th, … points that may be left out; the first and the
-    last one stay."""
+    """Return the rows without those of the 2nd, 4th, … points that may be left out; the first
+    and the last one stay."""
     middle = np.arange(1, len(kept_rows) - 1, 2)
     before, point, after = kept_rows[middle - 1], kept_rows[middle], kept_rows[middle + 1]
     # The colour of a piece is that of the point that it leads to.

@@ -87,9 +87,9 @@ _SLOT = re.compile(r"\{([a-z]+)\}")
 
 
 def viewer_page(scene: Scene, live: str = "") -> bytes:
-    """The HTML file of a scene, UTF-8. Without a playback in the scene every move runs at its
-    feed. `live`: HTML of the state of a program that is being sent. ValueError when the playback
-    is that of another toolpath."""
+    """Return the HTML file of a scene, UTF-8. Without a playback in the scene every move runs
+    at its feed. `live`: HTML of the state of a program that is being sent. ValueError when the
+    playback is that of another toolpath."""
     run, content = _run(scene), content_of(scene)
     traced = traced_of(scene, run, _top_um(scene, run))
     rows, columns = _rows(content)
@@ -168,8 +168,8 @@ MIN_STEP_MM = 0.005
 
 
 def _cutting(scene: Scene, pair: StockPair | None, stock: StockBox | None) -> dict[str, object]:
-    """The stock, the cutters with the first row of the turn of each, and what is known of the
-    tools above their flutes, for JSON."""
+    """Return the stock, the cutters with the first row of the turn of each, and what is known
+    of the tools above their flutes, for JSON."""
     if pair is None or stock is None:
         return {"stock": None, "cutters": [], "bodies": []}
     begins = np.flatnonzero(np.diff(pair.moves.tool, prepend=-1))
@@ -199,8 +199,8 @@ def _body(tool: Tool) -> tuple[float | None, ...]:
 
 
 def _stock_of(scene: Scene) -> StockPair | None:
-    """The stock and the moves that cut it; those of a point where no tool is known; None without
-    moves."""
+    """Return the stock and the moves that cut it; those of a point where no tool is known; None
+    without moves."""
     toolpath = scene.toolpath
     if toolpath is None or not toolpath.is_motion.any():
         return None
@@ -213,7 +213,7 @@ def _stock_of(scene: Scene) -> StockPair | None:
 
 
 def _box_of(pair: StockPair) -> StockBox:
-    """The box of the stock and its grid, as fine as MAX_HEIGHTS allows."""
+    """Return the box of the stock and its grid, as fine as MAX_HEIGHTS allows."""
     box = pair.box_mm
     across, upwards = box[2] - box[0], box[3] - box[1]
     finest = max(math.sqrt(across * upwards / MAX_HEIGHTS), MIN_STEP_MM)
@@ -227,7 +227,8 @@ def _box_of(pair: StockPair) -> StockBox:
 
 
 def _rows(content: Content) -> tuple[list[dict[str, object]], Columns]:
-    """The layers that the script draws by their parts, from the ground up, and their columns."""
+    """Return the layers that the script draws by their parts, from the ground up, and their
+    columns."""
     rows: list[dict[str, object]] = []
     columns: Columns = {}
     for layer in from_the_ground_up():
@@ -261,7 +262,7 @@ def _part_style(part: Part) -> dict[str, object]:
 
 
 def _light_and_dark(colour: str | float) -> dict[str, str] | None:
-    """A colour on light and on dark ground; None for none."""
+    """Return a colour on light and on dark ground; None for none."""
     paint = str(colour)
     return None if paint == "none" else {"light": paint, "dark": on_dark(paint)}
 
@@ -285,7 +286,7 @@ def _table(table: ReportTable) -> dict[str, object]:
 
 
 def _top_um(scene: Scene, run: Playback | None) -> float:
-    """The end of the map of errors, µm: the largest error of the moves and of the trace."""
+    """Return the end of the map of errors, µm: the largest error of the moves and of the trace."""
     errors = [MIN_TOP_UM / UM_PER_MM]
     if run is not None:
         errors += [float(error) for error in run.error_mm[np.isfinite(run.error_mm)]]
@@ -305,7 +306,7 @@ def _policy(script: str, style: str) -> str:
 
 
 def _json(value: Mapping[str, object]) -> str:
-    """JSON in ASCII without any character that has a meaning in HTML."""
+    """Return JSON in ASCII without any character that has a meaning in HTML."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
@@ -353,7 +354,7 @@ _ID = re.compile(' id="[^"]*"')
 
 
 def circles_of(scene: Scene) -> str:
-    """The HTML of the plots in the order of the report; empty without a full circle."""
+    """Return the HTML of the plots in the order of the report; empty without a full circle."""
     # The same circle in the other direction is in the plot of the first one.
     first = [
         number
@@ -392,7 +393,8 @@ def _figure(scene: Scene, circle_number: int) -> str:
 
 
 def _joined(errors_um: Floats) -> Floats:
-    """(B, 3) least, mean and largest error of neighbours joined; NaN where all of them are."""
+    """Return (B, 3) least, mean and largest error of neighbours joined; NaN where all of them
+    are."""
     joined_count = max(1, math.ceil(len(errors_um) / BINS_SHOWN))
     if len(errors_um) % joined_count:
         return errors_um
