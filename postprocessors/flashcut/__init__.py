@@ -45,7 +45,7 @@ class Flashcut(Target):
         return float(10.0**-machine.dialect.decimals)
 
     def wire(self) -> NoWire:
-        """None: its port is no line, and the PC is its clock (L1044-1050)."""
+        """Return `NoWire`: its port is no serial line, and the PC is its clock (L1044-1050)."""
         from camtool.target.wire import NoWire
 
         return NoWire(

@@ -60,23 +60,23 @@ class FlashcutModel(ControllerModel[FlashcutController, FlashcutDialect]):
     """The PC of the parallel-port machine: a timer for each axis."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """Return the motion, chunk by chunk."""
+        """Return the motion in chunks."""
         return FlashcutRun(toolpath, machine, options).run()
 
     def timed(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> Iterator[TimedChunk]:
-        """Return the motion with the milliseconds of its timers."""
+        """Return the motion in chunks, with the times of its samples by the millisecond timers."""
         run = FlashcutRun(toolpath, machine, options)
         return run.timed(MoveClock(run, machine))
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """Return the moves as the program says them, homing at machine zero: the controller
-        keeps lengths and rounds displacements, so that steps are part of its interpolation."""
+        """Return the toolpath as programmed, with homing at machine zero: the controller keeps
+        lengths and rounds displacements, so that steps are part of its interpolation."""
         return place_events(toolpath, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Return both axes by timers of their own."""
+        """Return "timers": each axis follows a timer of its own."""
         return "timers"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -141,7 +141,7 @@ class FlashcutRun:
         return map(self._chunk, self.batches())
 
     def timed(self, clock: MoveClock) -> Iterator[TimedChunk]:
-        """Yield the chunks with the times of their samples, each of which ends its period."""
+        """Yield the chunks with the times of their samples; each sample ends its period."""
         for batch in self.batches():
             times = clock.take(batch)
             move_s = times.begin_ms[times.number] / MS_PER_S
@@ -152,7 +152,7 @@ class FlashcutRun:
             yield TimedChunk(self._chunk(batch), at_s, np.maximum(before_s, move_s), at_s)
 
     def batches(self) -> Iterator[TimerBatch]:
-        """Yield the samples of all rows up to the end of the program."""
+        """Yield the samples of all rows up to the end of the program, in batches."""
         low = 0
         while low < self._rows:
             move_counts = np.cumsum(self._table.moves_of(low, low + MOVES_AT_ONCE))
@@ -161,7 +161,7 @@ class FlashcutRun:
             low = high
 
     def _window(self, low: int, high: int) -> Iterator[TimerBatch]:
-        """Yield the samples of the rows low:high."""
+        """Yield the samples of the rows low:high, in batches."""
         moves = self._table.moves(low, high)
         move = done_rows = 0  # rows from `low` on whose ledger is complete
         while done_rows < high - low:
@@ -182,7 +182,7 @@ class FlashcutRun:
             done_rows = under_way
 
     def _chunk(self, batch: TimerBatch) -> Chunk:
-        """Return the samples of a batch, and what its rows did in them."""
+        """Return the samples of a batch as a chunk, with the ledger of its rows."""
         low, rows, issued, filled = batch.low, batch.rows, batch.issued, batch.filled
         row, commanded = issued.row[:filled] + low, issued.commanded[:filled]
         reversals = np.zeros((len(rows), 3), dtype=np.int64)
@@ -207,7 +207,8 @@ class FlashcutRun:
         return Chunk(row, commanded, slide, ledger)
 
     def _seconds(self, reversals: Ints, rows: Ints) -> Floats:
-        """Return (R,) s of the compensation steps that the reversals (R, 3) of these rows cost."""
+        """Return (R,) seconds of the compensation steps after the reversals (R, 3) of these
+        rows."""
         steps = reversals * self._mechanics.compensation_steps
         half_xy, half_z = self._table.half_period_xy[rows], self._table.half_period_z[rows]
         if self._compensation_ms is not None:
@@ -328,7 +329,7 @@ class MoveClock:
         )
 
     def _wait(self, row: int) -> None:
-        """Let the waits of the rows up to this one pass."""
+        """Add the dwells of the rows up to `row` to the time."""
         self.now_ms += int(self._waits_ms[self._row + 1 : row + 1].sum())
         self._row = max(self._row, row)
 
@@ -352,7 +353,7 @@ def place_events(toolpath: Toolpath, machine: _Machine) -> Toolpath:
     """Return the toolpath with homing at machine zero, and with events where the moves before them
     ended.
 
-    ProgramError for arcs without a centre and positions of more steps than can be counted.
+    ProgramError for arcs without a centre and for positions beyond the steps that can be counted.
     """
     check_positions(toolpath, machine)
     max_mm = 0.25 * MAX_LONG * np.array([axis.coded_step_mm for axis in machine.axes])
@@ -373,8 +374,8 @@ def half_periods(
     step_mm: float,
     moves_one_axis: Callable[[Toolpath], Bools],
 ) -> Indices:
-    """Return (N,) ms of the longer axis of each row, for steps of `step_mm`; rapids have the
-    shortest. `moves_one_axis` gives the rows of one axis.
+    """Return (N,) the half period, ms, of the longer axis of each row, for steps of `step_mm`;
+    rapids have the shortest. `moves_one_axis` gives a mask of the rows of one axis.
 
     ProgramError for feeds whose half period the controller cannot count.
     """
@@ -394,21 +395,21 @@ def half_periods(
 
 
 def _moves_one_axis(toolpath: Toolpath, x_mm: float, y_mm: float) -> Bools:
-    """Return the mask (N,) of the rows that move X or Y alone, by their steps of `x_mm` and
-    `y_mm`; no arcs."""
+    """Return a mask (N,), true for rows that move only X or only Y, by whole steps of `x_mm` and
+    `y_mm`; arcs are not among them."""
     travel = np.abs(toolpath.end - toolpath.starts)
     has_one_axis = np.minimum(to_steps(travel[:, 0], x_mm), to_steps(travel[:, 1], y_mm)) == 0
     return np.asarray(~toolpath.is_arc & (has_one_axis | (toolpath.kind >= Kind.HOME_XY)))
 
 
 def _rises(toolpath: Toolpath) -> Bools:
-    """Return (N,) true for rows that move Z."""
+    """Return a mask (N,), true for rows that move Z."""
     lifted = toolpath.end[:, 2] != toolpath.starts[:, 2]
     return np.asarray((toolpath.kind == Kind.HOME_Z) | (toolpath.is_motion & lifted))
 
 
 def _chords(toolpath: Toolpath, per_turn: int) -> Indices:
-    """Return (N,) moves of X and Y that each row makes."""
+    """Return (N,) the number of moves in X and Y that each row makes."""
     flat = (toolpath.end[:, :2] != toolpath.starts[:, :2]).any(axis=1)
     along = toolpath.is_motion & (flat | ~_rises(toolpath))
     chords = np.ceil(np.abs(toolpath.sweeps()) * (per_turn / (2.0 * np.pi)) - CHORD_GUARD)
@@ -441,7 +442,7 @@ class MoveTable(Struct, frozen=True, eq=False):
         )
 
     def moves_of(self, low: int, high: int) -> Ints:
-        """Return (R,) moves of each of the rows low:high."""
+        """Return (R,) the number of moves of each of the rows low:high."""
         return self.chords[low:high].astype(np.int64) + self.rises[low:high]
 
     def moves(self, low: int, high: int) -> Moves:
@@ -461,8 +462,8 @@ class MoveTable(Struct, frozen=True, eq=False):
         return Moves(drives, target, half_period.astype(np.int64), row - low)
 
     def _on_arc(self, row: Ints, share: Floats) -> Floats:
-        """Return (J, 2) mm at these shares of the arcs' sweeps, as far from the centre as the
-        start is: r = hypot(I, J) from the angle of the start on (L1378)."""
+        """Return (J, 2) points, mm, at these fractions of the arcs' sweeps, at the radius of the
+        start: r = hypot(I, J), from the angle of the start on (L1378)."""
         centre = self.toolpath.centre[row]
         spoke = self.toolpath.starts_of(row)[:, :2] - centre
         radius = np.hypot(spoke[:, 0], spoke[:, 1])

@@ -74,8 +74,8 @@ NOT_INCHES: Final = frozenset({"G20", "G21", "G30", "G31"})
 
 
 def read_program(data: bytes, machine: FlashcutMachine) -> Toolpath:
-    """Return the moves of a program; ProgramError naming block, line and column when it is
-    none."""
+    """Return the moves of a program; ProgramError with block, line and column for data that are no
+    program."""
     reader = _Reader(machine)
     for block in blocks_of(data, LEXING, reader.take):
         reader.block(block)
@@ -93,7 +93,8 @@ class _Excess(Struct):
     where: str = ""
 
     def add(self, index: int, feed: float) -> None:
-        """The block of this index, from 0."""
+        """Count the block `index` (from 0) with this feed; keep the highest feed and the first
+        block."""
         self.where = self.where or f"block {index + 1}"
         self.count += 1
         self.most = max(self.most, feed)
@@ -148,8 +149,8 @@ class _Reader:
             self._ended = code
 
     def take(self, blocks: PlainBlocks) -> int:
-        """Decode moves by columns, up to the first that is not surely what `block` would make of
-        it; how many were decoded."""
+        """Decode the first plain blocks at once, as columns, and return how many were decoded. It
+        stops at the first block for which `block` might return something else."""
         if self._ended:
             return 0
         moves = DecodedMoves(
@@ -187,7 +188,8 @@ class _Reader:
             )
 
     def _motion(self, block: WordBlock, code: str, form: str, numbers: list[float]) -> None:
-        """G00 to G03: X Y Z from part zero, I J from where the arc begins (L1000, L1016)."""
+        """Add the move of G00 to G03: X Y Z from part zero, I J from where the arc begins (L1000,
+        L1016)."""
         if not max(map(abs, numbers)) <= MAX_MM:
             word = next(
                 word for word, number in enumerate(numbers, 1) if not abs(number) <= MAX_MM
@@ -241,7 +243,8 @@ class _Reader:
         self.path.arc(x, y, centre=centre, ccw=code == "G03", feed=self._feed)
 
     def _refuse(self, block: WordBlock, code: str, form: str) -> None:
-        """Why a block fits no template."""
+        """Raise ProgramError for a block that fits no template: at its first word that has no
+        place, or for the word that it lacks."""
         forms = self._templates.get(code)
         if code in NOT_INCHES:
             block.fail(
@@ -328,7 +331,7 @@ class _Worst(Struct):
     most: float = 0.0
 
     def add(self, rows: Ints, sizes: Floats) -> None:
-        """Further rows (K,) and how wrong each is (K,)."""
+        """Count further rows (K,) whose faults have these sizes (K,); keep the worst row."""
         self.count += len(rows)
         if len(rows) and sizes.max() > self.most:
             self.row, self.most = int(rows[sizes.argmax()]), float(sizes.max())
@@ -370,7 +373,8 @@ def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> Iterator[Findin
 def _slow_feed_finding(
     path: Toolpath, machine: FlashcutMachine, controller: FlashcutController, too_fast: _Worst
 ) -> Finding:
-    """FEED_HELD: cuts whose feed the shortest half period does not let them have."""
+    """Return FEED_HELD for cuts programmed faster than the shortest half period of the timers
+    allows."""
     row = _Rows(path, slice(too_fast.row, too_fast.row + 1), machine)
     fastest, moves_one_axis = row.fastest_feeds(controller)
     gets, programmed = float(fastest[0]), row.feed[0]
@@ -398,11 +402,8 @@ class _Rows:
         )
 
     def fastest_feeds(self, controller: FlashcutController) -> tuple[Floats, Bools]:
-        """Return the highest feed of each row, and which rows move one axis alone; both (K,).
-
-        The feed, mm/min, is that at the shortest half period of the steps that the controller can
-        make.
-        """
+        """Return (K,) the highest feed of each row, mm/min, at the shortest half period that the
+        controller can make; and a mask (K,) of rows that move one axis alone."""
         moves = self.steps != 0
         moves_one_axis = (moves.sum(axis=1) == 1) & (self.kind < Kind.ARC_CW)
         step_mm = np.where(moves[:, 2] & moves_one_axis, self.step_mm[2], self.step_mm[:2].max())
@@ -411,7 +412,7 @@ class _Rows:
         ), moves_one_axis
 
     def steps_too_many(self, controller: FlashcutController) -> Ints:
-        """Return (K,) that lines and rapids make on their shorter axis of X and Y."""
+        """Return (K,) the surplus steps that lines and rapids make on the shorter of X and Y."""
         steps = self.steps[:, :2]
         feed = np.where(self.kind == Kind.LINE, self.feed, np.inf)
         moves_one_axis = (steps == 0).any(axis=1)

@@ -77,7 +77,8 @@ class RowArcs(Struct, frozen=True, eq=False):
 
 
 def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> RowArcs:
-    """Return the toolpath's rows in units, arcs as this controller takes them."""
+    """Return the toolpath's rows in units, with arcs changed until this controller accepts
+    them."""
     unit = 10.0**-dialect.decimals
     end = units_of(toolpath.end, dialect.decimals)
     kind = np.array(toolpath.kind)
@@ -111,10 +112,10 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> RowArcs:
 def arcs_accepted(
     sweep_rad: Floats, points: tuple[Ints, Ints, Ints], kind: Codes, dialect: GcodeDialect
 ) -> Bools:
-    """Return the mask (K,) of the arcs that the controller accepts and executes in the wanted
-    direction and turn.
+    """Return a mask (K,), true for arcs that the controller accepts and executes in the wanted
+    direction and number of turns.
 
-    `sweep_rad` (K,) > 0 as wanted; `points` start, end, centre (K, 2) in units.
+    `sweep_rad` (K,) > 0 as wanted; `points`: start, end, centre (K, 2) in units.
     """
     unit = 10.0**-dialect.decimals
     start, end, centre = points
@@ -136,7 +137,7 @@ def arcs_accepted(
 
 
 def sagitta_of(radius: Floats, sweep_rad: Floats) -> Floats:
-    """Return (K,) how far arcs rise above their chords; the radius where they turn by π or
+    """Return the heights (K,) of arcs above their chords; the radius where an arc turns by π or
     more."""
     half = np.minimum(np.abs(sweep_rad), math.pi) / 2.0
     # 1 − cos a = 2 sin²(a/2), which keeps its digits where a is small.
@@ -144,8 +145,8 @@ def sagitta_of(radius: Floats, sweep_rad: Floats) -> Floats:
 
 
 def turns_of(start_arm: Floats, end_arm: Floats, clockwise: Bools) -> Floats:
-    """Return (K,) in (0, 2π]: how far arcs turn from the arms `start_arm` to the arms
-    `end_arm`, both (K, 2)."""
+    """Return the angles (K,) in (0, 2π] that arcs turn from the vectors `start_arm` to the vectors
+    `end_arm`, both (K, 2) and from the centre."""
     cross = start_arm[:, 0] * end_arm[:, 1] - start_arm[:, 1] * end_arm[:, 0]
     sign = np.where(clockwise, -1.0, 1.0)
     angle = np.mod(sign * np.arctan2(cross, (start_arm * end_arm).sum(axis=1)), 2.0 * math.pi)
@@ -195,7 +196,7 @@ class _Wanted(Struct, frozen=True, eq=False):
     sweep: float
 
     def at(self, parts: Floats) -> Floats:
-        """Return (k, 2) points at these parts (0 to 1) of the sweep."""
+        """Return (k, 2) points of the arc, mm, at these fractions (0 to 1) of its sweep."""
         start_arm = self.start - self.centre
         r1, r2 = math.hypot(*start_arm), math.dist(self.end, self.centre)
         radius = r1 + (r2 - r1) * parts
@@ -208,12 +209,12 @@ class _Wanted(Struct, frozen=True, eq=False):
 def _recentre(
     arc: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> ReplacementRow | None:
-    """Return the arc about the nearest centre that the controller takes; None when there is none
-    close.
+    """Return the arc about the nearest centre that the controller accepts; None when there is none
+    within reach.
 
-    The centre from which both rounded ends are equally far and which is nearest to c is
-    c + ((m − c)·t) t, with m the middle of the chord and t its direction. It is hardly ever a
-    whole number of units, so those around it are tried, the nearest to c first.
+    The centre from which both rounded ends are equally far and which is nearest to c is c + ((m −
+    c)·t) t, with m the middle of the chord and t its direction. It is hardly ever a whole number
+    of units, so those around it are tried, the nearest to c first.
     """
     begin, stop = ends
     chord = (stop - begin).astype(np.float64)
@@ -240,7 +241,8 @@ def _recentre(
 def _halves(
     arc: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> list[ReplacementRow] | None:
-    """Two arcs that meet at the middle; None when the controller would refuse one of them."""
+    """Return the arc as two arcs that meet at its middle; None when the controller would refuse
+    one of them."""
     begin, stop = ends
     mid_mm = arc.at(np.array([0.5]))[0]
     mid = units_of(mid_mm, dialect.decimals)
@@ -261,7 +263,7 @@ def _halves(
 def _keep_centre(
     arc: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> ReplacementRow | None:
-    """Return the arc with its own centre, if the controller takes it."""
+    """Return the arc about its own rounded centre; None when the controller would refuse it."""
     begin, stop = ends
     centre = units_of(arc.centre, dialect.decimals)
     points = (begin[None, :], stop[None, :], centre[None, :])
@@ -272,8 +274,8 @@ def _keep_centre(
 
 
 def _chords(arc: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> list[ReplacementRow]:
-    """Return the fewest equal chords within a unit of the arc: a chord over the angle a strays by
-    R (1 − cos(a/2)) = 2 R sin²(a/4)."""
+    """Return the fewest equal chords within a unit of the arc: a chord over the angle a deviates
+    by R (1 − cos(a/2)) = 2 R sin²(a/4)."""
     radius = math.dist(arc.start, arc.centre)
     unit = 10.0**-dialect.decimals
     ratio = min(0.5, LINE_SAGITTA_UNITS * unit / (2.0 * radius)) if radius > 0.0 else 0.5

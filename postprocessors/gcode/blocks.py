@@ -84,7 +84,7 @@ class ProgramLines:
         self.count = len(self.begins) - int(self.begins[-1] == len(self.data))
 
     def close(self) -> None:
-        """Let go of the program, of which no line can be read any more."""
+        """Release the program's bytes; no line can be read afterwards."""
         del self.data, self.octets, self.begins
 
     def text(self, number: int) -> str:
@@ -108,18 +108,19 @@ class PlainBlocks(Struct, frozen=True, eq=False):
         return len(self.facts)
 
     def has(self, column: int) -> Bools:
-        """Return (N,) whether a block has the word of this column."""
+        """Return a mask (N,), true for blocks that have the word of this column."""
         return np.asarray((self.facts[:, words.MASK] >> column) & 1 == 1)
 
 
 def fill_forward(has_value: Bools, values: Floats, before: float) -> Floats:
-    """Return (N,) the last given value up to each row; `before` where none was given yet."""
+    """Return (N,) for each row the last value given up to it; `before` where none was given
+    yet."""
     latest = np.maximum.accumulate(np.where(has_value, np.arange(1, len(has_value) + 1), 0))
     return np.asarray(np.concatenate([[before], values])[latest])
 
 
 def form_of(letters: str) -> int:
-    """Return the number that stands for these letters in this order (`words.FORM`)."""
+    """Return the code of a block with these letters in this order, as in `words.FORM`."""
     number = 0
     for letter in letters:
         number = number * 8 + LETTERS.index(letter) + 1
@@ -143,8 +144,8 @@ class PlainRuns:
         self._most = ROWS_AT_ONCE
 
     def run(self, number: int, index: int, take: Take) -> tuple[int, int]:
-        """Have plain lines from this one on taken, the first of which is the block of this index:
-        how many blocks, and the line behind them."""
+        """Offer to `take` the plain lines from line `number` on, the first of which is block
+        `index`. Return how many blocks it took, and the number of the line behind them."""
         self._waited += 1
         if self._waited < self._wait or number >= self._lines.count:
             return 0, number
@@ -193,21 +194,21 @@ class WordBlock:
         self.words = words
 
     def column(self, word: int) -> int:
-        """Return the column, from 1, of a word's letter."""
+        """Return the column, counted from 1, of a word's letter in its line."""
         return [match.start() + 1 for match in re.finditer("[A-Z]", self.text)][word]
 
     def fail(self, message: str, *, word: int | None = None, mend: str = "") -> NoReturn:
-        """Raise ProgramError at this block and the column of `word` (its first one when None)."""
+        """Raise ProgramError at this block and the column of `word` (its first word when None)."""
         raise _error(message, self.index, self.line, self.column(word or 0), mend)
 
 
 def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator[WordBlock]:
-    """Yield the blocks of a program one by one, but for those that `take` has taken; ProgramError
-    at the first that is none, and for more lines than a program may have.
+    """Yield the blocks of a program as words, except those that `take` decodes; ProgramError at
+    the first line that is no block, and for more lines than a program may have.
 
-    Where thousands of lines in a row are plain, Python objects for each of them would be most of
-    the time; all others, and whatever `take` does not want, are given here. So `take` need not
-    know any fault: it leaves the block.
+    In large programs thousands of lines in a row are plain moves, and a Python object for each
+    would take most of the time: `take` is offered such runs as columns. It need not recognise
+    faults, since every block that it leaves is yielded here.
     """
     check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     check_ascii(data)
@@ -238,7 +239,7 @@ def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator
 
 
 def check_ascii(data: bytes) -> None:
-    """Raise ProgramError at the first byte that is no printable ASCII, tab or line end."""
+    """Raise ProgramError at the first byte that is not printable ASCII, tab or line end."""
     odd = _ODD.search(data)
     if odd:
         before = _LINE_END.split(data[: odd.start()])
@@ -264,7 +265,8 @@ def _error(message: str, index: int, line: int, column: int, mend: str) -> Progr
 
 
 def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
-    """Return why a line is no row of words: the first place where it stops being one."""
+    """Return the error for a line that is not a row of words, at the first place where it stops
+    being one."""
     columns = [
         position
         for position, sign in enumerate(raw)
@@ -278,7 +280,8 @@ def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
 
 
 def _explain(remainder: str, lexing: Lexing) -> tuple[str, str, int]:
-    """Return (message, mend, characters to pass over) for text that begins with no word."""
+    """Return (message, remedy, characters to pass over) for text that does not begin with a
+    word."""
     sign, shown = remainder[0], repr(remainder[:SHOWN_CHARS])
     if sign in lexing.letters:
         sign_match = re.match(r"[+-]?", remainder[1:])
@@ -301,8 +304,8 @@ def _explain(remainder: str, lexing: Lexing) -> tuple[str, str, int]:
 
 
 def listing(data: bytes, _machine: object) -> Listing:
-    """Return the blocks of a program that its reader takes, each as its line stands in the
-    file: the lines with a word besides their number, whichever machine it is for."""
+    """Return the blocks of a program, each as its line stands in the file: the lines with a word
+    besides their number, whichever machine it is for."""
     lines = (line.decode("latin-1") for line in _LINE_END.split(data))
     numbered = [(line.strip(), number) for number, line in enumerate(lines, 1) if has_words(line)]
     return Listing(tuple(line for line, _ in numbered), lines=tuple(n for _, n in numbered))

@@ -26,7 +26,7 @@ WHOLE_TOLERANCE: Final = 1e-6
 
 
 def check(toolpath: Toolpath, machine: Machine) -> None:
-    """Refuse what cannot be written or done, whatever the order of the rows."""
+    """Refuse rows that cannot be written or executed, whatever their order."""
     refuse_start(toolpath)
     is_far = np.abs(toolpath.end).max(axis=1, initial=0.0) > MAX_MM
     refuse(toolpath, is_far, f"a coordinate beyond {MAX_MM:g} mm", "check the units")
@@ -37,8 +37,8 @@ def check(toolpath: Toolpath, machine: Machine) -> None:
 def feed_units(
     toolpath: Toolpath, machine: Machine, unit: Unit = MM
 ) -> tuple[Ints, list[Finding]]:
-    """Return (N,) feeds as whole units of the F word, rounded down, 0 where none; and
-    FEED_ROUNDED when one had to be."""
+    """Return the feeds (N,) in whole units of the F word, rounded down, 0 for rows without one;
+    and FEED_ROUNDED if a feed had to be rounded."""
     scale = 10.0 ** (feed_decimals(machine) + unit.more_decimals) / unit.mm
     exact_units = np.where(toolpath.is_feed, toolpath.feed, 0.0) * scale
     rounded = np.rint(exact_units)
@@ -63,7 +63,8 @@ def feed_units(
 
 
 def _check_feeds(toolpath: Toolpath, machine: Machine) -> None:
-    """Feeds are numbers above 0 and no higher than the machine's highest."""
+    """Raise PostError for feeds that are not numbers above 0, or above the machine's highest
+    feed."""
     feed, is_feed = toolpath.feed, toolpath.is_feed
     with np.errstate(invalid="ignore"):
         fine = (feed > 0.0) & np.isfinite(feed)

@@ -36,8 +36,9 @@ Lines = Callable[[int], str]
 def header(
     toolpath: Toolpath, machine: Machine, dialect: GcodeDialect, axes: Sequence[str] = "XYZ"
 ) -> list[str]:
-    """Return the program's maker, machine, drawing, set-up and units, and how far it reaches.
-    Toolpath and dialect are in the program's own units; `axes` are the letters of X, Y and Z."""
+    """Return the comments at the head of a program: its maker, machine, drawing, set-up, units and
+    extents. Toolpath and dialect are in the program's own units; `axes` are the letters of X, Y
+    and Z."""
     if dialect.comments == "none":
         return []
     style, unit = NumberStyle(dialect.decimals), UNITS[dialect.units].name
@@ -72,12 +73,12 @@ def comments(
     mounted: Mapping[int, Sequence[str]],
     seconds: Floats | None = None,
 ) -> tuple[Ints, Lines]:
-    """Return all other lines: the block (by index, from 0) that each stands before (C,),
-    ascending, and the text of the k-th.
+    """Return all comments but the header: the index (from 0) of the block that each stands before
+    (C,), ascending, and a function that gives the text of the k-th.
 
-    `of_row` (B,): the rows of the blocks; `message`: what a comment for the operator begins with;
-    `mounted`: what the operator is told at the rows where a tool is changed by hand; `seconds`
-    (N,): how long the controller takes for each row, where that is known.
+    `of_row` (B,): the toolpath row of each block; `message`: the text that a comment for the
+    operator begins with; `mounted`: what the operator is told at the rows where a tool is changed
+    by hand; `seconds` (N,): how long the controller takes for each row, where that is known.
     """
     no_rows = np.empty(0, dtype=np.int64)
     begins, tells = no_rows, np.flatnonzero(toolpath.kind == Kind.MESSAGE)
@@ -123,8 +124,9 @@ def _message(toolpath: Toolpath, row: int, message: str) -> str:
 def _of_operations(
     toolpath: Toolpath, operations: Operations, unit: Unit, seconds: Floats | None
 ) -> Iterator[tuple[int, str]]:
-    """Yield (row, comment): what each operation does, where it begins. `seconds` (N,): how long
-    the controller takes for each row; None: only the cuts are timed, at their feeds."""
+    """Yield (row, comment) for each operation: what it does, at the row where it begins. `seconds`
+    (N,): how long the controller takes for each row; None: only the cuts are timed, at their
+    feeds."""
     template = "takes {}"
     if seconds is None:
         seconds, template = _feed_seconds(toolpath) * unit.mm, "cuts {} at these feeds"
@@ -168,7 +170,7 @@ def _length(length_mm: float, unit: Unit) -> str:
 
 
 def tool_words(tool: ToolNote, unit: Unit) -> str:
-    """Number, name, shape and diameter, as far as they are known."""
+    """Return the tool's number, name, shape and diameter as text, as far as they are known."""
     number = "" if tool.number is None else f" {tool.number}"
     shape = TOOL_SHAPES.get(tool.kind, tool.kind)
     name = "" if tool.name.casefold() in shape.casefold() else f" {tool.name}:"
@@ -178,7 +180,7 @@ def tool_words(tool: ToolNote, unit: Unit) -> str:
 
 
 def mounting_messages(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
-    """Return the messages for the operator at a tool change by hand; the toolpath's lengths are in
+    """Return the messages to the operator at a tool change by hand; lengths of the toolpath are in
     `unit`."""
     tool = ToolNote(int(toolpath.value[row]))
     operations = toolpath.operations
@@ -200,7 +202,8 @@ def mounting_messages(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
 
 
 def pack(parts: Sequence[str]) -> Iterator[str]:
-    """Yield parts joined with dashes, as many on a line as fit into a comment."""
+    """Yield lines of parts joined with dashes, with as many parts on a line as fit into a
+    comment."""
     if not parts:
         return
     line = ""
@@ -214,7 +217,7 @@ def pack(parts: Sequence[str]) -> Iterator[str]:
 
 
 def duration(seconds: float) -> str:
-    """Return seconds in words, rounded to the second.
+    """Return a time in words, rounded to the second.
 
     >>> duration(3725.4)
     '1 h 2 min 5 s'
@@ -229,8 +232,8 @@ def duration(seconds: float) -> str:
 
 
 def _feed_seconds(toolpath: Toolpath) -> Floats:
-    """Return (N,) s that each row cuts if it has its feed from end to end, 0 for rapids and
-    events, where places are in mm."""
+    """Return (N,) seconds that each row cuts if it has its programmed feed from end to end, 0 for
+    rapids and events. Lengths of the toolpath are in mm."""
 
     def seconds(part: Toolpath) -> Floats:
         begin = part.starts

@@ -68,8 +68,8 @@ Cycle = CycleHole | CycleThread
 
 
 def threads_of(toolpath: Toolpath, unit_mm: float, style: NumberStyle) -> list[CycleThread]:
-    """Return the threads of a lathe's plan that G76 cuts with the same moves; lengths of the
-    toolpath are in a unit of so many mm, X along the axis and Y the radius."""
+    """Return the threads of a lathe's plan that G76 cuts with exactly the same moves. Lengths of
+    the toolpath are in units of `unit_mm` mm, X along the axis and Y the radius."""
     operations = toolpath.operations
     if operations is None:
         return []
@@ -108,8 +108,8 @@ def threads_of(toolpath: Toolpath, unit_mm: float, style: NumberStyle) -> list[C
 
 
 def holes_of(toolpath: Toolpath) -> list[CycleHole]:
-    """Return the holes that the drilling operations of a plan make, as far as a cycle can say
-    them."""
+    """Return the holes that the drilling operations of a plan make, as far as a canned cycle can
+    express them."""
     operations = toolpath.operations
     if operations is None:
         return []
@@ -123,7 +123,7 @@ def holes_of(toolpath: Toolpath) -> list[CycleHole]:
 
 
 def _holes(toolpath: Toolpath, low: int, high: int) -> Iterator[CycleHole]:
-    """Yield those of the rows low:high."""
+    """Yield the holes among the rows low:high that a canned cycle can express."""
     rows = _Rows(
         toolpath.kind[low:high].tolist(),
         toolpath.end[low:high].tolist(),
@@ -155,7 +155,8 @@ class _Rows(Struct, frozen=True):
     feed: list[float]
 
     def hole(self, first: int, above: float) -> CycleHole | None:
-        """Return the hole that begins with a row, which comes from a height; without its dwell."""
+        """Return the hole that begins with row `first`, which comes from the height `above`,
+        without its dwell; None where these rows are no hole of a canned cycle."""
         x, y, z = self.end[first]
         if self.kind[first] != Kind.RAPID or z != above:
             return None
@@ -188,9 +189,9 @@ class _Rows(Struct, frozen=True):
 def cycle_blocks(
     holes: Sequence[CycleHole], feed_words: Sequence[str], style: NumberStyle
 ) -> dict[int, tuple[str, ...]]:
-    """Return the blocks of each hole by its first row at a feed, whose F words are
-    `feed_words`. Holes that follow each other and look alike are one cycle with several places;
-    behind the last of them it is cancelled."""
+    """Return the blocks of each hole, by its first row at a feed; `feed_words` are its F words.
+    Consecutive holes of equal depth, height and peck share one cycle with several places,
+    cancelled behind the last of them."""
 
     def number(value: float) -> str:
         return format_number(value, style)
@@ -216,13 +217,15 @@ def cycle_blocks(
 
 
 def _rounded_down(bite: float, style: NumberStyle) -> float:
-    """Return the depth of a peck rounded down to the last decimal of a coordinate, or None."""
+    """Return the depth of a peck rounded down to the last decimal of a coordinate, at least one
+    such unit."""
     unit = 10.0**-style.decimals
     return max(float(np.floor(bite / unit + 1e-6)), 1.0) * unit
 
 
 def rows_kept(count: int, cycles: Sequence[Cycle]) -> Ints:
-    """Of so many rows those that are no part of a cycle, and the first row at a feed of each."""
+    """Return the rows of `count` that remain when each cycle becomes one block: those outside of
+    all cycles, and the first row at a feed of each cycle."""
     is_kept = np.ones(count, dtype=np.bool_)
     for cycle in cycles:
         is_kept[cycle.first : cycle.last + 1] = False

@@ -97,8 +97,8 @@ def last_decimal_mm(dialect: GcodeDialect) -> float:
 
 
 def feed_decimals(machine: Machine) -> int:
-    """Digits behind the point of an F word in mm/min, from `feed.unit_mm_min`; MachineError when
-    that is no power of ten between 1 and 10^−6."""
+    """Return the number of decimals of an F word in mm/min, from `feed.unit_mm_min`; MachineError
+    when that is no power of ten between 1 and 10^−6."""
     digits = -math.log10(machine.feed.unit_mm_min)
     rounded = round(digits)
     if abs(digits - rounded) > POWER_OF_TEN_TOLERANCE or not 0 <= rounded <= MAX_FEED_DECIMALS:
@@ -115,8 +115,8 @@ MAX_BLOCKS: Final = 100
 
 
 def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) -> None:
-    """Raise MachineError for start and end blocks that the controller would not take alone,
-    that cut, end the program, or go farther than the machine can."""
+    """Raise MachineError for start and end blocks that the controller would not accept by
+    themselves, that cut, end the program, or go farther than the machine can."""
     import numpy as np
 
     from camtool.toolpath.moves import Kind, toolpath_extents
@@ -168,9 +168,9 @@ def _check_block(block: str, where: str, machine: Machine[Any, Any]) -> None:
 
 
 def check_unit(machine: Machine, unit_mm: float, arc_spread_mm: float) -> None:
-    """Raise MachineError where the last decimal of a coordinate, worth `unit_mm`, is more than
-    a dialect can lose: a step of the machine, or what the radii of an arc may differ by, which
-    the rounding of its numbers makes up to a unit."""
+    """Raise MachineError where the last decimal of a coordinate, `unit_mm`, is coarser than a step
+    of the machine, or than the difference of an arc's two radii that the controller accepts
+    (`arc_spread_mm`): rounding alone makes a difference of up to one unit."""
     step_mm = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     if unit_mm > step_mm * (1.0 + UNIT_GUARD):
         raise MachineError(

@@ -46,7 +46,7 @@ class NumberStyle(Struct, frozen=True):
 def units_of(values: Floats, decimals: int) -> Ints:
     """Return values (any shape) as whole units of 10^−decimals, half away from zero.
 
-    ValueError for what is not finite or too large to be exact.
+    ValueError for values that are not finite or too large to be exact.
     """
     units = np.empty(np.shape(values), dtype=np.int64)
     flat_values, flat_units = np.ravel(values), units.reshape(-1)
@@ -60,13 +60,14 @@ def units_of(values: Floats, decimals: int) -> Ints:
 
 
 def values_of(units: Ints, decimals: int) -> Floats:
-    """Return the floats nearest to the decimal numbers of the units: what a reader must find."""
+    """Return the floats nearest to the decimal numbers of these units, which are what a reader
+    must decode."""
     return np.asarray(units / 10.0**decimals)
 
 
 def word_of(letter: str, units: Ints, written: Bools, style: NumberStyle) -> WordColumn:
-    """Return the words of a letter, with numbers of whole units (M,), in the blocks that have
-    it (M,)."""
+    """Return the words of a letter: numbers of whole units (M,), and in which blocks they are
+    written (M,)."""
     return WordColumn(letter, units, written, style.decimals, 0 if style.strip else None)
 
 
@@ -85,12 +86,12 @@ def _digits_of(value: float, style: NumberStyle) -> str:
 
 
 def format_number(value: float, style: NumberStyle) -> str:
-    """Return a single number; ValueError as `units_of`."""
+    """Return a number as text, rounded to the style's decimals; ValueError as `units_of`."""
     return format_column(np.array([value]), style)[0]
 
 
 def comment(text: str) -> str:
-    """`text` as a comment that may stand in any program: ASCII letters, digits, spaces and
+    """Return `text` as a comment that may stand in any program: ASCII letters, digits, spaces and
     ._+:/=- only.
 
     Every other character becomes _ (line ends and tabs a space); runs of spaces become one; cut to
@@ -101,8 +102,8 @@ def comment(text: str) -> str:
 
 
 def check_length(data: bytes, max_chars: int, unit: str, mend: str) -> None:
-    """Raise PostError for the first line of more than `max_chars` characters (line end not
-    counted); `unit` is the name of a line in messages."""
+    """Raise PostError for the first line of more than `max_chars` characters, without its line
+    end; `unit` is what messages call a line."""
     lengths = line_lengths(data)
     if (lengths > max_chars).any():
         index = int((lengths > max_chars).argmax())

@@ -49,7 +49,8 @@ class PartMoves:
     def __init__(
         self, path: ToolpathBuilder, full_turn_rad: float, *, is_lathe: bool = False
     ) -> None:
-        """`is_lathe`: the part's X is Z of the program, its Y is X, and its Z is Y."""
+        """Begin at the path's position. `is_lathe`: the part's X is Z of the program, its Y is X,
+        and its Z is Y."""
         self.path = path
         self._is_lathe = is_lathe
         self._flat_plane = 180 if is_lathe else 170
@@ -76,7 +77,7 @@ class PartMoves:
         return self._same and not self._is_lathe
 
     def set_frame(self, frame: ProgramFrame) -> None:
-        """Set the frame of the coordinates that follow."""
+        """Set the frame in which the coordinates that follow are given."""
         self._frame = frame
         if not self.moved:
             self._base = frame
@@ -98,7 +99,7 @@ class PartMoves:
         self._turn = (math.cos(angle), math.sin(angle)) if angle else (1.0, 0.0)
 
     def to_part(self, x: float, y: float, z: float) -> Point:
-        """Return the point in the frame of the part, mm."""
+        """Return a place of the program's coordinates in the frame of the part, mm."""
         x, y, z = x * self.mm, y * self.mm, z * self.mm
         if not self._same:
             (cos, sin), (dx, dy, dz) = self._turn, self._shift
@@ -108,8 +109,8 @@ class PartMoves:
         return (z, x, y) if self._is_lathe else (x, y, z)
 
     def snap(self, place: Point) -> Point:
-        """Return the point, with those coordinates of the tool that differ from it by rounding
-        alone."""
+        """Return the point, with coordinates that differ from the tool's only by rounding replaced
+        by the tool's."""
         position = self.path.position
         if position == place:
             return position
@@ -122,18 +123,19 @@ class PartMoves:
     # Moves
 
     def rapid(self, x: float, y: float, z: float) -> None:
-        """Straight, as fast as the machine can."""
+        """Add a rapid to a place in the program's coordinates."""
         self.moved = True
         self.path.rapid(*self.snap(self.to_part(x, y, z)))
 
     def line(self, x: float, y: float, z: float) -> None:
-        """Straight, at the feed."""
+        """Add a straight cut at the feed to a place in the program's coordinates."""
         self.moved = True
         self.path.line(*self.snap(self.to_part(x, y, z)), feed=self.feed)
 
     def arc(self, end: list[float], centre: tuple[float, float], turn: int) -> None:
-        """An arc of |turn| turns begun, counter-clockwise where it is above 0: its end and centre
-        are (first, second, normal) and (first, second) of the plane."""
+        """Add an arc of |turn| turns (the last may be incomplete), counter-clockwise where `turn`
+        is above 0. Its end and centre are (first, second, normal) and (first, second) of the
+        plane."""
         self.moved = True
         if len(self.path) + abs(turn) > bounds.MAX_MOVES:
             raise LineFault(too_many("the turns of this arc"), "p", bounds.SPLIT_PROGRAM)
@@ -150,8 +152,9 @@ class PartMoves:
             self._chords(end, centre, turn)
 
     def _flat_arc(self, end: Point, middle: tuple[float, float], turn: int) -> None:
-        """An arc in the part's XY, whole turns first, each with its share of the height. An arc so
-        short that the controller takes it for a full circle is one, and a line to its end."""
+        """Add an arc in the part's XY, whole turns first, each with its share of the height. An
+        arc so short that the controller executes it as a full circle becomes a full circle, and a
+        line to its end."""
         path = self.path
         x, y, z = path.position
         target = self.snap(end)
@@ -189,7 +192,7 @@ class PartMoves:
         )
 
     def _chords(self, end: list[float], centre: tuple[float, float], turn: int) -> None:
-        """An arc in XZ or YZ, whose ends may lie at two radii."""
+        """Add an arc in XZ or YZ as chords; its start and end may have different radii."""
         self.chords += 1
         axes = PLANES[self.plane]
         start = self._program(self.path.position)
@@ -227,7 +230,7 @@ class PartMoves:
         )
 
     def _program(self, place: Point) -> Point:
-        """Return a place in the frame of the part in the coordinates of the program."""
+        """Return a place of the part's frame in the coordinates of the program."""
         x, y, z = (place[1], place[2], place[0]) if self._is_lathe else place
         if not self._same:
             (cos, sin), (dx, dy, dz) = self._turn, self._shift
@@ -255,5 +258,5 @@ def turn_of(
 
 
 def too_many(subject: str) -> str:
-    """Return the message for a program of too many moves."""
+    """Return the message for a program with too many moves."""
     return f"with {subject} the program has more than {bounds.MAX_MOVES} moves"

@@ -50,8 +50,8 @@ RECENTRE_REACH: Final = 2
 
 
 def check_plain(toolpath: Toolpath, machine: Machine) -> None:
-    """Raise PostError for the first row that has no meaning there, named as the toolpath
-    numbers it."""
+    """Raise PostError for the first row that the program cannot express, with its number in the
+    toolpath."""
     check(toolpath, machine)
     for row in np.flatnonzero(~toolpath.is_motion).tolist():
         kind = Kind(int(toolpath.kind[row]))
@@ -76,7 +76,8 @@ def check_plain(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def split_z(toolpath: Toolpath, machine: Machine) -> tuple[LoweredToolpath, list[Finding]]:
-    """XY and Z apart, slopes and helices as steps; and MOVE_SPLIT when a feed move had to be."""
+    """Return the toolpath with moves in XY and in Z separate, and slopes and helices as steps; and
+    MOVE_SPLIT if a move at a feed had to be split."""
     step_mm = slope_step_mm(machine)
     parts = helices_to_steps(toolpath, step_mm)
     is_split = np.bincount(parts.row, minlength=len(toolpath)) > 1
@@ -88,8 +89,8 @@ def split_z(toolpath: Toolpath, machine: Machine) -> tuple[LoweredToolpath, list
 
 
 def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) -> Iterator[Finding]:
-    """Yield a finding with the number of rows of these kinds, which the program leaves out, if
-    there are any."""
+    """Yield one finding with the number of rows of these kinds, if there are any: the program
+    leaves them out."""
     rows = np.flatnonzero(np.isin(toolpath.kind, [int(kind) for kind in kinds]))
     if len(rows):
         names = ", ".join(dict.fromkeys(Kind(kind).name for kind in toolpath.kind[rows].tolist()))
@@ -139,8 +140,8 @@ class PlainRows(Struct, frozen=True, eq=False):
 
 
 def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
-    """Return the rows of a toolpath (in the program's own lengths) in units, arcs made
-    consistent."""
+    """Return the rows of a toolpath, whose lengths are those of the program, in whole units, with
+    arcs changed until the controller's rules hold for the rounded numbers."""
     halved = _halve_circles(toolpath, rules)
     path = halved.toolpath
     rows = np.flatnonzero(path.is_arc)
@@ -174,7 +175,8 @@ def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
 
 
 def arc_findings(rows: PlainRows, place: str) -> Iterator[Finding]:
-    """ARC_MENDED, and MOVE_COLLAPSED for what is smaller than a unit, where there is any."""
+    """Yield ARC_MENDED for arcs with another centre, and MOVE_COLLAPSED for moves smaller than a
+    unit, if there are any."""
     if rows.recentred or rows.lines:
         yield ARC_MENDED_PLAIN(
             where=place,
@@ -188,8 +190,8 @@ def arc_findings(rows: PlainRows, place: str) -> Iterator[Finding]:
 
 
 def _halve_circles(toolpath: Toolpath, rules: ArcRules) -> LoweredToolpath:
-    """Full and nearly full circles, whose rounded ends coincide, in halves; other rows
-    unchanged."""
+    """Return the toolpath with each full circle, and each arc whose rounded ends coincide, cut
+    into two halves; other rows unchanged."""
     begin = units_of(toolpath.starts, rules.decimals)
     stop = units_of(toolpath.end, rules.decimals)
     is_full = toolpath.is_arc & (begin[:, :2] == stop[:, :2]).all(axis=1)
@@ -220,8 +222,8 @@ class WantedArcs:
         self.most = rules.most_mm * scale
 
     def fits(self, indices: Ints, centre: Floats) -> Bools:
-        """Return the mask (L,) of arcs that satisfy the dialect's rules about these rounded
-        centres (L, 2)."""
+        """Return a mask (L,), true for the arcs `indices` that satisfy the dialect's rules about
+        these rounded centres (L, 2)."""
         begin, stop = self.begin[indices], self.stop[indices]
         start_arm, end_arm = begin - centre, stop - centre
         r1, r2 = np.hypot(*start_arm.T), np.hypot(*end_arm.T)
@@ -236,8 +238,8 @@ class WantedArcs:
 
 
 def _centres(arcs: WantedArcs) -> tuple[Ints, Bools, Bools]:
-    """For each arc its centre (K, 2) in units, whether there is one, and whether it is another
-    than the rounded one."""
+    """Return for each of K arcs its centre (K, 2) in units, a mask (K,) of those that have one,
+    and a mask (K,) of those whose centre is not simply the rounded one."""
     count = len(arcs.radius)
     in_range = arcs.radius <= arcs.most
     centre = np.zeros((count, 2), dtype=np.int64)

@@ -102,8 +102,8 @@ class PlainMoves:
         self.count = len(is_sure) if is_sure.all() else int(is_sure.argmin())
 
     def add_to(self, path: ToolpathBuilder, fast: FastFeeds) -> bool:
-        """Add the rows of the sure ones, of which there is one at least, to a path; whether any
-        moves. Their feeds are noted."""
+        """Add the rows of the first `count` blocks, at least one, to a path, and note feeds above
+        the limit in `fast`. Return True if any of them moves."""
         sure_rows = slice(self.count)
         rows, feeds = self.moving[sure_rows], self.feed[sure_rows]
         has_feed_word = self._plain.has(words.F_WORD)[sure_rows]
@@ -128,8 +128,9 @@ class PlainMoves:
 
 
 def sure_arcs(start: Floats, end: Floats, centre: Floats, rule: ArcRule) -> Bools:
-    """Return (K,) which arcs surely have one radius, and turn by more than what is taken for a
-    full circle or end where they start."""
+    """Return a mask (K,), true for arcs that the controller surely executes as meant: the radii at
+    both ends agree well within the rule, and the arc either ends where it starts or turns by
+    clearly more than what is taken for a full circle."""
     start_arm, end_arm = start - centre, end - centre
     r1, r2 = np.hypot(start_arm[:, 0], start_arm[:, 1]), np.hypot(end_arm[:, 0], end_arm[:, 1])
     cross = start_arm[:, 0] * end_arm[:, 1] - start_arm[:, 1] * end_arm[:, 0]
@@ -148,7 +149,8 @@ class FastFeeds:
         self._count, self._first, self._most = 0, 0, 0.0
 
     def note(self, first: int, feeds: Floats) -> None:
-        """The feeds (K,) that blocks from this one on give, NaN where they give none."""
+        """Count the F words among `feeds` (K,) that exceed the limit; they belong to the blocks
+        from `first` on, NaN where a block has no F."""
         fast = np.flatnonzero(exceeds(feeds, self._limit))
         if len(fast):
             if not self._count:

@@ -186,8 +186,8 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
 
 
 def first_change(toolpath: Toolpath, events: Events) -> int:
-    """Return the row of the first tool change where nothing but rapids straight up is before
-    it; else 0. Behind the change the tool goes to its height anyway."""
+    """Return the row of the first tool change if only rapids straight up come before it, else 0.
+    Behind the change the tool is sent to its height anyway."""
     row = events.changes[0] if events.changes else 0
     motion = toolpath.is_motion[:row]
     is_upward = (toolpath.kind[:row] == Kind.RAPID) & (toolpath.end[:row, 2] >= toolpath.start[2])
@@ -196,8 +196,9 @@ def first_change(toolpath: Toolpath, events: Events) -> int:
 
 
 def _seconds(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Floats | None:
-    """Return (N,) s that the controller takes for each row; None where nobody knows, or nobody
-    asks. What its model cannot follow is told when the program is verified."""
+    """Return (N,) seconds that the controller takes for each row; None where no comment shows
+    times, no model is known, or the model cannot follow the toolpath (verification reports
+    that)."""
     exact = isinstance(machine.controller, PathController)
     model: ControllerModel[Any, Any] | None = PathModel() if exact else style.model
     if model is None or style.dialect.comments in ("none", "header"):
@@ -216,7 +217,8 @@ def _feed_texts(feeds: Ints, holes: Sequence[CycleHole], decimals: int) -> list[
 def in_units(
     toolpath: Toolpath, dialect: GcodeDialect, unit: Unit
 ) -> tuple[Toolpath, GcodeDialect]:
-    """Return the places of a toolpath, and the lengths and decimals of its dialect, in a unit."""
+    """Return the toolpath with its places, and the dialect with its lengths and decimals,
+    converted to a unit."""
     if unit.mm == 1.0:
         return toolpath, dialect
     places = {name: getattr(toolpath, name) / unit.mm for name in ("end", "centre", "start")}
@@ -231,8 +233,8 @@ def in_units(
 def _path_modes(
     toolpath: Toolpath, rows_sent: Sent, style: ProgramStyle
 ) -> tuple[tuple[str, ...], dict[int, str]]:
-    """Return the path mode to begin with, and the blocks that change it, by the place among the
-    rows that are sent; none for dialects that know no such thing."""
+    """Return the block that sets the first path mode, and the blocks that change it, by the index
+    of the sent row that each stands before; nothing for dialects without path modes."""
     if style.path_mode is None or style.own_mode is None:
         return (), {}
     written = [style.path_mode(mode) for mode in (*toolpath.modes, style.own_mode)]
@@ -248,22 +250,24 @@ class BlockOrder:
     """The blocks of motions, which are texts by columns, and all others between them."""
 
     def __init__(self, is_motion: Bools) -> None:
-        """`is_motion` (M,): the rows that are sent as motions; the others have no text there."""
+        """Begin with M rows that are sent. `is_motion` (M,): those that are motions, written by
+        columns; the others have no text of their own."""
         self._before = np.concatenate([[0], np.cumsum(is_motion)])
         self._is_motion = is_motion
         self._others: list[tuple[int, str, int]] = []
 
     def add(self, index: int, blocks: Sequence[str], row: int = -1) -> None:
-        """Blocks in front of row `index` of those that are sent, with the toolpath's row."""
+        """Add blocks in front of the sent row `index`; `row` is their row of the toolpath."""
         self._others += [(index, block, row) for block in blocks]
 
     def _sorted(self) -> tuple[list[tuple[int, str, int]], Ints]:
-        """Return the others in order, and how many motions are in front of each."""
+        """Return the added blocks in order, and how many motions stand in front of each."""
         other_blocks = sorted(self._others, key=lambda other: other[0])
         return other_blocks, self._before[[index for index, _, _ in other_blocks]]
 
     def rows(self, row: Ints) -> Ints:
-        """Return (B,) the toolpath's row of each block; `row` (M,) of those that are sent."""
+        """Return (B,) the toolpath row of each block; `row` (M,): the toolpath row of each sent
+        row."""
         other_blocks, before = self._sorted()
         return np.insert(row[self._is_motion], before, [one for _, _, one in other_blocks])
 
@@ -276,8 +280,9 @@ class BlockOrder:
         numbers: LineNumbers | None = None,
         blanks: bool = True,
     ) -> bytes:
-        """Return all blocks, those of motions by `columns` of M rows, with C lines of comments
-        ("" for none), the k-th before block commented[k] (from 0); these ascend."""
+        """Return the bytes of all blocks; motions are written by `columns` of M rows. C comment
+        lines stand between them, the k-th before block commented[k] (from 0, ascending); an empty
+        text is left out."""
         other_blocks, before = self._sorted()
         indices = np.array([indices for indices, _, _ in other_blocks], dtype=np.int64)
         number = before + np.arange(len(other_blocks))
@@ -317,23 +322,25 @@ class LineNumbers(Struct, frozen=True):
     highest: int | None = None
 
     def of(self, index: Ints) -> Ints:
-        """Return the numbers (K,) of blocks, whose indices (K,) count from 0."""
+        """Return the block numbers (K,) of the blocks `index` (K,), counted from 0."""
         if self.highest is not None:
             index = index % ((self.highest - self.first) // self.step + 1)
         return self.first + self.step * index
 
     def column(self, index: Ints, written: Bools) -> WordColumn:
-        """Return the words N of blocks."""
+        """Return the N words of the blocks `index`."""
         return WordColumn("N", self.of(index), written, digits=self.digits)
 
     def label(self, index: int, *, blanks: bool) -> str:
-        """Return the word N of one block, and a blank behind it."""
+        """Return the N word of one block, with a blank behind it if there are `blanks` between
+        words."""
         number = int(self.of(np.array([index]))[0])
         return f"N{number:0{self.digits}}{' ' if blanks else ''}"
 
 
 def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[str]:
-    """Out of the material (below Z 0) to the highest Z, spindle off, end: only what is missing."""
+    """Return the last blocks of a program: retract out of the material (from below Z 0) to the
+    highest Z, spindle off, end; each only where the program has not done it."""
     heights = np.append(toolpath.end[:, 2], toolpath.start[2])
     last = float(toolpath.end[-1, 2]) if len(toolpath) else 0.0
     retract = dialect.retract and last < 0.0
@@ -405,10 +412,10 @@ def sent_rows(
     *,
     raises: bool = True,
 ) -> Sent:
-    """Return all rows with pieces in place of arcs, without moves that move nothing, and
-    without motions among the first `unmoved` rows. `changes`: the rows of tool changes that
-    have a block; each of `cycles` is one block. `raises`: behind a change of tools the tool is
-    sent to its height once more."""
+    """Return the rows that are sent: with pieces in place of repaired arcs, without moves that
+    move nothing, and without motions among the first `unmoved` rows. `changes`: the rows of tool
+    changes that have a block; each of `cycles` is one block. `raises`: after a tool change the
+    tool is sent to its height once more."""
     origins, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
     if arcs.pieces:
         piece_counts = np.ones(len(toolpath), dtype=np.int64)
@@ -480,8 +487,8 @@ def sent_rows(
 
 
 def _raised_again(kind: Codes, end: Ints, is_changed: Bools) -> list[int]:
-    """Return the rows before which the tool must be sent to its height once more: those behind
-    a change of tools that stands between moves, unless the next move is a rapid in Z anyway."""
+    """Return the rows before which the tool must be sent to its height once more: those after a
+    tool change between moves, unless the next move is a rapid in Z anyway."""
     motions = np.flatnonzero(kind <= Kind.ARC_CCW)
     raised = []
     for index in np.flatnonzero(is_changed).tolist():
@@ -494,16 +501,16 @@ def _raised_again(kind: Codes, end: Ints, is_changed: Bools) -> list[int]:
 
 
 def _differ(ends: Ints | Floats, start: Floats) -> Bools:
-    """Return (M, 3) where ends (M, 3) are not those of the row before, of the first not the
-    start."""
+    """Return a mask (M, 3), true where a coordinate of `ends` (M, 3) differs from that of the row
+    before; the first row is compared with `start`."""
     differ = np.empty(ends.shape, dtype=np.bool_)
     differ[:1], differ[1:] = ends[:1] != start, ends[1:] != ends[:-1]
     return differ
 
 
 def _not_yet_written(written: Bools, home: Bools) -> Bools:
-    """Return (M,) true where nothing was written before the row since the start, or since
-    homing."""
+    """Return a mask (M,), true for rows before which nothing was `written` since the start, or
+    since the last homing."""
     is_first = np.ones(len(written), dtype=np.bool_)
     for begin, end in pairwise([0, *np.flatnonzero(home).tolist(), len(written)]):
         if written[begin:end].any():
@@ -512,8 +519,8 @@ def _not_yet_written(written: Bools, home: Bools) -> Bools:
 
 
 def _first_after(home: Bools, motion: Bools) -> Bools:
-    """Return (M,) true for the first motion behind each homing, of several in a row behind the
-    last."""
+    """Return a mask (M,), true for the first motion after homing; after several homings in a row,
+    for the first motion after the last."""
     is_first = np.zeros(len(home), dtype=np.bool_)
     homes = np.flatnonzero(home)
     if len(homes):
@@ -528,8 +535,8 @@ G33: Final = 33
 
 
 def _pitches(toolpath: Toolpath) -> Floats:
-    """Return (N,) the feed for each turn of the spindle where it is to be followed, 0
-    elsewhere."""
+    """Return (N,) the feed per turn of the spindle in rows that follow the spindle, 0 in all
+    others."""
     pitch = np.zeros(len(toolpath))
     operations = toolpath.operations
     if operations is not None:
@@ -549,8 +556,9 @@ def motion_words(
     style: ProgramStyle | None = None,
     pitch: Floats | None = None,
 ) -> list[WordColumn]:
-    """Return the words of the motions among the rows, in the letters of a `style`; `pitch` (N,)
-    of the toolpath's rows that follow the spindle."""
+    """Return the words of all motions among the rows, one column for each letter, with the letters
+    of `style` where one is given; `pitch` (N,): the feed per turn of toolpath rows that follow the
+    spindle."""
     motion = rows_sent.is_motion
     rows = np.flatnonzero(motion)
     number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
@@ -586,8 +594,8 @@ def motion_words(
 
 
 def changes_of(values: Ints, counts: Bools) -> Bools:
-    """Return (M,) true where a row that counts has another value than the last one that
-    counted."""
+    """Return a mask (M,), true where a row that counts has another value than the last counting
+    row before it."""
     rows = np.flatnonzero(counts)
     is_changed = np.zeros(len(values), dtype=bool)
     is_changed[rows] = np.diff(values[rows], prepend=-1) != 0
@@ -624,7 +632,7 @@ class Events(Struct, frozen=True):
 
 
 def events_of(toolpath: Toolpath, words: EventWords) -> Events:
-    """Return the blocks of all events but END and messages."""
+    """Return the blocks of all events except END and messages."""
     blocks: dict[int, Sequence[str]] = {}
     rounded: list[int] = []
     spindle_on = cools = False
@@ -662,11 +670,11 @@ def events_of(toolpath: Toolpath, words: EventWords) -> Events:
 
 
 def common_words(event: Event) -> tuple[str, ...]:
-    """Return the block of a dwell, spindle, coolant or homing; PostError for values that none can
-    say.
+    """Return the block of a dwell, spindle, coolant or homing event; PostError for values that no
+    block can express.
 
-    Homing is a rapid in machine coordinates, `G53 G0`: G28 would go where the operator's memory
-    of it points.
+    Homing is a rapid in machine coordinates, `G53 G0`: G28 would go where the operator's memory of
+    it points.
     """
     if event.kind in SWITCHES:
         return (SWITCHES[event.kind],)
@@ -687,7 +695,7 @@ def common_words(event: Event) -> tuple[str, ...]:
 
 
 def tool_number(event: Event) -> int:
-    """Return the tool of a change; PostError when it is no whole number from 0."""
+    """Return the tool number of a change; PostError when it is not an integer of at least 0."""
     if not (event.value >= 0.0 and event.value == math.floor(event.value)):
         raise event.refuse(f"{event.value:g} is no tool number", "tools are 0, 1, 2 …")
     return int(event.value)

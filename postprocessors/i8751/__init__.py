@@ -31,8 +31,8 @@ class I8751(Target):
         check(machine)
 
     def stray_mm(self, machine: I8751Machine) -> float:
-        """Return the sum of both tolerances, mm: of the ends of records from their lines, and of
-        lines from their arcs."""
+        """Return the greatest distance of the cut from the drawing that the two tolerances allow
+        together, mm: records stray from their lines, and lines from their arcs."""
         return machine.dialect.tolerance_mm + machine.dialect.arc_tolerance_mm
 
     def twin_kind(self) -> TwinKind:
@@ -42,7 +42,7 @@ class I8751(Target):
         return TwinKind(I8751TwinSettings, I8751Twin)
 
     def line_bytes(self, data: bytes, machine: I8751Machine) -> int:
-        """Return the bytes of the packets, whatever the form of the file."""
+        """Return the bytes of the packets that go over the line, whatever the form of the file."""
         from .stream import stream_of
 
         return len(stream_of(data, machine))

@@ -41,17 +41,18 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
     """The Intel 8751: a dog-leg of X and Y, then Z."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """Return the motion, chunk by chunk."""
+        """Return the motion in chunks."""
         legs, blocks = _leg_run(toolpath, machine, options)
         return legs.run(blocks)
 
     def fused_run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> LineRun | None:
-        """Return the legs of all rows; None where the mechanics differ from place to place."""
+        """Return the motion as legs of whole steps, judged in closed form; None where the
+        mechanics differ from place to place."""
         legs, blocks = _leg_run(toolpath, machine, options)
         return legs.fused_run(blocks)
 
     def clock(self, toolpath: Toolpath, machine: _Machine) -> SampleClock:
-        """Return the ramps, pulse by pulse."""
+        """Return the clock of the samples: pulse by pulse, with ramps."""
         path, times = self.quantised(toolpath, machine), PulseTimes(machine.dialect)
         travel = np.rint(
             np.diff(path.end, axis=0, prepend=path.start[None, :]) / coded_steps_mm(machine)
@@ -63,8 +64,8 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
         return SampleClock(path, machine, waits)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """Return the same with start and ends at their nearest steps; ProgramError for arcs,
-        homing."""
+        """Return the toolpath with its start and ends at the nearest steps; ProgramError for arcs
+        and homing."""
         _check(toolpath, machine)
         step_mm = coded_steps_mm(machine)
         start = _in_steps(toolpath.start[None, :], machine)[0] * step_mm
@@ -72,7 +73,7 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
         return with_ends(toolpath, start, end)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Return a diagonal and the rest along an axis; there are no arcs."""
+        """Return "dog-leg": each record is a diagonal and then the rest along one axis."""
         return "dog-leg"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -92,7 +93,7 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
 def _leg_run(
     toolpath: Toolpath, machine: _Machine, options: Options
 ) -> tuple[LegRun, Iterator[Legs]]:
-    """Return the run of a program, and its legs."""
+    """Return the run that judges a program's legs, and an iterator over the legs."""
     _check(toolpath, machine)
     count = toolpath.executed_rows
     times = PulseTimes(machine.dialect)
@@ -108,7 +109,7 @@ def _check(toolpath: Toolpath, machine: _Machine) -> None:
 
 
 def _in_steps(points: Floats, machine: _Machine) -> Ints:
-    """Return points (N, 3) mm in steps."""
+    """Return points (N, 3) mm as whole steps."""
     columns = [
         to_steps(points[:, column], axis.coded_step_mm) for column, axis in enumerate(machine.axes)
     ]
@@ -116,7 +117,8 @@ def _in_steps(points: Floats, machine: _Machine) -> Ints:
 
 
 def _blocks(toolpath: Toolpath, machine: _Machine, times: PulseTimes) -> Iterator[Legs]:
-    """Yield the legs of all rows: X and Y together, one of them alone, Z."""
+    """Yield the legs of all rows, in their order: X and Y together, then one of them alone, then
+    Z."""
     for low in range(0, len(toolpath), ROWS_AT_ONCE):
         part = toolpath.part(low, min(low + ROWS_AT_ONCE, len(toolpath)))
         points = np.concatenate([part.start[None, :], part.end])

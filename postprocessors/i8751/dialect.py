@@ -106,7 +106,8 @@ I8751Machine = Machine[SlideStart, I8751Dialect]
 
 
 def check(machine: I8751Machine) -> None:
-    """Raise MachineError where the dialect's values are none, or too fine for the machine."""
+    """Raise MachineError where values of the dialect are impossible, or too fine for the machine's
+    steps."""
     name, dialect = machine.target.name, machine.dialect
     if not re.fullmatch("x?y?z?", dialect.plus_backward):
         raise MachineError(

@@ -44,10 +44,10 @@ FREE: Final = -1
 
 
 def reaches(steps: Ints, step_mm: tuple[float, float], tolerance_mm: float) -> Ints:
-    """Return (N,) the reach of lines of (N, 2) steps: the greatest |D·b − M·d| within the
-    tolerance.
+    """Return (N,) the reach of each line of (N, 2) steps: the greatest |D·b − M·d| at which a
+    record's end stays within the tolerance of the line.
 
-    Not below a // 2, which rounding alone could take from it; see the module.
+    It is at least a // 2, since rounding ends to whole steps can already cost that much.
     """
     length = np.hypot(steps[:, 0] * step_mm[0], steps[:, 1] * step_mm[1])
     reach = np.floor(tolerance_mm * length / (step_mm[0] * step_mm[1])).astype(np.int64)
@@ -55,7 +55,8 @@ def reaches(steps: Ints, step_mm: tuple[float, float], tolerance_mm: float) -> I
 
 
 def elbows(steps: Ints) -> Ints:
-    """Return (N,) b·d of lines of (N, 2) steps: what their elbow takes of the reach."""
+    """Return (N,) b·d of lines of (N, 2) steps: the part of the reach that the elbow of a single
+    record takes."""
     size = np.abs(steps)
     shorter = size.min(axis=1, initial=np.iinfo(np.int64).max)
     return np.asarray(shorter * (size.max(axis=1, initial=0) - shorter))
@@ -71,7 +72,7 @@ class StepLine(Struct, frozen=True):
     def pieces(self, max_steps: int) -> list[tuple[int, int]]:
         """Split the line into records and return the steps (dx, dy) of each, in order.
 
-        They add up to the whole line; none has more than `max_steps` steps along an axis.
+        Their sum is the whole line; no record has more than `max_steps` steps along an axis.
         """
         long, shorter = max(abs(self.dx), abs(self.dy)), min(abs(self.dx), abs(self.dy))
         x_is_long = abs(self.dx) >= abs(self.dy)
@@ -84,7 +85,8 @@ class StepLine(Struct, frozen=True):
         return pieces
 
     def _even_runs(self, diagonals: int, singles: int, max_steps: int) -> list[tuple[int, int]]:
-        """Return the fewest records that are found, as near to the line as so many can be."""
+        """Return the fewest records that are found, moved as close to the line as that number of
+        records allows."""
         if self.reach == FREE:
             return _runs(diagonals, singles, diagonals * singles, max_steps)
         runs = _runs(diagonals, singles, self.reach, max_steps)
@@ -98,7 +100,8 @@ class StepLine(Struct, frozen=True):
 
 
 def _runs(diagonals: int, singles: int, reach: int, max_steps: int) -> list[tuple[int, int]]:
-    """Records as (diagonal steps, single steps), each run as long as the reach allows."""
+    """Return the line as records of (diagonal steps, single steps), each run as long as the reach
+    allows."""
     # Comparisons, not `min`: long lines have hundreds of records, and this is half of the time.
     value, diagonals_left, singles_left = 0, diagonals, singles
     runs = []

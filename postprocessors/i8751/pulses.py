@@ -62,7 +62,8 @@ class Firmware(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return 1 if self.first_pulse == "repeats" else 0
 
     def pulses(self, steps: Ints) -> Ints:
-        """Return pulses that steps of either sign take, of any shape."""
+        """Return the number of pulses for these steps, which may have either sign and any
+        shape."""
         return np.where(steps != 0, np.abs(steps) + self.lost_pulses, 0)
 
 
@@ -81,14 +82,14 @@ class PulseTimes:
         self._ramp_s = float(periods[:-1].sum())
 
     def alone_s(self, steps: Ints) -> Floats:
-        """Return (N,) s for moves of one motor by `steps` (N,)."""
+        """Return (N,) seconds of moves of one motor by `steps` (N,)."""
         return self._run_s(self._firmware.pulses(steps))
 
     def legs_s(self, steps: Ints) -> Floats:
-        """Return (N, 2) s for records of `steps` (N, 2): both motors together, and one alone.
+        """Return (N, 2) seconds of records of `steps` (N, 2): of both motors together, and of one
+        alone.
 
-        Where one ramp serves both ("flows"), each has the part of the time that it has of the
-        pulses.
+        Where one ramp covers both ("flows"), the time is divided in proportion to the pulses.
         """
         pulses = self._firmware.pulses(steps)
         shorter, longer = pulses.min(axis=1), pulses.max(axis=1)
@@ -100,8 +101,9 @@ class PulseTimes:
         return np.column_stack([both_s, longer_s - both_s])
 
     def around(self, steps: Ints, number: Ints) -> tuple[Floats, Floats]:
-        """Return s (K,) of the pulses without a step right before the steps `number` (K,), counted
-        from 0, of records of `steps` (K, 3) ≥ 0; and s (K,) of the delay behind each."""
+        """Return two arrays (K,) of seconds for the steps `number` (K,), counted from 0, of
+        records of `steps` (K, 3) ≥ 0: the pulses without a step right before each, and the delay
+        behind it."""
         x, y, z = steps.T
         both, longer = np.minimum(x, y), np.maximum(x, y)
         flows = self._firmware.elbow == "flows"
@@ -117,7 +119,8 @@ class PulseTimes:
         return before_s, self._delays_s(pulse + lost, total)
 
     def _delays_s(self, pulse: Ints, total: Ints) -> Floats:
-        """Return the delays (K,), s, behind pulses, counted from 0, of runs of `total` (K,)."""
+        """Return (K,) seconds of delay behind the pulses `pulse` (K,), counted from 0, in runs of
+        `total` (K,) pulses."""
         if self._firmware.high_byte == "255":
             in_bursts = total // BURST_PULSES * BURST_PULSES
             total = np.where(pulse < in_bursts, BURST_PULSES, total - in_bursts)
@@ -126,7 +129,7 @@ class PulseTimes:
         return self.periods_s[np.where(total < 2 * RAMP_PULSES, 0, ramp)]
 
     def _run_s(self, pulses: Ints) -> Floats:
-        """Return the times (N,), s, of runs of so many pulses (N,), each with its ramps."""
+        """Return (N,) seconds of runs of `pulses` (N,), each with its ramps."""
         if self._firmware.high_byte == "256":
             return self._burst_s(pulses)
         bursts = pulses // BURST_PULSES
@@ -134,7 +137,7 @@ class PulseTimes:
         return np.asarray(bursts * burst_s + self._burst_s(pulses - BURST_PULSES * bursts))
 
     def _burst_s(self, pulses: Ints) -> Floats:
-        """Return the times (N,), s, of so many pulses (N,) with one ramp up and one down, which
-        there are from 90 pulses on."""
+        """Return (N,) seconds of runs of `pulses` (N,) with one ramp up and one down; only runs of
+        90 pulses and more have ramps."""
         ramped = 2.0 * self._ramp_s + (pulses - 2 * RAMP_PULSES) * self.periods_s[-1]
         return np.asarray(np.where(pulses < 2 * RAMP_PULSES, pulses * self.periods_s[0], ramped))

@@ -79,8 +79,8 @@ def read_program(data: bytes, machine: I8751Machine) -> Toolpath:
 
 
 def read_packet(records: bytes, machine: I8751Machine, start_steps: Ints) -> Toolpath:
-    """Return the moves of the records of one packet, of a machine that stands `start_steps`
-    (3,) steps from part zero; ProgramError as `read_program`."""
+    """Return the moves of the records of one packet for a machine that stands at `start_steps`
+    (3,), counted from part zero; ProgramError as `read_program`."""
     stream = bytes([ACCESS]) + records + bytes([PACKET_END, DATA_END])
     return _toolpath(_read_packets(stream, machine.dialect), machine, start_steps)
 
@@ -114,8 +114,8 @@ def _read_packets(data: bytes, dialect: I8751Dialect) -> Decoded:
 
 
 def _toolpath(decoded: Decoded, machine: I8751Machine, start_steps: Ints) -> Toolpath:
-    """Return rows of all records, then END; the first begins `start_steps` (3,) steps from part
-    zero."""
+    """Return the rows of all records, then END; the first begins at `start_steps` (3,), counted
+    from part zero."""
     dialect = machine.dialect
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
     x, y, z = (start_steps * step_mm).tolist()
@@ -152,8 +152,8 @@ def _toolpath(decoded: Decoded, machine: I8751Machine, start_steps: Ints) -> Too
 
 
 def _kinds(ends: Ints, steps: Ints, slot: Ints, *, goes_below: bool) -> Ints:
-    """RAPID or LINE for each row, by where it runs; waits are whatever comes out. `goes_below`:
-    whether the program goes below part zero."""
+    """Return RAPID or LINE for each row by where it runs; the value for waits has no meaning.
+    `goes_below`: true if the program goes below part zero; otherwise all rows are LINE."""
     if not goes_below:
         return np.full(len(ends), np.int64(Kind.LINE))
     is_z = slot >= 2
@@ -164,7 +164,7 @@ def _kinds(ends: Ints, steps: Ints, slot: Ints, *, goes_below: bool) -> Ints:
 
 
 def _feeds(steps: Ints, step_mm: Floats, times: PulseTimes) -> list[Floats]:
-    """Return feeds (R,) in X and Y, and in Z, mm/min; NaN where nothing moves."""
+    """Return the feeds (R,) in X and Y and those (R,) in Z, mm/min; NaN where nothing moves."""
     travel_xy = np.hypot(*(steps[:, :2] * step_mm[:2]).T)
     travel_z = np.abs(steps[:, 2]) * step_mm[2]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -175,7 +175,7 @@ def _feeds(steps: Ints, step_mm: Floats, times: PulseTimes) -> list[Floats]:
 
 
 def _two_ways(decoded: Decoded, dialect: I8751Dialect) -> Iterator[Finding]:
-    """READ_TWO_WAYS: runs with a high byte, whose unit is 256 steps or 255."""
+    """Yield READ_TWO_WAYS if runs have a high byte, whose unit may be 256 steps or 255."""
     if dialect.long_runs:
         return
     count, record, totals = 0, -1, np.zeros(3, dtype=np.int64)
@@ -222,7 +222,7 @@ class PacketReader:
         """Count of the records of the packet read so far."""
 
     def read(self) -> Decoded:
-        """Return all records of the stream."""
+        """Read the stream to its end and return all records."""
         self._take_key()
         while True:
             self._records_in_a_row()
@@ -240,7 +240,8 @@ class PacketReader:
         return Decoded(table[:, : packets.BEFORE], table[:, packets.BEFORE :])
 
     def _records_in_a_row(self) -> None:
-        """All records up to the first that is none, or to where packets end."""
+        """Read records, by the compiled loop, up to the first bytes that are none or to where the
+        packets end."""
         dialect = self._dialect
         octets = np.frombuffer(self._data, dtype=np.uint8)
         table = np.empty((RECORDS_AT_ONCE, packets.COLUMNS), dtype=np.int64)
@@ -263,7 +264,8 @@ class PacketReader:
             check_count(self._records, "record")
 
     def _peek(self, expected: str) -> int:
-        """Return the byte here; a fault when there is none."""
+        """Return the next byte without moving on; a fault that names what was `expected` when
+        there is none."""
         if self._at >= len(self._data):
             raise self._fault(self._at, f"the program breaks off: wanted {expected}")
         return self._data[self._at]
@@ -276,7 +278,7 @@ class PacketReader:
         self._at += 1
 
     def _refuse_record(self, byte: int) -> NoReturn:
-        """Raise ByteFault at the first byte that keeps a record from being one."""
+        """Raise ByteFault at the first byte that does not fit into a record."""
         if self._inside == RECORDS_PER_PACKET:
             raise self._fault(
                 self._at,
@@ -330,7 +332,7 @@ class PacketReader:
 
 
 def replies(data: bytes, decoded: Decoded, dialect: I8751Dialect) -> list[str]:
-    """Return the expected reply of the controller to each byte of a decoded stream."""
+    """Return the reply that the controller gives to each byte of a decoded stream."""
     to_wait = dialect.dwell_replies
     standing = [dialect.motor_reply, "M"]
     moving = [dialect.motor_reply, "M", "M", "M"]
@@ -387,7 +389,7 @@ class ListingReader:
         self._line = 0
 
     def read(self, data: bytes) -> Decoded:
-        """Return all records of a listing."""
+        """Read a listing and return all records."""
         check_count(_line_ends(data), "line")
         lines = text_lines(data)
         is_ended = False
@@ -423,7 +425,7 @@ class ListingReader:
         self._numbers.extend((*steps, *waits))
 
     def _whole_steps(self, text: str, axis: int, column: int) -> int:
-        """Return a distance in steps, half a step away from zero."""
+        """Return a distance as whole steps, half a step rounded away from zero."""
         exact = abs(float(text)) / self._step_mm[axis]
         steps = math.floor(exact + 0.5)
         if steps > self._most:
@@ -461,7 +463,7 @@ class ListingReader:
         return self._error(indent + column, f"{quote_line(text)}: wanted {expected}", mend)
 
     def _error(self, column: int, message: str, mend: str) -> ProgramError:
-        """ProgramError in the present line at a column from 0."""
+        """Return ProgramError for a column (from 0) of the current line."""
         record = len(self._numbers) // len(_WORDS) + 1
         where = f"record {record}, line {self._line}, column {column + 1}"
         return ProgramError(message, where=where, mend=mend)
@@ -513,7 +515,7 @@ def read_dump(data: bytes, dialect: I8751Dialect) -> Decoded:
 
 
 def _runs(lines: list[str]) -> tuple[list[_Run], bytes]:
-    """Return the lines with bytes, and all bytes in order."""
+    """Return the runs of bytes by line, and all bytes in order."""
     runs: list[_Run] = []
     stream = bytearray()
     for number, line in enumerate(lines, 1):
@@ -536,7 +538,8 @@ def _runs(lines: list[str]) -> tuple[list[_Run], bytes]:
 
 
 def _bytes(text: str) -> bytes:
-    """Pairs of hex digits with blanks between them; b"" when it is no such text."""
+    """Return the bytes of a text of hex digit pairs with blanks between them; b"" for any other
+    text."""
     try:
         return bytes.fromhex(text)
     except ValueError:
@@ -544,7 +547,7 @@ def _bytes(text: str) -> bytes:
 
 
 def _line_error(number: int, line: str) -> ProgramError:
-    """Return the error for a line that is no line of a hex dump, with the column of its first
+    """Return the error for a line that is not a line of a hex dump, with the column of its first
     wrong character."""
     offset = re.match(r"[0-9A-Fa-f]{4,8}(?=[ \t]|$)", line)
     column = 1
@@ -560,7 +563,8 @@ def _line_error(number: int, line: str) -> ProgramError:
 
 
 def _place_by_offset(fault: ByteFault, runs: list[_Run], lines: list[str]) -> ProgramError:
-    """Return the fault of a byte with the line and column in which the byte stands."""
+    """Return a fault at a byte offset as ProgramError with the line and column of that byte in the
+    dump."""
     run = runs[bisect_right([run.offset for run in runs], fault.offset) - 1]
     inside = fault.offset - run.offset
     column = run.column
@@ -576,7 +580,8 @@ def _place_by_offset(fault: ByteFault, runs: list[_Run], lines: list[str]) -> Pr
 
 
 def _check_replies(runs: list[_Run], expected: list[str]) -> None:
-    """Replies that a comment states, other than ?, must be those of the protocol."""
+    """Raise ProgramError where a comment states a reply, other than ?, that the protocol does not
+    give."""
     for run in runs:
         stated = _REPLIES.search(run.comment)
         if not stated:
@@ -610,7 +615,7 @@ def text_lines(data: bytes) -> list[str]:
 
 
 def _line_ends(data: bytes) -> int:
-    """Return the number of lines that end, whether they end with CR, LF or both."""
+    """Return the number of line ends, be they CR, LF or CR LF."""
     return max(data.count(b"\n"), data.count(b"\r"))
 
 

@@ -37,7 +37,7 @@ REFUSED: Final = {
 
 
 def check_toolpath(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect) -> None:
-    """Raise PostError for the first row that this machine cannot do."""
+    """Raise PostError for the first row that this machine cannot execute."""
     refuse_start(toolpath)
     _check_events(toolpath)
     _check_coordinates(toolpath, machine)
@@ -182,7 +182,8 @@ def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect)
 def _lower(
     toolpath: Toolpath, step_mm: float, dialect: I8751Dialect, counts: Counts
 ) -> tuple[Toolpath, Ints]:
-    """Return lines of XY or Z only, and the row of the toolpath that each came from."""
+    """Return the toolpath as lines of XY or of Z only, and the row of the given toolpath that each
+    came from; count what was changed."""
     two_lines = helices_to_steps(toolpath, step_mm)
     # A rapid in two parts is as good as one; a cut in steps is another cut.
     cut = (np.bincount(two_lines.row, minlength=len(toolpath)) > 1) & toolpath.is_feed
@@ -196,7 +197,7 @@ def _lower(
 
 
 def _nearest_steps(toolpath: Toolpath, machine: I8751Machine) -> Ints:
-    """Return (N, 3) ends in whole steps, half away from zero."""
+    """Return the ends (N, 3) in whole steps, half away from zero."""
     scaled = toolpath.end / np.array([axis.coded_step_mm for axis in machine.axes])
     return np.asarray((np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64))
 
@@ -231,7 +232,8 @@ def _cut_rows(
 
 
 def _refuse_too_many(each: Floats) -> None:
-    """Raise PostError for rows (N,) that need about so many records, or more."""
+    """Raise PostError if the rows together need more records than a program may have; `each` (N,):
+    a lower bound of each row's number."""
     total = float(np.maximum(each, 1.0).sum())
     if total > MAX_RECORDS:
         raise PostError(
@@ -248,8 +250,8 @@ def _split_long(steps: int, max_steps: int) -> list[int]:
 
 
 def _with_x_steps(steps: Ints) -> Ints:
-    """Return records in which Z never moves alone: X goes one step aside, and back in the next
-    record.
+    """Return records in which Z never moves alone: X makes one step aside, and goes back in the
+    next record.
 
     Only for controllers that take no record in which both X and Y stand still (the thesis shows
     none). The step aside is taken back as soon as a record moves X or Y anyway, or at the end.
@@ -278,8 +280,8 @@ class _Plain(Struct, frozen=True, eq=False):
     def with_waits(self, row: Ints, first: Ints) -> Records:
         """Return the records with waits, messages and end; `first` (N,) is the record of each row.
 
-        A wait follows in T2 of the record before it; what that cannot hold, or what comes before
-        the first record, goes into records of their own that move nothing.
+        A wait follows in T2 of the record before it. What exceeds T2, or comes before the first
+        record, goes into additional records that move nothing.
         """
         if not len(self.steps):
             raise PostError(
@@ -331,7 +333,7 @@ class _Plain(Struct, frozen=True, eq=False):
         )
 
     def _whole_seconds(self, index: int) -> int:
-        """Return a dwell rounded up: it is at least as long as wanted."""
+        """Return a dwell in whole seconds, rounded up so that it is never shorter than wanted."""
         seconds = float(self.lowered.value[index])
         self.counts.dwells_rounded += seconds != math.floor(seconds)
         return math.ceil(seconds)

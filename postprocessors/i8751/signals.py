@@ -29,7 +29,7 @@ class I8751Signals(SignalModel):
     """The coils of M1, M2 and M3."""
 
     def board(self, machine: _Machine) -> Board:
-        """Return the lines of the three motors."""
+        """Return the coil lines of the three motors."""
         backward = machine.dialect.plus_backward.upper()
         lines = "coil1", "coil2", "coil3", "coil4"
         return Board(
@@ -50,7 +50,7 @@ class I8751Signals(SignalModel):
         )
 
     def pulses(self, toolpath: Toolpath, machine: _Machine) -> Iterator[Pulses]:
-        """Yield the pulses with their ramps."""
+        """Yield the motor pulses, with the ramps of their rate."""
         model = I8751Model()
         chunks = model.run(toolpath, machine, OUTPUTS)
         return row_pulses(chunks, model.clock(toolpath, machine), toolpath)

@@ -12,7 +12,7 @@ from .write import END_OF_DATA, byte_table, packet_bytes
 
 
 def stream_of(data: bytes, machine: I8751Machine) -> bytes:
-    """Return the program as packets; ProgramError as its reader has it."""
+    """Return the program as packets; ProgramError as for its reader."""
     dialect = machine.dialect
     if dialect.format == "packets":
         return data
@@ -21,8 +21,8 @@ def stream_of(data: bytes, machine: I8751Machine) -> bytes:
 
 
 def listing(data: bytes, machine: I8751Machine) -> Listing:
-    """Return the bytes of each record in hex, then the end of the data; whatever the form of
-    the file."""
+    """Return the bytes of each record in hex, then those of the end of the data, whatever the form
+    of the file."""
     dialect = machine.dialect
     decoded = decoded_records(data, machine)
     end = f"{END_OF_DATA:02X}"

@@ -98,8 +98,8 @@ class I8751Twin(Twin):
             self._next_record()
 
     def _to_origin(self) -> Iterator[tuple[Travel, int]]:
-        """Yield the motion of each motor to its opto, one motor after the other; one that covers
-        it already stands."""
+        """Yield the motion of each motor to its opto switch, one motor after the other; a motor
+        that already covers its switch stands still."""
         for axis, step_mm in enumerate(self._step_mm):
             place = self.slides.commanded_mm
             count = max(math.ceil((place[axis] - self._choices.origin_mm) / step_mm - 1e-9), 0)
@@ -134,7 +134,7 @@ class I8751Twin(Twin):
             self._out.append(DONE)
 
     def _key(self, octet: int) -> Generator[None, int, None]:
-        """Until it is the key."""
+        """Answer OTRO to each byte until the key comes, then LISTO."""
         end = LINE_ENDS[self._choices.line_end]
         while octet != ACCESS:
             self._out += b"OTRO" + end
@@ -143,7 +143,8 @@ class I8751Twin(Twin):
         self.commands.append(bytes([ACCESS]))
 
     def _packet(self) -> Generator[None, int, None]:
-        """Records, the first of which has begun, to the end of the packet."""
+        """Receive records, the first of which has begun, up to the end of the packet, and execute
+        them."""
         records: list[bytes] = []
         octet = 1
         while octet != PACKET_END:
@@ -155,7 +156,7 @@ class I8751Twin(Twin):
         self._execute(records)
 
     def _record(self) -> Generator[None, int, bytes]:
-        """Yield a record whose first byte has come."""
+        """Receive a record whose first byte has come; return its bytes."""
         record = bytearray()
         for motor in (1, 2, 3):
             if motor > 1:
@@ -187,7 +188,7 @@ class I8751Twin(Twin):
 
     @staticmethod
     def _receive_one_of(*octets: int) -> Generator[None, int, int]:
-        """Receive bytes up to the next of these."""
+        """Receive bytes until one of `octets` comes, and return it."""
         while (octet := (yield)) not in octets:
             pass
         return octet
@@ -195,8 +196,8 @@ class I8751Twin(Twin):
     # What is executed.
 
     def _execute(self, records: list[bytes]) -> None:
-        """Begin with the first record; nothing, not even F, comes of a motor that turns for 0
-        steps."""
+        """Begin with the first of these records. Records that cannot be decoded, as those of a
+        motor that turns for 0 steps, do nothing: the controller does not even answer F."""
         start_steps = np.rint(self.slides.commanded_mm / self._step_mm).astype(np.int64)
         try:
             path = read_packet(b"".join(records), self._machine, start_steps)
@@ -209,7 +210,7 @@ class I8751Twin(Twin):
         self._next_record()
 
     def _travels(self, path: Toolpath, block: int, count: int) -> Iterator[tuple[Travel, int]]:
-        """Yield the motion of each record, and its index."""
+        """Yield the motion of each record, and the record's index."""
         edges = np.searchsorted(path.block, np.arange(count + 1))
         for index, (low, high) in enumerate(pairwise(edges.tolist())):
             rows = path.part(low, high)

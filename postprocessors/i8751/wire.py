@@ -109,8 +109,8 @@ class I8751Wire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> I8751Conversation:
-        """Return a jog is a program of its steps; the machine has one speed. To home is a
-        program of nothing, behind a reset."""
+        """Return the conversation of a jog: a program of its steps, at the machine's only speed.
+        Homing is an empty program behind a reset."""
         if action == "home":
             return self._homing(machine, manner)
         if action != "jog":
@@ -131,8 +131,8 @@ class I8751Wire(Wire):
         return I8751Conversation(packets, machine, manner)
 
     def _homing(self, machine: I8751Machine, manner: Manner) -> I8751Conversation:
-        """Return the conversation with a controller that seeks its optos at a reset (L5267-5338):
-        it takes the key when it has found them."""
+        """Return the conversation with a controller that seeks its opto switches after a reset
+        (L5267-5338): it takes the key when it has found them."""
         assert isinstance(machine.link, I8751Link)
         if machine.link.homing == "none":
             raise MachineError(
@@ -173,14 +173,15 @@ class I8751Terminal(Terminal):
     _WORDS: Final = re.compile(f"{READY}|{AGAIN}|.")
 
     def encode(self, line: str) -> bytes:
-        """Return the bytes of hex digits; other text as everywhere."""
+        """Return the bytes of hex digits; other text is encoded as for all wires."""
         try:
             return bytes.fromhex(line)
         except ValueError:
             return self.unescape(line)
 
     def decode(self, data: bytes) -> list[str]:
-        """Return all letters and the meaning of the last one; an unfinished word is kept."""
+        """Return all letters and the meaning of the last one; the beginning of an unfinished word
+        is kept for later."""
         text = "".join((self._rest + data).decode("latin-1").split())
         self._rest = b""
         if any(word.startswith(text) and word != text for word in (READY, AGAIN)):
@@ -190,7 +191,7 @@ class I8751Terminal(Terminal):
         return [self._with_meaning(" ".join(words).encode("latin-1"))] if words else []
 
     def meaning(self, line: str) -> str:
-        """Explain the last word."""
+        """Return the meaning of the last word received."""
         return self.MEANINGS.get(line.rpartition(" ")[2], "")
 
 
@@ -203,7 +204,8 @@ class _Part(Struct, frozen=True):
 
 
 def _parts(stream: bytes, machine: I8751Machine) -> Iterator[_Part]:
-    """Yield the packets of a stream that its reader accepts, or that the writer has made."""
+    """Yield the packets of a stream in which the reader has found no fault, or that the writer has
+    made."""
     dialect: I8751Dialect = machine.dialect
     assert isinstance(machine.link, I8751Link)
     begin = offset = records = 0
@@ -242,7 +244,8 @@ class I8751Conversation(PacketByPacket):
         *,
         homing_s: float = 0.0,
     ) -> None:
-        """`homing_s`: how long it may seek its origin before it takes the key, s."""
+        """Begin before the first packet. `homing_s`: the time that the machine may seek its origin
+        before it takes the key, s."""
         super().__init__(packets, manner)
         self._homing_s = homing_s
         self._homed_by_s = NEVER
@@ -261,7 +264,7 @@ class I8751Conversation(PacketByPacket):
 
     @property
     def _seeks_origin(self) -> bool:
-        """True while the key is not answered since the machine may home."""
+        """True until the key is answered, while the machine may still be homing."""
         return self._homing_s > 0.0 and self.sent <= 1 and self._at == 0
 
     def _send(self, packet: Packet, now: float) -> None:
@@ -298,7 +301,7 @@ class I8751Conversation(PacketByPacket):
         return self._packet_replies[self._at]
 
     def receive(self, data: bytes, now: float) -> None:
-        """Handle the reply to the byte just sent; line ends are passed over."""
+        """Handle the reply to the byte just sent; line ends are ignored."""
         text = "".join(data.decode("latin-1").split())
         if self.is_over or not text:
             return
@@ -355,7 +358,7 @@ class I8751Conversation(PacketByPacket):
             self._send_byte(now)
 
     def tick(self, now: float) -> None:
-        """Send the next byte where no reply was awaited; fail where one has not come."""
+        """Send the next byte where no reply is expected; fail where a reply is overdue."""
         if self.is_over or not self._busy or now < self.next_s:
             return
         if self._reply in (ANY, NONE):
@@ -366,7 +369,7 @@ class I8751Conversation(PacketByPacket):
             self._fail(f"no reply, {self._reply} was awaited{self._in_reply}", now)
 
     def _halt(self, now: float, *, unsent: bool) -> bool:
-        """Send nothing more: a packet that is not complete is never executed."""
+        """Send nothing more: an incomplete packet is never executed."""
         if self._executes and not unsent:
             return False
         if self._seeks_origin:

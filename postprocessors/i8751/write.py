@@ -126,7 +126,7 @@ def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
 
 
 def packet_bytes(steps: Ints, waits: Ints, dialect: I8751Dialect) -> bytes:
-    """Return the whole stream that the computer sends for records of steps (R, 3) and waits (R,
+    """Return the whole stream that the computer sends for R records: steps (R, 3) and waits (R,
     2)."""
     parts = []
     for low in range(0, len(steps), RECORDS_AT_ONCE):
@@ -138,8 +138,8 @@ def packet_bytes(steps: Ints, waits: Ints, dialect: I8751Dialect) -> bytes:
 
 
 def byte_table(steps: Ints, waits: Ints, dialect: I8751Dialect) -> tuple[Bytes, Bools]:
-    """Return (R, COLUMNS) bytes of records of steps (R, 3) and waits (R, 2), and which are
-    sent."""
+    """Return the bytes (R, COLUMNS) of records of steps (R, 3) and waits (R, 2), and a mask of
+    those that are sent."""
     count = len(steps)
     table = np.zeros((count, COLUMNS), dtype=np.uint8)
     is_used = np.ones((count, COLUMNS), dtype=np.bool_)
@@ -165,7 +165,8 @@ def byte_table(steps: Ints, waits: Ints, dialect: I8751Dialect) -> tuple[Bytes, 
 
 
 def _high_low(steps: Ints, dialect: I8751Dialect) -> tuple[Ints, Ints]:
-    """PH and PL of each motor's pulses; where PH counts 255, 255 pulses are PL alone."""
+    """Return PH and PL of each motor's pulses. Where PH counts units of 255, 255 pulses are
+    written with PL alone."""
     pulses = np.abs(steps) + dialect.lost_pulses
     unit = dialect.high_byte_steps
     high = np.maximum(pulses - (256 - unit), 0) // unit
@@ -173,7 +174,7 @@ def _high_low(steps: Ints, dialect: I8751Dialect) -> tuple[Ints, Ints]:
 
 
 def decimals_of(machine: I8751Machine) -> int:
-    """Decimals of mm that distinguish all steps of the machine."""
+    """Return the number of decimals of mm that distinguishes all steps of the machine."""
     finest = min(axis.coded_step_mm for axis in machine.axes)
     return max(MIN_DECIMALS, math.ceil(-math.log10(STEPS_PER_LAST_DIGIT * finest)))
 
@@ -227,7 +228,7 @@ class _Dump:
         self._table, self._used = byte_table(records.steps, records.waits, dialect)
 
     def parts(self) -> Iterator[tuple[bytes, str]]:
-        """Yield all runs in order."""
+        """Yield the runs of bytes in order, each with its meaning."""
         messages = list(self._records.messages)
         rows = [bytes(row) for row in self._table]
         for record, (row, steps) in enumerate(

@@ -71,12 +71,12 @@ class MatlabRouter(Target):
         return ticks
 
     def loop_keys(self, loop: SpeedLoop) -> dict[str, Any]:
-        """Return the keys of `[controller]` that say this loop."""
+        """Return the `[controller]` table that describes these motors and gains."""
         keys: dict[str, Any] = _controller().loop_keys(loop)
         return keys
 
     def signals(self) -> NoSignals:
-        """None; docs/signals.md."""
+        """Return `NoSignals`: speed loops have no step lines to show (docs/signals.md)."""
         return NoSignals(
             "its slaves turn DC motors by speed loops, with a voltage each 5 ms and no steps",
             "camtool preview --simulate FILE.html plays the places of its encoders",
@@ -85,8 +85,8 @@ class MatlabRouter(Target):
     def rest(
         self, data: bytes, machine: MatlabRouterMachine, first: int
     ) -> tuple[bytes, int] | None:
-        """Return the arrays from a line on: going home, to its start and down is what each job
-        does."""
+        """Return the program from line `first` on, and how many of its blocks bring the machine
+        there. No entry is needed: each job goes home, to its first point and down by itself."""
         from .wire import rest_of
 
         return rest_of(data, machine, first)

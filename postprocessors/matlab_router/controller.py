@@ -75,7 +75,7 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
     """The slaves of the Matlab router: a servo for each axis."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """Return the motion, chunk by chunk."""
+        """Return the motion in chunks."""
         return _Run(self.quantised(toolpath, machine), machine, options).run()
 
     samples_per_speed = 1
@@ -83,8 +83,8 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
     def timed(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> Iterator[TimedChunk]:
-        """Yield the motion at each tick; dwells and the numbers of a job on their way come
-        before."""
+        """Yield the motion with the times of its samples, one a tick. Dwells, and the transmission
+        of a job's numbers, pass before the samples of their row."""
         run = _Run(self.quantised(toolpath, machine), machine, options)
         ticks = 0
         for chunk in run.run():
@@ -94,9 +94,9 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
             ticks += len(tick)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """Return the same with all ends on whole counts from home, homing at home. ProgramError
-        for arcs, which no slave has, and for what lies farther from home than the program can
-        say."""
+        """Return the toolpath with all ends on whole counts from home, and with homing at home.
+        Raise ProgramError for arcs, which the machine does not have, and for ends farther from
+        home than a program can say."""
         mend = "post the drawing for it: arcs become lines then"
         refuse(toolpath, toolpath.is_arc, "this machine has no arcs", mend)
         home = np.array(machine.controller.machine_zero_mm)
@@ -119,7 +119,7 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
         return max(step, max(fastest, rapid) / 60.0 * TICK_S)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Return each axis by itself, by its speed loop."""
+        """Return "servo": each axis follows its own speed loop."""
         return "servo"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -246,8 +246,9 @@ class _Run:
                 yield ServoTicks(at_s + self.standing_s[of_row], of_row, np.array(lines), *columns)
 
     def _ordered_motion(self) -> tuple[Floats, Floats, Floats]:
-        """Return (L, 3), (L, 3) where each line begins and its way, counts from home, and (L, 3)
-        its speeds with sign, counts in a tick; one line without motion where there is none."""
+        """Return for each of L lines, in counts on X, Y and Z: where it begins (from home) and its
+        travel, and its signed speed in counts per tick; all (L, 3). A program without motion gives
+        one line of zeros."""
         orders, path = self._lines.orders, self._path
         if not len(orders):
             return np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3))
@@ -259,8 +260,9 @@ class _Run:
         return start, end - start, np.sign(end - start) * speed
 
     def _chunk(self, span: tuple[int, int, int], row: Ints, count: Ints) -> Chunk:
-        """Return the samples of a chunk; `span`: rows up to the first are accounted for
-        already, those up to the second are complete, those up to the third have samples."""
+        """Return the samples of a chunk and the ledger of its rows. `span` holds three row
+        numbers: rows before the first are accounted for, rows before the second are complete, rows
+        before the third have samples here."""
         first, complete, last = span
         first = min(first, int(row[0])) if len(row) else first
         rows = np.arange(first, last)
@@ -387,7 +389,7 @@ def lines_of(path: Toolpath, rows: int, machine: _Machine) -> MasterOrders:
 
 
 def _to_int32(orders: Ints) -> Indices:
-    """Convert to 32 bits; MachineError for numbers that do not fit."""
+    """Convert orders to 32 bits; MachineError for numbers that do not fit."""
     if np.abs(orders).max(initial=0) > INT32:
         raise MachineError(
             "a position has more counts than 32 bits hold",
@@ -398,7 +400,7 @@ def _to_int32(orders: Ints) -> Indices:
 
 
 def _check(path: Toolpath, rows: int) -> None:
-    """Raise ProgramError for what cannot be followed."""
+    """Raise ProgramError for rows that the controller cannot follow."""
     running = np.arange(len(path)) < rows
     with np.errstate(invalid="ignore"):
         no_feed = path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
@@ -413,7 +415,7 @@ def _check(path: Toolpath, rows: int) -> None:
 
 
 def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
-    """Return the mask (R,) of the rows that go home: homing, and rapids that end there on all
+    """Return a mask (R,), true for rows that go home: homing, and rapids that end at home on all
     axes that move."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     distance = np.abs(path.end[: len(way_mm)] - np.array(machine.controller.machine_zero_mm))
@@ -424,8 +426,8 @@ def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
 
 
 def _are_tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
-    """Return the mask (L,) of those of the rows `first` that continue the line before them: one
-    axis of a line of the program goes on alone."""
+    """Return a mask (L,) over the rows `first`, true where a row only continues the program line
+    of the row before it, because one axis arrives later than the other."""
     block, travel = path.block[first], way_mm[first]
     flat = (path.kind[first] == Kind.LINE) & (travel[:, 2] == 0.0)
     tail = np.zeros(len(first), dtype=np.bool_)
@@ -436,8 +438,8 @@ def _are_tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
 
 
 def _axis_beyond(path: Toolpath, first: Ints, second: Ints, machine: _Machine) -> Ints:
-    """Return (L, 2) the axis that goes on after the end of the first of two rows, and its count
-    there; zeros for a single row."""
+    """Return (L, 2): the axis that goes on alone from the row `first` to the row `second`, and its
+    count from home at the end of `first`; zeros where both are the same row."""
     part = np.zeros((len(first), 2), dtype=np.int64)
     pairs = np.flatnonzero(first != second)
     axis = np.abs(path.end[second] - path.end[first])[pairs, :2].argmax(axis=1)
@@ -449,7 +451,7 @@ def _axis_beyond(path: Toolpath, first: Ints, second: Ints, machine: _Machine) -
 
 
 def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: _Machine) -> Ints:
-    """Return (L, 3) counts in a tick of the axes of the rows `first`."""
+    """Return the speeds (L, 3) of the axes in the rows `first`, counts per tick."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     travel = np.abs(way_mm[first])
     feed = path.feed[first] / (60.0 * TICKS_PER_S)
@@ -467,8 +469,9 @@ def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: _Machine) -> I
 
 
 def _speed_pairs(speeds: Floats) -> Ints:
-    """Return (K, 2) whole speeds whose squares have the same sum as those of `speeds` (K, 2), the
-    nearest within `PAIR_COUNTS`; each rounded where there are none."""
+    """Return (K, 2) integer speeds whose sum of squares equals that of `speeds` (K, 2) rounded:
+    the pair nearest to them within `PAIR_COUNTS`. Where there is no such pair, each speed is
+    rounded by itself."""
     total = np.rint((speeds**2).sum(axis=1))
     rounded = to_steps(speeds, 1.0)
     slow = speeds.argmin(axis=1)[:, None]
@@ -486,7 +489,8 @@ def _speed_pairs(speeds: Floats) -> Ints:
 
 
 def _axis_counts(way_mm: Floats, router: MatlabRouterController, machine: _Machine) -> Ints:
-    """Return (L, 3) chunks, or counts as the text has them; 0 where an axis does not move."""
+    """Return the distances (L, 3) that the slaves receive: chunks with the listing's program, else
+    counts of the encoder; 0 where an axis does not move."""
     units = to_steps(np.abs(way_mm), 1.0 / UNITS_PER_MM)
     if router.slaves == "listing":
         return np.asarray(np.where(units > 0, ((units // 2 - 1) & INT16) + 1, 0))
@@ -498,7 +502,8 @@ def _axis_counts(way_mm: Floats, router: MatlabRouterController, machine: _Machi
 
 
 def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: _Machine) -> Ints:
-    """Return (L,) ticks after which a line is given up."""
+    """Return (L,) ticks after which the simulation gives up waiting for the axes of a line to
+    arrive."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     router = machine.controller
     speed = np.where(amount < 0, np.array(router.home_counts), np.abs(ref))
@@ -509,8 +514,8 @@ def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: _Machine) -> Int
 
 
 def _ends(header: Bools, homing: Bools, machine: _Machine) -> Bools:
-    """Return (L,) lines that are the last of their job: the last cut, or, where the master
-    raises the tool and goes home behind it, that."""
+    """Return a mask (L,), true for the last line of each job: its last cut, or the way home behind
+    it where the master raises the tool at the end."""
     ends: Bools = ~header & np.append(header[1:], True)
     if dialect_of(machine).end == "raise":
         behind_cuts = np.cumsum(~header) > 0
@@ -521,15 +526,17 @@ def _ends(header: Bools, homing: Bools, machine: _Machine) -> Bools:
 
 
 def _pauses(header: Bools, ends: Bools, router: MatlabRouterController) -> Floats:
-    """Return (L,) s behind each line; negative behind the last of a job, since the next begins
-    by a reset of the master, which knows nothing of the slaves' ticks: on a tick, ours."""
+    """Return (L,) seconds of pause behind each line. Behind the last line of a job it is negative:
+    the next job begins after a reset of the master, which is not synchronous with the slaves'
+    ticks, and is simulated to begin on a tick."""
     pauses = np.where(header, router.pause_s, router.turnaround_s)
     settle = SETTLE_TAUS * max(router.time_constant_s)
     return np.where(ends, -np.maximum(settle, pauses), pauses)
 
 
 def _link(header: Bools, first: Ints, rows: int, router: MatlabRouterController) -> Floats:
-    """Return (R,) s of the numbers of each job, at the first row of its way home."""
+    """Return (R,) seconds that the transmission of each job's numbers takes, at the first row of
+    its way home; 0 in all other rows."""
     extra = np.zeros(rows)
     opens = np.flatnonzero(header & ~np.concatenate([[False], header[:-1]]))
     lines = np.add.reduceat(~header, opens) if len(opens) else np.zeros(0)
@@ -589,7 +596,7 @@ def servo_ticks(toolpath: Toolpath, machine: _Machine) -> Iterator[ServoTicks]:
 
 
 def loop_keys(loop: SpeedLoop) -> dict[str, Any]:
-    """Return the keys of `[controller]` that say this loop, its motors to 6 digits."""
+    """Return the `[controller]` table that describes these motors and gains, to 6 digits."""
     motors = loop.motors
     keys = {
         "plant_gain": [motor.speed_at(IDENTIFIED) / IDENTIFIED for motor in motors],
@@ -628,7 +635,7 @@ def program_of(orders: Indices, pauses_s: Floats, thin: Bools, machine: _Machine
 
 
 def state_of(start_mm: Floats, machine: _Machine) -> State:
-    """Return all motors at rest at a place."""
+    """Return the state of all motors at rest at a place (3,) mm."""
     router = machine.controller
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     place = np.rint((start_mm - np.array(machine.controller.machine_zero_mm)) * SIGNS / coded)
@@ -641,6 +648,6 @@ def state_of(start_mm: Floats, machine: _Machine) -> State:
 
 
 def account_of(rows: int) -> Account:
-    """Return the account of so many rows, none of which has been run yet."""
+    """Return the account of `rows` rows, none of which has been run yet."""
     steps, samples = np.zeros((rows, 3), dtype=np.int64), np.zeros(rows, dtype=np.int64)
     return Account(np.zeros(rows), steps, np.ones(rows, dtype=np.bool_), samples)

@@ -218,5 +218,6 @@ def dialect_of(machine: MatlabRouterMachine) -> ResolvedDialect:
 
 
 def cut_z_mm(machine: MatlabRouterMachine, dialect: ResolvedDialect) -> float:
-    """Z of every cut, mm in the work frame: the plunge always starts from home."""
+    """Return the Z of all cuts, mm in the work frame: the plunge has one length and always starts
+    from home."""
     return machine.controller.machine_zero_mm[2] - dialect.plunge_mm

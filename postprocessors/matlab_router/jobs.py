@@ -87,7 +87,8 @@ def fail(where: str, message: str, mend: str = "") -> NoReturn:
 
 
 def check_count(count: int, place_of: Where, dialect: ResolvedDialect) -> None:
-    """The master's arrays hold so many lines, and it does not look (L4625-4635)."""
+    """Raise ProgramError for a job without lines, or with more than the arrays of the master hold:
+    it does not check the number by itself (L4625-4635)."""
     if not 1 <= count <= dialect.max_lines:
         fail(
             place_of("size_of_array", 0, 0),
@@ -180,7 +181,8 @@ def read_text(data: bytes, dialect: ResolvedDialect) -> Iterator[ReadJob]:
 def _job_of_arrays(
     text: _Text, number: int, values: dict[str, _Value], dialect: ResolvedDialect
 ) -> ReadJob:
-    """Return the six values as one job, once they agree."""
+    """Return the six named values of the text as one job; ProgramError where they contradict each
+    other."""
     scalar = {name: int(values[name].table[0, 0]) for name in NAMES if name not in TABLES}
 
     def place_of(name: str, row: int, column: int) -> str:
@@ -261,7 +263,8 @@ class _Text:
         return self._where(value.offset)
 
     def name(self) -> tuple[str, str | None, int]:
-        """`name =` or `name{1} =`: the name, the number in braces, and where it stood."""
+        """Read `name =` or `name{1} =`: return the name, the number in braces, and the offset of
+        the name."""
         offset = self.at
         match = _NAME.match(self.text, offset)
         if match is None:
@@ -288,7 +291,7 @@ class _Text:
         self._finish(match.end())
 
     def table(self) -> _Value:
-        """Return numbers in brackets, in rows of one length, and the end of the statement."""
+        """Read numbers in brackets, in rows of equal length, and the end of the statement."""
         match = _ROWS.match(self.text, self.at)
         if match is None:
             self._fail_rows()
@@ -329,7 +332,7 @@ class _Text:
             self._int(match[0], match.start())
 
     def _int(self, word: str, offset: int) -> int:
-        """Return a word at an offset as a whole number."""
+        """Return the word at an offset as an integer; ProgramError where it is none."""
         if _TEXT_NUMBER.fullmatch(word) is None or abs(int(word)) > MAX_NUMBER:
             self.fail(offset, f"{word[:SHOWN_CHARS]!r} is no whole number of an int16")
         return int(word)
@@ -349,7 +352,8 @@ class _Text:
             self.fail(odd.start(), f"{self._quoted(odd.start())} stands in an array")
 
     def _finish(self, offset: int) -> None:
-        """Nothing but ; and a comment stands behind a value on its line."""
+        """Move behind the end of a statement; ProgramError where more than `;` and a comment
+        follows its value on the line."""
         match = _END.match(self.text, offset)
         if match is None:
             self.fail(offset, f"{self._quoted(offset)} stands behind a value")
@@ -444,7 +448,8 @@ def _fail_number(word: bytes, where: str) -> NoReturn:
 
 
 def _first_y(word: bytes, place: Callable[[int], str], dialect: ResolvedDialect) -> int:
-    """y of the first point; sent as a character, the master's atol makes its digit or 0 of it."""
+    """Return y of the first point. Sent as one character, it is what the master's atol makes of
+    it: a digit's value, else 0."""
     if dialect.first_y == "character":
         if len(word) != 1:
             fail(
@@ -486,7 +491,8 @@ def listing(data: bytes, machine: MatlabRouterMachine) -> Listing:
 
 
 def _arrays(job: ReadJob) -> list[str]:
-    """Return the first point, then a column of `xy`, `lxy` and `velxy` for each line."""
+    """Return the first point of a job, then one column of `xy`, `lxy` and `velxy` for each line,
+    as text."""
     x, y = job.first.tolist()
     points = (job.first[:, None] + job.steps.cumsum(axis=1)).T.tolist()
     lengths, speeds = job.length.T.tolist(), job.speed.T.tolist()
@@ -504,8 +510,7 @@ def _arrays(job: ReadJob) -> list[str]:
 
 
 def _words_of(data: bytes, jobs: Iterator[ReadJob]) -> Iterator[list[str]]:
-    """Yield the numbers of each job as they are sent; a character that cannot be shown as its
-    code."""
+    """Yield for each job the numbers of the stream as text; unprintable characters are escaped."""
     escaped = data.decode("latin-1").encode("unicode_escape").decode("ascii")
     words = escaped.split(r"\r")
     begin = 0
@@ -516,7 +521,7 @@ def _words_of(data: bytes, jobs: Iterator[ReadJob]) -> Iterator[list[str]]:
 
 
 def _stream_numbers(words: list[str]) -> list[str]:
-    """Yield the header, then the four numbers of each line."""
+    """Return the header of a job, then the four numbers of each line, one text each."""
     count = int(words[0])
     body = words[len(HEADER) :]
     head = (f"{name} {word}" for name, word in zip(HEADER, words, strict=False))

@@ -92,7 +92,7 @@ class Jobs(Struct, frozen=True, eq=False):
 def jobs_of(
     cuts: CutLines, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: ResolvedDialect
 ) -> tuple[Jobs, LineChanges]:
-    """Return the jobs, and what was changed for them.
+    """Return the jobs and the counts of what was changed to make them.
 
     PostError for what lies outside of the area or has a feed that cannot be written.
     """
@@ -123,8 +123,8 @@ class _Maker:
         return self._straight(self._mend(self._on_grid(cuts)))
 
     def _on_grid(self, cuts: CutLines) -> SlaveLines:
-        """Return vertices at the nearest point of the grid, the first one of a stroke not
-        nearer to home than a chunk; PostError for those outside the area."""
+        """Return the lines with each vertex at the nearest point of the grid, the first vertex of
+        a stroke at least one chunk away from home; PostError for vertices outside the area."""
         grid, count = self._dialect.grid_units, len(cuts.row)
         rows = np.concatenate([cuts.row, cuts.row])
         exact = (np.concatenate([cuts.start, cuts.end]) - self._zero) * UNITS_PER_MM
@@ -169,7 +169,7 @@ class _Maker:
         return f"use --origin lower-left, or --set controller.machine_zero_mm=[{place}]"
 
     def _mend(self, lines: SlaveLines) -> SlaveLines:
-        """Remove distances of 1 and lines of no length."""
+        """Return the lines without distances of 1 unit and without lines of no length."""
         if (np.abs(lines.end - lines.start) == 1).any():
             lines = self._without_ones(lines)
         keep = (lines.end != lines.start).any(axis=1)
@@ -181,8 +181,8 @@ class _Maker:
         return lines.chosen(keep)
 
     def _without_ones(self, lines: SlaveLines) -> SlaveLines:
-        """Move a vertex that lies one unit from the one before it (in X or Y) onto it; each vertex
-        moves from its own place, so that no error adds up."""
+        """Return the lines with each vertex that lies one unit (in X or Y) from the vertex before
+        it moved onto it. Each vertex moves from its own place, so errors do not add up."""
         starts, ends, strokes = lines.start.tolist(), lines.end.tolist(), lines.stroke.tolist()
         for line, end in enumerate(ends):
             if line and strokes[line] == strokes[line - 1]:
@@ -194,8 +194,8 @@ class _Maker:
         return replace(lines, start=np.array(starts), end=np.array(ends))
 
     def _majors(self, lines: SlaveLines) -> tuple[Ints, Floats, Ints]:
-        """Return distances (L, 2); the larger of each line as a float (L,); its speed in counts
-        (L,)."""
+        """Return the distances (L, 2) of the lines, the larger of the two (L,) as floats, and the
+        speed of that axis (L,), counts in 5 ms."""
         distance = np.abs(lines.end - lines.start)
         larger = distance.max(axis=1).astype(np.float64)
         slant = np.hypot(*distance.T) / larger
@@ -227,8 +227,9 @@ class _Maker:
             )
 
     def speeds(self, lines: SlaveLines) -> Ints:
-        """Return (L, 2) signed counts: the larger distance at its speed, the other one in
-        proportion, by the same operations as the listing (L4444-4515) so that ties fall alike."""
+        """Return the signed speeds (L, 2), counts in 5 ms: the axis with the larger distance at
+        the speed of the line, the other one in proportion, by the same operations as in the
+        listing (L4444-4515) so that ties round alike."""
         distance, larger, counts = self._majors(lines)
         with np.errstate(divide="ignore"):
             factor = larger[:, None] / distance
@@ -238,7 +239,8 @@ class _Maker:
         return np.asarray(np.where(lines.end < lines.start, -speed, speed))
 
     def _straight(self, lines: SlaveLines) -> SlaveLines:
-        """Return lines that whole speeds would bend too much, or stop, in pieces."""
+        """Return the lines, those split into pieces whose rounded speeds would bend them beyond
+        the tolerance or stop an axis."""
         distance, larger, counts = self._majors(lines)
         limits = LineLimits(
             self._dialect.bend_tolerance_mm * UNITS_PER_MM, self._dialect.grid_units, self._least
@@ -264,7 +266,7 @@ class _Maker:
         return SlaveLines(start, end, lines.feed[source], lines.row[source], lines.stroke[source])
 
     def offsets(self, lines: SlaveLines) -> list[int]:
-        """Return the index of each job's first line, and the number of all lines."""
+        """Return the index of each job's first line, then the number of all lines."""
         count = len(lines.row)
         if count == 0:
             return [0]
@@ -279,8 +281,8 @@ class _Maker:
         return [*offsets, count]
 
     def _cut_at(self, lines: SlaveLines, first: int, last: int) -> int:
-        """Return the end of the job that begins with this line: at most `max_lines` on, and at a
-        vertex from which the next job can begin."""
+        """Return the end of the job that begins with line `first`: at most `max_lines` later, and
+        at a vertex from which the next job can begin."""
         max_end = first + self._dialect.max_lines
         if max_end >= last:
             return last
@@ -317,7 +319,8 @@ class LineLimits(Struct, frozen=True):
 
 
 def bends(larger: Floats, smaller: Ints, counts: Ints, tolerance: float) -> Bools:
-    """Return (n,) which lines stop (v = 0) or bend by more than the tolerance (units)."""
+    """Return a mask (n,), true for lines that stop (an axis has speed 0) or bend by more than
+    `tolerance` units."""
     slanted = smaller > 0
     exact = counts * smaller / larger
     rounded = np.floor(exact + 0.5)
@@ -330,7 +333,8 @@ def bends(larger: Floats, smaller: Ints, counts: Ints, tolerance: float) -> Bool
 def split_line(
     start: list[int], end: list[int], counts: int, limits: LineLimits
 ) -> list[list[int]]:
-    """Return the ends of the pieces of one line from `start` to `end` (x, y), its own end last."""
+    """Return the ends (x, y) of the pieces into which the line from `start` to `end` is split; the
+    last is its own end."""
     travel = (end[0] - start[0], end[1] - start[1])
     major = 0 if abs(travel[0]) >= abs(travel[1]) else 1
     place = list(start)
@@ -343,8 +347,8 @@ def split_line(
 
 
 def _bend(longer: int, shorter: int, counts: int) -> float:
-    """Return the deviation of one driven line from a straight one, units; inf if its slower axis
-    would stop."""
+    """Return how far the driven line strays from the straight one, units; inf if its slower axis
+    would stand still."""
     exact = counts * shorter / longer
     rounded = math.floor(exact + 0.5)
     if shorter == 0:
@@ -355,7 +359,8 @@ def _bend(longer: int, shorter: int, counts: int) -> float:
 
 
 def _pieces(longer: int, shorter: int, counts: int, limits: LineLimits) -> list[tuple[int, int]]:
-    """Return a line of these distances as pieces (along, across) that do not bend too much."""
+    """Return the pieces (along, across) of a line of these distances, none of which bends too
+    much."""
     bend = _bend(longer, shorter, counts)
     if bend <= limits.tolerance:
         return [(longer, shorter)]
@@ -392,12 +397,12 @@ class LineChanges(Struct):
     faster: float = 1.0
 
     def note_snap(self, moved_mm: float, place: str) -> None:
-        """Note a stroke whose worst vertex was moved by this much."""
+        """Record a stroke and how far its worst vertex was moved."""
         if moved_mm > max(self.snap_mm, SNAP_NOTICE_MM):
             self.snap_mm, self.snap_place = moved_mm, place
 
     def note_loss(self, place: str) -> None:
-        """Note a stroke of which nothing is left on the grid."""
+        """Record a stroke of which nothing is left on the grid."""
         self.lost_strokes += 1
         self.lost_place = self.lost_place or place
 

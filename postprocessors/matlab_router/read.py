@@ -55,12 +55,13 @@ _STREAM: Final = re.compile(rb"-?\d+\r(?!\n)")
 
 
 def read_program(data: bytes, machine: MatlabRouterMachine) -> Toolpath:
-    """Return the moves of a program; ProgramError naming the place when it is none."""
+    """Return the moves of a program; ProgramError with the place for data that are no program."""
     return path_of(read_jobs(data, machine), machine)
 
 
 def read_jobs(data: bytes, machine: MatlabRouterMachine) -> Iterator[ReadJob]:
-    """Yield the jobs of a program, checked; ProgramError naming the place when it is none."""
+    """Yield the jobs of a program, checked; ProgramError with the place for data that are no
+    program."""
     dialect = dialect_of(machine)
     streamed = _STREAM.match(data) is not None
     if streamed != (dialect.format == "stream"):
@@ -92,7 +93,7 @@ class _Moves:
         self._findings = JobFindings(machine, dialect)
 
     def add(self, job: ReadJob) -> None:
-        """The rows of one job."""
+        """Add the rows of one job to the toolpath: home, first point, plunge, lines."""
         lines = job.length.shape[1]
         check_count(self._blocks + lines + 1, "block")
         result = execute(job, self._dialect)
@@ -142,14 +143,14 @@ class _Moves:
             )
 
     def _go_home(self) -> None:
-        """Z first, then X and Y (state 0, L4718-4793)."""
+        """Add the rapids home: Z first, then X and Y (state 0, L4718-4793)."""
         x, y, z = self._home.tolist()
         self._rapid(z=z)
         self._rapid(x=x)
         self._rapid(y=y)
 
     def _rapid(self, **target: float) -> None:
-        """To a place along one axis, unless the tool is there."""
+        """Add a rapid to a place along one axis, unless the tool is there already."""
         before = dict(zip("xyz", self._path.position, strict=True))
         if before | target != before:
             self._path.rapid(**target)
@@ -163,7 +164,7 @@ class Executed(Struct, frozen=True, eq=False):
 
 
 def execute(job: ReadJob, dialect: ResolvedDialect) -> Executed:
-    """Compute where the slaves and the listed master really bring the tool."""
+    """Compute where the slaves bring the tool, and where the listed master would."""
     listed = _along(job.first, job.steps)
     first = job.first.copy()
     if dialect.master_y == "fixed":
@@ -230,7 +231,8 @@ class DrivenLines:
         bent: Bools,
         times: Ints,
     ) -> None:
-        """Rows of bent lines: to the bend with both axes, then with the later one alone."""
+        """Fill in the two rows of each bent line: both axes move up to the bend, then the later
+        one moves alone."""
         rows = np.flatnonzero(bent)
         first = (np.cumsum(times) - times)[rows]
         soon = took[rows].min(axis=1)[:, None]
@@ -242,8 +244,8 @@ class DrivenLines:
 
 
 def _lag(distance: Floats, took: Floats, share: Floats) -> Floats:
-    """Return (n,) units by which a line bends: what is left of the later axis, seen across the
-    line."""
+    """Return (n,) units by which a line bends: the rest that the later axis travels alone,
+    measured across the line."""
     later = took.argmax(axis=1)
     remaining = distance[np.arange(len(distance)), later] * (1.0 - share)
     other = distance[np.arange(len(distance)), 1 - later]
@@ -252,7 +254,8 @@ def _lag(distance: Floats, took: Floats, share: Floats) -> Floats:
 
 
 def _speed_errors(distance: Floats, speed: Ints, along: Floats) -> Floats:
-    """Return (n,) counts by which the speeds differ from those of a straight line."""
+    """Return (n,) the greatest difference between an axis' speed and that on a straight line,
+    counts."""
     length = np.hypot(*distance.T)
     straight = distance * (along / np.where(length > 0.0, length, 1.0))[:, None]
     return np.asarray(np.abs(speed - straight).max(axis=1))
@@ -266,7 +269,7 @@ class Worst(Struct):
     first: str = ""
 
     def add(self, count: int, max_value: float, place: str) -> None:
-        """So many more, which begin at `place`."""
+        """Count `count` more excesses, the first of them at `place`; keep the largest value."""
         if count:
             self.first = self.first or place
             self.count += count
@@ -292,7 +295,7 @@ class JobFindings(Struct):
     bent: Worst = field(default_factory=Worst)
 
     def add(self, job: ReadJob, result: Executed) -> None:
-        """Count what the machine does otherwise, or cannot do, in one job."""
+        """Count in one job what the machine executes differently, and what it cannot execute."""
         place = f"job {job.number}"
         odd = int((job.length % 2).sum() + (job.first % 2).sum())
         if self.dialect.odd == "truncated" and odd:

@@ -43,7 +43,8 @@ class CutLines(Struct, frozen=True, eq=False):
 def cuts_of(
     toolpath: Toolpath, machine: MatlabRouterMachine, dialect: ResolvedDialect
 ) -> tuple[CutLines, list[Finding]]:
-    """Return the strokes of a toolpath, and what had to be changed to have them."""
+    """Return the lines of all strokes of a toolpath, and the findings on rows that were left
+    out."""
     findings = _events(toolpath)
     flat_and_deep = xy_then_z(toolpath)
     lowered_path = arcs_to_lines(
@@ -93,7 +94,7 @@ def _refuse_depths(
     machine: MatlabRouterMachine,
     dialect: ResolvedDialect,
 ) -> None:
-    """All cuts lie at the one depth that the machine plunges to."""
+    """Raise PostError for cuts at another depth than the one that the machine plunges to."""
     depth = cut_z_mm(machine, dialect)
     if depth >= 0.0:
         raise PostError(
@@ -127,7 +128,7 @@ def _refuse_depths(
 
 
 def _refuse_holes(toolpath: Toolpath, number: Ints, below: Bools, cut: Bools, rows: Ints) -> None:
-    """Refuse a plunge without a line behind it: the master lowers the tool while it stands, and
+    """Refuse a plunge that no line follows: the master lowers the tool with the spindle off and
     switches it on with the first line (L6552-6560), so a job of one point drills nothing."""
     hole = below & ~np.isin(number, number[cut])
     refuse(
@@ -141,7 +142,8 @@ def _refuse_holes(toolpath: Toolpath, number: Ints, below: Bools, cut: Bools, ro
 
 
 def _events(toolpath: Toolpath) -> list[Finding]:
-    """Refuses events that the machine cannot do; findings for those that have no place here."""
+    """Refuse events that the machine cannot execute; return findings for events that are left
+    out."""
     kind = toolpath.kind
     message = "the spindle of this machine turns one way only"
     refuse(toolpath, kind == Kind.SPINDLE_CCW, message, "turn it clockwise")

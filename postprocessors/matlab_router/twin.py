@@ -112,8 +112,9 @@ class MatlabRouterTwin(Twin):
                 self._out.append(octet)
 
     def _begin_if_complete(self) -> None:
-        """Begin when the job is complete. More lines than its arrays hold are written beyond them
-        (L4625-4635), and a slave may run away: both hang it here, until it is reset."""
+        """Begin the job when all its numbers have come. A job of more lines than the arrays hold
+        overwrites what lies behind them (L4625-4635), and a slave may run away: in both cases this
+        controller hangs until it is reset."""
         count = self._numbers[0]
         if not 1 <= count <= self._dialect.max_lines:
             self._listens = False
@@ -125,8 +126,8 @@ class MatlabRouterTwin(Twin):
             self._begin(ReadJob(number, first, table[:2], table[2:], lambda *_: f"job {number}"))
 
     def _begin(self, job: ReadJob) -> None:
-        """Start the slaves on a job. They go on from all that they have done, since they were
-        never reset."""
+        """Start the slaves on a job; their counters continue from the jobs before, since only the
+        master was reset."""
         try:
             check_count(job.length.shape[1], job.where, self._dialect)
             check_job(job, self._dialect)

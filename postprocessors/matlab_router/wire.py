@@ -121,8 +121,8 @@ def _streams(jobs: Sequence[ReadJob], data: bytes, machine: MatlabRouterMachine)
 
 
 def _numbers(job: ReadJob, first: Ints, line: int) -> JobNumbers:
-    """Return the numbers that are sent for the rest of a job: from `line` (counted from 0) on,
-    beginning at the point `first` (2,), in counts."""
+    """Return the numbers that are sent for the rest of a job: its lines from `line` (counted from
+    0) on, beginning at the point `first` (2,) in units."""
     points = np.column_stack([first, first[:, None] + job.steps[:, line:].cumsum(axis=1)])
     x, y = first.tolist()
     lengths, speeds = job.length[:, line:].tolist(), job.speed[:, line:].tolist()
@@ -132,8 +132,9 @@ def _numbers(job: ReadJob, first: Ints, line: int) -> JobNumbers:
 
 
 def rest_of(data: bytes, machine: MatlabRouterMachine, first: int) -> tuple[bytes, int]:
-    """Return the program from one of its blocks (from 0) on; how many blocks bring the machine
-    there: a job has one for going home, to its first point and down, and one for each line."""
+    """Return the program from block `first` (from 0) on, and how many of its blocks bring the
+    machine there: a job has one block for going home, to its first point and down, then one for
+    each line."""
     dialect, jobs = dialect_of(machine), list(read_jobs(data, machine))
     begins = np.cumsum([0, *(job.length.shape[1] + 1 for job in jobs)])
     job_index = int(np.searchsorted(begins, first, side="right")) - 1
@@ -185,7 +186,8 @@ class MatlabRouterConversation(PacketByPacket):
         self.next_s = now
 
     def _next_number(self, now: float) -> None:
-        """Its digits; where they come back, its end goes out behind that."""
+        """Send the digits of the next number. Its carriage return follows at once, or, where the
+        master echoes, when the echo has been compared."""
         word = self._left.pop(0)
         self._count += 1
         if self._echoes:
@@ -197,7 +199,8 @@ class MatlabRouterConversation(PacketByPacket):
             self._end_number(now)
 
     def _end_number(self, now: float) -> None:
-        """The last one of a job sets the machine in motion."""
+        """Send the carriage return of a number. Behind the last number of a job the machine begins
+        to move: schedule the end of its simulated time."""
         self._write(END)
         self._echo = b""
         header, number = self._pauses
@@ -246,7 +249,7 @@ class MatlabRouterConversation(PacketByPacket):
             self._next_number(now)
 
     def _halt(self, now: float, *, unsent: bool) -> bool:
-        """Return True: the machine stands, for a job whose numbers are not complete never begins;
+        """Return True if the machine stands: a job whose numbers are not complete never begins.
         False while it moves."""
         if self._moving and not unsent:
             return False

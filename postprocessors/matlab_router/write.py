@@ -72,7 +72,7 @@ class JobNumbers(Struct, frozen=True):
 
 
 def _numbers_of(jobs: Jobs) -> Iterator[JobNumbers]:
-    """Yield all jobs as plain numbers."""
+    """Yield the numbers of each job as plain lists."""
     lines = jobs.lines
     for low, high in pairwise(jobs.offsets):
         start, end = lines.start[low:high], lines.end[low:high]
@@ -83,14 +83,14 @@ def _numbers_of(jobs: Jobs) -> Iterator[JobNumbers]:
 
 
 def program_of(jobs: Iterable[JobNumbers], count: int, dialect: ResolvedDialect) -> bytes:
-    """So many jobs in the form that the dialect has."""
+    """Return the bytes of `count` jobs in the dialect's form: a .m file or a serial stream."""
     if dialect.format == "stream":
         return stream_of(jobs, dialect)
     return _matlab(jobs, count, dialect)
 
 
 def _matlab(jobs: Iterable[JobNumbers], count: int, dialect: ResolvedDialect) -> bytes:
-    """Write one section of MATLAB code for each job. A section overwrites the arrays of the one
+    """Return one section of MATLAB code for each job. A section overwrites the arrays of the one
     before; `jobs{}` keeps all `count` of them."""
     lines = [
         f"% camtool: matlab-router, profile {dialect.profile}, {_count(count, 'job')}",
@@ -120,14 +120,14 @@ def _count(count: int, noun: str) -> str:
 
 
 def _matrix(name: str, rows: Pair) -> list[str]:
-    """Two rows of numbers in columns."""
+    """Return the lines of a MATLAB matrix of two rows, its numbers aligned in columns."""
     first, second = (("%5d " * len(row) % tuple(row)).rstrip() for row in rows)
     return [f"{name} = [", first, second, "];"]
 
 
 def stream_of(jobs: Iterable[JobNumbers], dialect: ResolvedDialect) -> bytes:
-    """Return each number in digits and a carriage return: lines, first x and y, all lx, ly,
-    velx, vely (L4294-4360)."""
+    """Return the bytes on the line, each number in digits and a carriage return: number of lines,
+    first x and y, all lx, ly, velx, vely (L4294-4360)."""
     parts = []
     for number, job in enumerate(jobs, 1):
         body = job.lxy[0] + job.lxy[1] + job.velxy[0] + job.velxy[1]
@@ -137,7 +137,8 @@ def stream_of(jobs: Iterable[JobNumbers], dialect: ResolvedDialect) -> bytes:
 
 
 def _first_y(y: int, number: int, dialect: ResolvedDialect) -> bytes:
-    """y of the first point: in digits, or as the one character of that number (L4306)."""
+    """Return the bytes of the first point's y: in digits, or as the one character of that code
+    (L4306)."""
     if dialect.first_y == "number":
         return b"%d\r" % y
     if y > CHARACTER_LIMIT or y == CARRIAGE_RETURN:

@@ -45,7 +45,7 @@ class PicMmh(Target):
         return max(1.0 / UNITS_PER_MM[machine.dialect.form], *steps)
 
     def listing(self, data: bytes, machine: PicMmhMachine) -> Listing:
-        """Divide the program into its blocks, each with its semicolon."""
+        """Return the blocks of a program, each with its semicolon."""
         from camtool.toolpath.program import Listing
 
         from .read import BLANKS

@@ -67,11 +67,11 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
     """The PIC18F8720: lines by DDA, arcs by direct search, DDA or stairs."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """Return the motion, chunk by chunk."""
+        """Return the motion in chunks."""
         return PicMmhRun(toolpath, machine, options).run()
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """Return the same with start, ends and arc centres at their nearest steps."""
+        """Return the toolpath with its start, ends and arc centres at the nearest steps."""
         coded_mm = [axis.coded_step_mm for axis in machine.axes]
         start = _on_grid(toolpath.start[None, :], coded_mm)[0]
         end = read_only(toolpath.by_parts(lambda part: _on_grid(part.end, coded_mm)))
@@ -84,11 +84,12 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
     def timed(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> Iterator[TimedChunk]:
-        """Return the motion with the times of its outputs."""
+        """Return the motion in chunks, with the times of its outputs."""
         return super().timed(toolpath, machine, options_by_pass(machine, options))
 
     def clock(self, toolpath: Toolpath, machine: _Machine) -> SampleClock:
-        """Outputs a period apart, and the steps that compensate backlash, by region too."""
+        """Return the clock of the samples: outputs one period apart, and behind them the steps
+        that compensate backlash, by region too."""
         added = None
         if machine.controller.compensates_by_region:
             added = np.zeros((len(toolpath), 3), dtype=np.int64)
@@ -98,7 +99,7 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
         return SampleClock(self.quantised(toolpath, machine), machine, added=added)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Return the interpolator of arcs: dsm, dda or stairs."""
+        """Return the name of the interpolator of arcs: dsm, dda or stairs."""
         return options.interpolator or machine.controller.arcs
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -114,7 +115,8 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
     def findings(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> tuple[Finding, ...]:
-        """Return arcs that do not end alike by every reading of the thesis."""
+        """Return a finding on arcs that do not end at the same place by every reading of the
+        thesis."""
         if self.interpolation(toolpath, machine, options) != "dsm" or not toolpath.is_arc.any():
             return ()
 
@@ -125,20 +127,20 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
     def fused_run(
         self, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> FusedLegs | None:
-        """Return the same motion as that of `run`, judged as it is made, without chunks; None
-        where the mechanics needs these. Raises as `run` does, all at once."""
+        """Return the same motion as `run`, judged while it is computed, without chunks; None where
+        the mechanics need chunks. Raises as `run` does, for the whole program at once."""
         return PicMmhRun(toolpath, machine, options).fused_run()
 
 
 def options_by_pass(machine: _Machine, options: Options) -> Options:
-    """Return the options of a run whose times are wanted: where idle passes take a period too, the
-    model runs pass by pass, which alone says where they are."""
+    """Return the options of a run with times. Where passes without output take a period too, the
+    model must run pass by pass: only that shows when they occur."""
     by_pass = machine.controller.time_base == "iteration"
     return replace(options, chunk_steps=1) if by_pass else options
 
 
 def _on_grid(points: Floats, coded_mm: list[float]) -> Floats:
-    """Return points (J, A) mm, each coordinate at its nearest step."""
+    """Return points (J, A) mm, each coordinate at the nearest step."""
     columns = [to_steps(points[:, axis], step) * step for axis, step in enumerate(coded_mm)]
     return np.column_stack(columns)
 
@@ -166,7 +168,7 @@ class _Leg(Struct, frozen=True):
 
 
 def _without_stop(fill: Filler) -> Filler:
-    """Wrap a filler so that it does not stop at the end, which may be passed on an earlier
+    """Return a filler that does not stop at the end of the arc, which may be passed on an earlier
     turn."""
 
     def is_on(buffer: Ints) -> tuple[int, int, bool]:
@@ -233,7 +235,8 @@ class PicMmhRun:
                 return
 
     def fused_run(self) -> FusedLegs | None:
-        """Return all rows up to the end of the program as legs."""
+        """Return the legs of all rows up to the end of the program; None where the mechanics need
+        chunks."""
         if not self._mechanics.plain or self._compensations is not None:
             return None
         toolpath = self._toolpath
@@ -255,9 +258,9 @@ class PicMmhRun:
         )
 
     def _stop_samples(self) -> Ints:
-        """Return (N,) samples of each arc up to its stop, by `controller.arc_end`; −1 for other
-        rows, and where it is "equal". The ends of arcs become their stops: the controller
-        counts steps, and goes on from where it is."""
+        """Return (N,) the samples of each arc up to its stop, by `controller.arc_end`; −1 for
+        other rows, and for all rows where it is "equal". The ends of arcs are changed to their
+        stops: the controller counts steps and continues from where it is."""
         toolpath, controller = self._toolpath, self._controller
         if controller.arc_end == "equal" or not toolpath.is_arc.any():
             return np.broadcast_to(np.int64(-1), len(toolpath))
@@ -277,8 +280,8 @@ class PicMmhRun:
         return stops
 
     def arcs_as_said(self) -> Ints:
-        """Return (L, 14) legs of the arcs up to the end of the program as if each stopped on
-        its end."""
+        """Return (L, 14) the legs of the arcs up to the end of the program, each beginning as if
+        the arcs before had stopped on their programmed ends."""
         toolpath = self._toolpath
         places = positions(toolpath, self._position, self._said, self._home)
         unknown = np.full(len(toolpath), -1, dtype=np.int64)
@@ -290,7 +293,7 @@ class PicMmhRun:
         return np.concatenate(parts)
 
     def _suspect(self, places: Ints) -> Bools:
-        """Return (N,) true for the rows that `_check` has to look at."""
+        """Return a mask (N,), true for the rows that `_check` has to look at."""
         kind, feed = self._toolpath.kind, self._toolpath.feed
         with np.errstate(invalid="ignore"):
             no_feed = self._toolpath.is_feed & ~((feed > 0.0) & np.isfinite(feed))
@@ -305,8 +308,8 @@ class PicMmhRun:
         self._rest_chunk(row, kind, position)
 
     def _motion_chunks(self, row: int, kind: Kind) -> Iterator[Chunk]:
-        """Yield the chunks of a row's motion; the controller then stands at the end that it was
-        given."""
+        """Yield the chunks of a row's motion; afterwards the controller stands at the row's end,
+        wherever the motion led."""
         if kind in (Kind.HOME_XY, Kind.HOME_Z):
             target = self._position.copy()
             axes = [0, 1] if kind == Kind.HOME_XY else [2]
@@ -325,7 +328,7 @@ class PicMmhRun:
             yield from self._emit(row, self._line((2,), target, self._period(row, kind, 2)))
 
     def _period(self, row: int, kind: Kind, axis: int) -> float:
-        """Return seconds between two outputs of a row on an axis."""
+        """Return the seconds between two outputs of a row on an axis."""
         if kind not in (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW):
             return self._rapid_period_s
         feed = float(self._toolpath.feed[row])
@@ -338,7 +341,7 @@ class PicMmhRun:
         return max(60.0 * float(self._coded_mm[axis]) / feed, self._least_period_s)
 
     def _line(self, axes: tuple[int, ...], target: Ints, period_s: float) -> _Leg:
-        """Return a DDA line of one or two axes from here to `target`."""
+        """Return a DDA line of one or two axes from the current position to `target`."""
         travel = [int(target[axis] - self._position[axis]) for axis in axes]
         a, b = abs(travel[0]), abs(travel[1]) if len(travel) > 1 else 0
         return _Leg(
@@ -351,7 +354,7 @@ class PicMmhRun:
         )
 
     def _arc(self, row: int, kind: Kind, target: Ints) -> _Leg:
-        """Return the arc of a row, about its rounded centre, as far as it will go."""
+        """Return the arc of a row about its rounded centre, up to where the controller stops."""
         centre_x, centre_y = self._centres[row].tolist()
         x, y = int(self._position[0]) - centre_x, int(self._position[1]) - centre_y
         arc = StepArc(
@@ -371,7 +374,8 @@ class PicMmhRun:
         return _Leg(fill, samples, (0, 1), origin, sign, period_s, ended=is_met)
 
     def _emit(self, row: int, leg: _Leg) -> Iterator[Chunk]:
-        """Yield the samples of a leg in chunks; an empty one when it has none and never ends."""
+        """Yield the samples of a leg in chunks; one empty chunk for a leg without samples that
+        never ends."""
         remaining, is_done = leg.samples, leg.samples == 0
         if is_done and not leg.ended:
             yield one_row(row, NO_SAMPLES, NO_SAMPLES, ended=False)
@@ -425,7 +429,7 @@ class PicMmhRun:
         return one_row(row, NO_SAMPLES, NO_SAMPLES, duration_s=seconds)
 
     def _arc_centres(self) -> Ints:
-        """Return (N, 2) steps; 0 where the row is no arc."""
+        """Return the arc centres (N, 2) in steps; 0 where the row is no arc."""
         toolpath = self._toolpath
         if not toolpath.is_arc.any():
             return np.broadcast_to(np.int64(0), (len(toolpath), 2))
@@ -434,7 +438,7 @@ class PicMmhRun:
         return self._steps(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), range(2))
 
     def _steps(self, points: Floats, axes: range, *, named: bool = True) -> Ints:
-        """Return (N, len(axes)) steps of points in mm; ProgramError beyond `MAX_STEPS`."""
+        """Return points in mm as steps (N, len(axes)); ProgramError beyond `MAX_STEPS`."""
         coded_mm = self._coded_mm[list(axes)]
         is_far = (np.abs(points) > MAX_STEPS * coded_mm).any(axis=1)
         if is_far.any():
@@ -455,11 +459,11 @@ def compensations(toolpath: Toolpath, machine: Machine[Any, PicMmhDialect]) -> F
     """Return the compensation (N, 2) mm of X and Y that is set before each row.
 
     An axis that turns away from `start_direction` is given the play of the region in which it
-    turns, as the motor makes it, in whole micrometres; the same is taken back when it turns again,
-    wherever that is: the motor then stands where the controller counts, and nothing adds up. A row
-    has one value: where an axis turns back in it and away again, the second turn gets that of the
-    first. NaN until the first turn away: what the controller has then is what it has given at the
-    last one, if the program goes on. MachineError without regions.
+    turns, as the motor makes it, in whole micrometres. When it turns back, the same value is taken
+    back, wherever that is: so the motor stands where the controller counts, and errors do not add
+    up. A row has one value: where an axis turns back in it and away again, the second turn gets
+    that of the first. The value is NaN until the first turn away: the controller still has the
+    last value of the program before. MachineError without regions.
     """
     controller, cells = machine.controller, machine.play_map.used
     if not any(cells):
@@ -530,7 +534,7 @@ class StepArc(Struct, frozen=True):
 
 
 def line_filler(a: int, b: int) -> Filler:
-    """Return a DDA line of a ≥ 0 and b ≥ 0 steps."""
+    """Return the filler of a DDA line of a ≥ 0 and b ≥ 0 steps."""
     registers, counters = np.zeros(2), np.zeros(2, dtype=np.int64)
 
     def fill(buffer: Ints) -> tuple[int, int, bool]:
@@ -541,8 +545,8 @@ def line_filler(a: int, b: int) -> Filler:
 
 
 def arc_filler(arc: StepArc, method: str, *, rounded: bool) -> Filler:
-    """Return an arc whose start is not its centre; `rounded`: the error at the start is that
-    against the circle of the rounded radius (DSM and stairs), else 0."""
+    """Return the filler of an arc whose start is not its centre; `rounded`: the error at the start
+    is that against the circle of the rounded radius (DSM and stairs), else 0."""
     state: Ints
     if method == "dda":
         state = dda_arc_start(arc.x, arc.y, arc.clockwise)
@@ -567,12 +571,11 @@ def arc_filler(arc: StepArc, method: str, *, rounded: bool) -> Filler:
 
 
 def arc_reach(arc: StepArc, fill: Filler) -> tuple[int, bool]:
-    """Return the number of positions that a fresh filler gives until the stop test is met, and
-    True.
+    """Return the number of positions until the stop test of an arc is met, and True.
 
-    When it is not met in the expected sweep and a quadrant more: how many until the nearest
-    approach to the end there, and False. The controller then goes round at least once more, if it
-    ever stops. Bounded in time and memory.
+    When it is not met in the expected sweep and a quadrant more, return the number until the
+    nearest approach to the end there, and False: the controller then goes round at least once
+    more, if it ever stops. `fill` must be fresh. Time and memory are bounded.
     """
     expected = expected_quadrants(arc.x, arc.y, arc.clockwise, arc.end_x, arc.end_y)
     low, high = expected - 1, expected + 1
@@ -598,8 +601,8 @@ def arc_reach(arc: StepArc, fill: Filler) -> tuple[int, bool]:
 
 
 def arc_end_findings(toolpath: Toolpath, machine: _Machine, arcs: Ints) -> tuple[Finding, ...]:
-    """Return one ARC_END_UNSURE for those of the legs `arcs` (L, 14), each from the end of the row
-    before it, that do not stop at their end under every reading of the thesis."""
+    """Return one ARC_END_UNSURE for the arcs that do not stop on their end under every reading of
+    the thesis; none if all do. `arcs` (L, 14): legs, each from the end of the row before it."""
     arcs = arcs[(arcs[:, [loops.A, loops.B]] != 0).any(axis=1)]
     is_met = [_stops(arcs, rounded, loops.EQUAL)[:, loops.MET] != 0 for rounded in (False, True)]
     unsure = ~(is_met[0] & is_met[1])
@@ -630,13 +633,13 @@ def arc_end_findings(toolpath: Toolpath, machine: _Machine, arcs: Ints) -> tuple
 
 
 def _stops(arcs: Ints, rounded: bool, reading: int) -> Ints:
-    """Return (L, 4) of `steps`, by direct search."""
+    """Return the stops (L, 4) of arcs by direct search, as `arc_stops` of `steps` gives them."""
     stops = np.empty((len(arcs), loops.STOP_COLUMNS), dtype=np.int64)
     loops.arc_stops(np.ascontiguousarray(arcs), (loops.DSM, rounded, reading), stops)
     return stops
 
 
 def _end_distances(arcs: Ints, rounded: bool, reading: int) -> Floats:
-    """Return (L,) steps from the stop of each arc to its end."""
+    """Return (L,) the distance from the stop of each arc to its programmed end, steps."""
     stops = _stops(arcs, rounded, reading)[:, [loops.STOP_X, loops.STOP_Y]]
     return np.asarray(np.hypot(*(stops - arcs[:, [loops.END_X, loops.END_Y]]).T))

@@ -27,7 +27,7 @@ METHODS: Final = {"dsm": loops.DSM, "stairs": loops.STAIRS, "dda": loops.DDA}
 
 
 def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
-    """Return (N + 1, 3) steps where the controller stands before each row and after the last
+    """Return (N + 1, 3) steps: where the controller stands before each row, and after the last
     one."""
     kind, count = toolpath.kind, len(toolpath)
     places = np.empty((count + 1, 3), dtype=np.int64)
@@ -52,7 +52,7 @@ class CommandedPath(Struct, frozen=True, eq=False):
     stops: Ints
 
     def legs(self, low: int, high: int) -> Ints:
-        """Return (L, 14) legs of `steps` of the rows low:high."""
+        """Return the legs (L, 14) of the rows low:high, in the columns of `steps`."""
         places, centres = self.places[low : high + 1], self.centres[low:high]
         kind = self.toolpath.kind[low:high]
         begin, travel = places[:-1], np.diff(places, axis=0)
@@ -90,7 +90,8 @@ class Periods(Struct, frozen=True, eq=False):
     step_mm: Floats
 
     def of(self, toolpath: Toolpath, low: int, high: int) -> Floats:
-        """Return (high − low, 2) s of the rows low:high in XY and in Z."""
+        """Return (high − low, 2) seconds between outputs, in XY and in Z, in each of the rows
+        low:high."""
         with np.errstate(divide="ignore", invalid="ignore"):
             feed_s = 60.0 * self.step_mm[None, :] / toolpath.feed[low:high, None]
             feed_s = np.maximum(feed_s, self.least_s)
@@ -110,9 +111,9 @@ class FusedLegs:
         options: tuple[str, bool, bool, float],
         mechanics: Mechanics,
     ) -> None:
-        """The first `rows` rows of the course. `options`: the method of arcs, whether their error
-        starts as that of the rounded radius, whether only outputs take time, mm of a step.
-        `mechanics` is plain."""
+        """Prepare the first `rows` rows of the course. `options`: the method of arcs, whether
+        their error starts as that of the rounded radius, whether only outputs take time, mm of a
+        step. `mechanics` must be plain."""
         self._course, self._rows, self._periods = course, rows, periods
         self._how, self._mechanics = options, mechanics
 
@@ -122,7 +123,8 @@ class FusedLegs:
         return self._rows
 
     def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
-        """Run the rows low:high, which follow those run before, and judge them."""
+        """Run the rows low:high, which follow those run before, and judge them; return their
+        ledger."""
 
         method, rounded, by_event, step_mm = self._how
         legs = self._course.legs(low, high)
@@ -153,7 +155,8 @@ class FusedLegs:
 
 
 def _sums_by_row(row: Ints, numbers: Ints, count: int) -> Ints:
-    """Return (count, C) sums of the columns of numbers (L, C) by row (L,)."""
+    """Return (count, C) for each row the sums of the columns of `numbers` (L, C), which belong to
+    the rows `row` (L,)."""
     sums = np.zeros((count, numbers.shape[1]), dtype=np.int64)
     np.add.at(sums, row, numbers)
     return sums

@@ -73,16 +73,15 @@ class UnitGrid(Struct, frozen=True):
         return max(1.0 / self.units_per_mm, self.step_mm)
 
     def fits(self, values_mm: Floats) -> Bools:
-        """Return the mask of the values that are finite and have no more digits than the form."""
+        """Return a mask, true for values that are finite and have no more digits than the form."""
         with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(np.abs(values_mm) * self.units_per_mm < self.most_units + 0.5)
 
     def units(self, values_mm: Floats) -> Ints:
         """Return values (mm, any shape) as whole units; they must fit.
 
-        A value that would lie half-way between two steps is written one unit farther from zero:
-        the step stays the same, and no longer depends on the last bit of the controller's
-        division.
+        A value half-way between two steps is written one unit farther from zero: it means the same
+        step, but no longer depends on the last bit of the controller's division.
         """
         scaled = values_mm * self.units_per_mm
         units = (np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64)
@@ -96,8 +95,8 @@ class UnitGrid(Struct, frozen=True):
         return np.asarray((np.sign(units) * np.floor(in_steps + 0.5)).astype(np.int64))
 
     def nearest_units(self, steps: Ints) -> Ints:
-        """Return the units nearest to these steps; where any whole unit means a step, it is
-        this one."""
+        """Return the units nearest to these steps. Where any whole number of units means a step at
+        all, this one means these steps."""
         scaled = steps * (self.units_per_mm * self.step_mm)
         return np.asarray(np.rint(scaled).astype(np.int64))
 
@@ -154,13 +153,14 @@ def _units_and_steps(
 
 
 def check_motion(toolpath: Toolpath, machine: PicMmhMachine) -> None:
-    """Refuse a path that does not start at the origin, and arcs that are none."""
+    """Refuse a path that does not start at the origin, and arcs with two radii."""
     refuse_start(toolpath)
     _check_arcs(toolpath, machine)
 
 
 def _check_arcs(toolpath: Toolpath, machine: PicMmhMachine) -> None:
-    """Arcs are planned for one interpolator, for equal steps, and must be arcs."""
+    """Raise PostError for arcs where the controller does not interpolate by direct search or X and
+    Y have different steps, and for arcs with two radii."""
     if not toolpath.is_arc.any():
         return
     arcs = controller_of(machine, PicMmhController).arcs
@@ -178,7 +178,7 @@ def _check_arcs(toolpath: Toolpath, machine: PicMmhMachine) -> None:
 
 
 def _check_coordinates(toolpath: Toolpath, grids: tuple[UnitGrid, UnitGrid, UnitGrid]) -> None:
-    """Five digits of µm (L3284-3285) for every end."""
+    """Raise PostError for an end of more than five digits of µm (L3284-3285)."""
     for name, values, grid in zip("XYZ", toolpath.end.T, grids, strict=True):
         refuse(
             toolpath,
@@ -191,15 +191,16 @@ def _check_coordinates(toolpath: Toolpath, grids: tuple[UnitGrid, UnitGrid, Unit
 
 
 def far_arcs(toolpath: Toolpath, machine: PicMmhMachine, dialect: PicMmhDialect) -> Bools:
-    """Return (N,) true for arcs whose centre has more than five digits of µm: nearly straight
-    ones."""
+    """Return a mask (N,), true for nearly straight arcs, whose centre has more than five digits of
+    µm."""
     grids = (UnitGrid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     fits = [grid.fits(values) for grid, values in zip(grids, toolpath.centre.T, strict=False)]
     return np.asarray(toolpath.is_arc & ~(fits[0] & fits[1]))
 
 
 def _feed_units(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[Ints, Finding | None]:
-    """8 (`F08`) for each feed move, and what was lost by rounding down to the word's unit.
+    """Return the whole units of the F word (8 for `F08`) of each row, 0 where it is no feed move;
+    and FEED_ROUNDED if a feed was rounded down to that unit, else None.
 
     The link carries one report per step and so bounds the step rate, feed / (60 · step)
     (L3196-3199); F00 would make the controller divide by 0.

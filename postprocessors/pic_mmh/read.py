@@ -90,7 +90,8 @@ EVENTS: Final = {
 
 
 def read_program(data: bytes, machine: PicMmhMachine) -> Toolpath:
-    """Return the moves of a program; ProgramError naming block and column when it is none."""
+    """Return the moves of a program; ProgramError with block and column for data that are no
+    program."""
     check_count(data.count(b";"), "block")
     _check_bytes(data)
     reader = _Reader(machine)
@@ -125,7 +126,7 @@ def _fail(index: int, column: int, message: str, mend: str = "") -> NoReturn:
 
 
 def _check_bytes(data: bytes) -> None:
-    """Raise ProgramError at the first byte that is no printable ASCII and no line end."""
+    """Raise ProgramError at the first byte that is neither printable ASCII nor a line end."""
     odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
     if odd:
         before = data[: odd.start()]
@@ -139,7 +140,8 @@ def _check_bytes(data: bytes) -> None:
 
 
 def _mm(whole_digits: str, decimals: str) -> float:
-    """µm as text, in mm by a single division, so the nearest float; `-00000.00` is 0."""
+    """Return a text of µm as mm, by a single division and so the nearest float; `-00000.00` is
+    0."""
     return int(whole_digits + decimals) / UNITS_PER_MM["example" if decimals else "annex"]
 
 
@@ -193,7 +195,8 @@ class _Reader:
         _fail(index, fault.column, fault.message, fault.mend)
 
     def moves(self, first: int, columns: Ints) -> None:
-        """Moves in a row (K, 9) of `blocks`, by columns; `first`: the index of the first."""
+        """Add consecutive blocks of moves to the path, by columns (K, 9) of `blocks`; `first`: the
+        index of the first block."""
         if self._buffer_chars is not None:
             for index in np.flatnonzero(columns[:, blocks.LENGTH] >= self._buffer_chars).tolist():
                 self._long.add(first + index, int(columns[index, blocks.LENGTH]) + 1)
@@ -239,7 +242,8 @@ class _Reader:
             )
 
     def _motion(self, code: str, letters: str, match: re.Match[str], index: int) -> None:
-        """G00 to G03: coordinates are absolute µm, F counts the feed word's unit."""
+        """Add the row of a block G00 to G03: coordinates are absolute µm, F counts the feed word's
+        unit."""
         groups = match.groups()
         feed = self._feed(match, index) if letters[-1] == "F" else 0.0
         if letters[0] == "Z":
@@ -255,7 +259,8 @@ class _Reader:
             self.path.arc(x, y, centre=centre, ccw=code == "G03", feed=feed)
 
     def _feed(self, match: re.Match[str], index: int) -> float:
-        """F08 as 0.8 mm/min (equation 3.1: tenths of mm/min); F00 would divide by 0."""
+        """Return a feed in mm/min: F08 is 0.8 mm/min (equation 3.1: tenths of mm/min).
+        ProgramError for F00, by which the controller would divide."""
         number = int(match[match.re.groups])
         if number == 0:
             column = match.start(match.re.groups) + 1
@@ -266,7 +271,8 @@ class _Reader:
         return feed
 
     def _event(self, code: str, letters: str, match: re.Match[str], index: int) -> None:
-        """Add the row of a block that is no move. G90 is always in force here and gives no row."""
+        """Add the row of a block that is not a move. G90 is always in force here and gives no
+        row."""
         x, y, z = self.path.position
         zero_x, zero_y, zero_z = self._zero
         if code == "G90":
@@ -295,7 +301,8 @@ class BlockFault(Struct, frozen=True):
 
 
 def patterns(form: str) -> Patterns:
-    """For each code its shapes: their letters ("XYF") and the pattern of what is behind the code.
+    """Return for each code its possible shapes: their letters ("XYF") and the pattern of the text
+    behind the code.
 
     A coordinate has two groups, digits before and after the point; other values have one.
     """
@@ -312,7 +319,7 @@ def patterns(form: str) -> Patterns:
 
 
 def fault_of(text: str, form: str) -> BlockFault:
-    """Return why a block (without its `;`) is none in this form."""
+    """Return why a text (without its `;`) is no block of this form."""
     if not text:
         return BlockFault(1, "an empty block", "remove the ; that has nothing before it")
     if _INTERACTIVE.fullmatch(text):
@@ -346,7 +353,7 @@ def _value(kind: str, form: str) -> str:
 
 
 def _walk(text: str, shape: Shape, form: str) -> BlockFault:
-    """Return the first word of the shape that the block does not have."""
+    """Return the fault of a text at the first word of the shape that it does not have."""
     offset = 3
     for letter, kind in shape:
         match = re.compile(letter + _value(kind, form)).match(text, offset)

@@ -29,7 +29,7 @@ class PicMmhSignals(SignalModel):
     """The phases of X and Y on port D, and of Z."""
 
     def board(self, machine: _Machine) -> Board:
-        """Return the lines of the three motors."""
+        """Return the phase lines of the three motors."""
         backward = STATES[:1] + STATES[:0:-1]
         return Board(
             (

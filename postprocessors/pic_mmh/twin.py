@@ -104,13 +104,13 @@ class PicMmhTwin(Twin):
             self._decode(string)
 
     def _stop(self) -> None:
-        """Alto: the rest of the motion is never done; the coils keep their state."""
+        """Stop the motion for good (Alto): its rest is never made; the coils keep their state."""
         self.slides.stop(self.now)
         self._joystick = None
         self._said = self.slides.commanded_mm - self._zero
 
     def _decode(self, string: bytes) -> None:
-        """Do what a string says, by its first character (L1598-1615)."""
+        """Execute a received string, by its first character (L1598-1615)."""
         text = string[:-1]
         if text[:1] in (b"G", b"M"):
             self._block(string)
@@ -153,7 +153,7 @@ class PicMmhTwin(Twin):
         self.slides.begin(travel.shifted(self._zero), self.now, len(self.decoded) - 1)
 
     def _set_zero(self) -> None:
-        """Part zero is here. Machine zero stays where it is."""
+        """Make the current position part zero. Machine zero stays at its place."""
         self._zero = self.slides.commanded_mm.copy()
         self._said = np.zeros(3)
         controller = self._given.controller
@@ -164,7 +164,7 @@ class PicMmhTwin(Twin):
     # The other strings.
 
     def _command(self, text: bytes) -> bool:
-        """Do it; whether it was deciphered."""
+        """Execute an interactive command; return False for a text that is none."""
         if text == b"A":
             self._stop()
         elif text == b"H":
@@ -187,12 +187,13 @@ class PicMmhTwin(Twin):
         return True
 
     def _run_on(self, senses: Ints, hz: float) -> None:
-        """Step until a character comes."""
+        """Step in these directions at a rate until a character comes."""
         self._joystick = senses, hz
         self.slides.begin(self._steps(senses * JOYSTICK_STEPS, hz), self.now, -1)
 
     def _home(self) -> None:
-        """Z, then X, then Y to their switches, and each back from it to machine zero."""
+        """Move Z, then X, then Y to their switches, then each back from its switch to machine
+        zero."""
         home = np.array(self._machine.controller.machine_zero_mm) + self._zero
         target = np.rint((home - self.slides.commanded_mm) / self._step_mm).astype(np.int64)
         legs = []
@@ -206,7 +207,8 @@ class PicMmhTwin(Twin):
         self._said = home - self._zero
 
     def _steps(self, travels: Ints, hz: float) -> Travel:
-        """Return travels (L, 3) or (3,) in steps, one after the other, each an output a period."""
+        """Return the motion of travels (L, 3) or (3,) in steps, one after the other, one output
+        per period."""
         most_hz = self._machine.limits.max_step_rate_hz
         period = 1.0 / min(hz, hz if most_hz is None else most_hz)
         parts = [self.slides.commanded_mm[None, :]]
@@ -222,7 +224,8 @@ class PicMmhTwin(Twin):
     # What is done and reported.
 
     def _make_outputs(self) -> None:
-        """Report the outputs that became due, and the compensation in front of them."""
+        """Report the outputs that have become due, with the compensation steps in front of
+        them."""
         steps, added = self.slides.advance(self.now)
         if self._choices.step_byte == "none" or not len(steps):
             return
@@ -242,7 +245,8 @@ class PicMmhTwin(Twin):
 
 
 def _senses(text: bytes) -> Ints:
-    """Return (3,) of X, Y and Z in a text such as X+Y-: 1, −1, or 0 where it is not named."""
+    """Return (3,) the directions of X, Y and Z in a text such as X+Y-: 1, −1, or 0 where an axis
+    is not named."""
     senses = np.zeros(3, dtype=np.int64)
     for axis, sense in zip(text[::2], text[1::2], strict=True):
         senses[b"XYZ".index(axis)] = -1 if sense == ord("-") else 1

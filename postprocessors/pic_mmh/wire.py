@@ -81,9 +81,9 @@ class PicMmhWire(Wire):
     zeroes_each = False
 
     def packets(self, data: bytes, machine: PicMmhMachine, forecast: Forecast) -> Sequence[Packet]:
-        """Return the compensations, then the blocks; by region, a compensation before each
-        block for which it changes. Whether M06 waits the thesis does not say: the user is asked
-        before it goes out."""
+        """Return the packets of the compensations, then those of the blocks; with compensation by
+        region, a compensation before each block for which it changes. The thesis does not say
+        whether M06 waits: the user is asked before it is sent."""
         fixed_mm = tuple(axis.compensation_mm for axis in machine.axes)[:2]
         decoded = forecast.decoded
         by_block = _by_block(decoded, machine)
@@ -136,7 +136,8 @@ class PicMmhWire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> PicMmhConversation:
-        """`H;`; `Q;`, which is for all axes; `PX+1000;`; `JX+;`, until it is stopped."""
+        """Return the conversation of a command: `H;` homes; `Q;` zeroes all axes at once;
+        `PX+1000;` jogs by steps; `JX+;` moves one axis until it is stopped ("hold")."""
         if action == "home":
             packets = [Packet(b"H;", counts=(UNTIL_SILENT, 3 * RETREAT_STEPS))]
         elif action == "zero":
@@ -180,8 +181,8 @@ def _by_hand_hz(machine: PicMmhMachine) -> float:
 
 
 def _reverses_s(machine: PicMmhMachine) -> list[float]:
-    """Return the time without reports, s, while the controller makes up for the play of each axis
-    by hand."""
+    """Return for each axis the seconds without reports while the controller takes up the play, in
+    moves by hand."""
     assert isinstance(machine.link, PicMmhLink)
     if machine.link.compensation == "reported" and machine.link.step_byte != "none":
         return [0.0, 0.0, 0.0]
@@ -190,8 +191,8 @@ def _reverses_s(machine: PicMmhMachine) -> list[float]:
 
 
 def _compensations(added_mm: Sequence[float], before_mm: Sequence[float] = ()) -> list[bytes]:
-    """`BX204;` `BY178;`: what the simulation reckons with, in µm, where it is known, and not
-    as before."""
+    """Return the commands (`BX204;` `BY178;`, in µm) that set the compensation of the simulation:
+    those that are known and differ from `before_mm`."""
     commands = []
     for index, (letter, added) in enumerate(zip("XY", added_mm, strict=True)):
         if math.isnan(added) or (before_mm and before_mm[index] == added):
@@ -208,7 +209,7 @@ def _compensations(added_mm: Sequence[float], before_mm: Sequence[float] = ()) -
 
 
 def _by_block(decoded: Toolpath, machine: PicMmhMachine) -> dict[int, tuple[float, ...]]:
-    """Return the compensation of X and Y, mm, of each block where it is by region; else none."""
+    """Return the compensation of X and Y, mm, for each block; empty where it is not by region."""
     if not machine.controller.compensates_by_region:
         return {}
     rows = compensations(decoded, machine)
@@ -221,7 +222,7 @@ def _by_block(decoded: Toolpath, machine: PicMmhMachine) -> dict[int, tuple[floa
 def _reports(
     forecast: Forecast, block: int, machine: PicMmhMachine, added_mm: Sequence[float]
 ) -> int:
-    """Return the number of bytes that report the steps of a block."""
+    """Return the number of bytes by which the controller reports the steps of a block."""
     link = machine.link
     assert isinstance(link, PicMmhLink)
     if link.step_byte == "none":
@@ -240,7 +241,7 @@ def _reports(
 
 
 def _steps(letter: str, way_mm: float, step_mm: float) -> list[tuple[bytes, int]]:
-    """Return the strings that move an axis, each with its steps."""
+    """Return the strings that move an axis by `way_mm`, each with its number of steps."""
     remaining, sense = round(abs(way_mm) / step_mm), "-" if way_mm < 0.0 else "+"
     parts = [MAX_STEPS] * (remaining // MAX_STEPS) + [remaining % MAX_STEPS] * (
         remaining % MAX_STEPS > 0
@@ -287,13 +288,13 @@ class PicMmhConversation(PacketByPacket):
         self._count_from(manner.at_mm)
 
     def _count_from(self, place_mm: Place | None) -> None:
-        """Count from this place on, where steps are reported."""
+        """Count reported steps from this place on, where steps are reported."""
         self.place_mm = self._base_mm = None if self._link.step_byte == "none" else place_mm
         self._counts = [0, 0, 0]
         self.counts_steps = self.place_mm is not None
 
     def _count_steps(self, octets: bytes) -> None:
-        """Move the place by reported steps; those of a compensation move nothing."""
+        """Move the place by reported steps; steps of a compensation do not move it."""
         for octet in octets:
             for axis in range(3):
                 sense = self._sense(octet, axis)
@@ -312,7 +313,7 @@ class PicMmhConversation(PacketByPacket):
         self.place_mm = x, y, z
 
     def _sense(self, octet: int, axis: int) -> int:
-        """Return 1, −1 or 0: the step of an axis that a byte reports."""
+        """Return the step of an axis that a byte reports: 1, −1 or 0."""
         if self._link.step_byte == "letters":
             return {"XYZ"[axis]: 1, "xyz"[axis]: -1}.get(chr(octet), 0)
         if not 0x40 < octet < 0x80:
@@ -330,7 +331,7 @@ class PicMmhConversation(PacketByPacket):
             self._moves(now)
 
     def _moves(self, now: float) -> None:
-        """Note that the block has been accepted: from now on it is executed."""
+        """Record that the block has been accepted and is executed from now on."""
         packet = self.packets[self.sent - 1]
         # In which sense an axis moved before the program, nobody knows.
         unmoved = zip(self._play_s, self._senses, strict=True)
@@ -347,19 +348,20 @@ class PicMmhConversation(PacketByPacket):
 
     @property
     def _is_counted_later(self) -> bool:
-        """True if the packet that is out is over when nothing comes any more."""
+        """True if the packet under way counts as done when nothing more is received."""
         return self.packets[self.sent - 1].counts[:1] == (UNTIL_SILENT,)
 
     @property
     def _silence_s(self) -> float:
-        """Return how long nothing may come before the packet counts as done, s. A jog is done with
-        the report of its last step; how many steps homing takes is not known."""
+        """Seconds without a received byte after which the packet counts as done. A jog is done
+        with the report of its last step; how many steps homing takes is not known."""
         packet = self.packets[self.sent - 1]
         complete = packet.seconds > 0.0 and self._count >= packet.counts[1]
         return SILENCE_FACTOR * self.manner.late_s + (0.0 if complete else self._reverses_s)
 
     def _silent(self, now: float) -> None:
-        """Nothing has come for long: done, if all can be that was reported."""
+        """End the packet after a long silence: done if enough steps have been reported, else
+        failed."""
         packet, reports = self.packets[self.sent - 1], self._link.step_byte != "none"
         min_count = packet.counts[1]
         if reports and self._count < min_count:
@@ -374,7 +376,8 @@ class PicMmhConversation(PacketByPacket):
             self._packet_done(now)
 
     def _count_on(self, now: float) -> None:
-        """Done when all has been reported and its time is over."""
+        """End the packet if all its steps have been reported and its time is over; else set the
+        time of the next check. Fail at too many steps."""
         counts = self.packets[self.sent - 1].counts
         missing = (counts[0] if counts else 0) - self._count
         if missing < 0:
@@ -432,7 +435,7 @@ class PicMmhConversation(PacketByPacket):
 
     @property
     def _rate(self) -> str:
-        """Return the hint on power and rate for an error before anything was understood; else
+        """Hint at power and baud rate for an error message before anything was understood; else
         ""."""
         return "; is it switched on, and is --baud its rate?" if not self.done else ""
 
@@ -442,7 +445,7 @@ class PicMmhConversation(PacketByPacket):
         return self._link.step_byte == "bits" and 0x40 < octet < 0x80
 
     def tick(self, now: float) -> None:
-        """End a block whose time is over, or fail where something has not come."""
+        """End a block whose time is over, or fail where a byte is overdue."""
         if self.is_over or now < self.next_s:
             return
         if self._halting:
@@ -472,7 +475,8 @@ class PicMmhConversation(PacketByPacket):
             self._count_on(now)
 
     def _halt(self, now: float, *, unsent: bool) -> bool:
-        """Stop the machine by `A;`: any character stops it, this one is a command of its own."""
+        """Stop the machine by `A;`. Any character would stop it, but this one is a command of its
+        own."""
         self._halting, self._told = True, now
         self._ends = 2 if self._echo and not unsent else 1
         self._write(ALTO)
@@ -506,7 +510,7 @@ class PicMmhTerminal(Terminal):
         self._echo = b""  # what is to come back: letters are bytes of steps too
 
     def encode(self, line: str) -> bytes:
-        """Return the line with its end."""
+        """Return the bytes of a typed line with its end."""
         data = self.unescape(line.strip())
         if data and not data.endswith(self.end):
             data += self.end
@@ -524,7 +528,8 @@ class PicMmhTerminal(Terminal):
         return data
 
     def halt(self) -> bytes:
-        """Return `A;`, which stops it as any character does, and has come back when it stands."""
+        """Return `A;`, which stops the machine as any character does; its echo says that the
+        machine stands."""
         stop = super().halt()
         self._ends = 1 + self._echo.count(self.end)
         self._echo += stop if self._link.echo == "echo" else b""
@@ -536,7 +541,8 @@ class PicMmhTerminal(Terminal):
         return line.strip().rstrip(";") == "A"
 
     def decode(self, data: bytes) -> list[str]:
-        """Return the echo as it is, and outputs counted, as many as have come together."""
+        """Return the echo as it is, and the outputs counted: one line for all that have come
+        together."""
         lines: list[str] = []
         for octet in data:
             echoed = self._echo[:1] == bytes([octet])
@@ -567,7 +573,8 @@ class PicMmhTerminal(Terminal):
         return [f"{count} × {step}" for step, count in steps]
 
     def _output(self, octet: int) -> str:
-        """Return the axes of an output and their senses; "" for a byte that reports none."""
+        """Return the axes of an output and their directions as text; "" for a byte that reports
+        none."""
         if self._link.step_byte == "letters" and chr(octet) in "XYZxyz":
             return f"{chr(octet).upper()}{'+' if chr(octet).isupper() else '-'}"
         if self._link.step_byte != "bits" or not 0x40 < octet < 0x80:

@@ -59,7 +59,7 @@ def write_program(toolpath: Toolpath, machine: PicMmhMachine) -> Program:
 
 
 def _refuse_chords(place: str) -> NoReturn:
-    """Raise PostError for an arc that passes where no coordinate can be written."""
+    """Raise PostError for an arc one of whose chords ends where no coordinate can be written."""
     raise PostError(
         "an arc that has to be written as lines leaves the five digits of a coordinate",
         where=place,
@@ -119,8 +119,8 @@ class _Writer:
         return self._numbers.grids[0]
 
     def blocks(self) -> tuple[bytes, Ints]:
-        """Return all blocks as text, and the row of the wanted toolpath of each, −1 for the
-        dialect's own."""
+        """Return the bytes of all blocks, and for each the row of the wanted toolpath, −1 for
+        blocks that the dialect adds."""
         points = self._points()
         events = self._events(points)
         is_sent = points.is_sent
@@ -147,12 +147,12 @@ class _Writer:
         yield from too_long(data, self._dialect.buffer_chars)
 
     def _place(self, row: int) -> str:
-        """Return the row of the given toolpath that a row of the lowered one came from, for
-        messages."""
+        """Return the text that names, in messages, the given toolpath's row from which a row of
+        the lowered one came."""
         return self._wanted.place(int(self._row[row]))
 
     def _words(self, points: Points) -> list[WordColumn]:
-        """Return the words of all points, none where nothing is sent."""
+        """Return the words of all points, empty where nothing is sent."""
         row, is_sent = points.row, points.is_sent
         flat = is_sent & ~points.is_deep
         arc = flat & points.is_arc
@@ -179,9 +179,9 @@ class _Writer:
     # Where blocks may bring the tool.
 
     def _points(self) -> Points:
-        """Return all points, and what of them is sent. The numbers of a step may differ by less
-        than a step, and so may the number that an arc starts from, whose landing may then be no
-        landing: as many passes as it takes until none is."""
+        """Return all points, and which of them are sent. Numbers of one step may differ by less
+        than a step, and so may the number that an arc starts from, which can make its landing
+        invalid: repeat until no more landings become invalid."""
         arcs = self._arcs()
         is_refused = np.zeros(len(arcs.row), dtype=np.bool_)
         while True:
@@ -195,7 +195,7 @@ class _Writer:
         return points
 
     def _arcs(self) -> StepArcs:
-        """Return the arcs as this controller takes them from where it stands, and their
+        """Return the arcs as this controller executes them from where it stands, and their
         landings."""
         numbers, path = self._numbers, self._toolpath
         is_deep = numbers.end_steps[:, 2] != self._before[:, 2]
@@ -219,7 +219,7 @@ class _Writer:
         return StepArcs(rows[~is_empty], table, sweep[~is_empty], landing, rows[is_empty])
 
     def _points_of(self, arcs: StepArcs, is_refused: Bools) -> Points:
-        """Return all points when the landings of `is_refused` (J,) are none."""
+        """Return all points if the landings `is_refused` (J,) are not used."""
         numbers, path, grid = self._numbers, self._toolpath, self._grid
         landed = arcs.landed & ~is_refused
         chords = self._chords(arcs, landed)
@@ -269,8 +269,9 @@ class _Writer:
         )
 
     def _refused_landings(self, arcs: StepArcs, points: Points) -> Bools:
-        """Return the mask (J,) of landings with which a reader would take the block for another
-        arc: short arcs can turn into almost full circles by the rounding of their numbers."""
+        """Return a mask (J,), true for landings with which a reader would take the block for
+        another arc: short arcs can turn into almost full circles by the rounding of their
+        numbers."""
         numbers, grid = self._numbers, self._grid
         units = np.where(
             arcs.at_end[:, None],
@@ -283,7 +284,8 @@ class _Writer:
         return np.asarray(arcs.landed & (full_turns(read, arcs.expected_rad) != 0.0))
 
     def _chords(self, arcs: StepArcs, landed: Bools) -> Chords:
-        """Return lines along the rest of each arc from its landing, or along all of it."""
+        """Return chords along the rest of each arc from its landing on, or along the whole arc
+        where it has none."""
         path, grid = self._toolpath, self._grid
         centre = path.centre[arcs.row]
         places = np.where(landed[:, None], arcs.stop * grid.step_mm, path.starts[arcs.row, :2])
@@ -295,7 +297,8 @@ class _Writer:
         return ends.without(landed & arcs.at_end)
 
     def _check_ends(self, arcs: StepArcs, points: Points) -> None:
-        """The numbers of each arc, taken as the controller takes them, must be its landing."""
+        """Raise PostError, as an internal fault, where the written numbers of an arc do not mean
+        its landing to the controller."""
         rows = np.flatnonzero(points.is_arc & points.is_sent)
         arc_rows = np.searchsorted(arcs.row, points.row[rows])
         is_wrong = (self._grid.steps(points.units[rows]) != arcs.stop[arc_rows]).any(axis=1)
@@ -372,7 +375,7 @@ class _Writer:
         return blocks
 
     def _home(self, axes: tuple[int, ...]) -> tuple[Ints, Ints]:
-        """Return steps and units of machine zero in these axes."""
+        """Return the steps and the units of machine zero in these axes."""
         zero = self._machine.controller.machine_zero_mm
         grids = [self._numbers.grids[axis] for axis in axes]
         units = [
@@ -394,17 +397,17 @@ class StepArcs(Struct, frozen=True, eq=False):
 
     @property
     def clockwise(self) -> Bools:
-        """(J,)"""
+        """Mask (J,) of the arcs that turn clockwise."""
         return np.asarray(self.table[:, CLOCKWISE] != 0)
 
     @property
     def end(self) -> Ints:
-        """(J, 2) steps."""
+        """Programmed ends (J, 2) in steps."""
         return self.table[:, 2:4] + self.table[:, 4:6]
 
     @property
     def stop(self) -> Ints:
-        """(J, 2) steps of the landing."""
+        """Landings (J, 2) in steps."""
         return self.landing[:, :2] + self.table[:, 4:6]
 
     @property
@@ -414,18 +417,18 @@ class StepArcs(Struct, frozen=True, eq=False):
 
     @property
     def at_end(self) -> Bools:
-        """(J,) whether it is the wanted end."""
+        """Mask (J,) of the arcs whose landing is the wanted end."""
         return np.asarray((self.landing[:, :2] == self.table[:, 2:4]).all(axis=1))
 
     @property
     def at_start(self) -> Bools:
-        """(J,) whether it is the start."""
+        """Mask (J,) of the arcs whose landing is their start."""
         return np.asarray((self.landing[:, :2] == self.table[:, :2]).all(axis=1))
 
     @property
     def expected_rad(self) -> Floats:
-        """(J,) about how far an arc has turned at its landing: n ≈ (2√2/π)·R·turn on the average
-        of all directions, and never off by more than a quarter of the turn."""
+        """Estimated angle (J,) that an arc has turned at its landing: n ≈ (2√2/π)·R·turn on the
+        average of all directions, and never off by more than a quarter of the turn."""
         radius = np.hypot(self.table[:, 0].astype(np.float64), self.table[:, 1])
         with np.errstate(divide="ignore", invalid="ignore"):
             turn = self.landing[:, ITERATION] * math.pi / (2.0 * math.sqrt(2.0) * radius)
@@ -457,7 +460,7 @@ class Chords(Struct, frozen=True, eq=False):
     part: Ints
 
     def without(self, arcs: Bools) -> Chords:
-        """Return the chords without those of these arcs (J,)."""
+        """Return the chords of all arcs except `arcs` (J,)."""
         is_kept = ~arcs[self.arc]
         return Chords(
             np.where(arcs, 0, self.count), self.end[is_kept], self.arc[is_kept], self.part[is_kept]
@@ -465,8 +468,8 @@ class Chords(Struct, frozen=True, eq=False):
 
 
 def turned_rad(start_arm: Floats | Ints, end_arm: Floats | Ints, clockwise: Bools) -> Floats:
-    """Return (J,) the sweep from the arms `start_arm` to the arms `end_arm` ((J, 2) each), in
-    (0, 2π]; a full turn when the two are one."""
+    """Return (J,) the sweep from the vectors `start_arm` to the vectors `end_arm`, (J, 2) each and
+    from the centre, in (0, 2π]; a full turn where both are equal."""
     cross = start_arm[:, 0] * end_arm[:, 1] - start_arm[:, 1] * end_arm[:, 0]
     dot = start_arm[:, 0] * end_arm[:, 0] + start_arm[:, 1] * end_arm[:, 1]
     angle = np.mod(np.arctan2(np.where(clockwise, -cross, cross), dot), _TURN)
@@ -481,8 +484,8 @@ def full_turns(turn_rad: Floats, expected_rad: Floats) -> Floats:
 def chord_ends(start: Floats, centre: Floats, sweep_rad: Floats, sagitta_mm: float) -> Chords:
     """Return the fewest equal chords within `sagitta_mm` of each arc.
 
-    `start`, `centre` (J, 2) mm; signed sweeps (J,). A chord over the angle a strays by
-    R (1 − cos(a/2)); no chord turns by more than a right angle.
+    `start`, `centre` (J, 2) mm; signed sweeps (J,). A chord over the angle a deviates by R (1 −
+    cos(a/2)); no chord turns by more than a right angle.
     """
     arms = start - centre
     radius = np.hypot(arms[:, 0], arms[:, 1])
@@ -534,9 +537,8 @@ class WriterChanges(Struct):
 
 
 def too_long(data: bytes, buffer_chars: int | None) -> Iterator[Finding]:
-    """Yield a BLOCK_TOO_LONG finding if blocks exceed the controller's buffer: a remark for the
-    buffer of the thesis, which contradicts itself, and a warning for one that the user has
-    given."""
+    """Yield BLOCK_TOO_LONG if blocks exceed the controller's buffer: a remark for the buffer of
+    the thesis, which contradicts itself, and a warning for one that the user has given."""
     lengths = line_lengths(data)
     limit = BUFFER_CHARS if buffer_chars is None else buffer_chars
     if count := int((lengths > limit).sum()):

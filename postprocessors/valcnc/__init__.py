@@ -38,7 +38,7 @@ class Valcnc(Target):
         check(machine)
 
     def unit_mm(self, machine: ValcncMachine, axis: Axis) -> float:
-        """Return the last decimal of a coordinate, on the axis where it is the most."""
+        """Return the last decimal of a coordinate in mm, on the axis where it is coarsest."""
         dialect = machine.dialect
         return float(10.0**-dialect.decimals / scales_of(machine, dialect).min())
 

@@ -58,27 +58,27 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
     """The PIC18F4550 of ValCNC: lines by a counter, arcs as lines."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """Return the motion, chunk by chunk."""
+        """Return the motion in chunks."""
         pieces = _Pieces(toolpath, machine)
         return _leg_run(pieces, toolpath, machine, options).run(pieces.legs())
 
     def fused_run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> LineRun | None:
-        """Return the lines of all rows; None where the mechanics differ from place to place."""
+        """Return the motion as lines of whole steps, judged in closed form; None where the
+        mechanics differ from place to place."""
         pieces = _Pieces(toolpath, machine)
         return _leg_run(pieces, toolpath, machine, options).fused_run(pieces.legs())
 
     def run_on(
         self, drawn: DrawingProgress, toolpath: Toolpath, machine: _Machine, options: Options
     ) -> tuple[list[Chunk], DrawingProgress]:
-        """Return the motion of rows that follow others, which ended at `drawn`; and where these
-        end."""
+        """Return the motion of rows that continue after `drawn`, and the state behind them."""
         pieces = _Pieces(toolpath, machine, drawn)
         chunks = list(_leg_run(pieces, toolpath, machine, options).run(pieces.legs()))
         return chunks, pieces.drawn
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """Return the moves with their ends on whole steps, and arcs about centres as far from
-        both.
+        """Return the toolpath with ends on whole steps, and with the centres of arcs equally far
+        from both ends.
 
         ProgramError for what the controller cannot follow.
         """
@@ -100,7 +100,7 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
         return round_to_steps(rounded, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Lines by the counter, arcs by lines."""
+        """Return "counter": lines by the counter, arcs as lines."""
         return "counter"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -162,15 +162,16 @@ class _Pieces:
         self._first = np.cumsum(parts, out=parts)
 
     def in_steps(self, points: Floats) -> Ints:
-        """Coordinates, or differences of them, (..., 3) mm in steps."""
+        """Return (..., 3) coordinates, or differences of coordinates, in whole steps by the
+        controller's rounding; `points` in mm."""
         if self._controller.rounding == "nearest":
             columns = [to_steps(points[..., axis], self._step_mm[axis]) for axis in range(3)]
             return np.stack(columns, axis=-1)
         return np.asarray(np.trunc(points / self._step_mm + self._guard(points)).astype(np.int64))
 
     def between_steps(self) -> int:
-        """Return how many coordinates of programmed ends lie where the rounding to whole steps
-        changes, within `HALF_STEP_GUARD` of a step."""
+        """Return how many coordinates of programmed ends lie within `HALF_STEP_GUARD` of a step
+        from where the rounding to whole steps jumps."""
         turns_at = 0.5 if self._controller.rounding == "nearest" else 0.0
         points = distinct_rows(self._end) / self._step_mm
         offsets = points - turns_at
@@ -178,7 +179,7 @@ class _Pieces:
         return int((is_near & (points != 0.0)).sum())
 
     def legs(self) -> Iterator[Legs]:
-        """Yield the legs, some thousands at a time."""
+        """Yield the lines in whole steps, some thousands at a time."""
         period_s = 1.0 / self._controller.step_rate_hz
         before, places_before = self.drawn.point[None, :], self.drawn.steps[None, :]
         for low in range(0, int(self._first[-1]), PIECES_AT_ONCE):
@@ -195,7 +196,7 @@ class _Pieces:
             yield Legs(row[moves], travel[moves], passes[moves] * period_s)
 
     def _points(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Return the row (J,) and end (J, 3) mm of the pieces low:high."""
+        """Return the toolpath row (J,) and the end (J, 3) mm of the pieces low:high."""
         index = np.arange(low, high)
         row = np.searchsorted(self._first, index, side="right") - 1
         part, parts = index - self._first[row] + 1, self._first[row + 1] - self._first[row]
@@ -211,7 +212,7 @@ class _Pieces:
         return row, points
 
     def _angles(self, toolpath: Toolpath, count: int) -> Floats:
-        """Return the five values of `arc_angles` for each arc of the first `count` rows, (J, 5).
+        """Return (J, 5) the values of `arc_angles` for each arc among the first `count` rows.
 
         Raises ProgramError for an arc about its own start, or with a chord longer than its
         diameter.
@@ -253,7 +254,7 @@ class _Pieces:
                 raise ProgramError(message, where=block_of(toolpath, int(rows[is_bad.argmax()])))
 
     def _parts(self, arcs: Floats) -> Ints:
-        """Return (J,) pieces of arcs (J, 5)."""
+        """Return (J,) the number of lines that each arc of `arcs` (J, 5) becomes."""
         if self._controller.arc_segments is not None:
             return np.full(len(arcs), self._controller.arc_segments)
         length = arcs[:, 2] * np.abs(arcs[:, 4]) / self._controller.arc_segment_mm

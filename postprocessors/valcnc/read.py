@@ -45,16 +45,16 @@ Point = tuple[float, float, float]
 
 
 def read_program(data: bytes, machine: ValcncMachine) -> Toolpath:
-    """Return the moves of a program; ProgramError naming block, line and column when it is
-    none."""
+    """Return the moves of a program; ProgramError with block, line and column for data that are no
+    program."""
     reader = _Reader(machine)
     reader.read(data)
     return reader.path.finish(reader.findings())
 
 
 def read_block(data: bytes, machine: ValcncMachine, start: Point) -> tuple[Toolpath, Point]:
-    """Return the moves of one block that follows others, which ended `start` a place in the
-    program's units; and where it ends. ProgramError when it is none."""
+    """Return the moves of one block that begins at `start`, in the program's units, and where it
+    ends. ProgramError for data that are no block."""
     reader = _Reader(machine, start)
     reader.read(data)
     return reader.path.finish(), reader.at
@@ -88,7 +88,8 @@ class _Reader:
         self.blocks = 0
 
     def read(self, data: bytes) -> None:
-        """All blocks; ProgramError at the first that is none, and where there is no block."""
+        """Read all blocks into the path; ProgramError at the first line that is no block, and for
+        a program without blocks."""
         for block in blocks_of(data, self.lexing, self.take):
             self.block(block)
         if not self.blocks:
@@ -152,7 +153,7 @@ class _Reader:
         return count
 
     def _send(self, blocks: PlainBlocks, kind: Ints, count: int) -> None:
-        """The moves of the first so many blocks."""
+        """Add the moves of the first `count` blocks to the path."""
         numbers, kind = blocks.numbers[:count], kind[:count]
         end = numbers[:, words.X_WORD : words.Z_WORD + 1]
         self.at = end[-1, 0].item(), end[-1, 1].item(), end[-1, 2].item()
@@ -170,7 +171,7 @@ class _Reader:
         )
 
     def _check_words(self, block: WordBlock, letters: str) -> None:
-        """Raise ProgramError for an unknown code, for a word that stands twice, and for tabs."""
+        """Raise ProgramError for an unknown code, a word that stands twice, and tabs."""
         first = "".join(block.words[0])
         if letters[0] != "G" or block.words[0][1] not in CODES:
             codes = " ".join(f"G{code}" for code in CODES)
@@ -188,8 +189,8 @@ class _Reader:
                 )
 
     def findings(self) -> Iterator[Finding]:
-        """Yield the scale that was taken, and arcs that the controller's angle does not bring
-        home."""
+        """Yield a finding on the scale that was assumed, and one on arcs that the controller's
+        angle does not lead to their end."""
         if not self._dialect.coord_scale_checked:
             yield COORDINATES_SCALED_READ(measured=self._dialect.coord_scale)
         if self._missed.count:
@@ -220,7 +221,7 @@ class _Reader:
         return x / a + 0.0, y / b + 0.0, z / c + 0.0
 
     def _line(self, block: WordBlock, code: str, values: dict[str, float], end: Point) -> None:
-        """A line; in two where the option puts Z before or after X and Y."""
+        """Add a line to the path; two where the option moves Z before or after X and Y."""
         if "I" in values or "J" in values:
             word, letter = next((word, one) for word, one in enumerate(values, 1) if one in "IJ")
             block.fail(f"{letter} in a G{code}, which is no arc", word=word, mend="remove it")
@@ -233,7 +234,8 @@ class _Reader:
                 self.path.line(x, y, z, feed=self._feed)
 
     def _in_order(self, block: WordBlock, end: Point) -> Point | None:
-        """Return the corner between the parts along Z and in XY, if they are apart."""
+        """Return the corner between the part along Z and the part in XY; None if the move is one
+        line."""
         old, order = self.at, self._dialect.z_order
         if end[:2] == old[:2] or end[2] == old[2] or order == "together":
             return None
@@ -247,7 +249,8 @@ class _Reader:
         return (*old[:2], end[2]) if order == "before" else (*end[:2], old[2])
 
     def _arc(self, block: WordBlock, code: str, values: dict[str, float], end: Point) -> None:
-        """An arc; Z in a block of its own before or after it where the option asks for it."""
+        """Add an arc to the path; Z moves by itself before or after it where the option says
+        so."""
         if "I" not in values or "J" not in values:
             missing = "J" if "I" in values else "I"
             block.fail(f"an arc without {missing}", mend="give I and J from the start")
@@ -272,7 +275,8 @@ class _Reader:
             self.path.line(x, y, z, feed=self._feed)
 
     def _check_arc(self, block: WordBlock, offset: tuple[float, float], end: Point) -> None:
-        """That the firmware's formulas (L1284-1326) have a value, and nearly the right one."""
+        """Raise ProgramError where the firmware's formulas (L1284-1326) have no value, or not
+        nearly the right one; note arcs that its angle does not lead to their end."""
         i, j = offset
         radius = math.hypot(i, j)
         chord = end[0] - self.at[0], end[1] - self.at[1]
@@ -304,7 +308,8 @@ class _Reader:
     def _note_miss(
         self, block: WordBlock, offset: tuple[float, float], chord: tuple[float, float]
     ) -> None:
-        """Compare 2·arcsin(C/2R), or 2π less it, with the angle between the two arms."""
+        """Compare the firmware's angle of an arc, 2·arcsin(C/2R) or 2π less it, with the angle
+        between its two radii, and record the worst miss."""
         start_arm = -offset[0], -offset[1]
         end_arm = chord[0] - offset[0], chord[1] - offset[1]
         cross, dot = (

@@ -26,7 +26,7 @@ class ValcncSignals(SignalModel):
     """Steps and directions of X on port D, of Y on port B, of Z on port A."""
 
     def board(self, machine: _Machine) -> Board:
-        """Return the lines of the three drivers."""
+        """Return the signal lines of the three drivers."""
         high_s = 1.0 / machine.controller.step_rate_hz - LOW_S
         return Board(
             tuple(
@@ -43,7 +43,7 @@ class ValcncSignals(SignalModel):
         )
 
     def pulses(self, toolpath: Toolpath, machine: _Machine) -> Iterator[Pulses]:
-        """Yield the passes of the counter."""
+        """Yield the step pulses of the counter's passes."""
         model = ValcncModel()
         chunks = model.run(toolpath, machine, OUTPUTS)
         return row_pulses(chunks, model.clock(toolpath, machine), toolpath)

@@ -50,9 +50,9 @@ class ValcncTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True
 def _with_all_defined(
     machine: Machine[ValcncController, ValcncDialect],
 ) -> Machine[ValcncController, ValcncDialect]:
-    """Return the machine with a meaning for what `[dialect]` refuses because the thesis gives
-    it none: a controller does something all the same. What ours does is in the page of its
-    wire."""
+    """Return the machine with a `[dialect]` that defines every case: where the thesis is silent
+    the reader refuses, but a controller does something all the same. What this one does is on the
+    page of its wire."""
     dialect = machine.dialect
     meant = {"z_order": "before", "missing_words": "keep", "full_circles": "whole"}
     defined: dict[str, Any] = {
@@ -109,7 +109,7 @@ class ValcncTwin(Twin):
             self._block(line)
 
     def _block(self, line: bytes) -> None:
-        """Draw it, if it is one."""
+        """Draw the block that a received line holds; a line that is no block is ignored."""
         try:
             path, end_place = read_block(line, self._machine, self._at)
             chunks, drawn = self._model.run_on(self._drawn, path, self._machine, COMMANDED)

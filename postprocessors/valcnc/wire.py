@@ -64,7 +64,7 @@ class ValcncWire(Wire):
     stopping = "nothing more is sent; the block that is being cut is cut to its end"
 
     def packets(self, data: bytes, machine: ValcncMachine, forecast: Forecast) -> Sequence[Packet]:
-        """Return a packet for each line that has words, without its blanks."""
+        """Return one packet for each line that has words, without its blanks."""
         packets = [Packet(OPENING)]
         lines = (line.translate(None, b" \t") for line in data.splitlines())
         for block, line in enumerate(filter(None, lines)):
@@ -97,8 +97,8 @@ class ValcncWire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> Conversation:
-        """Return a jog is a program of one block, or of two where Z moves too: up first, down
-        last."""
+        """Return the conversation of a jog: a program of one block, or of two where Z moves too,
+        up first or down last. Other actions as for all wires; MachineError for a zero."""
         if action == "zero":
             raise MachineError(
                 f"{machine.target.name} has no command to zero over its line",
@@ -126,13 +126,13 @@ class ValcncWire(Wire):
         return self.conversation(packets, machine, manner)
 
     def hand(self, machine: ValcncMachine, manner: Manner) -> ValcncHand:
-        """Return the conversation that jogs from place to place."""
+        """Return the conversation that jogs from place to place, and keeps the place."""
         return ValcncHand(self, machine, manner)
 
 
 def _corners(at: Floats, end: Floats) -> Iterator[Floats]:
-    """Yield the places (3,) of a jog: Z and the plane apart, and the tool up while it moves in
-    the plane."""
+    """Yield the places (3,) mm of a jog: Z and the plane separately, with the tool up while it
+    moves in the plane."""
     if end[2] > at[2]:
         yield np.array([at[0], at[1], end[2]])
     else:
@@ -151,8 +151,8 @@ def _block(place_mm: Floats, machine: ValcncMachine) -> bytes:
 
 
 def _block_packet(text: bytes, machine: ValcncMachine, at_mm: Place) -> Packet:
-    """Return a block that begins at a place, with its simulated time and its end; ProgramError for
-    text that is no block."""
+    """Return the packet of a block that begins at `at_mm`, with its simulated time and its end;
+    ProgramError for text that is no block."""
     scales = scales_of(machine, machine.dialect)
     x, y, z = np.round(np.array(at_mm) * scales, machine.dialect.decimals).tolist()
     path, end = read_block(text, machine, (x, y, z))
@@ -171,7 +171,8 @@ class ValcncHand(CommandHand):
         self._of_valcnc = machine
 
     def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
-        """Carry out an order; "zero" sends nothing, and says where the controller stands."""
+        """Carry out an order. "zero" sends nothing: it records that the controller stands at part
+        zero."""
         if action != "zero":
             super().order(action, values, now)
             return
@@ -186,7 +187,7 @@ class ValcncHand(CommandHand):
         self._tell("taken to stand at part zero: right if it has just been switched on there")
 
     def say(self, line: str, now: float) -> None:
-        """Send a typed block, and wait for its simulated time where its begin is known."""
+        """Send a typed block, and wait for its simulated time where its start is known."""
         text = "".join(line.split()).encode("ascii", "replace")
         try:
             if self.place_mm is None:

@@ -83,7 +83,7 @@ def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
 
 
 def _check_tools(toolpath: Toolpath) -> None:
-    """Nothing would stop the machine for another tool."""
+    """Raise PostError for a second tool: no block stops the machine for a tool change."""
     refuse(
         toolpath,
         (toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath),
@@ -132,13 +132,14 @@ def _text(rows: PlainRows, dialect: ValcncDialect) -> bytes:
 
 
 def _scale_finding(dialect: ValcncDialect) -> Iterator[Finding]:
-    """Warn that a wrong scale makes parts 8 times too large or too small."""
+    """Yield a warning while the scale is unchecked: a wrong one makes parts 8 times too large or
+    too small."""
     if not dialect.coord_scale_checked:
         yield COORDINATES_SCALED(measured=dialect.coord_scale)
 
 
 def _feed_finding(toolpath: Toolpath, machine: ValcncMachine) -> Iterator[Finding]:
-    """Report feeds that the machine will not keep: it has one speed."""
+    """Yield FEED_ROUNDED for feeds other than the machine's only speed."""
     speed = machine.max_feed_mm_min
     with np.errstate(invalid="ignore"):
         other = toolpath.is_feed & (np.abs(toolpath.feed - speed) > FEED_TOLERANCE * speed)
