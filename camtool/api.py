@@ -117,7 +117,7 @@ BYTES = "<bytes>"
 
 
 def _patterns(patterns: str | Sequence[str]) -> tuple[str, ...]:
-    """Return the patterns; a single one may be given as it is."""
+    """Return the patterns as a tuple; a single text counts as one pattern."""
     return (patterns,) if isinstance(patterns, str) else tuple(patterns)
 
 
@@ -185,7 +185,7 @@ def read_job(
 
 
 def as_drawing(drawing: Drawable, target: str | LoadedTarget | None, job: Job) -> Drawing:
-    """Return the drawing, or that of its file or objects, on the layers of the job's
+    """Return the drawing; one that is not read yet is read, with the layers of the job's
     operations."""
     if isinstance(drawing, Drawing):
         return drawing
@@ -201,7 +201,8 @@ def _reader_of(drawing: Drawable) -> Callable[[ReadOptions], Drawing]:
 
 
 def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
-    """Return the program and its name in messages; ProgramError when its file cannot be read."""
+    """Return the bytes of a program and its name for messages; ProgramError if its file cannot be
+    read."""
     if isinstance(program, bytes):
         return program, BYTES
     if isinstance(program, Program):
@@ -295,17 +296,17 @@ def load_target(
 
 
 def as_target(target: str | LoadedTarget) -> LoadedTarget:
-    """Return the target, loaded where its name is given."""
+    """Return the target as given, or loaded by its name."""
     return load_target(target) if isinstance(target, str) else target
 
 
 def _machine_of(target: str | LoadedTarget | None) -> Machine | None:
-    """Return the machine of the target, None without one."""
+    """Return the machine of a target, None if no target is given."""
     return None if target is None else as_target(target).machine
 
 
 def _as_toml(value: Any) -> str:
-    """Return a value as `--set` takes it."""
+    """Return a Python value as the TOML text that `--set` takes."""
     import json
 
     return json.dumps(value, ensure_ascii=False)
@@ -360,8 +361,8 @@ def post_by_tool(
     compensate: bool = False,
     gates: Gates | None = None,
 ) -> tuple[Run, ...]:
-    """As `post`, with one program for each stretch that one tool cuts: for machines without a tool
-    changer.
+    """Return a drawing as several programs, one for each stretch between tool changes, for
+    machines without a tool changer; otherwise as `post`.
 
     All of them are planned together, in one work frame; each is complete, and judged alone against
     what its operations ask for. Raises as `post` does. Source: docs/verifying.md.
@@ -380,7 +381,8 @@ def post_by_setup(
     compensate: bool = False,
     gates: Gates | None = None,
 ) -> tuple[Run, ...]:
-    """As `post`, with one program for each set-up of the job, in the order of the job.
+    """Return a drawing as several programs, one for each set-up of the job, in the order of the
+    job; otherwise as `post`.
 
     `job.setup(NAME)` is the job of one of them. Raises as `post` does, and OptionError for a job
     without set-ups. Source: docs/jobs.md.
@@ -391,7 +393,8 @@ def post_by_setup(
 
 
 def _with_compensation(job: Job | None, compensate: bool) -> Job:
-    """Return the job, which compensates if it says so itself or is told to."""
+    """Return the job with compensation switched on if `compensate` is set; a job that compensates
+    already is returned unchanged."""
     job_used = job or Job()
     return replace(job_used, compensate=True) if compensate else job_used
 
@@ -666,7 +669,8 @@ def preview(
 
 
 def _as_shown(value: Any) -> Shown:
-    """Return the value as one with a picture."""
+    """Return the value as one that shows a picture in a notebook; files and objects are read as a
+    drawing."""
     if isinstance(value, Shown):
         return value
     if isinstance(value, Drawing):

@@ -115,7 +115,7 @@ class Comparison(Shown):
         return Overlay(PurePath(self.source).name, window, wanted_path, lines, (note,))
 
     def _window(self, wanted_path: Toolpath, place: tuple[float, float]) -> Floats:
-        """Return [[xmin, xmax], [ymin, ymax]] mm that the picture shows."""
+        """Return the rectangle that the picture shows: [[xmin, xmax], [ymin, ymax]], mm."""
         import numpy as np
 
         machines = [each.target.machine for each in self.ways]
@@ -146,7 +146,8 @@ def compare_program(
     job: Job | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Return the program read and judged as each variant; raises as `verify_program` does."""
+    """Judge the program once for each variant and return the comparison; raises as
+    `verify_program` does."""
     runs = [
         verify_program(
             data,
@@ -188,8 +189,7 @@ def variants_of(variants_text: str, load: Load, judging: Judging) -> list[Progra
 
 
 def effects_without(names: Sequence[str]) -> Effects:
-    """Return all effects of the mechanics but these; OptionError for names that are none of
-    them."""
+    """Return all effects of the mechanics except these; OptionError for an unknown name."""
     unknown = [name for name in names if name not in EFFECTS]
     if unknown:
         raise OptionError(
@@ -206,7 +206,8 @@ def _interpolators(target: LoadedTarget, judging: Judging) -> list[ProgramVarian
 
 
 def _mechanics(target: LoadedTarget, judging: Judging) -> list[ProgramVariant]:
-    """Return all of the mechanics, without each part that acts, and without all of them."""
+    """Return variants with all effects of the mechanics, without each effect that acts on this
+    machine, and without any."""
     return [
         ProgramVariant("as it is", target, judging),
         *(
@@ -233,7 +234,8 @@ def _acts_on(effect: str, machine: Machine) -> bool:
 
 
 def _settings(key: str, value: str) -> tuple[str, ...]:
-    """Return the settings of a key of the machine, or of a short name for X and Y."""
+    """Return the settings `KEY=value` of a machine key; a short name such as "backlash" sets X and
+    Y."""
     if key in AXES_OF:
         return tuple(f"axes.{axis}.{AXES_OF[key]}={value}" for axis in "xy")
     return (f"{key}={value}",)

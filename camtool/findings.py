@@ -99,12 +99,13 @@ class FindingReport(FrozenRecord):
     unit: str = ""
 
     def to_line(self) -> str:
-        """Return the finding as lines for people have it."""
+        """Return the finding as one line of readable text."""
         place = f" [{self.where}]" if self.where else ""
         return one_line(f"{self.severity} {self.code}{place}: {self.message}")
 
     def at(self, file: str, line: int | None) -> FoundAt:
-        """Return the finding in a line of a file; None and 0: in the file as a whole."""
+        """Return the finding with its file and line; `line` None if it is about the file as a
+        whole."""
         values = {**asdict(self), "file": file, "line": line or None}
         return FoundAt(**values)
 
@@ -148,7 +149,7 @@ class Sentence(FrozenRecord):
         severity: Severity | None = None,
         **values: float | str,
     ) -> Finding:
-        """Return the finding with its message."""
+        """Return a finding with this sentence as its message."""
         used_severity = self.severity if severity is None else severity
         return Finding(
             self.code,
@@ -161,7 +162,7 @@ class Sentence(FrozenRecord):
         )
 
     def words(self, **values: float | str) -> str:
-        """Return the text alone, where several make one finding."""
+        """Return only the text, for findings that are composed of several sentences."""
         return _TEXTS.vformat(self.text, (), values)
 
 
@@ -169,7 +170,8 @@ class _Texts(Formatter):
     """Format strings with a choice by number: `{count:one|many}`."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Return a value as text, or the words that are chosen by it."""
+        """Return a value as text; with a choice in `format_spec`, the words that the number
+        selects."""
         if "|" not in format_spec:
             return format(value, format_spec)
         *none_words, one, many_words = format_spec.split("|")
@@ -215,10 +217,11 @@ def summarise_findings(findings: Iterable[_F]) -> list[tuple[_F, int]]:
 
 
 def worst(findings: tuple[Finding, ...] | list[Finding]) -> Severity:
-    """Return the highest severity of the findings; INFO without any."""
+    """Return the highest severity of the findings, INFO if there are none."""
     return max((f.severity for f in findings), default=Severity.INFO)
 
 
 def and_more(noun: str) -> str:
-    """Return the end of a text that names one of several: `more` counts the others."""
+    """Return the format text " and N more NOUN" for sentences that name one of several; `more` is
+    the number of the others."""
     return f"{{more:|; and # more {noun.removesuffix('s')}|; and # more {noun}}}"

@@ -35,12 +35,12 @@ class Given(Struct, frozen=True):
     file: str | None = None
 
     def refused(self, message: str, mend: str = "") -> OptionError:
-        """Return the error that says what is wrong with it."""
+        """Return an OptionError about this value, with its place."""
         return OptionError(message, file=self.file, where=self.where, mend=mend)
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
-        """Within the block, an OptionError gets the place of this value."""
+        """Add the place of this value to any OptionError that the block raises."""
         try:
             yield
         except OptionError as error:
@@ -48,9 +48,9 @@ class Given(Struct, frozen=True):
 
 
 class Value(Struct, frozen=True):
-    """The values that a key may have: `read` makes the field's value of what was given. The help
-    of its flag shows `metavar` or `choices`; a switch has neither. With `tables`, a table
-    may give it too."""
+    """The values that a key may have. `read` converts a given value to the value of the field; the
+    help of the flag shows `metavar` or `choices` (a switch has neither). `tables`: the value may
+    be given as a table too."""
 
     read: Callable[[Given], Any]
     metavar: str = ""
@@ -59,12 +59,12 @@ class Value(Struct, frozen=True):
 
 
 class Key(Struct, frozen=True):
-    """A key of a table: the `field` of its record that it fills, and what its `value` may be.
+    """A key of a table: the `field` of the record that it fills, and its possible `value`.
 
-    `help` is that of the flag that says the same; a key without has none. `example` stands in the
-    files that `camtool job new` begins. `only`: another key of the table, and the values of it
-    without which this one has no effect. `default`: the value of the field where nothing is given;
-    of keys that a kind of operation alone has, for the others' stand in their records.
+    `help` is the help text of its flag; a key without help has no flag. `example` appears in the
+    files that `camtool job new` begins. `only`: (other key, its values): with other values of that
+    key this one has no effect. `default`: the value of the field if the key is not given, for keys
+    that only one kind of operation has; the defaults of all others are in their records.
     """
 
     field: str
@@ -75,7 +75,7 @@ class Key(Struct, frozen=True):
     default: Any = None
 
     def read(self, raw: Given) -> Any:
-        """Return the field's value."""
+        """Convert a given value to the value of the field."""
         return self.value.read(raw)
 
 
@@ -87,23 +87,25 @@ class Table(Struct, frozen=True):
     file: str | None = None
 
     def refused(self, message: str, mend: str = "") -> OptionError:
-        """Return the error that says what is wrong with the table as a whole."""
+        """Return an OptionError about the table as a whole, with its place."""
         return OptionError(message, file=self.file, where=self.where, mend=mend)
 
     def only(self, names: Iterable[str]) -> Table:
-        """Return the keys of these names."""
+        """Return a table with only these keys."""
         name_set = set(names)
         chosen = {name: each for name, each in self.given.items() if name in name_set}
         return Table(chosen, self.where, self.file)
 
     def over(self, below: Table) -> Table:
-        """Return the keys of both, those of this table where both have one."""
+        """Return a table with the keys of both; where both have a key, the value of this one
+        counts."""
         first_table = self if self.given else below
         return Table({**below.given, **self.given}, first_table.where, first_table.file)
 
 
 def table_of(values: object, known_keys: Iterable[str], table_place: str, file: str) -> Table:
-    """Return a TOML table, its keys checked; `table_place` is "" for the top of the file."""
+    """Convert a TOML table whose keys must be among `known_keys`; `table_place` names it in
+    errors, "" for the top level of the file."""
     if not isinstance(values, dict):
         raise OptionError(
             f"{values!r} is no table",
@@ -126,10 +128,10 @@ def record_of(
     table: Table,
     base: Mapping[str, Any] | None = None,
 ) -> _T:
-    """Return the record of a table's values: each is tried alone first, so that its key can be
-    named.
+    """Make the record of a table's values. Each value is first tried alone, so that an error names
+    its key.
 
-    `base`: fields without which the record cannot be made.
+    `base`: fields that the record cannot be made without, for these trials.
     """
     fields: dict[str, Any] = {}
     for name, raw in table.given.items():
@@ -150,8 +152,8 @@ def record_of(
 
 
 def why_idle(keys: Mapping[str, Key], name: str, record: object) -> OptionError | None:
-    """Return why a key has no effect in this record, as an error without a place; None when it
-    has."""
+    """Return the reason why a key has no effect in this record, as an error without a place; None
+    if it has an effect."""
     condition = keys[name].only
     if condition is None:
         return None
@@ -167,7 +169,7 @@ def why_idle(keys: Mapping[str, Key], name: str, record: object) -> OptionError 
 
 
 def refuse_idle(keys: Mapping[str, Key], table: Table, record: object) -> None:
-    """Refuse a key that has no effect in the record made of its table."""
+    """Raise OptionError for a key that has no effect in the record made of its table."""
     for name, raw in table.given.items():
         error = why_idle(keys, name, record)
         if error is not None:
@@ -175,8 +177,8 @@ def refuse_idle(keys: Mapping[str, Key], table: Table, record: object) -> None:
 
 
 def meant(name: str, known_names: Iterable[str]) -> str:
-    """Return the known name that was probably meant, and all known names: the mend of an
-    unknown key."""
+    """Return the end of the message about an unknown key: the most similar known name, and all
+    known names."""
     return f"{guess(name, known_names)}known keys: {_listed(known_names)}"
 
 
@@ -219,7 +221,7 @@ def time(value: object) -> float:
 
 
 def number(value: object) -> float:
-    """Return a number without a unit."""
+    """Read a number without a unit."""
     text = number_text(value)
     try:
         return float(text)
@@ -234,11 +236,11 @@ def fraction(value: object) -> float:
 
 
 def engagement_angle(value: object) -> float:
-    """Read an engagement, rad: an angle with its unit, or the part of the diameter that is cut
-    beside a straight wall: a part a is the angle acos(1 − 2 a).
+    """Read an engagement and return the angle in rad: given as an angle with its unit, or as the
+    part a of the diameter that cuts along a straight wall, which is the angle acos(1 − 2 a).
 
-    >>> [round(math.degrees(engagement_angle(text))) for text in ("50%", "60deg")]
-    [90, 60]
+        >>> [round(math.degrees(engagement_angle(text))) for text in ("50%", "60deg")]
+        [90, 60]
     """
     text = str(value).strip()
     if isinstance(value, str) and text.endswith(("deg", "°", "rad")):
@@ -275,8 +277,8 @@ def text(value: object) -> str:
 
 
 def word(words: Sequence[str]) -> Callable[[Given], Any]:
-    """Return a reader of one of the known words; the error for another one guesses which was
-    meant."""
+    """Return a reader that accepts only these words; for another word its OptionError suggests the
+    most similar one."""
 
     def convert(value: object) -> str:
         name = text(value)
@@ -300,7 +302,7 @@ def patterns(value: object) -> tuple[str, ...]:
 
 
 def number_text(value: object) -> str:
-    """Return the text of a number with or without a unit; OptionError for what is neither."""
+    """Return a number, with or without a unit, as text; OptionError for other values."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise OptionError(f"{value!r} is no number", mend='write it like 0.2 or "0.2mm"')
     return value if isinstance(value, str) else repr(value)
@@ -320,5 +322,5 @@ SWITCH = Value(plain(switch))
 
 
 def one_of(words: tuple[str, ...]) -> Value:
-    """Return the Value of one of these words."""
+    """Return the Value of a key that takes one of these words."""
     return Value(word(words), choices=words)

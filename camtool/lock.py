@@ -26,11 +26,10 @@ _READ_BYTES = 1000
 
 @contextmanager
 def held(place: Path, refusal: Callable[[str], Exception]) -> Iterator[bool]:
-    """Hold the lock file at `place` within the block; yields False if its file system has no
-    locks.
+    """Hold the lock file at `place` within the block; yield False if its file system has no locks.
 
-    Raises `taken(owner)` if another process holds it, where `owner` is a text about that process,
-    and OSError if the file cannot be made.
+    Raises `refusal(owner)` if another process holds it, where `owner` describes that process, and
+    OSError if the file cannot be made.
     """
     handle, locked = _open_locked(place, refusal)
     try:

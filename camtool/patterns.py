@@ -18,8 +18,8 @@ def matches(patterns: Iterable[str], name: str) -> bool:
 
 @lru_cache(maxsize=64)
 def _compiled(patterns: tuple[str, ...]) -> tuple[frozenset[str], tuple[re.Pattern[str], ...]]:
-    """Return the patterns that are plain names, casefolded, and the others compiled. A job may
-    name thousands of entities."""
+    """Return the patterns without wildcards as casefolded names, and the others as regular
+    expressions; a job may name thousands of entities."""
     folded = [pattern.casefold() for pattern in patterns]
     wild = [pattern for pattern in folded if any(char in pattern for char in "*?[")]
     return frozenset(folded).difference(wild), tuple(re.compile(translate(each)) for each in wild)

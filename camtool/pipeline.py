@@ -169,7 +169,8 @@ def post_drawing(
 
 
 def _post_drawing(drawing: Drawing, job: Job, target: LoadedTarget, posting: _Posting) -> Run:
-    """Return the program of a job, judged in the stock as it is before that program runs."""
+    """Post a job as one program, judged in the stock `posting.before`, as it is before that
+    program runs."""
     from camtool.planning.plan import planned
 
     def plain() -> Run | None:
@@ -198,11 +199,11 @@ def post_by_tool(
     trace_points: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[Run, ...]:
-    """As `post_drawing`, with one program for each stretch that one tool cuts, for machines
-    without a tool changer.
+    """Post a drawing as several programs, one for each stretch between tool changes, for machines
+    without a tool changer; otherwise as `post_drawing`.
 
-    All are planned together, in one frame, so that they cut what the one program would; each is
-    complete and judged alone, against what its operations ask for.
+    All are planned together, in one frame, so that they cut what the single program would; each is
+    complete, and is judged alone against what its operations ask for.
     """
     from camtool.planning.plan import parted, planned, turns_of_tools
     from camtool.stock.before import planned_before
@@ -249,10 +250,12 @@ def post_by_setup(
     trace_points: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[Run, ...]:
-    """As `post_drawing`, with one program for each set-up of the job, in their order.
+    """Post a drawing as several programs, one for each set-up of the job, in their order;
+    otherwise as `post_drawing`.
 
-    Each is judged in its own frame, in the stock that those before it leave. OptionError for a job
-    without set-ups."""
+    Each is judged in its own frame, in the stock that the set-ups before it leave. OptionError for
+    a job without set-ups.
+    """
     from camtool.stock.before import stock_before
 
     if not job.setups:
@@ -282,9 +285,9 @@ def _post_plan(
     plain_run: Callable[[], Run | None],
     whole_plan: Callable[[], Plan],
 ) -> Run:
-    """Return the program of a plan, judged; `plain_run` gives the run of its job without
-    measures against reversals and backlash, None where it takes none, `whole_plan` the plan
-    undivided."""
+    """Write, read back and judge the program of a plan. `plain_run` returns the run of the same
+    job without its measures against reversals and backlash (None if it has none), for comparison;
+    `whole_plan` returns the plan with contours not divided."""
     from camtool.planning.checks import doubtful_settings
 
     job, progress = plan.job, posting.progress
@@ -398,8 +401,8 @@ def verify_program(
     judging: Judging | None = None,
     progress: Progress | None = None,
 ) -> Run:
-    """Return any program of the target, simulated and judged, against `drawing` planned with
-    `job` if it is given. ProgramError names file, block and column."""
+    """Simulate and judge any program of the target, against `drawing` planned with `job` if given.
+    ProgramError names file, block and column."""
     judging, progress = judging or Judging(), progress or Progress()
     progress.begin(f"reading {PurePath(source).name}")
     run = read_program(data, target, source=source)
@@ -464,8 +467,9 @@ def verify_program(
 
 
 def _register_drawing(case: Case, drawing: Drawing, job: Job, *, align: bool) -> tuple[Case, Job]:
-    """Return the case with the parts of the drawing that its program cuts as the wanted moves, and
-    the job with the place of the drawing and the tool that were found in the program."""
+    """Find the parts of the drawing that the program cuts. Return the case with these as its
+    wanted moves, and the job with the place of the drawing and the tool diameter found from the
+    program."""
     from camtool.planning.place import place
     from camtool.verification.registration import register
 
@@ -487,7 +491,8 @@ def _register_drawing(case: Case, drawing: Drawing, job: Job, *, align: bool) ->
 
 
 def _found_job(job: Job, registration: Registration) -> Job:
-    """Return the job with the tool of a program, and the drawing where it lies under it."""
+    """Return the job with the tool diameter that was found from a program, and with the drawing
+    placed where the program cuts it."""
     if registration.diameter_mm is not None:
         operations = tuple(
             replace(each, tool=replace(each.tool, diameter_mm=registration.diameter_mm))
@@ -572,7 +577,8 @@ def convert_program(
 def _surface_finding(
     flat: Toolpath, written: Toolpath, surface: Surface, target: LoadedTarget
 ) -> Finding:
-    """Return how far the cuts of a program are from the surface that they follow."""
+    """Return the finding that says how far (mm) the cuts of a program are from the surface that
+    they follow."""
     machine = target.machine
     limit = machine.defaults.fit_tolerance_mm + target.target.unit_mm(machine, machine.axes.z)
     error_mm, row = surface_error(flat, written, surface)
@@ -583,7 +589,7 @@ def _surface_finding(
 
 
 def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
-    """Return a program as the controller decodes it, not judged; ProgramError names the file
+    """Decode a program as the controller does, without judging it; ProgramError names the file
     too."""
     import numpy as np
 
@@ -596,8 +602,8 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
 
 
 def lint_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
-    """Return a program as the controller decodes it, with all that is found without simulating it;
-    ProgramError as `read_program`."""
+    """Decode a program as the controller does, with all findings that need no simulation;
+    ProgramError as for `read_program`."""
     run = read_program(data, target, source=source)
     assert run.decoded is not None
     case = Case(run.decoded, target)
@@ -617,7 +623,7 @@ def _decode(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
 
 
 def _folder_of(file: str) -> Path | None:
-    """Return the folder of a program, None where it came from elsewhere than a file."""
+    """Return the folder of a program's file, None if it came from no file."""
     path = Path(file)
     try:
         return path.parent if path.is_file() else None
@@ -628,8 +634,8 @@ def _folder_of(file: str) -> Path | None:
 def _write_and_read_back(
     moves: Toolpath, target: LoadedTarget, file: str, progress: Progress
 ) -> tuple[Program, Toolpath]:
-    """Return the program of these moves, which are of a file, and what the target's controller
-    decodes of it."""
+    """Return the program of these moves, and the toolpath that the target's controller decodes
+    from its bytes; `file` names the source in errors."""
     progress.begin("writing")
     try:
         program = target.target.write(moves, target.machine)
@@ -641,13 +647,13 @@ def _write_and_read_back(
 
 
 def _repeated_findings(program: Program, decoded: Toolpath) -> set[Finding]:
-    """Return the findings of the reader that the writer has made too, if in other words."""
+    """Return the findings of the reader whose code the writer has reported too."""
     codes = {finding.code for finding in program.findings}
     return {finding for finding in decoded.findings if finding.code in codes}
 
 
 def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
-    """Return the rows of the report for the operations that cut something."""
+    """Return the entries of the report for the operations that cut something."""
     from camtool.planning.checks import deepest_pass
 
     cutting = [step for step in steps if step.runs]
@@ -685,14 +691,15 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
 
 
 def _open_ended(limits: tuple[float, float] | None) -> tuple[float, float | None] | None:
-    """Return limits with None for an upper end that is nowhere."""
+    """Return the limits, with None for an infinite upper limit."""
     if limits is None:
         return None
     return limits[0], limits[1] if math.isfinite(limits[1]) else None
 
 
 def _deepest_mm(step: Step) -> float:
-    """Return the depth (mm) of an operation; a carving may end above its allowed depth."""
+    """Return the greatest depth that an operation cuts, mm (positive). A carving may stay above
+    the depth that it is allowed."""
     return -float(step.runs.vertices[:, 2].min())
 
 
@@ -720,8 +727,8 @@ def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
 def _with_times(
     planned: Planned, written: Toolpath, case: Case, verification: Verification
 ) -> Planned:
-    """Return the operations with the time that each takes, from where it has its turn: a change
-    of tools and the way to its first cut are its own."""
+    """Return the operations with the time of each, s; the tool change before an operation and the
+    way to its first cut count as its own."""
     import numpy as np
 
     if written.operations is None or case.row_from is None:
@@ -739,8 +746,8 @@ def _with_times(
 
 
 def _cut_mm(wanted_path: Toolpath) -> tuple[float, float, float, float] | None:
-    """Left, lower, right and upper end of what the tools cut; V bits as wide as at their depth.
-    None where nothing is cut, or nobody knows by which operation."""
+    """Return (left, low, right, high) of the area that the tools cut, mm; V bits count with their
+    width at their depth. None if nothing is cut, or the operations of the moves are not known."""
     import numpy as np
 
     operations = wanted_path.operations
@@ -762,7 +769,8 @@ def _cut_mm(wanted_path: Toolpath) -> tuple[float, float, float, float] | None:
 
 
 def _around(boxes: Sequence[Floats]) -> tuple[float, float, float, float] | None:
-    """Return left, lower, right and upper end of boxes (2, 2), None without any."""
+    """Return the bounding box (left, low, right, high) of boxes (2, 2) [[x, x], [y, y]]; None if
+    there are none."""
     import numpy as np
 
     if not boxes:
@@ -775,8 +783,9 @@ def _around(boxes: Sequence[Floats]) -> tuple[float, float, float, float] | None
 def _swept_mm(
     wanted_path: Toolpath, steps: Sequence[Step]
 ) -> tuple[float, float, float, float] | None:
-    """Left, lower, right and upper end of what tools, shanks and holders pass over, at any height
-    and in rapids too, as far as they are known. None where nobody knows which tool moves."""
+    """Return (left, low, right, high) of the area over which tools, shanks and holders pass, as
+    far as their sizes are known, at any height and in rapids too, mm. None if it is not known
+    which tool moves."""
     import numpy as np
 
     tools = [step.operation.tool for step in steps if step.runs]
@@ -795,7 +804,8 @@ def _swept_mm(
 
 
 def _touch_mm(wanted_path: Toolpath) -> tuple[tuple[float, float] | None, ...]:
-    """Return where each tool that is mounted in the program can be touched off."""
+    """Return, for each tool that is mounted during the program, a point (x, y) of the uncut top
+    where it can be touched off; None if there is none."""
     rows = changes_between_cuts(wanted_path).tolist()
     return tuple(untouched_place(wanted_path, row) for row in rows)
 
@@ -810,14 +820,14 @@ def _stock(job: Job) -> PlannedStock | None:
 def _gate_findings(
     verification: Verification, gates: Gates | None, findings: Iterable[Finding] = ()
 ) -> tuple[Finding, ...]:
-    """Return a finding for each of the limits that is exceeded."""
+    """Return a finding for each limit (gate) that the figures exceed."""
     if gates is None:
         return ()
     return tuple(gate_findings(verification.report, gates, findings))
 
 
 def _compensate(wanted_path: Toolpath, machine: Machine) -> CompensatedToolpath:
-    """Return the moves with which the slides follow `wanted_path`."""
+    """Return the commanded moves that make the machine's slides follow `wanted_path`."""
     from camtool.planning.compensating import compensate
 
     return compensate(wanted_path, machine)
@@ -829,7 +839,8 @@ def _without_measures(job: Job) -> Job:
 
 
 def _before_figures(plain_run: Run | None) -> BaselineReport | None:
-    """Return the figures of the plain run, for the report."""
+    """Return the figures of the run without measures, for the report; None if there is no such
+    run."""
     if plain_run is None:
         return None
     if plain_run.verification is None or plain_run.failed:
@@ -842,7 +853,7 @@ def _before_figures(plain_run: Run | None) -> BaselineReport | None:
 
 
 def _judge_program(case: Case, data: bytes, progress: Progress) -> Verification:
-    """Simulate and judge a case whose program has these bytes."""
+    """Simulate and judge the program of a case; `data` are its bytes."""
     from camtool.verification.verify import verify
 
     progress.begin("simulating and judging", len(case.decoded))
@@ -857,8 +868,8 @@ def _judge_program(case: Case, data: bytes, progress: Progress) -> Verification:
 
 
 def _beside_mm(case: Case) -> float:
-    """Return the distance in the plane that a wall may be off without a finding of the stock, mm:
-    the tolerance of coverage, and how far the planned lines are off the drawing."""
+    """Return how far (mm, in the plane) a wall may be off without a finding about the stock: the
+    tolerance of coverage plus the distance of the planned lines from the drawing."""
     drawn = None if case.wanted is None else case.wanted.drawn
     off_mm = 0.0 if drawn is None else float(drawn.off_mm[:, 0].max(initial=0.0))
     return WALL_COVERAGES * case.coverage_mm + off_mm
@@ -875,9 +886,10 @@ def _stock_findings(
     *,
     before: StockBefore | None = None,
 ) -> tuple[Finding, ...]:
-    """Return the findings of a program in its stock: of the path that its controller decodes, or
-    of the slides where that is bent against the mechanics. Where tools are not known, or cut no
-    width, or nothing is asked for (`request` None), only rapids are looked at."""
+    """Return the findings about the stock after a program. It is cut along the path that the
+    controller decodes, or along the slides' path if the program is compensated. Only rapids are
+    checked if tools are not known or have no width, or if nothing is asked for (`request` None).
+    """
     from camtool.stock.rapids import rapid_findings
 
     case, job = slides.case, slides.job or Job()
@@ -909,7 +921,8 @@ def _stock_findings(
 def _stock_gates(
     case: Case, request: StockRequest | None, job: Job | None, gates: Gates | None
 ) -> tuple[Finding, ...]:
-    """Return a finding for each limit of the stock that the moves of the slides exceed."""
+    """Return a finding for each limit of the stock (gouge, leftover, engagement) that the slides'
+    path exceeds."""
     if gates is None or (gates.gouge_mm is None and gates.leftover_mm is None):
         return ()
     from camtool.stock.cut import cut_stock
@@ -936,7 +949,8 @@ def _stock_gates(
 
 
 def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> Toolpath:
-    """Return the decoded toolpath with the operations by which it is cut, as it was written."""
+    """Return the decoded toolpath with the operations of the written one: each decoded move gets
+    the operation of the row from which it was written."""
     import numpy as np
 
     operations = written.operations
@@ -948,10 +962,10 @@ def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> 
 
 
 def _row_from(program: Program, decoded: Toolpath, written: Toolpath) -> Indices:
-    """Return (N,) the row of the toolpath from which each decoded row was written, −1 for none.
+    """Return (N,) the row of the written toolpath for each decoded row, −1 for none.
 
-    A cycle is one block, written from its first cut. Where the controller makes the same moves of
-    it as were planned, each is from its own row.
+    A canned cycle is one block, written from its first cut. Where the controller makes the same
+    moves of it as were planned, each move gets its own row.
     """
     import numpy as np
 
@@ -981,8 +995,8 @@ def _program_request(
     planned_path: Toolpath,
     compensation: CompensatedToolpath | None,
 ) -> ProgramRequest | None:
-    """Write and read back the planned moves, to compare a program with what the job asks for; None
-    if planning found an error, which is a finding already. `compensation` is `planned_path`
+    """Return what the job asks of a program: the planned moves, written and read back. None if
+    planning found an error (which is reported already). `compensation` is `planned_path`
     compensated against the mechanics."""
     from camtool.planning.settings import safe_z_of
     from camtool.verification.conformance import ProgramRequest
@@ -1009,8 +1023,8 @@ def _program_request(
 
 
 def _is_feed_named(job: Job, machine: Machine, wanted_path: Toolpath, row_from: Indices) -> Bools:
-    """Return (N,) true for the written rows whose feed the job names, or which follows from one
-    that it names; they were written from the rows `row_from` (N,) of `wanted_path`."""
+    """Return the mask (N,) of written rows whose feed the job names, or follows from one that it
+    names. `row_from` (N,): the row of `wanted_path` for each of them, −1 for none."""
     import numpy as np
 
     from camtool.planning.settings import feeds_of
@@ -1028,6 +1042,6 @@ def _is_feed_named(job: Job, machine: Machine, wanted_path: Toolpath, row_from: 
 def _merge_findings(
     *groups: tuple[Finding, ...], left_out: Collection[Finding] = ()
 ) -> tuple[Finding, ...]:
-    """Return all findings in order, each once, except those `left_out`."""
+    """Return all findings in order, without repeats and without those `left_out`."""
     every = dict.fromkeys(finding for group in groups for finding in group)
     return tuple(finding for finding in every if finding not in left_out)

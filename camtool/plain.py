@@ -71,7 +71,7 @@ def _shortened(text: str, length: int) -> str:
 
 
 def embedded_address(svg: bytes) -> str:
-    """Return the address of a picture that is embedded in a page."""
+    """Return a data URI of an SVG, for embedding it in a page."""
     import base64
 
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"

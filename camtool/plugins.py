@@ -55,7 +55,7 @@ PathState = tuple[tuple[str, int], ...]
 
 @lru_cache(maxsize=8)
 def _search(group: str, folders: PathState) -> tuple[EntryPoint, ...]:
-    """Find the entry points of a group."""
+    """Return the entry points of a group; cached by the state of the folders of `sys.path`."""
     if any(Path(folder).is_file() for folder, _ in folders):  # an archive
         from importlib import metadata
 
@@ -68,8 +68,9 @@ def _search(group: str, folders: PathState) -> tuple[EntryPoint, ...]:
 
 @lru_cache(maxsize=8)
 def _texts(folders: PathState) -> tuple[str, ...]:
-    """Read the entry points of each installed package; of one that is installed twice the first
-    counts. A `Path` for each of a thousand modules took 4 ms."""
+    """Return the `entry_points.txt` of each installed package; of a package that is installed
+    twice, the first counts. The names are split as text, since a `Path` for each of a thousand
+    modules took 4 ms."""
     files: dict[str, str] = {}
     for folder, has_changed in folders:
         for entry in os.scandir(Path(folder)) if has_changed and Path(folder).is_dir() else ():
@@ -80,7 +81,8 @@ def _texts(folders: PathState) -> tuple[str, ...]:
 
 
 def _text(folder: str) -> str:
-    """Return the entry points of a package by the folder of its metadata; "" where it has none."""
+    """Return the `entry_points.txt` in the metadata folder of a package, "" if there is none that
+    can be read as UTF-8."""
     try:
         with io.FileIO(f"{folder}/entry_points.txt") as file:
             return file.readall().decode()
@@ -89,7 +91,8 @@ def _text(folder: str) -> str:
 
 
 def _points(text: str, group: str) -> Iterator[EntryPoint]:
-    """Yield the entry points of a group from a text like `[group]`, `name = module:attribute`."""
+    """Yield the entry points of a group from a text with lines `[group]` and `name =
+    module:attribute`."""
     section = ""
     for line in map(str.strip, text.splitlines()):
         if line.startswith("["):
@@ -100,12 +103,12 @@ def _points(text: str, group: str) -> Iterator[EntryPoint]:
 
 
 def _path_state() -> PathState:
-    """Return the state of `sys.path` now."""
+    """Return the folders of `sys.path` with their times of change, as the key of the cache."""
     return tuple((folder, _changed_at_ns(folder)) for folder in sys.path)
 
 
 def _changed_at_ns(folder: str) -> int:
-    """Return when a folder changed last, 0 if there is none."""
+    """Return the time (ns) of a folder's last change, 0 if it does not exist."""
     try:
         return Path(folder).stat().st_mtime_ns
     except OSError:

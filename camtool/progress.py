@@ -41,8 +41,8 @@ _CURRENT: ContextVar[Progress | None] = ContextVar("progress", default=None)
 
 
 def tell_share(part: str, share: float | None) -> None:
-    """Tell that a part of the present stage, in words, is done by a share, 0 to 1; None: it has
-    ended. Nobody need listen."""
+    """Report the progress of a part of the present stage: its name and the share that is done, 0
+    to 1; None when it has ended. Without a listener nothing happens."""
     progress = _CURRENT.get()
     if progress is None:
         return

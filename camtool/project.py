@@ -120,7 +120,7 @@ class Project(Struct, frozen=True):
         )
 
     def find(self, name: str) -> Path | None:
-        """Return the machine file of a name; None without one."""
+        """Return the machine file of this name, None if there is none."""
         for folder in self._folders() if NAME.fullmatch(name) else ():
             file = folder / f"{name}.toml"
             if file.is_file() and _is_machine(file):
@@ -159,14 +159,14 @@ def _read_keys(file: Path) -> ProjectKeys:
 
 
 def names_machine(file: Path) -> bool:
-    """Return True if a `camtool.toml`, which need not exist, names a machine or a target."""
+    """Return True if this `camtool.toml` exists and names a machine or a target."""
     keys = _read_keys(file) if file.is_file() else ProjectKeys()
     return keys.machine is not None or keys.target is not None
 
 
 def text_naming_machine(file: Path, name: str) -> str:
-    """Return the text of a `camtool.toml`, which need not exist, that names this machine; its
-    other lines are kept."""
+    """Return the text of a `camtool.toml` that names this machine; the other lines of the file, if
+    it exists, are kept."""
     machine_line = f'machine = "{name}"'
     if not file.is_file():
         return f"# What camtool takes where no flag says otherwise.\n{machine_line}\n"
@@ -177,20 +177,21 @@ def text_naming_machine(file: Path, name: str) -> str:
 
 
 def user_folder() -> Path:
-    """Return the folder of the user's configuration for all projects: `~/.config/camtool` on
-    Linux, and its counterpart elsewhere."""
+    """Return the folder of the user's configuration: `~/.config/camtool` on Linux, and its
+    counterpart on other systems."""
     import click
 
     return Path(click.get_app_dir("camtool"))
 
 
 def _is_file_name(name: str) -> bool:
-    """Return True if a machine is given by the name of a file, and not by its own."""
+    """Return True if the text is a file name or path of a machine file, not the name of a
+    machine."""
     return NAME.fullmatch(name) is None or Path(name).is_file()
 
 
 def _is_machine(file: Path) -> bool:
-    """Return True if a TOML file is that of a machine: it extends a target."""
+    """Return True if this TOML file is a machine file, that is, it has the key `extends`."""
     try:
         return isinstance(read_table(file).get("extends"), str)
     except MachineError:

@@ -50,13 +50,13 @@ class FrozenRecord:
 
 
 def _compared_values(record: object) -> tuple[Any, ...]:
-    """Return the values by which a record is compared."""
+    """Return the values of the fields by which a record is compared."""
     kind: Any = type(record)
     return _columns(kind)(record)
 
 
 @cache
 def _columns(kind: Any) -> Callable[[object], tuple[Any, ...]]:
-    """Return the function that takes the values to compare from records of this kind."""
+    """Return the function that extracts the compared values from records of this class."""
     names = [each.name for each in dataclasses.fields(kind) if each.compare]
     return attrgetter(*names) if len(names) > 1 else lambda record: (getattr(record, *names),)

@@ -156,9 +156,9 @@ class Run(Shown):
         span_s: float | None = None,
         options: PictureOptions | None = None,
     ) -> bytes:
-        """Return a picture over time for a file of this name, .svg or .png: of "speed",
-        "position" or "error", from `from_s` on for `span_s` (None: up to the end). OptionError
-        without a verification, and for a stretch outside of the program."""
+        """Return a picture over time as bytes, .svg or .png by the name of `file`: "speed",
+        "position" or "error", from `from_s` on for `span_s` seconds (None: to the end).
+        OptionError without a verification, and for a stretch outside the program."""
         from camtool.waveforms.plot import TimeSpan, plot_file
 
         if self.verification is None:
@@ -175,8 +175,8 @@ class Run(Shown):
         stock: str = "",
         flags: tuple[tuple[str, str], ...] = (),
     ) -> ReportPage:
-        """Return the page of the run with captions and addresses of pictures, the address of a
-        picture of the stock, and the flags that made it."""
+        """Return the report page of the run. `pictures`: (caption, address) of each; `stock`:
+        address of the picture of the stock; `flags`: the command-line flags that made the run."""
         import hashlib
 
         machine, program = self.target.machine, self.program
@@ -191,9 +191,9 @@ class Run(Shown):
         return ReportPage(title, self.report, findings, setup, pictures, stock)
 
     def to_shapely(self, tolerance_mm: float = CHORD_MM) -> dict[str, Any]:
-        """Return the program's "cuts" and "rapids" as lines of shapely with heights, mm in the
-        work frame (without a program those that are planned), and what the slides cut:
-        "predicted", without heights, where it was verified."""
+        """Return shapely lines with heights, mm in the work frame: "cuts" and "rapids" of the
+        program (of the plan if there is no program), and as "predicted" what the slides cut,
+        without heights, if it was verified."""
         toolpath = self.wanted if self.decoded is None else self.decoded
         lines = {} if toolpath is None else shapely_of_moves(toolpath, tolerance_mm)
         if self.verification is not None:
@@ -202,7 +202,7 @@ class Run(Shown):
         return lines
 
     def _repr_html_(self) -> str:
-        """Return the page in a frame, which runs no script."""
+        """Return the report page in a frame that runs no scripts, for notebooks."""
         import html
 
         picture = embedded_address(self._repr_svg_().encode())
@@ -228,11 +228,11 @@ class ShownDrawing(Shown, Drawing):
 
     @classmethod
     def of(cls, drawing: Drawing) -> ShownDrawing:
-        """Return the drawing as a value with a picture."""
+        """Return the drawing as a ShownDrawing."""
         return _as_shown(cls, drawing)
 
     def scene(self) -> Scene:
-        """Return the drawing, titled by its file."""
+        """Return the picture's content: the drawing, with its file name as title."""
         from camtool.pictures.scene import scene_of_drawing
 
         return scene_of_drawing(self, PurePath(self.file).name)
@@ -276,11 +276,12 @@ class ShownToolpath(Shown, Toolpath):
         job: Job | None = None,
         target: LoadedTarget | None = None,
     ) -> ShownToolpath:
-        """Return the toolpath as a value with a picture, and that from which it was planned."""
+        """Return the toolpath as a ShownToolpath, with the drawing, job and target from which it
+        was planned."""
         return _as_shown(cls, toolpath, drawing=drawing, job=job, target=target)
 
     def scene(self) -> Scene:
-        """Return the moves over the drawing."""
+        """Return the picture's content: the moves over the drawing."""
         from camtool.pictures.scene import scene_of
 
         return scene_of(
@@ -307,7 +308,7 @@ _Kind = TypeVar("_Kind", ShownDrawing, ShownToolpath)
 
 
 def _as_shown(kind: type[_Kind], record: Drawing | Toolpath, **extra_fields: object) -> _Kind:
-    """Return the record as one of this `kind`, with `extra_fields` fields."""
+    """Return a copy of the record as its subclass `kind`, with `extra_fields` set."""
     values = {each.name: getattr(record, each.name) for each in fields(record)}
     return kind(**(values | extra_fields))
 

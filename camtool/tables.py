@@ -132,7 +132,8 @@ def _out_of_range(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> 
 
 
 def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
-    """Return the allowed words at `keys`, and a suggestion; "" if any word is allowed."""
+    """Return the end of a message that lists the allowed words at `keys` and suggests one; "" if
+    any word is allowed."""
     *above, (type_info, value) = _along(kind, table, keys)
     words = [
         word
@@ -152,7 +153,7 @@ def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
 
 
 def _along(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> Iterator[tuple[Any, Any]]:
-    """Yield type information and value of a table, and of each part of it along `keys`."""
+    """Yield (type information, value) of a table, and then of each part of it along `keys`."""
     type_info: Any = msgspec.inspect.type_info(kind)
     value: Any = table
     yield type_info, value
@@ -163,7 +164,7 @@ def _along(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> Iterato
 
 
 def _part(type_info: Any, value: Any, key: int | str) -> Any:
-    """Return type information of the part `key` of a table or a list with the type `type_info`."""
+    """Return the type information of the item `key` in a table or list of type `type_info`."""
     type_info = _fitting(type_info, value)
     if isinstance(type_info, msgspec.inspect.StructType):
         field_types = (field.type for field in type_info.fields if field.encode_name == key)
@@ -174,8 +175,8 @@ def _part(type_info: Any, value: Any, key: int | str) -> Any:
 
 
 def _fitting(type_info: Any, value: Any) -> Any:
-    """Return the one of several allowed types that fits this value: the table of its model, or the
-    type beside None."""
+    """Return the type of a union that fits this value: the table of the model that it names, or
+    the type beside None."""
     for one in getattr(type_info, "types", (type_info,)):
         if isinstance(one, msgspec.inspect.StructType):
             if one.tag is None or value.get(one.tag_field) == one.tag:
@@ -186,8 +187,8 @@ def _fitting(type_info: Any, value: Any) -> Any:
 
 
 def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
-    """Suggest a similar key, and list the keys of the table; for models with tables of their own,
-    the keys of that model."""
+    """Return the end of a message about an unknown key: a similar key, and all keys of the table
+    (for models with tables of their own, those of that model)."""
     record: Any = kind
     for name in tables:
         fields = {f.name: f.type for f in msgspec.structs.fields(record)}

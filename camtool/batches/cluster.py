@@ -97,8 +97,8 @@ class _SentDrawings:
         return bool(self._queue or self._busy)
 
     def send(self, max_busy: int) -> Iterator[tuple[DrawingTask, Outputs]]:
-        """Send drawings until `max_busy` of them are sent and not answered, or none remains; yield
-        the tasks whose drawings cannot be read, with the error in their outputs."""
+        """Send drawings until `max_busy` of them await a result or none is left; yield the tasks
+        whose drawings cannot be read, with the error in their outputs."""
         from camtool.importers.read import file_bytes
 
         while self._queue and len(self._busy) < max_busy:
@@ -148,10 +148,8 @@ class _Workers:
         self._reported = False
 
     def threads(self) -> int:
-        """Count the threads of all checked workers, and check the workers that are new.
-
-        Raises CamtoolError when the scheduler is lost or a worker has another camtool.
-        """
+        """Return the number of threads of all checked workers, after checking the workers that are
+        new. Raises CamtoolError when the scheduler is lost or a worker has another camtool."""
         threads_of = _threads(self._client)
         if new := sorted(threads_of.keys() - self._checked):
             self._checked.update(self._same_camtool(new))
@@ -195,13 +193,13 @@ def check_worker(digest: str, work: bytes) -> None:
 
 
 def make_on_worker(digest: str, work: bytes, task: bytes, data: bytes) -> Outputs:
-    """Make the outputs of a drawing; runs on a worker. OtherCodeError as above."""
+    """Make the outputs of a drawing on a worker; raises OtherCodeError as `check_worker` does."""
     return make_outputs(_work_of(digest, work), pickle.loads(task), data)
 
 
 @lru_cache(maxsize=1)
 def _work_of(digest: str, work: bytes) -> BatchWork:
-    """Unpickle the work, once for all drawings of a run."""
+    """Unpickle the BatchWork once per run; later drawings of the run get it from a cache."""
     try:
         batch_work: BatchWork = pickle.loads(work)
         is_same = batch_work.digest() == digest
@@ -246,7 +244,8 @@ def _leave(client: Client) -> None:
 
 
 def _threads(client: Client) -> dict[str, int]:
-    """Return the number of threads by worker; CamtoolError when the scheduler is lost."""
+    """Return the number of threads of each worker by its address; CamtoolError when the scheduler
+    is lost."""
     try:
         if client.status == "running":
             return dict(client.nthreads())
@@ -260,7 +259,8 @@ def _lost_error() -> CamtoolError:
 
 
 def _refusal(worker: str, error: Exception) -> CamtoolError:
-    """Return the error for a worker whose camtool differs."""
+    """Return the CamtoolError for a worker whose camtool is not the client's, with both
+    versions."""
     if isinstance(error, OtherCodeError):
         reason = f"{error}, or other code or packages under that number, and this is {__version__}"
     else:

@@ -54,7 +54,8 @@ def find_tasks(
 
 
 def _drawings_of(source: str, folder: Path) -> Iterator[tuple[Path, str]]:
-    """Yield the drawings of one argument, each with its stem; `folder` is a real path."""
+    """Yield the path and the output stem of each drawing that one argument (file, folder or
+    pattern) names; `folder` is a real path."""
     path = Path(source)
     if path.is_dir():
         for file in files_below(path, folder):
@@ -72,14 +73,14 @@ def _drawings_of(source: str, folder: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _fixed_part(pattern: str) -> Path:
-    """Return the folders of a pattern before its first wildcard."""
+    """Return the leading folders of a pattern, up to its first wildcard."""
     parts = PurePath(pattern).parts
     fixed = next(n for n, part in enumerate(parts) if glob.has_magic(part))
     return Path(*parts[: min(fixed, len(parts) - 1)])
 
 
 def _stem(relative: PurePath) -> str:
-    """Return the path without the extension of the file."""
+    """Return a relative path without its file extension, the name that its outputs share."""
     return relative.with_suffix("").as_posix()
 
 

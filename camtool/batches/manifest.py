@@ -56,7 +56,8 @@ class Manifest:
         self._entries, self._tidy = _read(self._place)
 
     def up_to_date(self, stem: str, key: str) -> ManifestEntry | None:
-        """Return the entry of a drawing if its key is the same and its files are unchanged."""
+        """Return the entry of a drawing if its key is the same and its files are unchanged, else
+        None."""
         entry = self._entries.get(stem)
         if entry is None or entry.key != key:
             return None
@@ -69,8 +70,9 @@ class Manifest:
         return frozenset(places.of(self._out / name) for name in names)
 
     def may_replace(self, stem: str, name: str, data: bytes) -> bool:
-        """Return True if no file is there, or one that a batch made for this drawing and that is
-        unchanged, or one that holds `data` already, as after a run that was killed."""
+        """Return True if an output may be written: no file is there, or one that a batch made for
+        this drawing and nobody changed, or one that holds `data` already, as after a run that was
+        killed."""
         place, entry = self._out / name, self._entries.get(stem)
         if not os.path.lexists(place):
             return True
@@ -80,7 +82,7 @@ class Manifest:
         )
 
     def add(self, stem: str, entry: ManifestEntry) -> None:
-        """Append an entry; OSError when it cannot be written."""
+        """Append the entry of a drawing to the file; OSError when it cannot be written."""
         before = self._entries.get(stem)
         if before is not None:
             earlier = {
@@ -148,8 +150,8 @@ def _read(place: Path) -> tuple[dict[str, ManifestEntry], bool]:
 
 
 def digest_of(*parts: str | bytes) -> str:
-    """Return the digest of several parts in their order, each with its length: `ab`, `c` differs
-    from `a`, `bc`."""
+    """Return the digest of several parts in their order. Each part's length is included, so that
+    ("ab", "c") differs from ("a", "bc")."""
     digest = hashlib.sha256()
     for part in parts:
         data = part.encode("utf-8", "surrogateescape") if isinstance(part, str) else part
@@ -189,7 +191,7 @@ def packages_digest(name: str) -> str:
 
 
 def _version(name: str) -> str:
-    """Return the version of a package, "" for one that only other systems need."""
+    """Return the version of an installed package; "" for one that only other systems need."""
     from importlib import metadata
 
     try:

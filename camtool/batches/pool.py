@@ -121,7 +121,8 @@ class LocalPool:
         return worker
 
     def _receive(self, worker: _Worker) -> tuple[DrawingTask, Outputs] | None:
-        """Receive a result from a worker; None when it became ready, or died while idle."""
+        """Receive a result from a worker; None if the worker reported that it is ready, or died
+        while idle."""
         try:
             message = worker.pipe.recv()
         except (EOFError, OSError):

@@ -70,7 +70,7 @@ class BatchWork(Protocol):
     """The function from a drawing to its outputs; every worker gets a copy."""
 
     def warm(self) -> None:
-        """Load the modules that every drawing needs; called in a new worker."""
+        """Load the modules that every drawing needs; called once in each new worker."""
 
     def make(self, task: DrawingTask, data: bytes | None) -> Outputs:
         """Make the outputs of a drawing; `data` is its content, None to read the file."""
@@ -229,7 +229,7 @@ def _record(
 def _write_files(
     task: DrawingTask, files: Mapping[str, bytes], order: BatchSettings, manifest: Manifest
 ) -> str | None:
-    """Write the files of a drawing; return the error, or None."""
+    """Write the files of a drawing; return the error as text, or None."""
     for name, data in () if order.force else files.items():
         if not manifest.may_replace(task.stem, name, data):
             foreign = OutputError(

@@ -38,10 +38,10 @@ class Display(Protocol):
     """A display of outcomes."""
 
     def begin(self) -> None:
-        """Called when the first drawing that is not up to date begins."""
+        """Begin the display; called when the first drawing that is not up to date is begun."""
 
     def add(self, outcome: Outcome) -> None:
-        """Show one outcome."""
+        """Show the outcome of one drawing."""
 
     def note(self, text: str) -> None:
         """Show another message, unless quiet."""
@@ -57,7 +57,7 @@ class Verbosity:
 
 @contextmanager
 def display(total: int, verbosity: Verbosity) -> Iterator[Display]:
-    """Return a progress bar on a terminal, lines elsewhere."""
+    """Yield the display of a batch: a progress bar on a terminal, plain lines elsewhere."""
     if verbosity.quiet or not sys.stderr.isatty():
         yield LineDisplay(total, verbosity)
         return
@@ -77,10 +77,10 @@ class LineDisplay:
         self._done = 0
 
     def begin(self) -> None:
-        """Do nothing: the first line shows it."""
+        """Do nothing: the line of the first drawing shows that the batch has begun."""
 
     def add(self, outcome: Outcome) -> None:
-        """Show one line, and those of its findings."""
+        """Show the line of a drawing, and the lines of its findings."""
         self._done += 1
         for line in outcome_lines(outcome, self._verbosity):
             say(line, quiet=False)
@@ -221,7 +221,7 @@ def verdicts_of(outcomes: Sequence[Outcome]) -> Counter[str]:
 
 
 def _verdict_words(counts: Mapping[str, int]) -> str:
-    """Return "3 in, 1 out", the usual verdicts first."""
+    """Return counts of verdicts as text, such as "3 in, 1 out", the usual verdicts first."""
     order = ("in", "out", "undecided", "predicted")
     return ", ".join(f"{counts[each]} {each}" for each in order if counts.get(each))
 
@@ -231,7 +231,8 @@ def _count_words(number: int, noun: str) -> str:
 
 
 def _lines(failed: Sequence[Outcome]) -> None:
-    """Return the lines of a table of drawing and reason, without colours."""
+    """Print the failed drawings and their reasons as plain lines, for output that is no
+    terminal."""
     if not failed:
         return
     listed = failed[:LISTED]
@@ -243,8 +244,8 @@ def _lines(failed: Sequence[Outcome]) -> None:
 
 
 def _table(rows: Sequence[Outcome], outcomes: Sequence[Outcome]) -> None:
-    """Return a coloured table of drawing and reason, without the folders that all drawings have in
-    common."""
+    """Print a coloured table of drawings and reasons; the folder that all drawings share stands in
+    the title and is left out of the rows."""
     if not rows:
         return
     from rich.console import Console
@@ -272,7 +273,7 @@ def _table(rows: Sequence[Outcome], outcomes: Sequence[Outcome]) -> None:
 
 
 def _common_folder(outcomes: Sequence[Outcome]) -> str:
-    """Return the folder that all drawings share; "" for none."""
+    """Return the folder that all drawings share, "" if there is none."""
     try:
         return os.path.commonpath([PurePath(each.source).parent for each in outcomes])
     except ValueError:  # some paths are absolute, some relative
@@ -285,8 +286,7 @@ def _say_more(rows: int) -> None:
 
 
 def _reason(outcome: Outcome) -> str:
-    """Return the error, or else the first remark, without the name of the drawing, which stands
-    before it."""
+    """Return the error of a drawing, or its first finding, without the drawing's name in front."""
     reason = one_line(outcome.error or next(iter(outcome.remarks), ""))
     reason = reason.removeprefix(f"{one_line(outcome.source)}: ")
     return reason.removeprefix("error " if outcome.code else "warning ")
@@ -306,7 +306,7 @@ def _progress() -> Progress:
     from rich.text import Text
 
     class Rate(ProgressColumn):
-        """Drawings a second."""
+        """A column of the progress bar: drawings per second."""
 
         def render(self, task: BarTask) -> Text:
             return Text("" if task.speed is None else f"{task.speed:.1f}/s")

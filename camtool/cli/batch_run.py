@@ -104,7 +104,7 @@ class LazyPool:
     def results(
         self, tasks: Sequence[DrawingTask]
     ) -> Generator[tuple[DrawingTask, Outputs] | None]:
-        """Yield the results of the pool."""
+        """Create the pool, begin the display, and yield the results of the tasks."""
         pool = self.pool()
         self.begin()
         yield from pool.results(tasks)
@@ -142,7 +142,8 @@ class BatchRun:
     def _run(
         self, sources: Sequence[str], flags: BatchFlags, reads: Sequence[str]
     ) -> tuple[EndedBatch, int | None]:
-        """Return the outcomes, and the signal that stopped the run."""
+        """Return the outcomes, and the number of the signal that stopped the run (None if none
+        did)."""
         begin = time.monotonic()
         earlier_outputs = Manifest(self.out).outputs()
         tasks = find_tasks(sources, self.out, earlier_outputs)
@@ -273,7 +274,7 @@ class BatchRun:
         write_all(files)
 
     def _checked(self, outcome: Outcome) -> CheckedFile:
-        """Return a drawing with its findings, for pipelines."""
+        """Return the outcome of a drawing as a CheckedFile, for SARIF, JUnit and annotations."""
         from camtool.cli.check_formats import CheckedFile, refused_file
 
         name, error = outcome.source, outcome.error
@@ -305,12 +306,13 @@ def pool_for(batch: BatchRun, note: Callable[[str], None]) -> Pool:
 
 
 def _order(job: JobFlags, work: PostWork) -> JobOrder:
-    """Return the order of a job."""
+    """Return the job of one drawing, with the options of the batch, as its JobOrder."""
     return JobOrder(job.job(work.drawing), job.file)
 
 
 def _read_tolerances_file(files: Sequence[str]) -> Asked | None:
-    """Read a file of tolerances. Many batches have none, and load nothing for it."""
+    """Return the dimensions of the file of tolerances, None if there is no file. Nothing is
+    imported in that case, since many batches have none."""
     if not files:
         return None
     from camtool.inspection.tolerances import read_tolerances

@@ -162,8 +162,8 @@ def _is_code(path: Path) -> bool:
 
 
 def _result_of(task: DrawingTask, run: Run, program: str | None) -> Outputs:
-    """Return the result for the client: the error of a drawing that must not be written, and its
-    worst findings; `program` is the name of the program's file."""
+    """Return the outputs of a posted drawing for the summary: its error if it must not be written,
+    its figures, and its worst findings. `program`: name of the program's file."""
 
     from camtool.cli.check_formats import found_in
 
@@ -190,7 +190,7 @@ def _result_of(task: DrawingTask, run: Run, program: str | None) -> Outputs:
 
 
 def _figures(run: Run) -> dict[str, float]:
-    """Return the figures of a drawing for the summary."""
+    """Return the figures of a drawing that the summary lists."""
     program, report = run.program, run.report
     figures: dict[str, float] = {"bytes": len(program.data) if program else 0}
     if report is not None:

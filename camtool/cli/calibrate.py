@@ -66,5 +66,6 @@ def calibrate(
 
 
 def _own_table(machine: str | None, target: str) -> dict[str, Any]:
-    """Return the table of the user's machine file; without one, only its key `extends`."""
+    """Return the table of the user's machine file; without a file, a table with only the key
+    `extends`."""
     return {"extends": target} if machine is None else read_table(Path(machine))

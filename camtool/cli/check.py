@@ -68,7 +68,8 @@ class _Check:
     verbose: bool
 
     def check_one_of_many(self, source: str) -> int:
-        """Check one of several drawings; the exit code of an error is a result like another."""
+        """Check one of several drawings and return the exit code; an error is shown and does not
+        stop the others."""
         try:
             return self.check_file(source)
         except CamtoolError as error:
@@ -122,7 +123,7 @@ _Rows = Iterator[tuple[str, str]]
 
 
 def _head(facts: dict[str, Any]) -> _Rows:
-    """Yield units, size and counts."""
+    """Yield rows about the file: its units, its size and its counts."""
     units, size, extents = facts["units"], facts["size_mm"], facts["extents_mm"]
     yield "file", facts["file"]
     yield "units", f"{units['name']} ({units['why']})"
@@ -162,7 +163,8 @@ _SIZE_WORDS = {
 
 
 def _layers(facts: dict[str, Any], max_rows: int | None) -> _Rows:
-    """Yield layers, colours and line types, if there are several."""
+    """Yield rows about layers, colours and line types, for each of these of which there are
+    several."""
     for name, layer in _first(list(facts["layers"].items()), max_rows):
         points = f", {layer['marks']} points" if layer["marks"] else ""
         yield "layer", f"{name}: {layer['closed']} closed, {layer['open']} open{points}"
@@ -180,7 +182,7 @@ def _layers(facts: dict[str, Any], max_rows: int | None) -> _Rows:
 
 
 def _entities(facts: dict[str, Any]) -> _Rows:
-    """Yield the counts of entities used, not used, and repaired."""
+    """Yield rows with the counts of entities used, not used and repaired."""
     used_text = ", ".join(f"{count} {kind}" for kind, count in facts["entities_used"].items())
     yield "entities", used_text or "none"
     for item in facts["entities_not_used"]:
@@ -196,7 +198,7 @@ def _entities(facts: dict[str, Any]) -> _Rows:
 
 
 def _places(facts: dict[str, Any], max_rows: int | None) -> _Rows:
-    """Yield gaps, branches, crossings and open ends, with their places."""
+    """Yield rows about gaps, branches, crossings and open ends, with their positions."""
     for key, state in (("gaps", "stays open"), ("closed_gaps", "was closed")):
         for gap in _first(facts[key], max_rows):
             yield (
@@ -226,6 +228,6 @@ def _first(items: list[Any], max_rows: int | None) -> list[Any]:
 
 
 def _rows_left_out(name: str, items: Any, max_rows: int | None) -> _Rows:
-    """Return a line with the number of rows that are not shown."""
+    """Yield a row with the number of rows that are not shown, if any."""
     if max_rows is not None and len(items) > max_rows:
         yield name, f"and {len(items) - max_rows} more (-v shows all)"

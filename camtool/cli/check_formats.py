@@ -55,9 +55,9 @@ _ENTITY: Final = re.compile(r"\b[A-Z][A-Z0-9_]* ([0-9A-F]{1,16})(?= |$)")
 
 @dataclass(frozen=True)
 class CheckedFile:
-    """A drawing or program that was looked at, by its name on the command line, with all that was
-    found; `is_refused` if an error of its input ended it, `unread` if the file itself could not be
-    read; `passed_over`: why nobody looked at it."""
+    """A drawing or program that was checked, under its name on the command line, with all its
+    findings. `is_refused`: an error in it ended the check; `unread`: the file itself could not be
+    read; `passed_over`: the reason why it was not checked."""
 
     name: str
     findings: tuple[FoundAt, ...] = ()
@@ -94,7 +94,7 @@ def found_in(run: Run, program: str | None) -> tuple[FoundAt, ...]:
 
 
 def refused_file(error: CamtoolError, name: str, *, unread: bool = False) -> CheckedFile:
-    """Return the file that an error made unusable: the error as its finding."""
+    """Return a checked file whose only finding is the error that made it unusable."""
     mend = f"; {error.mend}" if error.mend else ""
     where = error.where or ""
     finding = INPUT_REFUSED(where=where, message=f"{error.message}{mend}")
@@ -104,7 +104,8 @@ def refused_file(error: CamtoolError, name: str, *, unread: bool = False) -> Che
 
 
 class _Places:
-    """The lines of a run's files: of blocks in its program, of entities in its drawing."""
+    """The line numbers of findings: of blocks in the program of a run, and of entities in its
+    drawing."""
 
     def __init__(self, run: Run, program: str | None) -> None:
         self._run = run
@@ -113,7 +114,7 @@ class _Places:
         self._drawing_text: bytes | None = None
 
     def found_at(self, record: FindingReport, *, in_drawing: bool) -> FoundAt:
-        """Return a finding at its line."""
+        """Return a finding with the file and the line that it is about."""
         block = None if in_drawing else _BLOCK.match(record.where)
         line = _LINE.search(record.where)
         if block is not None and self._program is not None:
@@ -124,7 +125,8 @@ class _Places:
         return record.at(self._run.source, line and int(line[1]))
 
     def _line_of_block(self, block: int) -> int | None:
-        """Return the line of a block, both from 1."""
+        """Return the line (from 1) of a block (from 1) of the program, None if its dialect has no
+        listing."""
         if self._block_lines is None:
             make = self._run.listing
             listing = None if make is None else make()
@@ -132,8 +134,8 @@ class _Places:
         return self._block_lines[block - 1] if 0 < block <= len(self._block_lines) else None
 
     def _line_of_entity(self, file: str, where: str) -> int | None:
-        """Return the line of the drawing that an entity of DXF (by its handle) or SVG begins
-        on."""
+        """Return the line of the drawing on which an entity of a DXF (by its handle) or of an SVG
+        begins, None if that is unknown."""
         line, handle = _LINE.search(where), _ENTITY.search(where)
         if line is not None:
             return int(line[1])
@@ -172,7 +174,7 @@ def sarif(files: Sequence[CheckedFile], own_codes: Iterable[TargetCode] = ()) ->
 
 
 def _rule(name: str, code: Code | TargetCode | None) -> dict[str, Any]:
-    """Return the rule of a code; that of a code that nobody knows has its name alone."""
+    """Return the SARIF rule of a code; for an unknown code, a rule with only the name."""
     if code is None:
         return {"id": name}
     return {
@@ -203,7 +205,8 @@ def _result(finding: FoundAt, rule: int) -> dict[str, Any]:
 
 
 def _address(file: str) -> str:
-    """Return the file as a relative reference of RFC 3986, or as an address if it is absolute."""
+    """Return the file as a URI: a relative reference (RFC 3986), or a file URI if the path is
+    absolute."""
     path = PurePath(file)
     if path.is_absolute():
         return path.as_uri() if file.isprintable() else "file://" + _quoted(path.as_posix())
@@ -215,7 +218,8 @@ def _quoted(path: str) -> str:
 
 
 def _text(finding: FoundAt) -> str:
-    """Return the place and the message of a finding, as lines for people have them."""
+    """Return the place and the message of a finding in one line, as they are shown on the
+    terminal."""
     place = f"[{finding.where}] " if finding.where else ""
     return one_line(f"{place}{finding.message}")
 
@@ -224,8 +228,8 @@ def _text(finding: FoundAt) -> str:
 
 
 def junit(files: Sequence[CheckedFile], command: str) -> bytes:
-    """Return a test case for each file: a failure if a finding is an error, an error if it could
-    not be used. Warnings are its output."""
+    """Return JUnit XML with one test case for each file: a failure if it has findings of severity
+    error, an error if it could not be used. Warnings are in its output."""
     from xml.etree import ElementTree as tree
 
     failed = [file for file in files if file.errors and not file.is_refused]
@@ -283,8 +287,8 @@ def workflow_commands(files: Sequence[CheckedFile]) -> bytes:
 
 
 def _command(finding: FoundAt) -> str:
-    """Return a workflow command; values are escaped as GitHub's toolkit does, so that no text of
-    a drawing ends the command or begins another one."""
+    """Return the GitHub workflow command of a finding. Values are escaped as GitHub's toolkit
+    does, so that no text from a drawing can end the command or begin another one."""
     line = "" if finding.line is None else f",line={finding.line}"
     file, title = _property(PurePath(finding.file).as_posix()), _property(finding.code)
     return (

@@ -41,7 +41,8 @@ class CheckOutputs(Struct, frozen=True):
     def files(
         self, checked: Sequence[CheckedFile], own_codes: Iterable[TargetCode] = ()
     ) -> dict[str, bytes]:
-        """Return the files about what was checked; `own_codes` are those of the target."""
+        """Return the requested files (content by name) about what was checked; `own_codes` are the
+        codes that the target adds."""
         if not self.names:
             return {}
         from camtool.cli import check_formats as formats
@@ -58,7 +59,8 @@ class CheckOutputs(Struct, frozen=True):
 
     @contextmanager
     def reporting_refusal(self, source: str) -> Iterator[None]:
-        """Write the files about the error that makes `source` unusable, and let it pass."""
+        """Write the requested files if the block raises an error that makes `source` unusable; the
+        error is raised again."""
         try:
             yield
         except CamtoolError as error:

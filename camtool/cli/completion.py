@@ -129,7 +129,7 @@ class _Shell(ShellComplete):
         return words[1:-1], words[-1][:-1]
 
     def format_completion(self, item: CompletionItem[Any]) -> str:
-        """Return a line of the kind and the value."""
+        """Return the answer as one line: its kind and its value."""
         return f"{item.type},{item.value}"
 
 
@@ -147,7 +147,8 @@ class Zsh(_Shell):
     source_template: ClassVar[str] = _ZSH
 
     def format_completion(self, item: CompletionItem[Any]) -> str:
-        """Three lines: the kind, the value, and the help or _."""
+        """Return the answer as three lines: its kind, its value, and its help ("_" without
+        one)."""
         return f"{item.type}\n{item.value}\n{_help(item) or '_'}"
 
 
@@ -158,7 +159,7 @@ class Fish(_Shell):
     source_template: ClassVar[str] = _FISH
 
     def format_completion(self, item: CompletionItem[Any]) -> str:
-        """Return the kind, the value, and behind a tab the help."""
+        """Return the answer as one line: its kind, its value, and its help after a tab."""
         text, answer = _help(item), super().format_completion(item)
         return f"{answer}\t{text}" if text else answer
 
@@ -198,14 +199,16 @@ def completion(shell: str) -> int:
 
 
 def answer_shells(command: click.Command) -> None:
-    """Let click answer the supported shells for this command; the process does nothing else."""
+    """Let click answer a shell that asks for completions of this command; the process then
+    ends."""
     complete_values(command)
     for kind in SHELLS.values():
         add_completion_class(kind)
 
 
 def complete_values(command: click.Command) -> None:
-    """Give every text parameter of this command and its subcommands its completion."""
+    """Set, for every text parameter of this command and its subcommands, the type that completes
+    its values."""
     for param in command.params:
         answer = _answer_for(param)
         if answer is not None and type(param.type) is StringParamType:
@@ -261,7 +264,7 @@ def _targets(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 
 def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
-    """Return the layers of the drawing that the line names before, if it is a DXF of text."""
+    """Yield the layers of the DXF drawings (text format) that are already on the command line."""
     # What stands before a flag that still lacks its value has not been given its place.
     named = [*(ctx.params.get(key) or () for key in _DRAWINGS), tuple(ctx.args)]
     names_given = [Path(name) for names in named for name in _several(names)]
@@ -271,7 +274,8 @@ def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 
 def _picture_layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
-    """Return the layers of pictures; of several, for the one after the last comma."""
+    """Yield the names of picture layers; in a list with commas the name after the last comma is
+    completed."""
     before, comma, last = incomplete.rpartition(",")
     for name in layer_names():
         if name.startswith(last):
@@ -283,7 +287,8 @@ def _several(names: str | tuple[str, ...]) -> tuple[str, ...]:
 
 
 def dxf_layers(file: Path) -> set[str]:
-    """Return the layers that entities of a text DXF name (group code 8); empty for other files.
+    """Return the layers (group code 8) that the entities of a DXF in text format are on; an empty
+    set for other files.
 
     Names that cannot be shown, or that are of an encoding other than UTF-8, are left out.
     """
@@ -305,12 +310,13 @@ def dxf_layers(file: Path) -> set[str]:
 
 
 def _decode_name(name: str) -> str:
-    r"""Decode a name: older files write \U+00F6 for characters that are not ASCII."""
+    r"""Return the layer name with escapes such as \U+00F6 decoded, by which older DXF files write
+    characters that are not ASCII."""
     return re.sub(r"\\U\+([0-9A-Fa-f]{4})", lambda match: chr(int(match[1], 16)), name).strip()
 
 
 def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
-    """Return the keys of the machine that the line names before."""
+    """Yield the keys of the machine whose target is already on the command line."""
     import msgspec
 
     target = ctx.params.get("target")
@@ -322,7 +328,7 @@ def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 
 def _interpolators(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
-    """Return the interpolators of the controller of the target that the line names before."""
+    """Yield the interpolators of the target that is already on the command line."""
     target = ctx.params.get("target")
     if isinstance(target, str):
         for name in load_target(target).interpolators:

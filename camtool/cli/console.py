@@ -137,7 +137,8 @@ class _Talk:
         self._lines.put(None)
 
     def _turn(self, wishes: UserRequests) -> int | None:
-        """Listen for a moment, then handle requests; return the exit code at the end."""
+        """Listen for a moment, then handle the user's requests; return the exit code when the
+        dialogue ends, else None."""
         terminal, line = self._terminal, self._line
         data = line.read(TICK_S)
         time_s = time.monotonic()
@@ -181,7 +182,8 @@ class _Talk:
         return None
 
     def _stop(self, wish: Request, *, by_hand: bool) -> int | None:
-        """Stop the machine; return the exit code if it is not waited for."""
+        """Stop the machine; return the exit code if the dialogue ends now, None if it continues
+        until the machine stands."""
         at_keyboard = self._at_terminal and by_hand
         if self._stops if at_keyboard else wish.value == "close":
             self._line.write(self._terminal.halt())
@@ -189,8 +191,9 @@ class _Talk:
         return self._halt(None if at_keyboard else 1)
 
     def _halt(self, code: int | None) -> int | None:
-        """Tell the machine to stop; with a code, the dialogue ends with it when the machine
-        stands."""
+        """Tell the machine to stop. With a `code`, the dialogue ends with this exit code once the
+        machine stands. Return the exit code at once if the line has no means to stop it, else
+        None."""
         stop = self._terminal.halt()
         if not stop:
             self._say("nothing stops it over its line: its switch does")
@@ -204,7 +207,7 @@ class _Talk:
         return None
 
     def _stopped(self, time_s: float, told_s: float) -> bool:
-        """Return True when the machine stands, or its state is unknown."""
+        """Return True if the machine stands, or if its state cannot be known."""
         terminal = self._terminal
         silent = time_s - max(told_s, self._heard) >= CONFIRMS_S
         if terminal.stands:
@@ -246,8 +249,7 @@ class _Talk:
         return None
 
     def _show(self, lines: list[str], *, wait: bool = False) -> None:
-        """Show lines on stdout. A full pipe does not delay the dialogue, unless it is waited
-        for."""
+        """Print lines to stdout. A full pipe does not delay the dialogue, unless `wait` is set."""
         self._unshown += lines
         while self._shows and self._unshown and (wait or takes_more(sys.stdout)):
             try:

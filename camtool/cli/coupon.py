@@ -111,7 +111,7 @@ def coupon(
 
 
 def _travel(machine: Machine | None) -> tuple[float, float]:
-    """Return the travel of the machine, mm; OptionError if it is not known."""
+    """Return the travel (x, y) of the machine, mm; OptionError if it is not known."""
     if machine is None:
         return SIZE
     x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm

@@ -37,8 +37,8 @@ class ComparedSide:
         return ", ".join(name for name in names if name)
 
     def stock(self, *, quiet: bool, verbose: bool) -> CutStock | None:
-        """Return the stock after the program of this side; None where the job has errors, which
-        are said."""
+        """Return the stock after the program of this side; None if the job has errors, which are
+        shown."""
         target, job = self.machine.load(), self.job.job(self.drawing)
         with self.job.name_job_file():
             run = self._run(target, job)
@@ -49,7 +49,7 @@ class ComparedSide:
             return cut_stock(run.decoded, target, job)
 
     def _run(self, target: LoadedTarget, job: Job) -> Run:
-        """Return the program of this side, read or made."""
+        """Return the program of this side: read from its file, or posted from its drawing."""
         if self.drawing.is_program(self.file, target):
             return read_program(read_bytes(self.file), target, source=display_name(self.file))
         read = self.drawing.read(self.file, target.machine, job)
@@ -59,7 +59,7 @@ class ComparedSide:
 def difference_facts(
     difference: StockDifference, stocks: Sequence[CutStock], limit_mm: float, *, differs: bool
 ) -> dict[str, Any]:
-    """Return the figures as JSON."""
+    """Return the figures of the comparison as data for JSON."""
 
     def bracket(one: Bracket) -> dict[str, Any]:
         return {
@@ -79,7 +79,7 @@ def difference_facts(
 
 
 def difference_text(difference: StockDifference, names: Sequence[str]) -> str:
-    """Return the figures for people."""
+    """Return the figures of the comparison as readable text."""
     lines = [f"A  {names[0]}", f"B  {names[1]}"]
     for words, one, volume in (
         ("B cuts more", difference.deeper, difference.more_mm3),
@@ -96,7 +96,8 @@ def difference_text(difference: StockDifference, names: Sequence[str]) -> str:
 
 
 def _scene(cut: CutStock, other: CutStock, title: str, reference: str = "wanted") -> Scene:
-    """Return the scene of a stock, beside another one."""
+    """Return the picture scene of a stock, compared with the stock `other`; `reference` names
+    that."""
     box = box_around(cut.box_mm, other.box_mm)
     lowest = [float(each.moves.end[:, 2].min(initial=0.0)) for each in (cut, other)]
     is_known = cut.bottom_mm is not None
@@ -108,14 +109,15 @@ def _scene(cut: CutStock, other: CutStock, title: str, reference: str = "wanted"
 def difference_picture(
     stocks: tuple[CutStock, CutStock], difference: StockDifference, names: Sequence[str], file: str
 ) -> bytes:
-    """Return the picture of the greater of the two differences."""
+    """Return the picture (bytes, for a file of this name) of the greater of the two
+    differences."""
     cuts_more = difference.deeper.high >= difference.shallower.high
     scene = _scene(stocks[1], stocks[0], f"{names[1]} against {names[0]}", "A")
     return render(scene, file, PictureOptions(view="gouge" if cuts_more else "leftover"))
 
 
 def difference_page(stocks: tuple[CutStock, CutStock], names: Sequence[str], text: str) -> str:
-    """Return a page with both stocks and both differences; texts of names are escaped."""
+    """Return an HTML page with both stocks and both differences; names are escaped."""
     first, second = stocks
     shown = [
         (_scene(first, second, f"A: {names[0]}"), "iso"),

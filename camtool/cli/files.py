@@ -324,7 +324,7 @@ def _mode_for(place: Path) -> int:
 
 
 def display_name(name: str) -> str:
-    """Return the name of a file for messages."""
+    """Return the name of a file as messages show it."""
     return "<stdin>" if name == STDOUT else name
 
 
@@ -348,8 +348,8 @@ SEAL = b"<!-- camtool: sha256 "
 
 
 def seal(svg: bytes, maker: str) -> bytes:
-    """Return the picture with the seal of its maker, the name of a page or of the outputs of a
-    drawing."""
+    """Return the SVG with a seal: a digest and the name of its maker (a page, or the outputs of a
+    drawing), by which `is_foreign` recognises it."""
     import hashlib
 
     name = os.fsencode(PurePath(maker).name)
@@ -358,7 +358,7 @@ def seal(svg: bytes, maker: str) -> bytes:
 
 
 def is_foreign(place: str | Path, maker: str) -> bool:
-    """Return True if the file exists and is no unchanged picture of this maker."""
+    """Return True if a file exists there that is not an unchanged picture of this maker."""
     if not os.path.lexists(place):
         return False
     try:

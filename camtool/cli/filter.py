@@ -59,5 +59,5 @@ def filter(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
 
 
 def _progress(percent: int) -> None:
-    """Moves LinuxCNC's progress bar: a line of its own, at once."""
+    """Print a line that moves LinuxCNC's progress bar to this percentage."""
     say(f"FILTER_PROGRESS={percent}", quiet=False)

@@ -60,7 +60,7 @@ def act(
     yes: bool = False,
     at_mm: Place | None = None,
 ) -> int:
-    """Hold the conversation of one command; return the exit code."""
+    """Run one action of a machine (home, jog, zero, unlock) to its end; return the exit code."""
     target = machine.load()
     wire = wire_of(target)
     if at_mm is not None and not wire.jogs_from_place:
@@ -93,8 +93,8 @@ def carried(
     is_agreed: bool = False,
     watch: Callable[[Conversation], None] = lambda _: None,
 ) -> str:
-    """Hold a conversation to its end; return why it has failed, "" if it has not. Ctrl-C, q and
-    any exception stop the machine. `is_agreed`: it goes on where it waits for the user."""
+    """Run a conversation to its end; return why it failed, "" if it did not. Ctrl-C, q and any
+    exception stop the machine. `is_agreed`: go on without asking where it waits for the user."""
     opened = opened_line(port_of(port, baud, wire_of(target), target))
     with opened as line, keys_of_terminal() as key:
         wishes = UserRequests(key, {"q": Request.STOP})
@@ -115,8 +115,8 @@ def carried(
 
 
 def _is_agreed(conversation: Conversation) -> bool:
-    """Ask for what the user must do or allow before the first packet; True if there is nothing, or
-    the answer is yes."""
+    """Ask the user to do or allow what the conversation needs before its first packet. Return True
+    if nothing is needed or the answer is yes."""
     question = next((packet.ask for packet in conversation.packets[:1]), "")
     if not question:
         return True

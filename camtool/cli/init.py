@@ -230,22 +230,22 @@ class Questions:
         self.allowed = allowed
 
     def ask(self, text: str, default: str = "") -> str | None:
-        """Return the answer; None for an empty one without a default, or if no questions are
-        allowed."""
+        """Ask for a text and return the answer; None for an empty answer without a default, or if
+        questions are not allowed."""
         if not self.allowed:
             return None
         answer = click.prompt(text, default, show_default=bool(default), err=True)
         return str(answer).strip() or None
 
     def ask_one_of(self, text: str, choices: Sequence[str]) -> str | None:
-        """Return one of the choices; None if no questions are allowed."""
+        """Ask for one of the choices and return it; None if questions are not allowed."""
         if not self.allowed:
             return None
         return str(click.prompt(text, type=click.Choice(choices), err=True))
 
     def ask_axes(self, flag: str, text: str) -> str | None:
-        """Return numbers of the axes, as `flag` takes them; the question is repeated until they
-        are valid."""
+        """Ask for numbers of the axes, in the form that `flag` takes, until they are valid; return
+        the answer as text."""
         while True:
             answer = self.ask(f"{text}; Enter: not known")
             if answer is None:
@@ -258,7 +258,8 @@ class Questions:
             return answer
 
     def ask_lines(self, text: str) -> str:
-        """Return lines up to an empty one; the name of a file alone stands for its lines."""
+        """Ask for lines up to an empty one and return them; if the only line is the name of a
+        file, the content of the file is returned."""
         first = self.ask(f"{text}: paste it, end with an empty line; or the name of a file")
         if first is None:
             return ""
@@ -323,8 +324,8 @@ def _controller_settings(
 def machine_text(
     name: str, target: str, given_settings: Sequence[ControllerSetting], source: str
 ) -> str:
-    """Return the text of the machine file. MachineError, which names the source of the value, for
-    a value out of range."""
+    """Return the TOML text of the machine file. MachineError for a value out of range, with the
+    source of the value."""
     base = list_target(target)
     text = machine_template(name, target, base.text, base.needs, given_settings)
     try:
@@ -344,7 +345,7 @@ def machine_text(
 
 
 def _is_about(error: MachineError, key: str) -> bool:
-    """Return True if an error is about this key of a machine file."""
+    """Return True if the error names this key of the machine file."""
     table, _, name = key.rpartition(".")
     return error.where == f"table [{table}], key {name}"
 
@@ -353,7 +354,7 @@ def _is_about(error: MachineError, key: str) -> bool:
 
 
 def _place(name: str, output: str | None, *, project: bool) -> Path:
-    """Return the file of the machine; an invalid name is refused."""
+    """Return the path of the machine's file; OptionError for a name that cannot be a file name."""
     if not NAME.fullmatch(name) or name == Path(FILE).stem:
         raise OptionError(
             f"{name!r} is no name for a machine", mend="use small letters, digits and hyphens"
@@ -364,9 +365,9 @@ def _place(name: str, output: str | None, *, project: bool) -> Path:
 
 
 def _write(files: dict[str, bytes], settings: str | None, *, is_replaced: bool) -> str | None:
-    """Write the machine file, which must be new, and the `camtool.toml` that names it. One that
-    `is_replaced` is kept under another name, which is returned: its numbers may have been
-    measured."""
+    """Write the machine file and the `camtool.toml` that names it. An existing machine file is
+    refused, or with `is_replaced` kept under another name, which is returned: its numbers may have
+    been measured."""
     place, old_file = next(iter(files)), None
     if is_replaced and Path(place).is_file():
         old_file = f"{place}.old"

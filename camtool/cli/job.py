@@ -149,7 +149,8 @@ def new(
 
 
 def _ask_kind(each: Proposed) -> Proposed | None:
-    """Ask for the kind of operation of a part that is in doubt; None if it is not to be cut."""
+    """Ask the user which kind of operation a doubtful part is meant to be; return the operation,
+    or None if it is not to be cut."""
     part = each.part
     if not part.others and not part.is_left:
         return each
@@ -163,8 +164,8 @@ def _ask_kind(each: Proposed) -> Proposed | None:
 
 
 def _with_library(proposal: Proposal) -> Proposal:
-    """Return the proposal with the tools of the libraries that may cut its material; of a job that
-    names no tool and no diameter, the first end mill is its tool."""
+    """Return the proposal with the tools of the libraries that have presets for its material. If
+    neither a tool nor a diameter is given, the first end mill becomes its tool."""
     every: dict[str, Tool] = {}
     for file in project_of(Path.cwd()).libraries:
         every = {
@@ -245,7 +246,7 @@ def check(
 
 
 def _summary(facts: dict[str, Any]) -> Iterator[str]:
-    """Return the lines about a job, and about the parts of a drawing that it takes."""
+    """Yield the lines about a job, and about the parts of the drawing that it takes."""
     if "extents_mm" in facts:
         axes = facts["extents_mm"].items()
         ranges = (f"{axis} {' … '.join(map(_place, pair))}" for axis, pair in axes)
@@ -269,7 +270,8 @@ def _summary(facts: dict[str, Any]) -> Iterator[str]:
 
 
 def _sides(groups: list[dict[str, Any]]) -> Iterator[str]:
-    """Return the groups of contours with their sides; the largest if there are many."""
+    """Yield lines for the groups of contours, with the side on which the tool runs; only the
+    largest groups if there are many."""
     shown = sorted(groups, key=lambda group: -group["contours"])[:MAX_GROUPS]
     for group in shown:
         yield (

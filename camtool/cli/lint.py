@@ -61,7 +61,7 @@ def lint(
 
 
 def _check(program: str, target: LoadedTarget, *, quiet: bool, verbose: bool) -> CheckedFile:
-    """Return a program with its findings, which are shown."""
+    """Return a program with its findings, and show these."""
     name = display_name(program)
     try:
         data = read_bytes(program)
@@ -78,7 +78,7 @@ def _check(program: str, target: LoadedTarget, *, quiet: bool, verbose: bool) ->
 
 
 def _row(checked: CheckedFile) -> dict[str, Any]:
-    """Return the row of a program in the JSON."""
+    """Return the entry of a program for the JSON."""
     return {
         "program": checked.name,
         "errors": len(checked.errors),
@@ -88,7 +88,7 @@ def _row(checked: CheckedFile) -> dict[str, Any]:
 
 
 def _summary(checked: list[CheckedFile]) -> str:
-    """Return `3 programs: 2 errors, 1 warning`."""
+    """Return a line of counts, such as `3 programs: 2 errors, 1 warning`."""
     counts = Counter(each.severity for file in checked for each in file.findings)
     words = [f"{counts[kind]} {kind}{'s' * (counts[kind] != 1)}" for kind in ("error", "warning")]
     subject = one_line(checked[0].name) if len(checked) == 1 else f"{len(checked)} programs"

@@ -98,7 +98,7 @@ class _Commands(click.Group):
     """The group of `COMMANDS`, each of which is imported when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names of the commands."""
+        """Return the names of all commands."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
@@ -214,7 +214,8 @@ def _exit_code(*, debug: bool) -> int:
 
 @contextmanager
 def _system_errors() -> Iterator[None]:
-    """Raise what the system refuses as errors of camtool that name the file."""
+    """Convert exceptions of the operating system in the block to camtool's errors, which name the
+    file."""
     try:
         yield
     except OSError as error:
@@ -267,6 +268,6 @@ def _repeat_interrupt(hook_args: sys.UnraisableHookArgs) -> None:
 
 
 def _collect_seldom() -> None:
-    """Collect garbage seldom during a short run, and never at its end."""
+    """Set the garbage collector to run seldom, and never at exit: most commands are short."""
     gc.set_threshold(GARBAGE_AFTER)
     atexit.register(gc.freeze)

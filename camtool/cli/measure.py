@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def _points(_: click.Context, option: click.Parameter, values: tuple[str, ...]) -> Any:
-    """Return the points (x, y), mm, of the values of `--at`."""
+    """Parse the values of `--at` to points (x, y), mm."""
     points = []
     for value in values:
         x, comma, y = value.partition(",")
@@ -40,7 +40,7 @@ def _points(_: click.Context, option: click.Parameter, values: tuple[str, ...]) 
 
 
 def _sections(_: click.Context, option: click.Parameter, values: tuple[str, ...]) -> Any:
-    """Return the axes and places, mm, of the values of `--section`."""
+    """Parse the values of `--section` to (axis, coordinate in mm)."""
     sections = []
     for value in values:
         axis, equals, place = value.partition("=")
@@ -150,7 +150,7 @@ def _facts(
     *,
     with_volume: bool,
 ) -> dict[str, Any]:
-    """Return all figures as JSON."""
+    """Return all figures as data for JSON."""
     import numpy as np
 
     facts: dict[str, Any] = {"beside_um": round(stock.moves.beside_mm * UM_PER_MM, 3)}
@@ -188,7 +188,7 @@ def _facts(
 
 
 def _picture(title: str, profile: tuple[str, float, Floats], stock: CutStock, file: str) -> bytes:
-    """Return the picture of a section."""
+    """Return the picture of a section through the stock (bytes, for a file of this name)."""
     from camtool.pictures.draw import rendered
     from camtool.pictures.section import StockSection, section_svg
 
@@ -197,8 +197,8 @@ def _picture(title: str, profile: tuple[str, float, Floats], stock: CutStock, fi
 
 
 def _table(profiles: Profiles) -> str:
-    """Return sections as comma-separated values: the axis, its value, the place along the section
-    and the height, mm."""
+    """Return the sections as CSV with the columns axis, its coordinate, position along the
+    section, and height, mm."""
     lines = ["axis,at_mm,along_mm,z_mm"]
     for axis, value, rows in profiles:
         lines += [f"{axis},{value:g},{place:.6f},{z:.6f}" for place, z in rows.tolist()]
@@ -212,7 +212,7 @@ def _text(
     *,
     with_volume: bool,
 ) -> str:
-    """Return the figures for people."""
+    """Return the figures as readable text."""
     import numpy as np
 
     lines = []

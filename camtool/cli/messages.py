@@ -36,7 +36,8 @@ def say(text: str, *, quiet: bool) -> None:
 
 
 def show_text(text: str, *, err: bool = False) -> None:
-    """Show lines on stdout, styled or not; their names must have gone through `one_line`."""
+    """Print lines to stdout (with `err` to stderr), with or without styles; names in them must
+    have gone through `one_line`."""
     if err:
         _echo(text)
     else:
@@ -151,7 +152,8 @@ def show_compared(text: str, rows: Sequence[ContrastRow]) -> None:
 
 
 def report_marks(findings: Iterable[Finding]) -> dict[str, str]:
-    """Return the severities of the lines of the summary that these findings are about."""
+    """Return the severity of each line of the summary that findings are about, by the name of the
+    line."""
     marks: dict[str, str] = {}
     for finding in sorted(findings, key=lambda finding: finding.severity):
         name = _LINES.get(finding.where) or _LINES.get(finding.code.name)

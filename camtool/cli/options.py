@@ -73,8 +73,8 @@ class SectionedCommand(click.Command):
     option with a value is given once, unless it collects several."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the arguments; refuse an option that is given twice, of which click keeps the
-        last."""
+        """Parse the arguments; a usage error for an option that is given twice, since click would
+        silently keep the last one."""
         order = self.make_parser(ctx).parse_args(list(args))[2]
         for param, count in Counter(order).items():
             several = param.multiple or not isinstance(param, click.Option) or param.is_flag
@@ -84,7 +84,7 @@ class SectionedCommand(click.Command):
         return super().parse_args(ctx, args)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options into the help."""
+        """Write the options into the help text, section by section."""
         sections: dict[str, list[tuple[str, str]]] = {GENERAL: []}
         for param in self.get_params(ctx):
             record = param.get_help_record(ctx)
@@ -96,7 +96,7 @@ class SectionedCommand(click.Command):
 
 
 def option(section: str, *names: str, **settings: Any) -> Option:
-    """`click.option` under a heading."""
+    """Return a `click.option` that the help shows under the heading `section`."""
     return click.option(*names, cls=SectionOption, section=section, **settings)
 
 
@@ -109,7 +109,8 @@ _GROUPS = "gathered_groups"
 def gather(
     record: str, make: Callable[..., Any], names: Sequence[str]
 ) -> Callable[[Command], Command]:
-    """Return a wrapper that replaces the arguments `names` of a command by one record.
+    """Return a decorator that replaces the arguments `names` of a command by one argument
+    `record`, made of them by `make`.
 
     The records of a command that is wrapped several times are made in one call.
     """
@@ -151,7 +152,7 @@ def with_flags(
 
 
 def engagement_limit(text: str) -> float:
-    """Read a limit of engagement, rad; OptionError for one that every cut exceeds, or none."""
+    """Read a limit of engagement, rad; OptionError unless it is above 0 and at most π."""
     angle_rad = engagement_angle(text)
     if not 0.0 < angle_rad <= math.pi:
         raise OptionError(
@@ -203,9 +204,9 @@ class MachineFlags(Struct, frozen=True):
     def of(
         cls, target: str | None, machine: str | None, settings: tuple[str, ...]
     ) -> MachineFlags:
-        """Resolve the flags. The name of a machine is replaced by its file; so is the name of a
-        target, if the user has a machine so called. Without either flag the default of the project
-        applies, else that of the user."""
+        """Return the flags with names resolved: the name of a machine is replaced by its file, and
+        so is the name of a target if the user has a machine of that name. Without either flag the
+        default of the project applies, else that of the user."""
         from camtool.target.registry import target_names
 
         project = project_of(Path.cwd())
@@ -221,7 +222,7 @@ class MachineFlags(Struct, frozen=True):
         return cls(target, None, settings)
 
     def load(self) -> LoadedTarget:
-        """Load the target with the user's file and settings over it."""
+        """Load the target with the user's machine file and `--set` over its values."""
         from camtool.target.registry import load_target
 
         name = self.name()
@@ -234,7 +235,7 @@ class MachineFlags(Struct, frozen=True):
         return load_target(name, machine_file=file, settings=self.settings)
 
     def files(self) -> list[str]:
-        """User's machine file, if any."""
+        """Return the user's machine file in a list, [] without one."""
         return [] if self.machine is None else [self.machine]
 
     def name(self) -> str | None:
@@ -379,19 +380,19 @@ class InspectionFlags(Struct, frozen=True):
     require: Literal["in", "not-out"] | None = None
 
     def check(self, *, without: str | None) -> None:
-        """Raise a usage error for `--require` alone, and beside a flag (`without`) that leaves
-        nothing to inspect."""
+        """Raise a usage error for `--require` without `--tolerances`, and for both beside a flag
+        (`without`) that leaves nothing to inspect."""
         if self.require is not None and self.tolerances is None:
             raise click.UsageError("--require needs --tolerances")
         if self.tolerances is not None and without is not None:
             raise click.UsageError(f"{without} leaves nothing to inspect; drop --tolerances")
 
     def files(self) -> list[str]:
-        """File of tolerances, if there is one."""
+        """Return the file of tolerances in a list, [] without one."""
         return [] if self.tolerances in (None, DRAWING) else [str(self.tolerances)]
 
     def inspect_run(self, run: Run) -> Run:
-        """Return the run with the verdicts of its dimensions."""
+        """Return the run with a verdict on each of its dimensions."""
         if self.tolerances is None or run.drawing is None:
             return run
         from camtool.inspection.tolerances import dimensions_of
@@ -464,8 +465,8 @@ class DrawingFlags(Struct, frozen=True):
     ) -> Drawing:
         """Read the drawing (`-` is stdin), restricted to the layers of the job's operations.
 
-        `data` is the file's content where it has been read already. OptionError for a layer or
-        colour of the job that the drawing has not, unless flags restrict it.
+        `data` is the content of the file if it has been read already. OptionError for a layer or
+        colour of the job that the drawing does not have, unless flags select layers.
         """
         from camtool.jobs.drawing import read_for_job
 
@@ -478,8 +479,8 @@ class DrawingFlags(Struct, frozen=True):
         return read_for_job(data, file, options, job)
 
     def is_program(self, name: str, target: LoadedTarget) -> bool:
-        """Return True if a file has the extension of the target's programs, or a content that
-        is no drawing. `--format` says that it is one, and stdin is taken for one."""
+        """Return True if the file has the extension of the target's programs, or a content that is
+        no drawing. Stdin, and a file for which `--format` is given, count as drawings."""
         suffix = Path(name).suffix
         if suffix.lower() == target.machine.target.extension:
             return True
@@ -514,7 +515,8 @@ def drawing_options(command: Command) -> Command:
 
 
 def _read_flag(section: str, name: str, flag: Flag, kind: Any) -> Option:
-    """Return the flag of an option of reading; None unless given, so that defaults apply."""
+    """Return the flag for one option of reading drawings; its value is None unless given, so that
+    the defaults of ReadOptions apply."""
     settings: dict[str, Any] = {"metavar": flag.metavar}
     if kind is bool:
         settings = {"is_flag": True, "default": None}
@@ -556,9 +558,10 @@ class JobFlags(Struct, frozen=True, dict=True):
         return bool(has_operation or self.given) or self.file not in (None, own_file)
 
     def job(self, drawing: DrawingFlags) -> Job:
-        """Return the job of the file, with the given flags over it.
+        """Return the job of the file with the given flags over it.
 
-        `--layer` restricts the drawing; a job of one operation takes just that of it.
+        `--layer` restricts the reading of the drawing; the operation of a job with only one takes
+        just these layers.
         """
         file = JobTables()
         if self.file is not None:
@@ -571,10 +574,11 @@ class JobFlags(Struct, frozen=True, dict=True):
         return job if self.setup is None else job.setup(self.setup)
 
     def as_file(self, drawing: DrawingFlags, place: Path) -> tuple[Job, Table, ReadJob]:
-        """Return the job, its tables as one file at this place, and the function that makes a job
-        of such tables.
+        """Return the job, the tables of one job file at `place` that says the same, and a function
+        that reads a job from such tables.
 
-        Of one operation `--layer` is a part of it. A usage error for `--operation`.
+        If the job has one operation, `--layer` becomes a key of it. A usage error for
+        `--operation` and `--setup`, which leave out a part of the job.
         """
         from camtool.jobs.changes import job_of_tables, merged_tables
 
@@ -595,7 +599,8 @@ class JobFlags(Struct, frozen=True, dict=True):
         return job_used, tables, read
 
     def _tools_and_defaults(self) -> Shop:
-        """Return the tools that the job may name, and the defaults of the project and the user."""
+        """Return the tool libraries, and the default tool and material, of the project and the
+        user."""
         if self.project is None:
             return Shop()
         defaults = {key: self.project.value_of(key) for key in ("tool", "material")}
@@ -606,20 +611,21 @@ class JobFlags(Struct, frozen=True, dict=True):
         return Shop(self.project.libraries, **shop_values)
 
     def beyond(self, names: Collection[str]) -> list[str]:
-        """Return the flags of a job that are given beside the keys of these names: `--job` and
-        others."""
+        """Return the given flags of the job (`--job` included) that are not the flags of the keys
+        `names`, for commands that take only these."""
         flags = [flag_name(name) for name in self.given if name not in names]
         return [*(["--job"] if self.file is not None else []), *flags]
 
     def files(self) -> list[str]:
-        """Job file, its library of tools, and its tool table."""
+        """Return all files that the job is read from: its job file, tool libraries and
+        tool table."""
         named = (self.file, self._named_file("tool_library"), self._named_file("tool_table"))
         libraries = () if self.project is None else self.project.libraries
         return [*(file for file in named if file is not None), *map(str, libraries)]
 
     def _named_file(self, key: str) -> str | None:
-        """Return the file that a flag or a key of the job file names; None without one, and if the
-        job file cannot be read: `job` reports that."""
+        """Return the path that a flag or a key of the job file names. None if neither does, and if
+        the job file cannot be read, which `job` reports."""
         if self.file is None or key in self.given:
             return self.given.get(key)
 
@@ -653,7 +659,7 @@ OWN_JOB = ".toml"
 
 
 def own_job(drawing: Path) -> Path | None:
-    """Return the job file beside a drawing; None without one."""
+    """Return the job file beside a drawing, None if there is none."""
     if not drawing.name:  # the folder ., which is an error later
         return None
     job_file = drawing.with_suffix(OWN_JOB)
@@ -665,7 +671,7 @@ OWN_TOLERANCES = ".tolerances.toml"
 
 
 def own_tolerances(drawing: Path) -> Path | None:
-    """Return the file of tolerances beside a drawing; None without one."""
+    """Return the file of tolerances beside a drawing, None if there is none."""
     tolerances_file = drawing.parent / f"{drawing.stem}{OWN_TOLERANCES}"
     return tolerances_file if tolerances_file.is_file() else None
 
@@ -704,7 +710,8 @@ def job_options(command: Command) -> Command:
 
 
 def _key_flag(section: str, name: str, key: Key) -> Option:
-    """Return the flag of a key; None unless given, so that defaults apply."""
+    """Return the flag of a key of job files; its value is None unless given, so that defaults
+    apply."""
     settings: dict[str, Any] = {"is_flag": True, "default": None}
     if key.value.choices:
         settings = {"type": click.Choice(key.value.choices)}

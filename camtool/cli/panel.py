@@ -111,7 +111,7 @@ def panel(
 
 
 def _virtual(machine: MachineFlags) -> PseudoTerminal:
-    """Serve the virtual machine at a pseudo-terminal of its own."""
+    """Start a virtual machine on a pseudo-terminal, and return that."""
     from camtool.sending.faults import WiredTwin
     from camtool.sending.twin import Clock, PseudoTerminal, serve
 

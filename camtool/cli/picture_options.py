@@ -35,12 +35,13 @@ PICTURES = (".svg", ".png", ".html")
 
 
 def is_viewer(name: str) -> bool:
-    """Return True if a picture of this name is a page with pan, zoom and play."""
+    """Return True if a file of this name is an HTML page with pan, zoom and play, not a
+    picture."""
     return PurePath(name).suffix.lower() == ".html"
 
 
 def picture_name(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Validate the name of a picture."""
+    """Return the name of a picture if its extension is known; a usage error otherwise."""
     if value is not None and PurePath(value).suffix.lower() not in PICTURES:
         raise click.BadParameter(f"{value!r} ends in none of .svg, .png and .html", ctx, param)
     return value
@@ -98,7 +99,7 @@ class PictureFlags(Struct, frozen=True):
         return tuple(dict.fromkeys(name for name in names if name))
 
     def options(self) -> PictureOptions:
-        """Return the options of the pictures; OptionError for flags without a valid picture."""
+        """Return the options of the pictures; OptionError for values that no picture can have."""
         times = 1.0 if self.exaggerate is None else self.exaggerate
         layers = chosen(self.named, self.no_layer) if self.named or self.no_layer else None
         view = self.view or "plan"
@@ -129,8 +130,8 @@ class PictureFlags(Struct, frozen=True):
         self._check_layers(canvas, self.options())
 
     def _check_errors(self, canvas: Canvas) -> None:
-        """Refuse to show errors where they are not known, and anything beside the plot of a
-        circle."""
+        """Raise a usage error if errors are to be shown but are not known, and for flags that the
+        plot of a circle (`--polar`) does not have."""
         for flag in ("--exaggerate", "--polar"):
             if flag in self.given and not canvas.predicted:
                 raise click.UsageError(f"{flag} needs the predicted path; {canvas.more}")
@@ -158,7 +159,7 @@ class PictureFlags(Struct, frozen=True):
             raise click.UsageError("--exaggerate moves the layer path, which is left out")
 
     def painter(self, scenes: Callable[[], Sequence[Scene]], *, quiet: bool = False) -> Painter:
-        """Return the function that draws the scenes, several side by side, as a picture file of a
+        """Return the function that draws the scenes (several side by side) for a picture file of a
         given name. It warns about flags that the scenes cannot show."""
         return Painter(scenes, self, quiet)
 
@@ -238,7 +239,7 @@ def picture_options(command: Command) -> Command:
 def _crop(
     ctx: click.Context, param: click.Parameter, value: str | None
 ) -> tuple[float, float, float, float] | None:
-    """Parse `10,20,4mm,1/8in` to mm."""
+    """Parse a rectangle such as `10,20,4mm,1/8in` (x, y, width, height) to mm."""
     if value is None:
         return None
     try:
@@ -285,8 +286,8 @@ class Painter(Struct, frozen=True, dict=True):
         return render(scenes[0], name, options)
 
     def closeups(self) -> Iterator[tuple[str, bytes]]:
-        """Return caption and SVG of the further pictures of a page, of the last scene, which is
-        the result."""
+        """Yield caption and SVG of the additional pictures of a page: close-ups of the last scene,
+        which is the result."""
         from camtool.pictures.draw import render
         from camtool.pictures.limits import draw_limits, has_limits
         from camtool.pictures.picture import closeups

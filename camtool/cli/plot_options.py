@@ -44,12 +44,13 @@ class PlotFlags(Struct, frozen=True):
             raise click.UsageError(f"{others}: plots over time do not have it; add --preview")
 
     def refuse(self, why: str) -> None:
-        """Raise a usage error that says `why` there are no plots, if any is asked for."""
+        """Raise a usage error with the reason `why` there are no plots, if any are asked for."""
         if self.plot:
             raise click.UsageError(f"--plot {why}")
 
     def files(self, run: Run, options: PictureOptions) -> dict[str, bytes]:
-        """Return the plots of a run; none for a program that could not be simulated."""
+        """Return the plots of a run by file name; none for a program that could not be
+        simulated."""
         if run.verification is None:
             return {}
         look = PictureOptions(size_px=options.size_px, dark=options.dark)
@@ -62,7 +63,8 @@ class PlotFlags(Struct, frozen=True):
 def _plots(
     ctx: click.Context, param: click.Parameter, values: tuple[tuple[PlotKind, str], ...]
 ) -> tuple[tuple[PlotKind, str], ...]:
-    """Validate the names of plots."""
+    """Return the kinds and file names of plots; a usage error for a name with an unknown
+    extension."""
     for _, name in values:
         if PurePath(name).suffix.lower() not in (".svg", ".png"):
             raise click.BadParameter(f"{name!r} ends in none of .svg and .png", ctx, param)

@@ -59,14 +59,15 @@ def ports(names: tuple[str, ...], ask: bool, as_json: bool, quiet: bool, verbose
 
 
 def _wires() -> list[Wire]:
-    """Return the wires of all targets that have one."""
+    """Return the wires (serial protocols) of all targets that have one."""
 
     wires = [target.wire() for _, (target, _) in each_target(find_target, names=own_names())]
     return [wire for wire in wires if isinstance(wire, Wire)]
 
 
 def _asked(name: str, wires: list[Wire]) -> list[dict[str, Any]]:
-    """Ask at one port; the first controller that is recognised ends it."""
+    """Ask at one port, wire by wire, until a controller is recognised; return the answers
+    as data."""
 
     answers: list[dict[str, Any]] = []
     for wire, port in questions(name, wires):

@@ -63,8 +63,8 @@ if TYPE_CHECKING:
 
 
 def scenes_of(run: Run, *, before: bool) -> list[Scene]:
-    """Return the scene of the predicted result; with `before`, also that of the job without its
-    measures against reversals and backlash. OptionError if the job has none."""
+    """Return the scene of the predicted result in a list. With `before`, the scene of the same job
+    without its measures against reversals and backlash comes first; OptionError if it has none."""
     if not before or run.failed:
         return [run.scene()]
     if run.before is None:
@@ -102,8 +102,8 @@ class Posting(Struct, frozen=True):
         on_read: Callable[[], None] | None = None,
         pictures: Sequence[str] = (),
     ) -> Run:
-        """Post the drawing, for pictures of these names; `on_read` is called when it has been
-        read."""
+        """Post the drawing; `pictures` are the names of pictures that will be drawn of it, and
+        `on_read` is called when the drawing has been read."""
         from camtool.pipeline import post_drawing
 
         job_used = self.job.job(self.drawing)
@@ -123,7 +123,8 @@ class Posting(Struct, frozen=True):
         by_tool: bool,
         pictures: Sequence[str] = (),
     ) -> tuple[Run, ...]:
-        """Post the drawing as a program for each set-up of the job, or for each turn of a tool."""
+        """Post the drawing as several programs: one for each set-up of the job, or (`by_tool`) one
+        for each stretch between tool changes."""
         from camtool.pipeline import post_by_setup, post_by_tool
 
         read = self.drawing.read(source, target.machine, job)
@@ -132,7 +133,7 @@ class Posting(Struct, frozen=True):
             return parts(read, job, target, **self._settings(pictures))
 
     def _settings(self, pictures: Sequence[str]) -> dict[str, Any]:
-        """Return the settings of posting, for pictures of these names."""
+        """Return the keyword arguments for the functions of `camtool.pipeline` that post."""
         return {
             "check": not self.no_verify,
             "gates": self.gates.gates(),
@@ -146,8 +147,8 @@ class Posting(Struct, frozen=True):
         return [source, *self.job.files(), *self.inspection.files(), *self.machine.files()]
 
     def of(self, source: str) -> Posting:
-        """Return these flags with the drawing's own job file, if it has one, in place of `--job`;
-        flags override either."""
+        """Return these flags with the drawing's own job file, if there is one, in place of
+        `--job`; other flags override both."""
         own_file = own_job(Path(source))
         return (
             self if own_file is None else replace(self, job=replace(self.job, file=str(own_file)))
@@ -270,7 +271,8 @@ def _refuse_beside_setups(
     names: Sequence[str | None],
     job: Job,
 ) -> None:
-    """Refuse what programs of several set-ups cannot have."""
+    """Raise a usage error for flags and outputs that are not possible where a job gives several
+    programs, one for each set-up."""
     plots.refuse("is of one program; name a set-up with --setup")
     setup_names = ", ".join(each.name for each in job.setups)
     one = f"name one of them with --setup: {setup_names}"
@@ -309,13 +311,13 @@ class RequestedOutputs(Struct, frozen=True):
         self.outputs.check(self.reads, self.program(extension))
 
     def places(self) -> list[str | None]:
-        """Return files of a program whose name is known."""
+        """Return all files to write whose names are known before posting."""
         outputs = self.outputs
         return [self.output, outputs.preview, outputs.report, outputs.page, outputs.beside]
 
     def program(self, extension: str) -> str:
-        """Return the name of the program; by default that of the source, in this folder; for stdin
-        it is stdout."""
+        """Return the name of the program's file: as given, or the name of the source in the
+        current folder; "-" (stdout) if the source is stdin."""
         if self.output is not None:
             return self.output
         return STDOUT if self.source == STDOUT else Path(self.source).stem + extension
@@ -324,10 +326,10 @@ class RequestedOutputs(Struct, frozen=True):
 def finish(
     run: Run, requested: RequestedOutputs, *, picture: Painter, quiet: bool, verbose: bool
 ) -> int:
-    """Write the requested files, and report them; return the exit code. `picture` draws the
-    pictures.
+    """Write the requested files of a run and report them; return the exit code. `picture` draws
+    the pictures.
 
-    With an error, only the page of `--report` is written: it shows what is wrong.
+    If the run has an error, only the page of `--report` is written, which shows what is wrong.
     """
     outputs = requested.outputs
     say_findings(run.findings, quiet=quiet, verbose=verbose)
@@ -352,8 +354,8 @@ def finish(
 
 
 def _check_ours(run: Run, name: str) -> None:
-    """Raise OutputError if a file with a default name exists and is no program by camtool, for
-    dialects whose programs say so."""
+    """Raise OutputError if a file with the default name exists and was not written by camtool, for
+    dialects whose programs contain their origin."""
     made_elsewhere = run.target.target.made_elsewhere
     assert run.program is not None
     if not made_elsewhere(run.program.data):
@@ -380,8 +382,8 @@ def finish_parts(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Write the programs of one drawing as `finish` does, each with its own picture and page: all
-    files or none. The JSON is one, and lists the programs."""
+    """Write the programs of one drawing like `finish`, each with its own picture and page: all
+    files or none. There is one JSON, which lists the programs."""
     findings = dict.fromkeys(finding for run in runs for finding in run.findings)
     say_findings(findings, quiet=quiet, verbose=verbose)
     parts = [_part(run, requested, number, len(runs)) for number, run in enumerate(runs, 1)]
@@ -415,7 +417,7 @@ def finish_parts(
 
 
 def _placeholder_words(names: Sequence[str]) -> str:
-    """Return the note about unknown numbers of the machine."""
+    """Return a note about numbers of the machine that are still placeholders."""
     *first_names, last = names
     sentence = (
         f"{', '.join(first_names)} and {last} are placeholders"
@@ -430,8 +432,8 @@ def _placeholder_words(names: Sequence[str]) -> str:
 
 
 def _part(run: Run, requested: RequestedOutputs, number: int, count: int) -> RequestedOutputs:
-    """Return the outputs of one program of `count`: all names with its number, and its set-up or
-    its tool, which sort in the order of the runs."""
+    """Return the outputs of program `number` of `count`: each file name gets the number and the
+    set-up or tool, so that the files sort in the order of the programs."""
     from camtool.planning.naming import setup_name
 
     tool = _tool(run)
@@ -457,13 +459,14 @@ def _part(run: Run, requested: RequestedOutputs, number: int, count: int) -> Req
 
 
 def _tool(run: Run) -> ToolNote | None:
-    """Return the tool of a program that has one."""
+    """Return the tool of a program's first operation, None if its operations are not known. The
+    programs of `--split` have one tool each."""
     operations = None if run.wanted is None else run.wanted.operations
     return None if operations is None else operations.notes[0].tool
 
 
 def _programs_json(runs: Sequence[Run], parts: Sequence[RequestedOutputs]) -> bytes:
-    """Return JSON with file, set-up, tool, picture, page and report of each program."""
+    """Return JSON that lists file, set-up, tool, picture, page and report of each program."""
     import json
 
     from camtool.planning.naming import setup_name
@@ -485,7 +488,8 @@ def _programs_json(runs: Sequence[Run], parts: Sequence[RequestedOutputs]) -> by
 
 
 def _page_alone(run: Run, outputs: ReportOutputs, picture: Painter) -> dict[str, bytes]:
-    """Return the files of the page, and the picture of `--preview` if the page shows it."""
+    """Return the files of the page of `--report`, with the picture of `--preview` if the page
+    shows it."""
     files, linked = outputs.page_files(run, picture), outputs.linked
     return files if linked is None or linked in files else {**files, linked: picture(linked)}
 
@@ -547,7 +551,8 @@ def _try_once(action: Callable[[], int]) -> None:
 def _wait_until_stable(
     files: Files, seen_digests: Digests, wait: Callable[[float], None]
 ) -> Digests:
-    """Return the content of the files as digests; after a change, once it no longer changes."""
+    """Return the digests of the files. If they differ from `seen_digests`, wait until they no
+    longer change, so that a file that is being saved is not read half-written."""
     digests = _digests(files)
     while digests != seen_digests:
         wait(SETTLED_S)

@@ -120,8 +120,8 @@ def _each_setup(
     drawing: DrawingFlags,
     asks_for_path: bool,
 ) -> list[tuple[str, JobFlags]]:
-    """Return the pictures with the flags of their jobs: one of each set-up of the job, where none
-    is named."""
+    """Return (picture name, job flags) for each picture: one for each set-up of the job, unless
+    `--setup` names one."""
     is_planned = asks_for_path and machine.name() is not None and job.setup is None
     if is_planned and not drawing.is_program(sources[0], machine.load()):
         names = [each.name for each in job.job(drawing).setups]
@@ -133,7 +133,8 @@ def _each_setup(
 
 
 def _canvas(machine: MachineFlags, *, simulate: bool) -> Canvas:
-    """Return the possible content of the picture."""
+    """Return what the picture can show: moves of a machine, or only a drawing; with or without the
+    simulated path."""
     if machine.name() is None:
         return DRAWING
     return RESULT if simulate else Canvas("add --simulate")
@@ -141,9 +142,9 @@ def _canvas(machine: MachineFlags, *, simulate: bool) -> Canvas:
 
 @dataclass(frozen=True)
 class SceneSource:
-    """Convert files to scenes, each with the findings of its drawing, or of the program if it has
-    no drawing. `asks_for_path`: a drawing is shown with its toolpath, since a flag is about it; a
-    default machine is for programs."""
+    """The function from file names to scenes, each with the findings of its drawing, or of the
+    program if there is no drawing. `asks_for_path`: a drawing is shown with its toolpath because a
+    flag is about it; with a default machine alone a drawing is shown without."""
 
     machine: MachineFlags
     simulate: bool
@@ -153,7 +154,8 @@ class SceneSource:
     output: str
 
     def scene(self, source: str) -> tuple[Scene, Findings]:
-        """Return the scene of a drawing, a program, or the toolpath planned from a drawing."""
+        """Return the scene and the findings of a drawing, of a program, or of the toolpath planned
+        from a drawing."""
         if self.machine.name() is None:
             return self._drawing_scene(source)
         target = self.machine.load()
@@ -210,8 +212,7 @@ class SceneSource:
 
 
 def _refuse_program(source: str) -> None:
-    """Raise CamtoolError when the extension of the file is that of a program and no target is
-    given."""
+    """Raise CamtoolError if the file has the extension of a program and no target is given."""
     for name, listed in each_target(list_target):
         if Path(source).suffix.lower() == listed.target.extension:
             raise CamtoolError(

@@ -172,8 +172,8 @@ MIN_FEED, MAX_FEED = 0.1, 100_000.0
 
 
 def check_sizes(lengths: Mapping[str, float | None], feeds: Mapping[str, float]) -> None:
-    """Raise OptionError for a length (mm) or a feed (mm/min) that is out of range; lengths below 0
-    count by their size."""
+    """Raise OptionError for a length (mm; its absolute value counts) or a feed (mm/min) that is
+    out of range."""
     for values, low, high, unit in (
         (lengths, MIN_MM, MAX_MM, "mm"),
         (feeds, MIN_FEED, MAX_FEED, "mm/min"),
@@ -186,7 +186,7 @@ def check_sizes(lengths: Mapping[str, float | None], feeds: Mapping[str, float])
 
 
 def asked_to_begin(words: str) -> bool:
-    """Ask the user; False, and say so, if the machine is not to move."""
+    """Ask the user whether to begin; if not, report that nothing was moved and return False."""
     with signs_of_command().hidden():
         if click.confirm(words, err=True, default=False):
             return True
@@ -202,8 +202,9 @@ Close = Callable[[str, Mapping[str, Any]], None]
 def journaled(
     name: str | None, what: str, cycle: ProbeCycle
 ) -> Iterator[tuple[ProbeCycle, Close]]:
-    """Give the cycle that adds each touch to the journal as a JSON line, and what ends it; without
-    a file, the cycle as it is. OutputError for a file that cannot be written."""
+    """Yield the cycle, which writes each touch to the journal as a JSON line, and the function
+    that ends the journal; without a file name, the cycle unchanged. OutputError for a file that
+    cannot be written."""
 
     if name is None:
         yield cycle, lambda reason, measured: None
@@ -238,7 +239,7 @@ def journaled(
 
 
 def _contours(name: str) -> list[Segments]:
-    """Return the closed contours of a drawing."""
+    """Return the closed contours of the drawing in this file."""
 
     rings = [Segments.of(path) for path in read_drawing(Path(name)).paths if path.closed]
     if not rings:
@@ -247,7 +248,7 @@ def _contours(name: str) -> list[Segments]:
 
 
 def _boxes(name: str) -> list[Box]:
-    """Return the boxes of a job file, in the work frame."""
+    """Return the keep-out boxes of a job file, in the work frame."""
 
     boxes = job_of_file(Path(name)).keep_out
     if not boxes:

@@ -48,7 +48,7 @@ def report_option(command: Any) -> Any:
 
 
 def _page_name(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Validate the name of a page; - is Markdown on stdout."""
+    """Return the name of a page if its extension is known; "-" is Markdown on stdout."""
     if value not in (None, STDOUT) and PurePath(str(value)).suffix.lower() not in PAGES:
         raise click.BadParameter(f"{value!r} ends in none of {', '.join(PAGES)}", ctx, param)
     return value
@@ -101,7 +101,7 @@ class ReportOutputs(Struct, frozen=True):
             )
 
     def files(self, run: Run, picture: Painter) -> dict[str, bytes]:
-        """Return all files; `picture` draws the requested pictures."""
+        """Return all requested files by name; `picture` draws the pictures."""
         files: dict[str, bytes] = {}
         if self.preview is not None:
             files[self.preview] = picture(self.preview)
@@ -111,8 +111,8 @@ class ReportOutputs(Struct, frozen=True):
         return {**files, **self.page_files(run, picture)}
 
     def check_files(self, runs: Iterable[tuple[Run, str | None]]) -> dict[str, bytes]:
-        """Return the findings for pipelines of all programs of one source, each with the name of
-        its file; None: it is not written."""
+        """Return the files with findings for other programs (SARIF, JUnit, annotations). `runs`:
+        the programs of one source, each with the name of its file (None: it is not written)."""
         if not self.checks.names:
             return {}
         from camtool.cli.check_formats import checked_run

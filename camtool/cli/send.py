@@ -171,7 +171,8 @@ def send(
 
 
 def _find_unfinished(place: Path, data: bytes) -> JournalState | None:
-    """Return the state in the journal of this program, None if there is none or it is finished."""
+    """Return the state of this program in its journal; None if there is no journal or the program
+    was finished."""
     with suppress(InputError):
         state = read_journal(place)
         if state.sha256 == digest(data) and not state.finished:
@@ -180,8 +181,8 @@ def _find_unfinished(place: Path, data: bytes) -> JournalState | None:
 
 
 def _confirmed_place(tool_at: ToolAt, question: str) -> ToolAt:
-    """Return where the tool is, once the user has agreed to the question, "" for none;
-    OptionError if nobody agrees."""
+    """Return where the tool is after the user has agreed to `question` ("": nothing is asked);
+    OptionError if the user does not."""
     if not question:
         return tool_at
     if sys.stdin.isatty():
@@ -223,8 +224,8 @@ def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
 
 
 def _refuse_waiting(one: Consignment, *, single: bool, at_stop: str | None) -> None:
-    """Refuse programs that would wait for an answer if nobody can answer; with `at_stop`, their
-    stops are answered or are to be waited for."""
+    """Raise a usage error for a program that waits for an operator if there is no terminal at
+    which to answer. With `at_stop`, a command answers its stops."""
     asks = sum(bool(packet.ask) and not packet.waits for packet in one.packets[1:])
     if asks:
         raise click.UsageError(f"it waits for an answer {asks} times: run it at a terminal")
@@ -244,7 +245,7 @@ def _refuse_waiting(one: Consignment, *, single: bool, at_stop: str | None) -> N
 
 
 def _confirm() -> bool:
-    """Ask the user at a terminal; True for yes."""
+    """Ask the user at a terminal; return True for yes."""
     if not sys.stdin.isatty():
         raise click.UsageError("nobody can be asked here: give --yes")
     with signs_of_command().hidden():

@@ -280,7 +280,7 @@ STEP_S = 1.0
 def _answer(
     loop: SpeedLoop, axis: str, drive: float | None, speed: float | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return speed and reference (rpm) and drive (percent) of an axis, tick by tick, that answers
+    """Return speed and reference (rpm) and drive (percent) of an axis, tick by tick, in answer to
     a step of its drive (percent) or of its speed (rpm)."""
     import numpy as np
 
@@ -299,9 +299,9 @@ def _answer(
 
 
 def _answer_figures(answer: StepAnswer, loop: SpeedLoop) -> dict[str, Any]:
-    """Return the figures of an answer: the speed at the end, the peak and its part beyond the
-    commanded speed (in open loop: beyond that at the end), the time to 63.2 %, and that until it
-    stays within 2 %."""
+    """Return the figures of a step response: final speed, peak and overshoot (beyond the commanded
+    speed; in open loop beyond the final speed), time to 63.2 %, and time until it stays within 2
+    %."""
     import numpy as np
 
     rpm = 60.0 / (loop.tick_s * loop.counts_per_turn)
@@ -391,7 +391,7 @@ def show(
 
 
 def _run_lines(run: ServoRun, moves: Sequence[AxisMove]) -> Iterator[str]:
-    """Yield the figures of moves for people, and the extremes of all."""
+    """Yield lines of text with the figures of the moves, and the extremes over all moves."""
     yield "      at s  block  axis    reference    peak rpm  overshoot  settling   steady  end µm"
     for move in moves[:MOVES_SHOWN]:
         settling = "never" if move.settling_s is None else f"{move.settling_s * 1e3:.0f} ms"
@@ -416,7 +416,7 @@ def _run_lines(run: ServoRun, moves: Sequence[AxisMove]) -> Iterator[str]:
 
 
 def _run_data(run: ServoRun, moves: Sequence[AxisMove]) -> dict[str, Any]:
-    """Return the figures of a run as JSON has them."""
+    """Return the figures of a run as data for JSON."""
     from_s, to_s = run.shown_s
     return {
         "tick_s": run.loop.tick_s,
@@ -429,7 +429,8 @@ def _run_data(run: ServoRun, moves: Sequence[AxisMove]) -> dict[str, Any]:
 
 
 def _loop(loaded: LoadedTarget) -> SpeedLoop:
-    """Return the speed loops of the machine; OptionError for a machine without any."""
+    """Return the speed loops of the machine's servo axes; OptionError for a machine
+    without any."""
     loop = loaded.target.speed_loop(loaded.machine)
     if loop is None:
         raise OptionError(
@@ -443,7 +444,7 @@ def _loop(loaded: LoadedTarget) -> SpeedLoop:
 def _machine_file(
     flags: MachineFlags, loaded: LoadedTarget, loop: SpeedLoop, origin: str
 ) -> bytes:
-    """Return the text of a machine file with this loop over what the user's file says."""
+    """Return the text of a machine file with this loop in addition to the user's values."""
     table: dict[str, Any] = {"extends": str(flags.name())}
     if flags.machine is not None:
         table = read_table(Path(flags.machine))

@@ -113,8 +113,8 @@ def _pair(line: str) -> dict[str, str]:
 
 
 def asked_settings(target: LoadedTarget, port: str, baud: int | None, *, quiet: bool) -> list[str]:
-    """Return the settings of the controller at a port, listed twice alike; InputError where it
-    does not give them."""
+    """Read the settings of the controller at a port twice and return them as lines; InputError if
+    it does not list them or both readings differ."""
 
     conversation = wire_of(target).settings(target.machine, manner_of(target))
     reason = carried(conversation, target, port, baud, quiet=quiet)
@@ -169,8 +169,8 @@ def _name_value(line: str) -> tuple[str, str]:
 
 
 def _settings_of(file: str) -> dict[str, str]:
-    """Parse lines `$110=500.000`, with or without a meaning in brackets behind them; InputError
-    for others, and for a setting that is given twice."""
+    """Parse lines such as `$110=500.000`, with or without an explanation in brackets after them;
+    InputError for other lines, and for a setting that is given twice."""
     values: dict[str, str] = {}
     for number, line in enumerate(_text(file).splitlines(), 1):
         text = line.partition("(")[0].strip()

@@ -112,7 +112,7 @@ def signals(
 
 
 def _text(record: Signals) -> str:
-    """Return the counts of a whole run for people."""
+    """Return the step counts of a whole run as readable text."""
     counts = record.count()
     lines = []
     for k, motor in enumerate(record.board.motors):

@@ -72,9 +72,9 @@ def stale(
 
 @dataclass(frozen=True)
 class ComparedProgram:
-    """A program and the drawing that it was compared with; None where there is none. `state`:
-    "current", "stale", "missing", or "unknown" where the drawing cannot be posted any more; `why`
-    in words, and the exit code for it."""
+    """A program and the drawing that it was compared with (None if there is none). `state`:
+    "current", "stale", "missing", or "unknown" if the drawing cannot be posted any more; `why` in
+    words; `code`: the exit code."""
 
     drawing: str
     program: str | None
@@ -86,7 +86,8 @@ class ComparedProgram:
 def _compare(
     name: Path, drawings: Sequence[Path], posting: Posting, target: LoadedTarget, *, missing: bool
 ) -> ComparedProgram:
-    """Compare the program of this name with its drawing: of several, it needs to match one."""
+    """Compare the program of this name with its drawing. Of several drawings with the name, one
+    that matches is enough."""
     if not missing and not _has_program(name):
         return ComparedProgram(str(drawings[0]), None, "missing", f"{name}: has no program")
     faults = []
@@ -99,11 +100,11 @@ def _compare(
 
 
 def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
-    """Find the drawings of these files: the files themselves, those beside them, or those in
-    folders, by their names without suffix.
+    """Return the drawings for these files by their names without suffix: the files themselves,
+    those beside a program or job file, or those in folders.
 
-    A picture of a program may lie beside its drawing as an SVG of the same name, so that one name
-    may have several; the likeliest is first. InputError for what is not there.
+    An SVG beside a drawing may be a picture of its program, so one name may have several files;
+    the likeliest drawing is first. InputError for files that do not exist.
     """
     names = dict.fromkeys(name for file in files for name in _names(Path(file)))
     drawings_by_name = {name: _ordered(_files_named(name)) for name in names}
@@ -111,10 +112,11 @@ def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
 
 
 def drawings_of(files: Sequence[str], programs: Path) -> dict[Path, list[Path]]:
-    """Return the drawings that a batch of these would take, by the names of their programs in a
-    folder.
+    """Return the drawings that a batch of these arguments would take, by the path of their
+    programs in the folder `programs`.
 
-    InputError for what is no drawing or not there, OutputError for two of one name, as of a batch.
+    InputError for what does not exist or is no drawing, OutputError for two drawings with one
+    output name, as in a batch.
     """
     if not programs.is_dir():
         raise InputError("is no folder", file=str(programs), mend="give the --out of the batch")
@@ -145,21 +147,22 @@ def _ordered(files: list[Path]) -> list[Path]:
 
 
 def _files_named(name: Path) -> list[Path]:
-    """Return the files of this name with any suffix, sorted."""
+    """Return the files with this name and any suffix, sorted."""
     if not name.parent.is_dir():
         return []
     return sorted(other for other in name.parent.iterdir() if other.with_suffix("") == name)
 
 
 def _has_program(name: Path) -> bool:
-    """Return True if a file there may be a program: a dialect may have several suffixes."""
+    """Return True if a file of this name may be a program, by its suffix: a dialect may have
+    several."""
     return any(file.suffix.lower() not in (*SUFFIXES, OWN_JOB) for file in _files_named(name))
 
 
 def _compare_with(
     drawing: Path, name: Path, posting: Posting, target: LoadedTarget, *, missing: bool
 ) -> ComparedProgram:
-    """Compare the program of this name with what camtool writes for a drawing now."""
+    """Compare the program of this name with what camtool would write for the drawing now."""
     try:
         run = posting.of(str(drawing)).make(str(drawing), target)
     except CamtoolError as error:

@@ -35,11 +35,12 @@ class _Targets(click.Group):
     """`new` is a command; every other word is the name of a target to show."""
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command of this name, or the one that shows a target."""
+        """Return the command of this name, or for any other word the command that shows the
+        target."""
         return super().get_command(ctx, cmd_name) or show
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Return the commands and the targets."""
+        """Return the commands and targets that complete the word."""
         return [*super().shell_complete(ctx, incomplete), *target_items(incomplete)]
 
 
@@ -151,14 +152,14 @@ def new(
 
 
 def _described_by_files() -> str:
-    """Return the target whose dialect machine files describe."""
+    """Return the name of the target whose dialect machine files describe."""
     found_targets = each_target(find_target, names=own_names())
     return next(name for name, (each, _) in found_targets if each.dialect_from(b"") is not None)
 
 
 def _dialect_settings(dialect: SampledDialect, *, asks: bool) -> list[ControllerSetting]:
-    """Return what a program shows, and the answers to what it leaves open; what nobody answers
-    becomes a comment."""
+    """Return the settings that a program reveals of its dialect, and the answers to the open
+    questions; questions that nobody answers get their default and a comment."""
     settings = list(dialect.settings)
     for each in dialect.questions:
         answer: Any = each.default
@@ -171,7 +172,8 @@ def _dialect_settings(dialect: SampledDialect, *, asks: bool) -> list[Controller
 
 
 def _answer_to(open_key: OpenKey) -> Any:
-    """Return what the user answers; an empty text, which nobody can type, is called none."""
+    """Ask the user for the value of an open setting and return it; an empty text is offered as
+    "none"."""
     if not open_key.choices:
         return click.prompt(
             open_key.question, default=open_key.default, type=type(open_key.default), err=True
@@ -183,7 +185,7 @@ def _answer_to(open_key: OpenKey) -> Any:
 
 
 def setting_of(text: str) -> ControllerSetting:
-    """Return the value of a `KEY=VALUE` flag, whose value is TOML or a word."""
+    """Parse a `KEY=VALUE` flag; the value is TOML or a bare word."""
     key, equals, value = text.partition("=")
     if not equals or "." not in key:
         raise OptionError(
@@ -197,13 +199,13 @@ def setting_of(text: str) -> ControllerSetting:
 
 
 def loaded_machine(text: str, file: str, extends: str) -> LoadedTarget:
-    """Return the target of the text of a machine file; MachineError where it contradicts
+    """Return the target with a machine file of this text; MachineError if the file contradicts
     itself."""
     return loaded_target(extends, (parse_table(text), file))
 
 
 def _read_back(text: str, file: str, extends: str, data: bytes, program: str) -> str:
-    """Return what the reader of the new machine makes of the program that it was made from."""
+    """Return a sentence on how the new machine reads the program from which its file was made."""
     try:
         loaded = loaded_machine(text, file, extends)
         path = loaded.target.read(data, loaded.machine)
@@ -222,7 +224,7 @@ GRADES: dict[str, str] = {
 
 
 def target_items(incomplete: str) -> Iterator[CompletionItem]:
-    """Return the machines, each with its title."""
+    """Yield the names of targets and machines for completion, each with its title as help."""
     from click.shell_completion import CompletionItem
 
     for name, listed in each_target(list_target, prefix=incomplete):
@@ -272,7 +274,7 @@ def _list(as_json: bool) -> None:
 
 
 def _own_machines(broken: list[CamtoolError]) -> Iterator[dict[str, Any]]:
-    """Return the user's machines as rows; errors are appended to `broken`."""
+    """Yield the user's machines as rows of the list; errors are appended to `broken`."""
     try:
         project = project_of(Path.cwd())
         default = project.machine
@@ -333,7 +335,8 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
 
 
 def _backlash_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[str]:
-    """Format the cells as they lie on the table: +X to the right, +Y up."""
+    """Yield the lines of a table of backlash by region, laid out like the machine's table: +X to
+    the right, +Y up."""
     mean_um = getattr(machine.axes, name).backlash_mm * 1000.0
     instead = "" if machine.play_map.use else f", not used: play_map.use; {mean_um:g} everywhere"
     yield f"backlash of {name.upper()} by region of the table, µm{instead}"
@@ -354,7 +357,7 @@ def _speed(mm_min: float) -> str:
 
 
 def flat_lines(prefix: str, table: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Yield nested tables as `axes.x.travel_mm` lines, as --set takes them."""
+    """Return nested tables as (`axes.x.travel_mm`, value) pairs, the keys that `--set` takes."""
     rows: list[tuple[str, Any]] = []
     for key, value in table.items():
         name = f"{prefix}.{key}" if prefix else key

@@ -142,8 +142,8 @@ def show(
 
 
 def _relevant_findings(findings: Sequence[Finding]) -> Iterator[Finding]:
-    """Return the findings of reading the drawing, without those about its ignored dimension lines:
-    the dimensions themselves are read here."""
+    """Yield the findings of reading the drawing, except those about ignored dimension lines: this
+    command reads the dimensions."""
     for each in findings:
         if each.code != DrawingCode.ENTITY_SKIPPED or " DIMENSION left out" not in each.message:
             yield each
@@ -166,7 +166,8 @@ def _facts(each: Dimension) -> dict[str, Any]:
 
 
 def _lines(dimensions: Sequence[Dimension]) -> Iterator[str]:
-    """Return a line for each: name, kind, nominal size, deviations, smallest and largest size."""
+    """Yield one line for each dimension: name, kind, nominal size, deviations, smallest and
+    largest size."""
     rows = [_cells(each) for each in dimensions]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:

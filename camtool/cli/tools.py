@@ -29,11 +29,12 @@ class _Tools(click.Group):
     """`new` is a command; every other word is the name of a tool to show."""
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command of this name, or the one that shows a tool."""
+        """Return the command of this name, or for any other word the command that shows
+        the tool."""
         return super().get_command(ctx, cmd_name) or show
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Return the commands and the tools."""
+        """Return the commands and tools that complete the word."""
         return [*super().shell_complete(ctx, incomplete), *_items(incomplete)]
 
 
@@ -116,7 +117,8 @@ def new(project: bool, output: str | None, quiet: bool, verbose: bool) -> None:
 
 
 def _all_tools() -> dict[str, tuple[Described, Path]]:
-    """Return all tools by name, the nearest of each, with their files."""
+    """Return all tools of the project and the user by name, each with its file; of equal names the
+    nearest."""
     every: dict[str, tuple[Described, Path]] = {}
     for file in project_of(Path.cwd()).libraries:
         tools = {name: (each, file) for name, each in read_library(file).items()}
@@ -149,7 +151,8 @@ def _tool(name: str, described: Described) -> Tool:
 
 
 def _derived(tool: Tool, preset: Mapping[str, Any]) -> dict[str, float]:
-    """Compute the feed per tooth, mm, and the cutting speed, m/min, that follow from a preset."""
+    """Return the figures that follow from a preset: feed per tooth (mm) and cutting speed
+    (m/min)."""
     feed, rpm = preset.get("feed_mm_min"), preset.get("spindle_rpm")
     figures = {
         "feed_per_tooth_mm": None if feed is None else tool.feed_per_tooth_mm(feed, rpm),

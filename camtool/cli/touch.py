@@ -207,7 +207,8 @@ def _needed(name: str, value: float | None) -> float:
 
 
 def _senses(text: str, what: str) -> dict[Axis, int]:
-    """Parse `x+` and `x+y-` to the sense of each axis; OptionError for what does not fit."""
+    """Parse directions such as `x+` or `x+y-` to +1 or −1 for each axis; OptionError if they do
+    not suit `what` is touched."""
     count = {"edge": 1, "skew": 1, "corner": 2}.get(what, 0)
     pairs = re.findall(r"([xy])([+-])", text.lower())
     senses = {cast("Axis", axis): -1 if sense == "-" else 1 for axis, sense in pairs}

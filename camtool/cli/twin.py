@@ -152,7 +152,7 @@ class _TraceWriter:
 
 
 def rows(trace: TwinTrace) -> str:
-    """Return a trace as CSV."""
+    """Return a trace as CSV text."""
     columns = zip(
         trace.time_s.tolist(),
         trace.block.tolist(),

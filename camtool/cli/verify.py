@@ -185,8 +185,8 @@ def verify(
 
 
 def _finds_contours(job: JobFlags, against: str | None, *, align: bool, comparing: bool) -> bool:
-    """Return True if no flag says how the program cuts, so that this is found from it; a usage
-    error if that contradicts `--align`."""
+    """Return True if no flag says how the program cuts, so that contours, side and tool must be
+    found from the program. A usage error if that contradicts `--align`."""
     is_described = job.beyond({*PLACE, "tool_diameter"})
     if align and against is None:
         raise click.UsageError("--align needs --against DRAWING")

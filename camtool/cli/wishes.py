@@ -49,7 +49,8 @@ OVERRIDE_KEYS: Mapping[str, tuple[Override, int]] = {
 
 
 def override_orders() -> dict[str, Request | Order]:
-    """Return the orders of the keys that change overrides."""
+    """Return the orders by key: the keys that change feed and spindle overrides, and "=" which
+    resets them."""
 
     def changed(name: Override, by: int) -> Order:
         def order(talk: Conversation, now: float) -> None:
@@ -90,7 +91,8 @@ class AtStop:
         """Why the machine is being stopped, "" if it is not."""
 
     def begin(self, why: str) -> None:
-        """Begin to answer: the program waits."""
+        """Begin to answer a stop of the program: start the command, or note that the machine is to
+        be stopped."""
         if self._command == "fail":
             self._stops, self.trouble = True, "it waits, and --at-stop is fail"
             return
@@ -108,7 +110,8 @@ class AtStop:
         )
 
     def __call__(self) -> Request | None:
-        """Return the request that follows from the command, once it has ended."""
+        """Return the request that the answer gives: RESUME or STOP once the command has ended,
+        None before."""
         if self._stops:
             self._stops = False
             return Request.STOP
@@ -122,7 +125,7 @@ class AtStop:
         return Request.STOP
 
     def end(self) -> None:
-        """End a command that still runs: nobody needs its answer any more."""
+        """End the command if it still runs: nobody needs its answer any more."""
         running, self._running = self._running, None
         if running is None:
             return
@@ -206,7 +209,7 @@ class UserRequests:
 
 
 def _streams() -> Iterator[int]:
-    """Return the terminal that keys come from, and the output streams."""
+    """Yield the descriptors to watch: the terminal that keys come from, and the output streams."""
     for stream in (sys.stdin, sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):  # None, replaced or closed
             if stream is not sys.stdin or stream.isatty():
@@ -223,8 +226,8 @@ def _is_lost(file: int) -> bool:
 
 
 def takes_more(stream: TextIO | None) -> bool:
-    """Return True if a stream can be written to at once. One that cannot, such as a terminal
-    after Ctrl-S or a full pipe, must not keep a machine waiting."""
+    """Return True if a write to the stream would not block. A stream that blocks, such as a
+    terminal after Ctrl-S or a full pipe, must not delay a running machine."""
     if stream is None or not hasattr(select, "poll"):
         return True
     looking = select.poll()
@@ -246,7 +249,7 @@ class Messages:
             self.rest(1)
 
     def rest(self, max_count: int | None = None) -> None:
-        """Write the messages that were kept."""
+        """Write the messages that were kept, at most `max_count` of them."""
         for each in self._waiting[:max_count]:
             say(f"camtool: {one_line(each)}", quiet=self._quiet)
         del self._waiting[:max_count]
@@ -254,8 +257,8 @@ class Messages:
 
 @contextmanager
 def keys_of_terminal() -> Iterator[Callable[[], str]]:
-    """Return a function that returns the pressed key, "" without one; None if stdin is no
-    terminal. Its OSError means that the terminal is gone."""
+    """Yield a function that returns the pressed key, "" if none; yield None if stdin is no
+    terminal. An OSError of the function means that the terminal is gone."""
     if sys.platform == "win32" or sys.stdin is None or not sys.stdin.isatty():
         yield lambda: ""
         return

@@ -115,7 +115,8 @@ def read_job_file(path: Path, data: bytes | None = None) -> JobTables:
 
 
 def tables_of_flags(values: Mapping[str, Any]) -> JobTables:
-    """Return the tables of the flags that were given, by the names of their keys."""
+    """Return the tables of a job that the given command-line flags amount to, by the names of
+    their keys."""
 
     flags = Table({key: Given(value, flag_name(key)) for key, value in values.items()})
     return JobTables(flags.only(WHOLE), flags.only(PLACE), defaults=flags.only(OF_OPERATIONS))
@@ -149,7 +150,7 @@ def tables_of(values: dict[str, Any], path: Path) -> JobTables:
 
 
 def _operation_tables(values: dict[str, Any], file: str) -> tuple[Table, ...] | None:
-    """Return the tables of `[[operations]]`, None without any."""
+    """Return the tables `[[operations]]`; None if the file has none."""
     if "operations" not in values:
         return None
     return _list_of_tables(values, "operations", "operations", OF_OPERATIONS, file)
@@ -158,7 +159,8 @@ def _operation_tables(values: dict[str, Any], file: str) -> tuple[Table, ...] | 
 def _list_of_tables(
     values: dict[str, Any], key: str, subject: str, known_keys: Iterable[str], file: str
 ) -> tuple[Table, ...]:
-    """Return the tables `[[key]]`, each with keys of the known ones; () without any."""
+    """Return the tables `[[key]]`, () if there are none; OptionError for a key in them that is not
+    one of `known_keys`."""
     rows = values.get(key, ())
     if key in values and not (isinstance(rows, list) and rows):
         raise OptionError(
@@ -191,10 +193,10 @@ def build_job(
     selection: tuple[str, ...] = (),
     shop: Shop = Shop(),  # noqa: B008
 ) -> Job:
-    """Return the job of a file with the flags over it, of the operations that are `selection`
-    by name or number (none: all). `shop`: the tools that jobs may name, and what holds where
-    they say nothing. OptionError names file, table and key, or the flag, and says how to fix
-    it."""
+    """Return the job that a file and the flags over it describe. `selection` names or numbers the
+    operations to keep (empty: all); `shop` has the tools that jobs may name, and the tool and
+    material where the job names none. OptionError names file, table and key, or the flag, and says
+    how to fix it."""
     job_table = flags.whole.over(file.whole)
     tools = tools_for(file.tools, job_table, file.folder, shop)
     tables = file.operations or (Table(),)
@@ -229,8 +231,9 @@ def build_job(
 
 
 def _with_setups(job: Job, tables: Sequence[Table], names: Sequence[str]) -> Job:
-    """Return the job with its set-ups: where it has some of the operations of these `names` alone,
-    with as many of each set-up."""
+    """Return the job with the set-ups of its file. Operations in `names` that the job lacks,
+    because a selection left them out, are removed from the set-ups, and so are set-ups that become
+    empty."""
     absent = set(names) - {each.name for each in job.operations}
     setups = []
     for table in tables:
@@ -257,15 +260,16 @@ def _with_setups(job: Job, tables: Sequence[Table], names: Sequence[str]) -> Job
 def job_of_file(
     path: Path, selection: tuple[str, ...] = (), libraries: tuple[Path, ...] = ()
 ) -> Job:
-    """Return the job of a file alone, and of the tools of these libraries, the nearest first;
-    raises as `build_job` does."""
+    """Return the job of a file without flags; `libraries` are its tool libraries, the nearest
+    first. Raises as `build_job` does."""
     return build_job(read_job_file(path), JobTables(), selection, Shop(libraries))
 
 
 def _operation(
     number: int, layers: tuple[Table, Table, Table], tools: Tools, count: int
 ) -> Operation:
-    """Operation `number` of `count`: its own keys over the defaults, flags over both."""
+    """Return operation `number` of `count`, with its own keys over the file's defaults and the
+    flags over both; OptionError for a key that its kind does not know or that has no effect."""
     defaults, own_table, flags = layers
     merged = _merged_layers((defaults, own_table, flags)).only(OPERATION)
     record_of(
@@ -294,8 +298,8 @@ def _operation(
 
 
 def _tooled(operation: Operation, known_keys: Table, tool_used: Used, tools: Tools) -> Operation:
-    """Return the operation with its tool, and that of its finishing pass with the feed and the
-    speed that a preset of that gives it."""
+    """Return the operation with its tool and the tool of its finishing pass, which takes feed and
+    spindle speed from its own preset unless the operation sets them."""
     fields: dict[str, Any] = {"tool": tool_used.tool, "material": tool_used.material}
     keys = {key: known_keys.given[key] for key in _OF_WALLS if key in known_keys.given}
     if FINISH_TOOL in keys:
@@ -317,9 +321,9 @@ def _tooled(operation: Operation, known_keys: Table, tool_used: Used, tools: Too
 
 
 def _merged_layers(layers: Sequence[Table]) -> Table:
-    """Return the keys of all layers, the nearest of which is last; a depth in it takes the
-    place of another layer's breakthrough, and the other way round, where the operation knows
-    both."""
+    """Return the keys of all layers, the last of which counts most. A depth replaces the
+    breakthrough of another layer, and a breakthrough its depth, where the operation knows both
+    keys."""
     merged = layers[0]
     kinds = [layer.given["kind"].value for layer in layers if "kind" in layer.given]
     kind = kinds[-1] if kinds else Operation.kind
@@ -333,8 +337,8 @@ def _merged_layers(layers: Sequence[Table]) -> Table:
 
 
 def _settled(operation: Operation, layers: Sequence[Table], stock: Stock | None) -> Operation:
-    """Return the operation as its kind and the stock settle it; errors at the key that is
-    wrong."""
+    """Return the operation completed by its kind and the stock, such as the depth from the
+    thickness; an OptionError names the key at fault."""
     try:
         return operation.settled(stock)
     except OptionError as error:
@@ -350,7 +354,8 @@ def _settled(operation: Operation, layers: Sequence[Table], stock: Stock | None)
 
 
 def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operation]:
-    """Return the operations with what they clear the rest of."""
+    """Return the operations, each that clears what others leave (`rest`) linked to those;
+    OptionError for a depth of its own where the floor of a carving sets it."""
     carvings = {each.name for each in operations if each.contract.rest == "floor" and each.name}
     for operation, own_table in zip(operations, tables, strict=True):
         for key in ("depth", "breakthrough"):
@@ -369,13 +374,14 @@ def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operat
 
 
 def _unknown(name: str, kind: str) -> tuple[str, str]:
-    """Return message and mend for a key that a kind of operation does not know."""
+    """Return the message and the correction for a key that a kind of operation does not have."""
     known_keys = [key for key in OPERATION if is_known(key, kind)]
     return f"means nothing to the kind {kind}", f"it has: {', '.join(known_keys)}, tool"
 
 
 def _refuse_tool(operation: Operation, own_table: Table) -> None:
-    """Refuse a tool that is no V bit, or has no angle, where the operation needs one."""
+    """Raise OptionError where the operation needs a V bit and the tool is none, or its tip angle
+    is missing."""
     tool, kind = operation.tool, operation.kind
     if operation.contract.needs_v_bit and (tool.kind != "v" or tool.tip_angle_rad is None):
         place = own_table.given.get("tool", own_table)
@@ -398,7 +404,8 @@ def _refuse_equal_names(operations: list[Operation], tables: tuple[Table, ...]) 
 
 
 def _rows(operations: list[Operation], selection: tuple[str, ...]) -> list[int]:
-    """Return the rows of the operations of these names or numbers, in the order of the job."""
+    """Return the indices of the operations that `selection` names or numbers, in the order of the
+    job (all if it is empty); OptionError for an unknown one."""
     names = [operation.name for operation in operations]
     rows = set()
     for text in selection:
@@ -420,7 +427,7 @@ def _rows(operations: list[Operation], selection: tuple[str, ...]) -> list[int]:
 
 
 def _refuse_unused(layer: Table, operations: list[Operation]) -> None:
-    """Refuse a default or a flag that no operation uses."""
+    """Raise OptionError for a default or a flag that no operation uses."""
     for name, key_value in layer.only(OPERATION).given.items():
         reasons = [_why_unused(name, operation) for operation in operations]
         if None not in reasons and reasons[0] is not None:
@@ -435,8 +442,8 @@ def _why_unused(name: str, operation: Operation) -> OptionError | None:
 
 
 def _placement(file: JobTables, flags: JobTables) -> Placement:
-    """Return the drawing's placement; a scale on the command line takes the place of the file's
-    fit."""
+    """Return the placement of the drawing; a scale on the command line replaces the file's
+    `fit`."""
     below = dict(file.place.given)
     for one in flags.place.given:
         below.pop(EITHER.get(one, ""), None)
@@ -454,7 +461,7 @@ def _stock(table: Table | None) -> Stock | None:
 
 
 def _keep_out(number: int, table: Table) -> KeepOutBox:
-    """Return the box of a table `[[keep_out]]`, named by its number where it has no name."""
+    """Return the box of a table `[[keep_out]]`, called "box NUMBER" if the table has no name."""
     for key in ("x", "y"):
         if key not in table.given:
             raise table.refused(f"key {key} is missing", "give x and y, and z if it ends")

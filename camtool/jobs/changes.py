@@ -34,8 +34,8 @@ LEFT_DIGITS = 4
 
 
 class Change(Struct, frozen=True):
-    """Another value of a key: of the operation in this row of the file, or (None) of the job as a
-    whole. `instead`: what the key says so far, "" where it says nothing."""
+    """A new value for a key of the operation with this index in the file, or (None) of the whole
+    job. `instead`: the present value as text, "" if the key is not set."""
 
     key: str
     value: Any
@@ -44,8 +44,8 @@ class Change(Struct, frozen=True):
 
 
 class Left(Struct, frozen=True):
-    """So much more is left on the walls of an operation, mm (below 0: less): of the contours of
-    these `entities`, or (without any) of all that it takes."""
+    """A change of the allowance on the walls of an operation by `by_mm` (negative: less is left):
+    for the contours of these `entities`, or (if empty) for all contours of the operation."""
 
     operation: int
     by_mm: float
@@ -53,9 +53,11 @@ class Left(Struct, frozen=True):
 
 
 def merged_tables(file: JobTables, flags: JobTables, folder: Path) -> Values:
-    """Return the tables of a job file in `folder` that says what a file and flags say together.
+    """Return the tables of one job file in `folder` that means the same as a file and flags
+    together.
 
-    OptionError for flags of a tool beside operations that name one: a file says either.
+    OptionError for flags of a tool where the operation names its tool: a job file has one or the
+    other.
     """
     job_values = _raw(_merged(flags.whole, file.whole))
     for key in FILES:
@@ -89,8 +91,9 @@ def merged_tables(file: JobTables, flags: JobTables, folder: Path) -> Values:
 
 
 def _operation(own_table: Table, defaults: Table, flags: Table, carved: set[str]) -> Values:
-    """Return the table of an operation with the flags that it knows over it. The floor of one
-    that is `carved` has its depth."""
+    """Return the table of an operation, overridden by the flags that its kind knows. An operation
+    that clears the floor of a carving (`rest` in `carved`) takes no depth from flags: the carving
+    sets it."""
     if _raw(own_table).get("rest") in carved:
         flags = flags.only(set(flags.given) - {"depth", "breakthrough"})
     kind = {**defaults.given, **own_table.given, **flags.given}.get("kind")
@@ -106,13 +109,15 @@ def _operation(own_table: Table, defaults: Table, flags: Table, carved: set[str]
 
 
 def _leaves_floor(table: Values) -> bool:
-    """Return True if the operation of this table carves a floor, whose depth is its own."""
+    """Return True if the operation of this table carves a flat floor that other operations can
+    clear."""
     kind = table.get("kind")
     return isinstance(kind, str) and kind_named(kind).rest == "floor"
 
 
 def _merged(above: Table, below: Table) -> Table:
-    """Return the keys of both; the upper ones say instead of the lower what contradicts them."""
+    """Return the keys of both tables. A key of `above` wins, and removes keys of `below` that
+    contradict it, such as a scale for a fit or a tool's name for single keys of a tool."""
     overridden = {EITHER[name] for name in above.given if name in EITHER}
     if TOOL_NAME in above.given:
         overridden |= set(TOOL_KEYS)
@@ -128,8 +133,8 @@ def _presets(presets: Mapping[str, Table]) -> Values:
 
 
 def _relative(raw: Given, old_folder: Path, folder: Path) -> str:
-    """Return the name of a file from the new folder: a file names it from its own, a flag from
-    here."""
+    """Return the path of a file relative to `folder`. Names in a job file are relative to
+    `old_folder`, names in flags to the current directory."""
     named = old_folder / str(raw.value) if raw.file is not None else Path(str(raw.value))
     return Path(os.path.relpath(named.absolute(), folder.absolute())).as_posix()
 
@@ -137,8 +142,8 @@ def _relative(raw: Given, old_folder: Path, folder: Path) -> str:
 def changed_tables_of(
     tables: Values, changes: Sequence[Change], own_parts: Sequence[Left] = ()
 ) -> Values:
-    """Return the tables with these changes. An operation with several `own_parts` becomes as
-    many, in their order: together they name all entities that it takes."""
+    """Return the tables with these changes. An operation with several `own_parts` is divided into
+    one operation for each, in their order; together these must name all entities that it takes."""
     changed_tables = {
         **tables,
         **{each.key: each.value for each in changes if each.operation is None},
@@ -154,8 +159,9 @@ def changed_tables_of(
 
 
 def _divided(table: Values, parts_left: Sequence[Left], names: set[str]) -> list[Values]:
-    """Return the operations that one becomes; the first has its name, the others numbers behind
-    it."""
+    """Return the operations into which the parts divide an operation, each with its own allowance
+    and entities. The first keeps the name, the others get numbers after it; new names are added to
+    `names`."""
     if not parts_left:
         return [table]
     name = str(table.get("name") or table.get("kind") or "profile")
@@ -178,8 +184,8 @@ def _divided(table: Values, parts_left: Sequence[Left], names: set[str]) -> list
 
 
 def text_of(tables: Values, head: Sequence[str] = ()) -> str:
-    """Return the text of a job file; `head` are comments at its top. A single operation stands
-    at the top of the file."""
+    """Return the text of a job file, with the lines `head` as comments at its top. The keys of a
+    single operation stand at the top level."""
     if len(tables["operations"]) == 1:
         job_values = {key: value for key, value in tables.items() if key != "operations"}
         tables = {**job_values, **tables["operations"][0]}
@@ -188,5 +194,6 @@ def text_of(tables: Values, head: Sequence[str] = ()) -> str:
 
 
 def job_of_tables(tables: Values, place: Path, shop: Shop) -> Job:
-    """Return the job that a file of these tables at this place says: its text is read."""
+    """Return the job of these tables as if read from a file at `place`: the text is written and
+    parsed again."""
     return build_job(tables_of(parse_table(text_of(tables)), place), JobTables(), (), shop)

@@ -31,8 +31,9 @@ NOT_KNOWN_MM = math.inf
 def described(
     job: Job, drawing: Drawing | None = None, machine: Machine | None = None
 ) -> tuple[dict[str, Any], list[Finding]]:
-    """Return the job in words and numbers, mm, with what it takes of a drawing, and the findings
-    about its sides. OptionError for an operation that takes nothing."""
+    """Return the job as data for JSON, lengths in mm: its operations, the contours that they take
+    of the drawing, and the findings about the side on which the tool runs. OptionError for an
+    operation that takes nothing."""
     facts: dict[str, Any] = {
         "operations": [_operation(job, k) for k in range(len(job.operations))]
     }
@@ -92,13 +93,14 @@ def _operation(job: Job, index: int) -> dict[str, Any]:
 
 
 def _stages_before(job: Job, index: int) -> int:
-    """Count the operations up to this one that are the second stage of the one before them."""
+    """Return the number of finishing stages among the operations up to `index`, each of which
+    belongs to the operation before it."""
     return sum(each.stage == "finish" for each in job.operations[: index + 1])
 
 
 def _below(job: Job, operation: Operation) -> float | None:
-    """Return the depth of an operation below the stock, mm; None if it ends above, or is not
-    known."""
+    """Return how far an operation goes below the underside of the stock, mm; None if it does not,
+    or if thickness or depth is not known."""
     if job.stock is None or operation.depth_mm is None:
         return None
     below = operation.depth_mm - job.stock.thickness_mm
@@ -108,7 +110,8 @@ def _below(job: Job, operation: Operation) -> float | None:
 def _groups(
     operation: Operation, selection: Chosen, sides: Sides, placed_drawing: Drawing
 ) -> list[dict[str, Any]]:
-    """Count the contours of each layer by the side on which the tool runs, and by the reason."""
+    """Return the number of contours for each layer, side on which the tool runs, and reason for
+    that side."""
     contract = operation.contract
     if contract.cuts in ("at", "over"):
         return []

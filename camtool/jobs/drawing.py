@@ -28,16 +28,17 @@ knows its size within the tolerance of the previous one."""
 
 
 def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Drawing:
-    """Return the drawing in the content of a file, of the layers that the job's operations
-    take, in all set-ups of the part, or of those that `options` select. OptionError for a layer
-    or colour of the job that the drawing has not, unless `options` select some."""
+    """Parse the bytes of a drawing file, as finely as the job needs, with the layers that its
+    operations take (in all set-ups) or those that `options` select. OptionError for a layer or
+    colour of the job that the drawing does not have, unless `options` select some."""
     return chosen_for_job(partial(read_bytes, data, file), options, job)
 
 
 def chosen_for_job(
     read: Callable[[ReadOptions], Drawing], options: ReadOptions, job: Job
 ) -> Drawing:
-    """As `read_for_job`, of the drawing that a call reads."""
+    """Return the drawing that `read` gives with the options for the job; otherwise like
+    `read_for_job`."""
     job = job.whole
     selection, wanted_layers = options.select, layers_of(job)
     options = replace(options, select=replace(selection, layers=selection.layers or wanted_layers))
@@ -55,8 +56,8 @@ def chosen_for_job(
 def read_to_scale(
     read: Callable[[ReadOptions], Drawing], options: ReadOptions, job: Job
 ) -> Drawing:
-    """Read a drawing at the scale of the part, which is the job's; if the job fits the drawing
-    into a size, the scale is computed from a first reading."""
+    """Read a drawing at the scale of the job. If the job fits the drawing into a size, the scale
+    is computed from the drawing, which is read again until its scale and the fit agree."""
     if job.placement.fit_mm is None:
         return read(replace(options, scale=job.placement.scale))
     from camtool.planning.place import SCALE_SHARE, part_scale
@@ -74,15 +75,16 @@ def read_to_scale(
 
 
 def layers_of(job: Job) -> tuple[str, ...]:
-    """Return patterns of all layers that the job needs; empty when an operation takes any."""
+    """Return the layer patterns of all operations, to read only those layers; () if an operation
+    takes any layer."""
     if not all(operation.layers for operation in job.operations):
         return ()
     return tuple(dict.fromkeys(p for operation in job.operations for p in operation.layers))
 
 
 def refuse_unmatched(drawing: Drawing, job: Job) -> None:
-    """Raise OptionError for a pattern of an operation that no path and no mark of the drawing
-    has."""
+    """Raise OptionError for a layer or colour pattern of an operation that matches no path and no
+    mark of the drawing."""
     layers = {*drawing.layers, *(mark.layer for mark in drawing.marks)}
     colours = {*drawing.colours, *(mark.colour for mark in drawing.marks)}
     for number, operation in enumerate(job.operations, start=1):
@@ -101,7 +103,8 @@ def refuse_unmatched(drawing: Drawing, job: Job) -> None:
 
 
 def _unmatched(error: NoMatchError, job: Job) -> OptionError:
-    """Return the reader's error about a layer of the job, with the operation that names it."""
+    """Return the error for a layer pattern that matches nothing, with the operation that
+    names it."""
     rows = enumerate(job.operations, start=1)
     operation_place = next(
         _name_words(each, n) for n, each in rows if error.pattern in each.layers

@@ -77,42 +77,43 @@ _WILD = re.compile(r"[*?\[]")
 
 
 def layers(value: object) -> tuple[str, ...]:
-    """Return a list of patterns, or one text with commas between them."""
+    """Return patterns from a list, or from a text with commas between them."""
     if isinstance(value, str):
         value = [word.strip() for word in value.split(",")]
     return patterns(value)
 
 
 def words(value: object) -> tuple[str, ...]:
-    """Return a list of words to select by, or one text with commas between them."""
+    """Return the words of `select` from a list, or from a text with commas between them."""
     return tuple(word(SELECTED)(Given(each, "")) for each in layers(value))
 
 
 def names(value: object) -> tuple[str, ...]:
-    """Return a list of names of operations."""
+    """Return the operation names of a list; OptionError if it is empty or no list."""
     if not isinstance(value, list) or not value:
         raise OptionError(f"{value!r} is no list of names", mend='write it like ["holes", "edge"]')
     return tuple(text(each) for each in value)
 
 
 def allowed(value: object) -> tuple[str, ...]:
-    """Return a list of words that a job may allow, or one text with commas between them."""
+    """Return the words of `allow` from a list, or from a text with commas between them."""
     return tuple(word(ALLOWED)(Given(each, "")) for each in layers(value))
 
 
 def length_range(value: object) -> tuple[float, float]:
-    """["3mm", "8mm"] or "3..8mm", one end of which may be left out; a unit at the end holds for
-    both."""
+    """Read a range of lengths, such as ["3mm", "8mm"] or "3..8mm", and return its ends in mm. In a
+    text one end may be missing (0 or inf), and a unit at the end holds for both."""
     return _range(value, length)
 
 
 def number_range(value: object) -> tuple[float, float]:
-    """Read a range of numbers: [10, 200] or "10..200"."""
+    """Read a range of numbers, such as [10, 200] or "10..200"."""
     return _range(value, number)
 
 
 def span(value: object) -> tuple[float, float]:
-    """["-5mm", "8mm"] or "-5..8mm"; an end that is left out is nowhere."""
+    """Read a range of coordinates, such as ["-5mm", "8mm"] or "-5..8mm", and return its ends in
+    mm; a missing end is infinite."""
     return _range(value, length, -math.inf)
 
 
@@ -131,8 +132,8 @@ def _range(
 
 
 def colours(value: object) -> tuple[str, ...]:
-    """Return patterns of colours, "#rrggbb" as drawings have them; names and numbers are
-    converted."""
+    """Return patterns of colours, written "#rrggbb" as in drawings; colour names and numbers are
+    converted, wildcards kept."""
     if isinstance(value, list | tuple):
         value = [str(item) if type(item) is int else item for item in value]
     return tuple(
@@ -141,7 +142,8 @@ def colours(value: object) -> tuple[str, ...]:
 
 
 def lengths(value: object) -> tuple[float, float]:
-    """[12, "9mm"] or "12x9mm"; a unit at the end holds for both."""
+    """Read two lengths, such as [12, "9mm"] or "12x9mm", and return them in mm; in a text a unit
+    at the end holds for both."""
     if isinstance(value, str):
         match = _PAIR.fullmatch(value.strip())
         if match is None:
@@ -153,7 +155,7 @@ def lengths(value: object) -> tuple[float, float]:
 
 
 def counts(value: object) -> tuple[int, int]:
-    """Read two counts: [3, 2] or "3x2"."""
+    """Read two whole numbers, such as [3, 2] or "3x2"."""
     if isinstance(value, str):
         match = _PAIR.fullmatch(value.strip())
         if match is None:
@@ -163,29 +165,29 @@ def counts(value: object) -> tuple[int, int]:
 
 
 def origin(value: object) -> str | tuple[float, float]:
-    """Return a word, [x, y] or "x,y"."""
+    """Read the key `origin`: one of ORIGINS, or a point [x, y] or "x,y", mm."""
     return _word_or_place(value, ORIGINS)
 
 
 def start(value: object) -> str | tuple[float, float]:
-    """Return a word, [x, y] or "x,y"."""
+    """Read the key `start`: one of STARTS, or a point [x, y] or "x,y", mm."""
     return _word_or_place(value, STARTS)
 
 
 def zero(value: object) -> str | tuple[float, float]:
-    """Return a place of the stock, [x, y] or "x,y"."""
+    """Read the key `zero`: one of ZEROS (places of the stock), or a point [x, y] or "x,y", mm."""
     return _word_or_place(value, tuple(ZEROS))
 
 
 def places(value: object) -> tuple[tuple[float, float], ...]:
-    """Return a list of places [x, y]."""
+    """Read a list of points [x, y], mm."""
     if not isinstance(value, list | tuple):
         raise OptionError(f"{value!r} is no list of places", mend="write it like [[10, 5]]")
     return tuple(_pair(each, length, '["10mm", "5mm"]') for each in value)
 
 
 def kind(raw: Given) -> str:
-    """Return the name of an installed kind of operation."""
+    """Read the name of a kind of operation; OptionError unless it is installed and loads."""
     if raw.value in broken_kinds():
         with raw.blamed():
             kind_named(raw.value)
@@ -194,17 +196,20 @@ def kind(raw: Given) -> str:
 
 
 def entry(raw: Given) -> Entry:
-    """Return a table, or "ramp", "ramp:3deg", "helix:3deg:1mm"."""
+    """Read an entry move from a table, or from a text such as "ramp", "ramp:3deg" or
+    "helix:3deg:1mm"."""
     return _record(Entry, ENTRY, _parts(raw, ENTRY, ("kind", "angle", "radius")))
 
 
 def lead(raw: Given) -> Lead:
-    """Return a table, or "none", "line:1mm", "arc:1mm"."""
+    """Read lead-in or lead-out from a table, or from a text such as "none", "line:1mm" or
+    "arc:1mm"."""
     return _record(Lead, LEAD, _parts(raw, LEAD, ("kind", "length")))
 
 
 def tabs(raw: Given) -> Tabs:
-    """Return a table, or how many ("4") or how far apart ("20mm"), then ":width:height"."""
+    """Read tabs from a table, or from a text: their count ("4") or spacing ("20mm"), optionally
+    followed by ":width:height"."""
     value = raw.value
     is_count = type(value) is int or (isinstance(value, str) and _COUNT.match(value))
     first = "count" if is_count else "spacing"
@@ -224,7 +229,8 @@ def _record(make: Callable[..., _T], keys: Mapping[str, Key], table: Table) -> _
 
 
 def _part_of(raw: Given, known_keys: Iterable[str]) -> Table:
-    """Return a table that is the value of a key, such as `entry = {kind = "ramp"}`."""
+    """Convert an inline table that is the value of a key, such as `entry = {kind = "ramp"}`;
+    OptionError for an unknown key in it."""
     parts = {}
     for name, value in raw.value.items():
         parts[name] = Given(value, f"{raw.where}.{name}", raw.file)
@@ -234,7 +240,7 @@ def _part_of(raw: Given, known_keys: Iterable[str]) -> Table:
 
 
 def _parts(raw: Given, keys: Mapping[str, Key], names: Sequence[str]) -> Table:
-    """Return the keys of a table that is a value, or of a text "a:b:c" that gives `names` in
+    """Convert an inline table, or a text "a:b:c" whose parts are the values of `names` in
     order."""
     if isinstance(raw.value, dict):
         return _part_of(raw, keys)
@@ -251,8 +257,8 @@ def _parts(raw: Given, keys: Mapping[str, Key], names: Sequence[str]) -> Table:
 
 
 def _word_or_place(value: object, words: Sequence[str]) -> str | tuple[float, float]:
-    """Return one of the words, or a place given as a list of two lengths or a text with a
-    comma."""
+    """Return the value if it is one of `words`; else read it as a point, from a list of two
+    lengths or a text with a comma."""
     if isinstance(value, list | tuple):
         return _pair(value, length, '["10mm", "5mm"]')
     name = text(value)
@@ -546,7 +552,7 @@ for _contract in installed_kinds().values():
 
 
 def is_known(name: str, kind: str) -> bool:
-    """Return True if operations of this kind know a key of `OPERATION`."""
+    """Return True if operations of this kind have the key `name` of OPERATION."""
     contract = kind_named(kind)
     return name in contract.keys or name in contract.own
 
@@ -595,13 +601,14 @@ _FIELDS: dict[str, Key] = {
 
 
 def flag_name(name: str) -> str:
-    """Return the flag that says what a key says."""
+    """Return the command-line flag for a key of job files."""
     return _FLAGS_OF_OTHER_NAMES.get(name, f"--{name.replace('_', '-')}")
 
 
 def field_value(name: str, value: Any) -> Any:
-    """Return the value of a field of Operation, Job, Placement or (with `tool_` before it)
-    Tool: texts, lists, and numbers where a record is wanted, are read as a job file has them."""
+    """Convert a value given in Python for a field of Operation, Job, Placement or (with the prefix
+    `tool_`) Tool. Texts, lists and tables are read as in a job file, and so are numbers for fields
+    that hold records; other values are returned unchanged."""
     key = _FIELDS.get(name)
     if name == "layers" and isinstance(value, str):
         return layers(value)

@@ -22,11 +22,11 @@ PIN_DEPTH_SHARE = 1.5
 
 
 class Proposal(Struct, frozen=True):
-    """The known sizes of the cut, mm, 0 where it is not: the tool's diameter, the stock's
-    thickness. `tool`: its name in a library, and the materials that it has presets for, which say
-    how deep passes are; `material`: the one of them that is cut, where that is said. `library`:
-    all tools that the job may name for it; `flip`: the part is turned over about a line along "x"
-    or "y", "" for one that is cut from one face."""
+    """The sizes of the cut as far as known, mm (0: unknown): diameter of the tool and thickness of
+    the stock. `tool`: its name in a library; `materials`: those it has presets for, which set the
+    depth of passes; `material`: the one that is cut, if given. `library`: all tools that the job
+    may name for it. `flip`: the axis "x" or "y" about which the part is turned over, "" for a part
+    that is cut from one face."""
 
     tool_mm: float = 0.0
     thickness_mm: float = 0.0
@@ -59,9 +59,9 @@ class Proposal(Struct, frozen=True):
         return math.ceil(self.tool_mm + ROOM_SHARE * self.pin_mm)
 
     def tools(self, kind: str) -> list[Tool]:
-        """Return the tools of this kind in the library, the widest first. Where the materials are
-        known, only those with presets for the material that is cut, or for one of all: a tool
-        without would cut with its spindle off."""
+        """Return the tools of this kind in the library, the widest first. Where the material is
+        known, only tools with a preset for it are returned: a tool without one would cut with its
+        spindle off."""
         materials = {self.material} if self.material else set(self.materials)
         tools = [
             tool
@@ -71,12 +71,13 @@ class Proposal(Struct, frozen=True):
         return sorted(tools, key=lambda tool: -tool.diameter_mm)
 
     def has_drill(self, width_mm: float) -> bool:
-        """Return True if a drill of the library is as wide as a hole of this diameter."""
+        """Return True if the library has a drill of this diameter."""
         drills = self.tools("drill")
         return any(abs(width_mm - tool.diameter_mm) <= HOLE_SIZE_MM for tool in drills)
 
     def fits_hole(self, width_mm: float) -> bool:
-        """Return True if a drill or the mill makes a hole of this diameter."""
+        """Return True if a drill of the library, or the job's mill, can make a hole of this
+        diameter."""
         return width_mm >= self.tool_mm - HOLE_SIZE_MM or self.has_drill(width_mm)
 
     @property

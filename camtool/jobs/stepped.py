@@ -43,8 +43,8 @@ PLAIN = ("", "drill", "profile")
 
 
 class Sink(Struct, frozen=True):
-    """A countersink: the row of the hole in it, how wide its slope is from above, mm, the bit that
-    cuts it, and whether a layer is called so."""
+    """A countersink: the row of the hole in it, the width of its slope seen from above (mm), the V
+    bit that cuts it, and whether the layer's name calls it a countersink."""
 
     hole: int
     width_mm: float
@@ -53,8 +53,8 @@ class Sink(Struct, frozen=True):
 
 
 class SteppedHoles(Struct, frozen=True):
-    """The stepped holes of a drawing by the row of their wider circle: those that are `bored`,
-    with the row of the hole within, and those that are `sunk`."""
+    """The stepped holes of a drawing by the row of their wider circle: `bored` are counterbores,
+    with the row of the hole in each; `sunk` are countersinks."""
 
     bored: Mapping[int, int] = field(default_factory=dict)
     sunk: Mapping[int, Sink] = field(default_factory=dict)
@@ -71,8 +71,8 @@ class SteppedHoles(Struct, frozen=True):
 
 
 def stepped_holes(drawing: Drawing, proposal: Proposal, habits: Mapping[int, str]) -> SteppedHoles:
-    """Return the stepped holes that the tools of a proposal can cut. `habits`: what the layers of
-    the paths are called, by their rows."""
+    """Return the counterbores and countersinks of a drawing that the tools of the proposal can
+    cut. `habits`: by row of a path, the kind of operation that the name of its layer asks for."""
     tool, thickness = proposal.tool_mm, proposal.thickness_mm
     bored: dict[int, int] = {}
     sunk: dict[int, Sink] = {}
@@ -96,8 +96,9 @@ def stepped_holes(drawing: Drawing, proposal: Proposal, habits: Mapping[int, str
 
 
 def sinking_bit(proposal: Proposal, width_mm: float, *, is_named: bool) -> Tool | None:
-    """Return the V bit that cuts a slope so wide, and not through the stock; one of another angle
-    than screws have only where the layer says that it is a countersink."""
+    """Return the V bit of the library that cuts a slope of this width (seen from above) without
+    going through the stock, or None. Bits that do not have the angle of a screw head are used only
+    if the layer is named a countersink (`is_named`)."""
     fits = []
     for bit_tool in proposal.tools("v"):
         angle = bit_tool.tip_angle_rad
@@ -117,8 +118,8 @@ def sinking_bit(proposal: Proposal, width_mm: float, *, is_named: bool) -> Tool 
 
 
 def _circles_about_one_centre(drawing: Drawing) -> list[tuple[int, int, tuple[float, float]]]:
-    """Return the rows of circles that hold one circle about the same centre and nothing else, the
-    row of that, and the diameters of both, mm."""
+    """Return (row of the wider circle, row of the inner one, their diameters in mm) for each
+    circle that contains nothing but one concentric circle."""
     parent = drawing.nesting.levels.parent
     counts = np.bincount(parent[parent >= 0], minlength=len(parent))
     pairs = []

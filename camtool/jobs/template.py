@@ -86,15 +86,15 @@ class _Group(Struct, frozen=True):
 
 
 def _materials(proposal: Proposal) -> Iterator[str]:
-    """Yield the row of the material that is cut, and those of the others as comments."""
+    """Yield the line of the material that is cut, and the lines of the other materials as
+    comments."""
     for name in proposal.materials:
         is_chosen = name == proposal.material
         yield _row(f"{'' if is_chosen else '# '}material = {toml_string(name)}", "as --material")
 
 
 def proposed(drawing: Drawing, proposal: Proposal) -> list[Proposed]:
-    """Return the operations that a drawing is cut by, in the order of cutting, each with its own
-    name and the group of paths that it takes from."""
+    """Return the operations proposed for a drawing, in the order of cutting, with unique names."""
     (left_x, right), (low, high) = drawing_extents(drawing).tolist()
     groups = sorted(_groups(drawing), key=lambda group: _extent(drawing, group))
     habits = {row: _habit(group.name) for group in groups for row in group.paths}
@@ -119,8 +119,9 @@ def proposed(drawing: Drawing, proposal: Proposal) -> list[Proposed]:
 
 
 def _sided(drawing: Drawing, part: Part, operations: Sequence[Proposed]) -> Part:
-    """Return the part; of profiles within contours that are marked, which by themselves bound
-    nothing, with the side on which the drawing has them."""
+    """Return the part with a key `side` if it is a profile within a contour that is only engraved.
+    An engraved contour bounds no part, so the side must be stated: the one that the nesting in the
+    drawing implies. Other parts are returned unchanged."""
     if not kind_named(part.kind).runs_beside or any(key == "side" for key, _, _ in part.keys):
         return part
     marked = {row for each in operations if each.part.kind == "engrave" for row in each.part.rows}
@@ -137,8 +138,8 @@ def _sided(drawing: Drawing, part: Part, operations: Sequence[Proposed]) -> Part
 
 
 def _turn(each: Proposed) -> tuple[int, bool]:
-    """Return when a part is cut: what frees parts comes last. Edges are broken after engraving,
-    for which the same bit may be in."""
+    """Return the sort key of an operation in the order of cutting: what frees parts comes last,
+    and edges are broken after engraving, for which the same V bit may be in the spindle."""
     kind = kind_named(each.part.kind)
     return CUTTING_ORDER.index("along" if kind.breaks_edges else kind.cuts), kind.breaks_edges
 
@@ -150,10 +151,9 @@ def job_template(
     parts: Sequence[Proposed] | None = None,
     text: str = "",
 ) -> str:
-    """Return TOML text of a job for the drawing; for `machine`, when it is known, with its
-    numbers. With a proposal of tool and stock, contours are told apart by what they are.
-    `parts`: its operations, if not those that are `proposed`; `text`: how the drawing's text
-    was read."""
+    """Return the TOML text of a job for the drawing. `machine`: its defaults and travel are noted
+    in the head; `proposal`: tools and stock; `parts`: the operations (None: those that `proposed`
+    returns); `text`: the value of the key `text`, with which the drawing was read."""
     proposal = proposal or Proposal()
     (left_x, right), (low, high) = drawing_extents(drawing).tolist()
     size = (right - left_x, high - low)
@@ -193,7 +193,8 @@ def job_template(
 def _stock(
     size: tuple[float, float], proposal: Proposal, parts: Sequence[Proposed]
 ) -> Iterator[str]:
-    """Yield the rows of the stock; where a drill goes through, its board takes the point."""
+    """Yield the lines of `[stock]`; where a drill goes through, the spoilboard is as thick as its
+    point needs."""
     is_known_thickness = bool(proposal.thickness_mm)
     thickness = f"{proposal.thickness_mm:.6g}" if is_known_thickness else "1"
     remark = "its top is Z0; the corner is its lower left one"
@@ -224,13 +225,14 @@ BACK = ("back", "bottom", "rear", "under")
 
 
 def two_sided_stock(size: tuple[float, float], proposal: Proposal) -> Box:
-    """Return the box of the stock for a part of this size that is turned over."""
+    """Return the box of the stock for a part of this size that is turned over: the part and a
+    margin of waste all round."""
     margin = proposal.margin_mm
     return -margin, -margin, size[0] + margin, size[1] + margin
 
 
 def two_sided_pins(size: tuple[float, float], proposal: Proposal) -> tuple[Pin, Pin]:
-    """Return the places of the alignment pins of a part of this size."""
+    """Return the positions of the two alignment pins for a part of this size."""
     line = 0.5 * size[0 if proposal.flip == "y" else 1]
     stock, part = two_sided_stock(size, proposal), (0.0, 0.0, *size)
     flip = proposal.flip, line
@@ -240,7 +242,8 @@ def two_sided_pins(size: tuple[float, float], proposal: Proposal) -> tuple[Pin, 
 
 
 def pin_words(drawing: Drawing, proposal: Proposal) -> str:
-    """Return where the alignment pins are, and how deep they stand in the board."""
+    """Return a sentence for the user: diameter and positions of the holes for the alignment pins,
+    and how deep they go into the board."""
     (left, right), (low, high) = drawing_extents(drawing).tolist()
     pins = two_sided_pins((right - left, high - low), proposal)
     places = " and ".join(f"X{x:g} Y{y:g}" for x, y in pins)
@@ -251,7 +254,7 @@ def pin_words(drawing: Drawing, proposal: Proposal) -> str:
 
 
 def _pins(proposal: Proposal) -> Iterator[str]:
-    """Yield the operation that drills the holes of alignment pins."""
+    """Yield the lines of the operation that drills the holes for the alignment pins."""
     drill = proposal.pin_drill
     name = drill.name if drill else proposal.tool or TOOL_NAME
     yield "# the pins of [[setups]] meet again when the part is turned over"
@@ -268,8 +271,8 @@ def _pins(proposal: Proposal) -> Iterator[str]:
 def _setups(
     size: tuple[float, float], proposal: Proposal, parts: Sequence[Proposed]
 ) -> Iterator[str]:
-    """Yield the two set-ups: what the names of layers say is cut from the other face, and what
-    frees the part; all else from the face that is drawn."""
+    """Yield the lines of the two set-ups. The second face gets the operations whose layer names it
+    (BACK) and those that cut the part free; the face as drawn gets all others."""
     first, second = ["pins"], list[str]()
     for each in parts:
         words = re.split(r"[^a-z]+", each.group.name.casefold())
@@ -291,7 +294,7 @@ def _setups(
 
 
 def _frees(part: Part) -> bool:
-    """Return True for the outlines of parts, which come last."""
+    """Return True if the operation cuts the outline of parts, and so frees them."""
     return part.kind == "profile" and not any('"inner"' in value for _, value, _ in part.keys)
 
 
@@ -317,7 +320,8 @@ def _head(drawing: Drawing, size: tuple[float, float], machine: Machine | None) 
 
 
 def _groups(drawing: Drawing) -> list[_Group]:
-    """By layer, names that differ in case alone together; by colour when there is one layer."""
+    """Return the paths and marks of the drawing by layer, or by colour if there is only one layer;
+    names that differ only in case are one group."""
     layers = _groups_by(drawing.layers, [mark.layer for mark in drawing.marks], "layers")
     colours = _groups_by(drawing.colours, [mark.colour for mark in drawing.marks], "colours")
     return colours if len(layers) == 1 and len(colours) > 1 else layers
@@ -333,19 +337,21 @@ def _groups_by(names: Sequence[str], of_marks: Sequence[str], key: str) -> list[
 
 
 def _extent(drawing: Drawing, group: _Group) -> float:
-    """Return the size of the group, mm; larger groups come after the ones within them."""
+    """Return the width plus the height of the group's paths, mm; groups are sorted by it, so that
+    smaller ones within larger ones are cut first."""
     lines = drawing.paths.select(group.paths)
     return float(np.ptp(extents(lines), axis=1).sum()) if len(lines) else 0.0
 
 
 class Part(Struct, frozen=True):
-    """An operation that a kind proposes: its name, what it takes of a group (rows of the drawing's
-    paths, and how many single points), and keys as TOML text, each with a remark. `excludes`: the
-    word by which the other operations of the group leave these paths out. `tool`: one of the
-    library, "" for that of the job. `why`: the reason, in a few words, "" where there is none.
-    `others`: kinds that may be meant as well, of a part that is in doubt; `instead`: the part of
-    one of them, where it takes other paths. `is_shared`: another operation takes its paths too.
-    `is_left`: it is not cut, unless that is asked for."""
+    """An operation that a kind proposes for a part of a group. `rows`: the drawing's paths that it
+    takes; `marks`: the number of single points; `keys`: (name, TOML value, remark) of its keys;
+    `excludes`: the word of `select` by which the other operations of the group leave these paths
+    out; `tool`: name of a tool of the library, "" for the tool of the job; `why`: the reason in a
+    few words, or "". `others`: other kinds that the drawing may have meant, where that is in
+    doubt; `instead`: the operation of one of these kinds, if it takes other paths. `is_shared`:
+    another operation takes its paths too. `is_left`: it is written as a comment and not cut unless
+    asked for."""
 
     name: str
     kind: str
@@ -361,11 +367,13 @@ class Part(Struct, frozen=True):
     is_left: bool = False
 
     def in_doubt(self, instead: Part) -> Part:
-        """Return the part, of which this one may be meant instead."""
+        """Return the part with `instead` as the operation that may have been meant in its
+        place."""
         return replace(self, others=(instead.kind,), instead=instead)
 
     def of_kind(self, kind: str) -> Part:
-        """Return the part cut by another kind of operation with the tool of the job."""
+        """Return the part as another kind of operation, with the tool of the job; keys other than
+        those that select paths are dropped."""
         if self.instead is not None and self.instead.kind == kind:
             return self.instead
         keys = tuple(key for key in self.keys if key[0] in SELECTING_KEYS)
@@ -373,27 +381,27 @@ class Part(Struct, frozen=True):
 
 
 class Proposed(Struct, frozen=True):
-    """An operation of a job, and the group that it takes its paths of."""
+    """A proposed operation, and the group from which it takes its paths."""
 
     group: _Group
     part: Part
 
     def cut(self) -> Proposed:
-        """Return the same, also where it would have been left."""
+        """Return the operation as one that is cut (`is_left` False)."""
         return Proposed(self.group, replace(self.part, is_left=False))
 
     def of_kind(self, kind: str) -> Proposed:
-        """Return the same, cut by another kind of operation."""
+        """Return the operation as another kind."""
         return Proposed(self.group, self.part.of_kind(kind))
 
 
 class Remaining(Struct, frozen=True):
-    """The part of a group that no operation takes yet: paths (rows of the drawing's), and how many
-    single points. `name`: that of the layer or colour; `title`: the same for names of operations.
-    `size_mm`: the longer side of the drawing; `steps`: its counterbores and countersinks,
-    `sunk`: the wider circles of the latter in the group, which are cut with the holes in them.
-    `is_divided`: operations before take other paths of the group, so that those that follow have
-    to select."""
+    """The part of a group that no proposed operation takes yet: `rows` of the drawing's paths, and
+    the number of single points. `name`: that of the layer or colour; `title`: the same as a name
+    for operations. `size_mm`: the longer side of the drawing; `steps`: the counterbores and
+    countersinks of the drawing; `sunk`: the wider circles of the group's countersinks, which are
+    cut together with their holes. `is_divided`: earlier operations take other paths of the group,
+    so later ones need keys that select."""
 
     drawing: Drawing
     name: str
@@ -422,8 +430,8 @@ class Remaining(Struct, frozen=True):
         return depth if 0.0 < depth <= (self.proposal.thickness_mm or MAX_DEPTH_MM) else None
 
     def crowded(self, width_mm: float) -> tuple[int, ...]:
-        """Return rows of the closed paths that a tool of this width cannot run beside or
-        within."""
+        """Return the rows of closed paths beside or within which a tool of this width has
+        no room."""
         crowded_rows = crowded(self.drawing, width_mm) - self.steps.rows
         return tuple(row for row in self.contours if row in crowded_rows)
 
@@ -449,7 +457,7 @@ class Remaining(Struct, frozen=True):
         return tuple(row for row in self.rows if self.drawing.paths.closed[row])
 
     def contours_that_are(self, *words: str) -> tuple[int, ...]:
-        """Return rows of the closed paths of which all these words of `select` are true."""
+        """Return the rows of closed paths that satisfy all these words of the key `select`."""
         drawing = self.drawing
         continuous = [kind.casefold() in CONTINUOUS for kind in drawing.line_types]
         edges = np.array(continuous, dtype=np.bool_)
@@ -460,7 +468,8 @@ class Remaining(Struct, frozen=True):
         return tuple(np.flatnonzero(selected).tolist())
 
     def without(self, parts: Sequence[Part]) -> Remaining:
-        """Return the paths and points that are left when these operations have taken theirs."""
+        """Return what remains of the group after these operations have taken their paths and
+        points."""
         parts = [part for part in parts if not part.is_shared]
         taken_rows = {row for part in parts for row in part.rows}
         return replace(
@@ -472,7 +481,8 @@ class Remaining(Struct, frozen=True):
 
 
 def _habit(name: str) -> str:
-    """Return what the name of a layer, or its colour, asks for: a key of HABITS, or ""."""
+    """Return the kind of operation that the name of a layer, or its colour, suggests (a key of
+    HABITS), or ""."""
     words = re.split(r"[^a-z]+", name.casefold())
     for kind, starts in HABITS.items():
         if any(word.startswith(start) for word in words for start in starts):
@@ -483,8 +493,8 @@ def _habit(name: str) -> str:
 def _parts(
     drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal, steps: SteppedHoles
 ) -> list[Part]:
-    """Return the operations that a group is cut by, as the kinds propose them one after the
-    other."""
+    """Return the operations for a group. The kinds propose in the order of their `proposal_rank`,
+    each from what the kinds before it left."""
     sunk = tuple(row for row in group.paths if row in steps.sunk)
     rows, marks = tuple(row for row in group.paths if row not in sunk), len(group.marks)
     title = group.called
@@ -512,8 +522,9 @@ def _parts(
 
 
 def _exact(drawing: Drawing, group: _Group, part: Part) -> Part:
-    """Return the part, which says sizes or names entities if its words would take others of the
-    group; entities of one name may still be taken together."""
+    """Return the part with keys that select its paths exactly. If its words of `select` would take
+    other paths of the group too, a range of sizes is added, or else the names of its entities
+    (which still take all entities of the same name)."""
     if part.instead is not None:
         part = replace(part, instead=_exact(drawing, group, part.instead))
     own_words = {key: value for key, value, _ in part.keys if key in SELECTING_KEYS}
@@ -538,7 +549,8 @@ def _exact(drawing: Drawing, group: _Group, part: Part) -> Part:
 
 
 def _narrower(drawing: Drawing, part: Part) -> Iterator[dict[str, str]]:
-    """Yield keys by which a part may say more exactly what it takes, the simplest first."""
+    """Yield keys to add to the selection of a part, from the simplest: none, its range of sizes,
+    the names of its entities."""
     yield {}
     if not part.rows:
         return
@@ -552,7 +564,8 @@ def _narrower(drawing: Drawing, part: Part) -> Iterator[dict[str, str]]:
 
 
 def _excluding(part: Part, words: Sequence[str]) -> Part:
-    """Return the part, which selects what these words too are true of."""
+    """Return the part with these words added to its key `select`, by which it leaves out the paths
+    of other operations; parts that select only points are returned unchanged."""
     selection = {key: value for key, value, _ in part.keys}.get("select")
     if not words or selection == '["point"]':
         return part
@@ -566,12 +579,13 @@ def _excluding(part: Part, words: Sequence[str]) -> Part:
 
 
 def _numbered(name: str, number: int) -> str:
-    """Return a name for what has been called so before."""
+    """Return the name for its first use, or "NAME (NUMBER)" for a later one."""
     return name if number == 1 else f"{name} ({number})"
 
 
 def _text(drawing: Drawing, group: _Group, part: Part, proposal: Proposal) -> list[str]:
-    """Return the lines of the operation for a part of a group."""
+    """Return the lines of `[[operations]]` for a part of a group, with its unused keys as
+    comments."""
     lines = drawing.paths.select(part.rows)
     marks = f", {part.marks} points" if part.marks else ""
     text = [
@@ -616,7 +630,7 @@ def _count_words(lines: Polylines) -> str:
 
 
 def _comments(keys: Mapping[str, Key]) -> list[str]:
-    """Keys with their examples, commented out, and the words that each may be."""
+    """Return one commented line for each key, with its example, help text and possible words."""
     return [
         _row(f"# {name} = {key.example}", f"{key.help} {', '.join(key.value.choices)}".rstrip())
         for name, key in keys.items()
@@ -629,10 +643,11 @@ def _row(text: str, remark: str) -> str:
 
 
 def _commented(text: str) -> str:
-    """Text for a comment: one line, and nothing that TOML refuses there."""
+    """Return the text made fit for a TOML comment: characters that cannot be printed become
+    spaces."""
     return "".join(char if char.isprintable() else " " for char in text)
 
 
 def pattern_of(name: str) -> str:
-    """Return the pattern that matches this name alone (in any case)."""
+    """Return the pattern that matches this name alone, with its wildcards escaped."""
     return "".join(f"[{char}]" if char in "*?[" else char for char in name)

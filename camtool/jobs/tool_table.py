@@ -61,7 +61,8 @@ def read_tool_table(text: str, file: str) -> dict[int, TableTool]:
 
 
 def _words(text: str) -> Iterator[tuple[str, str]]:
-    """Letter and number of each word; OptionError for anything else, and for a letter twice."""
+    """Yield letter and number of each word of a line; OptionError for anything else, and for a
+    letter that comes twice."""
     letters_seen: set[str] = set()
     for word in text.split():
         match = _WORD.fullmatch(word)
@@ -85,7 +86,8 @@ def _tool(words: dict[str, str], remark: str, line: int) -> TableTool:
 
 
 def _whole_number(words: dict[str, str], letter: str) -> int:
-    """Return the number of a word that must be there, and whole."""
+    """Return the number of the word with this letter; OptionError if it is missing or not
+    whole."""
     if letter not in words:
         raise OptionError(
             f"the word {letter} is missing", mend=f"give every tool a T and a P, such as {letter}1"

@@ -50,15 +50,15 @@ _TOOL_NUMBER = re.compile(r"\d{1,9}")
 
 
 class Described(Struct, frozen=True):
-    """A tool as a file describes it: its keys, and what it is used with, by material."""
+    """A tool as a file describes it: its keys, and the keys of its presets by material."""
 
     keys: Table
     presets: Mapping[str, Table] = field(default_factory=dict)
 
 
 class Shop(Struct, frozen=True):
-    """Tools and materials from outside the job: the files of `libraries`, the nearest first; the
-    tool of operations that say none, and what is cut, where the job does not say it."""
+    """Tools and materials from outside the job: the files of `libraries`, the nearest first, and
+    the tool and the material for operations and jobs that name none."""
 
     libraries: tuple[Path, ...] = ()
     tool: Given | None = None
@@ -67,7 +67,7 @@ class Shop(Struct, frozen=True):
 
 class Used(Struct, frozen=True):
     """The tool of an operation, with the limits of its preset; the keys of operations that the
-    preset gives, and the material that it is for, "" without one."""
+    preset sets, and the material of the preset ("" without one)."""
 
     tool: Tool
     preset: Table
@@ -75,8 +75,8 @@ class Used(Struct, frozen=True):
 
 
 def tool_tables(values: Mapping[str, Any], file: str) -> dict[str, Described]:
-    """Return the tables `[tools.NAME]` of a file, each checked; OptionError for tools that are
-    wrong, used or not, and for two tools with one number."""
+    """Return the tools of the tables `[tools.NAME]` of a file. All are checked, even unused ones:
+    OptionError for a wrong tool, and for two tools with one number."""
     tools = values.get("tools", {})
     if not isinstance(tools, dict):
         raise Given(tools, "key tools", file).refused(
@@ -130,13 +130,14 @@ def read_library(path: Path) -> dict[str, Described]:
 
 
 def tool_of(name: str, described: Described) -> Tool:
-    """Return the record of a tool that a file describes."""
+    """Return the Tool record for a description in a file."""
     return replace(_tool(name, described.keys, ""), materials=tuple(described.presets))
 
 
 def tools_for(named: Mapping[str, Described], job_table: Table, folder: Path, shop: Shop) -> Tools:
-    """Return the tools of a job: those `named` in its file, which is in this folder, those of
-    libraries, and those of a tool table, which its keys for the `job_table` job name."""
+    """Return the tools that the operations of a job may use: those `named` in its file, those of
+    its libraries, and those of the LinuxCNC tool table that `job_table` names. `folder`: that of
+    the job file."""
     library = _path_of("tool_library", job_table, folder)
     tools = Tools(
         named,
@@ -158,8 +159,8 @@ def tools_for(named: Mapping[str, Described], job_table: Table, folder: Path, sh
 
 
 def _path_of(key: str, job_table: Table, folder: Path) -> Path | None:
-    """Return the file that a key names: in a job file relative to it, on the command line to
-    where it is run."""
+    """Return the path that a key names, None if it is not set. Names in a job file are relative to
+    its folder, names on the command line to the current directory."""
     key_value = job_table.given.get(key)
     if key_value is None:
         return None
@@ -168,10 +169,10 @@ def _path_of(key: str, job_table: Table, folder: Path) -> Path | None:
 
 
 class Tools(Struct, frozen=True, dict=True):
-    """The tools of a job: `named` in its file, those of `libraries`, the nearest first, which are
-    read when one is needed, and by number those of a LinuxCNC `table`, whose lengths have the unit
-    `units`. `material`: what is cut, if it is said, and whether the job or a flag says so;
-    `default`: the tool of operations that say none."""
+    """The tools of a job: `named` in its file; those of `libraries`, the nearest first, which are
+    read when needed; and those of a LinuxCNC `table` by number, with lengths in `units`.
+    `material`: the material that is cut, if given; `material_is_asked`: it comes from the job or a
+    flag, not from the shop; `default`: the tool of operations that name none."""
 
     named: Mapping[str, Described] = field(default_factory=dict)
     libraries: tuple[Path, ...] = ()
@@ -183,11 +184,12 @@ class Tools(Struct, frozen=True, dict=True):
     default: Given | None = None
 
     def of(self, layers: Sequence[Table], kind: str) -> Used:
-        """Return the tool of an operation of this kind. `layers`: the tables that apply to
-        it, the nearest last.
+        """Return the tool of an operation of this kind. `layers`: the tables that apply to it, the
+        nearest last.
 
-        The nearest name or number counts, and single keys (`tool_diameter`) of that layer and
-        of nearer ones change it. The default tool is for operations that say nothing of a tool.
+        The nearest tool name or number counts; single keys such as `tool_diameter` of the same or
+        a nearer layer change that tool. The default tool is used where no layer has any key of a
+        tool.
         """
         row = max((n for n, layer in enumerate(layers) if TOOL_NAME in layer.given), default=-1)
         tool_name = None if row < 0 else layers[row].given[TOOL_NAME]
@@ -208,8 +210,8 @@ class Tools(Struct, frozen=True, dict=True):
         return self._used(name, replace(described, keys=keys), kind)
 
     def _used(self, name: str, described: Described, kind: str) -> Used:
-        """Return the tool, and its preset for what is cut. OptionError for a material for which
-        it has none, though it has some."""
+        """Return the tool with its preset for the material that is cut. OptionError if it has
+        presets but none for this material."""
         tool = _tool(name, described.keys, kind)
         if self.material is None or not described.presets:
             return Used(replace(tool, materials=tuple(described.presets)), Table())
@@ -229,7 +231,7 @@ class Tools(Struct, frozen=True, dict=True):
         return Used(tool, preset.only(OPERATION), material)
 
     def refuse_idle_material(self, operations: Iterable[Operation]) -> None:
-        """Raise OptionError for a material that the job or a flag says, and no tool has
+        """Raise OptionError if the job or a flag sets a material but no tool of the job has
         presets."""
         if self.material is None or not self.material_is_asked:
             return
@@ -240,7 +242,8 @@ class Tools(Struct, frozen=True, dict=True):
             )
 
     def _chosen(self, raw: Given) -> tuple[str, Described]:
-        """Return the tool that a name or a number says, and its name."""
+        """Return name and description of the tool that a name or a number refers to; OptionError
+        for an unknown one."""
         value = raw.value
         if isinstance(value, str) and value in self.named:
             return value, self._completed(self.named[value])
@@ -283,7 +286,8 @@ class Tools(Struct, frozen=True, dict=True):
         return every
 
     def _completed(self, described: Described) -> Described:
-        """Complete a named tool that has a number with the diameter of the tool table."""
+        """Return the tool with the keys of the LinuxCNC tool table for its number, which fill in a
+        missing diameter."""
         keys, number = described.keys, _number_of(described.keys)
         if number is None or number not in self.table:
             return described
@@ -291,8 +295,8 @@ class Tools(Struct, frozen=True, dict=True):
         return replace(described, keys=keys.over(table_keys))
 
     def _of_table(self, number: int, *, needed: bool = True) -> Table:
-        """Return the keys of a tool of the table; refused when it lacks a diameter that is
-        needed."""
+        """Return the keys of tool `number` of the LinuxCNC table; OptionError if its diameter is
+        missing and `needed`."""
         tool = self.table[number]
         table = Table({}, f"line {tool.line}", self.table_file)
         if tool.diameter is None and needed:
@@ -307,7 +311,8 @@ class Tools(Struct, frozen=True, dict=True):
 
 
 def _with_table(tools: Tools, path: Path) -> Tools:
-    """Return the tools, and those of a LinuxCNC tool table; OptionError names file and line."""
+    """Return the tools together with those of a LinuxCNC tool table; OptionError names file and
+    line."""
     try:
         text = path.read_bytes().decode("utf-8", errors="replace")
     except OSError as error:
@@ -318,14 +323,15 @@ def _with_table(tools: Tools, path: Path) -> Tools:
 
 
 def _number_of(keys: Table) -> int | None:
-    """Return the number of a tool of the file, if it has one."""
+    """Return the key `number` of a tool, or None."""
     number_value = keys.given.get("number")
     number: int | None = None if number_value is None else TOOL["number"].read(number_value)
     return number
 
 
 def _tool(name: str, keys: Table, kind: str) -> Tool:
-    """Return the record; a tool with a tip that does not say its kind is a V bit, or drills."""
+    """Return the Tool record of these keys. A tool with a tip angle but no kind is a drill for
+    operations that peck, else a V bit."""
     if "tip_angle" in keys.given and "kind" not in keys.given:
         drills = bool(kind) and kind_named(kind).descent == "pecks"
         meant = Given("drill" if drills else "v", keys.where, keys.file)

@@ -41,8 +41,9 @@ NEAR_SHARE = 1e-6
 
 
 def has_room(lines: Polylines, radius_mm: float) -> Bools:
-    """Return the mask (N,) of the closed paths within which the centre of a tool of this radius
-    has room; of paths that enclose no clear region, those whose box is large enough."""
+    """Return the mask (N,) of closed paths with room inside for the centre of a tool of this
+    radius, that is, whose inward offset is not empty. For paths that enclose no clear region, the
+    mask of those whose bounding box is wider than the tool is returned."""
     ccw = reverse_lines(lines, signed_areas(lines) < 0.0)
     has_space: Bools = (
         np.ptp(path_extents(lines), axis=2).min(axis=1, initial=np.inf) > 2.0 * radius_mm
@@ -60,8 +61,8 @@ def has_room(lines: Polylines, radius_mm: float) -> Bools:
 
 
 def is_slot(lines: Polylines, width_mm: float) -> Bools:
-    """Return the mask (N,) of the closed paths whose widest place is as wide as a tool of this
-    width."""
+    """Return the mask (N,) of closed paths that are slots for a tool of this width: their widest
+    place is as wide as the tool, within SLOT_MM of the radius."""
     radius = 0.5 * width_mm
     if not radius > SLOT_MM:
         return np.zeros(len(lines), dtype=np.bool_)
@@ -70,9 +71,9 @@ def is_slot(lines: Polylines, width_mm: float) -> Bools:
 
 @lru_cache(maxsize=8)
 def crowded(drawing: Drawing, width_mm: float) -> frozenset[int]:
-    """Return rows of the closed paths, letters aside, that a tool of this width cannot run
-    beside or within without cutting into a neighbour, and of those that cross others; small
-    ones with all that lies within them."""
+    """Return the rows of closed paths, except letters, that a tool of this width cannot run beside
+    or within without cutting into a neighbour, and of those that cross others. A small crowded
+    path also brings in everything within it (LETTER_SHARE)."""
     lettered = np.array([is_text(source) for source in drawing.sources], dtype=np.bool_)
     rows = np.flatnonzero(drawing.paths.closed & ~lettered)
     lines = drawing.paths.select(rows)
@@ -95,8 +96,8 @@ def crowded(drawing: Drawing, width_mm: float) -> frozenset[int]:
 
 
 def _add_near(lines: Polylines, waste: Ints, width_mm: float, is_crowded: Bools) -> None:
-    """Mark the closed paths (N,) as crowded that are nearer to each other than this width, where
-    they bound the same `waste`, and those that cross."""
+    """Set `is_crowded` (N,) in place for closed paths that bound the same `waste` and are nearer
+    to each other than this width, and for paths that cross."""
     segments = Segments.leaving(lines, segment_rows(lines))
     path, boxes = segments.path, segment_boxes(segments)
     index, grown = BoxIndex(boxes), boxes + np.array([-1.0, -1.0, 1.0, 1.0]) * width_mm

@@ -45,7 +45,7 @@ def inkscape(out: str | None, quiet: bool, verbose: bool) -> int:
 
 
 def _user_folder() -> Path:
-    """Return the folder of the user's extensions, as Inkscape looks for it."""
+    """Return the folder in which Inkscape looks for the user's extensions."""
     profile = os.environ.get("INKSCAPE_PROFILE_DIR")
     if profile:
         return Path(profile, "extensions")

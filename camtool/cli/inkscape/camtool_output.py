@@ -29,7 +29,8 @@ class Refusal(Exception):
 
 
 def read_arguments(words: list[str]) -> Namespace:
-    """Return what Inkscape says: values of the dialog, and the file of the drawing."""
+    """Parse the arguments that Inkscape passes: the values of the dialog, and the file of the
+    drawing."""
     parser = ArgumentParser()
     parser.add_argument("--target", default="")
     parser.add_argument("--flags", default="")
@@ -38,10 +39,10 @@ def read_arguments(words: list[str]) -> Namespace:
 
 
 def post(options: Namespace, output: str, *more: str) -> tuple[bytes, list[str]]:
-    """Call `camtool post` for the drawing, in its folder, and return what is on stdout, and its
-    messages. Refusal with the errors.
+    """Run `camtool post` for the drawing, in its folder; return its stdout and its messages.
+    Raises Refusal with the errors.
 
-    Machine and job are those of the folder: its `camtool.toml`, and `part.toml` for `part.svg`.
+    Machine and job come from the folder: its `camtool.toml`, and `part.toml` for `part.svg`.
     """
     document = Path(os.environ.get("DOCUMENT_PATH", ""))
     folder = document.parent if document.is_absolute() else Path.home()
@@ -82,7 +83,7 @@ def post(options: Namespace, output: str, *more: str) -> tuple[bytes, list[str]]
 
 
 def show(text: str) -> None:
-    """Write a text for the dialog."""
+    """Write a text to stderr, which Inkscape shows in a dialog."""
     sys.stderr.buffer.write(f"{text}\n".encode())
 
 
