@@ -2,9 +2,9 @@
 
 Every reader ends here, so that a DXF and an SVG of the same part give the same Drawing:
 
-    pieces ──selected──▶ wanted ──cleaned──▶ checked, once ──healed──▶ contours ──▶ findings
-                       └▶ the others, cleaned and healed on their own ──▶ unchosen closed contours
-    wanted × contours ──off_drawn──▶ how far they are apart
+    pieces ──select_pieces──▶ chosen ──clean_pieces──▶ paths, each once ──heal_contours──▶ contours
+                           └▶ the others, cleaned and healed alone ──▶ unchosen closed contours
+    chosen × contours ──distance_from_drawn──▶ mm between them
 
 A *piece* is one entity or one subpath, in mm, Y up. A *gap* lies between two open ends.
 Tolerances: POSITION_EPS_MM (two points are one), `options.gap_mm` (two ends are joined), and
@@ -68,7 +68,7 @@ _SOURCES_NAMED = 3
 
 
 def unit_or_mm(options: ReadOptions, why: str) -> Units:
-    """Return the unit that was asked for, else mm, for the reason `why`."""
+    """Return the unit that the options ask for, else mm; `why` explains the mm to the user."""
     if options.units is None:
         return Units("mm", 1.0, why)
     return Units(options.units.lower(), options.mm_per(options.units), "as asked")
@@ -86,7 +86,7 @@ class Found(Struct, frozen=True, eq=False):
     callouts: Sequence[Callout] = ()
 
     def drawing(self, file: str, options: ReadOptions) -> Drawing:
-        """Return the Drawing of all of it."""
+        """Return the Drawing made of what was found (see `assemble`)."""
         return assemble(
             self.pieces,
             file=file,
@@ -112,12 +112,13 @@ def assemble(
     marks: Sequence[Mark] = (),
     callouts: Sequence[Callout] = (),
 ) -> Drawing:
-    """Return the Drawing of these pieces, in the order in which their first members came.
+    """Return the Drawing of these pieces; contours are in the order in which their first pieces
+    came.
 
-    `findings` are those of the reader (units, repairs); gaps, size and one ENTITY_SKIPPED for
-    each kind of `skipped` are added here. A drawing of `marks` alone has no paths; `callouts` are
-    all kept, whatever is selected. Raises
-    DrawingError when a number is no position or when nothing is left to draw.
+    `findings` are those of the reader (units, repairs); gaps, size and one ENTITY_SKIPPED for each
+    kind of `skipped` are added here. A drawing of `marks` alone has no paths; `callouts` are all
+    kept, whatever is selected. Raises DrawingError when a number is no position or when nothing is
+    left to draw.
     """
     every = pieces
     pieces, marks, unwanted = selected_with_marks(every, marks, options.select, file)
@@ -189,7 +190,7 @@ def _drawing_findings(drawing: Drawing, options: ReadOptions) -> list[Finding]:
 
 
 def _source(members: Sequence[Piece]) -> str:
-    """Return the sources of a chain's members, the first few by name."""
+    """Return the sources of the pieces that a contour is made of, the first few by name."""
     if len(members) == 1:
         return members[0].source
     names = list(dict.fromkeys(piece.source for piece in members))
@@ -214,10 +215,10 @@ def _nothing_drawn_error(skipped: Sequence[Skipped], file: str) -> DrawingError:
 def selected_with_marks(
     pieces: Sequence[Piece], marks: Sequence[Mark], selection: Selection, file: str
 ) -> tuple[list[Piece], list[Mark], list[Skipped]]:
-    """Return the chosen pieces and marks, and what was left out and why.
+    """Return the chosen pieces and marks, and the counts of those left out, with the reason.
 
-    Both go through one selection, so that a layer of marks alone is a layer that exists.
-    Raises DrawingError as `selected` does.
+    Both go through one selection, so that a layer that holds only marks counts as a layer. Raises
+    DrawingError as `select_pieces` does.
     """
     if selection == Selection():
         return list(pieces), list(marks), []
@@ -232,8 +233,8 @@ def selected_with_marks(
 
 
 def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], list[Skipped]]:
-    """Return each mark once, and the count of what went; two within POSITION_EPS_MM on a layer are
-    one.
+    """Return each mark once, and the counts of repeated ones; two marks of a layer within
+    POSITION_EPS_MM are one.
 
     DrawingError when a number is not finite or beyond MAX_COORDINATE_MM.
     """
@@ -296,7 +297,8 @@ def font_findings(lacking: Counter[str]) -> list[Finding]:
 
 
 def size_findings(drawing: Drawing) -> list[Finding]:
-    """IMPLAUSIBLE_SIZE when the longer side fits a wrong unit better than a part."""
+    """Return IMPLAUSIBLE_SIZE if the longer side is below MIN_SIZE_MM or above MAX_SIZE_MM: the
+    unit is probably wrong."""
     units, box = drawing.units, drawing_extents(drawing)
     width, height = (float(side) for side in box[:, 1] - box[:, 0])
     longest = max(width, height)
@@ -318,8 +320,10 @@ def size_findings(drawing: Drawing) -> list[Finding]:
 
 
 def gap_findings(gaps: Sequence[Gap], gap_mm: float, *, closed: bool) -> list[Finding]:
-    """Return a finding for each gap, largest first, and one for all that are more than are
-    read."""
+    """Return a finding for each of MAX_GAP_FINDINGS gaps, and one that counts the others.
+
+    Of `closed` gaps the largest come first, of open ones the smallest.
+    """
     ranked = sorted(gaps, key=lambda gap: -gap.size_mm if closed else gap.size_mm)
     findings = [
         (GAP_CLOSED if closed else GAP_OPEN)(
@@ -360,7 +364,8 @@ def healing_findings(healed: Healing, tolerance_mm: float) -> list[Finding]:
 
 
 def _branch_findings(healed: Healing) -> list[Finding]:
-    """Branches where the most ends meet first, the rest counted."""
+    """Return a finding for each point where several paths branch, those with the most ends first;
+    one finding counts those beyond MAX_PLACES."""
     ranked = sorted(healed.branches, key=lambda branch: -branch.ends)
     findings = [
         BRANCHED(where=_where(branch.layer, branch.at_mm), measured=branch.ends, limit=2.0)
@@ -373,8 +378,8 @@ def _branch_findings(healed: Healing) -> list[Finding]:
 
 
 def _crossing_findings(crossings: Sequence[SelfCrossing]) -> list[Finding]:
-    """Return a finding for each path that crosses itself, with its first place; those beyond
-    MAX_PLACES are counted."""
+    """Return a finding for each path that crosses itself, with its first place; one finding counts
+    those beyond MAX_PLACES."""
     times = Counter(crossing.path for crossing in crossings)
     first = {crossing.path: crossing for crossing in reversed(crossings)}
     findings = []

@@ -119,7 +119,8 @@ def find_format(data: bytes, suffix: str, file: str) -> str:
 
 
 def _by_bytes(data: bytes, file: str) -> str | None:
-    """Return the format whose first bytes these are; DrawingError for what is no drawing."""
+    """Return the format whose first bytes these are, None if none; DrawingError for what is
+    certainly no drawing."""
     if data.startswith(BINARY_DXF):
         return "dxf"
     if data.startswith(NPY_START) or is_npz(data):
@@ -145,7 +146,8 @@ def _by_bytes(data: bytes, file: str) -> str | None:
 
 
 def _by_text(data: bytes, suffix: str, file: str) -> str | None:
-    """Return the format of a text, by its first signs and then by the extension."""
+    """Return the format of a text, by its first characters and then by the extension; None if
+    unknown."""
     head = text_head(data)
     if _DXF_START.match(head):
         return "dxf"
@@ -209,8 +211,8 @@ def is_brep(head: str) -> bool:
 
 
 def text_head(data: bytes, size: int = HEAD_BYTES) -> str:
-    """Return the first characters of a text in UTF-8 or UTF-16 (by its mark), whatever bytes
-    follow."""
+    """Return the first characters of a text in UTF-8 or UTF-16 (by its byte-order mark); bytes
+    that cannot be decoded become U+FFFD."""
     head = data[:size]
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return head.decode("utf-16", errors="replace").lstrip("\ufeff")
@@ -222,7 +224,7 @@ def text_head(data: bytes, size: int = HEAD_BYTES) -> str:
 
 
 def _xml(head: str, file: str) -> str:
-    """ "svg", or DrawingError when the first element is another one."""
+    """Return "svg"; DrawingError if the first element of the XML is another one."""
     root = _xml_root(head)
     if root in ("svg", None):
         return "svg"
@@ -232,7 +234,8 @@ def _xml(head: str, file: str) -> str:
 
 
 def _xml_root(head: str) -> str | None:
-    """Return the name of the first element, without its prefix; None when none is to be seen."""
+    """Return the name of the first element, without its prefix; None if none is within this
+    head."""
     offset = 0
     while match := _XML_BEFORE.match(head, offset):
         offset = match.end()
@@ -242,7 +245,7 @@ def _xml_root(head: str) -> str | None:
 
 
 def _unpacked_head(data: bytes) -> bytes:
-    """Return the first bytes of what gzip packed, as many as are whole."""
+    """Return the first bytes of a gzip file, unpacked; b"" if it is damaged."""
     try:
         return zlib.decompressobj(31).decompress(data[: 16 * HEAD_BYTES], XML_HEAD_BYTES)
     except zlib.error:
@@ -250,8 +253,7 @@ def _unpacked_head(data: bytes) -> bytes:
 
 
 def _refuse_program(head: str, file: str) -> None:
-    """Raise DrawingError when the first line that is no comment is a block of a machine
-    program."""
+    """Raise DrawingError if the first line that is no comment is a block of a machine program."""
     offset = 0
     while offset < len(head) and (comment := _COMMENT.match(head, offset)):
         if comment.end() == offset:
@@ -266,7 +268,7 @@ def _refuse_program(head: str, file: str) -> None:
 
 
 def _looks_like_points(head: str) -> bool:
-    """Return True if this is text, and its first line that is no comment begins with two
+    """Return True if the content is text, and its first line that is no comment begins with two
     fields."""
     if "\x00" in head or "\ufffd" in head:
         return False

@@ -1,7 +1,7 @@
 """Pieces to contours: checked, mended, joined; and how far the contours lie from what was drawn.
 
-    pieces ──cleaned──▶ paths, each once ──healed──▶ contours, and a Healing that counts
-    pieces × contours ──off_drawn──▶ mm
+    pieces ──clean_pieces──▶ paths, each once ──heal_contours──▶ contours, and counts (`Healing`)
+    pieces × contours ──distance_from_drawn──▶ mm
 
 Cleaning checks numbers, takes out repeated points and keeps each piece once. Its tolerance is
 POSITION_EPS_MM, below which two points are one; it decides what is a repeated point, what has no
@@ -56,7 +56,8 @@ class Cleaned(Struct, frozen=True, eq=False):
 
 
 def clean_pieces(pieces: Sequence[Piece], file: str) -> Cleaned:
-    """Return the pieces without repeated points, each drawn once, and the count of what went.
+    """Return the pieces as paths without repeated points and each drawn once, and the counts of
+    what was left out.
 
     DrawingError when a number is not finite or beyond MAX_COORDINATE_MM, or a piece is no path.
     """
@@ -91,7 +92,7 @@ def clean_pieces(pieces: Sequence[Piece], file: str) -> Cleaned:
 
 
 def _select_rows(rows: Floats, is_chosen: Bools) -> Floats:
-    """Return the chosen rows; the very array where these are all."""
+    """Return the chosen rows; the same array, not a copy, if all are chosen."""
     return rows if is_chosen.all() else rows[is_chosen]
 
 
@@ -104,8 +105,11 @@ def is_placed(piece: Piece) -> bool:
 
 
 def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
-    """Return all vertices (N, 3) and how many each piece has; DrawingError when one is no
-    position."""
+    """Return the vertices (N, 3) of all pieces in one array, and the number of vertices of each
+    piece.
+
+    DrawingError when one is not finite or too far away.
+    """
     counts = np.array([len(piece.vertices) for piece in pieces], dtype=np.int64)
     if counts.sum() > MAX_POINTS:
         raise too_many_points(file)
@@ -134,7 +138,10 @@ def _kinds(
     times: Ints | None = None,
     before: str = "",
 ) -> list[Skipped]:
-    """Return the chosen pieces counted by kind; `times` counts each so often."""
+    """Return counts of the chosen pieces by kind, with the reason why they are left out.
+
+    `times` (of each piece) counts a piece more than once; `before` is put before the kind.
+    """
     counts: Counter[str] = Counter()
     for index in np.flatnonzero(is_chosen).tolist():
         counts[pieces[index].kind] += 1 if times is None else int(times[index])
@@ -144,7 +151,8 @@ def _kinds(
 def _lines(
     vertices: Floats, counts: Ints, closed: Bools, pieces: Sequence[Piece], file: str
 ) -> Polylines:
-    """Return the pieces as paths; a fault is named by its piece."""
+    """Return the pieces as Polylines; DrawingError, which names the piece, for one that is no
+    path."""
     try:
         return Polylines(vertices, np.concatenate([[0], np.cumsum(counts)]), closed)
     except GeometryError as error:
@@ -156,11 +164,12 @@ _Words = npt.NDArray[np.uint64]
 
 
 def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
-    """Return (M,) false for each path that is one before it again: same style, same segments.
+    """Return a mask (M,), false for each path that repeats an earlier one: same style, same
+    segments.
 
     Each segment is a number (`segment_numbers`); a path is the sum of its segments, the same from
-    any start. 64 bits: two different ones of
-    a million paths are taken for one with a chance of one in thirty million.
+    any start. With 64 bits, the chance that two different paths among a million are taken for the
+    same is one in thirty million.
     """
     count = len(lines)
     if not count:
@@ -176,8 +185,11 @@ def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
 
 
 def segment_numbers(vertices: Floats, begin: Ints | Indices, end: Ints | Indices) -> _Words:
-    """Return (K,) a number mixed from the rounded ends and the bulge of the segment between two
-    vertices (of N, 3), the rows (K,) of which are given; the same in both directions."""
+    """Return a 64-bit hash (K,) of each segment, from its rounded ends and bulge; the same in both
+    directions.
+
+    `begin` and `end` (K,) are the rows of its ends in `vertices` (N, 3).
+    """
     numbers = np.empty(len(begin), dtype=np.uint64)
     for first in range(0, len(begin), SEGMENTS_AT_ONCE):
         batch = slice(first, first + SEGMENTS_AT_ONCE)
@@ -197,7 +209,8 @@ def segment_numbers(vertices: Floats, begin: Ints | Indices, end: Ints | Indices
 
 
 def _mix_bits(words: _Words) -> _Words:
-    """Numbers scattered over 64 bits (the finalizer of SplitMix64, Steele and others 2014)."""
+    """Return the numbers hashed over 64 bits (the finalizer of SplitMix64, Steele and others
+    2014)."""
     word = words + np.uint64(0x9E3779B97F4A7C15)
     word = (word ^ (word >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     word = (word ^ (word >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -222,12 +235,14 @@ class Healed(Struct, frozen=True, eq=False):
 
 
 def gap_of(options: ReadOptions) -> float:
-    """Ends nearer than this are joined, mm; equal ends always are."""
+    """Return the distance, mm, below which open ends are joined; ends within POSITION_EPS_MM
+    always are."""
     return max(options.gap_mm, POSITION_EPS_MM) if options.chain_gaps else POSITION_EPS_MM
 
 
 def heal_contours(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions) -> Healed:
-    """Join the cleaned pieces to contours; arcs are recognised, and overlaps removed."""
+    """Return the contours joined from the cleaned pieces, without overlaps, and with arcs
+    recognised if the options ask for it."""
     lasting = [pieces[index] for index in clean.piece.tolist()]
     places = [("" if options.across_layers else piece.layer, piece.colour) for piece in lasting]
     tolerance = min(SAME_LINE_MM, options.tolerance_mm)
@@ -256,8 +271,8 @@ def heal_contours(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions)
 
 
 def _members(chains: tuple[tuple[int, ...], ...], sources: Ints) -> tuple[tuple[int, ...], ...]:
-    """Return the pieces of each chain of paths, each once; `sources` says which piece each path is
-    from."""
+    """Return for each chain of paths the pieces that it is made of, each once; `sources` gives the
+    piece of each path."""
     if np.array_equal(sources, np.arange(len(sources))):
         return chains
     rows = sources.tolist()
@@ -267,7 +282,7 @@ def _members(chains: tuple[tuple[int, ...], ...], sources: Ints) -> tuple[tuple[
 def _chain_paths(
     pieces: Sequence[Piece], lines: Polylines, sources: Ints, options: ReadOptions
 ) -> Chained:
-    """Return the paths joined, within their layers unless `across_layers`."""
+    """Return the paths joined at their ends, within one layer unless `options.across_layers`."""
     members = [pieces[index] for index in sources.tolist()]
     layers = [piece.layer for piece in members]
     kinds = Kinds(
@@ -279,8 +294,8 @@ def _chain_paths(
 
 
 def _recognise_arcs(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]:
-    """Return the paths with arcs for chords on one circle, if that was asked for; how many
-    arcs."""
+    """Return the paths with chords on one circle replaced by arcs, if the options ask for it, and
+    the number of arcs."""
     if not options.recognise_arcs:
         return lines, 0
 
@@ -304,8 +319,8 @@ PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def distance_from_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
-    """Return (N, 2) mm: the largest and the rms distance between what was drawn as `pieces` and
-    the segment that leaves each vertex of the paths made of them."""
+    """Return (N, 2) mm for the segment that leaves each vertex of `lines`: the largest and the rms
+    distance between it and what was drawn as `pieces`."""
     zeros = np.broadcast_to(0.0, (len(lines.vertices), 2))  # one number, seen as many
     drawn, drawn_off = _drawn_segments(pieces)
     if not len(drawn) or not len(lines):
@@ -341,7 +356,7 @@ class _Joined(Struct, frozen=True, eq=False):
         return len(self.begin)
 
     def numbers(self) -> _Words:
-        """Return (K,) as `segment_numbers` gives them."""
+        """Return the hash (K,) of each segment (`segment_numbers`)."""
         return segment_numbers(self.vertices, self.begin, self.end)
 
     def of(self, indices: Ints) -> Segments:
@@ -351,15 +366,16 @@ class _Joined(Struct, frozen=True, eq=False):
 
 
 def _is_among(numbers: _Words, candidates: _Words) -> Bools:
-    """Return (K,) which numbers are among the others, of which there is at least one."""
+    """Return a mask (K,) of the numbers that occur among the candidates, of which there is at
+    least one."""
     ordered = np.sort(candidates)
     positions = np.searchsorted(ordered, numbers)
     return np.asarray(ordered[np.minimum(positions, len(ordered) - 1, out=positions)] == numbers)
 
 
 def _drawn_segments(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
-    """Return the segments of the pieces that have a length, and how far off the segment that
-    leaves a vertex is said to be (N, 2)."""
+    """Return the segments of the pieces that have a length, and the errors (N, 2) mm that the
+    reader stated for the segment that leaves each vertex."""
     lasting = [piece for piece in pieces if len(piece.vertices)]
     counts = np.array([0, *(len(piece.vertices) for piece in lasting)])
     offsets = np.cumsum(counts)
@@ -383,8 +399,13 @@ def _drawn_segments(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
 def _add_distances(
     drawn: _Joined, drawn_off: Floats, result: _Joined, is_gone: Ints, new: Ints, off_mm: Floats
 ) -> None:
-    """Add to `off_mm` (N, 2), of the segment that leaves each vertex, what `is_gone` of the drawn
-    segments, and which of the made ones are `new`, says of it, measured both there and back."""
+    """Raise `off_mm` (N, 2), in place, to the distances between segments that have no equal on the
+    other side.
+
+    `is_gone` are rows of drawn segments that no result equals, `new` those of the result that no
+    drawn one equals. Distances are measured from drawn to result and from result to drawn, and the
+    reader's own error is added.
+    """
     # What was drawn, to what is there now: the nearest of it, and what is about as near.
     for rows, distances, point, row in _near_segments(drawn, is_gone, result, 2.0):
         total = distances[point, None] + drawn_off[drawn.begin[rows[point]]]
@@ -398,9 +419,12 @@ def _add_distances(
 def _near_segments(
     segments: _Joined, indices: Ints, other_segments: _Joined, times: float
 ) -> Iterator[tuple[Ints, Floats, Ints, Ints]]:
-    """For some of the segments `indices` at a time: which of them (P,) each point along them is
-    on, and how far (P,) mm the nearest of the others is from it; and pairs (J,), (J,) of a point
-    and one of the others that is no farther from it than so many times that."""
+    """Yield, for batches of the segments `indices`, the distances of points along them to the
+    nearest other segment.
+
+    Each batch gives for its P points the segment (P,) and the distance (P,) mm, then pairs (J,),
+    (J,) of a point and another segment whose distance is at most `times` the nearest one.
+    """
     if not len(indices):
         return
     moves = moves_of(other_segments.of(np.arange(len(other_segments))))

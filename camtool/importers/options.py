@@ -231,15 +231,15 @@ class ReadOptions(FrozenRecord):
 
     @property
     def px_an_inch(self) -> float:
-        """As asked, or as CSS has it."""
+        """Pixels per inch: as asked, or as CSS has it."""
         return DPI if self.dpi is None else self.dpi
 
     def as_drawn(self) -> ReadOptions:
-        """Return the same with lengths of the part as they are in the drawing; `scale` says so
-        still.
+        """Return the options with lengths on the part divided by `scale`, so that they apply to
+        the drawing.
 
-        A tolerance does not come below POSITION_EPS_MM by that: positions nearer than this are
-        one."""
+        A tolerance is not reduced below POSITION_EPS_MM: positions nearer than this are one.
+        """
         from camtool.geometry.polylines import POSITION_EPS_MM
 
         return replace(
@@ -322,7 +322,7 @@ def colour_named(text: str) -> str:
 
 
 def options_of(fields: Mapping[str, Any], machine: Machine | None = None) -> ReadOptions:
-    """Return the options of these fields of `ReadOptions` and `Selection`, by name.
+    """Return the options with these fields of `ReadOptions` and `Selection`, by name.
 
     Lengths may be texts with a unit, and a single pattern may stand without a list. Tolerances
     that are not given are those of the `machine`, if there is one. Raises OptionError.

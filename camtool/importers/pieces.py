@@ -91,9 +91,9 @@ NO_LINE_TYPE = "continuous"
 def select_pieces(
     pieces: Sequence[Piece], selection: Selection, file: str
 ) -> tuple[list[Piece], list[Skipped]]:
-    """Return the chosen pieces in order, and how many of each kind were left out, and why.
+    """Return the chosen pieces in order, and for each kind the number left out, with the reason.
 
-    DrawingError when a pattern (save of `exclude_layers`) matches no piece at all.
+    DrawingError when a pattern (except of `exclude_layers`) matches no piece at all.
     """
     if selection == Selection():
         return list(pieces), []
@@ -115,8 +115,8 @@ _Rule = tuple[str, Callable[[Piece], bool]]
 
 
 def _rules(selection: Selection, pieces: Sequence[Piece], file: str) -> list[_Rule]:
-    """Return the conditions of the selection, each with the reason for leaving out a piece that
-    does not fulfil it."""
+    """Return the conditions of the selection, each with the reason given for a piece that does not
+    fulfil it."""
     rules: list[_Rule] = []
     layers = matching_names(selection.layers, (piece.layer for piece in pieces), "layer", file)
     if layers is not None:
@@ -142,7 +142,7 @@ def matching_names(
 ) -> set[str] | None:
     """Return the names that any pattern matches, None without patterns.
 
-    NoMatchError for a pattern that matches none, listing the names there are.
+    NoMatchError, which lists the names there are, for a pattern that matches none.
     """
     if not patterns:
         return None

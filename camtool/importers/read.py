@@ -44,8 +44,8 @@ class Importer(Reader, Protocol):
     """A reader of a file format, named by an entry point of the group `camtool.importers`."""
 
     def recognises(self, data: bytes, suffix: str) -> bool:
-        """Return True if this is the content of a file of its format; `suffix` is that of its
-        name."""
+        """Return True if `data` is the content of a file of this format; `suffix` is the extension
+        of its name."""
 
 
 def read_drawing(path: Path, *, options: ReadOptions = DEFAULTS) -> Drawing:
@@ -63,10 +63,10 @@ def content(path: Path) -> tuple[bytes, str]:
 
 
 def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawing:
-    """Return the Drawing in the content of a file; `file` names it in messages, and its extension
-    hints.
+    """Return the Drawing in the content of a file.
 
-    DrawingError when there is none, OptionError for an option that it cannot have.
+    `file` names it in messages, and its extension is a hint at the format. DrawingError when there
+    is no drawing in it, OptionError for an option that its format does not have.
     """
     if not data.strip():
         raise DrawingError("is empty", file=file, mend=_EXPORT_AGAIN)
@@ -85,10 +85,9 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
 
 
 def _read_by_others(data: bytes, file: str, suffix: str, options: ReadOptions) -> Drawing | None:
-    """Return the Drawing by the first importer of others that recognises the content; None without
-    one.
+    """Return the Drawing made by the first plug-in that recognises the content; None if none does.
 
-    DrawingError, which names the plug-in, for one that is broken.
+    DrawingError, which names the plug-in, for one that fails in an unexpected way.
     """
     for point in sorted(entry_points(GROUP), key=lambda point: point.name):
         try:

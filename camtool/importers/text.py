@@ -76,7 +76,8 @@ class Letter(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, contours: list[list[Floats]], advance: float) -> Letter:
-        """From contours of parts (k, 2)."""
+        """Return the letter with these contours, each a list of parts (k, 2) of k = 2 to 4 control
+        points."""
         parts = [part for contour in contours for part in contour]
         points = np.concatenate(parts) if parts else np.empty((0, 2))
         counts = tuple(tuple(len(part) for part in contour) for contour in contours)
@@ -121,10 +122,11 @@ class WantedFont(Struct, frozen=True):
 
 @lru_cache(maxsize=_CHOICES_KEPT)
 def font_for(request: WantedFont, mode: str) -> tuple[Font, str]:
-    """Return the font to draw with, and the wanted one's name when that is not it ("" otherwise).
+    """Return the font to draw with, and the name of the requested one if another one stands in for
+    it, else "".
 
-    mode "stroke" draws all with single strokes, "outline" only what a stroke font is wanted for.
-    Raises Unusable when outlines are wanted and no outline font is installed.
+    Mode "stroke" draws every text with single strokes, mode "outline" only one for which a stroke
+    font is requested. Raises Unusable when outlines are needed and no outline font is installed.
     """
     if mode == "stroke":
         return stroke_font(), ""
@@ -145,7 +147,7 @@ def font_for(request: WantedFont, mode: str) -> tuple[Font, str]:
 
 @lru_cache(maxsize=1)
 def stroke_font() -> Font:
-    """Hershey's Roman simplex; it needs no font file."""
+    """Return Hershey's Roman simplex, a font of single strokes, which needs no file."""
     depth = max(y for stroke in _strokes("p") for _, y in stroke) - hershey.BASELINE
     blank = hershey.BOX.advance / hershey.CAP_UNITS
     return Font(hershey.NAME, False, _stroke_letter, depth / hershey.CAP_UNITS, blank, STROKE_EM)
@@ -184,7 +186,7 @@ class _Face(Struct, frozen=True, order=True):
         return any(word in self.style.lower() for word in ("italic", "oblique"))
 
     def distance(self, request: WantedFont) -> tuple[bool, int, int, str]:
-        """Return the key that sorts fonts by how much they differ from the requested one."""
+        """Return a sort key by which the fonts most like the requested one come first."""
         weight = _BOLD if request.bold else _REGULAR
         slant = self.italic is not request.italic
         return (slant, abs(self.weight - weight), abs(self.width - _NORMAL_WIDTH), self.path)
@@ -203,7 +205,8 @@ def installed_fonts() -> tuple[_Face, ...]:
 
 
 def _font_named(request: WantedFont) -> _Face | None:
-    """Return the installed font of this family or file name."""
+    """Return the installed font with the requested family, else with the requested file name, else
+    None."""
     if request.family and (face := _of_family(request.family, request)) is not None:
         return face
     name = PurePath(request.file.replace("\\", "/")).name.lower()
@@ -216,7 +219,7 @@ def _of_family(family: str, request: WantedFont) -> _Face | None:
 
 
 def _substitutes(request: WantedFont) -> list[_Face]:
-    """Fonts to try in place of the wanted one, the best first."""
+    """Return fonts to use in place of the requested one, the best first."""
     best = [face for name in SUBSTITUTES if (face := _of_family(name, request)) is not None]
     candidates = sorted(installed_fonts(), key=lambda face: face.distance(request))
     return best + candidates[:_FONTS_KEPT]
@@ -250,8 +253,10 @@ def _outline_font(path: str) -> Font | None:
 
 
 def _outline(glyphs: Any, capital: float, character: str) -> Letter | None:
-    """Return the outline of a letter, None if the font lacks it; `capital` is the height of its
-    capitals in its own units."""
+    """Return the outline of a letter, in heights of a capital; None if the font lacks it.
+
+    `capital` is the height of a capital in the units of the font.
+    """
     if ord(character) not in glyphs.cmap:
         return None
     base = np.array([0.0, float(glyphs.font_measurements.baseline)])
@@ -303,8 +308,11 @@ def finite(*values: float) -> tuple[float, ...]:
 
 
 def describe_lacking(font: str, substituted: str, missing: str) -> str:
-    """Describe what a font lacks, "" for nothing: `font` draws in place of the font
-    `substituted` ("" when it is the wanted one) and has none of the characters `missing`."""
+    """Return words for what a font lacks, "" if nothing.
+
+    `font` draws in place of the font `substituted` ("" when it is the wanted one) and has none of
+    the characters `missing`.
+    """
     notes = []
     if substituted:
         notes.append(f"font {substituted} is not installed: drawn with {font}")
@@ -321,12 +329,12 @@ def _visible(sign: str) -> str:
 
 
 def slant(oblique_deg: float) -> float:
-    """tan of an oblique angle."""
+    """Return the tangent of an oblique angle, which is limited to ±MAX_OBLIQUE_DEG."""
     return math.tan(math.radians(max(-MAX_OBLIQUE_DEG, min(MAX_OBLIQUE_DEG, oblique_deg))))
 
 
 def character_of_number(digits: str) -> str:
-    """Return the character of %%nnn in Windows' western code page."""
+    """Return the character with this number, the nnn of %%nnn, in Windows' western code page."""
     return bytes([int(digits)]).decode("cp1252", errors="replace")
 
 
@@ -350,13 +358,13 @@ class TextLook(Struct, frozen=True, eq=False):
     rules: Rule = Rule.NONE
 
     def advance(self, character: str) -> float:
-        """From this letter to the next."""
+        """Return the distance from the start of this letter to the start of the next one."""
         letter = self.font.letter(character)
         share = self.font.blank if letter is None else letter.advance
         return share * self.height * self.width_factor * self.tracking
 
     def width(self, text: str) -> float:
-        """Of a whole text on one line."""
+        """Return the width of a text on one line: the sum of its advances."""
         return sum(self.advance(character) for character in text)
 
 
@@ -369,8 +377,8 @@ class Ink(Struct, eq=False):
     missing: Counter[str] = field(default_factory=Counter)
 
     def write(self, text: str, look: TextLook, place: tuple[float, float]) -> float:
-        """Draw `text` with its baseline's left end at `place`; the x where the next text
-        begins."""
+        """Draw a text from `place`, the left end of its baseline; return the x at which the next
+        text begins."""
         x, y = place
         across = look.height * look.width_factor
         # (x, y) of a letter ↦ (across·x + height·slant·y, height·y)
@@ -387,7 +395,8 @@ class Ink(Struct, eq=False):
         return x
 
     def rule(self, look: TextLook, span: tuple[float, float], baseline: float) -> None:
-        """The lines that `look` draws along a text from x to x."""
+        """Draw the underline, strike-through and overline that `look` has, over the span from x to
+        x."""
         shares = {Rule.UNDER: -RULE_DROP, Rule.THROUGH: 0.5, Rule.OVER: 1.0 + RULE_DROP}
         for rule, share in shares.items():
             if look.rules & rule and span[1] > span[0]:
@@ -395,7 +404,7 @@ class Ink(Struct, eq=False):
                 self.line(look, (span[0], y), (span[1], y))
 
     def line(self, look: TextLook, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """A straight line: one stroke, or a thin bar among outlines."""
+        """Draw a straight line: one stroke in a stroke font, a thin rectangle among outlines."""
         ends = np.array([start, end], dtype=np.float64)
         if not look.font.outlines:
             self.points.append(ends)

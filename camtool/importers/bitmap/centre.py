@@ -52,7 +52,8 @@ Pixel = tuple[int, int]
 
 
 def thin(dark: Bools) -> Bools:
-    """Return (H, W) the pixels that remain of the dark ones."""
+    """Return the mask (H, W) of the dark pixels that remain when strokes are thinned to lines of
+    one pixel."""
     height, width = dark.shape
     wide = width + 2
     pixels = np.zeros((height + 2) * wide, dtype=np.bool_)
@@ -72,7 +73,7 @@ def thin(dark: Bools) -> Bools:
 
 
 def _edge(pixels: Ints, pixels_set: Bools, neighbours: Ints) -> Ints:
-    """Return those with a light pixel beside them."""
+    """Return those of the `pixels` that have at least one light neighbour."""
     inner = np.ones(len(pixels), dtype=np.bool_)
     for step in neighbours:
         inner &= pixels_set[pixels + step]
@@ -80,8 +81,11 @@ def _edge(pixels: Ints, pixels_set: Bools, neighbours: Ints) -> Ints:
 
 
 def _removable(neighbours: Bools, turn: int) -> Bools:
-    """Return (N,) which pixels may go at once, by their neighbours (N, 8): clockwise from
-    above. In one turn those on the lower right, in the other those on the upper left."""
+    """Return a mask (N,) of pixels that may be removed at once, from their eight neighbours (N,
+    8), clockwise from above.
+
+    Turn 0 removes pixels of the left and lower edges, turn 1 those of the right and upper edges.
+    """
     p2, p3, p4, p5, p6, p7, p8, p9 = neighbours.T
     pairs = ((p2, p3, p4), (p4, p5, p6), (p6, p7, p8), (p8, p9, p2))
     runs = sum((~one & (b | c)).astype(np.int8) for one, b, c in pairs)
@@ -118,8 +122,10 @@ class _Graph:
             self.links[row, column] = sides + diagonals
 
     def chains(self) -> list[list[Pixel]]:
-        """Between ends and junctions, these included; last the closed ones, which begin and end at
-        one pixel."""
+        """Return the chains of linked pixels from one end or junction to the next, both included.
+
+        Closed chains without a junction come last; they begin and end at the same pixel.
+        """
         chains, used_links = [], set[tuple[Pixel, Pixel]]()
         visited = set[Pixel]()
         for begin, links in self.links.items():
@@ -148,14 +154,15 @@ class _Graph:
         return chain
 
     def without(self, pixels: Sequence[Pixel]) -> None:
-        """Take pixels out."""
+        """Remove pixels and their links."""
         for pixel in pixels:
             for link in self.links.pop(pixel):
                 if link in self.links:
                     self.links[link].remove(pixel)
 
     def half_width(self, pixel: Pixel) -> float:
-        """From a pixel to the nearest light one, less half a pixel."""
+        """Return half the width of the stroke at a pixel, in pixels: the distance to the nearest
+        light one, less half a pixel."""
         row, column = pixel[0] + 1, pixel[1] + 1
         reach = 4
         while True:
@@ -169,8 +176,11 @@ class _Graph:
 
 
 def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
-    """Return the centre lines: points (n, 2) in pixels as in `outline`, and whether they are
-    closed; and how many dots are left out, which have no length."""
+    """Return the centre lines of the strokes, and the number of dots that are left out since they
+    have no length.
+
+    A line is its points (n, 2) in pixels (frame as in `outline`), and True if it is closed.
+    """
     graph = _Graph(thin(dark), dark)
     _prune(graph)
     dots = sum(1 for links in graph.links.values() if not links)
@@ -202,7 +212,7 @@ def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
 
 
 def _prune(graph: _Graph) -> None:
-    """Take out spurs until none is left."""
+    """Remove spurs, the short branches that thinning leaves at corners, until none is left."""
     for _ in range(MAX_ROUNDS):
         spur_pixels: list[Pixel] = []
         for chain in graph.chains():
@@ -220,7 +230,7 @@ def _prune(graph: _Graph) -> None:
 
 
 def _without_hook(chain: list[Pixel], graph: _Graph) -> list[Pixel]:
-    """Return a chain without what leads at its begin into a corner of the stroke."""
+    """Return a chain without the hook at its begin that leads into a corner of the stroke."""
     widths = [graph.half_width(chain[0])]
     for pixel in chain[1:]:
         widths.append(graph.half_width(pixel))
@@ -233,8 +243,8 @@ def _without_hook(chain: list[Pixel], graph: _Graph) -> list[Pixel]:
 
 
 def _junctions(graph: _Graph) -> dict[Pixel, int]:
-    """Number the junctions: return the junction of each pixel with three links or more, where
-    linked pixels are one junction."""
+    """Return the number of the junction for each pixel with three links or more; linked pixels of
+    this kind are one junction."""
     junctions = {pixel for pixel, links in graph.links.items() if len(links) > 2}
     numbers: dict[Pixel, int] = {}
     for begin in graph.links:
@@ -265,8 +275,10 @@ def _pair_straightest(
     middle: tuple[float, float],
     look: int,
 ) -> dict[tuple[int, bool], tuple[int, bool]]:
-    """Pair the ends of chains that meet at a junction, the pair with the smallest turn first; each
-    end is in one pair at most."""
+    """Return the pairs of chain ends that continue each other at a junction, both ways round.
+
+    The pair with the smallest turn is made first; each end is in one pair at most.
+    """
     headings = []
     for chain, last in arms:
         path = chains[chain][::-1] if last else chains[chain]
@@ -289,8 +301,8 @@ def _paths(
     chains: list[list[Pixel]],
     continuations: dict[tuple[int, bool], tuple[int, bool]],
 ) -> list[tuple[list[tuple[int, bool]], bool]]:
-    """Chains that go on into each other, each with whether it runs backwards; and whether the path
-    is closed."""
+    """Return paths of chains that continue each other: each chain's index with True if it runs
+    backwards, and for the path True if it is closed."""
     paths, visited = [], [False] * count
     # Paths that begin somewhere first; the rest are rings.
     ends = ((k, is_reversed) for k in range(count) for is_reversed in (False, True))
@@ -319,7 +331,8 @@ def _points(
     middles: dict[int, tuple[float, float]],
     height: int,
 ) -> Floats:
-    """Return the centres of the pixels of a path, (n, 2), and the middles of its junctions."""
+    """Return the points (n, 2) of a path: the centres of its pixels, and the middles of its
+    junctions."""
     places: list[tuple[float, float]] = []
     for chain, is_reversed in path:
         pixels = chains[chain][::-1] if is_reversed else chains[chain]

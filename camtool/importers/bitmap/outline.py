@@ -55,7 +55,7 @@ def crossings(ink: Ink, level: float) -> int:
 
 
 def outlines(ink: Ink, level: float) -> list[Floats]:
-    """Return the lines, closed, points (n, 2) each; n ≥ 4."""
+    """Return the closed lines at the darkness `level`, points (n, 2) in pixels each, n ≥ 4."""
     height, width = ink.shape
     field = np.zeros((height + 2, width + 2), dtype=np.float32)
     field[1:-1, 1:-1] = ink
@@ -82,8 +82,12 @@ def outlines(ink: Ink, level: float) -> list[Floats]:
 
 
 def _directed(field: Ink, dark: Bools, level: float) -> tuple[Ints, Ints]:
-    """Return (K,), (K,) the sides of squares at which lines enter and leave them: numbers of
-    the sides between neighbours in a row, then of those between neighbours in a column."""
+    """Return the sides (K,), (K,) at which a line enters and leaves each square between four
+    pixels.
+
+    Sides are numbered: first those between neighbours in a row, then those between neighbours in a
+    column.
+    """
     width = field.shape[1]
     corners = [dark[:-1, :-1], dark[:-1, 1:], dark[1:, 1:], dark[1:, :-1]]
     code = np.zeros(corners[0].shape, dtype=np.uint8)
@@ -115,8 +119,8 @@ def _directed(field: Ink, dark: Bools, level: float) -> tuple[Ints, Ints]:
 
 
 def _places(field: Ink, side: Ints, level: float) -> Floats:
-    """Return (K, 2) where lines cross these sides: column and row, between the centres of
-    pixels."""
+    """Return the points (K, 2), column and row, where lines cross these sides, interpolated
+    between the centres of pixels."""
     is_vertical = side >= field.size
     start_pixels = np.where(is_vertical, side - field.size, side)
     row, column = np.divmod(start_pixels, field.shape[1])
@@ -127,6 +131,6 @@ def _places(field: Ink, side: Ints, level: float) -> Floats:
 
 
 def enclosed_area(points: Floats) -> float:
-    """Return the area inside a closed line, positive where that is dark."""
+    """Return the area inside a closed line, square pixels; positive if the inside is dark."""
     x, y = (points - points[0]).T
     return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())

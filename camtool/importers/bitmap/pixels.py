@@ -54,7 +54,7 @@ class PixelPicture:
 
 
 def picture(data: bytes, file: str) -> PixelPicture:
-    """Return the picture in a file; DrawingError where it is broken or too large."""
+    """Decode a PNG or JPEG; DrawingError where it is broken or too large."""
     from PIL import Image, ImageOps
 
     with warnings.catch_warnings():
@@ -78,7 +78,7 @@ def picture(data: bytes, file: str) -> PixelPicture:
 
 
 def _ink(image: Any) -> Ink:
-    """Return the darkness of the pixels of an image of any mode."""
+    """Return the darkness (H, W), 0 white to 1 black, of an image of any mode."""
     from PIL import Image
 
     if image.mode.startswith(("I", "F")):
@@ -106,7 +106,7 @@ def _dpi(dpi: Any) -> tuple[float, float] | None:
 
 
 def is_square(dpi: tuple[float, float]) -> bool:
-    """Return True if pixels of this density are square."""
+    """Return True if the densities along x and y agree, so that pixels are square."""
     return abs(dpi[0] - dpi[1]) <= SQUARE_SHARE * max(dpi)
 
 

@@ -87,7 +87,8 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
 
 
 def _units(pixels: PixelPicture, file: str, options: ReadOptions) -> Units:
-    """Return the size of a pixel; DrawingError where no option gives it, or more than one."""
+    """Return the size of a pixel as a unit; DrawingError if no option gives it, or more than
+    one."""
     width = pixels.ink.shape[1]
     if options.units is not None:
         raise DrawingError(
@@ -142,8 +143,8 @@ def _check_tones(ink: Ink, options: ReadOptions, file: str) -> None:
 
 
 def _otsu_threshold(ink: Ink) -> float:
-    """Return the darkness that divides pixels into two kinds whose means differ most (Otsu
-    1979)."""
+    """Return the darkness that best divides the pixels into two classes (Otsu 1979: their means
+    differ most)."""
     counts, edges = np.histogram(ink, BINS, (0.0, 1.0))
     tones = 0.5 * (edges[1:] + edges[:-1])
     below, sums = np.cumsum(counts), np.cumsum(counts * tones)
@@ -163,7 +164,7 @@ def _is_large_enough(area: float, options: ReadOptions) -> bool:
 
 
 def _fill(dark: Bools, line: Floats, hole: bool) -> None:
-    """Make the pixels within a small line dark or light."""
+    """Set the pixels within a small line, in place: dark if it is a `hole`, else light."""
     height = len(dark)
     low, high = np.floor(line.min(axis=0)).astype(int), np.ceil(line.max(axis=0)).astype(int)
     x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)

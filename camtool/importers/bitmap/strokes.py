@@ -82,14 +82,14 @@ class _Shape(Struct, frozen=True, eq=False):
     mean: float
 
     def nearest(self, place: Floats) -> Floats:
-        """Return its place nearest to another one."""
+        """Return the point of the line or circle that is nearest to `place`."""
         arm = place - self.place
         if self.radius == 0.0:
             return self.place + float(arm @ self.direction) * self.direction
         return self.place + arm * (self.radius / (math.hypot(*arm) or 1.0))
 
     def squares(self, points: Floats) -> Floats:
-        """Return (n,) the squares of the distances of points from it."""
+        """Return the squared distances (n,) of points (n, 2) from the line or circle."""
         x, y = (points - self.place).T
         if self.radius > 0.0:
             return np.asarray((np.hypot(x, y) - self.radius) ** 2)
@@ -107,8 +107,11 @@ class PixelStrokes(Struct, frozen=True, eq=False):
 
 
 def strokes(points: Floats, limit: float, *, closed: bool) -> PixelStrokes:
-    """Return lines and arcs within `limit` of the points (n, 2); an open path keeps its ends, a
-    closed one about its area: the limit is less for thinner shapes."""
+    """Return lines and arcs within `limit` pixels of the points (n, 2).
+
+    An open path keeps its ends, a closed one its area to a share of AREA_SHARE: for thin shapes
+    the limit is halved until it does.
+    """
     if not closed:
         return _chain_of_shapes(points, _runs(points, limit), limit, closed=False)
     circle = _circle(points)
@@ -130,8 +133,8 @@ def strokes(points: Floats, limit: float, *, closed: bool) -> PixelStrokes:
 def _begin_at_best_division(
     ring: Floats, ends: list[int], limit: float
 ) -> tuple[Floats, list[int]]:
-    """Return a closed path and its runs, begun where the last run and the first leave the
-    least."""
+    """Return a closed path and its runs, rotated so that it begins where the squared distances
+    from its last and first run are least."""
     if len(ends) < 3:
         return ring, [0, len(ring) // 2, len(ring)]
     before, after = len(ring) - ends[-2], ends[1]
@@ -143,7 +146,7 @@ def _begin_at_best_division(
 
 
 def _sharpest(points: Floats) -> int:
-    """Return the point at which a closed path turns most."""
+    """Return the index of the point at which a closed path turns most."""
     arm = max(min(CORNER_POINTS, len(points) // 4), 1)
     before, after = (points - np.roll(points, arm * k, axis=0) for k in (1, -1))
     lengths = np.hypot(*before.T) * np.hypot(*after.T)
@@ -152,7 +155,8 @@ def _sharpest(points: Floats) -> int:
 
 
 def _circle(points: Floats) -> PixelStrokes | None:
-    """Return all points as a circle of two halves."""
+    """Return the circle through all points, as two half circles, with its distances from them;
+    None for points on a line."""
     circle = _centre(points)
     if circle is None:
         return None
@@ -167,8 +171,8 @@ def _circle(points: Floats) -> PixelStrokes | None:
 
 
 def _centre(points: Floats) -> tuple[Floats, float] | None:
-    """Return the centre and radius of the circle through points, least squares (Kåsa's); None
-    for points on a line."""
+    """Return centre and radius of the circle that fits the points best by least squares (Kåsa's
+    method); None for points on a line."""
     middle = points.sum(axis=0) / len(points)
     x, y = (points - middle).T
     square = x * x + y * y
@@ -183,7 +187,7 @@ def _centre(points: Floats) -> tuple[Floats, float] | None:
 
 
 def _line(points: Floats) -> _Shape:
-    """Return the line of least squares through points, in their direction."""
+    """Return the line that fits the points best by least squares, in their direction."""
     middle = points.sum(axis=0) / len(points)
     if len(points) == 1:
         return _Shape(middle, np.zeros(2), 0.0, 0.0, 0.0, 0.0)
@@ -204,7 +208,8 @@ def _line(points: Floats) -> _Shape:
 
 
 def _arc(points: Floats) -> _Shape | None:
-    """Return the arc of least squares along points; None where they run along none."""
+    """Return the arc that fits the points best by least squares; None if they do not run along
+    one."""
     circle = _centre(points) if len(points) > MIN_RUN_POINTS else None
     if circle is None:
         return None
@@ -225,7 +230,10 @@ def _arc(points: Floats) -> _Shape | None:
 
 
 def _best(points: Floats, limit: float) -> _Shape | None:
-    """Return the line, or else the arc, along points within the limit."""
+    """Return the line that fits the points within `limit`, else the arc that does, else None.
+
+    An arc is preferred where it fits clearly better and is not nearly straight.
+    """
     line = _line(points)
     if line.largest <= FLAT_SHARE * limit:
         return line
@@ -248,8 +256,11 @@ def _goes_back(points: Floats, line: _Shape) -> bool:
 
 
 def _runs(points: Floats, limit: float) -> list[int]:
-    """First points of runs, and the number of points: each run is as long as a line or an arc
-    reaches, then ends where it and the next one leave the least."""
+    """Return the indices at which runs begin, and the number of points at the end.
+
+    A run is as long as one line or arc can follow; then the division between neighbours moves to
+    where the squared distances from both are least.
+    """
     tolerance, ends = SEARCH_SHARE * limit, [0]
     while ends[-1] < len(points):
         ends.append(_reach(points, ends[-1], tolerance))
@@ -273,7 +284,8 @@ def _division_index(points: Floats, index: int, limit: float) -> int:
 
 
 def _reach(points: Floats, first: int, limit: float) -> int:
-    """Return the end of the longest run from `first` on: by doubling, then by halving."""
+    """Return the end of the longest run from `first` on that one line or arc follows within
+    `limit`, found by doubling and then bisection."""
     last = len(points)
     reached, step = min(first + MIN_RUN_POINTS, last), MIN_RUN_POINTS
     too_long = last + 1
@@ -295,8 +307,11 @@ def _reach(points: Floats, first: int, limit: float) -> int:
 def _chain_of_shapes(
     points: Floats, ends: list[int], limit: float, *, closed: bool
 ) -> PixelStrokes:
-    """Return the chain of the shapes of these runs. Where one of them does not suit its points
-    from meeting to meeting, it begins and ends where they do."""
+    """Return the chain of the lines and arcs of these runs, which meet where neighbours intersect.
+
+    Where a shape does not follow its points between these intersections, it begins and ends at the
+    points between the runs instead.
+    """
     runs = [
         _Run(part := points[low:high], _best(part, limit) or _line(part))
         for low, high in pairwise(ends)
@@ -351,7 +366,7 @@ class _Run(Struct, frozen=True, eq=False):
     shape: _Shape
 
     def rows(self, begin: Floats, end: Floats) -> Floats:
-        """Return its vertices (n, 3) between two places, that of the end last."""
+        """Return vertices (n, 3) of the shape between two points, the end included."""
         shape, bulge = self.shape, 0.0
         if shape.radius > 0.0:
             one, last = begin - shape.place, end - shape.place
@@ -361,12 +376,12 @@ class _Run(Struct, frozen=True, eq=False):
         return split_bulges(np.array([[*begin, bulge], [*end, 0.0]]), closed=False)
 
     def far(self, begin: Floats, end: Floats) -> float:
-        """Return the largest distance of the points from the shape between these ends."""
+        """Return the largest distance, pixels, of the points from the shape between these ends."""
         return float(furthest_off(np.ascontiguousarray(self.part), self.rows(begin, end)))
 
     def suits(self, begin: Floats, end: Floats, limit: float) -> bool:
-        """Return True if the points lie within the limit of the shape, which runs in their
-        direction."""
+        """Return True if all points lie within `limit` of the shape between these ends, and it
+        runs in their direction."""
         if abs(self.shape.sweep) < 0.5 * math.pi:
             chord = self.part[-1] - self.part[0]
             if float((end - begin) @ chord) < 0.0:
@@ -376,8 +391,12 @@ class _Run(Struct, frozen=True, eq=False):
     def segments(
         self, begin: Floats, end: Floats, limit: float
     ) -> tuple[list[list[float]], list[list[float]]]:
-        """Return the rows without the end, none where that is the begin, and how far points are
-        from each; those of its halves, at last its points, where they are too far."""
+        """Return the vertices between these ends, without the end, and for each its largest and
+        rms distance from the points.
+
+        Where the shape is too far from its points the run is halved, if need be down to single
+        points. A segment shorter than MIN_SEGMENT_PX gives no vertex.
+        """
         if math.hypot(*(end - begin)) <= MIN_SEGMENT_PX:
             return [], []
         half = len(self.part) // 2

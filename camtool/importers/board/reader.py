@@ -110,7 +110,8 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
 
 
 def _parts(data: bytes, file: str, skipped: list[Skipped]) -> list[_Part]:
-    """Return the files to read, an archive's in the order of their names."""
+    """Return the files of a board to read, those of an archive in the order of their names; others
+    are added to `skipped`."""
     if not data.startswith(b"PK"):
         return [_Part("", _layer_by_name(file) or "GERBER", _text(data))]
     parts, total = [], 0
@@ -151,7 +152,8 @@ def _text(data: bytes) -> str:
 
 
 def _layer_by_function(text: str) -> str | None:
-    """Return the layer that the file's own attribute says; "" for what is not cut."""
+    """Return the layer that the file's attribute .FileFunction names; "" for one that is not cut,
+    None without the attribute."""
     match = re.search(r"TF\.FileFunction,(\w+)(?:,L\d+)?(?:,(\w+))?", text[:20_000])
     if match is None:
         return None
@@ -165,7 +167,7 @@ def _layer_by_name(name: str) -> str:
 
 
 def _pieces(part: _Part, file: str, skipped: list[Skipped]) -> list[Piece]:
-    """Return the pieces of one file, and add to what was skipped."""
+    """Return the pieces of one file; what is left out is added to `skipped`."""
     try:
         from gerbonara.excellon import ExcellonFile
         from gerbonara.rs274x import GerberFile
@@ -204,7 +206,7 @@ def _pieces(part: _Part, file: str, skipped: list[Skipped]) -> list[Piece]:
 
 
 def _remark(text: str) -> str:
-    """Return a remark of gerbonara without the file, line and statement that it begins with."""
+    """Return a warning of gerbonara without the file, line and statement that it begins with."""
     return re.sub(r'^.*?:\d+ ".*?": ', "", text.partition("\n")[0])[:MAX_REMARK]
 
 
@@ -258,7 +260,7 @@ def _centre_lines(objects: Iterable[_Drawn], layer: str) -> Iterator[Piece]:
 
 
 def _arc_of(arc: Any) -> tuple[Floats, float, float, float]:
-    """Return centre, radius, start and sweep of an arc, counterclockwise positive."""
+    """Return centre, radius, start angle and sweep of an arc, rad, counter-clockwise positive."""
     centre = np.array([arc.cx, arc.cy])
     start = math.atan2(arc.y1 - arc.cy, arc.x1 - arc.cx)
     end = math.atan2(arc.y2 - arc.cy, arc.x2 - arc.cx)
@@ -274,7 +276,8 @@ def _arc_of(arc: Any) -> tuple[Floats, float, float, float]:
 
 
 def _areas(objects: Sequence[_Drawn], layer: str) -> Iterator[Piece]:
-    """Yield the contours of the area that all objects leave dark, in their order."""
+    """Yield the contours of the area that remains dark when all objects are drawn in order, dark
+    ones added, clear ones removed."""
     area: BaseGeometry = shapely.Polygon()
     for is_dark, group in _groups(objects):
         united = shapely.union_all(group)
@@ -284,7 +287,7 @@ def _areas(objects: Sequence[_Drawn], layer: str) -> Iterator[Piece]:
 
 
 def _groups(objects: Iterable[_Drawn]) -> Iterator[tuple[bool, list[BaseGeometry]]]:
-    """Yield runs of shapes of one polarity."""
+    """Yield dark (True) or clear, and the shapes, of each sequence of objects of one polarity."""
     dark, group = True, list[Any]()
     for primitives, is_dark in objects:
         shape = _flash(primitives, is_dark)
@@ -300,8 +303,10 @@ def _groups(objects: Iterable[_Drawn]) -> Iterator[tuple[bool, list[BaseGeometry
 
 
 def _flash(primitives: Sequence[Any], is_dark: bool) -> BaseGeometry:
-    """Return the area of one object: a hole in an aperture shows what lies below, so that it is
-    taken off the aperture alone."""
+    """Return the area of one object.
+
+    A hole in an aperture shows what lies below it, so it is removed from this object alone.
+    """
     shape: BaseGeometry = shapely.Polygon()
     for each in primitives:
         area = _area(each)
@@ -315,7 +320,7 @@ def _flash(primitives: Sequence[Any], is_dark: bool) -> BaseGeometry:
 
 
 def _area(primitive: Any) -> BaseGeometry:
-    """Return the area of a primitive; strokes have round ends."""
+    """Return the area of a primitive of gerbonara; strokes have round ends."""
     from gerbonara.graphic_primitives import Arc, ArcPoly, Circle, Line, Rectangle
 
     match primitive:
@@ -342,7 +347,7 @@ def _area(primitive: Any) -> BaseGeometry:
 
 
 def _chords(radius: float, sweep: float) -> int:
-    """Return the number of chords of an arc within FLAT_MM."""
+    """Return the number of chords that keep an arc of this sweep within FLAT_MM."""
     within = 2.0 * math.acos(max(1.0 - FLAT_MM / radius, -1.0)) if radius > FLAT_MM else math.pi
     return max(1, math.ceil(abs(sweep) / min(within, CHORD_RAD)))
 
@@ -360,7 +365,7 @@ def _disc(x: float, y: float, radius: float) -> BaseGeometry:
 
 
 def _stroke(line: Any) -> BaseGeometry:
-    """Return a straight stroke: two half discs, joined."""
+    """Return the area of a straight stroke: two half discs, joined."""
     radius = line.width / 2.0
     length = math.hypot(line.x2 - line.x1, line.y2 - line.y1)
     if radius <= 0.0 or length == 0.0:
@@ -373,7 +378,7 @@ def _stroke(line: Any) -> BaseGeometry:
 
 
 def _bent_stroke(arc: Any) -> BaseGeometry:
-    """Return a stroke along an arc: a sector of a ring and two discs."""
+    """Return the area of a stroke along an arc: a sector of a ring and two discs."""
     half = arc.width / 2.0
     centre, radius, start, sweep = _arc_of(arc)
     if half <= 0.0 or radius == 0.0:
@@ -389,7 +394,8 @@ def _bent_stroke(arc: Any) -> BaseGeometry:
 
 
 def _region(region: Any) -> BaseGeometry:
-    """Return the area of a region; cuts into it and back make holes."""
+    """Return the area of a region; where its outline cuts in and returns along the same line, it
+    encloses a hole."""
     points: list[Floats] = []
     for (x1, y1), (x2, y2), (clockwise, (cx, cy)) in region.segments:
         if clockwise is None:
@@ -407,7 +413,8 @@ def _region(region: Any) -> BaseGeometry:
 
 
 def _contours(area: BaseGeometry) -> Iterator[Floats]:
-    """Yield the closed contours of an area, vertices (n, 3), with arcs for chords of one."""
+    """Yield the closed contours of an area, vertices (n, 3), with chords of one circle replaced by
+    arcs."""
     for polygon in shapely.get_parts(shapely.remove_repeated_points(area, SPECK_MM)):
         if polygon.geom_type != "Polygon" or polygon.is_empty:
             continue

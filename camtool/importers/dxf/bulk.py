@@ -54,12 +54,13 @@ class Bulk(Struct, frozen=True, eq=False):
 
     @classmethod
     def none(cls, tags: Tags) -> Bulk:
-        """Return the value that leaves all tags to ezdxf."""
+        """Return the result in which all tags are left to ezdxf."""
         return cls(np.ones(len(tags.codes), dtype=np.bool_))
 
     @classmethod
     def of(cls, tags: Tags, frame: DxfSections) -> Bulk:
-        """Take the simple LINEs and the polylines out of the ENTITIES section, as columns."""
+        """Return the simple LINEs and the vertices of LWPOLYLINEs of the ENTITIES section as
+        columns, and the mask of the other tags."""
         part = next((each for each in frame.sections if each.name == "ENTITIES"), None)
         if part is None or part.end is None or frame.faults:
             return cls.none(tags)
@@ -76,8 +77,8 @@ class Bulk(Struct, frozen=True, eq=False):
         return bulk if bulk._is_plain(tags, frame) else cls.none(tags)
 
     def _is_plain(self, tags: Tags, frame: DxfSections) -> bool:
-        """Return True if each handle names one entity, and no hatch refers to a LINE that is
-        left out."""
+        """Return True if each handle names one entity, and no hatch refers to a LINE that was read
+        in bulk."""
         followers = {handle for each in self.lines.values() for handle in each.handles}
         names = {*followers, *self.lines, *self.vertices}
         has_handle = np.isin(tags.codes, _HANDLES)
@@ -96,8 +97,12 @@ class Bulk(Struct, frozen=True, eq=False):
 
 
 def _lines(tags: Tags, marks: Ints, is_line: Bools, is_other: Bools) -> dict[str, BulkLines]:
-    """Return the LINEs that follow another one and say the same, by the handle of the first;
-    their tags leave `is_other`. Entity k stands from marks[k] to marks[k + 1]."""
+    """Return the LINEs that repeat the attributes of the LINE before them, by the handle of the
+    first of each sequence.
+
+    Entity k has the tags marks[k] to marks[k + 1]. The tags of the LINEs returned are cleared in
+    `is_other`, in place.
+    """
     sizes = np.diff(marks)
     follows = np.zeros(len(sizes) + 1, dtype=np.bool_)
     follows[1:-1] = is_line[1:] & is_line[:-1] & (sizes[1:] == sizes[:-1])
@@ -133,8 +138,10 @@ def _lines(tags: Tags, marks: Ints, is_line: Bools, is_other: Bools) -> dict[str
 
 
 def _say_the_same(tags: Tags, rows: Ints, size: int) -> Bools:
-    """Return (K,) whether the entities of so many tags, which begin at these rows (K,), have
-    the codes and values of those just before them, save handle and ends."""
+    """Return a mask (K,) of entities that equal the one before them except in handle and ends.
+
+    Each has `size` tags from its row (K,) in `rows` on, and so has the one before it.
+    """
     table = tags.codes[rows[:, None] + np.arange(size)]
     is_same = np.asarray((table == tags.codes[rows[:, None] + np.arange(-size, 0)]).all(axis=1))
     for k in range(size):
@@ -151,7 +158,7 @@ def _say_the_same(tags: Tags, rows: Ints, size: int) -> Bools:
 
 def _is_simple(codes: tuple[int, ...]) -> bool:
     """Return True if a LINE of these group codes has one handle and two ends, each with its
-    coordinates in consecutive groups."""
+    coordinates in consecutive tags."""
     if codes.count(_HANDLE) != 1 or _HANDLES[1] in codes:
         return False
     if not {*codes[: codes.index(_HANDLE)]}.isdisjoint(_DIVISIONS):
@@ -167,8 +174,12 @@ def _is_simple(codes: tuple[int, ...]) -> bool:
 
 
 def _vertices(tags: Tags, begins: Ints, ends: Ints, is_other: Bools) -> dict[str, Floats]:
-    """Return the vertices (K, 5) of the larger ones of the LWPOLYLINEs that stand there, by their
-    handles; their tags leave `is_other`."""
+    """Return the vertices (K, 5) of each LWPOLYLINE of at least MIN_VERTICES, by handle: x, y,
+    start and end width, bulge.
+
+    The k-th one has the tags begins[k] to ends[k]; the tags read are cleared in `is_other`, in
+    place.
+    """
     rows_by_handle: dict[str, Floats] = {}
     for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
         codes = tags.codes[begin:end]

@@ -53,7 +53,8 @@ _VALUES = {
 def callout(
     entity: Any, frame: WorldMap, mm_per_unit: float, *, layer: str, source: str, paper: bool
 ) -> Callout:
-    """Return the callout of a DIMENSION in mm; Unusable, with the reason, for what is none.
+    """Return the callout of a DIMENSION in mm; Unusable, with the reason, for one that cannot be
+    inspected.
 
     `mm_per_unit`: the unit of the drawing. `paper`: it is in a layout, where a negative DIMLFAC
     applies too.
@@ -100,8 +101,12 @@ def _place(point: Floats) -> tuple[float, float]:
 def _measured_places(
     entity: Any,
 ) -> tuple[Literal["linear", "diameter", "radius"], list[Any], float | None]:
-    """Return the kind of a dimension, the two places between which it measures (world units), and
-    the angle in its plane along which it measures, None for the distance itself."""
+    """Return the kind of a dimension, the two points between which it measures (world units), and
+    the angle along which it measures.
+
+    The angle, rad in the plane of the dimension, is None if it measures the distance of the
+    points.
+    """
     dxf = entity.dxf
     if entity.is_dimensional_constraint:
         raise Unusable("is a constraint")
@@ -130,8 +135,8 @@ def _measured_places(
 
 
 def _style(entity: Any) -> dict[str, Any]:
-    """Return the values of its style, and over them those of the entity itself (the list DSTYLE
-    in its data of ACAD)."""
+    """Return the values of a dimension's style by name, overridden by those of the entity itself
+    (the list DSTYLE in its extended data of ACAD)."""
     values: dict[str, Any] = {}
     name = entity.dxf.dimstyle
     styles = entity.doc.dimstyles
@@ -150,7 +155,8 @@ def _style(entity: Any) -> dict[str, Any]:
 
 
 def _number(style: Mapping[str, Any], name: str, otherwise: float) -> float:
-    """Return a value of the style; Unusable where it is no finite number."""
+    """Return a value of the style, or `otherwise` where it has none; Unusable if it is no finite
+    number."""
     try:
         value = float(style.get(name, otherwise))
     except (TypeError, ValueError, OverflowError):
@@ -161,7 +167,10 @@ def _number(style: Mapping[str, Any], name: str, otherwise: float) -> float:
 
 
 def _factor(style: Mapping[str, Any], paper: bool) -> float:
-    """DIMLFAC: what is measured is shown so many times as large. A negative one is for layouts."""
+    """Return DIMLFAC, by which shown lengths are larger than measured ones.
+
+    A negative one applies in layouts (`paper`) only; 0 counts as 1.
+    """
     factor = _number(style, "dimlfac", 1.0)
     if factor < 0.0:
         factor = -factor if paper else 1.0
@@ -169,8 +178,12 @@ def _factor(style: Mapping[str, Any], paper: bool) -> float:
 
 
 def _unit(factor: float, own_mm: float, mm_per_unit: float) -> tuple[float, float]:
-    """Return the unit of its numbers, mm, and how many times larger than drawn it says things
-    are."""
+    """Return the unit, mm, of the dimension's numbers, and how many times larger than drawn they
+    say things are.
+
+    `factor` is DIMLFAC, `own_mm` the length of a unit where the dimension stands, scaled by its
+    blocks.
+    """
     shown_mm = own_mm / factor
     for unit_mm in (mm_per_unit, 1.0, 25.4):
         if abs(shown_mm / unit_mm - 1.0) <= SCALE_SHARE:
@@ -179,7 +192,8 @@ def _unit(factor: float, own_mm: float, mm_per_unit: float) -> tuple[float, floa
 
 
 def _deviations(style: Mapping[str, Any], unit_mm: float) -> tuple[float | None, float | None]:
-    """Return the upper and lower, mm; None where the style shows none. DIMTM counts downwards."""
+    """Return the upper and lower deviation, mm; None, None where the style shows none. DIMTM
+    counts downwards."""
     if not (_number(style, "dimtol", 0.0) or _number(style, "dimlim", 0.0)):
         return None, None
     upper, lower = _number(style, "dimtp", 0.0), -_number(style, "dimtm", 0.0)
@@ -187,7 +201,8 @@ def _deviations(style: Mapping[str, Any], unit_mm: float) -> tuple[float | None,
 
 
 def _text(entity: Any, style: Mapping[str, Any]) -> str:
-    """Return its text without codes, "<>" for what it measures; "" where it shows only that."""
+    """Return the text of a dimension without codes, with "<>" for the measured value; "" where it
+    shows only that value."""
     raw = str(entity.dxf.get("text", ""))
     post = str(style.get("dimpost", "") or "")
     if len(raw) + len(post) > MAX_TEXT_LENGTH:

@@ -65,7 +65,9 @@ class Loaded(Struct, frozen=True):
 
 def load(data: bytes, file: str, *, plain: bool = False) -> Loaded:
     """Return the document in `data`; DrawingError when it is no DXF, cut off or beyond repair.
-    `plain`: a `PlainDocument` will do, where the file is no more."""
+
+    `plain`: a `PlainDocument` is enough, if the file holds nothing that needs ezdxf.
+    """
     _check_bytes(data, file)
     tags = binary_tags(data, file) if data.startswith(BINARY_DXF) else ascii_tags(data, file)
     if len(tags.codes) > MAX_TAGS:
@@ -102,14 +104,14 @@ class _Kept(logging.Handler):
         self.messages: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep the message of a record, on one line."""
+        """Add the message of a log record, on one line, to `messages`."""
         self.messages.append(" ".join(record.getMessage().split()))
 
 
 @contextmanager
 def quiet() -> Iterator[list[str]]:
-    """ezdxf logs and warns of nothing in here, its warnings gather in the list; all is as before
-    behind."""
+    """Keep ezdxf from logging and warning inside the `with` block; its messages are collected in
+    the list that it yields."""
     logger = logging.getLogger("ezdxf")
     collector, propagate = _Kept(), logger.propagate
     logger.addHandler(collector)
@@ -124,13 +126,14 @@ def quiet() -> Iterator[list[str]]:
 
 
 def printable(text: str) -> str:
-    """Return the text with "?" for bytes that are no text in the file's encoding."""
+    """Return the text with "?" for characters that stand for undecodable bytes."""
     return text.encode("utf-8", errors="replace").decode("utf-8")
 
 
 @contextmanager
 def without_collector() -> Iterator[None]:
-    """Many objects arise in here and few go: looking for garbage would take half of the time."""
+    """Turn the garbage collector off inside the `with` block: reading makes many objects and drops
+    few, so that collecting would take half of the time."""
     running = gc.isenabled()
     gc.disable()
     try:
@@ -141,7 +144,8 @@ def without_collector() -> Iterator[None]:
 
 
 def _check_bytes(data: bytes, file: str) -> None:
-    """Raise DrawingError for what needs no reading to be refused."""
+    """Raise DrawingError for a file that is empty, too large, or has no section, before it is
+    parsed."""
     if not data.strip():
         raise DrawingError("is empty", file=file, mend=AGAIN)
     if len(data) > MAX_BYTES:
@@ -184,8 +188,8 @@ def _check_whole(tags: Tags, frame: DxfSections, file: str) -> list[str]:
 
 
 def _load_with_ezdxf(tags: Tags, bulk: Bulk, notes: list[str]) -> Any:
-    """Return the document of ezdxf's ordinary reader, without what is read in bulk; None when
-    it fails or finds fault, as `notes`."""
+    """Return the document that ezdxf's ordinary reader makes of the tags that were not read in
+    bulk; None if it fails, with the reason added to `notes`."""
     from ezdxf.document import Drawing
     from ezdxf.lldxf.types import DXFBinaryTag, DXFTag
 
@@ -203,7 +207,7 @@ def _load_with_ezdxf(tags: Tags, bulk: Bulk, notes: list[str]) -> Any:
 
 
 def _add_vertices(document: Any, bulk: Bulk) -> None:
-    """Give LWPOLYLINEs the vertices that were read in bulk."""
+    """Give the LWPOLYLINEs of the document, in place, the vertices that were read in bulk."""
     if not all(handle in document.entitydb for handle in bulk.lines):
         raise RuntimeError("LINEs that are read in bulk follow none of the document")
     for handle, vertices in bulk.vertices.items():
@@ -211,7 +215,8 @@ def _add_vertices(document: Any, bulk: Bulk) -> None:
 
 
 def _recover(tags: Tags, notes: list[str], file: str) -> Any:
-    """Return the document of ezdxf's recovery, its repairs added to the notes."""
+    """Return the document that ezdxf's recovery makes of all tags; its repairs are added to
+    `notes`."""
     from ezdxf.document import Drawing
     from ezdxf.recover import Recover
 
@@ -234,8 +239,8 @@ def _recover(tags: Tags, notes: list[str], file: str) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """Return the message of an error that ezdxf raises on purpose; that of any other would not
-    help."""
+    """Return the message of an error that ezdxf raises on purpose, or a general one for any other
+    error."""
     from ezdxf.lldxf.const import DXFStructureError, DXFVersionError
 
     on_purpose = isinstance(error, (DXFStructureError, DXFVersionError))

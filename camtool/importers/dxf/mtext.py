@@ -45,7 +45,7 @@ _CODE_ERRORS = (ValueError, TypeError, LookupError, ArithmeticError)
 def write_mtext(
     entity: Any, content: str, look: TextLook, font: tuple[WantedFont, str]
 ) -> tuple[Ink, list[tuple[str, str]]]:
-    """Draw the text of an MTEXT: return its lines relative to the insertion point, and its fonts.
+    """Draw the text of an MTEXT; return its lines relative to the insertion point, and its fonts.
 
     Fonts are pairs: the one used, and the one asked for if it was replaced, else "". `look` comes
     from the text style; `font` is the font that the style asks for, and the mode of text. Raises
@@ -79,8 +79,8 @@ def write_mtext(
 
 
 def _without_codes(content: str) -> str:
-    """Return codes that MTextParser takes for others: carets that are no control code, and
-    %%nnn."""
+    """Return the text with codes replaced that MTextParser would misread: carets without a control
+    code, and %%nnn."""
     content = _STACK_CARET.sub(r"\1^ ", content)
     content = _BARE_CARET.sub("^ ", content)
     return NUMBERED.sub(
@@ -108,7 +108,8 @@ def plain_text(content: str) -> str:
 
 
 def _columns(entity: Any) -> Columns:
-    """Width, gutter and heights; one column as high as need be where the entity sets none."""
+    """Return the width, gutter and heights of the columns; one column of any height if the entity
+    sets none."""
     width = max(0.0, float(entity.dxf.get("width", 0.0)))
     if not entity.has_columns:
         return Columns(width)
@@ -189,7 +190,7 @@ class _Reader:
         )
 
     def _dressed(self, context: Any) -> TextLook:
-        """Return the look that the codes make."""
+        """Return the look of letters at this place, as the codes before it set it."""
         key = context.font_face
         if key not in self._known:
             request = self._wanted
@@ -306,7 +307,7 @@ class Pitch(Struct, frozen=True, eq=False):
     exact: float = 0.0
 
     def drop(self, above: float, below: float) -> float:
-        """Return the distance of the baselines of two lines of these heights."""
+        """Return the distance of the baselines of two successive lines with these heights."""
         if self.exact:
             return LINE_PITCH * self.factor * self.exact
         return LINE_PITCH * self.factor * above - above + below
@@ -321,8 +322,8 @@ class Placed(Struct, frozen=True, eq=False):
 
 
 def wrap_paragraph(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
-    """Yield the lines of a paragraph, no wider than `width` where words allow that (0: one
-    line)."""
+    """Yield the lines of a paragraph, broken to be no wider than `width` where its words allow
+    that; 0: one line."""
     first_indent, following, margin = paragraph.indents
     limit = (width - margin) + WRAP_SLACK * width
     x = first_indent
@@ -352,7 +353,8 @@ def wrap_paragraph(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
 
 
 def _unbreakable(cells: Sequence[MTextCell]) -> Iterator[tuple[MTextCell, ...]]:
-    """Yield runs of words and hard spaces; each space and tab alone."""
+    """Yield groups of cells between which a line may break: words joined by hard spaces, or a
+    single space or tab."""
     run: list[MTextCell] = []
     for cell in cells:
         if cell.glue in (Glue.SPACE, Glue.TAB):
@@ -367,8 +369,8 @@ def _unbreakable(cells: Sequence[MTextCell]) -> Iterator[tuple[MTextCell, ...]]:
 
 
 def _tab_position(x: float, text_width: float, paragraph: Paragraph) -> float:
-    """Return the x at which the text after a tab begins; it is `text_width` wide up to the next
-    tab."""
+    """Return the x at which the text behind a tab begins; `text_width` is the width of that text,
+    up to the next tab."""
     for stop, share in paragraph.stops:
         if stop > x and stop - share * text_width >= x:
             return stop - share * text_width
@@ -378,7 +380,7 @@ def _tab_position(x: float, text_width: float, paragraph: Paragraph) -> float:
 def _line(
     paragraph: Paragraph, row: list[tuple[float, MTextCell]], left_edge: float, *, stretch: bool
 ) -> MTextLine:
-    """Return a line without the spaces at its end."""
+    """Return a line of these cells, without the spaces at its end."""
     count = len(row)
     while count and row[count - 1][1].glue is Glue.SPACE:
         count -= 1
@@ -389,7 +391,8 @@ def _line(
 
 
 def stack_lines(lines: Sequence[MTextLine], columns: Columns, pitch: Pitch) -> list[Placed]:
-    """Lines below each other, in the next column where one is full or ended."""
+    """Return the lines placed below each other; where a column is full or ends, the next line
+    begins the next column."""
     results: list[Placed] = []
     column, start = 0, True
     for line in lines:
@@ -407,7 +410,8 @@ def stack_lines(lines: Sequence[MTextLine], columns: Columns, pitch: Pitch) -> l
 
 
 def draw(ink: Ink, line: MTextLine, width: float, place: tuple[float, float]) -> None:
-    """A line into its column, whose left edge at the line's baseline is `place`."""
+    """Draw a line of text into its column of this width; `place` is the column's left edge on the
+    baseline."""
     spare = width - line.margin - line.right
     gaps = sum(cell.glue is Glue.SPACE for _, cell in line.cells)
     widened = spare / gaps if line.stretch and gaps and spare > 0.0 else 0.0
@@ -424,7 +428,8 @@ def draw(ink: Ink, line: MTextLine, width: float, place: tuple[float, float]) ->
 
 
 def _rule(ink: Ink, cells: Sequence[tuple[float, float, MTextCell]], baseline: float) -> None:
-    """Underlines and the like, each in one piece along cells that look alike."""
+    """Draw underlines, strike-throughs and overlines, in one piece along neighbouring cells of the
+    same look."""
 
     def manner(item: tuple[float, float, MTextCell]) -> tuple[int, float]:
         return int(item[2].look.rules), item[2].look.height
@@ -436,7 +441,8 @@ def _rule(ink: Ink, cells: Sequence[tuple[float, float, MTextCell]], baseline: f
 
 
 def _draw_cell(ink: Ink, cell: MTextCell, place: tuple[float, float]) -> None:
-    """A word, or the two of a stack and what divides them."""
+    """Draw a word, or a stack: two texts one above the other, or side by side, with the bar
+    between them."""
     x, y = place
     look = cell.look
     if not cell.bar:

@@ -73,11 +73,11 @@ class _Attributes(SimpleNamespace):
     flags: ClassVar[Any] = 0
 
     def hasattr(self, name: str) -> bool:
-        """Return True if the file says this attribute."""
+        """Return True if the file gives this attribute."""
         return name in vars(self)
 
     def get(self, name: str, default: Any = None) -> Any:
-        """Return what the file says of this attribute."""
+        """Return the value that the file gives for this attribute, else `default`."""
         return vars(self).get(name, default)
 
 
@@ -86,7 +86,7 @@ class _Entity(SimpleNamespace):
     of."""
 
     def dxftype(self) -> str:
-        """Return its kind."""
+        """Return the kind of the entity, such as "LINE"."""
         return str(self.kind)
 
     @property
@@ -95,11 +95,11 @@ class _Entity(SimpleNamespace):
         return bool(self.dxf.flags & 1)
 
     def is_frozen(self) -> bool:
-        """Return True if the flag of frozen layers is set."""
+        """Return True if the layer is frozen (flag 1)."""
         return bool(self.dxf.flags & 1)
 
     def is_off(self) -> bool:
-        """Return True if the colour of a layer is negative."""
+        """Return True if the layer is off: its colour is negative."""
         return int(self.dxf.get("color", 0)) < 0
 
 
@@ -117,12 +117,13 @@ class PlainDocument:
         return iter(self.entitydb.values())
 
     def modelspace(self) -> PlainDocument:
-        """Return the document itself."""
+        """Return the document itself, which is its own model space."""
         return self
 
 
 def plain_document(tags: Tags, frame: DxfSections, bulk: Bulk) -> PlainDocument | None:
-    """Return the document without what is read in bulk; None for files that are left to ezdxf."""
+    """Return the document made of the tags that were not read in bulk; None for a file that must
+    be left to ezdxf."""
     if not tags.is_text or frame.eof is None or frame.faults:
         return None
     try:
@@ -132,7 +133,7 @@ def plain_document(tags: Tags, frame: DxfSections, bulk: Bulk) -> PlainDocument 
 
 
 def _document(tags: Tags, frame: DxfSections, bulk: Bulk) -> PlainDocument:
-    """Return the document; ValueError for files that are left to ezdxf."""
+    """Return the document; ValueError for a file that must be left to ezdxf."""
     bounds = {part.name: (part.begin + 1, part.end or 0) for part in frame.sections}
     kinds, marks = [str(kind).strip() for kind in tags.kinds], [*tags.marks.tolist()]
     rows_of: dict[str, list[tuple[str, int, int]]] = defaultdict(list)
@@ -168,7 +169,7 @@ def _document(tags: Tags, frame: DxfSections, bulk: Bulk) -> PlainDocument:
 
 
 def _pairs(tags: Tags, rows: Any) -> list[tuple[int, str]]:
-    """Return group codes and values of tags."""
+    """Return the group codes and values of these tags, values as text."""
     return [(code, str(value)) for code, value in tags.pairs(rows)]
 
 
@@ -192,7 +193,7 @@ def _check_blocks(tags: Tags, entities: list[tuple[str, int, int]]) -> None:
 
 
 def _entity(kind: str, pairs: list[tuple[int, str]]) -> _Entity:
-    """Return the entity of these tags; ValueError for one that is left to ezdxf."""
+    """Return the entity of these tags; ValueError for one that must be left to ezdxf."""
     if kind not in _ATTRIBUTES:
         raise ValueError("another kind")
     names, repeated = _COMMON | _ATTRIBUTES[kind], _LISTS.get(kind, ())
@@ -223,7 +224,8 @@ def _entity(kind: str, pairs: list[tuple[int, str]]) -> _Entity:
 
 
 def _value(code: int, text: str, pairs: list[tuple[int, str]], k: int) -> Any:
-    """Return the value of tag `k` by the type of its group code."""
+    """Return the value of tag `k` as text, point, integer or float, according to its group
+    code."""
     if code in _TEXTS:
         return text
     if code in _POINTS:

@@ -1,6 +1,6 @@
 """DXF drawings, ASCII and binary, of any version that ezdxf knows: what a space of them shows.
 
-    bytes ──load──▶ document ──Walk of model space or a layout──▶ pieces ──assemble──▶ Drawing
+    bytes ──load──▶ document ──DxfWalk of model space or a layout──▶ pieces ──assemble──▶ Drawing
 
 What cannot be used is counted with a reason: layers that are off or frozen, kinds without lines,
 entities that lack what they need.
@@ -43,7 +43,8 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
 
 
 def walk_space(loaded: Loaded, space: Any, file: str, options: ReadOptions) -> Found:
-    """Return what model space or a layout of a document holds; DrawingError as `read`."""
+    """Return the pieces, marks and callouts of model space or a layout of a document; DrawingError
+    as `read`."""
     units, findings = units_of(loaded.header, options)
     walk = DxfWalk(loaded, file, options)
     with quiet():
@@ -66,7 +67,8 @@ def walk_space(loaded: Loaded, space: Any, file: str, options: ReadOptions) -> F
 
 
 def layout_of(document: Any, layout: str | None, file: str) -> Any:
-    """Model space, or the layout of this name in any case."""
+    """Return model space, or the layout with this name, upper or lower case; DrawingError if there
+    is none."""
     if layout is None:
         return document.modelspace()
     named = {str(space.name).casefold(): space for space in document.layouts}
@@ -94,7 +96,8 @@ def _not_applied_findings(lacking: Counter[tuple[str, str]]) -> list[Finding]:
 
 
 def _not_callouts(unread: Counter[tuple[str, str]]) -> list[Finding]:
-    """Return the dimensions that say nothing of what can be inspected, with the reason."""
+    """Return a finding for each kind of dimension that cannot be inspected, with the reason and
+    the number."""
     return [
         CALLOUT_NOT_READ(measured=count, kind=kind, reason=reason)
         for (kind, reason), count in unread.items()
@@ -147,7 +150,7 @@ _GUESSES = {
 
 
 def units_of(header: Mapping[str, Any], options: ReadOptions) -> tuple[Units, list[Finding]]:
-    """Return the unit, and a finding when the file does not say it."""
+    """Return the unit of the drawing, and a finding if the file does not state it."""
     code, measurement = (
         _header_number(header.get(name)) for name in ("$INSUNITS", "$MEASUREMENT")
     )
@@ -169,7 +172,8 @@ def units_of(header: Mapping[str, Any], options: ReadOptions) -> tuple[Units, li
 
 
 def _header_number(value: Any) -> int | None:
-    """Return a header's number; None when the file does not say it."""
+    """Return the value of a header variable as an integer; None when the file does not give
+    one."""
     try:
         return int(float(value))
     except (TypeError, ValueError, OverflowError):

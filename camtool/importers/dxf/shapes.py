@@ -52,7 +52,11 @@ class Plane(Struct, frozen=True, eq=False, dict=True):
 
     @classmethod
     def of(cls, u: Floats, v: Floats, origin: Floats, rise: Floats | None = None) -> Plane:
-        """From vectors (3,); Unusable when the plane is tilted or has no area."""
+        """Return the plane spanned by the axes `u` and `v` (3,) at `origin` (3,); Unusable if it
+        is tilted or has no area.
+
+        `rise` (3,) is the shift of the origin for each unit of elevation.
+        """
         longest = max(math.hypot(*u), math.hypot(*v))
         if not longest <= MAX_COORDINATE_MM:  # nor is NaN
             raise Unusable("is too large to be exact to a micrometre")
@@ -79,14 +83,14 @@ class Plane(Struct, frozen=True, eq=False, dict=True):
         return math.atan2(float(self.u[1]), float(self.u[0]))
 
     def at(self, elevation: float) -> Plane:
-        """Return the parallel plane at this elevation over the one here."""
+        """Return the parallel plane at this elevation above this one."""
         if not elevation or not self.rise.any():
             return self
         origin = self.origin + elevation * self.rise
         return Plane(self.u, self.v, origin, self.scale, self.sign, self.rise)
 
     def points(self, local: Floats) -> Floats:
-        """Return the local (n, 2) to (n, 2) mm."""
+        """Return points (n, 2), in mm, of local points (n, 2) of the plane."""
         return np.asarray(self.origin + local[:, :1] * self.u + local[:, 1:2] * self.v)
 
 
@@ -98,32 +102,36 @@ class WorldMap(Struct, frozen=True, eq=False):
     _planes: dict[tuple[float, ...], Plane] = field(default_factory=dict)
 
     def placed(self, linear: Floats, offset: Floats) -> WorldMap:
-        """This frame behind another map."""
+        """Return this map composed with another one that is applied before it: `linear` (3, 3) and
+        `offset` (3,) place a block."""
         return WorldMap(linear @ self.linear, offset @ self.linear + self.offset)
 
     def flat(self, points: Floats) -> Floats:
-        """Return points (n, 3) as (n, 2) mm; Unusable when they rise."""
+        """Return points (n, 2), in mm, of world points (n, 3); Unusable if they differ in
+        height."""
         flat, is_flat = self.flat_each(points[None])
         if not is_flat[0]:
             raise Unusable("is not flat")
         return np.asarray(flat[0])
 
     def flat_each(self, points: Floats) -> tuple[Floats, Any]:
-        """Many entities' points (m, n, 3) as (m, n, 2) mm, and whether each is flat (m,)."""
+        """Return the points (m, n, 2), in mm, of m entities with world points (m, n, 3), and the
+        mask (m,) of those that are flat."""
         world_points = points @ self.linear + self.offset
         width = np.ptp(world_points[..., :2], axis=1).max(axis=1)
         rise = np.ptp(world_points[..., 2], axis=1)
         return world_points[..., :2], rise <= np.maximum(FLAT_TILT * width, POSITION_EPS_MM)
 
     def plane(self, extrusion: Any, elevation: float) -> Plane:
-        """Return the plane of an OCS at this elevation; Unusable when it is tilted."""
+        """Return the plane of the object coordinate system (OCS) with this extrusion and
+        elevation; Unusable if it is tilted."""
         normal = tuple(extrusion)
         if normal not in self._planes:
             self._planes[normal] = self._plane(normal)
         return self._planes[normal].at(elevation)
 
     def _plane(self, normal: tuple[float, ...]) -> Plane:
-        """Return the plane of an OCS through the world's origin."""
+        """Return the plane through the world's origin of the OCS with this normal."""
         z = numbers(normal)
         if not z.any():
             raise Unusable("has an extrusion of 0")
@@ -144,25 +152,25 @@ class DxfShape(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, fit: Fit) -> DxfShape:
-        """Return the arcs that stand for a curve."""
+        """Return the shape of a fitted curve: open, with its arcs and its errors."""
         return cls(fit.vertices, False, fit.off_mm)
 
     def ring(self) -> DxfShape:
-        """Return the same closed, whose last vertex is its first one."""
+        """Return the shape closed, without its last vertex, which repeats the first."""
         errors = None if self.off_mm is None else self.off_mm[:-1]
         return DxfShape(self.vertices[:-1], True, errors, self.lacks)
 
 
 def require(entity: Any, names: tuple[str, ...]) -> None:
-    """Raise Unusable when the file does not say one of these attributes: ezdxf would make one
-    up."""
+    """Raise Unusable if the file does not give one of these attributes: ezdxf would assume a
+    value."""
     for name in names:
         if not entity.dxf.hasattr(name):
             raise Unusable(f"lacks its {name.replace('_', ' ')}")
 
 
 def numbers(values: Any) -> Floats:
-    """Return any numbers as an array; DrawingError when one of them is none."""
+    """Return the values as an array of floats; DrawingError if one is not finite."""
     is_array = isinstance(values, (list, np.ndarray))
     result = np.array(values if is_array else tuple(values), dtype=np.float64)
     if not np.isfinite(result).all():
@@ -173,12 +181,16 @@ def numbers(values: Any) -> Floats:
 
 
 def straight(points: Floats) -> Floats:
-    """Return points (n, 2) as vertices (n, 3) of lines."""
+    """Return points (n, 2) as vertices (n, 3) of a polyline of lines: x, y and bulge 0."""
     return np.column_stack([points, np.zeros(len(points))])
 
 
 def fit_arcs(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
-    """Return arcs for a curve whose place and size these numbers give."""
+    """Return arcs that fit a curve within the tolerance; DrawingError if it reaches too far.
+
+    `size` holds numbers, mm, that bound the place and size of the curve, such as its control
+    points.
+    """
     furthest = float(np.abs(size).max())
     if not furthest <= MAX_COORDINATE_MM:  # nor is NaN
         raise DrawingError(
@@ -221,20 +233,20 @@ place) for numbers that are none."""
 
 
 def line(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
-    """LINE."""
+    """Return the shape of a LINE."""
     require(entity, ("start", "end"))
     ends = numbers([tuple(entity.dxf.start), tuple(entity.dxf.end)])
     return [DxfShape(straight(frame.flat(ends)), closed=False)]
 
 
 def circle(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
-    """CIRCLE."""
+    """Return the shape of a CIRCLE: exact, or fitted where a block squeezes it to an ellipse."""
     require(entity, ("center", "radius"))
     return [_round(entity, frame, tolerance_mm, 0.0, 2.0 * math.pi)]
 
 
 def arc(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
-    """ARC, counter-clockwise from its start."""
+    """Return the shape of an ARC, counter-clockwise from its start."""
     require(entity, ("center", "radius", "start_angle", "end_angle"))
     start, end = numbers((entity.dxf.start_angle, entity.dxf.end_angle)).tolist()
     sweep = (end - start) % 360.0 or 360.0
@@ -244,7 +256,7 @@ def arc(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
 def _round(
     entity: Any, frame: WorldMap, tolerance_mm: float, start: float, sweep: float
 ) -> DxfShape:
-    """Return a circle or an arc."""
+    """Return the shape of a CIRCLE or ARC with this start angle and sweep, rad."""
     dxf = entity.dxf
     x, y, z, radius = numbers((*dxf.center, dxf.radius)).tolist()
     if radius <= 0.0:
@@ -256,7 +268,10 @@ def _round(
 def circle_or_arc(
     plane: Plane, disc: tuple[float, float, float], start: float, sweep: float, tolerance_mm: float
 ) -> DxfShape:
-    """Circle or arc of a centre and a radius (x, y, r) in a plane; angles in rad, either way."""
+    """Return the circle or arc with this centre and radius, `disc` (x, y, r), in a plane.
+
+    Angles are in rad, the sweep is positive counter-clockwise in the plane, and ±2π for a circle.
+    """
     x, y, radius = disc
     centre = plane.origin + x * plane.u + y * plane.v
     if not plane.scale:
@@ -269,7 +284,7 @@ def circle_or_arc(
 
 
 def ellipse(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
-    """ELLIPSE."""
+    """Return the shape of an ELLIPSE or an arc of one."""
     require(entity, ("center", "major_axis", "ratio"))
     dxf = entity.dxf
     centre, major, normal = (numbers(v) for v in (dxf.center, dxf.major_axis, dxf.extrusion))
@@ -286,15 +301,18 @@ def ellipse(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]
 
 
 def whole_turn(sweep: float) -> float:
-    """Return a sweep within one turn, and exactly one turn when it all but is."""
+    """Return the sweep reduced to one turn, and exactly 2π if it is within FULL_TURN_RAD of a full
+    turn or of 0."""
     sweep %= 2.0 * math.pi
     nearly = sweep <= FULL_TURN_RAD or sweep >= 2.0 * math.pi - FULL_TURN_RAD
     return 2.0 * math.pi if nearly else sweep
 
 
 def elliptic(axes: Floats, start: float, sweep: float, tolerance_mm: float) -> DxfShape:
-    """Return the centre and half axes (3, 2): circles and arcs of them exactly, ellipses
-    fitted."""
+    """Return an arc of an ellipse, `axes` (3, 2): centre and half axes.
+
+    It is exact if the ellipse is a circle, else fitted; with a sweep of ±2π it is closed.
+    """
     centre, u, v = axes
     closed = abs(sweep) == 2.0 * math.pi
     plane = Plane.of(np.append(u, 0.0), np.append(v, 0.0), np.append(centre, 0.0))
@@ -308,7 +326,7 @@ def elliptic(axes: Floats, start: float, sweep: float, tolerance_mm: float) -> D
 
 
 def lwpolyline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
-    """LWPOLYLINE."""
+    """Return the shape of an LWPOLYLINE."""
     dxf = entity.dxf
     rows = numbers(entity.lwpoints.values).reshape(-1, 5)
     plane = frame.plane(dxf.extrusion, float(numbers((dxf.get("elevation", 0.0),))[0]))
@@ -318,7 +336,7 @@ def lwpolyline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfSha
 
 
 def polyline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
-    """POLYLINE of one line, flat or in space."""
+    """Return the shape of a POLYLINE, 2D or 3D; Unusable for a mesh."""
     if entity.get_mode() not in ("AcDb2dPolyline", "AcDb3dPolyline"):
         raise Unusable("is a mesh")
     for vertex in entity.vertices:
@@ -350,8 +368,10 @@ def _with_width(shape: DxfShape) -> DxfShape:
 def polyline_with_bulges(
     local: Floats, closed: bool, plane: Plane, tolerance_mm: float
 ) -> DxfShape:
-    """Return a polyline (n, 3) of x, y, bulge in its own plane: exact, or its arcs fitted where
-    the plane squeezes circles."""
+    """Return the shape of a polyline (n, 3) of x, y, bulge in its own plane.
+
+    It is exact, or its arcs are fitted where the plane squeezes circles to ellipses.
+    """
     if len(local) == 0:
         raise Unusable("has no vertices")
     rows = np.empty(local.shape)
@@ -393,7 +413,7 @@ _LINE_POINTS = 2  # a Bézier of two control points is a line
 
 
 def spline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
-    """SPLINE, and HELIX when it does not rise."""
+    """Return the shape of a SPLINE, or of a HELIX that does not rise."""
     control = numbers([tuple(point) for point in entity.control_points]).reshape(-1, 3)
     if len(control):
         knots, weights = numbers([*entity.knots]), numbers([*entity.weights])
@@ -413,7 +433,8 @@ def spline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
 def spline_through(
     fit_points: Floats, tangents: list[tuple[float, ...]], closed: bool
 ) -> tuple[int, Floats, Floats]:
-    """Degree, knots and control points (n, 3) of the spline that CAD programs draw through points.
+    """Return degree, knots and control points (n, 3) of the spline that CAD programs draw through
+    these points.
 
     `tangents` are those of both ends, or none. Unusable when there are too few points.
     """
@@ -437,8 +458,11 @@ def spline_through(
 def spline_of(
     degree: int, knots: Floats, control: Floats, weights: Floats, tolerance_mm: float
 ) -> DxfShape:
-    """Return the spline of control points (n, 2) mm; no `weights` are equal ones. Unusable when
-    these do not belong together."""
+    """Return the fitted shape of the spline with control points (n, 2) mm; empty `weights` are all
+    equal.
+
+    Unusable when knots, weights and control points do not belong together.
+    """
     if degree > MAX_DEGREE:
         raise Unusable(f"has degree {degree}, at most {MAX_DEGREE} is read")
     if not len(control):
@@ -454,7 +478,8 @@ def spline_of(
 
 
 def outline(parts: list[Floats], closed: bool, frame: WorldMap, tolerance_mm: float) -> DxfShape:
-    """Béziers of 2 (a line), 3 or 4 control points (k, 3) in world coordinates, end to end."""
+    """Return a path of Béziers end to end, lines exact and curves fitted: each part has 2 (a
+    line), 3 or 4 control points (k, 3), in world coordinates."""
     vertices: list[Floats] = []
     errors: list[Floats] = []
     flat = frame.flat(np.concatenate([numbers(list(part)) for part in parts]))
@@ -481,10 +506,11 @@ _DRAWN_ORDER = (0, 1, 3, 2)  # SOLID and TRACE keep their corners in the order o
 
 
 def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
-    """Return the boundary paths of HATCH and MPOLYGON; edges of one path come as paths of their
-    own.
+    """Return the boundary paths of a HATCH or MPOLYGON; a path made of edges gives a shape for
+    each edge.
 
-    A boundary that follows other entities of the drawing is left to them.
+    A boundary that is taken from other entities of the drawing is left out, because these are read
+    themselves.
     """
     elevation = float(numbers(entity.dxf.elevation)[2])
     plane = frame.plane(entity.dxf.extrusion, elevation)
@@ -506,8 +532,8 @@ def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
 
 
 def _is_boundary_of_entities(path: Any, entity: Any) -> bool:
-    """Return True if the path is the boundary of a hatch that is associated with entities of the
-    drawing."""
+    """Return True if the boundary path is taken from entities of the drawing that the hatch is
+    associated with."""
     handles = path.source_boundary_objects
     database = entity.doc.entitydb if entity.doc is not None else {}
     if not (handles and entity.dxf.get("associative", 0)):
@@ -521,7 +547,7 @@ def _stands_beside(source: Any, entity: Any) -> bool:
 
 
 def _edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
-    """Convert an edge of a boundary: line, arc, ellipse or spline."""
+    """Return the shape of an edge of a hatch boundary: line, arc, ellipse or spline."""
     kind = edge.type.name
     if kind == "LINE":
         ends = numbers([tuple(edge.start)[:2], tuple(edge.end)[:2]])
@@ -543,7 +569,8 @@ def _edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
 
 
 def _spline_edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
-    """Return a spline edge by its control points, or through its fit points."""
+    """Return the shape of a spline edge, from its control points or else through its fit
+    points."""
     control = numbers([tuple(point)[:2] for point in edge.control_points]).reshape(-1, 2)
     weights = numbers([*edge.weights])
     if len(control):
@@ -558,7 +585,8 @@ def _spline_edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
 
 
 def solid(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
-    """SOLID and TRACE: the outline as it is filled, crossed over when its corners are."""
+    """Return the outline of a SOLID or TRACE, in the order in which it is filled: it crosses
+    itself if the corners do."""
     require(entity, _CORNERS[:3])
     named = [name for name in _CORNERS if entity.dxf.hasattr(name)]
     corners = numbers([tuple(entity.dxf.get(name)) for name in named])

@@ -73,37 +73,38 @@ class Tags(ABC):
 
     @abstractmethod
     def raw(self, rows: Ints) -> Iterator[Any]:
-        """Return the values of these tags as the file has them: of ASCII the bytes of their
+        """Return the values of these tags as they stand in the file: for ASCII the bytes of their
         lines."""
 
     @abstractmethod
     def values(self, rows: Ints) -> Iterator[Any]:
-        """Return the values of these tags: of ASCII the text, of binary DXF strings, numbers,
+        """Return the values of these tags: for ASCII text, for binary DXF strings, numbers or
         bytes."""
 
     @abstractmethod
     def code_as_said(self, row: int) -> str:
-        """Return the group code of a tag as the file has it, for messages."""
+        """Return the group code of a tag as it stands in the file, for messages."""
 
     @abstractmethod
     def ended(self, count: int) -> Tags:
-        """Return the first `count` tags and an end mark."""
+        """Return the first `count` tags, followed by the end mark 0 EOF."""
 
     def value(self, row: int) -> Any:
         """Return the value of one tag."""
         return next(self.values(np.array([row])))
 
     def numbers(self, rows: Ints) -> Floats:
-        """Return (K,) the values of these tags as numbers; ValueError when one is none."""
+        """Return the values of these tags as numbers (K,); ValueError if one is no number."""
         return np.fromiter(map(float, self.raw(rows)), dtype=np.float64, count=len(rows))
 
     def pairs(self, rows: Ints) -> Iterator[tuple[int, Any]]:
-        """Code and value of each of these tags."""
+        """Yield the group code and the value of each of these tags."""
         for part in lots(rows):
             yield from zip(self.codes[part].tolist(), self.values(part), strict=True)
 
     def where(self, row: int) -> str:
-        """Return the place of a tag for messages."""
+        """Return the place of a tag in the file for messages: its line, or in binary DXF its
+        number."""
         return f"line {2 * row + 1}" if self.is_text else f"tag {row + 1}"
 
     @cached_property
@@ -113,12 +114,12 @@ class Tags(ABC):
 
     @cached_property
     def kinds(self) -> list[Any]:
-        """Return the name of the entity or section that begins at each of the `marks`."""
+        """Names of the entities and sections that begin at the `marks`."""
         return list(self.values(self.marks))
 
 
 def lots(rows: Ints) -> Iterator[Ints]:
-    """Return the rows in lots of `AT_ONCE`."""
+    """Yield the rows in batches of AT_ONCE."""
     return (rows[first : first + AT_ONCE] for first in range(0, len(rows), AT_ONCE))
 
 
@@ -141,7 +142,7 @@ class BinaryTags(Tags):
         return str(self.codes[row])
 
     def ended(self, count: int) -> Tags:
-        """Return the first `count` tags and an end mark."""
+        """Return the first `count` tags, followed by the end mark 0 EOF."""
         return BinaryTags(np.append(self.codes[:count], _MARK), (), [*self.held[:count], "EOF"])
 
 
@@ -158,14 +159,14 @@ class TextTags(Tags):
     is_text = True
 
     def raw(self, rows: Ints) -> Iterator[bytes]:
-        """Yield the lines of the values of these tags."""
+        """Yield the bytes of the lines that hold the values of these tags."""
         data = self.data
         for part in lots(rows):
             ends = zip(self.at[2 * part + 1].tolist(), self.at[2 * part + 2].tolist(), strict=True)
             yield from [data[begin : end - 1] for begin, end in ends]
 
     def values(self, rows: Ints) -> Iterator[str]:
-        """Yield the values of these tags."""
+        """Yield the values of these tags as text."""
         for part in lots(rows):
             texts = [
                 line.decode(self.encoding, "surrogateescape").rstrip("\r")
@@ -174,12 +175,12 @@ class TextTags(Tags):
             yield from _without_escapes(texts) if self.escaped else texts
 
     def code_as_said(self, row: int) -> str:
-        """Return the line of the group code of a tag."""
+        """Return the group code of a tag as it stands in the file, in quotes, for messages."""
         line = self.data[self.at[2 * row] : self.at[2 * row + 1] - 1]
         return repr(line.decode(self.encoding, "surrogateescape").strip()[:20])
 
     def ended(self, count: int) -> Tags:
-        """Return the first `count` tags and an end mark."""
+        """Return the first `count` tags, followed by the end mark 0 EOF."""
         lines = self.at[: 2 * count + 1]
         return replace(
             self,
@@ -189,7 +190,8 @@ class TextTags(Tags):
         )
 
     def values_with(self, letters: Bools) -> Ints:
-        """Return the tags whose values have one of these bytes (of `data`)."""
+        """Return the rows of the tags whose values contain a marked byte; `letters` is a mask over
+        `data`."""
         lines = np.searchsorted(self.at, np.flatnonzero(letters), side="right") - 1
         rows = distinct(lines[lines % 2 == 1] // 2)
         return rows[rows < len(self.codes)]
@@ -214,14 +216,15 @@ class DxfSections(Struct, frozen=True):
     faults: tuple[str, ...]
 
     def is_complete(self, name: str) -> bool:
-        """Return True if there is a section of this name, and each of that name has its end."""
+        """Return True if there is a section of this name, and every section of this name has its
+        ENDSEC."""
         ends = [part.end for part in self.sections if part.name == name]
         return bool(ends) and None not in ends
 
 
 def binary_tags(data: bytes, file: str) -> Tags:
-    """Return the tags of binary DXF up to its end mark, or to the first bytes that are no tag;
-    DrawingError for a value that is no group code."""
+    """Return the tags of binary DXF up to its end mark, or up to the first bytes that cannot be
+    read as a tag; DrawingError for an impossible group code."""
     from ezdxf.lldxf.tagger import binary_tags_loader
 
     codes: list[int] = []
@@ -240,7 +243,8 @@ def binary_tags(data: bytes, file: str) -> Tags:
 
 
 def ascii_tags(data: bytes, file: str) -> Tags:
-    """Return the tags of ASCII DXF up to its end mark; DrawingError when a group code is none."""
+    """Return the tags of ASCII DXF up to its end mark; DrawingError for a line that should be a
+    group code and is none."""
     data, encoding, notes = _plain_lines(data)
     letters = np.frombuffer(data, dtype=np.uint8)
     feeds = np.flatnonzero(letters == ord("\n")).astype(np.int32)
@@ -269,7 +273,7 @@ def ascii_tags(data: bytes, file: str) -> Tags:
 
 
 def frame_of(tags: Tags) -> DxfSections:
-    """Return sections and end mark, and faults of their order."""
+    """Return the sections, the end mark, and the faults in their order."""
     sections: list[Section] = []
     faults: list[str] = []
     begin: int | None = None
@@ -299,9 +303,9 @@ def frame_of(tags: Tags) -> DxfSections:
 
 
 def lost_entities(tags: Tags, frame: DxfSections) -> list[str]:
-    """Describe entities and vertices that are lost because a group code is damaged.
+    """Return sentences about entities and vertices that are lost because a group code is damaged.
 
-    An entity that has two layers is two entities, the mark (0) of one being damaged.
+    An entity with two layers is in truth two entities: the mark (0) of the second one is damaged.
     """
     losses: list[str] = []
     for section in frame.sections:
@@ -315,7 +319,8 @@ def lost_entities(tags: Tags, frame: DxfSections) -> list[str]:
 
 
 def _lost_vertices(tags: Tags) -> list[str]:
-    """LWPOLYLINEs that do not have the vertices that they count, in words."""
+    """Return a sentence for each LWPOLYLINE that holds another number of vertices than it
+    states."""
     losses: list[str] = []
     vertices, counts = (np.flatnonzero(tags.codes == code) for code in (_POINT, _COUNT))
     ends = [*tags.marks[1:].tolist(), len(tags.codes)]
@@ -335,7 +340,7 @@ def _lost_vertices(tags: Tags) -> list[str]:
 
 
 def header_of(tags: Tags, frame: DxfSections) -> dict[str, Any]:
-    """Return the variables of the header that the file itself says, each with its first value."""
+    """Return the header variables that the file sets, each with its first value."""
     variables: dict[str, Any] = {}
     for section in frame.sections:
         if section.name == "HEADER":
@@ -347,8 +352,11 @@ def header_of(tags: Tags, frame: DxfSections) -> dict[str, Any]:
 
 
 def _plain_lines(data: bytes) -> tuple[bytes, str, tuple[str, ...]]:
-    """Return the same text with line feeds, in an encoding in which these are single bytes; and
-    its faults. The encoding is that of its mark, or of its header."""
+    """Return the text with line feeds at line ends, its encoding, and its faults.
+
+    In the encoding a line feed is a single byte; it is that of the byte-order mark, else that of
+    the header.
+    """
     notes: tuple[str, ...] = ()
     if data.startswith(_UTF16_MARKS):
         encoding, otherwise = "utf-16", "replace"
@@ -368,7 +376,8 @@ def _plain_lines(data: bytes) -> tuple[bytes, str, tuple[str, ...]]:
 
 
 def _encoding(head: bytes) -> str:
-    """Files since R2007 are UTF-8, older ones in the code page that they name."""
+    """Return the encoding of a file from its head: UTF-8 since R2007, before that the code page
+    that it names."""
     version, codepage = _VERSION.search(head), _CODEPAGE.search(head)
     if head.startswith(_UTF8_MARK):
         return "utf-8-sig"
@@ -382,7 +391,7 @@ def _encoding(head: bytes) -> str:
 
 
 def _check_codes(tags: Tags, file: str) -> None:
-    """Raise DrawingError for the first group code that is none."""
+    """Raise DrawingError for the first number that is no possible group code."""
     codes = tags.codes
     unused = (UNUSED_CODES.start <= codes) & (codes < UNUSED_CODES.stop)
     odd = np.flatnonzero((codes < 0) | (codes > MAX_CODE) | unused)
@@ -397,7 +406,8 @@ def _check_codes(tags: Tags, file: str) -> None:
 
 
 def check_numbers(tags: Tags, file: str, rows: Ints) -> None:
-    """Raise DrawingError for a value of these tags that must be a number and is none."""
+    """Raise DrawingError if one of these tags has a code that requires a number and another
+    value."""
     is_number = {code: _is_number(code) for code in distinct(tags.codes[rows]).tolist()}
     for row, (code, value) in zip(rows.tolist(), tags.pairs(rows), strict=True):
         if is_number[code] and not _NUMBER.fullmatch(str(value)):
@@ -415,7 +425,7 @@ def _is_number(code: int) -> bool:
 
 
 def _without_escapes(values: list[str]) -> list[str]:
-    """Return the signs that ASCII cannot say, written as \\U+00D6 or \\M+1…, as themselves."""
+    r"""Return the values with escaped characters (\U+00D6 or \M+1…) decoded."""
     from ezdxf.lldxf.encoding import (
         decode_dxf_unicode,
         decode_mif_to_unicode,
@@ -430,13 +440,13 @@ def _without_escapes(values: list[str]) -> list[str]:
 
 
 def _section_name(tags: Tags, begin: int) -> str:
-    """Return the name in the tag behind 0 SECTION; "" when that is no name."""
+    """Return the name of the section that begins at tag `begin`; "" if it has none."""
     named = tags.codes[begin + 1 : begin + 2].tolist() == [2]
     return str(tags.value(begin + 1)).strip() if named else ""
 
 
 def _wrong_names(tags: Tags, sections: list[Section]) -> list[str]:
-    """Return sections that are unknown or stand twice, in words."""
+    """Return a sentence for each section that is unknown or occurs twice."""
     faults: list[str] = []
     names_so_far: set[str] = set()
     for section in sections:

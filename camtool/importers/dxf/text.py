@@ -71,7 +71,7 @@ class TextShape(Struct, frozen=True, eq=False):
 
 
 def text_strokes(entity: Any, mode: str) -> TextShape:
-    """TEXT, ATTRIB, ATTDEF or MTEXT as curves; mode is "outline" or "stroke".
+    """Return a TEXT, ATTRIB, ATTDEF or MTEXT as curves; mode is "outline" or "stroke".
 
     An ATTDEF shows its tag, or its value when that is constant. Raises Unusable when the text is
     empty or invisible, has no finite size, or needs an outline font where none is installed.
@@ -107,7 +107,7 @@ class _Place(Struct, frozen=True, eq=False):
 
 
 def _text(entity: Any, mode: str) -> TextShape:
-    """Return a text on one line."""
+    """Return the curves of a text on one line: TEXT, ATTRIB or ATTDEF."""
     require(entity, ("insert", "height"))
     dxf = entity.dxf
     raw = dxf.tag if entity.dxftype() == "ATTDEF" and not entity.is_const else dxf.text
@@ -134,8 +134,11 @@ def _text(entity: Any, mode: str) -> TextShape:
 
 
 def _runs(raw: str) -> list[tuple[str, Rule]]:
-    """Return the text without its codes: %%c %%d %%p %%% %%nnn are signs; %%u %%o %%k begin and
-    end lines along it."""
+    """Split a text at its codes into parts, each with the lines drawn along it.
+
+    %%c %%d %%p %%% %%nnn are characters; %%u %%o %%k begin and end underline, overline and
+    strike-through.
+    """
     rules, runs, position = Rule.NONE, [], 0
     text = "".join(c if c >= " " else " " for c in _CARET.sub(_control, raw))
     for code in [*_CODE.finditer(text), None]:
@@ -151,12 +154,13 @@ def _runs(raw: str) -> list[tuple[str, Rule]]:
 
 
 def _control(match: re.Match[str]) -> str:
-    """^I is a tab and so on; "^ " is the caret itself."""
+    """Return the character of a caret code: ^I is a tab and so on; "^ " is the caret itself."""
     return "^" if match[1] == " " else chr(ord(match[1]) - ord("@"))
 
 
 def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
-    """Return the alignment point and the axes of a text, and its stretch (x, y)."""
+    """Return the plane of a text, whose origin is its alignment point, and the factors (x, y) by
+    which it is stretched to fit between two points."""
     dxf = entity.dxf
     mirror = int(dxf.text_generation_flag)
     signs = [-1.0 if mirror & _BACKWARD else 1.0, -1.0 if mirror & _UPSIDE_DOWN else 1.0]
@@ -192,7 +196,8 @@ def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
 
 
 def _start(entity: Any, look: TextLook, width: float) -> tuple[float, float]:
-    """Return the start of the baseline relative to the alignment point."""
+    """Return the start of the baseline, relative to the alignment point, of a text of this
+    width."""
     halign, valign = int(entity.dxf.halign), int(entity.dxf.valign)
     depth = look.font.descent
     share = {1: 0.5, 2: 1.0, _MIDDLE: 0.5}.get(halign, 0.0)
@@ -206,7 +211,7 @@ def _start(entity: Any, look: TextLook, width: float) -> tuple[float, float]:
 
 
 def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
-    """Return a text of any number of lines."""
+    """Return the curves of an MTEXT."""
     require(entity, ("insert", "char_height"))
     content = _checked(entity.all_columns_raw_content())
     style = _style(entity, document)
@@ -229,7 +234,7 @@ def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
 
 
 def _block(entity: Any) -> _Place:
-    """Return the plane of an MTEXT, its insertion point at (0, 0)."""
+    """Return the plane of an MTEXT, whose origin is its insertion point."""
     insert = np.array(finite(*entity.dxf.insert))
     normal, along = (finite(*v) for v in (entity.dxf.extrusion, entity.get_text_direction()))
     rise = np.cross(normal, along)
@@ -256,7 +261,7 @@ def _checked(raw: str) -> str:
 
 
 def _style(entity: Any, document: Any) -> Any:
-    """Return the text style that the entity names, None when there is no such style."""
+    """Return the text style that the entity names; None if the document has no such style."""
     if document is None:
         return None
     name = entity.dxf.get("style", "Standard")

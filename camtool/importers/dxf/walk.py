@@ -83,7 +83,8 @@ class DxfWalk:
         self._looks = DxfLooks.of(self.loaded.document)
 
     def space(self, space: Any, mm_per_unit: float) -> None:
-        """All entities of a space; what other layouts hold is counted."""
+        """Read all entities of model space or a layout; count the entities of the others as
+        skipped."""
         self._mm_per_unit = mm_per_unit
         self._entities(space, DxfScope(WorldMap(mm_per_unit * np.eye(3), np.zeros(3))))
         self.pieces = [piece for piece in self.pieces if piece is not _NOWHERE]
@@ -118,7 +119,7 @@ class DxfWalk:
             self._lines(lines, scope)
 
     def _check_shown(self, kind: str, attributes: dict[str, Any], look: DxfLook) -> None:
-        """Raise Unusable when the entity does not show."""
+        """Raise Unusable if the entity is invisible or on a layer that is off or frozen."""
         # An INSERT on a layer that is off still shows what its block has on other layers.
         if look.hidden and (kind != "INSERT" or look.frozen):
             raise Unusable(look.hidden)
@@ -126,7 +127,7 @@ class DxfWalk:
             raise Unusable("is invisible")
 
     def _entity(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
-        """Any entity but a LINE."""
+        """Read an entity of any kind but LINE; Unusable, with the reason, if it cannot be cut."""
         kind = entity.dxftype()
         if kind in CALLOUTS and not scope.source:
             self._callout(entity, scope, look)
@@ -147,15 +148,20 @@ class DxfWalk:
             raise Unusable(WHY_UNUSED.get(kind, OTHER))
 
     def _following(self, entity: Any) -> BulkLines:
-        """Return the LINEs behind this one in the file that were read in bulk, without ezdxf."""
+        """Return the LINEs after this one in the file, which were read in bulk, without ezdxf."""
         return self.loaded.lines.get(entity.dxf.handle, _NO_LINES)
 
     def _count_with(self, entity: Any) -> int:
-        """Return the entity and those that follow it."""
+        """Return the number of LINEs that the entity stands for: itself and those read in bulk
+        after it."""
         return 1 + len(self._following(entity).handles)
 
     def _lines(self, lines: list[tuple[int, Any, DxfLook]], scope: DxfScope) -> None:
-        """All LINEs of a scope, each into the place that was kept for it."""
+        """Make the pieces of all LINEs of a scope, in the places reserved for them, to keep the
+        order of the file.
+
+        `lines` are the index of the first reserved piece, the entity and its look.
+        """
         following = [self._following(entity) for _, entity, _ in lines]
         counts = np.array([1 + len(bulk.handles) for bulk in following])
         first = np.cumsum(counts) - counts
@@ -199,7 +205,7 @@ class DxfWalk:
     def _take(
         self, shapes: Iterable[DxfShape], entity: Any, scope: DxfScope, look: DxfLook
     ) -> None:
-        """The paths of an entity."""
+        """Add these shapes of an entity to the pieces."""
         source = _source(entity, scope)
         for shape in shapes:
             self.pieces.append(
@@ -218,7 +224,7 @@ class DxfWalk:
         self._use(entity, scope)
 
     def _point(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
-        """A POINT, wherever high."""
+        """Add a POINT to the marks, at any height."""
         require(entity, ("location",))
         place = numbers(entity.dxf.location) @ scope.frame.linear + scope.frame.offset
         at_mm = float(place[0]), float(place[1])
@@ -227,7 +233,8 @@ class DxfWalk:
         self._use(entity, scope)
 
     def _text(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
-        """Text, when it is wanted; the template of an attribute shows only outside of blocks."""
+        """Add a text to the pieces if text is wanted; the template of an attribute (ATTDEF) shows
+        only outside of blocks."""
         kind = entity.dxftype()
         if kind == "ATTDEF" and scope.blocks and not entity.is_const:
             raise Unusable("is the template of an attribute")
@@ -240,7 +247,8 @@ class DxfWalk:
             self.fonts[lacks] += 1
 
     def _callout(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
-        """Read the dimension with its limits, whether its lines are drawn or not."""
+        """Add a dimension with its limits to the callouts, also if its lines are not read as
+        pieces."""
         from camtool.importers.dxf.dimensions import callout
 
         source, paper = _source(entity, scope), self.options.layout is not None
@@ -255,7 +263,7 @@ class DxfWalk:
             self.callouts.append(measured)
 
     def _parts(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
-        """Walk through the entities that draw a dimension, a multiple line or a proxy."""
+        """Read the entities that draw a dimension, a multiple line or a proxy."""
         # A dimension is drawn by a block of its own, which may hold it again.
         drawn = vars(entity.dxf).get("geometry")
         name = block_key(drawn or f"{entity.dxftype()} {entity.dxf.handle}")
@@ -268,7 +276,8 @@ class DxfWalk:
         self._entities(parts, inner)
 
     def _insert(self, insert: Any, scope: DxfScope, look: DxfLook) -> None:
-        """The block of an INSERT at each place of its array, and its attributes."""
+        """Read the block of an INSERT at each place of its array, and the attributes of the
+        INSERT."""
         require(insert, ("name", "insert"))
         block = insert.block()
         name = block_key(insert.dxf.name)
@@ -292,14 +301,18 @@ class DxfWalk:
         self._entities(insert.attribs, scope)
 
     def _count(self, insert: Any, scope: DxfScope) -> None:
-        """Raise DrawingError before the blocks of a space become too many."""
+        """Raise DrawingError if the INSERTs of a space stand for more than MAX_INSERTED
+        entities."""
         if not scope.blocks:
             self._inserted += self._sizes.inserted(insert)
         if self._inserted > MAX_INSERTED:
             raise _too_many()
 
     def _visit(self) -> None:
-        """The same for what the sizes of blocks do not tell: blocks of dimensions."""
+        """Raise DrawingError if more than MAX_INSERTED entities within blocks are visited.
+
+        Blocks of dimensions have no INSERT, so that `_count` does not bound them.
+        """
         self._visited += 1
         if self._visited > MAX_INSERTED:
             raise _too_many()
@@ -312,14 +325,14 @@ class DxfWalk:
         self.skipped[kind, printable(str(reason))] += count
 
     def _placed(self, error: DrawingError, entity: Any, look: DxfLook) -> DrawingError:
-        """Return the error with file and place."""
+        """Return the same error with the file, layer and entity set."""
         error.file = error.file or self.file
         error.where = error.where or f"layer {look.layer}, {_source(entity, None)}"
         return error
 
 
 def _check_nesting(name: str, scope: DxfScope) -> None:
-    """Raise Unusable for a block that holds itself."""
+    """Raise Unusable for a block that contains itself, or is nested too deep."""
     if name in scope.blocks or len(scope.blocks) >= MAX_NESTING:
         raise Unusable("its block holds itself, or blocks too deep")
 
@@ -401,9 +414,9 @@ MAX_PARTS = 10_000
 
 
 def parts_of(entity: Any) -> list[Any]:
-    """Return the entities that a dimension, leader, multiple line or proxy is drawn with.
+    """Return the entities with which a dimension, leader, multiple line or proxy is drawn.
 
-    Unusable when there are none. The points that define a dimension are no part of it, nor is the
+    Unusable when there are none. The points that define a dimension are left out, and so is the
     filling between multiple lines.
     """
     left_out = {"POINT", "HATCH"} if entity.dxftype() == "MLINE" else {"POINT"}
@@ -436,8 +449,8 @@ def _virtual(entity: Any) -> Iterable[Any]:
 def text_shapes(
     entity: Any, frame: WorldMap, tolerance_mm: float, mode: str
 ) -> tuple[list[DxfShape], str]:
-    """Return the lines of a text in mm, and what was wanted and could not be had (""
-    otherwise)."""
+    """Return the outlines of a text in mm, and a description of fonts or characters that are
+    missing, else ""."""
     from camtool.importers.dxf.text import text_strokes
 
     text = text_strokes(entity, mode)
@@ -465,8 +478,8 @@ class BlockSizes:
         self._sizes: dict[str, int] = {}
 
     def inserted(self, insert: Any) -> int:
-        """Return entities that an INSERT stands for, itself included; 1 when its block is
-        missing."""
+        """Return the number of entities that an INSERT stands for, itself included; 1 if its block
+        is missing."""
         if not insert.dxf.hasattr("name"):
             return 1
         name = block_key(insert.dxf.name)
@@ -482,9 +495,10 @@ class BlockSizes:
 
 
 def matrix(insert: Any) -> Floats:
-    """Return the map (4, 4), for row vectors, of a block's entities to where its INSERT stands.
+    """Return the matrix (4, 4), for row vectors, that places the entities of a block where its
+    INSERT stands.
 
-    DrawingError for numbers that are not finite, Unusable when it has no plane.
+    DrawingError for numbers that are not finite, Unusable for an extrusion of 0.
     """
     dxf = insert.dxf
     numbers = (*dxf.insert, *dxf.extrusion, dxf.rotation)
@@ -499,7 +513,8 @@ def matrix(insert: Any) -> Floats:
 
 
 def member_shifts(insert: Any) -> Iterator[Floats]:
-    """Yield the shift of each member of an array from the first one, (3,) in world units.
+    """Yield for each member of an INSERT's array its shift (3,) from the first one, in world
+    units.
 
     The array turns with the INSERT, but its spacing is not scaled.
     """
@@ -513,13 +528,14 @@ def member_shifts(insert: Any) -> Iterator[Floats]:
 
 
 def block_key(name: Any) -> str:
-    """Return a name of a block or layer in the form by which names are compared: upper and lower
-    case are the same."""
+    """Return the name of a block or layer in lower case: DXF compares names without regard to
+    case."""
     return str(name).casefold()
 
 
 def _array(insert: Any) -> tuple[int, int]:
-    """Return columns and rows; without spacing all members stand on the first one."""
+    """Return the numbers of columns and rows of an INSERT's array; without spacing it has one
+    column or row."""
     columns = max(int(insert.dxf.column_count), 1) if insert.dxf.column_spacing else 1
     rows = max(int(insert.dxf.row_count), 1) if insert.dxf.row_spacing else 1
     return columns, rows
@@ -562,12 +578,12 @@ class DxfLooks(Struct):
 
     @classmethod
     def of(cls, document: Any) -> DxfLooks:
-        """With the layers of the document's table."""
+        """Return the looks of a document, with the layers of its table."""
         return cls({block_key(layer.dxf.name): _layer(layer) for layer in document.layers})
 
     def of_entity(self, attributes: dict[str, Any], block: DxfLook | None) -> DxfLook:
-        """Return the look of an entity that says these attributes, in a block placed with
-        `block`."""
+        """Return the look of an entity with these attributes; `block` is the look of the INSERT
+        around it, if any."""
         attribute_key = tuple(
             attributes.get(name) for name in ("layer", "color", "true_color", "linetype")
         )
@@ -598,7 +614,7 @@ class DxfLooks(Struct):
 
 
 def _layer(layer: Any) -> DxfLook:
-    """Return the look that a layer gives."""
+    """Return the look that a layer gives to its entities."""
     attributes = vars(layer.dxf)
     name, frozen = printable(str(layer.dxf.name)), bool(layer.is_frozen())
     state = "frozen" if frozen else "off" if layer.is_off() else ""
@@ -612,7 +628,8 @@ def _layer(layer: Any) -> DxfLook:
 
 
 def _colour(index: Any, true: Any, by_layer: str, by_block: str) -> str:
-    """ "#rrggbb" of a colour index or a true colour."""
+    """Return "#rrggbb" of a colour index or a true colour; BYLAYER and BYBLOCK give the colours
+    passed for them."""
     if true is not None:
         return f"#{int(true) & 0xFFFFFF:06x}"
     number = _BYLAYER if index is None else abs(int(index))

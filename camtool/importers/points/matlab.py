@@ -49,7 +49,7 @@ def is_matlab(text: str, file: str) -> bool:
 
 
 def parse_matlab(text: str, file: str) -> PointTable:
-    """Return the router's one stroke; DrawingError naming the line."""
+    """Return the router's one stroke, in tenths of a millimetre; DrawingError naming the line."""
     values = parse_assignments(text, file, _NAMES)
     points, line = _Job(file, values).points()
     return PointTable(
@@ -69,8 +69,8 @@ class _Job:
         self.sideways = self._is_sideways()
 
     def points(self) -> tuple[Floats, int]:
-        """Return the points (n, 2) in the file's unit, and the line of the array they come
-        from."""
+        """Return the points (n, 2) in the file's unit, and the line on which their array is
+        assigned."""
         places = self._pair("xy")
         lengths, speeds = self._pair("lxy"), self._pair("velxy")
         if places is not None:
@@ -88,8 +88,11 @@ class _Job:
         return np.cumsum([np.array(first, dtype=np.float64), *steps], axis=0), lengths[1]
 
     def _is_sideways(self) -> bool:
-        """Return True if arrays of pairs are (n, 2) instead of (2, n). A (2, 2) array follows
-        the others; alone it is read as the router reads it."""
+        """Return True if arrays of pairs are (n, 2) instead of (2, n).
+
+        An array (2, 2) may be either: it follows the other arrays, and alone it is read as (2, n),
+        as the router does.
+        """
         votes: dict[bool, MatlabArray] = {}
         for name in _PAIRS:
             value = self.values.get(name)
@@ -104,7 +107,8 @@ class _Job:
         return True in votes
 
     def _pair(self, name: str) -> tuple[Floats, int] | None:
-        """Return the array (n, 2) of this name, or of its two single rows; and its line."""
+        """Return the array (n, 2) of this name, or the one made of its two single rows, and its
+        line; None without either."""
         value = self.values.get(name)
         rows = [self._vector(part) for part in _PARTS[name]]
         x, y = rows
@@ -141,7 +145,8 @@ class _Job:
         return float(value.array[0, 0])
 
     def _steps(self, lengths: tuple[Floats, int], speeds: tuple[Floats, int]) -> Floats:
-        """Return the lines (n, 2) as displacements: lengths with the signs of the speeds."""
+        """Return the displacement (n, 2) of each line of the job: its lengths with the signs of
+        its speeds."""
         length, speed = lengths[0], speeds[0]
         if len(length) != len(speed):
             self._fail_at("lxy and velxy differ in length", speeds[1])
@@ -159,7 +164,7 @@ class _Job:
         lengths: tuple[Floats, int] | None,
         speeds: tuple[Floats, int] | None,
     ) -> None:
-        """Raise DrawingError when lines, directions, count or first point are not those of xy."""
+        """Raise DrawingError if the lengths, directions, count or first point contradict xy."""
         steps = np.diff(points, axis=0)
         if lengths is not None and not _are_same(lengths[0], np.abs(steps)):
             self._fail_at("lxy are not the lengths of the lines of xy", lengths[1])
@@ -227,7 +232,7 @@ class _Token(Struct, frozen=True):
 
 
 def _tokens(text: str) -> Iterator[_Token]:
-    """Yield all tokens; comments and continued lines are blanks."""
+    """Yield all tokens; comments and line continuations count as blanks."""
     text = _BLOCK.sub(lambda match: "\n" * match[0].count("\n"), text)
     line, blank = 1, True
     for match in _TOKEN.finditer(text):
@@ -243,7 +248,7 @@ def _tokens(text: str) -> Iterator[_Token]:
 
 
 def parse_assignments(text: str, file: str, names: tuple[str, ...]) -> dict[str, MatlabArray]:
-    """Return every assigned array by its name; DrawingError with its line for all that is no
+    """Return every assigned array by its name; DrawingError, with the line, for a value that is no
     number."""
     return _Parser(file, text, names).values()
 
@@ -298,7 +303,7 @@ class _Parser:
         return array
 
     def _matrix(self) -> Floats:
-        """Return the rows up to the closing bracket; a line's end ends a row as a semicolon
+        """Return the rows up to the closing bracket; the end of a line ends a row as a semicolon
         does."""
         rows: list[list[float]] = [[]]
         while True:
@@ -334,7 +339,8 @@ class _Parser:
         return value
 
     def _take(self) -> _Token:
-        """Return the next token; at the end it stays."""
+        """Return the current token and go on to the next; the end token is returned again and
+        again."""
         token = self._now
         self._now = next(self._rest, token)
         return token

@@ -78,7 +78,7 @@ def _decoded(data: bytes, file: str) -> str:
 
 
 def _units(table: PointTable, options: ReadOptions) -> Units:
-    """Return the caller's unit, else the file's, else mm."""
+    """Return the unit that the caller asks for, else the file's, else mm."""
     if options.units is None and table.unit is not None:
         size = table.mm_per_unit
         return Units(table.unit, options.mm_per(table.unit) if size is None else size, table.why)
@@ -86,7 +86,7 @@ def _units(table: PointTable, options: ReadOptions) -> Units:
 
 
 def piece_of(stroke: Stroke, mm_per_unit: float) -> Piece:
-    """Return a stroke in mm, its arcs of more than a half circle cut in two."""
+    """Return a stroke as a piece in mm; arcs of more than a half circle are cut in two."""
     points = stroke.points
     vertices = np.zeros((len(points), 3))
     closed = stroke.closed

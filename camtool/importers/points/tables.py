@@ -141,8 +141,11 @@ class _Lines(Struct):
         ]
 
     def _row(self, content: str, line: int, pattern: re.Pattern[str]) -> tuple[float, ...]:
-        """Return the numbers of one line; the pattern reads what is plain, and is many times
-        faster."""
+        """Return the numbers of one line.
+
+        The pattern matches plain numbers and is many times faster; any other line is read field by
+        field.
+        """
         match = pattern.fullmatch(content)
         if match is None:
             return self._diagnosed(content, line)
@@ -163,7 +166,7 @@ class _Lines(Struct):
 
     def _diagnosed(self, content: str, line: int) -> tuple[float, ...]:
         """Return the numbers of one line, field by field; DrawingError naming the first bad
-        one."""
+        field."""
         fields = _fields(content, self.parted or "")
         if len(fields) != self.columns:
             expected = "x and y" if self.columns == 2 else "x, y and bulge"
@@ -193,7 +196,11 @@ class _Lines(Struct):
         return value
 
     def _comma(self, content: str, proven: bool, line: int) -> None:
-        """A decimal comma stands in this line."""
+        """Note that a line has a decimal comma; DrawingError if another line has a decimal point.
+
+        `proven`: the line itself proves that its commas are decimal ones and do not separate x
+        from y.
+        """
         self.comma_line = self.comma_line or line
         self.proven = self.proven or proven or _PROOF.search(content) is not None
         if "." in content:
@@ -224,8 +231,8 @@ class _Lines(Struct):
             )
 
     def _names(self, content: str, line: int) -> bool:
-        """Return True if the line names the columns; DrawingError if it names them in another
-        order."""
+        """Read a line of column names if it is one, and return True; DrawingError for an order
+        other than x, y, bulge."""
         parted = next((sign for sign in (";", "\t", ",") if sign in content), "")
         fields = content.split(parted) if parted else content.split()
         matches = [_NAME.fullmatch(name) for name in fields]
@@ -247,7 +254,8 @@ class _Lines(Struct):
         return True
 
     def _unit(self, names: list[str], line: int) -> str | None:
-        """Return the unit that both names give, as in `x [in]` or `x_mm`."""
+        """Return the unit that the names of both columns give, as in `x [in]` or `x_mm`; None
+        without one."""
         units: set[str | None] = set()
         for name in names:
             match = _UNIT.fullmatch(name)
@@ -268,7 +276,7 @@ class _Lines(Struct):
 
 
 def _separator(content: str, columns: int) -> str:
-    """Return the separator of the fields of this line; "" for blanks."""
+    """Return the separator of the fields of this line: ";", ",", tab, or "" for blanks."""
     content = content.strip()
     unquoted = _QUOTED.sub("0", content)
     if ";" in unquoted:
@@ -286,15 +294,15 @@ def _separator(content: str, columns: int) -> str:
 
 
 def _row_pattern(parted: str, columns: int) -> re.Pattern[str]:
-    """Return a line of plain numbers in this dialect."""
+    """Return the pattern that matches a line of plain numbers with this separator."""
     number = f"({_REAL})" if parted == "," else f"({_REAL_COMMA})"
     sign = rf"[^\S\t]*{parted}[^\S\t]*" if parted else r"\s+"
     return re.compile(rf"\s*{sign.join([number] * columns)}\s*", re.ASCII)
 
 
 def _fields(content: str, parted: str) -> list[tuple[str, int]]:
-    """Return each field without its blanks, and its column; a sign within quotes separates
-    nothing."""
+    """Return each field without blanks around it, and its column in the line; a separator within
+    quotes does not count."""
     if not parted:
         return [(match[0], match.start() + 1) for match in re.finditer(r"\S+", content)]
     hidden = _QUOTED.sub(lambda match: "0" * len(match[0]), content)
@@ -444,7 +452,7 @@ _SAVE = "give an array of numbers (n, 2) of x, y or (n, 3) of x, y, bulge"
 
 
 def parse_npy(data: bytes, file: str) -> PointTable:
-    """Return the one stroke of an .npy; DrawingError when it is no such array."""
+    """Return the one stroke of an .npy file; DrawingError if its array is no list of points."""
     return PointTable([Stroke(_array(data, file, ""), "of the array")])
 
 
@@ -498,7 +506,7 @@ def _layer(name: str, file: str) -> str:
 
 
 def _array(data: bytes, file: str, name: str) -> Floats:
-    """Return the points (n, 2) or (n, 3) of one .npy."""
+    """Return the points (n, 2) or (n, 3) of the content of one .npy file."""
     where = f"array {name}" if name else None
     shape, fortran, dtype, begin = _header(data, file, where)
     check_type(shape, dtype, file, where)
@@ -519,7 +527,7 @@ def _array(data: bytes, file: str, name: str) -> Floats:
 def check_type(
     shape: tuple[int, ...], dtype: np.dtype[np.generic], file: str, where: str | None
 ) -> None:
-    """Refuse an array that is no list of points by its type or its shape: DrawingError."""
+    """Raise DrawingError if an array of this type or shape is no list of points."""
     if dtype.hasobject or dtype.kind not in "fiu":
         content = "objects" if dtype.hasobject else f"numbers of type {dtype}"[:60]
         raise DrawingError(f"holds {content}, no coordinates", file=file, where=where, mend=_SAVE)
@@ -536,7 +544,8 @@ def check_type(
 def _header(
     data: bytes, file: str, where: str | None
 ) -> tuple[tuple[int, ...], bool, np.dtype[np.generic], int]:
-    """Shape, order, type and where the numbers begin; the header is a literal and never run."""
+    """Return shape, Fortran order, type, and the offset of the numbers of an .npy file; its header
+    is read as a literal, never run."""
     stream = io.BytesIO(data)
     try:
         version = np.lib.format.read_magic(stream)
@@ -557,7 +566,7 @@ def _header(
 
 
 def check_numbers(points: Floats, file: str, name: str) -> None:
-    """Refuse the first row that is no point, with its number: DrawingError."""
+    """Raise DrawingError for the first row that is no point, with its number."""
     head = f"array {name}, " if name else ""
     odd = ~np.isfinite(points).all(axis=1)
     if odd.any():

@@ -32,12 +32,18 @@ class Body(Struct, frozen=True, eq=False):
 
 
 def shape_bodies(shape: Any) -> list[Body]:
-    """Return the parts of a build123d shape with the names and colours of its tree."""
+    """Return the bodies of a build123d shape, with the names and colours that its tree gives
+    them."""
     return _tree_bodies(shape.wrapped, shape, "0", "")
 
 
 def _tree_bodies(topods: Any, shape: Any, layer: str, colour: str) -> list[Body]:
-    """`topods` is where the shape really is: children do not move with what they belong to."""
+    """Return the bodies of a shape of build123d and of its children, with its own label and colour
+    or the inherited ones.
+
+    `topods` is the same shape at its place in the whole: children of build123d do not move with
+    their parent.
+    """
     from OCP.TopoDS import TopoDS_Iterator
 
     layer = layer_of(shape.label) or layer
@@ -66,8 +72,8 @@ def parts_in(shape: Any) -> list[Any]:
 
 
 def subshapes(shape: Any, kind: Any, outside: Any = None) -> list[Any]:
-    """Return all parts of this kind (`TopAbs_FACE` …), each once; with `outside` none that is
-    in such."""
+    """Return all parts of a shape that are of this kind (`TopAbs_FACE` …), each once; none that
+    lies within a part of the kind `outside`."""
     from OCP.TopAbs import TopAbs_SHAPE
     from OCP.TopExp import TopExp_Explorer
 
@@ -93,13 +99,16 @@ def has_edges(shape: Any) -> bool:
 
 
 def layer_of(label: object) -> str:
-    """Return the name as a layer; "" when there is none."""
+    """Return the layer that a label names; "" for an empty one."""
     text = "".join(sign if sign.isprintable() else "_" for sign in str(label or "")).strip()
     return "" if _NO_NAME.fullmatch(text) else text
 
 
 def colour_of(colour: Any) -> str:
-    """ "#rrggbb" of a `Quantity_Color`, which is linear: sRGB is 1.055 c^(1/2.4) − 0.055."""
+    """Return "#rrggbb" of a `Quantity_Color`.
+
+    Its channels are linear: sRGB is 1.055 c^(1/2.4) − 0.055.
+    """
     parts = [
         12.92 * part if part <= 0.0031308 else 1.055 * part ** (1.0 / 2.4) - 0.055
         for part in (colour.Red(), colour.Green(), colour.Blue())
@@ -108,7 +117,8 @@ def colour_of(colour: Any) -> str:
 
 
 def _as_own_class(shape: Any) -> Any:
-    """Return the shape as the class of its kind; the binding has other names since version 8."""
+    """Return the shape cast to the class of its kind (Face, Edge …), whose functions have other
+    names since version 8 of the binding."""
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID, TopAbs_WIRE
     from OCP.TopoDS import TopoDS
 
@@ -201,8 +211,8 @@ class _Tree:
         ]
 
     def _one(self, label: Any, place: Any, layer: str, colour: str, depth: int) -> list[Body]:
-        """Return the bodies of one part or assembly, with its own name and colour or the
-        inherited."""
+        """Return the bodies of one part or assembly, with its own name and colour or the inherited
+        ones."""
         from OCP.TDF import TDF_Label
 
         original = label
@@ -277,7 +287,8 @@ _MEND = "correct the script"
 
 
 def run_script(data: bytes, file: str) -> list[Body]:
-    """Return the bodies that a script leaves; DrawingError with its line when it fails."""
+    """Run a build123d script and return the bodies that it leaves; DrawingError, with its line,
+    when it fails."""
     names: dict[str, Any] = {"__name__": "camtool_script", "__file__": file}
     if Path(file).is_file():  # what lies beside a script it finds, as ever
         sys.path.insert(0, str(Path(file).resolve().parent))
@@ -307,7 +318,8 @@ def is_missing(error: Exception) -> bool:
 
 
 def _script_error(message: str, error: BaseException, file: str) -> DrawingError:
-    """Return the error with the last line of the script that was being run."""
+    """Return the error for a script that failed, with the number of its last line that was being
+    run."""
     lines = [
         frame.lineno
         for frame in traceback.extract_tb(error.__traceback__)
@@ -317,7 +329,8 @@ def _script_error(message: str, error: BaseException, file: str) -> DrawingError
 
 
 def _bodies_of_result(names: dict[str, Any]) -> list[Body]:
-    """Return the bodies of the first of RESULTS; DrawingError when there is none."""
+    """Return the bodies of the first variable among RESULTS that the script has set; DrawingError
+    when there is none."""
     name = next((name for name in RESULTS if names.get(name) is not None), None)
     if name is None:
         raise DrawingError(
@@ -339,7 +352,8 @@ def _bodies_of_result(names: dict[str, Any]) -> list[Body]:
 
 
 def shapes_in(value: Any) -> list[Any]:
-    """Return the shapes in a builder, a shape or a list of them; TypeError naming another type."""
+    """Return the shapes in a builder, a shape or a list of them; TypeError, which names the type,
+    for anything else."""
     from build123d import BuildLine, BuildPart, BuildSketch, Shape
 
     for builder, inside in ((BuildPart, "part"), (BuildSketch, "sketch"), (BuildLine, "line")):

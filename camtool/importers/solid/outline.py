@@ -47,7 +47,11 @@ class Outlines(Struct, frozen=True, eq=False):
 
 
 def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outlines:
-    """Return the outlines of the bodies; DrawingError when a section misses them all."""
+    """Return the outlines of the bodies: of their highest level faces, or of their section at this
+    height.
+
+    DrawingError when the plane of the section misses them all.
+    """
     boxes = [_box(body.shape) for body in bodies]
     low, high = min(box[2] for box in boxes), max(box[5] for box in boxes)
     if height is not None and not low - POSITION_EPS_MM <= height <= high + POSITION_EPS_MM:
@@ -75,7 +79,7 @@ def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outl
 
 
 def _why_nothing_drawn(kind: str, height: float | None) -> str:
-    """Return why nothing of a body is drawn."""
+    """Return the reason, for the user, why nothing of a body is drawn."""
     if height is not None:
         return "is not cut by the section"
     return "has no level face that looks up" if kind == "face" else "is not level"
@@ -84,8 +88,11 @@ def _why_nothing_drawn(kind: str, height: float | None) -> str:
 def _choose_faces(
     body: Body, box: tuple[float, ...], height: float | None
 ) -> tuple[str, list[Any], list[Any], float | None]:
-    """Choose the faces of a body whose outlines become the drawing; return their kind, the faces,
-    the edges that belong to no face, and their height."""
+    """Choose the faces of a body whose outlines become the drawing.
+
+    Return the kind of outline, the faces, the edges that belong to no face, and the height of the
+    faces, None if they were not chosen by height.
+    """
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 
     flat = box[5] - box[2] <= POSITION_EPS_MM
@@ -109,7 +116,7 @@ def _choose_faces(
 
 
 def _level(face: Any) -> float | None:
-    """Return the height of a level face that looks up, else None."""
+    """Return the height of a face that is level and looks up, None for any other face."""
     from OCP.BRepGProp import BRepGProp_Face
     from OCP.BRepTools import BRepTools
     from OCP.gp import gp_Pnt, gp_Vec
@@ -126,7 +133,7 @@ def _level(face: Any) -> float | None:
 
 
 def _is_plane(face: Any) -> bool:
-    """Return True if the surface is a plane, also where the file writes it as a spline."""
+    """Return True if the surface is a plane, even if the file writes it as a spline."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_BezierSurface, GeomAbs_BSplineSurface, GeomAbs_Plane
@@ -140,8 +147,8 @@ def _is_plane(face: Any) -> bool:
 
 
 def _section(shape: Any, box: tuple[float, ...], height: float) -> tuple[list[Any], list[Any]]:
-    """Return the faces that a solid shares with the level plane; of what has no inside, the
-    edges."""
+    """Return the faces that a solid shares with the level plane at this height; for a shell or
+    face without a volume, the edges instead."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Section
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.gp import gp_Ax3, gp_Dir, gp_Pln, gp_Pnt
@@ -162,8 +169,8 @@ def _section(shape: Any, box: tuple[float, ...], height: float) -> tuple[list[An
 
 
 def _wires(face: Any, tolerance: float) -> list[EdgePath]:
-    """Return the outer and inner wires as closed paths; the edges one by one of a wire that is
-    no ring."""
+    """Return the outer and inner wires of a face as closed paths; the edges of a wire that does
+    not close come as single paths."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepTools import BRepTools_WireExplorer
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_WIRE
@@ -191,7 +198,8 @@ def _wires(face: Any, tolerance: float) -> list[EdgePath]:
 
 
 def _box(shape: Any) -> tuple[float, ...]:
-    """x, y and z of the lowest corner, then of the highest, to the exact geometry."""
+    """Return the bounding box of the exact geometry: x, y, z of its lowest corner, then of its
+    highest."""
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
 
@@ -228,8 +236,8 @@ class EdgePath(Struct, frozen=True, eq=False):
 
 
 def edge_path(edge: Any, tolerance: float) -> EdgePath:
-    """Return the edge in its own direction, from its first point to its last, both in
-    `vertices`."""
+    """Return the edge in its own direction; `vertices` begin at its first point and end at its
+    last one."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.TopAbs import TopAbs_REVERSED
 
@@ -247,8 +255,8 @@ def edge_path(edge: Any, tolerance: float) -> EdgePath:
 
 
 def reversed_vertices(vertices: Floats) -> Floats:
-    """Return the open path from its end to its beginning; bulges change their sign and their
-    owner."""
+    """Return the open path in the opposite direction: each bulge changes its sign and moves to the
+    other end of its segment."""
     vertices_back = vertices[::-1].copy()
     vertices_back[:-1, 2] = -vertices[-2::-1, 2]
     vertices_back[-1, 2] = 0.0
@@ -256,7 +264,10 @@ def reversed_vertices(vertices: Floats) -> Floats:
 
 
 def join_edges(edges: list[EdgePath]) -> EdgePath:
-    """Edges one after the other as one closed path; each ends where the next one begins."""
+    """Return edges, each of which ends where the next begins, joined to one closed path.
+
+    A gap above POSITION_EPS_MM is added to the error of the segment before it.
+    """
     vertices = np.concatenate([path.vertices[:-1] for path in edges])
     errors = [path.off[:-1].copy() for path in edges]
     for row, step in zip(errors, _steps(edges).tolist(), strict=True):
@@ -265,20 +276,22 @@ def join_edges(edges: list[EdgePath]) -> EdgePath:
 
 
 def is_ring(edges: list[EdgePath]) -> bool:
-    """Return True if each edge begins where the one before ends, and the last one closes the
-    ring."""
+    """Return True if each edge begins where the one before ends, and the first where the last
+    ends."""
     return bool((_steps(edges) <= JOINT_MM).all())
 
 
 def _steps(edges: list[EdgePath]) -> Floats:
-    """Return (E,) how far from the end of each edge the next one begins."""
+    """Return the distance (E,) from the end of each edge to the begin of the next one, and of the
+    last to the first."""
     ends = np.array([path.vertices[-1, :2] for path in edges])
     starts = np.array([path.vertices[0, :2] for path in edges])
     return np.asarray(np.hypot(*(np.roll(starts, -1, axis=0) - ends).T))
 
 
 def _exact(curve: Any, start: float, end: float) -> Floats | None:
-    """Return a line or a level circle; None for every other curve."""
+    """Return the vertices of a line, or of a circle or arc in a level plane; None for any other
+    curve."""
     from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
 
     kind = curve.GetType()
@@ -299,7 +312,7 @@ def _exact(curve: Any, start: float, end: float) -> Floats | None:
 
 
 def _fitted_curve(curve: Any, start: float, end: float) -> Curve:
-    """Return the curve as `fit_curve` takes it, seen from above."""
+    """Return the curve, seen from above, in the form that `fit_curve` takes."""
     from OCP.GeomAbs import (
         GeomAbs_BezierCurve,
         GeomAbs_BSplineCurve,
@@ -330,7 +343,8 @@ def _fitted_curve(curve: Any, start: float, end: float) -> Curve:
 
 
 def _spline(spline: Any, start: float, end: float) -> Curve:
-    """Return the part of a B-spline between two parameters, with its own knots and weights."""
+    """Return the part of a B-spline between two parameters, with the knots and weights of that
+    part."""
     if spline.IsPeriodic():
         spline.SetNotPeriodic()
     if (spline.FirstParameter(), spline.LastParameter()) != (start, end):
@@ -348,7 +362,8 @@ def _spline(spline: Any, start: float, end: float) -> Curve:
 
 
 def _sample_curve(curve: Any, start: float, end: float) -> Curve:
-    """Return any curve, point by point; it may have corners where its intervals meet."""
+    """Return a curve of any kind by functions that sample it; it may have corners where its
+    intervals meet."""
     from OCP.GeomAbs import GeomAbs_C1
     from OCP.gp import gp_Pnt, gp_Vec
 

@@ -65,8 +65,8 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
 
 
 def found_in(answer: dict[str, Any], why: str, scale: float, options: ReadOptions) -> Found:
-    """Return what the worker's answer holds, `scale` mm for each of its mm; `why` says from where
-    its unit is known."""
+    """Return the pieces in the worker's answer, in mm: `scale` is mm for each mm of the answer;
+    `why` says where the unit comes from."""
     height = None if options.section_z_mm is None else options.section_z_mm / scale
     return Found(
         _pieces(answer["outlines"], scale),
@@ -78,7 +78,10 @@ def found_in(answer: dict[str, Any], why: str, scale: float, options: ReadOption
 
 
 def _kind(data: bytes, file: str, options: ReadOptions) -> tuple[str, FileUnit]:
-    """ "step", "brep" or "script" by the content, and its unit."""
+    """Return "step", "brep" or "script" by the content, and the unit of the file.
+
+    DrawingError for a file that is cut off or unknown, or a script that is not allowed.
+    """
     head = text_head(data)
     if is_step(head):
         if _STEP_END not in data:
@@ -99,7 +102,7 @@ def _kind(data: bytes, file: str, options: ReadOptions) -> tuple[str, FileUnit]:
 
 
 def _pieces(outlines: list[dict[str, Any]], scale: float) -> list[Piece]:
-    """Return a piece for each wire, in mm."""
+    """Return a piece for each path of the outlines, in mm."""
     pieces: list[Piece] = []
     for number, outline in enumerate(outlines, start=1):
         for wire, path in enumerate(outline["paths"], start=1):
@@ -113,7 +116,8 @@ def _pieces(outlines: list[dict[str, Any]], scale: float) -> list[Piece]:
 
 
 def _faults(answer: dict[str, Any]) -> list[Finding]:
-    """FILE_REPAIRED when the reader complained or a body does not hold together."""
+    """Return findings FILE_REPAIRED if OpenCASCADE complained, or if faces and edges of a body do
+    not fit together."""
     findings: list[Finding] = []
     if answer["faulty"]:
         findings.append(FILE_REPAIRED_BODIES(measured=answer["faulty"], bodies=answer["bodies"]))
@@ -123,7 +127,8 @@ def _faults(answer: dict[str, Any]) -> list[Finding]:
 
 
 def _section_finding(answer: dict[str, Any], scale: float, height: float | None) -> list[Finding]:
-    """SECTION_CHOSEN: what was taken, at which height, and how high the model is."""
+    """Return the finding SECTION_CHOSEN: the height at which faces or a section were taken, and
+    the lowest and highest z of the model."""
     if not answer["levels"]:
         return []
     low, high = scale * min(answer["levels"]), scale * max(answer["levels"])
@@ -182,7 +187,11 @@ def run_worker(data: bytes, request_items: dict[str, Any], file: str) -> dict[st
 
 
 def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
-    """Return the exit code of the worker, whose words go to this file descriptor."""
+    """Run the worker, which writes its messages to the file descriptor `output`; return its exit
+    code.
+
+    DrawingError if it takes more than `seconds`.
+    """
     try:
         process = subprocess.run(
             [sys.executable, "-P", "-c", START, str(request)],
@@ -202,7 +211,8 @@ def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
 
 
 def _answer(answer: Path, code: int, script: bool, file: str) -> dict[str, Any]:
-    """Read the answer of the worker; DrawingError without one, since it died of a damaged file."""
+    """Read the answer of the worker; DrawingError without one, since then a damaged file has
+    killed it."""
     if answer.exists():
         result: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
         return result
@@ -250,7 +260,8 @@ class FileUnit(Struct, frozen=True):
     mm: float | None = 1.0
 
     def scale(self, options: ReadOptions, file: str) -> float:
-        """By what lengths are to be multiplied, so that the caller's unit is the file's."""
+        """Return the factor for lengths that replaces the file's unit by the one that the caller
+        asks for; 1 if none is asked for."""
         if options.units is None:
             return 1.0
         if self.mm is None:
@@ -261,17 +272,18 @@ class FileUnit(Struct, frozen=True):
 
 
 def unnamed_unit() -> FileUnit:
-    """Return mm, since BREP files name no unit."""
+    """Return mm as the unit, since BREP files name none."""
     return FileUnit("BREP names no unit; its makers count in mm")
 
 
 def script_unit() -> FileUnit:
-    """Return mm, the unit of build123d."""
+    """Return mm as the unit, since build123d counts in mm."""
     return FileUnit("build123d counts in mm")
 
 
 def step_unit(data: bytes) -> FileUnit:
-    """Return the one unit of length that all parts of a STEP file name; its reader gives mm."""
+    """Return the unit of length that all parts of a STEP file name; its reader has converted it to
+    mm. It is unknown (None) if they differ."""
     entities = {match[1]: match[2] for match in _ENTITY.finditer(data)}
     names = {
         _name(entities[number])

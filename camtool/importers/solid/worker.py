@@ -24,7 +24,8 @@ MAX_MEMORY_BYTES = 12 << 30
 
 
 def main(request: dict[str, Any]) -> None:
-    """Does what is asked and writes the answer, or the error, to the file `request["answer"]`."""
+    """Read the model that `request` describes and write its outlines, or the error, as JSON to the
+    file `request["answer"]`."""
     _limit(None if request["kind"] == "script" else MAX_MEMORY_BYTES)
     try:
         result = find_outlines(request)
@@ -39,8 +40,8 @@ def find_outlines(request: dict[str, Any]) -> dict[str, Any]:
     """Return the outlines of the model in the file `request["source"]`, as plain lists and
     numbers.
 
-    `kind` ("step", "brep", "script"), `height` of a section or None, `tolerance` of fitting;
-    lengths in the model's mm. `file` is the model's name for messages.
+    Other keys: `kind` ("step", "brep", "script"), `height` of a section or None, `tolerance` of
+    fitting, both in the model's mm, and `file`, the model's name for messages.
     """
     script = request["kind"] == "script"
     return outlines_of(
@@ -51,9 +52,10 @@ def find_outlines(request: dict[str, Any]) -> dict[str, Any]:
 def outlines_of(
     bodies_of: Callable[[], list[Body]], height: float | None, tolerance: float, *, script: bool
 ) -> dict[str, Any]:
-    """Return the outlines of the bodies that a call makes, as plain lists and numbers.
+    """Return the outlines of the bodies that `bodies_of` makes, as plain lists and numbers.
 
-    DrawingError where OpenCASCADE fails on them: those of a `script`, or else of a file."""
+    DrawingError where OpenCASCADE fails on them: those of a `script`, or else of a file.
+    """
     try:
         bodies = bodies_of()
         result = outlines(bodies, height, tolerance)
@@ -73,7 +75,7 @@ def outlines_of(
 
 
 def _missing_error(error: Exception) -> DrawingError:
-    """Return the error for a library that is not there, or that lacks one of the system's."""
+    """Return the error for a library that is not installed, or cannot be loaded."""
     if isinstance(error, ModuleNotFoundError):
         return DrawingError(
             "is read by build123d, which is not installed here", mend="pip install build123d"
@@ -111,7 +113,7 @@ def _is_valid(body: Body) -> bool:
 
 
 def _as_plain_lists(result: Outlines) -> dict[str, Any]:
-    """Return the outlines without arrays and records."""
+    """Return the outlines as lists and dictionaries, ready for JSON."""
     return {
         "levels": result.levels,
         "span": result.span,
@@ -136,7 +138,8 @@ def _as_plain_lists(result: Outlines) -> dict[str, Any]:
 
 
 def _limit(memory: int | None) -> None:
-    """Limits the memory of the worker; one that crashes leaves no core file."""
+    """Limit the memory of this process to so many bytes, if any are given, and switch off core
+    files."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 

@@ -81,7 +81,7 @@ def parse_colour(text: str) -> str:
 
 
 def _channel(text: str) -> float:
-    """0 to 1 of "80%" or "204"."""
+    """Return a channel, 0 to 1, of "80%" or "204"."""
     return float(text[:-1]) / 100.0 if text.endswith("%") else float(text) / 255.0
 
 

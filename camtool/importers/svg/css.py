@@ -103,7 +103,7 @@ class CssRules(Struct):
     _matches: int = 0
 
     def read(self, text: str, properties: Iterable[str]) -> None:
-        """Adds the rules of one sheet that say one of these properties."""
+        """Add the rules of a style sheet that declare at least one of these properties."""
         kept_properties = frozenset(properties)
         for selectors, body in self._blocks(_without_comments(text)):
             declarations = parse_declarations(body, kept_properties)
@@ -113,8 +113,10 @@ class CssRules(Struct):
                 self._add(selector.strip(), declarations)
 
     def holding(self, node: Node) -> list[Declarations]:
-        """Return the declarations that hold for an element, the strongest last; DrawingError
-        when the sheets would take too long to apply."""
+        """Return the declarations that apply to an element, the strongest last.
+
+        DrawingError when the sheets would take too long to apply.
+        """
         if not self._count:
             return []
         lists = [self._by_tag[""], self._by_tag.get(node.tag, []), self._by_id.get(node.get("id"))]
@@ -130,7 +132,8 @@ class CssRules(Struct):
         return [rule.declarations for rule in rules_found]
 
     def _blocks(self, text: str) -> Iterable[tuple[str, str]]:
-        """Selectors and body of each rule; @-blocks are skipped, @media counted."""
+        """Yield the selectors and the body of each rule of a sheet; @-blocks are skipped, those of
+        @media counted."""
         offset = 0
         while (begin := text.find("{", offset)) >= 0:
             selectors = text[offset:begin].rpartition(";")[2].strip()
@@ -161,8 +164,8 @@ class CssRules(Struct):
 
 
 def parse_declarations(text: str, properties: frozenset[str]) -> Declarations:
-    """Return the wanted properties of "name: value; ..."; of two the later wins, or the
-    important one."""
+    """Return those declarations "name: value; ..." whose name is in `properties`; of two for one
+    property the later wins, or the important one."""
     declarations: Declarations = {}
     for item in text.split(";"):
         name, colon, value = item.partition(":")
@@ -176,8 +179,11 @@ def parse_declarations(text: str, properties: frozenset[str]) -> Declarations:
 
 
 def _parse_selector(selector: str) -> tuple[tuple[_Compound, ...], tuple[bool, ...]] | None:
-    """Return steps and links of a selector from the element outwards, None when it has other
-    signs."""
+    """Return the steps of a selector from the element outwards, and for each but the first True if
+    it must be the parent of the step before, False for any ancestor.
+
+    None for a selector with other signs (`+`, `:hover`).
+    """
     words = selector.replace(">", " > ").split()
     steps: list[_Compound] = []
     child: list[bool] = []
@@ -239,7 +245,7 @@ def _passes_test(node: Node, test: _Test) -> bool:
 
 
 def _ancestors(node: Node) -> list[Node]:
-    """Parent, its parent and so on."""
+    """Return the parent of an element, its parent and so on up to the root."""
     ancestors: list[Node] = []
     while node.parent is not None:
         node = node.parent
@@ -248,7 +254,7 @@ def _ancestors(node: Node) -> list[Node]:
 
 
 def _block_end(text: str, begin: int) -> int:
-    """Behind the brace that closes the one at `begin`."""
+    """Return the index behind the brace that closes the one at `begin`."""
     depth = 0
     for match in _BRACE.finditer(text, begin):
         depth += 1 if match[0] == "{" else -1

@@ -76,7 +76,7 @@ def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> S
 def _by_the_file(
     root: Node, sides: tuple[_Side, _Side], box: SvgBox | None, options: ReadOptions
 ) -> SvgPage:
-    """Return the page by the sizes in the file."""
+    """Return the page according to the width, height and viewBox in the file."""
     width, height = sides
     named = width if width.size_mm is not None else height
     if named.size_mm is None:
@@ -103,7 +103,8 @@ def _by_the_file(
 def _page_in_unit(
     width: _Side, height: _Side, box: SvgBox | None, options: ReadOptions
 ) -> SvgPage:
-    """Return the page whose user unit is the caller's unit; the size in the file is ignored."""
+    """Return the page in which one user unit is one of the caller's unit; the size in the file is
+    ignored."""
     unit = str(options.units).lower()
     scale = options.mm_per(unit)
     viewport = _size(width, height, options.mm_per("px"))
@@ -118,7 +119,7 @@ def _page_in_unit(
 
 
 def _sizeless(box: SvgBox | None, options: ReadOptions) -> SvgPage:
-    """Return the page has no size: user units are taken as px."""
+    """Return the page of a file without a size: user units are taken as px."""
     px = options.mm_per("px")
     units = Units("px", px, f"no size in the file, taken as {options.px_an_inch:g} px an inch")
     finding = _unitless("the svg has no width and height", options)
@@ -129,8 +130,8 @@ def _sizeless(box: SvgBox | None, options: ReadOptions) -> SvgPage:
 
 
 def _side(root: Node, name: str, options: ReadOptions) -> _Side:
-    """Return a side as the attribute says it, else as the style does (as pages for the web have
-    it)."""
+    """Return the width or height that the attribute gives, else the one that the style gives (as
+    pages for the web have it)."""
     text = (
         root.get(name)
         or parse_declarations(root.get("style"), frozenset([name])).get(name, ("",))[0]
@@ -148,7 +149,7 @@ def _side(root: Node, name: str, options: ReadOptions) -> _Side:
 
 
 def _size(width: _Side, height: _Side, px: float) -> tuple[float, float] | None:
-    """Return both sides in px, where both are known."""
+    """Return width and height in px; None unless both are known."""
     if width.size_mm is None or height.size_mm is None:
         return None
     return width.size_mm / px, height.size_mm / px

@@ -1,6 +1,6 @@
 """SVG to Drawing: bytes, tree, page, walk.
 
-    bytes ──ready──▶ UTF-8 ──parse_tree──▶ nodes ──page_of──▶ map to mm ──Walk──▶ pieces
+    bytes ──as_safe_utf8──▶ UTF-8 ──parse_tree──▶ nodes ──page_of──▶ map to mm ──SvgWalk──▶ pieces
 
 Source: Scalable Vector Graphics 1.1 and, where it says more, 2.
 """
@@ -127,7 +127,8 @@ class SvgWalk:
                 self._ids.setdefault(name, node)
 
     def run(self) -> None:
-        """The whole document; the root's size and viewBox are in the page already."""
+        """Walk through the whole document; the size and viewBox of the root are applied in the
+        page already."""
         root, page = self._root, self._page
         style = self._sheet.style(root, SvgStyle())
         if style.display == "none":
@@ -142,7 +143,7 @@ class SvgWalk:
         self._children(root, SvgScope(page.to_mm, style, page.viewport))
 
     def _children(self, node: Node, scope: SvgScope) -> None:
-        """All children, one level deeper."""
+        """Walk through all children of an element, one level deeper."""
         inner = scope._replace(depth=scope.depth + 1)
         for child in node.children:
             self._visit(child, inner)
@@ -167,7 +168,7 @@ class SvgWalk:
             self._count(node, "stands in an element that is not drawn")
 
     def _drawn(self, node: Node, scope: SvgScope) -> None:
-        """A shape, or what is in a group."""
+        """Draw a shape or text, or visit what is in a group."""
         if node.tag in SHAPES:
             self._shape(node, scope)
         elif node.tag == "text":
@@ -185,8 +186,8 @@ class SvgWalk:
             self._children(node, scope)
 
     def _entered(self, node: Node, scope: SvgScope) -> SvgScope | None:
-        """Return the scope inside the element; None, and its shapes counted, when it shows
-        nothing."""
+        """Return the scope inside the element; None if it shows nothing, after counting its shapes
+        as left out."""
         style = self._sheet.style(node, scope.style)
         if style.display == "none":
             self._count(node, "is hidden (display: none)")
@@ -211,12 +212,14 @@ class SvgWalk:
         return scope._replace(to_mm=to_mm, style=style, layer=layer_in(node, scope))
 
     def _limits(self, style: SvgStyle, name: str) -> None:
-        """Counts what would hide or add something."""
+        """Count properties that would hide or add something and are not applied (clip paths,
+        masks, filters …)."""
         for limit in style.limits:
             self.notes.changed[f"{limit} of {name}", LIMITS[limit]] += 1
 
     def _shape(self, node: Node, scope: SvgScope) -> None:
-        """A shape's subpaths as pieces."""
+        """Add the subpaths of a shape to the pieces, or count it with the reason why it is left
+        out."""
         style = scope.style
         if style.visibility in ("hidden", "collapse"):
             self.notes.left_out[node.tag, "is hidden (visibility)"] += 1
@@ -251,7 +254,7 @@ class SvgWalk:
     def _take(
         self, subpaths: list[Subpath], fitted: list[Fitted], node: Node, scope: SvgScope
     ) -> None:
-        """Subpaths of an element, in mm, as pieces."""
+        """Add these fitted subpaths of an element to the pieces; `fitted` are in mm."""
         style = scope.style
         source = node.label + (f" by use {scope.uses[-1]}" if scope.uses else "")
         for subpath, (vertices, errors) in zip(subpaths, fitted, strict=True):
@@ -268,7 +271,7 @@ class SvgWalk:
             )
 
     def _text(self, node: Node, scope: SvgScope) -> None:
-        """The letters of a text as pieces, all or none."""
+        """Add the letters of a text to the pieces, all or none."""
         from camtool.importers.svg.text import text_of  # fonts: only where there is text
 
         def lengths_of(style: SvgStyle) -> Lengths:
@@ -316,7 +319,8 @@ class SvgWalk:
             self.notes.left_out["text", "draws nothing"] += 1
 
     def _subpaths(self, node: Node, scope: SvgScope) -> tuple[list[Subpath], str]:
-        """Return the shape in user units; paths that are used again are not parsed again."""
+        """Return the subpaths of a shape in user units, and the fault in its data, or ""; those
+        drawn by `use` are parsed once."""
         if not scope.uses or node.tag not in ("path", "polyline", "polygon"):
             return subpaths(node, self._lengths(scope, scope.style))
         if node not in self._shapes:
@@ -324,7 +328,7 @@ class SvgWalk:
         return self._shapes[node]
 
     def _use(self, node: Node, scope: SvgScope) -> None:
-        """The element that `use` names, drawn here."""
+        """Draw the element that a `use` refers to, at the place of the `use`."""
         reference = node.get("href") or node.get("xlink:href")
         name = reference[1:] if reference.startswith("#") else ""
         target = self._ids.get(name)
@@ -353,7 +357,11 @@ class SvgWalk:
             self._visit(target, inner)
 
     def _framed(self, node: Node, size: Node, scope: SvgScope) -> None:
-        """An inner svg or a symbol: `size` says how large (the element itself, or its use)."""
+        """Draw the content of an inner svg or a symbol; `size` is the element that gives its size:
+        itself, or its `use`.
+
+        Pieces that leave the frame are counted, not clipped.
+        """
         try:
             frame = frame_of(node, size, scope, self._lengths(scope, scope.style))
         except DrawingError as error:
@@ -374,20 +382,21 @@ class SvgWalk:
         return Lengths(self.options, scope.viewport, style.font_px)
 
     def _unreadable(self, node: Node, error: DrawingError) -> None:
-        """Leaves out an element for a wrong number, and counts the shapes in it."""
+        """Count an element with a wrong number as a fault, and the shapes inside it as left
+        out."""
         self.notes.fault(node.tag, "cannot be read", node, error)
         for inner in node.walk():
             if inner is not node and inner.tag in _COUNTED:
                 self.notes.left_out[inner.tag, f"stands in a {node.tag} that cannot be read"] += 1
 
     def _count(self, node: Node, reason: str) -> None:
-        """Counts what would have been drawn in and below an element that is left out."""
+        """Count everything drawable in and below an element as left out."""
         for inner in node.walk():
             if inner.tag in _COUNTED:
                 self.notes.left_out[inner.tag, reason] += 1
 
     def _spend(self, cost: int, node: Node) -> None:
-        """Bounds what is drawn through use."""
+        """Add to the cost of what is drawn through `use`; DrawingError beyond MAX_USED."""
         self._by_use += cost
         if self._by_use > MAX_USED:
             raise DrawingError(
@@ -397,7 +406,8 @@ class SvgWalk:
 
 
 def _cost(subpaths: list[Subpath]) -> int:
-    """Return curves, and hundreds of corners."""
+    """Return the cost of drawing subpaths: 1 for each curve, and 1 for every _CORNERS_A_UNIT
+    corners."""
     segments = [segment for one in subpaths for segment in one.segments]
     corners = sum(len(segment.points) for segment in segments if isinstance(segment, SvgLines))
     curves = sum(not isinstance(segment, SvgLines) for segment in segments)
@@ -418,14 +428,15 @@ class Notes(Struct):
     _first: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def fault(self, kind: str, outcome: str, node: Node, fault: DrawingError | str) -> None:
-        """A node whose numbers are wrong: `outcome` was done with it ("cannot be read")."""
+        """Count an element whose numbers are wrong; `outcome` says what became of it ("cannot be
+        read")."""
         self._faults[kind, outcome] += 1
         if (kind, outcome) not in self._first:
             text = str(fault)
             self._first[kind, outcome] = f"{node.label}: {text}"
 
     def skipped(self) -> list[Skipped]:
-        """Return the elements that were left out, by kind and reason."""
+        """Return the counts of elements that were left out, by kind and reason."""
         faults = [
             Skipped(kind, count, f"{outcome} ({self._first[kind, outcome]})")
             for (kind, outcome), count in self._faults.items()
@@ -433,7 +444,8 @@ class Notes(Struct):
         return faults + [Skipped(kind, n, reason) for (kind, reason), n in self.left_out.items()]
 
     def findings(self) -> list[Finding]:
-        """NOT_APPLIED for each thing that changes the look and was not done; what fonts lack."""
+        """Return NOT_APPLIED for each kind of property that changes the look and was not applied,
+        and the findings about missing fonts."""
         applied = [
             NOT_APPLIED(measured=count, what=subject, why=reason)
             for (subject, reason), count in self.changed.items()
@@ -469,8 +481,11 @@ class CurveFitter:
         self.tolerance_mm = tolerance_mm
 
     def vertices(self, subpath: Subpath, to_mm: Affine) -> Fitted:
-        """Return (n, 3) x, y, bulge in mm, the last one the end, and how far the curves lie
-        from them; DrawingError when out of bounds."""
+        """Return the vertices (n, 3) of a subpath in mm, the last one its end, and how far the
+        curves lie from the arcs.
+
+        DrawingError when it reaches out of bounds.
+        """
         first = subpath.segments[0]
         if len(subpath.segments) == 1 and isinstance(first, SvgLines):
             points = np.concatenate([subpath.start[None, :], first.points])
@@ -489,7 +504,7 @@ class CurveFitter:
         return _in_reach(np.concatenate(rows)), np.concatenate(errors)
 
     def _segment(self, start: Floats, segment: Segment, to_mm: Affine) -> Fitted:
-        """Return (n, 3) from `start` (2,) mm to the segment's end, both exact."""
+        """Return the vertices (n, 3) of a segment from `start` (2,) mm to its end, both exact."""
         if isinstance(segment, SvgLines):
             points = _straight(to_mm, segment.points)
             return np.concatenate([[[start[0], start[1], 0.0]], points]), None
@@ -508,7 +523,8 @@ class CurveFitter:
         return _with_ends(vertices, ends), errors
 
     def _fitted(self, curve: Curve, bounds: Floats) -> Fitted:
-        """Return arcs for a curve whose size and place `bounds` (n, 2) give."""
+        """Return arcs that fit a curve; `bounds` (n, 2) are points, mm, that bound its place and
+        size."""
         _in_reach(bounds, MAX_CURVE_MM)
         try:
             fit = fit_curve(curve, self.tolerance_mm)
@@ -520,14 +536,14 @@ class CurveFitter:
 
 
 def _straight(to_mm: Affine, points: Floats) -> Floats:
-    """Return (n, 3) of points (n, 2) mapped, without bulges."""
+    """Return points (n, 2) in user units as vertices (n, 3) of lines in mm."""
     vertices = np.zeros((len(points), 3))
     vertices[:, :2] = to_mm.points(points)
     return vertices
 
 
 def _in_reach(vertices: Floats, limit_mm: float = MAX_COORDINATE_MM) -> Floats:
-    """Return the same numbers; DrawingError when one is too far away."""
+    """Return the vertices unchanged; DrawingError if one is farther away than the limit."""
     furthest = float(np.abs(vertices).max())
     if not furthest <= limit_mm:
         raise DrawingError(
@@ -538,7 +554,8 @@ def _in_reach(vertices: Floats, limit_mm: float = MAX_COORDINATE_MM) -> Floats:
 
 
 def _circle(centre: Floats, u: Floats, v: Floats, arc: Arc) -> Floats | None:
-    """Return the arc's vertices when its mapped ellipse is a circle, else None."""
+    """Return the vertices of the arc of an ellipse if its map to mm makes it circular, else
+    None."""
     u_axis, v_axis = complex(*u), complex(*v)
     p, q = (u_axis - 1j * v_axis) / 2.0, (u_axis + 1j * v_axis) / 2.0
     if 2.0 * min(abs(p), abs(q)) > ROUND_EPS_MM:
@@ -549,7 +566,8 @@ def _circle(centre: Floats, u: Floats, v: Floats, arc: Arc) -> Floats | None:
 
 
 def _with_ends(vertices: Floats, ends: Floats) -> Floats:
-    """Return the same with its first and last point set to `ends` (2, 2), which rounding moved."""
+    """Return a copy of the vertices with the first and last point set to `ends` (2, 2): rounding
+    had moved them."""
     exact = vertices.copy()
     exact[[0, -1], :2] = ends
     return exact

@@ -41,7 +41,8 @@ class SvgScope(NamedTuple):
 
 
 def own_transform(node: Node, style: SvgStyle, lengths: Lengths) -> Affine:
-    """Return its transform: of its style, else its attribute, about its origin; DrawingError."""
+    """Return the transform of an element, from its style or else its attribute, about its origin;
+    DrawingError."""
     attribute = node.get("transform")
     if style.transform:
         transform = (
@@ -56,7 +57,8 @@ def own_transform(node: Node, style: SvgStyle, lengths: Lengths) -> Affine:
 
 
 def is_for_us(node: Node) -> bool:
-    """Return True if the element is for English or any language, and requires no extension."""
+    """Return True if the element is for English readers or any language, and requires no
+    extension."""
     if node.get("requiredExtensions"):
         return False
     languages = node.attributes.get("systemLanguage")
@@ -66,8 +68,8 @@ def is_for_us(node: Node) -> bool:
 
 
 def layer_in(node: Node, scope: SvgScope) -> str:
-    """Return the layer inside this element: an Inkscape layer's label, or the name of a group that
-    stands right under the root."""
+    """Return the layer for what is inside this element: the label of an Inkscape layer, or the id
+    of a group directly under the root."""
     if node.tag != "g":
         return scope.layer
     if node.get("inkscape:groupmode") == "layer":
@@ -95,7 +97,7 @@ class ClipFrame(Struct, frozen=True):
     outer: Affine
 
     def is_left_by(self, points: Floats) -> bool:
-        """Return True if any of the points (n, 2) mm lies outside."""
+        """Return True if any of the points (n, 2) mm lies outside of the frame."""
         if not (self.box.width and self.box.height and self.outer.determinant):
             return False
         places = self.outer.inverse.points(points)
@@ -106,11 +108,11 @@ class ClipFrame(Struct, frozen=True):
 
 
 def frame_of(node: Node, size: Node, scope: SvgScope, lengths: Lengths) -> ClipFrame | None:
-    """Return the frame of an inner svg or a symbol, None when nothing of it is to be seen;
-    DrawingError.
+    """Return the frame of an inner svg or a symbol; None if it has no size and so shows nothing.
+    DrawingError for wrong numbers.
 
-    `size`: the element that says how large, itself or the `use` that draws it. An svg that a `use`
-    draws keeps its place and the sizes that the `use` does not name.
+    `size` is the element that gives the size: itself, or the `use` that draws it. An svg that a
+    `use` draws keeps its place and the sizes that the `use` does not name.
     """
     frame_node = node if node.tag == "svg" else None
     x = lengths.along(frame_node, "x", "x") if frame_node else 0.0

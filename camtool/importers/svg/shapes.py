@@ -62,12 +62,14 @@ class Subpath(Struct, frozen=True, eq=False):
 
 
 def arc_between(start: complex, end: complex, radii: complex, turn: float, flags: int) -> Arc:
-    """Return the arc of path data: `radii` = rx + i·ry, `turn` rad of the x axis; flags: 1 the
-    sweep flag, 2 the large-arc flag. Radii that are too short are grown. Start and end differ.
-    DrawingError when its radii are so unlike its chord that numbers fail.
+    """Return the elliptical arc of path data from `start` to `end`, which differ.
 
-    In the frame where the ellipse is the unit circle, with the chord's half h = (p1 − p0)/2,
-    |h| = sin(half the small sweep), the centre lies at the chord's middle ± i·h/|h|·√(1 − |h|²).
+    `radii` = rx + i·ry; `turn`: the angle of the ellipse's x axis, rad; `flags`: 1 the sweep flag,
+    plus 2 the large-arc flag. Radii that are too short are enlarged until the ends can be reached.
+    DrawingError when the radii are so unlike the chord that the arithmetic fails.
+
+    In the frame where the ellipse is the unit circle, with the chord's half h = (p1 − p0)/2, |h| =
+    sin(half the small sweep), the centre lies at the chord's middle ± i·h/|h|·√(1 − |h|²).
     """
     rx, ry = abs(radii.real), abs(radii.imag)
     axis = complex(math.cos(turn), math.sin(turn))
@@ -130,8 +132,8 @@ _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 
 
 
 def parse_path(data: str) -> tuple[list[Subpath], str]:
-    """Return the subpaths of path data that draw something, up to the first fault, and that fault
-    ("").
+    """Return the subpaths of path data that draw something, up to the first fault, and that fault,
+    or "".
 
     DrawingError for data that cannot be drawn at all: too many or too large, or arcs without a
     shape.
@@ -145,7 +147,8 @@ def parse_path(data: str) -> tuple[list[Subpath], str]:
 
 
 def _drawn(data: str, pen: _Pen) -> str:
-    """Draws command by command; the first fault, or ""."""
+    """Draw path data with the pen, command by command, up to the first fault; return that fault,
+    or ""."""
     lead, *words = _COMMAND.split(data)
     if lead.strip() or (words and words[0] not in "Mm"):
         begin = lead.strip() or words[0]
@@ -173,8 +176,10 @@ def _drawn(data: str, pen: _Pen) -> str:
 
 
 def _arcs(pen: _Pen, relative: bool, text: str) -> str:
-    """Draw the arcs of an "a" command; return its fault, or "". Flags may stick to what follows
-    ("a1 1 0 011 2")."""
+    """Draw the arcs of an "A" command with the pen; return its fault, or "".
+
+    Flags need no separator after them ("a1 1 0 011 2").
+    """
     start = _START.match(text)
     offset = start.end() if start else 0
     drawn = 0
@@ -206,7 +211,8 @@ class _Pen(Struct):
     subpaths: list[Subpath] = field(default_factory=list)
 
     def command(self, letter: str, words: list[str]) -> None:
-        """Any command but A, with whole sets of numbers; "M" without numbers draws nothing."""
+        """Draw any command but A, given complete sets of numbers; "M" without numbers draws
+        nothing."""
         kind, relative = letter.upper(), letter.islower()
         if kind == "Z":
             self.lift(closed=True)
@@ -239,7 +245,7 @@ class _Pen(Struct):
         self.place = end
 
     def lift(self, *, closed: bool) -> None:
-        """Ends the subpath, if one is begun; the pen stands at its start when it is closed."""
+        """End the open subpath, if there is one; if `closed`, the pen returns to its start."""
         self._flush()
         if self.segments:
             self.subpaths.append(
@@ -252,7 +258,7 @@ class _Pen(Struct):
             self.start = self.place
 
     def _straight(self, kind: str, relative: bool, n: list[float]) -> None:
-        """L, H, V, and the pairs after the first one of M."""
+        """Draw the lines of L, H or V, or of the coordinate pairs after the first one of M."""
         if kind == "H":
             other_axis = self.place.imag if not relative else 0.0
             ends = [complex(x, other_axis) for x in n]
@@ -270,9 +276,12 @@ class _Pen(Struct):
         self.place = _bounded(ends[-1])
 
     def _curve(self, letter: str, words: list[str]) -> None:
-        """C, S, Q, T. The first control point of a smooth curve (S, T) is the last one of the
-        curve before it, reflected in the point between them; that point itself where no curve of
-        the same degree comes before it."""
+        """Draw the curves of C, S, Q or T.
+
+        The first control point of a smooth curve (S, T) is the last control point of the curve
+        before it, reflected in the point between them; without a curve of the same degree before
+        it, it is that point itself.
+        """
         kind, relative = letter.upper(), letter.islower()
         numbers = _floats(words)
         points = list(map(complex, numbers[::2], numbers[1::2]))
@@ -309,7 +318,8 @@ def _floats(words: list[str]) -> list[float]:
 
 
 def _bounded(place: complex) -> complex:
-    """Return the place itself; relative steps may add up to one that is too far away."""
+    """Return the place unchanged; DrawingError if it is too far away, as sums of relative steps
+    may be."""
     if not (abs(place.real) <= MAX_NUMBER and abs(place.imag) <= MAX_NUMBER):
         raise DrawingError("path data lead to a place that is too far away")
     return place
@@ -340,15 +350,15 @@ class Lengths(Struct, frozen=True):
     font_px: float = FONT_PX
 
     def along(self, node: Node, name: str, axis: str, default: float = 0.0) -> float:
-        """Return the attribute `name` in user units; `axis` x, y or d (diagonal) says what %
-        are of."""
+        """Return the length in the attribute `name`, in user units; a percentage is of the
+        viewport's width, height or diagonal for the axis x, y or d."""
         text = node.get(name)
         if not text or text == "auto":
             return default
         return self.length(text, axis, name)
 
     def length(self, text: str, axis: str, name: str = "length") -> float:
-        """Return a length in user units; DrawingError naming it."""
+        """Return a length in user units; DrawingError, which names it, for any other text."""
         # Most lengths are bare numbers.
         if NUMBER.fullmatch(text):
             return in_bounds(float(text), name)
@@ -362,7 +372,7 @@ class Lengths(Struct, frozen=True):
         return in_bounds(value * MM_PER_UNIT[unit] / self.options.mm_per("px"), name)
 
     def size(self, node: Node, name: str, axis: str, default: float = 0.0) -> float:
-        """Like `along`, for what cannot be negative."""
+        """Return the length in an attribute as `along` does; DrawingError if it is negative."""
         value = self.along(node, name, axis, default)
         if value < 0.0:
             raise DrawingError(f"{name} is negative")
@@ -380,7 +390,8 @@ class Lengths(Struct, frozen=True):
 
 
 def split_length(text: str, name: str) -> tuple[float, str]:
-    """Number and unit ("" when bare, else lower case or %); DrawingError for what is neither."""
+    """Return the number and the unit of a length, "" if it has none, else lower case or "%";
+    DrawingError for any other text."""
     match = _LENGTH.fullmatch(text)
     if match is None:
         raise DrawingError(f"{name} {text[:24]!r} is no length")
@@ -393,7 +404,10 @@ def split_length(text: str, name: str) -> tuple[float, str]:
 
 def subpaths(node: Node, lengths: Lengths) -> tuple[list[Subpath], str]:
     """Return the subpaths of a shape in user units, [] if it draws nothing, and the fault in its
-    data before which they end, or "". DrawingError if it cannot be drawn at all."""
+    data that ends them, or "".
+
+    DrawingError if it cannot be drawn at all.
+    """
     match node.tag:
         case "path":
             data = node.get("d")
@@ -440,7 +454,8 @@ def _corners(node: Node) -> tuple[list[Subpath], str]:
 
 
 def _radii(node: Node, lengths: Lengths) -> tuple[float, float]:
-    """rx and ry; the one that is left out is as the other."""
+    """Return rx and ry of an ellipse or of rounded corners; where one is missing it equals the
+    other."""
     rx = lengths.size(node, "rx", "x", math.nan)
     ry = lengths.size(node, "ry", "y", math.nan)
     if math.isnan(rx):
@@ -458,7 +473,8 @@ def _ellipse(node: Node, lengths: Lengths, rx: float, ry: float) -> list[Subpath
 
 
 def _rect(node: Node, lengths: Lengths) -> list[Subpath]:
-    """Along the sides and round the corners, in the standard's direction."""
+    """Return the closed path of a rectangle with its rounded corners, in the direction that the
+    standard prescribes."""
     x, y = lengths.along(node, "x", "x"), lengths.along(node, "y", "y")
     width, height = lengths.size(node, "width", "x"), lengths.size(node, "height", "y")
     if width == 0.0 or height == 0.0:

@@ -148,8 +148,10 @@ class StyleSheet:
         return self._rules.left_out
 
     def style(self, node: Node, above: SvgStyle) -> SvgStyle:
-        """Return the element's style under its parent's; DrawingError when the sheets would
-        take too long to apply."""
+        """Return the style of an element, given that of its parent.
+
+        DrawingError when the sheets would take too long to apply.
+        """
         attributes = node.attributes
         values = {name: attributes[name] for name in _ATTRIBUTES if name in attributes}
         strong: dict[str, str] = {}
@@ -173,7 +175,8 @@ class StyleSheet:
 
 
 def _under(above: SvgStyle, values: dict[str, str]) -> SvgStyle:
-    """Return the style of these values; what is missing or "inherit" comes from above."""
+    """Return the style that these property values give to an element; missing ones and "inherit"
+    come from `above`, its parent's style."""
     fields: dict[str, Any] = dict(_BLANK)
     for name, written in values.items():
         value = written.strip().lower()
@@ -203,8 +206,8 @@ def _under(above: SvgStyle, values: dict[str, str]) -> SvgStyle:
 
 
 def _text_property(name: str, value: str, above: SvgStyle, fields: dict[str, Any]) -> None:
-    """Apply a property in PLAIN_TEXT, or text-decoration, which adds to that of the elements
-    around."""
+    """Store in `fields`, in place, a property of PLAIN_TEXT (as odd unless plain), or
+    text-decoration, which adds to that of the elements around."""
     if value in ("inherit", "unset", ""):
         return
     if name in PLAIN_TEXT:
@@ -217,7 +220,10 @@ def _text_property(name: str, value: str, above: SvgStyle, fields: dict[str, Any
 
 def _longhands(text: str) -> dict[str, str]:
     """Split `font: [style, variant, weight or stretch] size[/line-height] family` into its single
-    properties; the size is "?" for a system font and for text that is no font."""
+    properties.
+
+    The size is "?" for a system font and for text that is no font.
+    """
     longhands = {"font-style": "normal", "font-weight": "normal", "font-variant": "normal",
             "font-stretch": "normal", "font-size": "?", "font-family": ""}  # fmt: skip
     if text.lower() in ("inherit", "initial", "unset"):
@@ -240,7 +246,8 @@ def _longhands(text: str) -> dict[str, str]:
 
 
 def _font_px(text: str, above: float) -> float | None:
-    """Return a font size in px, None when it is none."""
+    """Return a font size in px, None for text that is no size; `above` is the size of the parent,
+    px."""
     if text in _FONT_WORDS:
         return _FONT_WORDS[text]
     if text in _FONT_STEPS:

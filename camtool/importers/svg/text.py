@@ -84,11 +84,11 @@ def text_of(
     lengths_of: Callable[[SvgStyle], Lengths],
     mode: str,
 ) -> Text:
-    """Return a `text` of this style; `style_of` gives the style of an element within it, under
-    that of its parent; mode is "outline" or "stroke".
+    """Return the outlines of a `text` element; mode is "outline" or "stroke".
 
-    Raises Unusable with the reason when it cannot be drawn as it is shown, DrawingError for a
-    place that is none.
+    `style` is its style; `style_of` gives the style of an element within it from that of its
+    parent. Raises Unusable, with the reason, when it cannot be drawn as it is shown, DrawingError
+    for a position that is no length.
     """
     flow = _Flow(style_of, lengths_of)
     flow.visit(node, style, _keeps_blanks(node))
@@ -104,7 +104,8 @@ def text_of(
 
 
 def _keeps_blanks(node: Node | None) -> bool:
-    """xml:space of the element or of the nearest one around it."""
+    """Return True if xml:space of the element, or of the nearest one around it that has it, is
+    "preserve"."""
     while node is not None:
         space = node.get("xml:space")
         if space:
@@ -128,7 +129,8 @@ class _Flow(Struct, eq=False):
     _recounted: bool = False
 
     def visit(self, node: Node, style: SvgStyle, keep: bool) -> None:
-        """Add the letters of the element, then their positions, after those of inner elements."""
+        """Add the letters of the element and of those within it; then store the positions that it
+        gives to them, unless an inner element has given one."""
         for name in ("rotate", "textLength"):
             if node.get(name):
                 raise Unusable(f"has {name}, which is not read: convert it to paths")
@@ -150,8 +152,10 @@ class _Flow(Struct, eq=False):
         self._place(node, style, first)
 
     def end(self) -> None:
-        """A last blank collapses too; Unusable when there are no letters, or of a kind whose
-        places are not known."""
+        """Remove a last blank, which collapses too.
+
+        Unusable when there are no letters, or some whose places are not known.
+        """
         if self._after_blank and self.letters:
             self.letters.pop()
             self.at.pop(len(self.letters), None)
@@ -163,7 +167,7 @@ class _Flow(Struct, eq=False):
             raise Unusable("has a place for each letter, and letters that are combined")
 
     def _add(self, raw: str, style: SvgStyle, keep: bool) -> None:
-        """Letters of one style, blanks kept or not."""
+        """Add letters of one style; blanks collapse unless `keep` or the style says otherwise."""
         if not raw:
             return
         if style.blanks:
@@ -204,7 +208,8 @@ class _Flow(Struct, eq=False):
 
 
 def _check(letter: str) -> None:
-    """Raise Unusable for a letter whose place depends on those around it."""
+    """Raise Unusable for a letter whose position depends on those around it: written leftwards, or
+    combining."""
     if unicodedata.bidirectional(letter) in _LEFTWARDS:
         raise Unusable("is written from right to left")
     if unicodedata.category(letter) in ("Mn", "Mc", "Me"):
@@ -231,8 +236,8 @@ class _Writer(Struct, eq=False):
     plainer: dict[str, None] = field(default_factory=dict)
 
     def look(self, style: SvgStyle) -> tuple[TextLook, tuple[str, str]]:
-        """Return the look of letters of this style, and the names of their font and of the wanted
-        one."""
+        """Return the look of letters of this style, and two names: of their font, and of the
+        wanted font if that is another one, else ""."""
         if style.odd:
             raise Unusable(f"its {min(style.odd)} cannot be applied: convert it to paths")
         if style.anchor not in _ANCHORS:
@@ -247,8 +252,8 @@ class _Writer(Struct, eq=False):
         return TextLook(font, style.font_px / font.em, rules=rules), (font.name, other)
 
     def _font(self, style: SvgStyle) -> tuple[Font, str]:
-        """Return the first installed family of the list; else what stands in for the first of
-        all."""
+        """Return the first installed font of the families that the style lists, else a substitute
+        for the first one; and the name of the wanted font if it is another one, else ""."""
         weight = _WEIGHTS.get(style.weight, 0)
         if not weight:
             if not (style.weight.isdecimal() and 1 <= int(style.weight[:5]) <= 1000):
@@ -271,16 +276,16 @@ class _Writer(Struct, eq=False):
 
 
 def _family(name: str) -> str:
-    """Return the name without quotes, fit to be printed."""
+    """Return a font family without quotes, with "?" for characters that cannot be printed."""
     words = " ".join(name.strip().strip("\"'").split())[:_MAX_NAME]
     return "".join(sign if sign.isprintable() else "?" for sign in words)
 
 
 def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
-    """Yield the words between letters that have places of their own.
+    """Yield chunks of words: a chunk begins at each letter that has an x or y of its own.
 
-    Unusable where a line goes on from letters that text-anchor moves: the standard counts from
-    where they were before that, renderers from where they are.
+    Unusable where a line continues behind letters that text-anchor has moved: the standard
+    continues from where they were before that, renderers from where they are.
     """
     starts = sorted(
         {0, *flow.at}
@@ -310,9 +315,12 @@ def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
 
 
 def _draw_chunk(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[TextRun]:
-    """Yield the words of a chunk drawn, their span [a, b] moved so that its start, middle or
-    end lies at the chunk's first letter. Unusable where a dx within it changes that span: the
-    standard takes it into account, not all renderers do."""
+    """Draw the words of a chunk and yield each as outlines with its style.
+
+    All are moved so that the start, middle or end of the chunk lies at its first letter's place
+    (text-anchor). Unusable where a dx within the chunk changes its span: the standard takes it
+    into account, not all renderers do.
+    """
     begin = min(words.x for words in chunk)
     end = max(words.end for words in chunk)
     gaps = any(words.x != before.end for before, words in pairwise(chunk))
@@ -351,7 +359,8 @@ def _subpaths(ink: Ink) -> list[Subpath]:
 
 
 def _segments(parts: list[Floats]) -> tuple[Segment, ...]:
-    """Parts end to end, straight ones in a row together."""
+    """Return the parts of a contour, which lie end to end, as segments; lines in a row become one
+    segment."""
     segments: list[Segment] = []
     corners: list[Floats] = []
     for part in parts:

@@ -54,7 +54,7 @@ class Affine(Struct, frozen=True):
         return self.a * self.d - self.b * self.c
 
     def points(self, points: Floats) -> Floats:
-        """Return (n, 2) positions mapped."""
+        """Return positions (n, 2) mapped."""
         x, y = points[:, 0], points[:, 1]
         mapped = np.empty((len(points), 2))
         mapped[:, 0] = self.a * x + self.c * y + self.e
@@ -62,18 +62,18 @@ class Affine(Struct, frozen=True):
         return mapped
 
     def vectors(self, vectors: Floats) -> Floats:
-        """Return (n, 2) directions mapped: without the shift."""
+        """Return directions (n, 2) mapped, without the shift."""
         return np.asarray(vectors @ np.array([[self.a, self.b], [self.c, self.d]]))
 
     @property
     def inverse(self) -> Affine:
-        """The map back; the determinant must not be 0."""
+        """The inverse map; the determinant must not be 0."""
         size = self.determinant
         a, b, c, d = self.d / size, -self.b / size, -self.c / size, self.a / size
         return Affine(a, b, c, d, -(a * self.e + c * self.f), -(b * self.e + d * self.f))
 
     def checked(self) -> Affine:
-        """This map; DrawingError when its numbers are too large."""
+        """Return this map unchanged; DrawingError when a number in it is too large."""
         if not all(abs(v) <= MAX_NUMBER for v in (self.a, self.b, self.c, self.d, self.e, self.f)):
             raise DrawingError("its transforms multiply to numbers that are too large")
         return self
@@ -90,14 +90,14 @@ def scaling(x: float, y: float) -> Affine:
 
 
 def in_bounds(value: float, name: str) -> float:
-    """Return the number itself; DrawingError when it is too large."""
+    """Return the value unchanged; DrawingError, which names it, when it is too large."""
     if not abs(value) <= MAX_NUMBER:
         raise DrawingError(f"{name} {value:g} is too large")
     return value
 
 
 def parse_numbers(text: str, name: str) -> list[float]:
-    """Numbers separated by blanks or commas; DrawingError naming what is not a number."""
+    """Parse numbers separated by blanks or commas; DrawingError quoting what is no number."""
     remainder = NUMBER.sub(" ", text).strip(BETWEEN)
     remainder = remainder.replace(",", " ").strip()
     if remainder:
@@ -118,7 +118,8 @@ class SvgBox(Struct, frozen=True):
 
 
 def parse_view_box(text: str) -> SvgBox | None:
-    """viewBox, None when it is not there; DrawingError when it is no box."""
+    """Parse the attribute viewBox; None when it is missing. DrawingError when it is no rectangle
+    with an area."""
     if not text:
         return None
     numbers = parse_numbers(text, "viewBox")
@@ -131,9 +132,10 @@ def parse_view_box(text: str) -> SvgBox | None:
 
 
 def view_box_map(box: SvgBox, onto: SvgBox, align: str) -> Affine:
-    """Return the map of viewBox `box` onto the viewport `onto` by preserveAspectRatio `align`.
+    """Return the map from the viewBox `box` to the viewport `onto`, according to the attribute
+    preserveAspectRatio, `align`.
 
-    meet: scale = min(sx, sy), all is seen; slice: the greater one, all is covered. What is left
+    meet: scale = min(sx, sy), all is visible; slice: the greater one, all is covered. What is left
     over, viewport − scale · box, is shared out by Min (0), Mid (½), Max (1).
     """
     match = _ALIGN.fullmatch(align or "xMidYMid")
@@ -149,7 +151,7 @@ def view_box_map(box: SvgBox, onto: SvgBox, align: str) -> Affine:
 
 
 def shortened(text: str) -> str:
-    """Return a quoted beginning of a text, for messages."""
+    """Return the beginning of a text, in quotes, for messages."""
     return repr(text if len(text) <= 24 else text[:21] + "...")
 
 
@@ -172,7 +174,8 @@ Length = Callable[[str, str], float]
 
 
 def parse_transform(text: str) -> Affine:
-    """Return a transform list: matrix, translate, scale, rotate, skewX, skewY; DrawingError."""
+    """Return the map of a transform list: matrix, translate, scale, rotate, skewX, skewY;
+    DrawingError for other text."""
     product = Affine()
     for name, inside in _functions(text):
         numbers = parse_numbers(inside, f"transform {name}")
@@ -181,7 +184,8 @@ def parse_transform(text: str) -> Affine:
 
 
 def parse_css_transform(text: str, length: Length) -> Affine:
-    """Return a CSS transform list in the plane, with units; DrawingError for what is none."""
+    """Return the map of a CSS transform list in the plane, with units; DrawingError for other
+    text."""
     product = Affine()
     for name, inside in _functions(text):
         words = [word for word in re.split(r"[\s,]+", inside) if word]
@@ -190,7 +194,11 @@ def parse_css_transform(text: str, length: Length) -> Affine:
 
 
 def parse_origin(text: str, length: Length) -> tuple[float, float]:
-    """transform-origin in user units; DrawingError. What is missing is 0 for an SVG element."""
+    """Return the point (x, y) that transform-origin names, in user units; DrawingError for other
+    text.
+
+    Of a single value the other one is "center".
+    """
     words = text.lower().split()[:2]
     if len(words) == 1:
         words = ["center", words[0]] if words[0] in _VERTICAL else [words[0], "center"]
@@ -204,13 +212,14 @@ def parse_origin(text: str, length: Length) -> tuple[float, float]:
 
 
 def about_point(origin: tuple[float, float], inner: Affine) -> Affine:
-    """Return the map done about a point instead of (0, 0)."""
+    """Return the map `inner` applied about the point `origin` instead of (0, 0)."""
     x, y = origin
     return (translation(x, y) @ inner @ translation(-x, -y)).checked()
 
 
 def _functions(text: str) -> list[tuple[str, str]]:
-    """Name and inside of each function of a list."""
+    """Return the name of each function in a transform list, and the text between its
+    parentheses."""
     parts: list[tuple[str, str]] = []
     offset = 0
     while text[offset:].strip(BETWEEN):
@@ -228,7 +237,7 @@ _MAX_FUNCTIONS = 1000
 
 
 def _single(name: str, n: Sequence[float]) -> Affine:
-    """Return the map of a function in a transform list."""
+    """Return the map of one function of a transform list, given its numbers."""
     match name, len(n):
         case "matrix", 6:
             return Affine(*n)
@@ -248,7 +257,8 @@ def _single(name: str, n: Sequence[float]) -> Affine:
 
 
 def _css_single(name: str, words: list[str], length: Length) -> Affine:
-    """Return the map of a function of the CSS property; `name` is in lower case."""
+    """Return the map of one function of a CSS transform list, given its words; `name` is in lower
+    case."""
     if name in _LENGTHWISE:
         second = name == "translatey"
         numbers = [length(word, "xy"[(place + second) % 2]) for place, word in enumerate(words)]
@@ -275,7 +285,8 @@ def _css_single(name: str, words: list[str], length: Length) -> Affine:
 
 
 def _with_unit(word: str, units: dict[str, float]) -> float:
-    """Return a number times its unit."""
+    """Return a number times the value of its unit; DrawingError for a unit that is not in
+    `units`."""
     match = _MEASURE.fullmatch(word)
     unit = match[2].lower() if match else None
     if match is None or unit not in units:
@@ -284,7 +295,8 @@ def _with_unit(word: str, units: dict[str, float]) -> float:
 
 
 def _rotation(degrees: float) -> Affine:
-    """Quarter turns are exact, so that a turned square stays one."""
+    """Return the rotation by an angle; quarter turns are exact, so that a turned square stays
+    one."""
     quarter, remainder = divmod(degrees, 90.0)
     if remainder == 0.0:
         cosine, sine = _QUARTERS[int(quarter) % 4]

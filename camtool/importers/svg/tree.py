@@ -65,12 +65,12 @@ class Node(Struct, eq=False):
         return f"{self.tag} {name}" if name else f"{self.tag} at line {self.line}"
 
     def get(self, name: str, default: str = "") -> str:
-        """Return an attribute without blanks around it."""
+        """Return an attribute without blanks around it, or `default`."""
         value = self.attributes.get(name)
         return default if value is None else value.strip()
 
     def walk(self) -> Iterator[Node]:
-        """This node and all below it, in document order."""
+        """Yield this node and all below it, in document order."""
         pending = [self]
         while pending:
             node = pending.pop()
@@ -79,8 +79,8 @@ class Node(Struct, eq=False):
 
 
 def parse_tree(data: bytes) -> Node:
-    """Return the root of an SVG document made `as_safe_utf8`; DrawingError when it is no XML,
-    no SVG, or not safe."""
+    """Return the root of an SVG document, given as by `as_safe_utf8`; DrawingError when it is no
+    XML, no SVG, or not safe."""
     from defusedxml.common import DefusedXmlException
 
     handler = _Builder()
@@ -112,7 +112,7 @@ def parse_tree(data: bytes) -> Node:
 
 
 def _parser(builder: _Builder, data: bytes) -> Any:
-    """defusedxml's parser, which accepts a few entities that are short and plain text.
+    """Return a parser of defusedxml that accepts a few entities which are short and plain text.
 
     It takes all data in one go: expat before 2.6 begins a long attribute anew with each portion.
 
@@ -184,7 +184,7 @@ class _Builder(ContentHandler):
         self._texts += node.tag == "text"
 
     def end(self) -> None:
-        """The innermost element ends."""
+        """Handle an end tag, which closes the innermost open element."""
         if self._letters:
             self._put_letters()
         node = self._open.pop()
@@ -194,7 +194,8 @@ class _Builder(ContentHandler):
             self._sheet = []
 
     def _put_letters(self) -> None:
-        """Add the letters since the last tag to the element in or behind which they stand."""
+        """Store the characters since the last tag in the open element: as its text, or as the tail
+        of its last child."""
         node = self._open[-1]
         letters = "".join(self._letters)
         self._letters = []
@@ -204,7 +205,8 @@ class _Builder(ContentHandler):
             node.text = letters
 
     def skippedEntity(self, name: str) -> None:
-        """An entity of the outside: with it, attributes could have lost words without a sign."""
+        """Raise DrawingError for an external entity: without it, text or attributes would silently
+        lack words."""
         raise DrawingError(f"refers to {name[:40]!r}, which stands in no file that may be read",
                            mend="save it as plain SVG")  # fmt: skip
 
@@ -216,7 +218,8 @@ class _Builder(ContentHandler):
 
 
 def _split_name(name: str) -> tuple[str, str]:
-    """Namespace ("" for none) and name; the prefix, where there is one, says nothing."""
+    """Return the namespace ("" for none) and the local name; the prefix, which has no meaning, is
+    dropped."""
     words = name.split(" ")
     return ("", name) if len(words) == 1 else (words[0], words[1])
 
@@ -225,7 +228,8 @@ _PREFIXES = {SVG: "", XLINK: "xlink:", XML: "xml:", INKSCAPE: "inkscape:"}
 
 
 def _attributes(attributes: dict[str, str]) -> dict[str, str]:
-    """SVG's own by name, those of XML, XLink and Inkscape with a prefix, no others."""
+    """Return attributes of SVG by name, those of XML, XLink and Inkscape with a prefix such as
+    "xlink:", and none of other namespaces."""
     named: dict[str, str] = {}
     for name, value in attributes.items():
         if " " in name:
@@ -275,7 +279,11 @@ _ILLUSTRATOR = re.compile(rb"Generator: Adobe Illustrator")
 
 
 def as_safe_utf8(data: bytes) -> bytes:
-    """UTF-8 (or what expat reads itself) without outside references; DrawingError."""
+    """Return the document unpacked, in UTF-8 or another encoding that expat reads, and without
+    references to files outside.
+
+    DrawingError for one that is too large or cannot be decoded.
+    """
     if data.startswith(GZIP):
         data = _unpack(data)
     if len(data) > MAX_BYTES:
@@ -286,8 +294,10 @@ def as_safe_utf8(data: bytes) -> bytes:
 
 
 def writer_dpi(head: bytes) -> tuple[str, float] | None:
-    """Return the program that wrote the file and the px an inch that it means, where that is
-    not 96."""
+    """Return the program that wrote the file and its px per inch, where that is not 96; else None.
+
+    Old versions of Inkscape used 90, Adobe Illustrator uses 72.
+    """
     head = head[:_HEAD_BYTES]
     inkscape = _OLD_INKSCAPE.search(head)
     if inkscape is not None:
@@ -317,7 +327,8 @@ def _too_large(size: int) -> DrawingError:
 
 
 def _decode(data: bytes) -> bytes:
-    """Return the same text as UTF-8, unless expat knows its encoding."""
+    """Return the text encoded as UTF-8; unchanged if expat knows its encoding. DrawingError for an
+    unknown or wrong encoding."""
     name = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
     if not name:
         declared = _DECLARED.match(data[:_HEAD_BYTES])
@@ -343,5 +354,6 @@ def _decode(data: bytes) -> bytes:
 
 
 def _blot_document_type(match: re.Match[bytes]) -> bytes:
-    """Return the document type without its reference; lines keep their numbers."""
+    """Return the document type without its reference to a file, with as many line feeds, so that
+    lines keep their numbers."""
     return match[1] + b"\n" * match[2].count(b"\n")
