@@ -17,7 +17,8 @@ from camtool.libraries.read import NO_UNIT
 
 
 def read(value: Any, name: str, options: ReadOptions) -> Found:
-    """Return the rings, lines and points of a geometry; OptionError for other objects."""
+    """Return the rings, lines and points of a shapely geometry as pieces and marks; OptionError
+    for other objects."""
     import shapely
 
     if not isinstance(value, shapely.Geometry):
@@ -56,5 +57,5 @@ def _parts(geometry: Any) -> Iterator[Any]:
 
 
 def _straight(points: Floats) -> Floats:
-    """Return points (n, 2) as vertices (n, 3) of lines."""
+    """Return points (n, 2) as vertices (n, 3) of a polyline of lines: x, y and bulge 0."""
     return np.column_stack([points, np.zeros(len(points))])

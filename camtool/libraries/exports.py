@@ -80,7 +80,7 @@ def polygons_of(paths: Polylines, tolerance_mm: float) -> list[Any]:
 
 
 def gathered(parts: list[Any]) -> Any:
-    """Return the geometries as one: a MultiPolygon, MultiLineString or MultiPoint where all are of
+    """Return the geometries as one: a MultiPolygon, MultiLineString or MultiPoint if all are of
     one kind, else a GeometryCollection."""
     import shapely
 
@@ -95,7 +95,8 @@ def gathered(parts: list[Any]) -> Any:
 
 
 def chord_points(path: Polyline, tolerance_mm: float) -> Floats:
-    """Return points (n, 2) of the path with chords for arcs; a closed path ends at its start."""
+    """Return the points (n, 2) of the path with arcs replaced by chords; a closed path repeats its
+    start at its end."""
     points = chords_of(Segments.of(path), tolerance_mm, min_count=MIN_CHORDS).once
     return np.concatenate([points, path.end[None, :]])
 
@@ -131,7 +132,7 @@ def svgpathtools_of(drawing: Drawing) -> dict[str, list[Any]]:
 
 
 def rises_of(segments: Segments) -> Floats:
-    """Return how far the middle of each segment (K,) lies from its chord, mm."""
+    """Return the height of the middle of each segment above its chord, (K,) mm: 0 for lines."""
     chord = segments.end - segments.start
     return np.asarray(0.5 * np.abs(segments.bulge) * np.hypot(chord[:, 0], chord[:, 1]))
 
@@ -194,8 +195,10 @@ def circle_of(path: Polyline) -> tuple[float, float, float] | None:
 
 
 def shapely_of_moves(toolpath: Toolpath, tolerance_mm: float = CHORD_MM) -> dict[str, Any]:
-    """Return the moves as lines of shapely with heights: "cuts" at a feed and "rapids", a line for
-    each row of moves without a break; arcs as chords within the tolerance."""
+    """Return the moves as 3-D lines of shapely: "cuts" at a feed and "rapids".
+
+    Each unbroken sequence of moves is one line, with arcs as chords within the tolerance.
+    """
     check_tolerance(tolerance_mm)
     return {
         "cuts": _lines_of(toolpath, toolpath.is_feed, tolerance_mm),
@@ -204,7 +207,8 @@ def shapely_of_moves(toolpath: Toolpath, tolerance_mm: float = CHORD_MM) -> dict
 
 
 def _lines_of(toolpath: Toolpath, is_chosen: Bools, tolerance_mm: float) -> Any:
-    """Return the chosen moves as a MultiLineString, without those that go nowhere."""
+    """Return the chosen moves as a MultiLineString, one line for each unbroken sequence; moves
+    without a length are left out."""
     import shapely
 
     is_chosen = is_chosen & ((toolpath.end != toolpath.starts).any(axis=1) | toolpath.is_arc)
@@ -217,14 +221,15 @@ def _lines_of(toolpath: Toolpath, is_chosen: Bools, tolerance_mm: float) -> Any:
 
 
 def _without_repeats(points: Floats) -> Floats:
-    """Return points (n, 3) without those that repeat the one before: shapely would take two that
-    lie above each other for the same."""
+    """Return points (n, 3) without those that equal the one before in X, Y and Z: shapely compares
+    X and Y alone and would drop vertical moves."""
     keep = np.append(True, (points[1:] != points[:-1]).any(axis=1))
     return np.asarray(points[keep])
 
 
 def move_points(toolpath: Toolpath, rows: Any, tolerance_mm: float) -> tuple[Floats, Any]:
-    """Return points (P, 3) along these moves, arcs as chords, and the move (P,) of each."""
+    """Return points (P, 3) along these moves, with arcs as chords, and for each point the index
+    (P,) of its move."""
     arcs = PolarArcs(toolpath, np.isin(np.arange(len(toolpath)), rows) & toolpath.is_arc)
     radius = np.maximum(arcs.radius, arcs.end_radius)
     within = 1.0 - tolerance_mm / np.maximum(radius, tolerance_mm)

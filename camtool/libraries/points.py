@@ -18,7 +18,7 @@ from camtool.libraries.read import NO_UNIT
 
 
 def read(value: Any, name: str, options: ReadOptions) -> Found:
-    """Return the polyline of an array; DrawingError when it is no list of points."""
+    """Return the polyline of an array of numpy; DrawingError if its rows are no points."""
     if not isinstance(value, np.ndarray):
         raise OptionError(
             f"{name} is a number of numpy ({type(value).__name__})", mend="give an array of points"

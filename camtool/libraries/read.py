@@ -58,8 +58,11 @@ class Library(Protocol):
     """A module that reads the objects of one library."""
 
     def read(self, value: Any, name: str, options: ReadOptions) -> Found:
-        """Return what the object holds, in mm; `name` is its place in messages. DrawingError when
-        it cannot be read, OptionError when it is no drawing."""
+        """Return the pieces and marks that the object holds, in mm; `name` is its place in
+        messages.
+
+        DrawingError when it cannot be read, OptionError when it is no drawing.
+        """
 
 
 class ReadObject(Struct, frozen=True):
@@ -87,7 +90,8 @@ def path_of(value: Any) -> Path:
 
 
 def library_of(value: object) -> EntryPoint | None:
-    """Return the reader of the library that the object is of; None for an object of no library."""
+    """Return the reader (entry point) for the library that the object's class is from; None for a
+    library that is not known."""
     packages = [kind.__module__.partition(".")[0] for kind in type(value).__mro__]
     for package in packages:
         if package in LIBRARIES:
@@ -141,7 +145,11 @@ def name_of(value: object) -> str:
 
 
 def items_of(value: Any, place: str, layer: str, depth: int) -> Iterator[tuple[Any, str, str]]:
-    """Yield each object with its place and its layer; OptionError for what holds none."""
+    """Yield each drawable object within `value`, which may be nested lists or {layer: objects},
+    with its place for messages and its layer.
+
+    OptionError for anything that is no drawing.
+    """
     if depth > MAX_NESTING:
         raise OptionError(
             f"{place} lies deeper than {MAX_NESTING} lists", mend="give one list of objects"
@@ -176,7 +184,7 @@ def is_points(value: object) -> bool:
 
 
 def as_array(value: Any, place: str) -> Any:
-    """Return a list of points as an array; OptionError when its rows are not alike."""
+    """Return a list of points as an array; OptionError when its rows differ in length."""
     try:
         return np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -186,8 +194,10 @@ def as_array(value: Any, place: str) -> Any:
 
 
 def read_one(value: object, place: str, options: ReadOptions) -> Found:
-    """Return what one object holds. DrawingError, which names the plug-in, for one that is
-    broken."""
+    """Return the pieces and marks of one object, read by the module of its library.
+
+    DrawingError, which names the plug-in, if a plug-in fails in an unexpected way.
+    """
     library = library_of(value)
     if library is None:
         raise OptionError(f"{place} is of no library that is read", mend=f"give {_KINDS}")
@@ -219,7 +229,7 @@ def _refuse_mixed_units(objects: list[ReadObject]) -> None:
 
 
 def _on_layer(content: Found, layer: str) -> Found:
-    """Return what was found with all of it on a layer; unchanged for ""."""
+    """Return the same content with everything moved to `layer`; unchanged for ""."""
     if not layer:
         return content
     return replace(

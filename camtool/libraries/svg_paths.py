@@ -61,7 +61,7 @@ def continuous_parts(path: Any) -> list[list[Any]]:
 
 
 def _segment(segment: Any) -> Segment:
-    """Return a segment as path data give it."""
+    """Convert a segment of svgpathtools to the record of SVG path data."""
     from svgpathtools import Arc, Line
 
     numbers = [segment.start, segment.end]

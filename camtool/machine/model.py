@@ -358,13 +358,14 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     correlations: tuple[tuple[str, str, Coefficient], ...] = ()
 
     def standard(self, key: str) -> float | None:
-        """Return the standard uncertainty at a key such as "x.scale"; None: not known."""
+        """Return the standard uncertainty of the value with a key such as "x.scale"; None: not
+        known."""
         record, _, name = key.rpartition(".")
         value: float | None = getattr(getattr(self, record) if record else self, name)
         return value
 
     def correlation(self, keys: Sequence[str]) -> Floats:
-        """Return (P, P) the coefficients between these keys."""
+        """Return the correlation coefficients (P, P) between the values with these P keys."""
         import numpy as np
 
         matrix = np.eye(len(keys))
@@ -375,8 +376,8 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return matrix
 
     def check(self) -> None:
-        """Raise MachineError for correlations that no numbers can have, or of what is not
-        known."""
+        """Raise MachineError for correlations that are impossible, or that name a value of unknown
+        uncertainty."""
         pairs = set[frozenset[str]]()
         for number, (one, other, _) in enumerate(self.correlations):
             for key in (one, other):
@@ -404,8 +405,8 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         self._check_semidefinite()
 
     def _check_semidefinite(self) -> None:
-        """Raise MachineError, which names the keys, for correlations that contradict each
-        other."""
+        """Raise MachineError, which names the keys, for correlations that contradict each other:
+        their matrix is not positive semidefinite."""
         if len(self.correlations) < 2:
             return
         import numpy as np
@@ -526,7 +527,7 @@ class Machine(
 
 
 def _given_values(record: msgspec.Struct) -> dict[str, Any]:
-    """Return the values of a record that are not its defaults, with its tag."""
+    """Return the values of a record that differ from its defaults, by name, with its tag."""
     config, values = record.__struct_config__, dict[str, Any]()
     if config.tag_field is not None:
         values[config.tag_field] = config.tag

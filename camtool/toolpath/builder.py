@@ -59,13 +59,13 @@ class ToolpathBuilder:
     def rapid(
         self, x: Coordinate = None, y: Coordinate = None, z: Coordinate = None
     ) -> ToolpathBuilder:
-        """Straight move at the machine's highest speed, not cutting."""
+        """Add a straight rapid to these coordinates: the machine's highest speed, no cutting."""
         return self._move(Kind.RAPID, (x, y, z), math.nan)
 
     def line(
         self, x: Coordinate = None, y: Coordinate = None, z: Coordinate = None, *, feed: float
     ) -> ToolpathBuilder:
-        """Straight move at `feed` mm/min."""
+        """Add a straight cut to these coordinates at `feed` mm/min."""
         return self._move(Kind.LINE, (x, y, z), feed)
 
     def arc(
@@ -78,8 +78,10 @@ class ToolpathBuilder:
         ccw: bool,
         feed: float,
     ) -> ToolpathBuilder:
-        """Arc in XY about the absolute `centre`, with a `z` a helix; a full turn when it ends
-        above, below or at its start."""
+        """Add an arc in XY about the absolute `centre`, or a helix if `z` is given.
+
+        It is a full turn when its end lies above, below or at its start.
+        """
         kind = Kind.ARC_CCW if ccw else Kind.ARC_CW
         return self._move(kind, (x, y, z), feed, centre)
 
@@ -187,7 +189,7 @@ class ToolpathBuilder:
         return -1 if self.mode is None else self._modes.setdefault(self.mode, len(self._modes))
 
     def _gather(self) -> None:
-        """Move the rows that are Python objects into the columns."""
+        """Move the rows collected as Python tuples into the columns of arrays."""
         if self._rows:
             table = np.array(self._rows, dtype=np.float64)
             self._rows = []
@@ -213,7 +215,8 @@ class _Column:
         return self._count
 
     def shape_of(self, rows: int) -> tuple[int, ...]:
-        """Array shape of this number of rows."""
+        """Return the shape of an array of this column with so many rows: (rows,), (rows, 2) or
+        (rows, 3)."""
         return (rows, *self._width)
 
     def add(self, rows: Ints | Floats | float, count: int) -> None:
@@ -243,7 +246,8 @@ class _Column:
 
 
 def _as_rows(columns: Sequence[Ints | Floats | float], count: int) -> Iterator[tuple[float, ...]]:
-    """Yield rows of numbers from columns of this length; a single number is the value of all."""
+    """Yield `count` tuples of numbers, one for each row of these columns; a column that is a
+    single number repeats it."""
     parts: list[Any] = []
     for column in columns:
         if isinstance(column, np.ndarray):
@@ -254,7 +258,8 @@ def _as_rows(columns: Sequence[Ints | Floats | float], count: int) -> Iterator[t
 
 
 def _are_same(one: Any, rows: Any) -> bool:
-    """Return True if all rows have the bits of this one: NaN equals NaN, and 0 differs from −0."""
+    """Return True if all `rows` have the same bits as row `one`: NaN equals NaN, and 0 differs
+    from −0."""
     if one.dtype == np.float64:
         one, rows = one.view(np.int64), rows.view(np.int64)
     return bool((rows == one).all())

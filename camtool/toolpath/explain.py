@@ -104,7 +104,7 @@ def explain(
 
 
 def _modal_words(text: str, meanings: Mapping[str, str]) -> Iterator[str]:
-    """Yield the meanings of the words of a block outside of its comments."""
+    """Yield the meanings, from `meanings`, of the words of a block outside of its comments."""
     bare = _NO_WORDS.sub("", text).upper()
     for letter, number in _WORD.findall(bare) if meanings else ():
         meaning = meanings.get(f"{letter}{number}")
@@ -131,7 +131,8 @@ class _Teller:
         self._has_new_mode[moving[is_new]] = True
 
     def words(self, rows: Ints) -> Iterator[str]:
-        """Yield what these rows do, the first MAX_MOVES of them and the last."""
+        """Yield a sentence for each of these rows, the first MAX_MOVES of them, and one that
+        counts the others."""
         for row in rows[:MAX_MOVES].tolist():
             yield self._row_words(row)
         if len(rows) > MAX_MOVES:
@@ -139,7 +140,7 @@ class _Teller:
             yield f"and {len(rows) - MAX_MOVES} more moves, the last to {place} mm"
 
     def moves(self, rows: Ints) -> Iterator[ExplainedMove]:
-        """Yield these rows as records."""
+        """Yield a record for each of these rows of the toolpath."""
         for row in rows.tolist():
             move = self._move(row)
             sweep = float(self._sweeps[row])
@@ -188,7 +189,7 @@ class _Teller:
         return ", ".join(parts)
 
     def _motion_words(self, move: Move, sweep: float) -> str:
-        """Return the way of a move: where it goes, on the axes that move, and how."""
+        """Return a sentence for a move: line, rapid or arc, and its end on the axes that move."""
         axes = "".join(
             axis
             for axis, low, high in zip("XYZ", move.start, move.end, strict=True)

@@ -50,8 +50,8 @@ class LoweredToolpath(Struct, frozen=True, eq=False):
     row: Ints
 
     def after(self, earlier: LoweredToolpath) -> LoweredToolpath:
-        """Return this with `row` composed with `earlier.row`, where this was made from
-        `earlier`."""
+        """Return this result with `row` traced back through `earlier`, the lowering before it, to
+        the toolpath that `earlier` was made from."""
         return replace(self, row=earlier.row[self.row])
 
 
@@ -148,7 +148,8 @@ class _Parts(Struct, frozen=True, eq=False):
 
 
 def _parts_of_rows(toolpath: Toolpath, arms: PolarArcs, parts: Floats) -> _Parts:
-    """Return `parts` (J,) of the arcs, at least 1 each, and one part for every other row."""
+    """Return the number of parts of each row: `parts` (J,) for the arcs, at least 1 each, and 1
+    for every other row."""
     count = np.ones(len(toolpath))
     count[arms.row] = np.maximum(parts, 1.0)
     return _Parts(count)
@@ -186,12 +187,12 @@ def _split(
 
 
 def _identity(toolpath: Toolpath) -> LoweredToolpath:
-    """Return the toolpath itself, each row from its own."""
+    """Return the toolpath unchanged; each of its rows comes from itself."""
     return LoweredToolpath(toolpath, np.arange(len(toolpath)))
 
 
 def _repeat_rows(counts: Ints) -> tuple[Ints, Ints]:
-    """Repeat each row index by its count; return it with the number of the part, from 0."""
+    """Return each row index repeated by its count, and for each repetition its number, from 0."""
     row = np.repeat(np.arange(len(counts)), counts)
     before = np.cumsum(counts) - counts
     return row, np.arange(len(row)) - before[row]
@@ -200,8 +201,11 @@ def _repeat_rows(counts: Ints) -> tuple[Ints, Ints]:
 def _with_rows(
     toolpath: Toolpath, row: Ints, kind: Codes, end: Floats, centre: Floats
 ) -> LoweredToolpath:
-    """Return rows with new kinds, ends and centres, and all other columns of the rows that they
-    came from. The three arrays become read-only and are not copied."""
+    """Return a toolpath with these kinds, ends and centres; its other columns are those of the
+    rows `row` that the new rows came from.
+
+    The three arrays become read-only and are not copied.
+    """
     kind, end, centre = read_only(kind), read_only(end), read_only(centre)
     return LoweredToolpath(toolpath.picked(row, kind=kind, end=end, centre=centre), row)
 

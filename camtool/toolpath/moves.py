@@ -216,7 +216,7 @@ class Toolpath:
         return int(ends[0]) + 1 if len(ends) else len(self)
 
     def first(self, rows: int) -> Toolpath:
-        """Return the first rows; the toolpath itself if these are all."""
+        """Return the first `rows` rows; the toolpath itself if it has no more."""
         return self if rows >= len(self) else self.part(0, rows)
 
     def part(self, low: int, high: int) -> Toolpath:
@@ -310,7 +310,7 @@ def _sweeps(kind: Codes, begin: Floats, end: Floats, centre: Floats) -> Floats:
 
 
 def read_only(column: Column) -> Column:
-    """Make an array read-only and return it: a Toolpath takes it without a copy."""
+    """Make an array read-only in place and return it: a Toolpath takes it without a copy."""
     column.flags.writeable = False
     return column
 
@@ -446,5 +446,6 @@ def mounted_before(toolpath: Toolpath) -> Bools:
 
 
 def changes_between_cuts(toolpath: Toolpath) -> Ints:
-    """Return the rows of the other tool changes, at which the operator has to be waited for."""
+    """Return the rows of the tool changes after the first cut, at which the program has to wait
+    for the operator."""
     return np.flatnonzero((toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath))

@@ -88,12 +88,13 @@ class CycleRun:
         return self._script is not None
 
     def begin(self, place: Place) -> None:
-        """Begin with a tool that stands there."""
+        """Begin the cycle with a tool that stands at `place`, mm in the work frame."""
         self.place, self._script = place, self._cycle(place)
         self._turn(None)
 
     def answer(self, touched: Place | None = None) -> None:
-        """Note that the step is done: the probe has touched at a place, or has not."""
+        """Note that the step is done, and take the next one: the probe touched at the place
+        `touched`, or did not touch (None)."""
         step = self.step
         assert step is not None
         x, y, z = (step.axes.get(axis, self.place["xyz".index(axis)]) for axis in AXES)
@@ -101,8 +102,11 @@ class CycleRun:
         self._turn(ProbeAnswer(self.place, touched is not None))
 
     def refusal(self, touched: Place) -> str:
-        """Return why the probe cannot have touched at a place in this step, as the controller
-        says; "" where it can."""
+        """Return the reason why the probe cannot have touched at this place: the step does not
+        pass there. "" if it can.
+
+        The place is what the controller reported.
+        """
         assert self.step is not None
         for axis, before, reported in zip(AXES, self.place, touched, strict=True):
             end = self.step.axes.get(axis, before)
@@ -129,8 +133,8 @@ class CycleRun:
             self.step = step
 
     def _is_there(self, step: ProbeStep) -> bool:
-        """Return True for a step that would not move: controllers refuse to probe where they
-        stand."""
+        """Return True if the step would not move the tool: controllers refuse to probe without a
+        move."""
         return all(
             abs(value - self.place["xyz".index(axis)]) < SAME_MM
             for axis, value in step.axes.items()
@@ -199,7 +203,8 @@ def _touch_once(
 
 
 def _guard(axes: Mapping[Axis, float], how: Touch) -> Generator[ProbeStep, ProbeAnswer, None]:
-    """Move where nothing should be in the way; MachineError where something is."""
+    """Move to these coordinates where nothing should be in the way; MachineError if the probe
+    touches something."""
     answer = yield ProbeStep("guard", axes, how.travel)
     if answer.has_touched:
         raise MachineError(
@@ -213,7 +218,8 @@ def _guard(axes: Mapping[Axis, float], how: Touch) -> Generator[ProbeStep, Probe
 def _zero(
     stands: Place, measured_mm: Mapping[Axis, float], how: Touch
 ) -> Generator[ProbeStep, ProbeAnswer, None]:
-    """Give what was measured its coordinates, with a tool that stands at `stands`."""
+    """Set the work coordinates so that what was measured at `measured_mm` gets the values of
+    `how`; the tool stands at `stands`. Without `how.sets_zero` do nothing."""
     if how.sets_zero:
         values = {
             axis: stands["xyz".index(axis)] - place + how.values.get(axis, 0.0)
@@ -223,14 +229,14 @@ def _zero(
 
 
 def plate(start: Place, how: Touch, thickness_mm: float) -> Measured:
-    """Touch a plate of this thickness that lies on the part: its lower side is Z0."""
+    """Touch a plate of this thickness that lies on the part: its lower side becomes Z0."""
     top = yield from touch(start, "z", -1, how)
     yield from _zero(start, {"z": top - thickness_mm}, how)
     return {"top_z_mm": top, "z_mm": top - thickness_mm}
 
 
 def edge(start: Place, axis: Axis, sense: int, how: Touch) -> Measured:
-    """Touch a side of a part from beside it: the side is at 0."""
+    """Touch a side of a part from beside it: the side becomes 0 of that axis."""
     place = yield from _side(start, axis, sense, how)
     yield from _zero(start, {axis: place}, how)
     return {f"{axis}_mm": place}
@@ -239,7 +245,8 @@ def edge(start: Place, axis: Axis, sense: int, how: Touch) -> Measured:
 def _side(
     start: Place, axis: Axis, sense: int, how: Touch
 ) -> Generator[ProbeStep, ProbeAnswer, float]:
-    """Return the coordinate of a side: that of the tool's centre, and its radius beyond it."""
+    """Touch a side of the part; return its coordinate: that of the tool's centre, and the tool's
+    radius beyond it."""
     return (yield from touch(start, axis, sense, how)) + sense * how.radius_mm
 
 
@@ -273,8 +280,8 @@ def corner(
 
 
 def bore(start: Place, how: Touch) -> Measured:
-    """Touch a bore at four places from within, X again through the centre: its centre is
-    X0 Y0, and the tool stands there."""
+    """Touch a bore at four places from within, X again through the centre: its centre becomes X0
+    Y0, and the tool stands there."""
     x, y, z = start
     x, _ = yield from _middle((x, y, z), "x", how)
     yield from _guard({"x": x}, how)
@@ -299,14 +306,15 @@ def _round(x: float, y: float, width: float, height: float) -> dict[str, float]:
 def _middle(
     start: Place, axis: Axis, how: Touch
 ) -> Generator[ProbeStep, ProbeAnswer, tuple[float, float]]:
-    """Touch both ways from `start`; return the middle and the distance of the two, mm."""
+    """Touch two opposite walls from `start`; return the coordinate midway between them and their
+    distance, mm."""
     low = yield from touch(start, axis, -1, how)
     high = yield from touch(start, axis, 1, how)
     return 0.5 * (low + high), high - low
 
 
 def boss(start: Place, how: Touch, size_mm: float, clear_mm: float, depth_mm: float) -> Measured:
-    """Touch a boss about `size_mm` wide at four places from outside: its centre is X0 Y0.
+    """Touch a boss about `size_mm` wide at four places from outside: its centre becomes X0 Y0.
 
     The tool stands free above its centre. It goes out beyond each side by `clear_mm`, and down by
     `depth_mm`; X is touched again through the centre, and the tool ends above it.
@@ -322,8 +330,8 @@ def boss(start: Place, how: Touch, size_mm: float, clear_mm: float, depth_mm: fl
 def _across(
     above: Place, axis: Axis, how: Touch, size_mm: float, clear_mm: float, depth_mm: float
 ) -> Generator[ProbeStep, ProbeAnswer, tuple[float, float]]:
-    """Touch both sides of a boss, and go above the middle of them; return it and their
-    distance."""
+    """Touch two opposite sides of a boss and go above the middle between them; return the
+    coordinate of the middle and their distance, mm."""
     index, places = "xyz".index(axis), list[float]()
     for sense in (-1, 1):
         place = list(above)
@@ -357,7 +365,8 @@ def skew(start: Place, axis: Axis, sense: int, how: Touch, along_mm: float) -> M
 
 
 def noted(cycle: ProbeCycle, note: TouchNote) -> ProbeCycle:
-    """Return the cycle that tells `note` of what it touches, and of the zeros that it sets."""
+    """Return a cycle that does the same and calls `note` after each touch and each zero that is
+    set."""
 
     def run(start: Place) -> ProbeScript:
         script = cycle(start)
@@ -381,8 +390,12 @@ def height_map(
     feed: float,
     heights: list[float],
 ) -> ProbeCycle:
-    """Return the cycle that adds the height at each point to `heights`: between them the probe is
-    lifted to `clear_mm`, and it goes down to `lowest_mm` at most, by `feed` mm/min."""
+    """Return a cycle that touches the top at each point and adds the heights to the list
+    `heights`, in order.
+
+    Between the points the probe is at `clear_mm`; it goes down to `lowest_mm` at most, at `feed`
+    mm/min.
+    """
 
     def run(_: Place) -> ProbeScript:
         yield ProbeStep("go", {"z": clear_mm})
@@ -452,8 +465,8 @@ def probed_nodes(
 def refuse_boxes_on_the_way(
     points: Sequence[tuple[float, float]], boxes: Sequence[Box], clear_mm: float, margin_mm: float
 ) -> None:
-    """Raise OptionError where the way between two points leads over a box that is higher than
-    `clear_mm`."""
+    """Raise OptionError if the straight way at `clear_mm` from one point to the next leads over,
+    or within `margin_mm` of, a box whose top is at that height or above."""
     places = np.array(points)
     begin, steps = places[:-1], np.diff(places, axis=0)
     for box in boxes:
@@ -482,7 +495,8 @@ def refuse_boxes_on_the_way(
 
 
 def in_rows(x: Floats, y: Floats, probed: Bools) -> list[tuple[float, float]]:
-    """Return the probed nodes row by row, every other row backwards."""
+    """Return the (x, y) of the probed nodes row by row, every other row backwards, so that the
+    probe travels little."""
     points: list[tuple[float, float]] = []
     for row, place in enumerate(y.tolist()):
         columns = np.flatnonzero(probed[row])[:: -1 if row % 2 else 1]
@@ -491,7 +505,8 @@ def in_rows(x: Floats, y: Floats, probed: Bools) -> list[tuple[float, float]]:
 
 
 def surface_from(x: Floats, y: Floats, probed: Bools, heights: Sequence[float]) -> Surface:
-    """Return the surface of heights in the order of `in_rows`."""
+    """Return the surface of the heights probed at the nodes of the mask `probed`, in the order of
+    `in_rows`."""
     z = np.full(probed.shape, np.nan)
     values = iter(heights)
     for row in range(len(y)):

@@ -71,15 +71,19 @@ class Surface(Struct, frozen=True, eq=False):
 
 
 def _cell(nodes: Floats, values: Floats) -> tuple[Ints, Floats]:
-    """Return the cell of each value, and its share of that cell, 0 to 1."""
+    """Return the index of the grid cell of each value, and its place within the cell, 0 to 1;
+    values beyond the grid count as on its edge."""
     cell = np.clip(np.searchsorted(nodes, values, side="right") - 1, 0, len(nodes) - 2)
     share = (values - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
     return cell, np.clip(share, 0.0, 1.0)
 
 
 def filled(x: Floats, y: Floats, z: Floats) -> Surface:
-    """Return the surface of nodes of which some were not probed (NaN): these get the mean of their
-    neighbours, all at once. ValueError if none was probed."""
+    """Return the surface with the nodes that were not probed (NaN) filled in smoothly.
+
+    Each of them gets the mean of its four neighbours, found by iteration until nothing changes by
+    more than FILL_MM. ValueError if no node was probed.
+    """
     missing = np.isnan(z)
     if missing.all():
         raise ValueError("no node was probed")
@@ -95,8 +99,8 @@ def filled(x: Floats, y: Floats, z: Floats) -> Surface:
 
 
 def text_of_surface(surface: Surface) -> str:
-    """Return the text of a file: the first line, then a row of X, and for each Y a row of Y and
-    the heights; mm, separated by commas."""
+    """Return the surface as the text of a file: the first line, then a row of X, and for each Y a
+    row of Y and the heights; mm, separated by commas."""
     rows = [f"# {FORMAT}: mm; a row of X, then for each Y its heights"]
     rows.append(",".join(["", *(f"{value:.6g}" for value in surface.x.tolist())]))
     for y, heights in zip(surface.y.tolist(), surface.z.tolist(), strict=True):
@@ -105,7 +109,8 @@ def text_of_surface(surface: Surface) -> str:
 
 
 def surface_of_text(text: str, file: str) -> Surface:
-    """Parse the text of a file; an empty height was not probed. InputError names file and line."""
+    """Parse the text of a surface file; an empty height was not probed. InputError names file and
+    line."""
     lines = [
         (number, line.strip())
         for number, line in enumerate(text.splitlines(), 1)
@@ -200,7 +205,8 @@ def _refuse_beside(toolpath: Toolpath, surface: Surface, cuts: Ints) -> None:
 
 
 def _points(toolpath: Toolpath, row: int, start: Floats, sweep: float, shares: Floats) -> Floats:
-    """Return the points (K, 3) mm at these shares of a move; the last one is its end."""
+    """Return the points (K, 3) mm of a move at these shares of its length; the point of the last
+    share is the exact end."""
     end = toolpath.end[row]
     points = start + shares[:, None] * (end - start)
     if sweep:
@@ -223,8 +229,11 @@ def _shares(
     surface: Surface,
     tolerance_mm: float,
 ) -> Floats:
-    """Return the shares (K,) of a move at which its parts end: at the lines of the grid, and so
-    often between them that the surface bends by no more than the tolerance."""
+    """Return the shares (K,) of a move, up to 1, at which its parts end.
+
+    Parts end at the lines of the grid; between these the move is divided so often that the surface
+    bends by no more than the tolerance within a part.
+    """
     end = toolpath.end[row]
     centre = toolpath.centre[row] if sweep else None
     crossings = [np.array([0.0, 1.0])]
@@ -248,7 +257,8 @@ def _shares(
 def _crossings(
     start: Floats, end: Floats, centre: Floats | None, sweep: float, axis: int, nodes: Floats
 ) -> Floats:
-    """Return the shares of a move, within (0, 1), at which it crosses lines of the grid."""
+    """Return the shares of a move, within (0, 1), at which it crosses the grid lines of one axis,
+    which stand at `nodes`."""
     if centre is None:
         change = float(end[axis] - start[axis])
         if change == 0.0:
@@ -363,9 +373,13 @@ class _Cuts:
 
 
 def surface_error(flat: Toolpath, written: Toolpath, surface: Surface) -> tuple[float, int]:
-    """Return the largest distance in Z, mm, of the cuts of `written` from those of `flat` on the
-    surface, at many places of each cut, and the row of `written` where it is. Places that belong
-    together have come equally far in their runs. PostError where the runs are not the same."""
+    """Return the largest error in Z, mm, of `written`, which should be `flat` raised by the
+    surface, and the row of `written` where it is.
+
+    It is measured at many places of each cut; a place of `written` is compared with that place of
+    `flat` which has come equally far in its run. PostError if the two have different numbers of
+    runs.
+    """
     plain, warped = _Cuts(flat), _Cuts(written)
     if plain.runs != warped.runs:
         raise PostError(

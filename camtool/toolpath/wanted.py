@@ -41,7 +41,7 @@ class DrawnEdges(Struct, frozen=True, eq=False):
     datum_off_mm: float = 0.0
 
     def picked(self, row: Ints) -> DrawnEdges:
-        """Select rows (M,) in the given order, with repetitions."""
+        """Return the record for rows (M,) selected in the given order, with repetitions."""
         return replace(self, off_mm=self.off_mm[row], edge=self.edge[row])
 
 
@@ -100,11 +100,12 @@ class Operations(Struct, frozen=True, eq=False):
     begin: Ints
 
     def of_part(self, low: int, high: int) -> Operations:
-        """Return the operations for the rows low:high."""
+        """Return the operations of the part low:high of the rows, counted from `low`."""
         return replace(self, begin=self.begin.clip(low, high) - low)
 
     def picked(self, row: Ints) -> Operations:
-        """Return the operations for ascending rows (M,); ValueError if they do not ascend."""
+        """Return the operations of a toolpath of the selected rows (M,), which must ascend;
+        ValueError if they do not."""
         if (np.diff(row) < 0).any():
             raise ValueError("rows out of order belong to no order of operations")
         return replace(self, begin=np.searchsorted(row, self.begin))

@@ -76,7 +76,8 @@ def line_lengths(data: bytes) -> Ints:
 
 
 def texts_of(columns: Sequence[WordColumn], *, blanks: bool = False, end: str = "\n") -> TextLines:
-    """Format M blocks, each with its words in this order, separated by spaces if `blanks`."""
+    """Format M blocks of text, each with its words in the order of the columns, separated by
+    spaces if `blanks`."""
     pieces = [*(each.letter for each in columns), end]
     fixed = np.frombuffer("".join(pieces).encode("ascii"), dtype=np.uint8).copy()
     fixed_ends = np.cumsum([len(piece) for piece in pieces])
