@@ -59,15 +59,16 @@ MAX_OVERHANG_MM = 1000.0
 
 
 def overhang_mm(operation: Operation) -> float:
-    """Return the distance of the outermost round of the tool's centre from the stock: as given,
-    or its radius."""
+    """Return how far the outermost round of the tool's centre lies outside the stock, mm: as
+    given, or the tool's radius."""
     given_mm: float | None = operation.own_value("overhang")
     return operation.tool.radius_mm if given_mm is None else given_mm
 
 
 def checked(operation: Operation, stock: Stock | None) -> Operation:
-    """Return the operation; OptionError without a stock of known size, for a depth of all of it,
-    for a tool that leaves no flat top, and for an overhang below 0 or above MAX_OVERHANG_MM."""
+    """Return the operation unchanged. OptionError without a stock of known size, for a depth as
+    large as its thickness, for a tool that leaves no flat top, and for an overhang below 0 or
+    above MAX_OVERHANG_MM."""
     from camtool.planning.naming import key_of
 
     if stock is None or stock.box_mm is None:
@@ -102,9 +103,9 @@ def checked(operation: Operation, stock: Stock | None) -> Operation:
 
 
 def faced(_: Chosen, setting: Setting) -> Work:
-    """Return one item, the runs that clear the top of the stock at all levels of the setting.
+    """Return one item with the runs that clear the top of the stock at all levels of the setting.
 
-    OptionError for a step-over that would take for ever.
+    OptionError for a step-over so small that the passes would be too many.
     """
     import numpy as np
 

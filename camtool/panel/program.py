@@ -52,22 +52,22 @@ class Course:
         return self._left_s[acknowledged]
 
     def acknowledged_block(self, talk: Conversation) -> int:
-        """Return the block that was acknowledged last, from 1; 0 for none."""
+        """Return the last acknowledged block of the program (from 1), 0 if there is none."""
         if not talk.acknowledged:
             return 0
         return self.one.block_of(self.one.packets[talk.acknowledged - 1].block) + 1
 
     def following_block(self, talk: Conversation) -> int:
-        """Return the block behind the one that stops the program, from 1."""
+        """Return the block (from 1) after the one at which the program stopped."""
         return self.one.block_of(self.one.packets[talk.stop_index].block) + 2
 
     def waiting_bytes(self, talk: Conversation) -> int:
-        """Return the bytes that were sent and are not acknowledged."""
+        """Return the number of bytes that were sent and are not yet acknowledged."""
         return sum(len(each.data) for each in self.one.packets[talk.acknowledged : talk.sent])
 
     def facts(self, talk: Conversation) -> BlockFacts:
-        """Return the facts of the block after the one that was acknowledged last, if it was sent,
-        else of that one."""
+        """Return facts about the block that runs: the one after the last acknowledged block if it
+        was sent, else the last acknowledged one."""
         if not talk.sent:
             return BlockFacts()
         block = self.one.packets[min(talk.acknowledged, talk.sent - 1)].block
@@ -108,7 +108,7 @@ class LoadedProgram(Struct, frozen=True, eq=False):
 
     @property
     def journal(self) -> Path:
-        """Return the file of its journal, which is that of `camtool send`."""
+        """Return the path of the program's journal, the same as for `camtool send`."""
         return Path(f"{self.file}.journal")
 
     def page(self) -> bytes:
@@ -164,9 +164,9 @@ class LoadedProgram(Struct, frozen=True, eq=False):
         tool_at: ToolAt = "",
         more: bool = False,
     ) -> tuple[Consignment, SendOptions]:
-        """Return what is sent, and how; `more`: the journal goes on. OptionError for a program
-        with errors, unless they are allowed, for one that cannot be resumed, and where the place
-        of the tool must be said."""
+        """Return what is sent, and the options of sending it; `more`: continue the journal.
+        OptionError for a program with errors unless these are allowed, for one that cannot be
+        resumed, and if the user must say where the tool is."""
         if self.one.run.failed and not despite_errors:
             raise OptionError(
                 "the program has errors that would spoil the part",
@@ -206,8 +206,8 @@ class LoadedProgram(Struct, frozen=True, eq=False):
         return one, options
 
     def _sent_file(self, one: Consignment) -> str:
-        """Write what is sent beside the program, for a controller that opens it as a file; return
-        its path, "" for others."""
+        """Write what is sent to a file beside the program, for controllers that open a file
+        themselves; return its path, "" for other controllers."""
         if not one.wire.opens_file:
             return ""
         file = Path(self.file)

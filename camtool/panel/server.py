@@ -283,7 +283,8 @@ class PanelServer:
     async def _guard(
         self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
-        """Refuse what does not come from the page of this server, opened with its key."""
+        """Handle a request only if it comes from this server's own page, opened with its key;
+        refuse it otherwise."""
         own = {f"{name}:{self.port}" for name in (HOST, "localhost")}
         origin = request.headers.get("Origin")
         allowed = request.host in own and origin in (None, *(f"http://{each}" for each in own))
@@ -309,7 +310,7 @@ class PanelServer:
         return response
 
     async def _view(self, request: web.Request) -> web.Response:
-        """Return the program in the viewer, which the page shows in a frame."""
+        """Answer with the viewer page of the program, which the panel's page shows in a frame."""
         if self.program is None:
             raise web.HTTPNotFound
         page = await asyncio.to_thread(self.program.page)
@@ -342,7 +343,7 @@ class PanelServer:
     # What a page is told.
 
     async def _push(self, client: Client) -> None:
-        """Send the state to a page whenever it has changed."""
+        """Send the state to a page each time it has changed, until the page is closed."""
         while not client.socket.closed:
             await client.changed.wait()
             client.changed.clear()
@@ -373,7 +374,8 @@ class PanelServer:
         )
 
     def _state(self, client: Client) -> str:
-        """Return the state, and the messages that the page does not have yet."""
+        """Return the message with the present state, and the messages to the user that this page
+        does not have yet."""
         messages = [each for each in self.session.messages if each.number > client.shown]
         if messages:
             client.shown = messages[-1].number
@@ -390,7 +392,7 @@ class PanelServer:
     # What a page wants.
 
     def _take(self, client: Client, text: str) -> None:
-        """Do what a page wants, if it may."""
+        """Carry out a request of a page, if this page may command."""
         session = self.session
         try:
             request = _DECODER.decode(text)
@@ -453,7 +455,7 @@ class PanelServer:
                 self._work = asyncio.create_task(asyncio.to_thread(self._start, request))
 
     def _programs(self) -> list[Path]:
-        """List the programs of the folder."""
+        """Return the programs in the folder."""
         if self.folder is None:
             return []
         suffixes = {self.session.target.machine.target.extension, *SUFFIXES}
@@ -485,7 +487,7 @@ class PanelServer:
         session.tell(f"{name} is loaded")
 
     def _feed(self, feed: float, axes: Iterable[str]) -> float:
-        """Return a feed, mm/min, no higher than the axes can do."""
+        """Return the feed, mm/min, limited to what these axes can do."""
         machine = self.session.target.machine
         rates = [getattr(machine.axes, axis).max_rate_mm_min for axis in axes]
         feed = min([feed, *(rate for rate in rates if rate is not None)])
@@ -494,7 +496,7 @@ class PanelServer:
         return feed
 
     def _jog(self, request: JogRequest) -> None:
-        """Jog, at no more than the axes can do."""
+        """Jog at the requested feed, limited to what the axes can do."""
         values = {axis: getattr(request, axis) for axis in AXES if getattr(request, axis)}
         values["feed"] = self._feed(request.feed, values)
         if request.held:
@@ -503,7 +505,7 @@ class PanelServer:
             self.session.order("jog", values)
 
     def _start(self, request: StartRequest) -> None:
-        """Send the program."""
+        """Start to send the program as requested."""
         if self.program is None:
             self.session.tell("no program was given: camtool panel PROGRAM", bad=True)
             return
@@ -526,7 +528,8 @@ class PanelServer:
 
 
 def _cycle_of(request: TouchRequest) -> Callable[[Place], probing.Measured]:
-    """Return the cycle of touches; OptionError for numbers and directions that make none."""
+    """Return the probing cycle of a request; OptionError for numbers and directions that give
+    none."""
     sizes = (
         request.reach,
         request.feed,

@@ -112,7 +112,8 @@ class StepRate:
         self._places: deque[tuple[float, Place]] = deque()
 
     def add(self, place_mm: Place, now: float) -> tuple[float, float]:
-        """Note a place; return the feed, mm/min, and the step rate of the fastest axis, Hz."""
+        """Record a place and the time; return the feed (mm/min) and the step rate of the fastest
+        axis (Hz) over the last `RATE_S`."""
         self._places.append((now, place_mm))
         while len(self._places) > 2 and now - self._places[1][0] > RATE_S / self._speed:
             self._places.popleft()
@@ -188,7 +189,7 @@ class Session:
         self._opens.set()
 
     def stop(self) -> None:
-        """Stop the machine. What is waiting to be done is forgotten."""
+        """Stop the machine and drop all waiting requests."""
         with suppress(queue.Empty):
             while True:
                 self._requests.get_nowait()
@@ -197,11 +198,12 @@ class Session:
         self._requests.put(Request.STOP)
 
     def request(self, request: Request) -> None:
-        """Pause, go on, or do a single block, of a program that runs."""
+        """Pause or resume the program that runs, or do a single block of it."""
         self._requests.put(request)
 
     def order(self, action: HandAction, values: Mapping[str, float]) -> None:
-        """Home, zero, jog or unlock. A jog that would leave the travel is refused."""
+        """Home, zero, jog or unlock. A jog that would leave the travel is refused with a message
+        to the user."""
 
         def begin(hand: Hand, now: float) -> None:
             if action == "jog":
@@ -211,8 +213,8 @@ class Session:
         self._by_hand(begin)
 
     def go(self, places: Mapping[str, float], feed: float) -> None:
-        """Go to a place of the work frame: up first, then across, then down. MachineError where
-        the place of the tool is not known."""
+        """Move to a place of the work frame: up first, then across, then down. MachineError if the
+        position of the tool is not known."""
         at = self.state.place_mm
         if at is None:
             raise MachineError("nobody knows where the tool stands", mend="home it or zero it")
@@ -226,7 +228,7 @@ class Session:
         self._legs = deque((leg, feed) for leg in legs)
 
     def go_home(self, feed: float) -> None:
-        """Go to machine zero, where homing has left it. MachineError where it was not homed."""
+        """Move to machine zero, where homing ends. MachineError if the machine was not homed."""
         at, machine_at, home = self.state.place_mm, self.state.machine_mm, self._home_mm
         if at is None or machine_at is None or home is None or not self.state.is_homed:
             raise MachineError("it was not homed from here", mend="home it")
@@ -234,15 +236,15 @@ class Session:
         self.go({axis: end + one - other for axis, one, other, end in columns}, feed)
 
     def touch(self, what: str, measure: Callable[[Place], Measured]) -> None:
-        """Touch a part or a plate, by a cycle of `camtool.toolpath.probing`; MachineError if the
+        """Touch a part or a plate by a cycle of `camtool.toolpath.probing`; MachineError if the
         machine is not ready."""
         self._check_ready()
         self._touch = what, measure
         self._by_hand(lambda hand, now: hand.close(now))
 
     def leave_stop(self) -> None:
-        """End a program that waits at a stop, so that the machine can be moved by hand, as to
-        touch off another tool; it goes on behind the stop."""
+        """End a program that waits at a stop, so that the machine can be moved by hand, for
+        example to touch off another tool. It can be resumed after the stop."""
         if not self.state.stops:
             self.tell("the program does not wait at a stop", bad=True)
             return
@@ -255,8 +257,8 @@ class Session:
         self._by_hand(lambda hand, now: hand.say(line, now))
 
     def hold(self, values: Mapping[str, float]) -> None:
-        """Move until `release`, until `keep` has not been called for `HELD_S`, or to the end of
-        the travel where that is known."""
+        """Jog until `release` is called, until `keep` has not been called for `HELD_S`, or to the
+        end of the travel if that is known."""
         self._held_until = time.monotonic() + HELD_S
 
         def begin(hand: Hand, now: float) -> None:
@@ -298,7 +300,8 @@ class Session:
                 )
 
     def _room(self, values: Mapping[str, float]) -> Mapping[str, float]:
-        """Return how far a held jog may go, mm; MachineError at the end of the travel."""
+        """Return how far (mm, by axis) a held jog may go; MachineError if an axis is at the end of
+        its travel."""
         ends, at = self.ends_mm, self._place_mm
         senses = [values.get(axis, 0.0) for axis in AXES]
         norm = math.hypot(*senses)
@@ -325,7 +328,7 @@ class Session:
         self._by_hand(lambda hand, now: hand.release(now))
 
     def override(self, name: Override, percent: int) -> None:
-        """Change an override, by hand or in a program."""
+        """Set an override in percent, between programs or during one."""
         self._requests.put(lambda talk, now: talk.override(name, percent, now))
 
     def run_program(self, one: Consignment, options: SendOptions) -> None:
@@ -351,7 +354,7 @@ class Session:
             )
 
     def tell(self, text: str, *, bad: bool = False) -> None:
-        """Add a message."""
+        """Add a message for the user."""
         self._count += 1
         self.messages.append(Message(self._count, text, bad))
         self.watch()
@@ -386,11 +389,12 @@ class Session:
             self._set(MachineState(why=self.state.why, change_first=self._change_first))
 
     def _forget_place(self) -> None:
-        """The machine position is not known any more: it may have been switched off."""
+        """Mark the machine position as unknown, since the machine may have been switched off."""
         self._is_homed, self._machine_mm = False, None
 
     def _converse(self, line: LineToController) -> None:
-        """Hold conversations until the line is to be closed or nobody can speak to the machine."""
+        """Hold conversations one after another, until the line is to be closed or no conversation
+        is possible any more."""
         while not self._closing.is_set():
             following, self._next = self._next, None
             if following is not None:
@@ -427,7 +431,7 @@ class Session:
         what: str,
         measure: Callable[[Place], Measured],
     ) -> None:
-        """Carry out a cycle of touches, and tell what it has measured."""
+        """Run a cycle of touches, and report to the user what it measured."""
         measured: dict[str, float] = {}
 
         def cycle(start: Place) -> ProbeScript:
@@ -496,7 +500,8 @@ class Session:
         return None
 
     def _next_leg(self) -> Order | None:
-        """Return the order of the next leg of the way to a place."""
+        """Return the order for the next leg of the way to a place. None if there is nothing to
+        move, or if the last leg did not arrive: then the way ends there with a message."""
         at = self.state.place_mm
         (goal, feed), before = self._legs.popleft(), self._leg
         arrived = at is not None and all(
@@ -579,8 +584,8 @@ class Session:
         )
 
     def _speeds(self, talk: Conversation, facts: BlockFacts) -> tuple[float | None, float | None]:
-        """Return the feed, mm/min, and the step rate, Hz: as counted, or else by the feed that is
-        reported or programmed; None for what is not known, as that of a rapid."""
+        """Return the feed (mm/min) and the step rate (Hz): as counted, or from the reported or
+        programmed feed; None where unknown, as for a rapid."""
         if talk.counts_steps and talk.place_mm is not None:
             return self._rate.add(talk.place_mm, time.monotonic())
         moves = talk.state in (WireState.SENDING, WireState.PAUSING, WireState.STOPPING)
@@ -597,7 +602,7 @@ class Session:
 
 
 def _close(talk: Conversation, now: float) -> None:
-    """End a conversation: a hand that is ready, or a machine that is to be stopped."""
+    """End a conversation: leave a hand that is ready, stop a machine otherwise."""
     if isinstance(talk, Hand):
         talk.close(now)
     else:

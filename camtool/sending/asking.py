@@ -21,8 +21,9 @@ MAX_HEARD = 400
 
 
 class Answer(Struct, frozen=True):
-    """An answer at a port: the rate, None where it has none; the bytes that were sent, in hex; the
-    text that was heard; and the controller that says such, "" for another."""
+    """The answer at a port: its baud rate (None if it has none), the bytes that were sent
+    (hexadecimal), the text that was received, and the controller that answers so ("" if unknown).
+    """
 
     baud: int | None
     sent: str
@@ -31,8 +32,8 @@ class Answer(Struct, frozen=True):
 
 
 def questions(port: str, wires: Iterable[Wire]) -> Iterator[tuple[Wire, Port]]:
-    """Yield the wires that may be asked at a port, and the port with their settings: of a serial
-    port those whose rate is known, of a socket all."""
+    """Yield (wire, port with the wire's settings) for each wire that may be tried at a port: for a
+    serial port the wires with a known rate, for a socket all."""
     for wire in wires:
         settings = Port(port, wire.baud, wire.frame)
         if wire.question and (wire.baud is not None or "://" in port):
@@ -40,7 +41,7 @@ def questions(port: str, wires: Iterable[Wire]) -> Iterator[tuple[Wire, Port]]:
 
 
 def ask(port: Port, wire: Wire) -> Answer:
-    """Send a wire's question to a port until it is answered, and return what was heard. InputError
+    """Send a wire's question to a port until it is answered; return what was received. InputError
     for a port that cannot be opened or read."""
     sent, heard, controller = bytearray(), b"", ""
     with opened_line(port) as line:

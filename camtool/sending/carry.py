@@ -66,8 +66,8 @@ class SentProgram(Struct, frozen=True, eq=False):
 def program_conversation(
     one: Consignment, target: LoadedTarget, port: Port, options: SendOptions
 ) -> Conversation:
-    """Return the conversation that sends a program. The user has been asked for what its first
-    packet needs."""
+    """Return the conversation that sends a program. The user must already have been asked for what
+    its first packet needs."""
     manner = manner_of(
         target,
         single=options.single,
@@ -96,7 +96,7 @@ def carry_program(
     watch: Callable[[Conversation], None],
     tell: Callable[[str], None],
 ) -> SentProgram:
-    """Send a program to its end, and keep its journal."""
+    """Send a program to its end, write its journal, and return the outcome."""
     head: dict[str, Any] = {
         "program": one.run.source,
         "sha256": one.sha256,

@@ -93,7 +93,7 @@ class Driver:
         return time.monotonic() * self.speed
 
     def carry(self, conversation: Conversation) -> WireState:
-        """Hold the conversation and return the state in which it ended."""
+        """Hold the conversation to its end; return the state in which it ended."""
         conversation.begin(self.now())
         is_running = True
         while is_running:
@@ -118,7 +118,7 @@ class Driver:
         return conversation.state
 
     def _act(self, conversation: Conversation) -> bool:
-        """Perform the actions of the conversation; return False at its end."""
+        """Perform the pending actions of the conversation; return False at its end."""
         actions = conversation.actions()
         for action in actions:
             if isinstance(action, Tell):
@@ -137,7 +137,8 @@ class Driver:
         return not conversation.is_over or conversation.has_actions
 
     def _reopen(self, conversation: Conversation) -> None:
-        """Reopen the port as soon as it exists again, unless the user stops meanwhile."""
+        """Reopen the port as soon as it exists again, unless the user stops the machine
+        meanwhile."""
         end = time.monotonic() + REOPEN_S
         while not conversation.is_over:
             try:
@@ -150,8 +151,8 @@ class Driver:
                 return
 
     def _show(self, conversation: Conversation, show: Callable[[Any], None], value: Any) -> None:
-        """Show a value to the user. If that fails, nobody watches the machine, and it is
-        stopped."""
+        """Show a value to the user. If that fails, the machine is stopped, since nobody watches
+        it."""
         if not self._has_display:
             return
         try:

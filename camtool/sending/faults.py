@@ -86,7 +86,7 @@ class FaultyLine:
         self._free_s = 0.0  # when the last byte will have come
 
     def put(self, data: bytes, now: float) -> None:
-        """Send bytes; those after the plug was pulled are lost."""
+        """Send bytes; after the plug was pulled they are lost."""
         faults, random = self.faults, self._random
         if not data:
             return
@@ -140,7 +140,7 @@ class WiredTwin:
         self.back = FaultyLine(faults_back, Random(f"{seed} back"), byte_s)
 
     def connect(self, now: float) -> None:
-        """Open the line."""
+        """Open the line, which resets some controllers."""
         self._run(now)
         self.back.put(self.twin.connect(now), now)
 
@@ -156,13 +156,14 @@ class WiredTwin:
         return self.back.take(now)
 
     def next_s(self) -> float | None:
-        """Return the time of the next event that happens by itself; None if there is none."""
+        """Return the time of the next event (bytes that arrive, an answer of the twin); None if
+        there is none."""
         times = self.there.next_s(), self.back.next_s(), self.twin.next_s()
         return min((time_s for time_s in times if time_s is not None), default=None)
 
     def wake_s(self) -> float | None:
-        """Return the time of the next event except outputs within a travel: a clock without real
-        time jumps to it."""
+        """Return the time of the next event, not counting outputs during a move; a clock without
+        real time jumps to it. None if there is none."""
         times = self.there.next_s(), self.back.next_s(), self.twin.wake_s()
         return min((time_s for time_s in times if time_s is not None), default=None)
 

@@ -82,8 +82,8 @@ class Journal:
         self._add(self._head, sync=True)
 
     def note(self, place: Point | None = None, **counts: Any) -> None:
-        """Write these counts with the place of the tool, if they differ from the last ones;
-        nothing is written before something is sent."""
+        """Write these counts and the place of the tool as a line, if they differ from the last
+        ones. Nothing is written before something is sent."""
         if counts == self._last or not counts.get("sent"):
             return
         self._last = counts
@@ -95,15 +95,15 @@ class Journal:
         self._add(line, sync=time_s - self._synced >= SYNC_S)
 
     def _begin_anew(self) -> None:
-        """Remove the lines of an earlier program."""
+        """Remove the lines of an earlier program from the file."""
         with suppress(OSError):  # what is no file has nothing to drop
             os.lseek(self._handle, 0, os.SEEK_SET)
             os.ftruncate(self._handle, 0)
         self._add(self._head, sync=False)
 
     def close(self, end: str, reason: str, *, is_still: bool = False, **counts: Any) -> None:
-        """Write the end and its counts; `is_still`: the machine is known to stand at the place in
-        them."""
+        """Write the last line: how sending ended, and the counts. `is_still`: the machine is known
+        to stand at the place in them."""
         seconds = round(time.monotonic() - self._begun, 3)
         try:
             line = {"s": seconds, "end": end, "why": reason, **counts, "still": is_still}
@@ -112,7 +112,7 @@ class Journal:
             os.close(self._handle)
 
     def _end_line(self) -> None:
-        """Go to the end, and complete a line that was cut short by a crash."""
+        """Seek to the end of the file, and complete a line that a crash cut short."""
         if os.lseek(self._handle, 0, os.SEEK_END):
             os.lseek(self._handle, -1, os.SEEK_END)
             if os.read(self._handle, 1) != b"\n":
@@ -155,7 +155,7 @@ class _Line(msgspec.Struct):
 
 
 def read_journal(file: Path) -> JournalState:
-    """Read the state in a journal; InputError for a file that is none."""
+    """Return the state in a journal; InputError for a file that is no journal."""
     if file.exists() and not file.is_file():
         raise InputError("is no file that could hold a journal", file=str(file))
     try:
@@ -198,8 +198,8 @@ def read_journal(file: Path) -> JournalState:
 
 
 def _head(row: bytes) -> _Head | None:
-    """Parse the first line of a journal, None for another; InputError for one of another
-    camtool."""
+    """Parse the first line of a journal; None if it is another kind of line, InputError if it is
+    from another version of camtool."""
     try:
         head = msgspec.json.decode(row, type=_Head)
     except msgspec.DecodeError:

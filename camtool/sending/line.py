@@ -178,8 +178,8 @@ def wire_of(target: LoadedTarget) -> Wire:
 
 
 def manner_of(target: LoadedTarget, **choices: Any) -> Manner:
-    """Return the settings of a conversation; MachineError for those that the controller has no
-    command for."""
+    """Return the settings of a conversation with the target's controller; MachineError for choices
+    that the controller has no command for."""
     if choices.get("unlock") and not wire_of(target).unlocks:
         raise MachineError(
             f"{target.machine.target.name} has no command to unlock over its line",

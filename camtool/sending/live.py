@@ -67,7 +67,7 @@ class LivePage:
         self._moves = moves
 
     def _feed_at(self, row: int) -> str:
-        """Return the feed of the last move up to this row, "" without one."""
+        """Return the feed of the last feed move up to this row as text, "" if there is none."""
         index = int(np.searchsorted(self._moves, row, side="right")) - 1
         feed = float(self._feeds[index]) if index >= 0 else math.nan
         return "rapid" if feed == math.inf else f"{feed:g} mm/min" if feed == feed else ""
@@ -108,7 +108,7 @@ class LivePage:
         return self._before + shown + self._after
 
     def write(self, page: str) -> None:
-        """Replace the page at once; OSError when it cannot be written."""
+        """Replace the page's file atomically; OSError if it cannot be written."""
         new = self.file.with_name(f".{self.file.name}.new")
         new.write_text(page, encoding="utf-8")
         new.replace(self.file)

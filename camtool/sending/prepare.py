@@ -51,9 +51,9 @@ HEAD_BYTES = 4096
 
 
 class Rest(Struct, frozen=True, eq=False):
-    """A program from its block `first` on: `data`, whose first `entry` blocks bring the machine
-    there; `done` (B,): for each of its blocks, the last block of the program that is done with it,
-    −1 within the entry."""
+    """The rest of a program, from its block `first` on. `data`: its bytes, of which the first
+    `entry` blocks bring the machine to where that block begins; `done` (B,): for each block of
+    `data`, the last block of the original program that is done with it, −1 within the entry."""
 
     data: bytes
     first: int
@@ -94,7 +94,8 @@ class Consignment(Struct, frozen=True, eq=False):
         return float(sum(packet.seconds for packet in self.packets))
 
     def times_left_s(self) -> list[float]:
-        """Return the times (P + 1), s, that remain when 0, 1, … P packets are acknowledged."""
+        """Return (P + 1) times, s: how long sending still takes when 0, 1, … P packets are
+        acknowledged."""
         seconds = [packet.seconds for packet in reversed(self.packets)]
         return list(accumulate(seconds, initial=0.0))[::-1]
 
@@ -106,7 +107,7 @@ class Consignment(Struct, frozen=True, eq=False):
 
     def place_of(self, conversation: Conversation) -> Place | None:
         """Return the place that the machine reports, or else the end of the last block that is
-        done, in the work frame in which the program begins."""
+        done, mm in the program's work frame; None if neither is known."""
         if self.wire.place == "told":
             return conversation.at_mm
         path = self.forecast.decoded
@@ -136,8 +137,8 @@ class Consignment(Struct, frozen=True, eq=False):
 
 
 def check_settings(data: bytes, target: LoadedTarget, file: str) -> None:
-    """Raise ProgramError for a program that names other values of the machine than its file
-    has."""
+    """Raise ProgramError for a program made with other values of the machine than its file has
+    now."""
     match = _SETTINGS.search(data[:HEAD_BYTES])
     if match is None or match[1].decode() == target.machine.short_digest:
         return
@@ -160,10 +161,10 @@ def consignment(
     despite_errors: bool = False,
     progress: Progress | None = None,
 ) -> Consignment:
-    """Verify a program and cut it into packets; with `first` (a block, from 0) its rest from there
-    on. `state`: the state in its journal; `tool_at`: the place of the tool as the user gives it.
-    A program with errors has no packets, unless `despite_errors`. Raises ProgramError for one that
-    cannot be read, or that is another machine's."""
+    """Verify a program and divide it into packets; with `first` (a block, from 0), only its rest
+    from there on. `state`: the state in its journal; `tool_at`: where the user says that the tool
+    is. A program with errors has no packets, unless `despite_errors`. Raises ProgramError for a
+    program that cannot be read, or that belongs to another machine."""
     wire = wire_of(target)
     check_settings(data, target, source)
     judging = Judging(keep_ledger=True)
@@ -200,8 +201,8 @@ def consignment(
 
 
 def _resume_point(state: JournalState, decoded: Toolpath, tool_at: ToolAt) -> ResumePoint:
-    """Return the point at which the program was left; if it was not stopped, some of the sent
-    blocks are done."""
+    """Return the point from which the program resumes. If it was not stopped in an orderly way, an
+    unknown number of the sent blocks is done."""
     under_way = (decoded.block >= state.block - 1) & (decoded.block <= state.last)
     return ResumePoint(state.tool_mm, state.is_still, decoded.end[under_way], tool_at)
 
@@ -217,9 +218,9 @@ def _shift(path: Toolpath, by_mm: Floats) -> Toolpath:
 
 
 def tool_at_of(wire: Wire, state: JournalState, answer: ToolAt, name: str) -> tuple[ToolAt, str]:
-    """Decide where the tool is when a program resumes: as the user gave it, or as it follows from
-    the journal; and the question to ask the user, "" for none. Raises MachineError and OptionError
-    for answers that the controller or the journal does not allow."""
+    """Return where the tool is when a program resumes, as the user said or as follows from the
+    journal, and the question to ask the user ("" for none). MachineError and OptionError for
+    answers that the controller or the journal does not allow."""
     place = f"--tool-at {answer}" if answer else "--tool-at"
     if wire.place == "homed":
         if answer:
@@ -273,7 +274,7 @@ def _no_forecast(run: Run) -> Forecast:
 
 
 def forecast_of_run(run: Run) -> Forecast:
-    """Return the forecast of each block of a program that was judged with `keep_ledger`."""
+    """Return the forecast (time of each block) of a program that was judged with `keep_ledger`."""
     assert run.decoded is not None
     assert run.verification is not None
     books = run.verification.rows.books
@@ -282,7 +283,7 @@ def forecast_of_run(run: Run) -> Forecast:
 
 
 def forecast_of(decoded: Toolpath, target: LoadedTarget) -> Forecast:
-    """Simulate moves that are not judged, and return the forecast of each of their blocks."""
+    """Simulate moves without judging them; return the forecast of each block."""
     count = len(decoded)
     ledger, samples = still_ledger(np.arange(count)), np.zeros(count, dtype=np.int64)
     for chunk in target.simulate(decoded, Options()):
@@ -292,8 +293,8 @@ def forecast_of(decoded: Toolpath, target: LoadedTarget) -> Forecast:
 
 
 def _forecast(decoded: Toolpath, ledger: Ledger, samples: Ints) -> Forecast:
-    """Sum up the ledger and the samples (N,) of each row by blocks; those behind the end of the
-    program take no time."""
+    """Return the forecast by blocks, from the ledger and the samples (N,) of each row; blocks
+    after the end of the program take no time."""
     blocks = int(decoded.block.max(initial=-1)) + 1
     seconds, compensation = np.zeros(blocks), np.zeros(blocks)
     outputs = np.zeros(blocks, dtype=np.int64)
@@ -320,12 +321,12 @@ def rest_of(
     *,
     begin_mm: Place | None = None,
 ) -> Rest:
-    """Write the rest of a program from a block (from 0) on, after an entry, which is the target's
-    own where it has one. `data`: the program, if it is at hand.
+    """Write the rest of a program from block `first` (from 0) on, with an entry before it; a
+    target may have its own function for that. `data`: the program, if at hand.
 
-    It begins as the program does, at part zero, or at `begin_mm` if part zero is known: up; tool,
-    spindle and coolant as they are at the block; across above the place; down to it at the plunge
-    feed. Then the same moves follow, which are read back and compared. Raises OptionError for a
+    It begins like the program, at part zero, or at `begin_mm` if part zero is known: up; tool,
+    spindle and coolant as they are at the block; across to above the place; down to it at the
+    plunge feed. Then the same moves follow, which are read back and compared. OptionError for a
     block that does not exist, and for one after which nothing moves.
     """
     rows = np.flatnonzero(decoded.block >= first)
@@ -369,8 +370,8 @@ def rest_of(
 def _write_rest(
     decoded: Toolpath, low: int, high: int, target: LoadedTarget, begin_mm: Place | None
 ) -> tuple[bytes, Toolpath]:
-    """Write the program of an entry and of the rows from `low` to `high`; return its bytes and the
-    toolpath that is read back from them."""
+    """Write a program of the entry and the rows `low` to `high`; return its bytes and the toolpath
+    read back from them."""
     entry = _entry(decoded, low, target, begin_mm)
     count = len(entry)
     columns: dict[str, Any] = {
@@ -395,8 +396,8 @@ def _has_moves(path: Toolpath) -> bool:
 
 
 def _entry(decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | None) -> Toolpath:
-    """Build the moves and events that bring the machine from the beginning of the program, or from
-    `begin_mm`, to the start of row `low`."""
+    """Return the moves and events that bring the machine from the beginning of the program, or
+    from `begin_mm`, to the start of row `low`."""
     machine = target.machine
     x, y, z = decoded.starts_of(np.array([low]))[0].tolist()
     before = decoded.part(0, low)
@@ -440,8 +441,8 @@ def _entry(decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | 
 
 
 def _plunge_feed(decoded: Toolpath, low: int, target: LoadedTarget) -> float:
-    """Return the feed, mm/min, of the last plunge before the row, else of the first one, else the
-    machine's."""
+    """Return the feed (mm/min) of the last plunge before the row, else of the first plunge, else
+    the machine's plunge feed."""
     machine = target.machine
     drops = (decoded.kind == Kind.LINE) & (decoded.end[:, 2] < decoded.starts[:, 2])
     plunges = np.flatnonzero(drops)
@@ -495,8 +496,8 @@ class _MovePairs:
         return end
 
     def _begin(self, row: Ints, end: int) -> int | None:
-        """Return the first of the rows, up to and including `end`, that make up a wanted move;
-        None if they do not."""
+        """Return the index of the first row that, together with the rows up to `end`, makes up a
+        wanted move; None if they do not."""
         part = np.array([end])
         if self._are_equal(row, part).all():
             return end
@@ -511,7 +512,7 @@ class _MovePairs:
         return None
 
     def _is_negligible(self, path: Toolpath, starts: Floats, row: Ints) -> bool:
-        """Return True if a row is no move, or one shorter than the resolution of the dialect."""
+        """Return True if a row does not move, or moves less than the resolution of the dialect."""
         if path.is_arc[row].any():
             return False
         return not path.is_motion[row].any() or bool(
@@ -519,12 +520,12 @@ class _MovePairs:
         )
 
     def _are_near(self, ones: Floats, other_points: Floats) -> Bools:
-        """Return the mask (K,) of the points (K, 3) that are within the resolution of each
+        """Return the mask (K,) of pairs of points (K, 3) that are within the resolution of each
         other."""
         return np.asarray((np.abs(ones - other_points) <= self._slack).all(axis=1))
 
     def _are_equal(self, rows: Ints, other_rows: Ints) -> Bools:
-        """Return the mask (K,) of equal moves."""
+        """Return the mask (K,) of pairs of rows whose moves are equal within the resolution."""
         wanted_path, reread = self._wanted, self._again
         deviations = np.nan_to_num(
             np.abs(wanted_path.centre[rows] - reread.centre[other_rows])
@@ -561,7 +562,7 @@ class _MovePairs:
 
 
 def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]]:
-    """Return the lines of a dry run: (name, text)."""
+    """Return the lines of a dry run as (name, text) pairs."""
     machine, run = target.machine, one.run
     decoded = one.forecast.decoded
     low_high = toolpath_extents(decoded.first(decoded.executed_rows))
@@ -598,7 +599,7 @@ def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]
 
 
 def _begin_words(one: Consignment) -> str:
-    """Describe where the tool must stand when the program begins or resumes."""
+    """Return a sentence on where the tool must stand when the program begins or resumes."""
     resume_point, is_told = one.standing, one.wire.place == "told"
     tool_at = "zero" if resume_point is None else resume_point.tool_at
     if tool_at == "zero":

@@ -83,7 +83,7 @@ class PseudoTerminal:
         return self._master
 
     def hang_up(self) -> None:
-        """Do nothing: the client has closed it."""
+        """Do nothing: the client itself has closed the terminal."""
 
     def close(self) -> None:
         """Close the terminal; a client that has it open reads its end."""
@@ -148,7 +148,8 @@ class Clock:
         return min(max((event_s - self.now()) / self.speed, 0.0), POLL_S)
 
     def skip_to(self, event_s: float | None) -> None:
-        """Advance a clock without real time to `event_s`, since no client has sent anything."""
+        """Advance a clock without real time to `event_s`; called when no client has sent
+        anything."""
         if self.speed is None and event_s is not None:
             self._now = max(self._now, event_s)
 

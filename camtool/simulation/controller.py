@@ -26,11 +26,11 @@ class FusedRun(Protocol):
 
     @property
     def rows(self) -> int:
-        """Number of rows."""
+        """Return the number of rows."""
 
     def judge(self, low: int, high: int, task: Any, sums: Any) -> Ledger:
-        """Run the rows low:high, which follow those of the last call, and judge them with the task
-        and sums of `camtool.kernels.judging`."""
+        """Simulate and judge the rows low:high, which follow those of the last call; their figures
+        are added to `sums` in place (`camtool.kernels.judging`). Return the ledger of the rows."""
 
 
 class ControllerModel(ABC, Generic[ControllerT, DialectT]):
@@ -41,15 +41,16 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
     is up to 41 % off; 16 are at most 3 %. 1 where samples are positions of a smooth motion."""
 
     def speed_period_s(self, machine: Machine[ControllerT, DialectT]) -> float:
-        """Return the time (s) over which a speed is measured at least; 0 where samples count."""
+        """Return the shortest time (s) over which a speed is averaged; 0 if the speed between two
+        samples is meaningful."""
         return 0.0
 
     @abstractmethod
     def run(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> Iterator[Chunk]:
-        """Yield the motion in chunks, up to the end of the program. Raises MachineError, and
-        ProgramError, which names the block (some only when that row is run)."""
+        """Yield the motion in chunks, up to the end of the program. MachineError, and ProgramError
+        with the block (for some faults only when that row is run)."""
 
     def timed(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
@@ -60,22 +61,22 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
             yield clock.timed(chunk)
 
     def clock(self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]) -> SampleClock:
-        """Return the clock of the samples; by default those of a row within a chunk share its time
-        equally."""
+        """Return the clock that times the samples; by default the samples of a row within a chunk
+        share its time equally."""
         return SampleClock(self.quantised(toolpath, machine), machine)
 
     @abstractmethod
     def interpolation(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> str:
-        """Return a word for the report: the interpolation of lines and arcs, such as "dsm" or
-        "path"."""
+        """Return a word for the report that names how lines and arcs are interpolated, such as
+        "dsm" or "path"."""
 
     def quantised(self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]) -> Toolpath:
-        """Return the moves as the controller rounds them before it interpolates, row by row: the
+        """Return the moves as the controller rounds them before interpolation, row by row; the
         error of interpolation is measured from these. ProgramError for rows that it cannot follow.
 
-        By default: as they are read, without rounding, and with homing at machine zero.
+        By default nothing is rounded, and homing ends at machine zero.
         """
         check_positions(toolpath, machine)
         return with_event_positions(
@@ -90,14 +91,14 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
     def seconds(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]
     ) -> Floats | None:
-        """Return (N,) s that each row takes, without its motion; None for a model that knows them
-        by that alone. Raises as `run`."""
+        """Return (N,) s that each row takes, computed without simulating the motion; None for a
+        model that cannot. Raises as `run`."""
         return None
 
     def assumptions(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]
     ) -> tuple[str, ...]:
-        """Return the assumptions of times and figures, a short sentence each."""
+        """Return the assumptions behind times and figures, one short sentence each."""
         return ()
 
     def findings(
@@ -109,6 +110,6 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
     def fused_run(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> FusedRun | None:
-        """Return the motion of `run`, judged as it is simulated; None for a model that makes
-        chunks."""
+        """Return the motion of `run` in a form that is judged while it is simulated (faster); None
+        for a model that only makes chunks."""
         return None

@@ -64,8 +64,8 @@ class LegRun:
             yield Chunk(np.empty(0, dtype=np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
 
     def fused_run(self, blocks: Iterator[Legs]) -> LineRun | None:
-        """Return the lines of all legs, judged as they are; None where the mechanics differ from
-        place to place."""
+        """Return all legs as lines that are judged in closed form, without chunks; None where
+        backlash differs from place to place or scatters."""
         if not self._mechanics.even:
             return None
         standing = self._standing
@@ -79,8 +79,8 @@ class LegRun:
         )
 
     def _lines(self, blocks: Iterator[Legs]) -> Iterator[LineRows]:
-        """Yield the legs as lines, whole rows at a time: the last row of a block may go on in the
-        next one."""
+        """Yield the legs as lines in groups of whole rows; the last row of a block may continue in
+        the next one."""
         low, pending = 0, Legs(_NO_STEPS[:, 0], _NO_STEPS, np.zeros(0))
         for legs in blocks:
             row = np.concatenate([pending.row, legs.row])
@@ -102,7 +102,7 @@ class LegRun:
         return LineRows(low, high, seconds, legs.row, start, np.ascontiguousarray(legs.steps))
 
     def _still(self, rows: Ints) -> Ledger:
-        """Return a ledger of rows without motion."""
+        """Return a ledger for rows without motion: only their waits."""
         ledger = still_ledger(rows)
         ledger.duration_s[:] = self._standing.waits[rows]
         return ledger
@@ -155,11 +155,13 @@ class _Share:
         """(J,) passes of each leg within the window."""
 
     def part(self, seconds: Floats) -> Floats:
-        """Return (J,) s within the window, from the `seconds` (L,) of all legs."""
+        """Return the seconds (J,) of each leg that fall within the window, given those of all legs
+        (L,)."""
         return np.asarray(seconds[self.legs] * (self.passes / self._whole))
 
     def steps(self, steps: Ints) -> Ints:
-        """Return (J, 3) steps within the window, from those of all legs (L, 3); see the kernel."""
+        """Return the steps (J, 3) of each leg within the window, given those of all legs
+        (L, 3)."""
         size, leg_sizes = np.abs(steps[self.legs]), self._whole[:, None]
         return np.asarray(
             self._to[:, None] * size // leg_sizes - self._from[:, None] * size // leg_sizes
@@ -174,12 +176,12 @@ of another must fit 64 bits."""
 
 
 def coded_steps_mm(machine: Machine) -> Floats:
-    """Return (3,) mm: the step of each axis as the controller assumes it."""
+    """Return (3,) mm: the coded step of each axis, which the controller assumes."""
     return np.array([axis.coded_step_mm for axis in machine.axes])
 
 
 def check_rows(toolpath: Toolpath, machine: Machine) -> None:
-    """Raise ProgramError, which names the block, for rows that a controller without homing cannot
+    """Raise ProgramError, with the block, for rows that a controller without homing cannot
     follow."""
     kind, step_mm = toolpath.kind, coded_steps_mm(machine)
     with np.errstate(invalid="ignore"):
@@ -215,7 +217,8 @@ def check_rows(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def waits_s(toolpath: Toolpath, rows: int) -> Floats:
-    """Return (rows,) s: the dwell of each row; one number, seen as many, where nothing dwells."""
+    """Return (rows,) s: the dwell of each row. Without dwells it is a single 0 broadcast to all
+    rows."""
     dwells = toolpath.kind[:rows] == Kind.DWELL
     if not dwells.any():
         return np.broadcast_to(0.0, rows)

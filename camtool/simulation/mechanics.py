@@ -119,8 +119,8 @@ class Mechanics:
         self.axes[axis, 3] = steps * self._coded_mm[axis]
 
     def place(self, position_mm: Floats) -> None:
-        """Set the position of the controller to `position_mm` (3,) without a reversal: after an
-        arc that was left at its nearest approach."""
+        """Set the position of the controller to `position_mm` (3,) without counting a reversal, as
+        after an arc that was left at its nearest approach to the end."""
         self.states[:, 0] = position_mm
 
 
@@ -129,7 +129,8 @@ def _backlash_mm(axis: Axis, effects: Effects) -> float:
 
 
 def _varied(machine: Machine, effects: Effects, shares: Floats) -> _Varied | None:
-    """Return the further arguments of `play_varied_fill`; None where `play_fill` is enough."""
+    """Return the additional arguments of `play_varied_fill` (backlash by region, scatter); None
+    where `play_fill` is enough."""
     axes = list(machine.axes)
     cells = machine.play_map.used if effects.play else (None, None, None)
     scatter = [axis.repeatability_mm if effects.repeatability else 0.0 for axis in axes]

@@ -32,7 +32,8 @@ class Ledger(Struct, frozen=True, eq=False):
     ended: Bools
 
     def add(self, other: Ledger) -> None:
-        """Add the ledger of a chunk, with each row at most once, to this one of all rows."""
+        """Add the ledger of a chunk to this ledger of all rows, in place; each row may occur at
+        most once in the chunk."""
         rows = other.row
         self.duration_s[rows] += other.duration_s
         self.compensation_s[rows] += other.compensation_s
@@ -43,7 +44,7 @@ class Ledger(Struct, frozen=True, eq=False):
 
 
 def still_ledger(rows: Ints) -> Ledger:
-    """Return the ledger of rows (R,) without motion; its columns may be written to."""
+    """Return a ledger of zeros for rows (R,) without motion; its columns may be written to."""
     count = len(rows)
     return Ledger(
         row=rows,

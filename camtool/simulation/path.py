@@ -74,16 +74,16 @@ class PathModel(SampledModel[PathController, Any]):
         return round_to_steps(toolpath, machine)
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
-        """Return a coded step, or more where the program would have more than `MAX_SAMPLES`
-        samples."""
+        """Return the distance of samples, mm: a coded step, or more if the program would have more
+        than `MAX_SAMPLES` samples."""
         return sample_spacing_mm(toolpath, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Return "path": nothing is interpolated."""
+        """Return "path": lines and arcs are followed exactly, without interpolation."""
         return "path"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """Return the assumptions of the times, a sentence each."""
+        """Return the assumptions behind the times, one sentence each."""
         return (
             "the controller follows every line and arc exactly",
             "speeds change at once: there is no acceleration, and compensation takes no time",
@@ -143,8 +143,8 @@ def round_to_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
 
 
 def _centre_arcs(path: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:
-    """Move the centres of the rows `arcs` (J,), which turn by `sweep` (J,) rad, to the same
-    distance from their rounded ends and starts.
+    """Return the path with the centres of the rows `arcs` (J,), which turn by `sweep` (J,) rad,
+    moved to the same distance from their rounded starts and ends.
 
     With the direction u and the midpoint m of the chord, the nearest such point to the centre c is
     c − ((c − m)·u) u. Its distance from c is the difference of the radii times radius / chord. An
@@ -168,8 +168,8 @@ def _centre_arcs(path: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) ->
 
 
 def _restore_turned_arcs(rounded: Toolpath, inside_out: Ints, is_small: Bools) -> Toolpath:
-    """Replace arcs that rounding has turned inside out: `is_small` ones (J,) by lines, the others
-    by full circles."""
+    """Return the path with the arcs that rounding has turned inside out replaced: `is_small` ones
+    (J,) by lines, the others by full circles."""
     lines, circles = inside_out[is_small], inside_out[~is_small]
     end, kind, centre = rounded.end.copy(), rounded.kind.copy(), rounded.centre.copy()
     end[circles, :2] = rounded.starts_of(circles)[:, :2]

@@ -51,7 +51,7 @@ class Pulses(Struct, frozen=True, eq=False):
 
     @classmethod
     def none(cls, motors: int) -> Pulses:
-        """Return no pulses of so many motors."""
+        """Return an empty record for this number of motors."""
         return cls(
             np.zeros(0),
             np.zeros((0, motors), dtype=np.int64),
@@ -82,7 +82,8 @@ def row_pulses(chunks: Iterable[Chunk], clock: SampleClock, path: Toolpath) -> I
 
 
 def _added_pulses(pulses: Pulses, counts: Ints, signs: Ints, each_s: Floats) -> list[Pulses]:
-    """Return the `counts` (K, 3) steps that come right before each pulse, of X, then Y, then Z."""
+    """Return the compensation pulses `counts` (K, 3) that come immediately before each pulse,
+    those of X first, then Y, then Z."""
     parts = []
     remaining = counts.sum(axis=1)
     for motor in range(counts.shape[1]):
@@ -101,7 +102,8 @@ def _added_pulses(pulses: Pulses, counts: Ints, signs: Ints, each_s: Floats) -> 
 
 
 def in_order(parts: list[Pulses], until_s: float) -> Pulses:
-    """Concatenate pulses and sort them by time; those of equal time keep the order of `parts`."""
+    """Return the pulses of all parts, sorted by time; those of equal time keep the order of
+    `parts`."""
     at_s = np.concatenate([part.at_s for part in parts])
     order = np.argsort(at_s, kind="stable")
     return Pulses(

@@ -17,8 +17,8 @@ are exact in a float."""
 
 
 def with_event_positions(toolpath: Toolpath, home: Floats) -> Toolpath:
-    """Return the toolpath with events at the ends of the moves before them, and homing at `home`
-    (3,) mm; the very toolpath where they are there."""
+    """Return the toolpath with each event at the end of the move before it, and homing at `home`
+    (3,) mm; the same object if nothing changes."""
     kind, count = toolpath.kind, len(toolpath)
     events = np.flatnonzero(~toolpath.is_motion)
     homes = np.isin(kind[events], (Kind.HOME_XY, Kind.HOME_Z)).any()
@@ -34,8 +34,8 @@ def with_event_positions(toolpath: Toolpath, home: Floats) -> Toolpath:
 
 
 def with_ends(toolpath: Toolpath, start: Floats, end: Floats) -> Toolpath:
-    """Return the toolpath with this start (3,) and these ends (N, 3) mm; the very toolpath where
-    they are its own."""
+    """Return the toolpath with this start (3,) and these ends (N, 3), mm; the same object if
+    nothing changes."""
     if (start == toolpath.start).all() and (end == toolpath.end).all():
         return toolpath
     return replace(toolpath, start=start, end=read_only(end))
@@ -75,15 +75,15 @@ def check_rows(path: Toolpath, rows: int) -> None:
 
 
 def refuse(toolpath: Toolpath, is_bad: npt.ArrayLike, message: str, mend: str = "") -> None:
-    """Raise ProgramError for the first row that is `is_bad` (N,), if there is one."""
+    """Raise ProgramError with this message for the first row in the mask `is_bad` (N,), if any."""
     rows = np.flatnonzero(is_bad)
     if len(rows):
         raise ProgramError(message, where=block_of(toolpath, int(rows[0])), mend=mend)
 
 
 def block_of(toolpath: Toolpath, row: int) -> str:
-    """Return the block (from 1) from which a row was read, and what called it; the row where none
-    was read."""
+    """Return text that names the block (from 1) from which a row was read, and what called it; the
+    row if it has no block."""
     block, caller = int(toolpath.block[row]), toolpath.text(row)
     if block < 0:
         return f"move {row}"

@@ -61,14 +61,14 @@ class SampleSource(Protocol):
         last window."""
 
     def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
-        """Return (K,) s from the starts of their rows to the samples low:high; `rows_s` (R,) is
-        what each row takes."""
+        """Return (K,) s from the start of its row to each of the samples low:high; `rows_s` (R,):
+        the time that each row takes."""
 
 
 class SampledRows(Struct, frozen=True, eq=False):
     """The rows low:high of a program, with the time of each, `seconds` (high − low,). `samples`
-    are of the rows from `base` on, which may be more; where it `iterates`, each of them is a pass
-    of the interpolator."""
+    are those of the rows from `base` on, which may be more rows; `iterates`: each sample is one
+    pass of the interpolator."""
 
     low: int
     high: int
@@ -79,7 +79,7 @@ class SampledRows(Struct, frozen=True, eq=False):
 
 
 def row_seconds(blocks: Iterable[SampledRows], rows: int) -> Floats:
-    """Return (rows,) s that each row takes, 0 for those behind the end of the program."""
+    """Return (rows,) s that each row takes, 0 for rows after the end of the program."""
     seconds = np.zeros(rows)
     for block in blocks:
         seconds[block.low : block.high] = block.seconds
@@ -93,13 +93,13 @@ class SampledModel(ControllerModel[ControllerT, DialectT]):
     def sampled(
         self, path: Toolpath, machine: Machine[ControllerT, DialectT]
     ) -> Iterator[SampledRows]:
-        """Yield the rows of a quantised path up to the end of the program; ProgramError, which
-        names the block, for rows that cannot be followed."""
+        """Yield the rows of a quantised path up to the end of the program; ProgramError, with the
+        block, for rows that cannot be followed."""
 
     def mechanics(
         self, path: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> Mechanics:
-        """Return the slides at the start of the path."""
+        """Return the mechanics with the slides at the start of the path."""
         return Mechanics(machine, path.start, options.effects)
 
     def run(
@@ -127,8 +127,8 @@ class SampledModel(ControllerModel[ControllerT, DialectT]):
 def row_chunks(
     blocks: Iterable[SampledRows], mechanics: Mechanics, chunk_steps: int
 ) -> Iterator[Chunk]:
-    """Yield the chunks of all rows, whose blocks follow one another, each with at most
-    `chunk_steps` samples; the time of a row in several chunks is divided in proportion to its
+    """Yield the chunks of all rows, each with at most `chunk_steps` samples; the blocks must
+    follow one another. The time of a row in several chunks is divided in proportion to its
     samples."""
     for block in blocks:
         yield from _chunks(block, mechanics, chunk_steps)
@@ -137,7 +137,7 @@ def row_chunks(
 def timed_row_chunks(
     blocks: Iterable[SampledRows], mechanics: Mechanics, chunk_steps: int
 ) -> Iterator[TimedChunk]:
-    """Yield the chunks of all rows as `row_chunks`, with the times of their samples."""
+    """Yield the chunks of `row_chunks` with the times of their samples."""
     clock_s, reached_s, last_row = 0.0, 0.0, -1
     for block in blocks:
         rows_s = np.concatenate([np.zeros(block.low - block.base), block.seconds])
@@ -199,7 +199,8 @@ def sample_spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
 
 
 def spacing_along(length_mm: Floats, machine: Machine) -> float:
-    """Return the distance of samples for rows of these lengths (N,) mm, as `sample_spacing_mm`."""
+    """Return the distance of samples for rows of these lengths (N,), mm: the finer coded step of X
+    and Y, or more so that there are at most `MAX_SAMPLES`."""
     step = min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     return max(step, float(length_mm.sum()) / MAX_SAMPLES)
 
@@ -273,7 +274,8 @@ class PathSamples:
         return np.repeat(self._pieces.row[pieces], sample_counts), share
 
     def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
-        """Return (K,) s from the starts of their rows to the samples low:high, at even speed."""
+        """Return (K,) s from the start of its row to each of the samples low:high, at constant
+        speed along the row."""
         row, share = self.places(low, high)
         return np.asarray(share * rows_s[row])
 
@@ -285,7 +287,8 @@ class PathSamples:
 
 
 def ways_of(toolpath: Toolpath, arms: PolarArcs) -> Ways:
-    """Return the ways of all rows of a toolpath, with its arcs."""
+    """Return all rows of a toolpath, with its arcs, in the form that the compiled loops read
+    (Ways)."""
     table = np.empty((len(arms.row), at.ARM_COLUMNS))
     table[:, [at.CENTRE_X, at.CENTRE_Y]] = arms.centre
     table[:, at.RADIUS], table[:, at.GROWTH] = arms.radius, arms.end_radius - arms.radius
@@ -297,7 +300,8 @@ def ways_of(toolpath: Toolpath, arms: PolarArcs) -> Ways:
 
 
 class CountedSamples(PathSamples):
-    """The same, with the steps of each axis between samples: changes of its nearest step."""
+    """The samples of PathSamples, with the steps of each axis between them: the changes of its
+    nearest whole step."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine, spacing_mm: float) -> None:
         super().__init__(toolpath, spacing_mm)
@@ -315,7 +319,8 @@ class CountedSamples(PathSamples):
         return (row, points) if low == 0 else (row[1:], points[1:])
 
     def steps(self, bounds: Ints) -> Ints:
-        """Return steps of each axis between samples of the window."""
+        """Return (R, 3) steps of the axes within samples bounds[r]:bounds[r+1] of the last
+        window."""
         return np.diff(self._counts[bounds - self._low], axis=0)
 
 
@@ -337,10 +342,10 @@ def _pieces_of_rows(length: Floats, arms: PolarArcs) -> _Pieces:
 
 
 def _arc_pieces(arms: PolarArcs) -> _Pieces:
-    """Return arcs divided at the reversals of their axes.
+    """Return the arcs divided where an axis reverses.
 
-    These lie at angles k·π/2. In the direction of the arc (σ = ±1) from its start at σ·a, the next
-    ones are k = ⌊σa/(π/2)⌋ + 1, + 2, ...
+    These places lie at angles k·π/2. In the direction of the arc (σ = ±1) from its start at σ·a,
+    the next ones are k = ⌊σa/(π/2)⌋ + 1, + 2, ...
     """
     quarter = 0.5 * np.pi
     progress = np.sign(arms.sweep) * arms.angle

@@ -20,8 +20,9 @@ from camtool.machine.model import Machine
 
 
 class EntryState(Struct, frozen=True):
-    """The state in which the blocks before a plan leave it: the highest speed in the last of them,
-    and the square of the speed, (mm/s)², that they allow behind it; 0 and 0 before the first."""
+    """What the blocks before a plan leave to it: the highest speed (mm/s) of the last of them, and
+    the square of the speed, (mm/s)², that they allow at the plan's start; 0 and 0 at the
+    beginning."""
 
     speed_mm_s: float = 0.0
     square: float = 0.0
@@ -43,7 +44,7 @@ class SpeedPlan(Struct, frozen=True, eq=False):
 
     def squares(self, window: int) -> Floats:
         """Return (N + 1,) (mm/s)²: the square of the speed at the start of each block, and 0 after
-        the last, for a planner with a buffer of `window` blocks, the current one included."""
+        the last. The planner has a buffer of `window` blocks, the current one included."""
         first = np.full(min(len(self.speed_mm_s), 1), self.before.speed_mm_s)
         highest = np.concatenate([first, self.speed_mm_s[:-1]])
         np.minimum(highest, self.speed_mm_s, out=highest)
@@ -54,7 +55,8 @@ class SpeedPlan(Struct, frozen=True, eq=False):
         return squares
 
     def seconds(self, squares: Floats) -> Floats:
-        """Return (N,) s: the time of each block, with the `squares` (N + 1,) of its method."""
+        """Return (N,) s: the time of each block, given `squares` (N + 1,) from the method of that
+        name."""
         a, d, entry = self.acceleration_mm_s2, self.length_mm, np.sqrt(squares)
         first, last = entry[:-1], entry[1:]
         peak = np.minimum(self.speed_mm_s, np.sqrt(a * d + 0.5 * (first**2 + last**2)))
@@ -63,8 +65,8 @@ class SpeedPlan(Struct, frozen=True, eq=False):
         return np.asarray((2.0 * peak - first - last) / a + steady)
 
     def moments_s(self, squares: Floats, block: Ints, way_mm: Floats) -> Floats:
-        """Return (K,) s from the starts of blocks (K,) to `way_mm` (K,) along them, with the
-        `squares` (N + 1,) of its method."""
+        """Return (K,) s from the starts of blocks (K,) to the points `way_mm` (K,) along them,
+        given `squares` (N + 1,) from the method of that name."""
         a, d = self.acceleration_mm_s2[block], self.length_mm[block]
         first, last = squares[:-1][block], squares[1:][block]
         peak_square = np.minimum(self.speed_mm_s[block] ** 2, a * d + 0.5 * (first + last))
@@ -78,26 +80,27 @@ class SpeedPlan(Struct, frozen=True, eq=False):
         return np.asarray(rising_s + steady_mm / peak + falling_s)
 
     def entry_after(self, count: int, squares: Floats) -> EntryState:
-        """Return the entry state of the blocks behind the first `count` ones."""
+        """Return the entry state for a plan of the blocks after the first `count`."""
         if count == 0:
             return self.before
         reached = squares[count - 1] + self._gains()[count - 1]
         return EntryState(float(self.speed_mm_s[count - 1]), float(reached))
 
     def _gains(self) -> Floats:
-        """Return (N,) (mm/s)²: what the square of the speed can change by within each block."""
+        """Return (N,) (mm/s)²: the largest change of the squared speed within each block, 2 ·
+        acceleration · length."""
         return np.asarray(2.0 * self.acceleration_mm_s2 * self.length_mm)
 
 
 def max_along(limit: Floats, unit: Floats) -> Floats:
-    """Return (B,) the largest value along unit vectors (B, 3) within the limits of three axes
-    (3,)."""
+    """Return (B,) the largest value (speed or acceleration) along each unit vector (B, 3) with
+    which no axis exceeds its limit (3,)."""
     with np.errstate(divide="ignore", over="ignore"):
         return np.asarray((limit / np.abs(unit)).min(axis=1, initial=np.inf))
 
 
 def axis_limits(machine: Machine, key: str) -> Floats:
-    """Return (3,) the limit `key` of each axis; MachineError where one is missing."""
+    """Return (3,) the limit `key` of X, Y and Z; MachineError if one is missing."""
     values = []
     for name, axis in zip("xyz", machine.axes, strict=True):
         value: float | None = getattr(axis, key)

@@ -53,8 +53,9 @@ class LineRun:
         rounds: bool,
         compensation_s: float = 0.0,
     ) -> None:
-        """`blocks` are all `rows` rows of the program, in order; `step_mm` (3,) and `rounds` as in
-        `StepLines`; `compensation_s`: the time of each step that is added at a reversal."""
+        """Take the blocks, which are all `rows` rows of the program in order; `step_mm` (3,) and
+        `rounds` as in `StepLines`; `compensation_s`: the time of each step that is added at a
+        reversal."""
         self.rows = rows
         self._blocks, self._block = blocks, LineRows(0, 0, *_no_lines())
         self._step_mm = step_mm
@@ -62,7 +63,8 @@ class LineRun:
         self._compensation_s = compensation_s
 
     def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
-        """Judge the rows low:high, which follow those of the last call."""
+        """Judge the rows low:high, which follow those of the last call; their figures are added to
+        `sums` in place. Return the ledger of the rows."""
         ledger = still_ledger(np.arange(low, high))
         while low < high:
             if low == self._block.high:
@@ -105,7 +107,8 @@ def _no_lines() -> tuple[Floats, Ints, Ints, Ints]:
 
 
 def judge_in_parts(lines: StepLines, followed: Followed, task: Task, sums: Sums) -> None:
-    """Judge lines in threads; their figures, traces and pieces are joined in order."""
+    """Judge lines in threads, part by part; their figures, traces and pieces are added to `sums`
+    in order."""
     bounds = _parts(lines.row, task)
     parts = [
         _Part(lines, followed, slice(low, high), task, sums) for low, high in pairwise(bounds)
@@ -115,8 +118,9 @@ def judge_in_parts(lines: StepLines, followed: Followed, task: Task, sums: Sums)
 
 
 def _parts(row: Ints, task: Task) -> list[int]:
-    """Return where parts of the lines begin, and the end of all: at first lines of rows; one part
-    where a row goes round a full circle, whose bins have one writer."""
+    """Return the indices of lines at which parts begin, and the end of the last. Parts begin at
+    the first line of a row; if a row goes round a full circle there is a single part, since its
+    bins may have only one writer."""
     count = len(row)
     if count == 0 or (task.rows[row[[0, -1]] - task.low, CIRCLE] >= 0).any():
         return [0, count] if count else [0]
@@ -153,12 +157,12 @@ class _Part:
         self._pieces = np.empty((0, 0))
 
     def judge(self) -> _Part:
-        """Judge the lines of the part."""
+        """Judge the lines of the part and return it."""
         self._pieces = judge_lines(self._lines, self._followed, self._task, self._sums)
         return self
 
     def join(self, sums: Sums) -> None:
-        """Add what was found to the sums of all lines."""
+        """Add the part's results to the sums of all lines, in place."""
         written, begin = int(self._sums.pen[WRITTEN]), int(sums.pen[WRITTEN])
         sums.trace[begin : begin + written] = self._sums.trace[:written]
         sums.pen[WRITTEN] += written
@@ -167,8 +171,8 @@ class _Part:
 
 
 def thread_count() -> int:
-    """Return how many threads judge: as many as the process has cores, or as OMP_NUM_THREADS says,
-    which is 1 for the workers of a batch."""
+    """Return the number of threads that judge: the process's cores, or OMP_NUM_THREADS if set (1
+    for the workers of a batch)."""
     limit = os.environ.get("OMP_NUM_THREADS", "")
     if limit.isdecimal():
         return max(int(limit), 1)

@@ -58,9 +58,10 @@ class SampleClock:
         waits: Waits | None = None,
         added: Ints | None = None,
     ) -> None:
-        """`path` is the toolpath as the controller rounds it. Without `waits` the samples of a row
-        within a chunk share its time equally. `added` (N, 3): the steps that the controller adds
-        at a reversal in each row; None: those of the machine."""
+        """Start the clock at the beginning of `path`, the toolpath as the controller rounds it.
+        Without `waits` the samples of a row within a chunk share its time equally. `added` (N, 3):
+        the steps that the controller adds at a reversal in each row; None: those of the machine.
+        """
         if added is None:
             of_axes = [to_steps(axis.compensation_mm, axis.coded_step_mm) for axis in machine.axes]
             added = np.broadcast_to(np.array(of_axes), (len(path), 3))
@@ -99,9 +100,9 @@ class SampleClock:
     def _passes(
         self, ledger: Ledger, row: Ints, position: Ints
     ) -> tuple[Floats, Floats, Floats, Floats, float]:
-        """Begin (K,) of the passes of all samples without added steps, s from there to the sample
-        (K,), and from it to the end of its pass (K,), s (R,) that an added step takes, and the end
-        of the chunk without them."""
+        """Return the times (s) of the interpolator's passes: their begins (K,) without added
+        steps, from there to the sample (K,), from the sample to the end of its pass (K,), the time
+        of one added step in each row (R,), and the end of the chunk without added steps."""
         net_s = ledger.duration_s - ledger.compensation_s
         added = (ledger.reversals * self._added[ledger.row]).sum(axis=1)
         each_s = ledger.compensation_s / np.maximum(added, 1)
@@ -134,8 +135,8 @@ class SampleClock:
 
 
 def reversals_of(moves: Ints, sense: Ints) -> tuple[Bools, Ints]:
-    """Return the mask (K, M) of the moves (K, M) of motors that go the other way than those before
-    them, and the directions (M,) ±1 of the last ones; `sense` (M,): the directions before."""
+    """Return the mask (K, M) of the moves of M motors that reverse against the move before, and
+    the last directions (M,) ±1; `sense` (M,): the directions before the first move."""
     turns = np.zeros(moves.shape, dtype=np.bool_)
     last = sense.copy()
     for motor in range(moves.shape[1]):

@@ -13,7 +13,7 @@ ENTRY = ("entry", '"helix:3deg"', "how steeply it goes down")
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Return one operation for the circles in which the tool has room to go round."""
+    """Propose one operation for the circles within parts that are wider than the tool."""
     tool, min_width = remaining.proposal.tool_mm, remaining.proposal.tool_mm + HOLE_SIZE_MM
     if not tool or remaining.habit == "pocket":
         return []
@@ -38,8 +38,8 @@ def propose(remaining: Remaining) -> list[Part]:
 
 
 def _stepped(remaining: Remaining) -> list[Part]:
-    """Return the counterbores of the stock whose thickness is known, and the holes in them and in
-    countersinks."""
+    """Propose the counterbores (where the thickness of the stock is known), and the holes within
+    counterbores and countersinks."""
     parts = [counterbore(remaining, wide)] if (wide := _wider(remaining)) else []
     holes = [row for row in remaining.rows if row in remaining.steps.holes]
     bored = {row: circle_of(remaining.drawing.paths[row]) for row in holes}
@@ -63,7 +63,7 @@ def _wider(remaining: Remaining) -> tuple[int, ...]:
 
 
 def counterbore(remaining: Remaining, rows: tuple[int, ...]) -> Part:
-    """Return the operation for the wider circles of counterbores."""
+    """Return the operation that bores the wider circles of counterbores."""
     depth = remaining.depth_mm or HALF * remaining.proposal.thickness_mm
     reason = f"two circles about one centre are a counterbore; the wider is {depth:g} mm deep"
     keys = (("depth", f'"{depth:g}mm"', "of the counterbore"), ENTRY)

@@ -74,8 +74,8 @@ TURN_SLACK = 1e-9
 def bore(chosen: Chosen, setting: Setting) -> Work:
     """Return one Fixed item for each circle that is wider than the tool.
 
-    Circles within another one are bored with it. What is no circle, or has no room for the tool,
-    is named in a finding. OptionError for a tool that cuts no width.
+    Circles within another one are bored with it. Paths that are no circle, and circles without
+    room for the tool, are named in findings. OptionError for a tool that cuts no width.
     """
     operation = setting.operation
     if operation.tool.radius_mm == 0.0 and len(chosen.lines):
@@ -106,7 +106,7 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
 
 
 def _walls(holes: list[Hole], setting: Setting) -> list[Contour]:
-    """Return the contours along the walls of the bores."""
+    """Return the contours of the finishing pass along the walls of the bores."""
     clearance = setting.operation.away_mm
     rings = [
         helix(hole.at_mm, 0.5 * _diameter(hole) - clearance, 0.0, 0)[:4, [0, 1, 3]]
@@ -118,13 +118,13 @@ def _walls(holes: list[Hole], setting: Setting) -> list[Contour]:
 
 
 def radii(wide_mm: float, tool_mm: float, step_mm: float) -> list[float]:
-    """Return the radii of the rings of the tool's centre, mm, from the inside out, the last the
-    largest one; the first leaves no core, and neighbours are no farther apart than a step.
+    """Return the radii of the rings of the tool's centre, mm, from the inside out; the last is
+    `wide_mm`. The first ring leaves no core, and neighbours are at most a step-over apart.
 
-    >>> radii(1.0, 1.5, 1.2)
-    [1.0]
-    >>> radii(4.5, 1.5, 1.2)
-    [1.35, 2.4, 3.45, 4.5]
+        >>> radii(1.0, 1.5, 1.2)
+        [1.0]
+        >>> radii(4.5, 1.5, 1.2)
+        [1.35, 2.4, 3.45, 4.5]
     """
     first = min(wide_mm, CORE_SHARE * tool_mm)
     count = math.ceil((wide_mm - first) / step_mm * (1.0 - TURN_SLACK))
@@ -133,8 +133,8 @@ def radii(wide_mm: float, tool_mm: float, step_mm: float) -> list[float]:
 
 
 def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Finding]]:
-    """Return the runs of a bore, one for each ring; and what of them is steeper than it should
-    be."""
+    """Return the runs of a bore, one helix for each ring, and findings where a helix is steeper
+    than the entry's angle."""
     operation = setting.operation
     wide = 0.5 * _diameter(hole) - operation.away_mm
     step = operation.step_over * operation.tool.diameter_mm
@@ -161,7 +161,8 @@ def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Findin
 
 
 def _turned_vertices(vertices: Floats, hole: Hole, operation: Operation) -> Floats:
-    """Return the vertices of a ring, which runs CCW, in the direction of the operation."""
+    """Return the vertices of a CCW ring in the operation's direction: unchanged for climb,
+    mirrored in place for conventional."""
     if operation.direction == "conventional":  # mirrored
         vertices[:, 1] = 2.0 * hole.at_mm[1] - vertices[:, 1]
         vertices[:, 3] *= -1.0
@@ -169,19 +170,21 @@ def _turned_vertices(vertices: Floats, hole: Hole, operation: Operation) -> Floa
 
 
 def _is_narrow(hole: Hole, operation: Operation) -> bool:
-    """Return True if there is no room for a useful helix: the tool plunges."""
+    """Return True if a bore is so little wider than the tool that it is plunged instead of cut by
+    a helix."""
     wide = 0.5 * _diameter(hole) - operation.away_mm
     return wide < MIN_HELIX_SHARE * operation.tool.radius_mm
 
 
 def _peck_mm(operation: Operation) -> float:
-    """Return the depth (mm) of one peck of an end mill."""
+    """Return the depth of one peck of an end mill, mm."""
     widest = operation.tool.diameter_mm
     return widest if operation.step_down_mm is None else min(widest, operation.step_down_mm)
 
 
 def _plunged(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Finding]]:
-    """Down in the middle in pecks, once round at the full depth, and back to the middle."""
+    """Return the run of a narrow bore, and the finding that says so: plunge in the middle in
+    pecks, once round at the full depth, back to the middle."""
     operation, feeds = setting.operation, setting.feeds
     wide = 0.5 * _diameter(hole) - operation.away_mm
     depths = peck_depths(-setting.levels_mm[-1], _peck_mm(operation))
@@ -200,7 +203,8 @@ def _plunged(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Fin
 
 
 def _turns(radius_mm: float, depth_mm: float, operation: Operation) -> int:
-    """Return the fewest turns down of which none is too steep or too deep."""
+    """Return the number of turns of a helix: the fewest with which no turn is steeper than the
+    entry's angle or deeper than the step down."""
     pitch = 2.0 * math.pi * radius_mm * math.tan(operation.entry.angle_rad)
     if operation.step_down_mm is not None:
         pitch = min(pitch, operation.step_down_mm)
@@ -208,8 +212,8 @@ def _turns(radius_mm: float, depth_mm: float, operation: Operation) -> int:
 
 
 def helix(centre: tuple[float, float], radius_mm: float, depth_mm: float, turns: int) -> Floats:
-    """Return (4 turns + 6, 4) x, y, z, bulge: CCW about a centre from the stock top to the
-    depth in so many turns, once round there, and to the centre."""
+    """Return (4 turns + 6, 4) x, y, z, bulge of a CCW helix about `centre`: from the stock top to
+    the depth in this many turns, once round at the depth, and to the centre."""
     count = 4 * turns + 4
     quarter = np.arange(count + 1)
     x = centre[0] + radius_mm * np.array([1.0, 0.0, -1.0, 0.0])[quarter % 4]
@@ -224,7 +228,7 @@ def _diameter(hole: Hole) -> float:
 
 
 def _outermost(circles: list[Hole]) -> list[Hole]:
-    """Return those that lie in no other one, each once, in their order."""
+    """Return the circles that lie in no other one, in their order; of equal circles only one."""
     if not circles:
         return []
     places = np.array([hole.at_mm for hole in circles])
@@ -255,7 +259,8 @@ def _too_small(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
 
 
 def _cut_away_between(holes: list[Hole], operation: Operation) -> list[Finding]:
-    """Return bores that are cut beyond their circles, of which two leave nothing between them."""
+    """Return findings for pairs of bores that, being cut wider than drawn, leave nothing between
+    them."""
     if not operation.beyond_mm or not holes:
         return []
     max_distance, findings = 2.0 * operation.beyond_mm, list[Finding]()

@@ -11,7 +11,7 @@ from camtool.operations.bore.proposal import counterbore
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Return one operation for the countersinks of each width, and each bit. The holes in them are
+    """Propose one operation for the countersinks of each width and V bit; the holes in them are
     left to the kinds that follow."""
     groups = defaultdict(list)
     for row, sink in remaining.steps.sunk.items():

@@ -33,13 +33,12 @@ from camtool.records import replace
 
 
 def chamfered(operation: Operation, _: Stock | None) -> Operation:
-    """Return the operation with the depth that its chamfer makes.
+    """Return the operation with the depth at which the V bit cuts its chamfer.
 
-    A cone of half angle α and tip radius t is r(h) = t + h·tan α wide, h above its tip. Its
-    tip runs an offset o below the bevel, whose lower edge is the drawn line: the axis runs
-    r(o) beside that line, and the bevel is w = r(D) − r(o) wide at the stock top for a tip
-    D = o + w / tan α deep.
-    OptionError without a width, for a tool that is no V bit, and for one too narrow.
+    A cone of half angle α and tip radius t is r(h) = t + h·tan α wide, h above its tip. Its tip
+    runs an offset o below the bevel, whose lower edge is the drawn line: the axis runs r(o) beside
+    that line, and the bevel is w = r(D) − r(o) wide at the stock top for a tip D = o + w / tan α
+    deep. OptionError without a width, for a tool that is no V bit, and for one too narrow.
     """
     place = f"operation {operation.name or operation.kind!r}, key chamfer"
     if operation.chamfer_mm is None:

@@ -10,8 +10,8 @@ SMALL_HOLE = 0.1
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Return holes at the points, and in the circles that are small, or fit a drill or the
-    tool."""
+    """Propose drilling for the points, and for circles that are small or as wide as the tool or a
+    drill of the library."""
     tool = remaining.proposal.tool_mm
     if remaining.habit == "pocket":
         return []

@@ -35,11 +35,12 @@ from camtool.planning.naming import operation_name
 
 
 def drill(chosen: Chosen, setting: Setting) -> Work:
-    """Return one Fixed item for each mark and each circle up to the largest hole of the operation.
+    """Return one Fixed item for each mark and each circle up to the largest diameter that the
+    operation drills.
 
-    Places that are drawn twice are drilled once; of concentric circles the one nearest to the
-    drill's diameter counts. What is no hole for this drill is named in a finding; when nothing
-    is left that is an error.
+    Places that are drawn twice are drilled once; of concentric circles, the one nearest to the
+    drill's diameter counts. Marks and circles that are no hole for this drill are named in
+    findings; it is an error if none is left.
     """
     operation = setting.operation
     holes, large, other_names = drilled_holes(chosen, operation)
@@ -60,7 +61,7 @@ def drill(chosen: Chosen, setting: Setting) -> Work:
 
 
 def _run(hole: Hole, setting: Setting) -> CutRun:
-    """Down and up in the hole."""
+    """Return the run of a hole: down in pecks, dwell, and up."""
     operation = setting.operation
     depths = peck_depths(-setting.levels_mm[-1], operation.peck_mm)
     vertices, feeds = pecks(hole.at_mm, depths, setting)
@@ -84,7 +85,7 @@ def _no_circles(names: list[str]) -> Iterator[Finding]:
 
 
 def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
-    """Yield one finding for each diameter that is not the drill's."""
+    """Yield one finding for each diameter of holes that differs from the drill's."""
     drill_mm = operation.tool.diameter_mm
     by_size: dict[float, list[str]] = {}
     for hole in holes:

@@ -25,8 +25,8 @@ MAX_POINTS = 4000
 
 
 def propose(paths: Remaining) -> list[Part]:
-    """Engravings of the letters, of the open paths, of what the mills are too wide for, or of all
-    that is left."""
+    """Propose engraving for text, for open paths, for closed paths that the end mills are too wide
+    for, or for all that is left if the layer's name asks for it."""
     sources, closed = paths.drawing.sources, paths.drawing.paths.closed
     parts: list[Part] = []
     text = tuple(row for row in paths.rows if is_text(sources[row]))
@@ -86,7 +86,8 @@ def propose(paths: Remaining) -> list[Part]:
 
 
 def _undrilled(widths_mm: Collection[float], mill_mm: float) -> str:
-    """Return why holes are only marked, and the drills that would make them."""
+    """Return the reason why holes are only marked, with the drill diameters that would
+    make them."""
     sizes = sorted({round(width, 2) for width in widths_mm})
     listed = ", ".join(f"{size:g}" for size in sizes[:SIZES_TOLD])
     more = ", …" if len(sizes) > SIZES_TOLD else ""
@@ -97,8 +98,8 @@ def _undrilled(widths_mm: Collection[float], mill_mm: float) -> str:
 
 
 def _text_beside_parts(drawing: Drawing, text: Sequence[int]) -> set[int]:
-    """Return the rows of texts that lie beside the parts, or across their edges, as notes do,
-    where a part is larger than they are."""
+    """Return the rows of texts that lie beside the parts or across their edges, as notes do. Texts
+    larger than every part are not counted."""
     lines, levels = drawing.paths, drawing.nesting.levels
     lettered = np.array([is_text(source) for source in drawing.sources], dtype=np.bool_)
     edges = np.flatnonzero(lines.closed & ~lettered)
@@ -121,7 +122,8 @@ def _text_beside_parts(drawing: Drawing, text: Sequence[int]) -> set[int]:
 
 
 def _cut(remaining: Remaining, part: Part, reason: str, *, always_deep: bool = False) -> Part:
-    """Return the part with the bit that fits between its lines, its depth, and why."""
+    """Return the part with a depth, the V bit that fits between its lines, and the reason. Without
+    V bits the depth is set only if `always_deep`."""
     bits = remaining.proposal.tools("v")
     if not bits and not always_deep:
         return replace(part, why=reason)
@@ -138,8 +140,8 @@ def _cut(remaining: Remaining, part: Part, reason: str, *, always_deep: bool = F
 
 
 def _fitting(remaining: Remaining, rows: Sequence[int], bits: Sequence[Tool]) -> Tool:
-    """Return the bit of the widest groove that keeps what is between the lines, or else the
-    finest."""
+    """Return the widest V bit whose groove keeps the material between the lines, or else the
+    narrowest bit."""
     lines = remaining.drawing.paths.select(rows)
     widest = sorted(bits, key=_width, reverse=True)
     if len(lines.vertices) <= MAX_POINTS:

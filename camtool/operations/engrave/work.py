@@ -57,8 +57,9 @@ def engrave(chosen: Chosen, setting: Setting) -> Work:
 
 
 def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
-    """Yield one finding for the lines under the tool that are nearer to each other than it is
-    wide at the depth of its tip: lines that do not touch, and what touching lines enclose."""
+    """Yield one finding for places where lines are nearer to each other than the groove is wide at
+    the depth of the tip, so that the material between them is lost. Lines that touch count only
+    for what they enclose."""
     width = 2.0 * setting.operation.tool.radius_at(-setting.levels_mm[-1])
     groove = widest_groove(chosen.lines, width)
     if groove is None:
@@ -73,14 +74,14 @@ def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
 
 
 def leaves_all(lines: Polylines, width: float) -> bool:
-    """Return True if a groove of this width, mm, keeps all that is between the lines."""
+    """Return True if a groove of this width, mm, leaves material between all lines."""
     return not len(lines) or not _narrow_places(_chords(lines, width), lines.closed, width)
 
 
 def widest_groove(lines: Polylines, width: float) -> tuple[float, Any, int, int] | None:
-    """Return the width of the widest groove that keeps what is between the lines, mm, the place
-    that limits it, the row of one of its lines, and how many places are too narrow for a groove of
-    this `width`, mm; None if there are none."""
+    """Return (its width in mm, the place that limits it, the row of a line there, the number of
+    places that are too narrow for a groove of `width` mm) for the widest groove that leaves
+    material between all lines; None if a groove of `width` does."""
     if width == 0.0 or not len(lines):
         return None
     chords = _chords(lines, width)
@@ -93,8 +94,8 @@ def widest_groove(lines: Polylines, width: float) -> tuple[float, Any, int, int]
 
 
 def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float, Any, int]]:
-    """Return the places where a groove of this width takes away what is between two lines: the
-    width of that, mm, its middle, and the row of one of the lines."""
+    """Return (width in mm, middle, row of one of the lines) for each place where a groove of this
+    width removes all material between two lines."""
     import shapely
 
     near_rows, other = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=width)
@@ -133,8 +134,8 @@ def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float,
 
 
 def _enclosed(lines: Any, width: float) -> Iterator[tuple[float, Any]]:
-    """Yield the places that touching lines enclose and a groove of this width fills: the width of
-    each, mm, and its middle."""
+    """Yield (width in mm, middle) of each area that touching lines enclose and a groove of this
+    width fills."""
     import shapely
 
     min_gap = MIN_GAP_SHARE * width
@@ -151,8 +152,8 @@ def _enclosed(lines: Any, width: float) -> Iterator[tuple[float, Any]]:
 
 
 def _connected(count: int, one: Any, other: Any) -> Any:
-    """Return (N,) the least index of what is connected with each of N things, by pairs of
-    these."""
+    """Return labels (N,) of connected components: the least index of each component of the graph
+    with N nodes and the edges (`one`, `other`)."""
     label = np.arange(count)
     while True:
         min_label = label.copy()
@@ -165,8 +166,8 @@ def _connected(count: int, one: Any, other: Any) -> Any:
 
 
 def _chords(lines: Polylines, width: float) -> Any:
-    """Return paths as lines of shapely: all of them, or the first ones where more would have too
-    many pairs nearer to each other than this width, mm."""
+    """Return the paths as shapely lines; only the first of them if all would have too many pairs
+    nearer to each other than `width` mm."""
     import shapely
 
     chords = np.array([*map(_chord_line, lines)], dtype=object)
@@ -181,7 +182,7 @@ def _chords(lines: Polylines, width: float) -> Any:
 
 
 def _chord_line(path: Polyline) -> Any:
-    """Return a path as a line of shapely."""
+    """Return a path as a shapely line, arcs as chords."""
     import shapely
 
     segments = Segments.of(path)

@@ -28,9 +28,11 @@ MAX_RINGS = 50
 
 
 def isolated(operation: Operation, _: Stock | None) -> Operation:
-    """Return the operation with the depth at which its tool passes the drawn edge.
+    """Return the operation with its tip offset set to the depth: the axis then runs beside the
+    drawn edge by the tool's radius at the top of the copper.
 
-    OptionError without a depth, for one that leaves copper, and for an isolation below the tool's.
+    OptionError without a depth, for a depth that leaves copper, for a tool without width there,
+    and for an isolation narrower than one cut or with too many rings.
     """
     copper_mm = operation.own_value("copper")
     if operation.depth_mm is None:
@@ -71,8 +73,8 @@ def isolated(operation: Operation, _: Stock | None) -> Operation:
 
 
 def isolate(chosen: Chosen, setting: Setting) -> Work:
-    """Return the contours round the copper, the ring beside it first; only that one must go all
-    the way round, so only its findings count."""
+    """Return the contours round the copper, the ring beside it first. Only that ring must be
+    complete, so only its findings are kept."""
     first, *rings = (
         chamfer(chosen, replace(setting, operation=replace(setting.operation, allowance_mm=each)))
         for each in _rings_mm(setting.operation)
@@ -84,13 +86,14 @@ def isolate(chosen: Chosen, setting: Setting) -> Work:
 
 
 def _one_cut_mm(operation: Operation) -> float:
-    """Return the width of one cut at the bottom of the copper, mm."""
+    """Return the width of a single cut at the bottom of the copper, mm."""
     copper_mm = operation.own_value("copper")
     return 2.0 * operation.tool.radius_at((operation.depth_mm or 0.0) - copper_mm)
 
 
 def _ring_count(operation: Operation) -> float:
-    """Return the number of rings, as a whole float: widths of any size are looked at."""
+    """Return the number of rings as a whole float, since widths that are absurdly large are
+    checked with it."""
     width_mm, one_mm = operation.own_value("isolation"), _one_cut_mm(operation)
     if width_mm is None or width_mm <= one_mm:
         return 1.0
@@ -98,7 +101,8 @@ def _ring_count(operation: Operation) -> float:
 
 
 def _rings_mm(operation: Operation) -> list[float]:
-    """Return the distances of the rings from the first one, mm: evenly, with OVERLAP."""
+    """Return the distances of the rings from the first one, mm, evenly spaced with at least
+    OVERLAP."""
     count = round(_ring_count(operation))
     if count == 1:
         return [0.0]

@@ -14,7 +14,8 @@ SPLINTER_SHARE = 4.0
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Return one operation for a layer of pockets, or for the small windows of another one."""
+    """Propose a pocket for a layer whose name asks for it, or for the small windows of another
+    layer."""
     tool, paths = remaining.proposal.tool_mm, remaining.drawing.paths
     if not tool:
         return []

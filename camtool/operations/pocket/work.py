@@ -100,9 +100,9 @@ class Pocket(Struct, frozen=True, eq=False):
 
 
 class Cleared(Struct, frozen=True, eq=False):
-    """The runs that clear a region, in order; and what did not fit of their entries, with the
-    first run for which that is so. `is_rest`: others have cleared before. `narrow`: the tool
-    centre regions that adaptive clearing has no room in."""
+    """The runs that clear a region, in order. `changed`: why an entry is not as asked for, with a
+    run that has it; `is_rest`: other operations have cleared parts of the region; `narrow`: tool
+    centre regions without room for adaptive clearing."""
 
     runs: list[CutRun]
     changed: dict[str, CutRun]
@@ -111,13 +111,13 @@ class Cleared(Struct, frozen=True, eq=False):
 
 
 def checked(operation: Operation, _: Stock | None) -> Operation:
-    """Return the operation; OptionError for a strategy that is not for pockets."""
+    """Return the operation unchanged; OptionError for a strategy that pockets do not have."""
     refuse_strategy(operation, "adaptive")
     return operation
 
 
 def pocket(chosen: Chosen, setting: Setting) -> Work:
-    """Return one item for each region that the closed paths enclose (even-odd), with findings of
+    """Return one item for each region that the closed paths enclose (even-odd), and findings about
     what stays uncut.
 
     OptionError for an open path, for paths that cross, and for a tool that cuts no width.
@@ -151,7 +151,8 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
 
 
 def _walls(chosen: Chosen, setting: Setting) -> Work:
-    """Return the contours along the walls of all regions, and what they do not reach."""
+    """Return the contours of the finishing pass along the walls of all regions, and findings about
+    what they do not reach."""
     operation = setting.operation
     paths, names, sources = list[Polyline](), list[str](), list[int]()
     findings: list[Finding] = []
@@ -168,12 +169,13 @@ def _walls(chosen: Chosen, setting: Setting) -> Work:
 
 
 def kept_by(chosen: Chosen) -> Polylines:
-    """Return the boundary of what the pockets leave, which is on the left of its paths."""
+    """Return the boundary of the material that the pockets leave, which lies on the left of its
+    paths."""
     return reverse_lines(oriented(chosen.nesting))
 
 
 def pockets(chosen: Chosen) -> list[Pocket]:
-    """Return the regions that the closed paths enclose, each outer path with the islands in it."""
+    """Return the regions that the closed paths enclose: each outer path with its islands."""
     return [
         Pocket(region, chosen.names[row], int(chosen.source[row]))
         for row, region in regions(chosen.nesting)
@@ -183,7 +185,8 @@ def pockets(chosen: Chosen) -> list[Pocket]:
 def _cleared(
     slots: list[Floats], each: Pocket, setting: Setting, airs: tuple[Air, ...]
 ) -> Cleared:
-    """Return the runs of one region: each connected tool centre region, then the slots."""
+    """Return the runs that clear one region: its tool centre regions, each from the nearest end
+    on, and its slots. `airs`: where earlier operations have cleared."""
     groups: list[list[CutRun]] = []
     changed_runs: dict[str, CutRun] = {}
     narrow: list[Polylines] = []
@@ -221,11 +224,11 @@ def _cleared(
 
 
 def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
-    """Return the connected tool centre regions that clear a region; where a wider tool has cleared
-    what it reached, those that clear the rest.
+    """Return the connected tool centre regions that clear a region; after a wider tool, only those
+    that clear what it left.
 
-    The region shrunk at once by the tool and what it leaves: where it cuts beyond the lines, a
-    region that was grown first would have gaps closed that the tool must not go through.
+    The region is shrunk once by the tool's radius and the allowance together: where the allowance
+    is negative, growing the region first would close gaps that the tool must not go through.
 
     A disc of radius r reaches into what one of radius R does not cover where its centre is in the
     region shrunk by r, and not in what a disc of radius R − r covers of that: for what R covers,
@@ -261,7 +264,7 @@ def _without_lost_islands(region: Polylines, beyond_mm: float) -> Polylines:
 
 
 def _nearest_next(groups: list[list[CutRun]]) -> list[CutRun]:
-    """Return all runs, after those of one connected region those of the one whose begin is
+    """Return all runs in one list: after each group of runs, the group whose first run begins
     nearest."""
     runs: list[CutRun] = []
     remaining = list(groups)
@@ -275,8 +278,8 @@ def _nearest_next(groups: list[list[CutRun]]) -> list[CutRun]:
 def clearing_paths(
     part: Polylines, operation: Operation
 ) -> Iterator[tuple[Floats, ConnectedRegion]]:
-    """Yield the paths through one connected tool centre region, each with the region at whose
-    pole there is the most room to go down."""
+    """Yield the paths through one connected tool centre region, each with the region in whose
+    widest place (pole) the tool has most room to go down."""
     radius = operation.tool.radius_mm
     step = operation.step_over * operation.tool.diameter_mm
     forward = operation.direction != "conventional"
@@ -291,7 +294,7 @@ def clearing_paths(
 
 
 def _check(chosen: Chosen, operation: Operation) -> None:
-    """Raise OptionError for what cannot be a pocket."""
+    """Raise OptionError for paths and tools that make no pocket."""
     operation_place = operation_name(operation)
     if operation.tool.radius_mm == 0.0 and len(chosen.lines):
         raise OptionError(
@@ -322,7 +325,8 @@ def _check(chosen: Chosen, operation: Operation) -> None:
 
 
 def _check_step(chosen: Chosen, operation: Operation) -> None:
-    """Raise OptionError for a step-over, or a limit of engagement, that would take for ever."""
+    """Raise OptionError for a step-over, or a limit of engagement, so small that the passes would
+    be too many."""
     step = operation.step_over * operation.tool.diameter_mm
     size = float(np.ptp(extents(chosen.lines), axis=1).max()) if len(chosen.lines) else 0.0
     if operation.engagement_rad is not None:
@@ -386,8 +390,9 @@ def _narrow(each: Pocket, part: Polylines, operation: Operation) -> Finding:
 
 
 class Down(Struct, frozen=True, eq=False):
-    """The way down of the tool: the centre (2,) and radius of a helix; or a ramp; or neither (a
-    plunge). `changed` says what did not fit, "" when all does."""
+    """The entry of the tool: a helix with `centre` (2,) and radius; or a ramp; or neither, which
+    is a plunge. `changed` says how it differs from the entry that was asked for, "" if it does
+    not."""
 
     centre: Floats | None = None
     radius_mm: float = 0.0
@@ -401,8 +406,8 @@ def down_for(
     full_region: ConnectedRegion | None,
     setting: Setting,
 ) -> Down:
-    """Choose what fits of the entry that is asked for: a helix about the pole of a region that
-    keeps to the whole region; else a ramp along the path; else a plunge."""
+    """Choose the entry: a helix about the pole of `region`, within `full_region`, if one was asked
+    for and fits; else a ramp along the path; else a plunge."""
     entry = setting.operation.entry
     if entry.kind == "plunge":
         return Down()
@@ -428,8 +433,8 @@ def down_for(
 def lowered_runs(
     path: Floats, way_down: Down, link: Link, setting: Setting, name: str
 ) -> list[CutRun]:
-    """Return the runs that follow a path (n, 3) at all levels: one, unless there is no link
-    back."""
+    """Return the runs that follow a path (n, 3) at all levels: a single run, or several where
+    `link` finds no way back from the end to the entry."""
     runs: list[CutRun] = []
     parts: list[Floats] = []
     for above, level in pairwise((0.0, *setting.levels_mm)):
@@ -447,7 +452,8 @@ def lowered_runs(
 def _entry(
     path: Floats, way_down: Down, link: Link, heights: tuple[float, float], setting: Setting
 ) -> Floats:
-    """Return (k, 4) from the floor above down to the beginning of the path."""
+    """Return the entry (k, 4) x, y, z, bulge from the floor above to the beginning of the path at
+    its level."""
     above, level = heights
     begin = path[0, :2]
     drop = above - level
@@ -466,7 +472,8 @@ def _entry(
 
 
 def _ramp(path: Floats, length: float, heights: tuple[float, float]) -> Floats:
-    """Return (k, 4) to and fro along the beginning of the path, down to where it begins."""
+    """Return a ramp (k, 4) that runs to and fro along the beginning of the path, and ends at its
+    first point at full depth."""
     along = MeasuredPath.of(Polyline(path))
     laps = max(1, math.ceil(0.5 * length / along.total_mm))
     reach = 0.5 * length / laps
@@ -476,20 +483,22 @@ def _ramp(path: Floats, length: float, heights: tuple[float, float]) -> Floats:
 
 
 def _descent(setting: Setting) -> float:
-    """Return the length of the slope, seen from above, at the deepest step, mm."""
+    """Return the length in the plane, mm, of an entry at the given angle for the largest step
+    down."""
     drop = max(above - level for above, level in pairwise((0.0, *setting.levels_mm)))
     return drop / math.tan(setting.operation.entry.angle_rad)
 
 
 def _sloping(flat: Floats, heights: tuple[float, float]) -> Floats:
-    """Return (k,) z of an open path (k, 3) that slopes evenly from one height to another."""
+    """Return heights z (k,) along an open path (k, 3) that falls evenly from the first height to
+    the second."""
     lengths = MeasuredPath.of(Polyline(flat)).reach
     above, level = heights
     return np.asarray(above + (level - above) * lengths / lengths[-1])
 
 
 def _at_height(flat: Floats, z: float) -> Floats:
-    """Return (k, 4) an open path (k, 3) at one height."""
+    """Return an open path (k, 3) as (k, 4) x, y, z, bulge at one height."""
     return np.insert(flat, 2, z, axis=1)
 
 
@@ -500,12 +509,13 @@ def _run(parts: list[Floats], setting: Setting, name: str) -> CutRun:
 
 
 def over_floor(region: ConnectedRegion) -> Link:
-    """Return links that stay in a tool centre region."""
+    """Return the function that links two points of a tool centre region within that region."""
     return lambda start, end: route(start, end, region)
 
 
 def back_along(path: Floats) -> Link:
-    """Links back along the path itself, from its end to its beginning."""
+    """Return the function that links the end of the path to its beginning, back along the path
+    itself."""
     along = MeasuredPath.of(Polyline(path))
 
     def link(start: Floats, end: Floats) -> Floats | None:

@@ -8,8 +8,8 @@ from camtool.planning.strategies import LIMIT_KEYS, SLOT_KEYS, STRATEGIES
 
 
 def checked(operation: Operation, stock: Stock | None) -> Operation:
-    """Return the operation; OptionError for a slot that cannot be. What plans slots is not loaded
-    for other profiles: a batch that has nothing to do would load numpy for it."""
+    """Return the operation unchanged; OptionError for a slot that cannot be cut. The planner of
+    slots is imported only for operations with a slot, since it needs numpy."""
     if operation.own_value("strategy") == STRATEGIES[0]:
         return operation
     from camtool.operations.profile.slots import checked_slot

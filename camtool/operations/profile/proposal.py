@@ -22,9 +22,9 @@ MIN_TAB_HEIGHT_MM = 0.5
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Return one operation for all closed contours; where the tool is known, one for slots of its
-    width, one for windows and one for outlines, with tabs where the stock is known too, and others
-    for those that need a finer mill."""
+    """Propose one operation for all closed contours. If the tool is known, propose instead one for
+    slots of its width, one for windows and one for outlines (with tabs if the stock is known), and
+    others for contours that need a finer mill."""
     if not remaining.proposal.tool_mm:
         select = (("select", '["closed"]', ""),) if remaining.is_divided else ()
         return (
@@ -74,15 +74,15 @@ def propose(remaining: Remaining) -> list[Part]:
 
 
 def _inner_words(remaining: Remaining, rows: Sequence[int]) -> str:
-    """Return the words for contours within parts: circles are left out where none of them is
-    one."""
+    """Return the words of `select` for contours within parts; they leave circles out if none of
+    the rows is one."""
     other_rows = set(remaining.contours_that_are("inner", "not circle"))
     return '["inner", "not circle"]' if set(rows) <= other_rows else '["inner"]'
 
 
 def _finer(remaining: Remaining, rows: Collection[int]) -> Tool | None:
     """Return the widest end mill of the library that has room beside and within all these
-    contours."""
+    contours, None if there is none."""
     for mill in remaining.proposal.finer_mills if rows else ():
         if not set(remaining.crowded(mill.diameter_mm)) & set(rows):
             return mill
@@ -92,9 +92,10 @@ def _finer(remaining: Remaining, rows: Collection[int]) -> Tool | None:
 def _by_tabs(
     remaining: Remaining, rows: Sequence[int], tool: float
 ) -> list[tuple[Keys, list[int]]]:
-    """Return the key for tabs of twice the tool's diameter, and the contours that it is for: as
-    many as each has room for, at most MAX_TABS, so that they leave it at least as much as they
-    take. Larger contours have as many or more, so that their sizes tell the operations apart."""
+    """Return (key for tabs, rows of the contours that get it) for each number of tabs. Tabs are
+    twice the tool's diameter wide; a contour gets at most MAX_TABS, and no more than leave as much
+    of it free as they take. Larger contours get at least as many as smaller ones, so that the
+    operations can select by size."""
     thickness = remaining.proposal.thickness_mm
     if not thickness:
         return [((), list(rows))]

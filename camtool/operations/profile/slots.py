@@ -50,8 +50,8 @@ NEAR_SHARE = 0.05
 
 
 def checked_slot(operation: Operation, _: Stock | None) -> Operation:
-    """Return the operation; OptionError for a strategy that is not for profiles, for a slot too
-    narrow or too wide, and for what cannot be with one."""
+    """Return the operation unchanged. OptionError for a strategy that profiles do not have, for a
+    slot too narrow or too wide, and for settings that contradict a slot."""
     refuse_strategy(operation, "trochoidal")
     if not operation.makes_slots:
         return operation
@@ -94,8 +94,9 @@ class SlotWall(Struct, frozen=True, eq=False):
 
 
 def without_feet(path: Polyline, tool_mm: float) -> Polyline:
-    """Return the path of a tool along a wall (on its left) as far as the discs reach by which
-    slots are cleared: round in inner corners, where feet of these would engage it more."""
+    """Return the path of a tool along a wall (material on its left) with inner corners rounded to
+    the radius up to which the discs of a slot clear. In the sharp corners left between these discs
+    the finishing pass would be engaged more."""
     radius = FOOT_SHARE * tool_mm
     free_side = reverse_lines(Polylines.of([path]))
     reached = reverse_lines(offset_shape(offset_shape(free_side, radius), -radius))
@@ -115,7 +116,7 @@ class _Band(Struct, frozen=True, eq=False):
 def slot_items(
     walls: list[SlotWall], open_rows: list[int], chosen: Chosen, setting: Setting
 ) -> list[Fixed]:
-    """Return one item for each connected slot beside walls and on open paths."""
+    """Return one item for each connected slot, beside walls and along open paths."""
     bands = list(_beside(walls, chosen, setting.operation))
     spare = setting.operation.spare_mm
     if open_rows:
@@ -126,8 +127,8 @@ def slot_items(
 
 
 def _beside(walls: list[SlotWall], chosen: Chosen, operation: Operation) -> Iterator[_Band]:
-    """Yield the bands beside walls, without the cusps far from these: those of one region
-    together."""
+    """Yield the bands beside walls, one for the walls of each region, without the cusps that
+    trochoids leave on the far side."""
     half = 0.5 * operation.spare_mm
     assert operation.engagement_rad is not None
     cusp = cusp_mm(half, operation.tool.radius_mm, operation.engagement_rad)
@@ -150,7 +151,8 @@ def _beside(walls: list[SlotWall], chosen: Chosen, operation: Operation) -> Iter
 
 
 def _refuse_endless(bands: list[_Band], setting: Setting) -> None:
-    """Raise OptionError for more circles than any machine would make."""
+    """Raise OptionError if the bands would take more circles than is reasonable for any
+    machine."""
     operation = setting.operation
     assert operation.engagement_rad is not None
     half = 0.5 * operation.spare_mm

@@ -58,7 +58,7 @@ SLOT_TOLERANCE_MM = 5e-4
 
 
 class _Line(Struct, frozen=True, eq=False):
-    """A path of the tool centre; what is to stay lies to its left, or (False) to its right;
+    """A path of the tool centre. The material that stays lies to its left (`is_left`) or right;
     `sources`: the chosen paths that it belongs to, the one it mostly follows first."""
 
     path: Polyline
@@ -69,7 +69,7 @@ class _Line(Struct, frozen=True, eq=False):
 
 
 class _Found(Struct, eq=False):
-    """Lines and findings, collected path by path."""
+    """The lines and findings that the functions of this module collect, changed in place."""
 
     lines: list[_Line] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
@@ -117,16 +117,18 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
 
 
 def _add_shapes(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
-    """Round the shapes of all closed paths, each shape at once."""
+    """Add to `line_set` the lines around all closed paths, taken together as the boundaries of
+    shapes."""
     for path_rows in _shapes(chosen, closed):
         _add_shape(chosen, path_rows, setting, line_set)
 
 
 def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
-    """Return the closed paths as the boundaries of one region, or of two.
+    """Return the rows of the closed paths as the boundaries of one region, or of two.
 
-    Those whose side is as they nest among themselves, and those that have the other one because
-    of contours that were not chosen: windows whose plate is not, a part in a window that is not.
+    Two if contours that were not chosen reverse the side of some paths: the windows of a plate
+    without the plate, or a part within a window without the window. These paths form the second
+    region.
     """
     if not closed:
         return []
@@ -137,7 +139,8 @@ def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
 
 
 def _add_shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set: _Found) -> None:
-    """Round a shape of these paths."""
+    """Add to `line_set` the lines around one shape, whose boundary these paths are, and the
+    findings about places that the tool cannot reach or cuts away."""
     from camtool.planning.reach import cut_away_findings, unreached_findings
 
     lines = chosen.lines.select(path_rows)
@@ -158,7 +161,7 @@ def _add_shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set:
 
 
 def _add_each(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Found) -> None:
-    """Round or within each of the closed paths, whatever the others are."""
+    """Add to `line_set` the lines outside or inside each closed path, each path taken alone."""
     from camtool.planning.reach import cut_away_findings
 
     lines = chosen.lines.select(closed)
@@ -180,7 +183,8 @@ def _add_each(chosen: Chosen, closed: list[int], setting: Setting, line_set: _Fo
 def _round(
     chosen: Chosen, path_rows: list[int], shape: Polylines, setting: Setting, line_set: _Found
 ) -> None:
-    """Lines round a shape (on the left of its paths, which are these of the chosen ones)."""
+    """Add to `line_set` the lines around a shape: its offset by the tool's radius and allowance.
+    The shape lies on the left of its paths, which are `path_rows` of the chosen ones."""
     paths = _offset(shape, setting.operation.away_mm, setting)
     sources = _sources(paths, shape)
     for path, along in zip(paths, sources, strict=True):
@@ -199,8 +203,9 @@ def _missing(
     setting: Setting,
     line_set: _Found,
 ) -> None:
-    """Lines along paths of a shape where a tool that is thinner by a hair has room, and findings
-    for the others."""
+    """Add lines along paths of a shape (`missing`, reduced in place) in which only a tool thinner
+    by SLOT_TOLERANCE_MM has room, such as slots as wide as the tool, and findings for the paths
+    that have no room even so."""
     # What is as wide as the tool has room for one that is thinner by a hair.
     paths = _offset(shape, max(setting.operation.away_mm - SLOT_TOLERANCE_MM, 0.0), setting)
     for path, along in zip(paths, _sources(paths, shape), strict=True):
@@ -215,14 +220,14 @@ def _missing(
 
 
 def _offset(shape: Polylines, away_mm: float, setting: Setting) -> Polylines:
-    """Return the lines so far away from a shape, with the joins of the operation."""
+    """Return the offset of a shape by `away_mm`, with the operation's joins at corners."""
     operation = setting.operation
     return offset_shape(shape, -away_mm, joins=operation.joins, mitre_limit=operation.mitre_limit)
 
 
 def _sources(paths: Polylines, shape: Polylines) -> list[tuple[int, ...]]:
-    """For each of the offset paths those of the shape to which its segments are nearest, the one
-    that is nearest to most of them first."""
+    """Return, for each offset path, the paths of the shape that its segments are nearest to, the
+    one nearest to most of them first."""
     if len(paths) == 0:
         return []
     source, segments = Segments.of(shape), Segments.of(paths)
@@ -237,7 +242,8 @@ def _sources(paths: Polylines, shape: Polylines) -> list[tuple[int, ...]]:
 
 
 def _is_double(shape: Polylines, place: int) -> bool:
-    """Return True if an earlier path of the shape runs along all of this one."""
+    """Return True if an earlier path of the shape covers this one, as contours that are drawn
+    twice do."""
     segments = Segments.of(shape)
     own_segments, earlier = segments[segments.path == place], segments[segments.path < place]
     if len(earlier) == 0:
@@ -259,13 +265,13 @@ def _no_room(chosen: Chosen, k: int, outer: bool, setting: Setting) -> Finding:
 
 
 def _box_centre(chosen: Chosen, k: int) -> str:
-    """Return a path and the centre of its box."""
+    """Return the name of a path and the centre of its bounding box, as the place of a finding."""
     return at_place(chosen.names[k], extents(chosen.lines.select([k])).mean(axis=1))
 
 
 def _joined(chosen: Chosen, runs: list[tuple[int, ...]], setting: Setting) -> Iterator[Finding]:
-    """Yield findings of lines that run round several paths at once: between them nothing is
-    cut."""
+    """Yield findings about lines that run around several paths at once, since nothing is cut
+    between these."""
     room = 2.0 * setting.operation.away_mm
     several = [run for run in runs if len(run) > 1]
     path_rows = [row for run in several for row in run]
@@ -290,7 +296,8 @@ def _joined(chosen: Chosen, runs: list[tuple[int, ...]], setting: Setting) -> It
 
 
 def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Finding]) -> _Line:
-    """Return the line with reliefs at the sharp inner corners of the paths that it belongs to."""
+    """Return the line with reliefs (dog bones) at the sharp inner corners of its paths; findings
+    are appended."""
     from camtool.planning.reliefs import add_reliefs
 
     tool, path = setting.operation.tool, line.path
@@ -308,8 +315,8 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
 
 
 def _side_contours(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contour]:
-    """Return the lines as the operation's direction has them: climbing, what is to stay is on the
-    right."""
+    """Return the lines as contours in the operation's direction: with climb, the material that
+    stays lies to the right."""
     direction = setting.operation.direction
     paths, left_flags = (
         Polylines.of(line.path for line in lines),
@@ -336,7 +343,8 @@ def _side_contours(lines: list[_Line], chosen: Chosen, setting: Setting) -> list
 
 
 def _starts(path: Polyline, plain_path: Polyline | None) -> Ints:
-    """Return the vertices at which a path with reliefs may begin: not at the tip of one."""
+    """Return the indices of the vertices at which a path with reliefs may begin: joints outside
+    the reliefs."""
     if plain_path is None:
         return NO_STARTS
     own_places = {tuple(place) for place in plain_path.vertices[:, :2].tolist()}
@@ -354,9 +362,10 @@ def _no_side(chosen: Chosen, k: int, side: str) -> Finding:
 
 
 def _far_corners(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Finding]:
-    """Yield corners of the tool's path that lie far from the drawn corner that they go round.
+    """Yield findings for corners of the tool's path that lie far from the drawn corner, as sharp
+    and mitred joins do.
 
-    At a corner of the angle α the straight sides meet at away / sin(α/2) from it.
+    At a corner of angle α the straight sides of the path meet at away / sin(α/2) from it.
     """
     max_distance = FAR_CORNER * setting.operation.away_mm
     for line in lines:

@@ -59,7 +59,8 @@ def _above_zero(operation: Operation, *names: str) -> None:
 
 
 def checked(operation: Operation, _: Stock | None) -> Operation:
-    """Return the operation; OptionError for a bar without diameter and flanks that are none."""
+    """Return the operation unchanged; OptionError for a bar without diameter, and for impossible
+    flank angles."""
     _above_zero(operation, "bar", "lead_angle", "trail_angle")
     if not 0.0 <= operation.own_value("face") < math.inf:
         raise OptionError(
@@ -77,8 +78,8 @@ def checked(operation: Operation, _: Stock | None) -> Operation:
 
 
 def checked_thread(operation: Operation, _: Stock | None) -> Operation:
-    """Return the operation; OptionError for a thread without its sizes, or deeper than its
-    radius."""
+    """Return the operation unchanged; OptionError for a thread without its sizes, or deeper than
+    its radius."""
     _above_zero(operation, "thread_pitch", "thread_major", "thread_length")
     depth, radius = thread_depth_mm(operation), 0.5 * operation.own_value("thread_major")
     if depth >= radius:
@@ -97,7 +98,7 @@ def checked_thread(operation: Operation, _: Stock | None) -> Operation:
 
 
 def checked_parting(operation: Operation, _: Stock | None) -> Operation:
-    """Return the operation; OptionError for a bar or a blade without width."""
+    """Return the operation unchanged; OptionError for a bar or a blade without width."""
     _above_zero(operation, "bar")
     if operation.own_value("part_at") is None or not operation.tool.diameter_mm:
         raise OptionError(
@@ -109,7 +110,8 @@ def checked_parting(operation: Operation, _: Stock | None) -> Operation:
 
 
 def thread_depth_mm(operation: Operation) -> float:
-    """Return the depth of a thread: as given, or that of an outer ISO thread."""
+    """Return the depth of a thread, mm: as given, or that of an external ISO thread of its
+    pitch."""
     pitch: float = operation.own_value("thread_pitch")
     return SHARP_DEPTH * pitch if operation.depth_mm is None else operation.depth_mm
 
@@ -192,8 +194,8 @@ def _length(path: Polyline) -> float:
 
 
 def _beside(section: Floats, distance: float) -> Floats:
-    """Return the path (n, 3) at a distance outside of a section: from its end, or the axis, to
-    where the section ends at the chuck."""
+    """Return the path (n, 3) of the nose's centre at a distance outside a section, from its end
+    (or the axis) to where the section ends at the chuck."""
     (x0, y0), (x1, y1) = section[0, :2].tolist(), section[-1, :2].tolist()
     far = 10.0 * (abs(x0 - x1) + float(section[:, 1].max()) + distance)
     around = [[x1 - far, y1, 0.0], [x1 - far, -far, 0.0], [x0, -far, 0.0]]
@@ -225,7 +227,8 @@ def _beside(section: Floats, distance: float) -> Floats:
 
 
 def _runs(section: Floats, setting: Setting, name: str) -> tuple[list[CutRun], list[Finding]]:
-    """Return the one run that cuts a section, and what the nose leaves."""
+    """Return the run that cuts a section in levels and finishes it, and findings about what the
+    nose leaves."""
     operation, feed = setting.operation, setting.feeds.cut_mm_min
     nose, bar = operation.tool.radius_mm, 0.5 * operation.own_value("bar")
     clear = min(CLEAR_SHARE * bar, MAX_CLEAR_MM)
@@ -269,8 +272,8 @@ def _runs(section: Floats, setting: Setting, name: str) -> tuple[list[CutRun], l
 
 
 def _spans(path: Floats, height: float, right: float) -> list[tuple[float, float]]:
-    """Return the stretches (right, left) of a height that lie above a path, which runs to the left
-    from the place `right` on."""
+    """Return the stretches (right, left) of a level at this height that are free of the part:
+    those above the path, which runs to the left. `right`: X at which the level begins."""
     crossings: list[float] = []
     segments = Segments.of(Polyline(path))
     for k in range(len(segments)):
@@ -310,7 +313,8 @@ def _spans(path: Floats, height: float, right: float) -> list[tuple[float, float
 def _left_by_nose(
     section: Floats, finish: Floats, nose: float, name: str, operation: Operation
 ) -> list[Finding]:
-    """Return a finding for the corner in which the nose leaves most."""
+    """Return a finding for the inner corner in which the round nose leaves most, [] if it leaves
+    nothing."""
     if not nose:
         return []
     line = Polyline(section)
@@ -325,8 +329,8 @@ def _left_by_nose(
 
 
 def _overhang(section: Floats, name: str) -> Finding:
-    """Return the length that stands out of the chuck, over the thinnest diameter behind the
-    end."""
+    """Return the finding about the overhang: the length that stands out of the chuck, and its
+    ratio to the thinnest diameter."""
     length = float(section[0, 0] - section[-1, 0])
     radii = section[:, 1]
     thin = 2.0 * float(radii[radii > POSITION_EPS_MM].min(initial=math.inf))
@@ -334,7 +338,7 @@ def _overhang(section: Floats, name: str) -> Finding:
 
 
 def thread(_: Chosen, setting: Setting) -> Work:
-    """Return one run: passes of equal area of chip, and one more along the last."""
+    """Return one run: threading passes of equal chip area, and one spring pass along the last."""
     operation = setting.operation
     pitch, major = operation.own_value("thread_pitch"), operation.own_value("thread_major")
     speed = setting.spindle_rpm
@@ -388,7 +392,8 @@ def thread(_: Chosen, setting: Setting) -> Work:
 
 
 def part_off(_: Chosen, setting: Setting) -> Work:
-    """Return one run: the blade to the axis, beside the part's end, and out again."""
+    """Return one run that parts off: the blade to the axis beside the part's end, and out
+    again."""
     operation = setting.operation
     bar, half = 0.5 * operation.own_value("bar"), operation.tool.radius_mm
     x, clear = operation.own_value("part_at") - half, min(CLEAR_SHARE * bar, MAX_CLEAR_MM)

@@ -101,9 +101,9 @@ class _Region(Struct, frozen=True, eq=False):
 
 
 def vcarve(chosen: Chosen, setting: Setting) -> Work:
-    """Return one Fixed item for each region: what an even-odd reading of the closed paths fills.
+    """Return one Fixed item for each region that the closed paths enclose (even-odd).
 
-    Where paths cross it is not defined what is filled: a finding of severity error, and no items.
+    If paths cross, the regions are undefined: a finding of severity error, and no items.
     OptionError for an open path and for a tool that is no V bit.
     """
     cone = Cone.of(setting.operation)
@@ -134,7 +134,7 @@ def _refuse_open(chosen: Chosen, operation: Operation) -> None:
 
 
 def _crossings(chosen: Chosen) -> Iterator[Finding]:
-    """Yield the places where paths cross themselves or each other."""
+    """Yield findings for the places where paths cross themselves or each other."""
     segments = Segments.of(chosen.lines)
     rows, zeros = np.arange(len(segments)), np.zeros(len(segments), dtype=np.int64)
     every = np.ones(len(segments), dtype=np.bool_)
@@ -163,7 +163,7 @@ def _regions(chosen: Chosen) -> Iterator[_Region]:
 
 
 def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed], list[Finding]]:
-    """Return the item of one region, none if the tip fits nowhere, and its findings."""
+    """Return the item of one region ([] if the tip fits nowhere) and its findings."""
     boundary, trace = medial_trace(region.lines, CARVE_TOLERANCE_MM)
     limits = [cone.tip_mm, *(cone.radius_at(-level) for level in setting.levels_mm)]
     for limit in sorted(set(limits)):
@@ -185,8 +185,8 @@ def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed],
 
 
 def _walks(trace: MedialTrace, floor: list[Floats], band: Band, again_mm: float) -> list[Floats]:
-    """Return the paths of the tip in one band of depths: the grooves, the walls, and the centre
-    of a round region."""
+    """Return the paths (n, 4) of the tip in one band of radii: walks over the grooves and walls,
+    and a single point for a round region that these do not pass."""
     graph = pruned(graph_of([*grooves(trace, band), *floor]), band.tolerance_mm)
     largest = trace.discs[int(np.argmax(trace.rho))]
     is_cut = band.low_mm < largest[2] <= band.high_mm
@@ -195,8 +195,8 @@ def _walks(trace: MedialTrace, floor: list[Floats], band: Band, again_mm: float)
 
 
 def _passed_by(pieces: list[Floats], point: Floats) -> float:
-    """Return the distance of a point from the nearest of the pieces in the plane, mm; inf if
-    there are none."""
+    """Return the distance in the plane from a point to the nearest piece, mm; inf if there are
+    none."""
     rows = [np.column_stack([piece[:-1], piece[1:, :2]]) for piece in pieces]
     if not rows:
         return math.inf
@@ -206,7 +206,7 @@ def _passed_by(pieces: list[Floats], point: Floats) -> float:
 
 
 def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> CutRun:
-    """Return the run along a path (n, 4) of x, y, rho, bulge."""
+    """Return the run of the tip along a path (n, 4) of x, y, disc radius, bulge."""
     vertices = np.column_stack([path[:, :2], 0.0 - cone.depth_of(path[:, 2]), path[:, 3]])
     return CutRun(
         vertices, feeds_along(vertices, setting.feeds), setting.feeds.plunge_mm_min, name
@@ -214,8 +214,8 @@ def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> CutRun:
 
 
 def _too_narrow(region: _Region, trace: MedialTrace, cone: Cone) -> Iterator[Finding]:
-    """Yield a finding for what a flat tip cannot enter: all of the region, or its corners and
-    narrow places."""
+    """Yield a finding for places that the flat tip of the bit cannot enter: the whole region, or
+    its corners and narrow places."""
     tip, widest = 2.0 * cone.tip_mm, 2.0 * float(trace.rho.max())
     if widest <= tip:
         yield CONTOUR_TOO_SMALL_FOR_TIP(
@@ -248,8 +248,8 @@ def _limited(
 
 
 class Band(Struct, frozen=True):
-    """Radii mm from `low` to `high`, what the pass before has left and what this one may cut; and
-    the tolerance, mm."""
+    """The disc radii that one pass cuts, mm: above `low`, which the pass before has cut, up to
+    `high`; and the tolerance of fitted arcs, mm."""
 
     low_mm: float
     high_mm: float
@@ -257,7 +257,7 @@ class Band(Struct, frozen=True):
 
 
 def with_level(boundary: Boundary, trace: MedialTrace, level_mm: float) -> MedialTrace:
-    """Return the trace with a row of exactly this radius wherever the radius passes it."""
+    """Return the trace with a row added wherever its radius passes exactly `level_mm`."""
     is_level = np.abs(trace.rho - level_mm) <= LEVEL_EPS_MM
     trace = _with_radius(trace, np.where(is_level, level_mm, trace.rho))
     above = np.sign(trace.rho - level_mm)
@@ -282,10 +282,10 @@ def _with_radius(trace: MedialTrace, rho: Floats) -> MedialTrace:
 
 
 def grooves(trace: MedialTrace, band: Band) -> list[Floats]:
-    """Return pieces (n, 4) of x, y, rho, bulge: the axis within the band, each piece once; an arc
-    whose radius changes changes it evenly along its sweep.
+    """Return pieces (n, 4) of x, y, rho, bulge: the parts of the medial axis whose disc radius rho
+    is within the band, each once. Along an arc the radius changes evenly with the sweep.
 
-    `trace` has rows at both limits of the band.
+    `trace` must have rows at both limits of the band (`with_level`).
     """
     rho = trace.rho
     low_rho, high_rho = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
@@ -306,8 +306,8 @@ def grooves(trace: MedialTrace, band: Band) -> list[Floats]:
 
 
 def walls(boundary: Boundary, trace: MedialTrace, high_mm: float) -> list[Floats]:
-    """Return pieces (2, 4) of x, y, rho, bulge beside the boundary where discs are larger than
-    high."""
+    """Return pieces (2, 4) of x, y, rho, bulge: parallels of the boundary at the distance
+    `high_mm`, wherever the discs are larger than that."""
     rho = trace.rho
     low_rho, high_rho = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
     same_element = trace.element[1:] == trace.element[:-1]
@@ -319,7 +319,8 @@ def walls(boundary: Boundary, trace: MedialTrace, high_mm: float) -> list[Floats
 
 
 def floor_area(pieces: list[Floats]) -> float:
-    """Area within the walls, mm²: they run round it with the floor on their left."""
+    """Return the area of the floor between the walls, mm²; the walls run round it with the floor
+    on their left."""
     total = 0.0
     for piece in pieces:
         (ax, ay, _, bulge), (bx, by, _, _) = piece.tolist()
@@ -333,7 +334,8 @@ def floor_area(pieces: list[Floats]) -> float:
 def _index_runs(
     trace: MedialTrace, is_wanted: Bools, partners: bool = True
 ) -> list[tuple[int, int]]:
-    """First and last rows of the runs of wanted gaps, within an element (and one partner)."""
+    """Return (first row, last row) of each run of consecutive wanted gaps between rows of the
+    trace; a run stays on one element of the boundary (and with `partners` on one partner)."""
     is_joined = is_wanted[1:] & is_wanted[:-1] & (trace.element[2:] == trace.element[:-2])
     if partners:
         is_joined &= trace.partner[2:] == trace.partner[:-2]
@@ -345,7 +347,8 @@ def _index_runs(
 def _wall(
     boundary: Boundary, element: int, part: tuple[float, float], distance_mm: float
 ) -> Floats:
-    """Return the parallel of a part of an element: a line, or an arc of the same sweep."""
+    """Return the parallel (2, 4) of a part of a boundary element: a line, or an arc of the same
+    sweep."""
     rows = []
     for t in part:
         x, y, nx, ny = frame(boundary.table, element, t)
@@ -355,7 +358,8 @@ def _wall(
 
 
 def _fitted(discs: Floats, tolerance_mm: float) -> Floats:
-    """Return lines and arcs through some of the discs (n, 3), all others within the tolerance."""
+    """Return lines and arcs (n, 4) through some of the discs (n, 3) x, y, rho; the others lie
+    within the tolerance of these."""
     pieces, waiting = [], [(0, len(discs) - 1)]
     while waiting:
         i, j = waiting.pop()
@@ -369,8 +373,8 @@ def _fitted(discs: Floats, tolerance_mm: float) -> Floats:
 
 
 def _bulge(discs: Floats, tolerance_mm: float) -> float | None:
-    """Return the bulge of the line (0) or arc that stands for these discs; None if neither
-    does."""
+    """Return the bulge of the line (0) or arc from the first to the last disc that keeps the
+    others within the tolerance; None if there is none."""
     inner = discs[1:-1]
     begin, end = discs[:1], discs[-1:]
     if len(inner) == 0 or off_chord(inner, begin, end).max() <= tolerance_mm:
@@ -389,8 +393,8 @@ def _bulge(discs: Floats, tolerance_mm: float) -> float | None:
 
 
 def _off_arc(inner: Floats, begin: Floats, end: Floats, bulge: float) -> float:
-    """Return distances of discs from an arc along which the radius changes evenly with the
-    sweep."""
+    """Return the distances of discs (x, y, rho) from an arc along which the radius changes evenly
+    with the sweep."""
     chord = end[:2] - begin[:2]
     normal = np.array([-chord[1], chord[0]])
     centre = 0.5 * (begin[:2] + end[:2]) + (1.0 - bulge**2) / (4.0 * bulge) * normal
@@ -403,7 +407,8 @@ def _off_arc(inner: Floats, begin: Floats, end: Floats, bulge: float) -> float:
 
 
 class Graph(Struct, frozen=True, eq=False):
-    """P pieces between V places: `ends` (P, 2) rows of `places` (V, 3) of x, y, rho."""
+    """A graph of pieces of paths: P `pieces` between V `places` (V, 3) of x, y, rho; `ends` (P, 2)
+    are the rows of the places where each piece begins and ends."""
 
     pieces: list[Floats]
     ends: Ints
@@ -411,8 +416,8 @@ class Graph(Struct, frozen=True, eq=False):
 
 
 def graph_of(pieces: list[Floats]) -> Graph:
-    """Return the graph of pieces (n, 4) of x, y, rho, bulge; those that go nowhere are left
-    out."""
+    """Return the graph of pieces (n, 4) of x, y, rho, bulge; pieces without length are
+    left out."""
     pieces = [piece for piece in pieces if _extent(piece) > MEET_MM]
     if not pieces:
         return Graph([], np.empty((0, 2), dtype=np.int64), np.empty((0, 3)))
@@ -423,8 +428,8 @@ def graph_of(pieces: list[Floats]) -> Graph:
 
 
 def _extent(piece: Floats) -> float:
-    """Return the greatest distance of the points of a piece from its start; above 0 for a full
-    turn."""
+    """Return the greatest distance of the points of a piece from its start; for a full turn, which
+    ends where it starts, this is still above 0."""
     return float(np.hypot(*(piece[1:, :2] - piece[0, :2]).T).max())
 
 
@@ -460,7 +465,7 @@ def pruned(graph: Graph, tolerance_mm: float) -> Graph:
 
 
 def _pieces_at(graph: Graph) -> list[list[int]]:
-    """Return the pieces that end at each place; twice where both ends do."""
+    """Return the rows of the pieces that end at each place; a loop is listed twice."""
     at_place: list[list[int]] = [[] for _ in range(len(graph.places))]
     for row, (a, b) in enumerate(graph.ends.tolist()):
         at_place[a].append(row)
@@ -469,15 +474,13 @@ def _pieces_at(graph: Graph) -> list[list[int]]:
 
 
 def walks(graph: Graph, again_mm: float) -> list[Floats]:
-    """Return all pieces, joined to as few walks (n, 4) of x, y, rho, bulge as possible.
+    """Join all pieces to as few walks (n, 4) of x, y, rho, bulge as possible, and return these.
 
-    A connected graph in which 2k places have an odd number of ends is walked in k walks (in one
-    when k is 0): it is joined by k jumps between near places to one closed walk, that is found
-    piece by piece (Hierholzer), and cut where the tool would jump. Short pieces between two such
-    places are walked twice instead, into a corner and back, which saves a jump each.
-
-    Pieces up to `again_mm` long may be walked twice. A walk begins at that of its ends where the
-    disc is smaller.
+    A connected graph with 2k places of odd degree needs k walks (one if k is 0). It is joined by k
+    jumps between near places to one closed walk, which is found piece by piece (Hierholzer) and
+    cut at the jumps, where the tool is lifted. Short pieces between two such places (up to
+    `again_mm` long) are walked twice instead, into a corner and back, which saves a jump each. A
+    walk begins at the end with the smaller disc.
     """
     graph = _doubled(graph, again_mm)
     ends = np.concatenate([graph.ends, _jumps(graph)])
@@ -496,8 +499,8 @@ def walks(graph: Graph, again_mm: float) -> list[Floats]:
 
 
 def _doubled(graph: Graph, again_mm: float) -> Graph:
-    """Return the graph with a second one of each short piece between two places with an odd
-    number of ends; the shortest first, each place once."""
+    """Return the graph with short pieces between two places of odd degree repeated, the shortest
+    first and at most one piece for each place, so that these degrees become even."""
     odd = np.bincount(graph.ends.ravel(), minlength=len(graph.places)) % 2 == 1
     lengths = [float(lengths_of(piece).sum()) for piece in graph.pieces]
     repeated = []
@@ -511,7 +514,7 @@ def _doubled(graph: Graph, again_mm: float) -> Graph:
 
 
 def lengths_of(path: Floats) -> Floats:
-    """Return (n−1,) lengths in the plane of the lines and arcs of a path (n, 4)."""
+    """Return the lengths (n − 1,) in the plane of the lines and arcs of a path (n, 4), mm."""
     chord = np.hypot(*np.diff(path[:, :2], axis=0).T)
     bulge = path[:-1, 3]
     safe = np.where(bulge != 0.0, bulge, 1.0)
@@ -520,7 +523,8 @@ def lengths_of(path: Floats) -> Floats:
 
 
 def _jumps(graph: Graph) -> Ints:
-    """Return (k, 2) pairs of the places of one component that have an odd number of ends."""
+    """Return (k, 2) pairs of places of odd degree, each with the nearest one of the same
+    component."""
     degree = np.bincount(graph.ends.ravel(), minlength=len(graph.places))
     component = _components(graph)
     odd = np.flatnonzero(degree % 2).tolist()
@@ -536,7 +540,7 @@ def _jumps(graph: Graph) -> Ints:
 
 
 def _components(graph: Graph) -> list[int]:
-    """Return the component of each place."""
+    """Return the number of the connected component of each place."""
     root = list(range(len(graph.places)))
 
     def top(row: int) -> int:
@@ -552,7 +556,8 @@ def _components(graph: Graph) -> list[int]:
 
 
 def _circuits(ends: Ints, count: int) -> Iterator[list[tuple[int, bool]]]:
-    """Closed walks (row, backwards) over all edges, one for each component; all degrees even."""
+    """Yield an Eulerian circuit for each component, as (row of the edge, True if walked
+    backwards). All `count` places must have even degree."""
     edges: list[list[int]] = [[] for _ in range(count)]
     for row, (a, b) in enumerate(ends.tolist()):
         edges[a].append(row)
@@ -579,7 +584,7 @@ def _circuits(ends: Ints, count: int) -> Iterator[list[tuple[int, bool]]]:
 
 
 def _cut(circuit: list[tuple[int, bool]], count: int) -> list[list[tuple[int, bool]]]:
-    """Return the walks between the jumps (rows from `count` on) of a closed walk."""
+    """Return the walks into which the jumps (rows from `count` on) divide a closed walk."""
     first = next((i for i, (row, _) in enumerate(circuit) if row >= count), None)
     if first is None:
         return [circuit]
