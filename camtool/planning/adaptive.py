@@ -762,6 +762,7 @@ def adaptive_runs(
 ) -> list[CutRun]:
     """Return the runs that clear one connected tool centre region at all levels, in order, but for
     what is air at a level; none where nothing is left, or it is too narrow for a helix."""
+    refuse_feeds_and_lift(setting)
     operation = setting.operation
     tool_mm = operation.tool.radius_mm
     backward = operation.direction == "conventional"
@@ -786,6 +787,25 @@ def refuse_strategy(operation: Operation, own_strategy: str) -> None:
             f"a {operation.kind} has no strategy {strategy!r}",
             where=key_of(operation, "strategy"),
             mend=f'give strategy = "{own_strategy}"',
+        )
+
+
+def refuse_feeds_and_lift(setting: Setting) -> None:
+    """Refuse a greatest feed below the feed, and a lift out of the first pass."""
+    operation, feed = setting.operation, setting.feeds.cut_mm_min
+    max_feed = operation.own_value("max_feed")
+    if max_feed is not None and max_feed < feed:
+        raise OptionError(
+            f"a greatest feed of {max_feed:g} mm/min is below the feed of {feed:g} mm/min",
+            where=key_of(operation, "max_feed"),
+            mend="give a higher one, or leave it out",
+        )
+    lift_mm, first_mm = operation.own_value("lift"), -setting.levels_mm[0]
+    if lift_mm > first_mm:
+        raise OptionError(
+            f"a lift of {lift_mm:g} mm takes links out of a pass {first_mm:g} mm deep",
+            where=key_of(operation, "lift"),
+            mend="give a smaller one",
         )
 
 
@@ -867,19 +887,6 @@ def _with_feeds(clearing: AdaptiveStays, setting: Setting) -> list[tuple[Floats,
     legs = [leg for stay in clearing.stays for leg in stay]
     cuts = [(leg.vertices, np.full(len(leg.vertices) - 1, feed)) for leg in legs]
     max_feed = operation.own_value("max_feed")
-    if max_feed is not None and max_feed < feed:
-        raise OptionError(
-            f"a greatest feed of {max_feed:g} mm/min is below the feed of {feed:g} mm/min",
-            where=key_of(operation, "max_feed"),
-            mend="give a higher one, or leave it out",
-        )
-    lift_mm, first_mm = operation.own_value("lift"), -setting.levels_mm[0]
-    if lift_mm > first_mm:
-        raise OptionError(
-            f"a lift of {lift_mm:g} mm takes links out of a pass {first_mm:g} mm deep",
-            where=key_of(operation, "lift"),
-            mend="give a smaller one",
-        )
     if max_feed is not None and legs:
         tool_mm, limit = operation.tool.radius_mm, operation.own_value("engagement")
         rows = [_chords_of(leg, tool_mm) for leg in legs]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from pathlib import Path
 
 import ezdxf
@@ -38,8 +39,16 @@ def adaptive(
     paths: list[Polyline], diameter_mm: float, limit: float, **options: object
 ) -> list[CutRun]:
     own = (("strategy", "adaptive"), ("engagement_rad", limit))
-    entry = Entry("helix", angle_rad=math.radians(5.0))
-    return runs_of(work_of(paths, diameter_mm, own=own, entry=entry, **options))
+    return runs_of(work_of(paths, diameter_mm, own=own, entry=HELIX, **options))
+
+
+LIMIT = math.acos(1.0 - 2.0 * 0.12)
+
+
+@cache
+def square_runs() -> list[CutRun]:
+    """Return the runs of the square at LIMIT, with one feed and no lift."""
+    return adaptive([SQUARE], 1.2, LIMIT)
 
 
 @pytest.mark.parametrize("shape", ["square", "star"])
@@ -49,22 +58,18 @@ def test_all_within_reach_is_cleared_and_nothing_else(shape: str) -> None:
     assert complaints(runs, region_of(QUICK[shape]), 0.65, -1.0, share=SHARE) == []
 
 
-@pytest.mark.parametrize(("shape", "part"), [("square", 0.12), ("plate", 0.3)])
-def test_the_engagement_keeps_to_its_limit(shape: str, part: float) -> None:
-    limit = math.acos(1.0 - 2.0 * part)
-    runs = adaptive(QUICK[shape], 1.2, limit)
-    assert len([run for run in runs if run.vertices[0, 2] == 0.0]) == 1
-    engaged = greatest_engagement(runs, 0.6, 4e-3 * 0.6)
-    assert 0.7 * limit < engaged <= 1.02 * limit
+def test_the_engagement_keeps_to_its_limit() -> None:
+    wide = math.acos(1.0 - 2.0 * 0.3)
+    for runs, limit in ((square_runs(), LIMIT), (adaptive(PLATE, 1.2, wide), wide)):
+        assert len([run for run in runs if run.vertices[0, 2] == 0.0]) == 1
+        engaged = greatest_engagement(runs, 0.6, 4e-3 * 0.6)
+        assert 0.7 * limit < engaged <= 1.02 * limit
 
 
 def test_the_feed_rises_on_the_same_path() -> None:
     """Lines and arcs are split where the feed changes, between `feed` (600) and `max_feed`."""
-    limit = math.acos(1.0 - 2.0 * 0.12)
-    own = (("strategy", "adaptive"), ("engagement_rad", limit), ("max_feed_mm_min", 1800.0))
-    entry = Entry("helix", angle_rad=math.radians(5.0))
-    plain = adaptive([SQUARE], 1.2, limit)
-    runs = runs_of(work_of([SQUARE], 1.2, own=own, entry=entry))
+    own = (("strategy", "adaptive"), ("engagement_rad", LIMIT), ("max_feed_mm_min", 1800.0))
+    plain, runs = square_runs(), runs_of(work_of([SQUARE], 1.2, own=own, entry=HELIX))
     assert len(runs) == len(plain)
     for run, same in zip(runs, plain, strict=True):
         assert length_of(run) == pytest.approx(length_of(same), rel=1e-4)
@@ -77,11 +82,8 @@ def test_the_feed_rises_on_the_same_path() -> None:
 
 def test_links_are_lifted_and_nothing_else() -> None:
     """Strokes are the same; links rise by 45 degrees at most, up to the lift."""
-    limit = math.acos(1.0 - 2.0 * 0.12)
-    own = (("strategy", "adaptive"), ("engagement_rad", limit), ("lift_mm", 0.1))
-    entry = Entry("helix", angle_rad=math.radians(5.0))
-    plain = adaptive([SQUARE], 1.2, limit)
-    runs = runs_of(work_of([SQUARE], 1.2, own=own, entry=entry))
+    own = (("strategy", "adaptive"), ("engagement_rad", LIMIT), ("lift_mm", 0.1))
+    plain, runs = square_runs(), runs_of(work_of([SQUARE], 1.2, own=own, entry=HELIX))
     highest = -1.0
     for run, same in zip(runs, plain, strict=True):
         assert np.array_equal(run.vertices[:, [0, 1, 3]], same.vertices[:, [0, 1, 3]])
@@ -93,16 +95,15 @@ def test_links_are_lifted_and_nothing_else() -> None:
     assert highest == pytest.approx(0.1)
 
 
-def test_a_lift_out_of_the_first_pass_is_refused() -> None:
-    own = (("strategy", "adaptive"), ("lift_mm", 1.1))
-    with pytest.raises(OptionError, match="a lift of"):
-        work_of([SQUARE], 1.2, own=own, entry=Entry("helix", angle_rad=0.1))
-
-
-def test_a_greatest_feed_below_the_feed_is_refused() -> None:
-    own = (("strategy", "adaptive"), ("max_feed_mm_min", 500.0))
-    with pytest.raises(OptionError, match="greatest feed"):
-        work_of([SQUARE], 1.2, own=own, entry=Entry("helix", angle_rad=0.1))
+@pytest.mark.parametrize(
+    ("own", "words"),
+    [(("lift_mm", 1.1), "a lift of"), (("max_feed_mm_min", 500.0), "greatest feed")],
+)
+def test_a_lift_out_of_the_first_pass_and_a_low_greatest_feed_are_refused(
+    own: tuple[str, float], words: str
+) -> None:
+    with pytest.raises(OptionError, match=words):
+        work_of([SQUARE], 1.2, own=(("strategy", "adaptive"), own), entry=HELIX)
 
 
 @pytest.mark.slow
@@ -130,7 +131,7 @@ def test_both_sides_of_a_neck_that_no_disc_passes_are_cleared() -> None:
 def test_slots_in_which_no_limit_holds_are_named(wide_mm: float) -> None:
     slot = closed((0, 0), (20, 0), (20, wide_mm), (0, wide_mm))
     own = (("strategy", "adaptive"), ("engagement_rad", math.radians(50.0)))
-    work = work_of([slot], 2.0, own=own, entry=Entry("helix", angle_rad=0.1))
+    work = work_of([slot], 2.0, own=own, entry=HELIX)
     (finding,) = (each for each in work.findings if each.code.name == "SLOT_AS_WIDE")
     assert finding.measured == pytest.approx(wide_mm, abs=1e-3)
     assert "X" in finding.where
@@ -159,9 +160,9 @@ def test_the_scallop_of_corners_is_named_and_nothing_else_is_left(tmp_path: Path
 
 def test_conventional_is_the_mirror_image_of_climb() -> None:
     limit = math.acos(1.0 - 2.0 * 0.2)
-    climb = adaptive(PLATE, 1.6, limit)
-    turned = [mirrored(path) for path in PLATE]
-    conventional = adaptive(turned, 1.6, limit, direction="conventional")
+    wedge = closed((0, 0), (8, 0), (0, 6))
+    climb = adaptive([wedge], 1.6, limit)
+    conventional = adaptive([mirrored(wedge)], 1.6, limit, direction="conventional")
     total = [sum(length_of(run) for run in runs) for runs in (climb, conventional)]
     assert total[0] == pytest.approx(total[1], rel=0.02)
 
@@ -265,7 +266,7 @@ def test_the_limit_is_proved_on_the_predicted_slides(tmp_path: Path) -> None:
         spindle_rpm=9000.0,
         plunge_feed_mm_min=60.0,
         own=(("strategy", "adaptive"), ("engagement_rad", math.radians(50.0))),
-        entry=Entry("helix", angle_rad=math.radians(5.0)),
+        entry=HELIX,
     )
     job = Job(operations=(operation,))
     names = []

@@ -82,8 +82,8 @@ def beside(stock: Stock) -> shapely.Geometry:
 
 
 OPEN = {
-    "right": [box(20, 8, 44, 22)],
-    "corner with an island": [box(12, 10, 45, 36), closed((24, 18), (30, 20), (25, 25))],
+    "right": [box(30, 8, 44, 20)],
+    "corner with an island": [box(25, 15, 44, 34), closed((31, 21), (35, 22), (31, 25))],
     "through": [box(-4, 10, 44, 20)],
     "part by part": [closed((-4, 5), (44, 5), (44, 25), (30, 25), (30, 15.02), (-4, 15.02))],
     "all round an island": [box(-5, -5, 45, 35), box(15, 10, 25, 20)],
@@ -106,21 +106,27 @@ def test_open_pockets_of_all_kinds(name: str) -> None:
 
 
 def test_without_a_place_beside_the_stock_it_begins_with_a_helix() -> None:
-    (step,) = steps_of([box(20, 8, 42.9, 22)], adaptive(), stock=STOCK)
+    (step,) = steps_of([box(32, 8, 42.9, 18)], adaptive(), stock=STOCK)
     assert [run.vertices[0, 2] for run in step.runs if run.vertices[0, 2] == 0.0] == [0.0]
-    (step,) = steps_of([box(20, 8, 43.3, 22)], adaptive(), stock=STOCK)
+    (step,) = steps_of([box(32, 8, 43.3, 18)], adaptive(), stock=STOCK)
     assert {run.vertices[0, 2] for run in step.runs} == {-2.0}
 
 
 PLATE = [box(0, 0, 30, 20), box(14, 8, 18, 12)]
 
 
-@pytest.mark.parametrize("wide", [{}, {"own": OWN}])
-def test_behind_a_wider_tool_only_the_rest_is_cut(wide: dict[str, object]) -> None:
-    first, rest = steps_of(PLATE, passes(**wide), adaptive(rest="wide", depth_mm=None), stock=None)
-    (alone,) = steps_of(PLATE, adaptive())
+@pytest.mark.parametrize(
+    ("paths", "wide"),
+    [(PLATE, {}), ([box(0, 0, 15, 12)], {"own": OWN})],
+    ids=["passes", "adaptive"],
+)
+def test_behind_a_wider_tool_only_the_rest_is_cut(
+    paths: list[Polyline], wide: dict[str, object]
+) -> None:
+    first, rest = steps_of(paths, passes(**wide), adaptive(rest="wide", depth_mm=None), stock=None)
+    (alone,) = steps_of(paths, adaptive())
     air = swept(at_depth(list(first.runs), -2.0), 4.0, CHORD_RAD)
-    check(list(rest.runs), PLATE, air)
+    check(list(rest.runs), paths, air)
     assert len(rest.runs) == 1
     assert cut_mm(rest) < 0.3 * cut_mm(alone)
 
@@ -131,7 +137,7 @@ def cut_mm(step: Step) -> float:
 
 
 def test_what_others_cleared_is_air_as_far_as_they_are_deep_enough() -> None:
-    paths = [box(0, 0, 30, 20), box(0, 0, 16, 20), closed((20, 10, 1), (25, 10, 1))]
+    paths = [box(0, 0, 18, 12), box(0, 0, 9, 12), closed((11, 6, 1), (16, 6, 1))]
     layers = "PAB"
     before = (
         passes(layers=("A",), depth_mm=1.0),
@@ -163,8 +169,7 @@ def test_levels_that_were_faced_are_left_out() -> None:
     assert {float(run.vertices[:, 2].min()) for run in last.runs} == {-2.0}
 
 
-@pytest.mark.parametrize(("angle", "flipped"), [(0.5, False), (2.0, True)])
-def test_turned_and_mirrored_pockets_are_cleared_alike(angle: float, flipped: bool) -> None:
+def test_turned_and_mirrored_pockets_are_cleared_alike() -> None:
     """The order of strokes may differ, the strokes do not."""
 
     def cut(paths: list[Polyline], air: Polylines) -> float:
@@ -174,17 +179,16 @@ def test_turned_and_mirrored_pockets_are_cleared_alike(angle: float, flipped: bo
         strokes = [leg.vertices for stay in clearing.stays for leg in stay if leg.cuts]
         return sum(length(Polyline(each)) for each in strokes)
 
-    def other(path: Polyline) -> Polyline:
-        path = rotate(moved(path, -3.0, 2.0), angle)
-        return mirrored(Polylines.of([path]))[0] if flipped else path
+    def turned(paths: list[Polyline], angle: float, flipped: bool) -> Polylines:
+        there = Polylines.of([rotate(moved(path, -3.0, 2.0), angle) for path in paths])
+        return mirrored(there) if flipped else there
 
-    paths = [box(20, 8, 46, 22), closed((30, 13, 1), (34, 13, 1))]
-    air = [box(40, -30, 90, 60), closed((26, 12, 1), (22, 12, 1))]
-    turned = [other(path) for path in air]
+    paths = [box(27, 8, 44, 20), closed((33, 13, 1), (36, 13, 1))]
+    air = [box(40, -30, 90, 60), closed((31, 16, 1), (28, 16, 1))]
     expected = cut(paths, Polylines.of(air))
-    assert cut([other(path) for path in paths], Polylines.of(turned)) == pytest.approx(
-        expected, rel=0.02
-    )
+    for turn in ((0.5, False), (2.0, True)):
+        there = cut(list(turned(paths, *turn)), turned(air, *turn))
+        assert there == pytest.approx(expected, rel=0.02), turn
 
 
 @pytest.mark.parametrize("target", ["grbl", "linuxcnc"])

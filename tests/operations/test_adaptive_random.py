@@ -210,7 +210,7 @@ def faults_of(runs: list[CutRun], case: Case, every: float, phase: float) -> lis
 
 
 @examples(3, nightly=40)
-@given(cases(40.0), st.floats(0.0, 1.0))
+@given(cases(20.0), st.floats(0.0, 1.0))
 def test_random_pockets_are_cleared_within_their_limit(case: Case, phase: float) -> None:
     assert faults(case, 0.3, phase) == []
 

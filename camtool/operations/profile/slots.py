@@ -26,6 +26,7 @@ from camtool.planning.adaptive import (
     CORNER_SHARE,
     entry_mm,
     mirrored,
+    refuse_feeds_and_lift,
     refuse_strategy,
     runs_of,
     wide_parts,
@@ -117,6 +118,7 @@ def slot_items(
     walls: list[SlotWall], open_rows: list[int], chosen: Chosen, setting: Setting
 ) -> list[Fixed]:
     """Return one item for each connected slot, beside walls and along open paths."""
+    refuse_feeds_and_lift(setting)
     bands = list(_beside(walls, chosen, setting.operation))
     spare = setting.operation.spare_mm
     if open_rows:
