@@ -239,8 +239,8 @@ def engagement_angle(value: object) -> float:
     """Read an engagement and return the angle in rad: given as an angle with its unit, or as the
     part a of the diameter that cuts along a straight wall, which is the angle acos(1 − 2 a).
 
-        >>> [round(math.degrees(engagement_angle(text))) for text in ("50%", "60deg")]
-        [90, 60]
+    >>> [round(math.degrees(engagement_angle(text))) for text in ("50%", "60deg")]
+    [90, 60]
     """
     text = str(value).strip()
     if isinstance(value, str) and text.endswith(("deg", "°", "rad")):

@@ -48,12 +48,13 @@ class SetupCut(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, name: str, moves: StockMoves, turn: Turn) -> SetupCut:
-        """Return the cuts of a set-up whose feeds make these moves."""
+        """Return the cuts of a set-up whose tools make these moves, with the map into this
+        set-up's frame."""
         return cls(name, moves, stock_tree(moves), turn)
 
     def heights_in(self, drawn: HeightMap) -> npt.NDArray[np.float32]:
-        """Return the heights (NY, NX) mm that the cuts leave in the cells of a map, as they are
-        seen from its own face."""
+        """Return the heights (NY, NX), mm, that the cuts leave in the cells of a map, measured
+        from the face that this set-up cuts."""
         from camtool.stock.heightmap import add_moves
 
         start, end = map(self.turn.back.points, (self.moves.start, self.moves.end))
@@ -63,20 +64,22 @@ class SetupCut(Struct, frozen=True, eq=False):
 
 
 class StockBefore(Struct, frozen=True, eq=False):
-    """Stock that other set-ups have cut before a program, `above` from its own face and `below`
-    from the other one, of a stock that is so thick (inf where nothing is cut below)."""
+    """The stock that other set-ups have cut before a program: `above` are cuts from the program's
+    own face, `below` those from the other face. `thickness_mm` is inf where nothing is cut below.
+    """
 
     above: tuple[SetupCut, ...] = ()
     below: tuple[SetupCut, ...] = ()
     thickness_mm: float = np.inf
 
     def tops(self, points: Floats, grow_mm: float = 0.0) -> Floats:
-        """Return the heights (J,) mm of the tops over points (J, 2), of cuts that are wider by
-        `grow_mm`."""
+        """Return the heights (J,), mm, of the tops over points (J, 2), with the tools of the
+        earlier cuts widened by `grow_mm`."""
         return _lowest(self.above, points, lambda tree, at: tree.heights(at, None, grow_mm)[0])
 
     def floors(self, points: Floats, grow_mm: float = 0.0) -> Floats:
-        """Return the heights (J,) mm of the floors, −inf where nothing is cut from below."""
+        """Return the heights (J,), mm, of the floors over points (J, 2), with the tools widened by
+        `grow_mm`; −inf where nothing is cut from below."""
         return self._raised(
             _lowest(self.below, points, lambda tree, at: tree.heights(at, None, grow_mm)[0])
         )
@@ -100,7 +103,8 @@ class StockBefore(Struct, frozen=True, eq=False):
         return self._raised(_lowest(self.below, squares, lambda tree, at: tree.min_heights(at)))
 
     def shown_in(self, drawn: HeightMap) -> HeightMap:
-        """Return a map of what is left of a stock; where it is gone it has its bottom."""
+        """Return the height map of what is left of the stock; where it is cut through, the height
+        is that of its bottom."""
         heights = drawn.heights
         for each in self.above:
             heights = np.minimum(heights, each.heights_in(drawn))
@@ -111,8 +115,8 @@ class StockBefore(Struct, frozen=True, eq=False):
         return replace(drawn, heights=heights)
 
     def turned_over(self, drawn: HeightMap) -> HeightMap:
-        """Return the map of what is left of a stock, turned over about the axis X: its lower face
-        is at 0, and has the cuts from below and the holes."""
+        """Return the height map of what is left of the stock, turned over about X: the lower face
+        is at 0, and shows the cuts from below and the holes."""
         heights = np.where(drawn.heights <= -self.thickness_mm + THROUGH_SLACK_MM, -np.inf, 0.0)
         for each in self.below:
             heights = np.minimum(heights, each.heights_in(drawn))
@@ -122,19 +126,20 @@ class StockBefore(Struct, frozen=True, eq=False):
         return replace(drawn, heights=heights, corner_mm=(low_x, -top), owner=None)
 
     def deepest_below(self, point: Floats) -> str:
-        """Return the name of the set-up that has cut deepest from below over a point (2,)."""
+        """Return the name of the set-up that has cut deepest from below at a point (2,)."""
         depths = [each.tree.heights(each.turn.points(point[None]))[0][0] for each in self.below]
         return self.below[int(np.argmin(depths))].name
 
     def _raised(self, depths: Floats) -> Floats:
-        """Return the floors (J,) of heights (J,) as they are seen from the other face."""
+        """Convert heights (J,) measured from the other face to floors (J,) in this frame; −inf
+        where that face is uncut."""
         return np.where(depths < TOP_MM, TOP_MM - self.thickness_mm - depths, -np.inf)
 
 
 def _lowest(
     cuts: Sequence[SetupCut], squares: Floats, heights_of: Callable[[StockTree, Floats], Floats]
 ) -> Floats:
-    """Return the lowest of the heights (J,) of all cuts at points or over squares (J, 2 or 3)."""
+    """Return the lowest height (J,) over all cuts, at points (J, 2) or squares (J, 3)."""
     lowest = np.full(len(squares), TOP_MM)
     for each in cuts:
         lowest = np.minimum(lowest, heights_of(each.tree, each.turn.points(squares)))
@@ -146,8 +151,8 @@ WHOLE = StockBefore()
 
 
 def stock_before(job: Job, earlier: Sequence[tuple[Job, Toolpath]]) -> StockBefore:
-    """Return what the planned toolpaths of earlier set-ups, each with its job, leave for the
-    set-up of this job."""
+    """Return the stock that earlier set-ups leave for this job's set-up, computed from the planned
+    toolpath of each."""
     above: list[SetupCut] = []
     below: list[SetupCut] = []
     if job.stock is None:
@@ -165,7 +170,8 @@ def stock_before(job: Job, earlier: Sequence[tuple[Job, Toolpath]]) -> StockBefo
 
 
 def planned_before(drawing: Drawing, job: Job, machine: Machine) -> StockBefore:
-    """Return what the set-ups before that of a job leave of the stock."""
+    """Plan all set-ups of the part that come before the job's own, and return the stock that they
+    leave; the uncut stock for a job that is no set-up."""
     if job.setup_of is None:
         return WHOLE
     from camtool.planning.plan import planned  # all of planning, for set-ups alone
@@ -179,9 +185,9 @@ def planned_before(drawing: Drawing, job: Job, machine: Machine) -> StockBefore:
 
 
 def least_remaining(tree: StockTree, before: StockBefore, box_mm: Box) -> Bracket:
-    """Bracket how far the floors from below get above what a program leaves, mm, where both faces
-    are cut and neither goes through; below 0 it is the least thickness that is left, with the sign
-    changed."""
+    """Bracket the greatest value of floor − top, mm: how far the cuts from below reach above what
+    the program leaves. A negative value is minus the least remaining thickness. Only places cut
+    from both faces and through from neither are considered."""
     bottom = TOP_MM - before.thickness_mm
 
     def value(points: Floats) -> Floats:

@@ -138,8 +138,8 @@ def stock_request(
     before: StockBefore | None = None,
     is_whole: bool = True,
 ) -> StockRequest:
-    """Return what a job asks of the stock, of the steps of its plan; for the rest see
-    `StockRequest`."""
+    """Return what a job asks of the stock, from the steps of its plan; see `StockRequest` for the
+    arguments."""
     cutting = [step for step in steps if step.runs]
     codes = {finding.code.name for step in steps for finding in step.findings}
     closed = [step.chosen.lines.closed for step in cutting]
@@ -178,8 +178,8 @@ def stock_findings(
     deep_mm: float,
     findings: Sequence[Finding] = (),
 ) -> tuple[Finding, ...]:
-    """Return the findings of a program whose tools make these moves. Depths may be off by
-    `deep_mm`. `findings`: those of planning."""
+    """Return the findings about the stock after a program whose tools make these moves. Depths may
+    be off by `deep_mm`; `findings` are those of planning."""
     checks = _Checks(decoded, request, moves, deep_mm)
     gouged = any(each.code is ProgramCode.GOUGE for each in findings)
     stock_faults = [
@@ -198,8 +198,8 @@ def stock_findings(
 
 
 def net_findings(slides: StockMoves, request: StockRequest) -> Iterator[Finding]:
-    """Yield NETS_JOINED and NET_CUT for nets of copper that are not apart, or not whole, after the
-    moves of the slides, and NETS_APART for a board without such a net."""
+    """Yield NETS_JOINED for nets of copper that are still connected after the moves of the slides,
+    NET_CUT for nets that are no longer in one piece, and NETS_APART if there is neither."""
     from camtool.stock.nets import judge_nets
 
     stock = request.stock
@@ -265,7 +265,7 @@ class _Checks:
         )
 
     def _beside(self, rows: Ints, radii: Floats, share: float) -> _Points:
-        """Return points along moves, on the axis and on both sides of it."""
+        """Return points on the axis of moves and at `radii` to both sides of it."""
         start, travel = self.moves.start[rows], self.moves.end[rows] - self.moves.start[rows]
         length = np.hypot(travel[:, 0], travel[:, 1])
         along_mm = max(ALONG_MM, float(length.sum()) / MAX_PLACES)
@@ -289,14 +289,15 @@ class _Checks:
         return _Points(np.concatenate(shifted), np.tile(rows[owners], 3), np.tile(axis[:, 2], 3))
 
     def _in_stock(self, points: Floats) -> Bools:
-        """Return True (P,) for points within the stock, where its sides are known."""
+        """Return the mask (P,) of points within the sides of the stock; all True if these are not
+        known."""
         box = None if self.request.stock is None else self.request.stock.box_mm
         if box is None:
             return np.ones(len(points), dtype=np.bool_)
         return np.asarray(((points >= box[:2]) & (points <= box[2:])).all(axis=1))
 
     def too_deep(self, severity: Severity) -> Iterator[Finding]:
-        """Yield CUT_TOO_DEEP for places at which the stock is below the lowest that is allowed."""
+        """Yield CUT_TOO_DEEP for places where the stock is lower than allowed."""
 
         trial = self._tried(Gouges)
         if trial.holds:
@@ -321,7 +322,7 @@ class _Checks:
             )
 
     def left(self) -> Iterator[Finding]:
-        """Yield MATERIAL_LEFT for places at which the stock is above the highest that is asked."""
+        """Yield MATERIAL_LEFT for places where the stock is higher than the job asks."""
 
         leftover_of, upper = self.stock.leftover
         boxes = [layer.curves.boxes for layer in self.solid.must if len(layer.lines)]
@@ -350,7 +351,8 @@ class _Checks:
             )
 
     def _tried(self, judge: type[Gouges] | type[Leftovers]) -> Trial:
-        """Try whether nothing exceeds the tolerances: then no place needs to be looked at."""
+        """Try to prove that no place exceeds the tolerances; if that succeeds, no points need to
+        be examined."""
         distance_mm = min(self.solid.wall_mm, self.deep_mm)
         if len(self.low) > MAX_CUTS or distance_mm <= 0.0:
             return Trial(False)
@@ -366,8 +368,8 @@ class _Checks:
         value: Callable[[Floats], Floats],
         upper: Callable[[Floats], Floats],
     ) -> Iterator[tuple[Floats, int]]:
-        """Yield the places (2,) of the greatest of the values (P,) at points (P, 2) that are above
-        the tolerance, each the greatest around it, and how many more there are."""
+        """Yield (place (2,), number of places not listed) for the points (P, 2) with the greatest
+        values (P,) above the tolerance. Each place is refined to the greatest value near it."""
         exceeding = np.flatnonzero(values > self.deep_mm)
         exceeding = exceeding[np.argsort(-values[exceeding], kind="stable")]
         places: list[Floats] = []
@@ -389,7 +391,8 @@ class _Checks:
             yield two_places[int(value(two_places).argmax())], other_count
 
     def passes(self) -> Iterator[Finding]:
-        """Yield PASS_TOO_DEEP for feeds that take more at once than their operation allows."""
+        """Yield PASS_TOO_DEEP for feeds that remove a thicker layer at once than their operation
+        allows."""
         limit = self._chips_mm()
         feeds = ~self.moves.rapid[self.cuts.move] & self._in_stock(self.cuts.points)
         # No move cuts below its lower end, nor above the top of the stock.
@@ -418,8 +421,8 @@ class _Checks:
             )
 
     def _operations_of(self, row: int) -> list[int]:
-        """Return the operations that a row of the program may be of: its own, or all of its
-        tool."""
+        """Return the indices of the operations that a row of the program may belong to: its own if
+        known, else all that use its tool."""
         plan = self.decoded.operations
         if plan is not None and len(plan.notes) == len(self.request.operations):
             turn = int(np.searchsorted(plan.begin, row, side="right")) - 1
@@ -428,7 +431,7 @@ class _Checks:
         return self._with_cutter(int(self.moves.tool[min(move, len(self.moves) - 1)]))
 
     def _chips_mm(self) -> Floats:
-        """Return the thickest chip that each move (M,) may take, mm."""
+        """Return (M,) the thickest layer, mm, that each move may remove at once."""
         operations, plan = self.request.operations, self.decoded.operations
         max_chips = np.array(list(map(_chip_mm, operations, self.request.depths_mm)))
         if plan is not None and len(plan.notes) == len(operations):
@@ -441,12 +444,12 @@ class _Checks:
         return np.asarray(np.array(of_cutter)[self.moves.tool])
 
     def _with_cutter(self, number: int) -> list[int]:
-        """Return the operations whose tool has the shape of this cutter."""
+        """Return the indices of the operations whose tool has the shape of this cutter."""
         cutter, operations = self.moves.cutters[number], self.request.operations
         return [k for k, each in enumerate(operations) if cutter_profile(each.tool) == cutter]
 
     def tabs(self) -> Iterator[Finding]:
-        """Yield TAB_MISSING and TAB_THIN for bridges that do not stand as the job asks."""
+        """Yield TAB_MISSING and TAB_THIN for tabs that do not stand as the job asks."""
         requested = (self.request.operations, self.request.depths_mm, self.request.bridges)
         for operation, depth_mm, bridges in zip(*requested, strict=True):
             tabs, name = operation.tabs, operation_name(operation)
@@ -475,8 +478,8 @@ class _Checks:
     def _tab(
         self, bridge: Bridge, width_mm: float, height_mm: float, depth_mm: float
     ) -> tuple[float, float]:
-        """Return how wide the stock stands up to the top of a tab, and how high in its middle
-        above the floor of the cut, mm."""
+        """Return the width over which a tab stands at its full height, and its height in its
+        middle above the floor of the cut, mm."""
         half = 0.5 * width_mm
         step = half * np.arange(-MIN_CHORDS, MIN_CHORDS + 1) / MIN_CHORDS
         points = bridge.centre + step[:, None] * bridge.ahead
@@ -487,8 +490,9 @@ class _Checks:
         return float(wide), float(standing[MIN_CHORDS])
 
     def loose(self) -> Iterator[Finding]:
-        """Yield LOOSE_PIECE for pieces that come loose, and for parts that are cut after that, in
-        this set-up or in one before."""
+        """Yield findings for pieces that come loose and are no finished part, for parts that are
+        cut into after they came loose, and for cuts into pieces that an earlier set-up has freed.
+        """
         stock = self.request.stock
         if stock is None:
             return
@@ -530,8 +534,8 @@ class _Checks:
                 )
 
     def remaining(self) -> Iterator[Finding]:
-        """Yield FACES_MEET where the other face's cuts meet these, or else the least thickness
-        that both leave."""
+        """Yield FACES_MEET where cuts from both faces meet, or else FLOOR_LEFT with the least
+        thickness that they leave."""
         stock = self.request.stock
         if stock is None or not self.before.below:
             return
@@ -549,8 +553,8 @@ class _Checks:
             yield FLOOR_LEFT(where=place, measured=max(-thickness.low, 0.0), other=other)
 
     def _is_part(self, piece: LoosePiece) -> bool:
-        """Return True if more than half of a piece has the outline of a part as its innermost
-        contour."""
+        """Return True if a loose piece is a part: for more than half of it, the innermost contour
+        around it is the outline of a part."""
         contours = self.request.contours
         if not len(contours):
             return False
@@ -565,8 +569,8 @@ class _Checks:
         return bool(2 * int(parts.sum()) > len(points))
 
     def bodies(self) -> Iterator[Finding]:
-        """Yield TOOL_IN_STOCK for shanks and holders that meet the stock as it stands after their
-        own move has cut."""
+        """Yield TOOL_IN_STOCK for shanks and holders that touch the stock as it stands after the
+        move that carries them."""
         for number, tool in self.tools:
             for body, radius, begin, _ in tool.bodies:
                 wider = radius > tool.radius_mm + POSITION_EPS_MM
@@ -610,7 +614,8 @@ class _Checks:
             )
 
     def keep_out(self) -> Iterator[Finding]:
-        """Yield KEEP_OUT_ENTERED for moves, rapids too, at which a part of a tool is in a box."""
+        """Yield KEEP_OUT_ENTERED for moves, rapids included, in which a part of a tool enters a
+        keep-out box."""
         for box in self.request.keep_out:
             for number, tool in self.tools:
                 rows = np.flatnonzero(self.moves.tool == number)
@@ -636,8 +641,9 @@ class _Checks:
     def _entered(
         self, rows: Ints, box: KeepOutBox, body: tuple[float, float, float]
     ) -> tuple[Floats, Floats]:
-        """Return how far the side of a cylinder gets into a box at moves (R,), mm: its radius
-        where its axis does, below 0 where it stays out; and the nearest places (R, 2)."""
+        """Return how far the side of a cylinder enters a box in the moves (R,), mm (its radius
+        where its axis enters; negative where it stays out), and the nearest places (R, 2) of its
+        axis."""
         radius, begin, end = body
         start, travel = self.moves.start[rows], self.moves.end[rows] - self.moves.start[rows]
         # The part of each move in which the heights of both meet.
@@ -659,8 +665,8 @@ class _Checks:
         return np.where(is_met, radius - distances, -np.inf), place
 
     def not_known(self) -> Iterator[Finding]:
-        """Yield TOOL_NOT_KNOWN where a job describes shanks, holders or boxes, for the tools whose
-        shank or holder is not known."""
+        """Yield TOOL_NOT_KNOWN for tools whose shank or holder is not known, if the job describes
+        shanks, holders or keep-out boxes."""
         bodies_told = [{body for body, *_ in tool.bodies} for _, tool in self.tools]
         if not self.request.keep_out and not any(bodies_told):
             return
@@ -678,8 +684,9 @@ class _Checks:
 
 
 def _chip_mm(operation: Operation, depth_mm: float) -> float:
-    """Return the thickest chip that an operation may take, mm: its step down or peck, no longer
-    than the edges of its tool. What slopes or finishes may take all of its depth."""
+    """Return the thickest layer that an operation may remove at once, mm: its step down or peck,
+    at most the length of the tool's edges. Operations that slope or finish may remove their full
+    depth."""
     descent = operation.contract.descent
     step = operation.peck_mm if descent == "pecks" else operation.step_down_mm
     if descent == "slopes" or operation.stage == "finish" or step is None:
@@ -688,8 +695,8 @@ def _chip_mm(operation: Operation, depth_mm: float) -> float:
 
 
 def _from_box(a: Floats, b: Floats, box: KeepOutBox) -> tuple[Floats, Floats]:
-    """Return the distances (R,) of lines from a to b (R, 2) from a box in the plane, 0 where they
-    enter it, and the nearest places (R, 2) on them."""
+    """Return the distances (R,) in the plane of the lines from a to b (R, 2) to a box, 0 where
+    they enter it, and their nearest places (R, 2)."""
     low = np.array([box.x_mm[0], box.y_mm[0]])
     high = np.array([box.x_mm[1], box.y_mm[1]])
     travel = b - a

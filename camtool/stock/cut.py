@@ -59,13 +59,13 @@ class CutStock(Struct, frozen=True, eq=False):
     bottom_mm: float | None = None
 
     def heights(self, points: Floats) -> Floats:
-        """Return the heights (J,) mm over points (J, 2)."""
+        """Return the heights (J,), mm, of the stock over points (J, 2)."""
         z, _ = self.tree.heights(points)
         return z
 
     def bounds(self, points: Floats) -> Floats:
-        """Return the lowest and the highest height (J, 2) mm that there may be over points (J, 2),
-        since the slides may be `moves.beside_mm` beside the moves."""
+        """Return the lowest and the highest possible height (J, 2), mm, over points (J, 2): the
+        slides may be `moves.beside_mm` beside the moves."""
         beside_mm = self.moves.beside_mm
         low, _ = self.tree.heights(points, None, beside_mm)
         high, _ = self.tree.heights(points, None, -beside_mm)
@@ -78,9 +78,10 @@ class CutStock(Struct, frozen=True, eq=False):
         return np.where(move_index >= 0, self.moves.row[move_index.clip(min=0)], -1)
 
     def section(self, axis: str, at_mm: float) -> Floats:
-        """Return the profile (P, 2) of the stock where an axis, "x" or "y", has a value: places
-        along the other axis and heights, mm. Between two rows the stock is within `SECTION_MM` of
-        the line from one to the other, as far as the middle shows, or they stand at a wall."""
+        """Return the profile (P, 2) of the stock in the section where `axis` ("x" or "y") is
+        `at_mm`: position along the other axis and height, mm. Between two rows the stock is within
+        `SECTION_MM` of the line from one to the other, as far as its middle shows, or the two rows
+        stand at a wall."""
         low, high = (self.box_mm[1::2]) if axis == "x" else (self.box_mm[0::2])
         place = np.linspace(low, high, SECTION_POINTS)
         z = self.heights(_across(axis, at_mm, place))
@@ -105,8 +106,8 @@ class CutStock(Struct, frozen=True, eq=False):
         )
 
     def removed_mm3(self, share: float = 0.01) -> Bracket:
-        """Return the volume that is cut out of the stock within its box and above its bottom, mm³,
-        between two bounds."""
+        """Return lower and upper bounds of the volume that is cut out of the stock, within its box
+        and above its bottom, mm³."""
         top, bottom = self.tree.top, -math.inf if self.bottom_mm is None else self.bottom_mm
 
         def quarter_means(squares: Floats) -> tuple[Floats, Floats]:
@@ -121,7 +122,7 @@ class CutStock(Struct, frozen=True, eq=False):
 
 
 def _across(axis: str, at_mm: float, place: Floats) -> Floats:
-    """Return points (J, 2) of a section."""
+    """Return the points (J, 2) of a section at these places along the other axis."""
     level = np.full(len(place), at_mm)
     return np.column_stack([level, place] if axis == "x" else [place, level])
 
@@ -133,8 +134,8 @@ def cut_stock(
     options: Options | None = None,
     thin_mm: float | None = None,
 ) -> CutStock:
-    """Simulate a program and return the stock after it; `thin_mm`: how far its moves may be beside
-    the slides (None: a step). OptionError where the tools are not known; raises besides what
+    """Simulate a program and return the stock after it. `thin_mm`: how far its thinned moves may
+    be from the slides (None: a step). OptionError if the tools are not known; raises also what
     `LoadedTarget.simulate` raises."""
     tools = tools_of_rows(decoded, job)
     moves = slide_moves(decoded, target, tools, options, thin_mm=thin_mm)
@@ -145,8 +146,8 @@ def cut_stock(
 
 
 def cut_box(moves: StockMoves) -> Box:
-    """Return the box of all that the tools cut, cones as wide as at their depth; that of all moves
-    where nothing is cut."""
+    """Return the bounding box of all that the tools cut, with cones as wide as at their depth; the
+    box of all moves if nothing is cut."""
     cuts = np.minimum(moves.start[:, 2], moves.end[:, 2]) < 0.0
     chosen_moves = moves.select(cuts) if cuts.any() else moves
     if not len(chosen_moves):
@@ -179,8 +180,8 @@ class StockDifference(Struct, frozen=True):
 
 
 def difference_of(first: CutStock, second: CutStock, limit_mm: float) -> StockDifference:
-    """Compare two stocks. Distances that do not exceed the limit are told as that much at most,
-    others to `TRIAL_SHARE` of it."""
+    """Compare two stocks. A distance of at most `limit_mm` is reported only as an upper bound; a
+    greater one is determined to within `TRIAL_SHARE` of the limit."""
     box = box_around(first.box_mm, second.box_mm)
     slack_mm3 = DIFFERENCE_SHARE * max(first.removed_mm3().high, second.removed_mm3().high)
     # What both cut is no difference: of each only the moves that the other has not are compared.
@@ -194,7 +195,8 @@ def difference_of(first: CutStock, second: CutStock, limit_mm: float) -> StockDi
 
 
 def _own_moves(moves: StockMoves, other: StockMoves) -> StockTree:
-    """Return the index of those moves that are not also, to the last bit, among the others."""
+    """Return the index of the moves that have no bit-identical counterpart among the `other`
+    moves."""
 
     def rows(each: StockMoves) -> Floats:
         return np.hstack([each.start, each.end, each.table[each.tool]])
@@ -205,13 +207,14 @@ def _own_moves(moves: StockMoves, other: StockMoves) -> StockTree:
 
 
 def box_around(one: Box, other: Box) -> Box:
-    """Return the box of two boxes."""
+    """Return the box that encloses both boxes."""
     low, high = np.minimum(one, other)[:2].tolist(), np.maximum(one, other)[2:].tolist()
     return low[0], low[1], high[0], high[1]
 
 
 def _distance(one: StockTree, other: StockTree, box: Box, limit_mm: float) -> Bracket:
-    """Return the greatest distance of what `other` cuts from what `one` cuts or leaves free."""
+    """Bracket the greatest distance by which what `other` cuts lies inside the stock that `one`
+    leaves."""
     tolerance_mm = TRIAL_SHARE * limit_mm
 
     def bracket_beyond(distance: float, enough_value: float = math.inf) -> Bracket:
@@ -248,7 +251,8 @@ def _distance(one: StockTree, other: StockTree, box: Box, limit_mm: float) -> Br
 
 
 def _volume_between(one: StockTree, other: StockTree, box: Box, slack_mm3: float) -> Bracket:
-    """Return the volume that `other` cuts below `one`, mm³, to 1 % or `slack_mm3`."""
+    """Bracket the volume that `other` cuts below the surface that `one` leaves, mm³, to 1 % or to
+    `slack_mm3`."""
 
     def extremes(squares: Floats) -> tuple[Floats, Floats]:
         lower = np.maximum(one.min_heights(squares) - other.max_heights(squares), 0.0)

@@ -43,8 +43,8 @@ class CutterProfile(Struct, frozen=True):
         return self.radius_mm, self.flat_mm, self.corner_mm, self.rise
 
     def heights(self, distance: Floats) -> Floats:
-        """Return the heights of the surface over the tip at distances from the axis; inf beyond
-        the radius."""
+        """Return the heights, mm, of the tool's surface above its tip at these distances from its
+        axis; inf beyond the radius."""
         beyond_flat = np.maximum(distance - self.flat_mm, 0.0)
         if self.corner_mm:
             below = np.minimum(beyond_flat, self.corner_mm)
@@ -55,8 +55,8 @@ class CutterProfile(Struct, frozen=True):
 
 
 def cutter_profile(tool: Tool | ToolNote) -> CutterProfile:
-    """Return the profile of a tool. A V bit or a drill without a known angle counts as flat, which
-    cuts more than the tool does."""
+    """Return the profile of a tool. A V bit or drill whose angle is not known counts as flat, and
+    so cuts more than it really does."""
     angle, radius = tool.tip_angle_rad, 0.5 * tool.diameter_mm
     if tool.kind in ("v", "drill") and angle is not None:
         flat = 0.5 * tool.tip_diameter_mm if tool.kind == "v" else 0.0

@@ -74,9 +74,9 @@ NO_WIDTH = "it cuts with a tool of no width"
 
 
 class Engagement(Struct, frozen=True, eq=False):
-    """A bound of the engagement (M,) rad of each of M moves; 0 for those that cut nothing, NaN for
-    moves above the stock. `is_entry` (M,): moves of entries, which do not count; `is_known` (M,):
-    the move is not one along the stock of a tool whose width changes with its height."""
+    """An upper bound of the engagement (M,), rad, of each of M moves: 0 for moves that cut
+    nothing, NaN for moves above the stock. `is_entry` (M,): moves of entries, which do not count;
+    `is_known` (M,): False for moves in the stock of a tool whose width changes with its height."""
 
     bound_rad: Floats
     is_entry: Bools
@@ -84,8 +84,8 @@ class Engagement(Struct, frozen=True, eq=False):
     moves: StockMoves
 
     def max_heights(self, chosen: Bools) -> tuple[float, int | None]:
-        """Return the greatest bound of some moves outside of entries, rad, and which one has it;
-        0 and None where none of them cuts."""
+        """Return the greatest bound among the `chosen` moves outside of entries, rad, and the
+        index of the move; 0 and None if none of them cuts."""
         bound = np.where(chosen & ~self.is_entry, np.nan_to_num(self.bound_rad), 0.0)
         if not bound.any():
             return 0.0, None
@@ -112,9 +112,10 @@ class OperationEngagement(Struct, frozen=True):
 
 
 def _askew(moves: StockMoves, decoded: Toolpath) -> Floats:
-    """Return the angles (M, 2) rad from each move of the slides to the direction in which its
-    decoded move runs at both ends of it, left positive: a move may stand for an arc, and slides go
-    beside their path by steps, so that a short move says little of where the tool heads."""
+    """Return the angles (M, 2), rad, left positive, from the direction of each move of the slides
+    to the direction of its decoded move at its start and end. A move may stand for an arc, and
+    slides run beside their path in steps, so the direction of a short move is a poor guide to
+    where the tool is heading."""
     own = (moves.end - moves.start)[:, :2]
     line = (decoded.end - decoded.starts_of(np.arange(len(decoded))))[moves.row, :2]
     arcs = np.flatnonzero(decoded.is_arc[moves.row])
@@ -140,12 +141,13 @@ def engagement_of(
     box_mm: tuple[float, float, float, float] | None,
     limits: tuple[Ints, Floats] | None = None,
 ) -> Engagement:
-    """Bound the engagement of all moves that a decoded program makes, each within COARSE_RAD of an
-    angle that there is; `box_mm`: the stock in the plane, None: it goes on for ever.
+    """Bound the engagement of all moves that a decoded program makes, each to within COARSE_RAD.
+    `box_mm`: the sides of the stock, None: unlimited.
 
-    `limits`: the operation of each move (M,), ascending, and the limit of each operation (K,) rad.
-    Then only the greatest bound of an operation is as near as that, or within FINE_RAD where it is
-    above the limit; all others are no more than bounds."""
+    `limits`: the operation of each move (M,), ascending, and the limit of each operation (K,),
+    rad. Then only the greatest bound of each operation is that tight (within FINE_RAD if it is
+    above the limit); all others are merely bounds.
+    """
     moves, index = _parted(moves)
     number, limit = (np.zeros(len(moves), np.int64), np.zeros(1))
     if limits is not None:
@@ -197,8 +199,8 @@ def engagement_of(
 
 
 def _parted(moves: StockMoves) -> tuple[StockMoves, Ints]:
-    """Return the moves, those that an entry ends in as two of them, and of which each is a
-    part."""
+    """Return the moves, with those in which an entry ends divided in two, and for each the index
+    of the move it is a part of."""
     travel = moves.end - moves.start
     length = np.hypot(*travel[:, :2].T)
     down = travel[:, 2] < -LEVEL_MM * length
@@ -214,22 +216,23 @@ def _parted(moves: StockMoves) -> tuple[StockMoves, Ints]:
 
 
 def _entry_remaining(down: Bools, length: Floats, radius: Floats) -> Floats:
-    """Return (M,) the length of an entry that remains where each move begins, after the last of
-    those that go down; at or below 0 where it has ended."""
+    """Return (M,) mm: the length of the entry that remains at the begin of each move, counted from
+    the last move that goes down; 0 or negative once it has ended."""
     travelled = np.concatenate([[0.0], np.cumsum(length)])
     last = np.maximum.accumulate(np.where(down, travelled[1:], -np.inf))
     return np.asarray(last + ENTRY_TURNS * 2.0 * np.pi * radius - travelled[:-1])
 
 
 def _thick_share(limit_rad: float) -> float:
-    """Return the thickness up to which chips do not count, over the tool's radius; 0: no limit."""
+    """Return the chip thickness, as a share of the tool's radius, up to which chips do not count;
+    `limit_rad` 0: no limit."""
     step = 1.0 - float(np.cos(limit_rad))
     return min(THICK_SHARE, THICK_OF_STEP * step) if limit_rad else THICK_SHARE
 
 
 def _behind(down: Bools, length: Floats, radius: Floats) -> Bools:
-    """Return the mask (M,) of the moves that go down, and of those behind them up to the length
-    of an entry."""
+    """Return the mask (M,) of the moves of entries: those that go down, and those after them up to
+    the length of an entry."""
     return np.asarray(_entry_remaining(down, length, radius) > ENDED_MM)
 
 
@@ -240,8 +243,8 @@ def engagement_by_operation(
     box_mm: tuple[float, float, float, float] | None,
     gate_rad: float | None = None,
 ) -> tuple[OperationEngagement, ...]:
-    """Return the greatest engagement of each operation; `parts`: the first row, the name and the
-    own limit (rad) of each in their order; `gate_rad`: a limit for all of them."""
+    """Return the greatest engagement of each operation. `parts`: (first row, name, own limit in
+    rad or None) of each, in order; `gate_rad`: a limit for all of them."""
     begin = [row for row, _, _ in parts]
     number = (np.searchsorted(begin, slides.row, side="right") - 1).clip(min=0)
     gate = np.pi if gate_rad is None else gate_rad
@@ -267,8 +270,8 @@ def engagement_by_operation(
 
 
 def engagement_findings(rows: tuple[OperationEngagement, ...]) -> Iterator[Finding]:
-    """Yield ENGAGEMENT_TOO_HIGH for each operation that promises a limit and does not keep it,
-    ENGAGEMENT_KEPT for each that does, and STOCK_NOT_JUDGED for those that are not judged."""
+    """Yield ENGAGEMENT_TOO_HIGH for each operation that exceeds its limit, ENGAGEMENT_KEPT for
+    each that keeps it, and STOCK_NOT_JUDGED for those that were not judged."""
     for each in rows:
         if each.limit_rad is None:
             continue

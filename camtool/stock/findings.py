@@ -12,7 +12,7 @@ FINDINGS_LISTED = 10
 
 
 def place_words(place: Sequence[float] | Floats) -> str:
-    """Name a place (x, y) mm as pictures find it in a finding."""
+    """Return a place (x, y), mm, as text in the form that pictures read from findings."""
     return f"at X {place[0]:.3f} Y {place[1]:.3f}"
 
 

@@ -45,7 +45,8 @@ class HeightMap(Struct, frozen=True, eq=False):
         return np.asarray(self.corner_mm[1] + (place + 0.5) * self.cell_mm)
 
     def at(self, points: Floats) -> Floats:
-        """Return the heights (J,) of the cells that hold the points (J, 2); NaN outside."""
+        """Return the heights (J,) of the cells that contain the points (J, 2); NaN outside the
+        map."""
         place = np.floor((points - np.array(self.corner_mm)) / self.cell_mm)
         inside = ((place >= 0.0) & (place < self.heights.shape[::-1])).all(axis=1)
         column, row = np.where(inside[:, None], place, 0.0).astype(np.int64).T
@@ -53,7 +54,8 @@ class HeightMap(Struct, frozen=True, eq=False):
 
 
 def height_map(moves: StockMoves, box: Box, cell_mm: float, *, owners: bool = False) -> HeightMap:
-    """Cut the moves into a map that covers the box; ValueError for more than MAX_CELLS cells."""
+    """Return a map of the box with the moves cut into it; ValueError for more than MAX_CELLS
+    cells."""
     left_x, bottom, right, top = box
     columns = max(1, math.ceil((right - left_x) / cell_mm - 1e-9))
     rows = max(1, math.ceil((top - bottom) / cell_mm - 1e-9))
@@ -87,6 +89,7 @@ def add_moves(heights: HeightMap, moves: StockMoves, first: int = 0) -> None:
 
 
 def cell_for(box: Box, cells: int) -> float:
-    """Return the width of a cell, mm, with which a map of the box has about `cells` cells."""
+    """Return the side of a square cell, mm, with which a map of the box has about `cells`
+    cells."""
     area = max((box[2] - box[0]) * (box[3] - box[1]), 1e-12)
     return math.sqrt(area / cells)

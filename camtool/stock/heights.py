@@ -50,7 +50,8 @@ MIN_HALF_MM = 1e-9
 
 
 def stock_tree(moves: StockMoves) -> StockTree:
-    """Index the moves for searches of heights; tools that cut no width are left out."""
+    """Return an index of the moves for searches of heights; moves of tools without width are left
+    out."""
     number = np.flatnonzero(moves.table[moves.tool, 0] > 0.0)
     selected = moves.select(number)
     columns = move_columns(selected)
@@ -65,8 +66,8 @@ def stock_tree(moves: StockMoves) -> StockTree:
 
 
 def move_columns(moves: StockMoves) -> Floats:
-    """Return the moves (M, 7) as the compiled loops read them: start, direction and length in the
-    plane, slope; of those straight up or down the lower end."""
+    """Return the moves (M, 7) as the compiled loops read them: start (x, y, z), direction and
+    length in the plane, slope. Vertical moves are replaced by their lower end."""
     start, steps = moves.start, moves.end - moves.start
     length = np.hypot(steps[:, 0], steps[:, 1])
     flat = length > 0.0
@@ -111,7 +112,8 @@ def greatest_value(
     max_squares: int = MAX_SQUARES,
     enough_value: float = np.inf,
 ) -> Bracket:
-    """Bracket the greatest value of a function over a box (low x, low y, high x, high y).
+    """Bracket the greatest value of a function over a box (low x, low y, high x, high y) by branch
+    and bound.
 
     `value` gives it at points (J, 2); `upper` gives upper bounds over squares, whose middle and
     half a side are the rows of (K, 3), −inf for squares that are of no interest. Values below
@@ -170,12 +172,13 @@ def integral(
     share: float = VOLUME_SHARE,
     slack: float = MIN_VOLUME_MM3,
 ) -> Bracket:
-    """Return the integral of a function over a box between two bounds, to a share of it or to
-    `slack`, whichever is more.
+    """Bracket the integral of a function over a box, to a `share` of it or to `slack`, whichever
+    is larger.
 
-    `quarter_means` bounds the means of the function over the quarters of squares, `extremes` its
-    values, for squares that lie partly outside of the box. The squares where the bounds are
-    farthest apart are divided again and again. The place is that of the square with the most.
+    `quarter_means` returns bounds of the function's means over the quarters of squares; `extremes`
+    bounds of its values, for squares that lie partly outside the box. The squares with the largest
+    gap between the bounds are divided again and again. The place of the bracket is that of the
+    square with the largest part.
     """
     squares, low, high = _quarters(_first_squares(box), quarter_means, extremes, box)
     while True:
@@ -208,7 +211,8 @@ def _quarters(
     extremes: Bounds,
     box: tuple[float, float, float, float],
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the quarters of squares, and bounds of the integral over what of each is in a box."""
+    """Return the quarters (4 K, 3) of squares, and lower and upper bounds of the integral over the
+    part of each that is in the box."""
     quarters = divided(squares)
     low = np.maximum(quarters[:, :2] - quarters[:, 2:], box[:2])
     high = np.minimum(quarters[:, :2] + quarters[:, 2:], box[2:])
@@ -226,7 +230,7 @@ def _quarters(
 
 
 def _first_squares(box: tuple[float, float, float, float]) -> Floats:
-    """Return squares (K, 3) that cover a box."""
+    """Return squares (K, 3) of middle and half side that cover a box."""
     wide, high = box[2] - box[0], box[3] - box[1]
     side = max(np.sqrt(wide * high / FIRST_SQUARES), max(wide, high) / FIRST_SQUARES, 1e-6)
     columns, rows = max(1, int(np.ceil(wide / side))), max(1, int(np.ceil(high / side)))
@@ -237,7 +241,7 @@ def _first_squares(box: tuple[float, float, float, float]) -> Floats:
 
 
 def divided(squares: Floats) -> Floats:
-    """Return the four quarters of each square: (4 K, 3) of (K, 3)."""
+    """Return the four quarters of each square, (4 K, 3) for (K, 3) of middle and half side."""
     half = 0.5 * squares[:, 2]
     middles = squares[:, None, :2] + QUARTERS * half[:, None, None]
     return np.column_stack([middles.reshape(-1, 2), np.repeat(half, 4)])

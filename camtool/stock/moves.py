@@ -45,7 +45,7 @@ class StockMoves(Struct, frozen=True, eq=False):
         return len(self.start)
 
     def select(self, chosen: Ints | Bools | slice) -> StockMoves:
-        """Return some of the moves, with all cutters."""
+        """Return the chosen moves, with the whole table of cutters."""
         return StockMoves(
             self.start[chosen],
             self.end[chosen],
@@ -57,7 +57,7 @@ class StockMoves(Struct, frozen=True, eq=False):
         )
 
     def below(self, z_mm: float) -> StockMoves:
-        """Return the moves without their parts above a height, below which each of them gets."""
+        """Return the parts of the moves below a height; each move must reach below it."""
         start, end = self.start.copy(), self.end.copy()
         for one, other in ((start, self.end), (end, self.start)):
             above = one[:, 2] > z_mm
@@ -74,8 +74,8 @@ class StockMoves(Struct, frozen=True, eq=False):
 def stock_moves_of_toolpath(
     toolpath: Toolpath, tool: Ints, cutters: tuple[CutterProfile, ...]
 ) -> StockMoves:
-    """Return the moves of a toolpath as its rows say, arcs as chords within SAGITTA_MM; `tool`
-    (N,): the index of the cutter of each row."""
+    """Return the moves of a toolpath, arcs as chords within SAGITTA_MM; `tool` (N,): the index of
+    the cutter of each row."""
     count = np.zeros(len(toolpath), dtype=np.int64)
     count[toolpath.is_motion] = 1
     count[toolpath.executed_rows :] = 0

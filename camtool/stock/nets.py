@@ -63,9 +63,8 @@ class Width(Struct, frozen=True):
 
 
 class NetReport(Struct, frozen=True):
-    """The nets of a board after the cut. `gap` is the narrowest groove between two pieces of
-    copper of which one is of a net; `copper` the least width that is left of a net, of nets that
-    have one."""
+    """The nets of a board after the cut. `gap`: the narrowest groove between a piece of copper of
+    a net and another piece; `copper`: the least width of the copper that is left of any net."""
 
     nets: int
     shorts: tuple[NetFault, ...]
@@ -114,7 +113,7 @@ def judge_nets(
 
 
 def _area(contours: Polylines) -> BaseGeometry:
-    """Return the area within an odd number of contours."""
+    """Return the region with an odd number of contours around it."""
     rings = [
         shapely.LinearRing(chords_of(Segments.of(path), FLAT_MM, min_count=2).once)
         for path in contours
@@ -126,7 +125,8 @@ def _area(contours: Polylines) -> BaseGeometry:
 
 
 def _grooves(moves: StockMoves, z_mm: float, *, widest: bool) -> BaseGeometry:
-    """Return what the moves cut of the copper down to its bottom: at least, or at most."""
+    """Return the area that the moves cut through the copper: an upper bound if `widest`, else a
+    lower bound."""
     high = np.maximum(moves.start[:, 2], moves.end[:, 2])
     low = np.minimum(moves.start[:, 2], moves.end[:, 2])
     depth = z_mm - (low if widest else high)
@@ -147,7 +147,8 @@ def _grooves(moves: StockMoves, z_mm: float, *, widest: bool) -> BaseGeometry:
 
 
 def _radii(table: Floats, above_tip: Floats) -> Floats:
-    """Return the radii (M,) of cutters (M, 4) so far above their tips."""
+    """Return the radii (M,) of cutters (rows of the table (M, 4)) at heights (M,) above their
+    tips."""
     radius, flat, corner, rise = table.T
     below = np.maximum(corner - above_tip, 0.0)
     round_mm = np.sqrt(np.maximum(corner * corner - below * below, 0.0))
@@ -156,8 +157,8 @@ def _radii(table: Floats, above_tip: Floats) -> Floats:
 
 
 def _runs(moves: StockMoves, rows: Ints, radius: Floats) -> Ints:
-    """Return the places among the rows at which a run of moves begins: the next one goes on where
-    the last one ended, with the same radius."""
+    """Return the indices among `rows` at which a run of connected moves with equal radius
+    begins."""
     follows = (np.diff(rows) == 1) & (np.diff(radius) == 0.0)
     meets = (moves.start[rows[1:], :2] == moves.end[rows[:-1], :2]).all(axis=1)
     return np.concatenate([[0], np.flatnonzero(~(follows & meets)) + 1])
@@ -167,7 +168,8 @@ def _runs(moves: StockMoves, rows: Ints, radius: Floats) -> Ints:
 
 
 class _Pieces(Struct, frozen=True, eq=False):
-    """Connected pieces of copper, and the numbers of those that hold something of each net."""
+    """The connected pieces of copper, and for each net the indices of the pieces that hold a part
+    of it."""
 
     pieces: list[BaseGeometry]
     of_net: list[list[int]]
@@ -184,14 +186,15 @@ def _pieces_of(copper: BaseGeometry, nets: list[BaseGeometry]) -> _Pieces:
 
 
 def _conducts(copper: BaseGeometry) -> bool:
-    """Return True if copper has room for a disc of SPECK_MM."""
+    """Return True if the copper has room for a disc of SPECK_MM; smaller specks are ignored."""
     if copper.area < math.pi * (0.5 * SPECK_MM) ** 2:
         return False
     return not shapely.buffer(copper, -0.5 * SPECK_MM).is_empty
 
 
 def _joined(copper: _Pieces) -> list[tuple[int, int]]:
-    """Return the pairs of nets that share a piece, each with the one of the lowest number."""
+    """Return pairs of nets that share a piece of copper: the lowest-numbered net of the piece with
+    each other one."""
     nets_in: dict[int, list[int]] = {}
     for net, pieces in enumerate(copper.of_net):
         for piece in pieces:
@@ -201,7 +204,7 @@ def _joined(copper: _Pieces) -> list[tuple[int, int]]:
 
 
 def _between(one: BaseGeometry, other: BaseGeometry) -> tuple[float, float]:
-    """Return the middle of the shortest line between two nets."""
+    """Return the middle (x, y) of the shortest line between two areas of copper."""
     (x1, y1), (x2, y2) = shapely.get_coordinates(shapely.shortest_line(one, other)).tolist()
     return 0.5 * (x1 + x2), 0.5 * (y1 + y2)
 
@@ -212,7 +215,8 @@ def _middle(net: BaseGeometry) -> tuple[float, float]:
 
 
 def _least_gap(copper: _Pieces) -> Width | None:
-    """Return the narrowest groove between a piece that holds a net and any other piece."""
+    """Return the narrowest groove between a piece that belongs to a net and any other piece, None
+    if there is none."""
     tree = shapely.STRtree(copper.pieces)
     best: Width | None = None
     for number in sorted({piece for pieces in copper.of_net for piece in pieces}):
@@ -231,8 +235,8 @@ def _least_gap(copper: _Pieces) -> Width | None:
 
 
 def _least_copper(nets: list[BaseGeometry]) -> Width | None:
-    """Return the least width of copper that is left of a net: the widest disc that can be taken
-    off all its edges before it falls into two pieces, or vanishes."""
+    """Return the narrowest neck among all nets: width and place. The width is the largest for
+    which each net, eroded by half of it, is still one piece. None if no copper is left."""
     best: Width | None = None
     for net in nets:
         if not _conducts(net):
@@ -246,7 +250,8 @@ def _least_copper(nets: list[BaseGeometry]) -> Width | None:
 
 
 def _bottleneck(net: BaseGeometry, below_mm: float) -> float | None:
-    """Return the width at which a net falls apart, by halving; None if that is not `below_mm`."""
+    """Return the width of the narrowest neck of a net, by bisection; None if it is not less than
+    `below_mm`."""
     widest = 2.0 * float(shapely.maximum_inscribed_circle(net).length)
     high = min(below_mm, widest)
     if below_mm <= widest and _holds(net, below_mm):
@@ -259,13 +264,14 @@ def _bottleneck(net: BaseGeometry, below_mm: float) -> float | None:
 
 
 def _holds(net: BaseGeometry, width_mm: float) -> bool:
-    """Return True if a net is one piece without half of the width at each edge."""
+    """Return True if a net, eroded by half of `width_mm`, is still one piece and not empty."""
     worn = shapely.buffer(net, -0.5 * width_mm)
     return sum(map(_conducts, shapely.get_parts(worn))) <= 1 and not worn.is_empty
 
 
 def _narrow_place(net: BaseGeometry, worn: BaseGeometry) -> tuple[float, float]:
-    """Return a place of the net where nothing is left of it once it is worn."""
+    """Return the place of the narrowest neck: between the pieces into which the eroded net
+    (`worn`) falls, or the net's middle if it vanished."""
     parts = [part for part in shapely.get_parts(worn) if not part.is_empty]
     if len(parts) < 2:
         return _middle(net)

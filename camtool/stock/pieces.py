@@ -62,9 +62,9 @@ LEVEL_POINTS = 20_000
 
 
 class LoosePiece(Struct, frozen=True, eq=False):
-    """A piece as it comes loose: the number of the move that frees it, its area, mm², its box (low
-    x, low y, high x, high y), mm, and points (P, 2) in it. `again`: the move from which on it is
-    cut through once more (−1: none)."""
+    """A piece of the stock that comes loose: the index of the move that frees it, its area (mm²),
+    its box (low x, low y, high x, high y), mm, and points (P, 2) in it. `again`: the index of the
+    next move that cuts into it, −1: none."""
 
     move: int
     area_mm2: float
@@ -94,8 +94,8 @@ class _Level(Struct, frozen=True, eq=False):
 def loose_pieces(
     moves: StockMoves, thickness_mm: float, box_mm: Box | None, before: StockBefore = WHOLE
 ) -> LoosePieces:
-    """Return the pieces that come loose of a stock with this thickness and these sides (None:
-    without limits), which set-ups have cut before."""
+    """Return the pieces that come loose from a stock of this thickness and with these sides (None:
+    unlimited). `before`: what other set-ups have cut."""
     levels = [
         _Level(floor, *_through_cuts(moves, floor))
         for floor in _floors(moves, thickness_mm, before)
@@ -137,7 +137,8 @@ def loose_pieces(
 
 
 def _floors(moves: StockMoves, thickness_mm: float, before: StockBefore) -> list[float]:
-    """Return the heights of the floors through which moves cut, the lowest first."""
+    """Return the heights of the floors that moves must reach to cut through: minus the thickness,
+    and those that cuts from the other face have left, the lowest first."""
     if not before.below:
         return [-thickness_mm]
     ends = np.concatenate([moves.start, moves.end])[:, :2]
@@ -151,8 +152,8 @@ def _floors(moves: StockMoves, thickness_mm: float, before: StockBefore) -> list
 
 
 def _through_cuts(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
-    """Return the parts of moves that cut through the stock, as level moves of flat tools that are
-    as wide there as the tool is at the bottom, and the number of each among all moves."""
+    """Return the parts of moves that cut through the stock, and the index of each among all moves.
+    They become level moves of flat tools as wide as the tool is at the height `bottom_mm`."""
     start, end = moves.start, moves.end
     low = np.minimum(start[:, 2], end[:, 2]) <= bottom_mm
     low &= moves.table[moves.tool, 0] > 0.0
@@ -196,8 +197,8 @@ class _Raster(Struct, frozen=True, eq=False):
     def times(
         self, box: Box, cell_mm: float, inwards_mm: float, until: int | None = None
     ) -> tuple[HeightMap, Ints]:
-        """Return a raster of a box, and the first move (NY, NX) that cuts each of its cells
-        through, of those up to `until`, with tools that are slimmer by `inwards_mm`."""
+        """Return a raster of a box, and for each of its cells (NY, NX) the first move that cuts it
+        through. Only moves up to `until` count, with tools narrower by `inwards_mm`."""
         first_cuts: Ints | None = None
         for level in self.levels:
             is_chosen = level.number <= (STANDING if until is None else until)
@@ -225,8 +226,8 @@ class _Raster(Struct, frozen=True, eq=False):
         return drawn, np.where(is_gone, BEFORE, first_cuts)
 
     def measured(self, time: Ints, parting: Ints, cells: int) -> LoosePiece | None:
-        """Return a piece as it is when a move frees it, by its row of
-        `camtool.kernels.pieces.partings`; None where all its cells are cut in part."""
+        """Return a piece at the time when a move frees it. `parting`: its row from
+        `camtool.kernels.pieces.partings`. None if no fine cell of it is left uncut."""
         now, place, low, high, left_column, right = parting[:CUT].tolist()
         row, column = divmod(place, time.shape[1])
         time = time[low : high + 1, left_column : right + 1]

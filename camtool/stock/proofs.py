@@ -80,8 +80,8 @@ MAX_DOUBTFUL = 2_000
 
 
 class Trial(Struct, frozen=True):
-    """The outcome of a trial of a distance: `holds` if all places are proved to be fine; else the
-    greatest excess of height that was found, mm, and its place (−inf: none was found)."""
+    """The result of trying a distance. `holds`: all places are proved to be within it; otherwise
+    the greatest excess of height that was found, mm, and its place (−inf: none was found)."""
 
     holds: bool
     excess_mm: float = -math.inf
@@ -93,15 +93,15 @@ Judgement = tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]
 
 
 class JudgedStock(Struct, frozen=True, eq=False):
-    """The stock after a program, of which set-ups before have cut `before`, beside what is wanted
-    of it."""
+    """The stock after a program, with what earlier set-ups have cut (`before`), compared with the
+    wanted solid."""
 
     tree: StockTree
     solid: WantedSolid
     before: StockBefore
 
     def tops(self, points: Floats, until: Ints | None = None) -> Floats:
-        """Return the heights (J,) of what is left over points (J, 2), after all moves or before
+        """Return the heights (J,), mm, of the stock over points (J, 2), after all moves, or before
         the moves `until` (J,)."""
         return np.minimum(self.tree.heights(points, until)[0], self.before.tops(points))
 
@@ -145,21 +145,22 @@ CutWithin = Callable[[float], CutStock]
 def proved_gouge(
     cut: CutWithin, solid: WantedSolid, limit_mm: float, before: StockBefore = WHOLE
 ) -> Bracket:
-    """Bracket the greatest distance, mm, by which slides cut below a wanted solid; one that does
-    not exceed the limit is told as that much at most."""
+    """Bracket the greatest distance, mm, by which the slides cut into the wanted solid. A distance
+    within `limit_mm` is only bounded from above (the bracket is 0 to `limit_mm`)."""
     return _least_distance(lambda thin_mm: Gouges(cut(thin_mm), solid, before), limit_mm)
 
 
 def proved_leftover(
     cut: CutWithin, solid: WantedSolid, limit_mm: float, before: StockBefore = WHOLE
 ) -> Bracket:
-    """Bracket the greatest distance, mm, by which material stands above what must be cut, as
+    """Bracket the greatest distance, mm, by which material is left above what must be cut, as
     `proved_gouge` does."""
     return _least_distance(lambda thin_mm: Leftovers(cut(thin_mm), solid, before), limit_mm)
 
 
 def _least_distance(judge: Callable[[float], Gouges | Leftovers], limit_mm: float) -> Bracket:
-    """Bracket the least distance, mm, of which a trial holds: few moves first, which are cheap."""
+    """Bracket the least distance, mm, for which a trial holds. Coarsely thinned moves are tried
+    first, since they are cheap."""
     for share in THIN_SHARES:
         judged = judge(max(share * limit_mm, MIN_THIN_MM))
         beside_mm = judged.stock.moves.beside_mm
@@ -191,8 +192,8 @@ def _least_distance(judge: Callable[[float], Gouges | Leftovers], limit_mm: floa
 
 
 class _Chords(Struct, frozen=True, eq=False):
-    """K chords of moves below the stock top: their middles and half ways (K, 2), the heights of
-    tips at both ends (K, 2), and the tool of each (K,)."""
+    """K chords of moves below the stock top: their `middle` and their `half` vector from there to
+    the end (K, 2), the heights of the tip at both ends (K, 2), and the tool of each (K,)."""
 
     middle: Floats
     half: Floats
@@ -203,7 +204,7 @@ class _Chords(Struct, frozen=True, eq=False):
         return len(self.tool)
 
     def select(self, rows: Bools | Ints | slice) -> _Chords:
-        """Return some of the chords."""
+        """Return the chosen chords."""
         return _Chords(self.middle[rows], self.half[rows], self.z[rows], self.tool[rows])
 
     @property
@@ -268,7 +269,7 @@ class Gouges:
         )
 
     def tried(self, distance_mm: float) -> Trial:
-        """Try whether nothing is cut below the solid by more than a distance."""
+        """Try to prove that nothing is cut into the solid by more than a distance."""
         chords, waiting = self.chords, list[_Chords]()
         while len(chords):
             chords = chords.select(~self._are_fine(chords, distance_mm))
@@ -286,8 +287,8 @@ class Gouges:
         return self._searched(rest, distance_mm) if rest else Trial(True)
 
     def _are_fine(self, chords: _Chords, distance_mm: float) -> Bools:
-        """Return True (K,) for chords along which one layer allows all that is cut, or that cut
-        nothing of the stock."""
+        """Return the mask (K,) of chords that are proved: a single layer allows all that they cut,
+        or they cut nothing."""
         wide = np.abs(chords.half) + self.table[chords.tool, :1]
         low, high = np.array(self.stock.box_mm).reshape(2, 2)
         is_outside = (chords.middle + wide < low) | (chords.middle - wide > high)
@@ -300,7 +301,8 @@ class Gouges:
         return fine
 
     def _worst(self, chords: _Chords, distance_mm: float) -> Trial:
-        """Return the greatest excess at the edges and axes of the middles of chords."""
+        """Return the greatest excess found at the tool's axis and edge in the middle of each
+        chord."""
         points = chords.points.select(slice(MAX_DOUBTFUL))
         radius, flat, corner, rise = self.table[points.tool].T
         deep = STOCK_TOP_MM - points.z[:, 0]
@@ -318,16 +320,17 @@ class Gouges:
         return _greatest(at, self._excess(at, distance_mm), self.stock.box_mm)
 
     def _excess(self, at: Floats, distance_mm: float) -> Floats:
-        """Return how far the stock is below what is allowed, with walls moved by a distance."""
+        """Return how far (mm) the stock at points (P, 2) is below what is allowed, with walls
+        moved by a distance."""
         return self._judged(self.stock.tree, distance_mm).gouge[0](at)
 
     def _judged(self, tree: StockTree, distance_mm: float) -> JudgedStock:
-        """Return what moves leave beside the solid, its walls moved by a distance."""
+        """Return what the moves of a tree leave, compared with the solid whose walls are moved by
+        a distance."""
         return JudgedStock(tree, replace(self.solid, wall_mm=distance_mm), self.before)
 
     def _searched(self, rest: list[_Chords], distance_mm: float) -> Trial:
-        """Search the squares about those chords of which no single layer shows that they are
-        fine."""
+        """Search by squares around the chords that no single layer proves."""
         start = np.concatenate([np.column_stack([c.middle - c.half, c.z[:, 0]]) for c in rest])
         end = np.concatenate([np.column_stack([c.middle + c.half, c.z[:, 1]]) for c in rest])
         tool = np.concatenate([each.tool for each in rest])
@@ -360,14 +363,15 @@ class Gouges:
 
 
 def _outcome(bracket: Bracket, distance_mm: float) -> Trial:
-    """Return the outcome of a search whose floor was the distance."""
+    """Return the Trial that follows from a search whose `floor` was the distance."""
     if bracket.low > distance_mm:
         return Trial(False, bracket.low, bracket.at_mm)
     return Trial(bracket.high <= distance_mm + 2.0 * EPS_MM)
 
 
 def _greatest(at: Floats, excess: Floats, box: Box) -> Trial:
-    """Return the greatest excess (P,) at points (P, 2) of the stock."""
+    """Return a failed Trial with the greatest excess (P,) among the points (P, 2) within the
+    stock."""
     within = ((at >= box[:2]) & (at <= box[2:])).all(axis=1)
     excess = np.where(within, excess, -np.inf)
     row = int(excess.argmax())
@@ -375,7 +379,7 @@ def _greatest(at: Floats, excess: Floats, box: Box) -> Trial:
 
 
 def _width(deep: Floats, radius: Floats, flat: Floats, corner: Floats, rise: Floats) -> Floats:
-    """Return the radius of tools at the stock top, their tips so deep below it."""
+    """Return the radius of tools at the stock top when their tips are `deep` below it."""
     cone = flat + deep.clip(min=0.0) / np.where(rise > 0.0, rise, 1.0)
     round_ = flat + np.sqrt(
         np.maximum(corner**2 - np.minimum(np.maximum(corner - deep, 0.0), corner) ** 2, 0.0)
@@ -385,7 +389,7 @@ def _width(deep: Floats, radius: Floats, flat: Floats, corner: Floats, rise: Flo
 
 
 def _allows(layer: WantedLayer, chords: _Chords, table: Floats, distance_mm: float) -> Bools:
-    """Return True (K,) for chords along which a layer allows all that is cut, to within a
+    """Return the mask (K,) of chords along which a layer allows all that is cut, to within a
     distance."""
     nearest, farthest = layer.along(chords.middle, chords.half)
     s, deep = nearest + distance_mm, STOCK_TOP_MM - chords.z
@@ -431,7 +435,7 @@ class Leftovers:
         self.enough: list[float] = [math.inf] * len(solid.must)
 
     def tried(self, distance_mm: float) -> Trial:
-        """Try whether nothing stands above the solid by more than a distance."""
+        """Try to prove that nothing is left above the solid by more than a distance."""
         unknown = False
         # Vertical walls are soon judged.
         for number in sorted(range(len(self.enough)), key=lambda k: self.solid.must[k].rise):
@@ -449,13 +453,13 @@ class Leftovers:
         return Trial(not unknown)
 
     def _excess(self, at: Floats, distance_mm: float, layer: WantedLayer) -> Floats:
-        """Return how far the stock is above what a layer asks, with walls moved by a distance."""
+        """Return how far (mm) the stock at points (P, 2) is above what a layer asks for, with
+        walls moved by a distance."""
         solid = WantedSolid((), (layer,), distance_mm)
         return JudgedStock(self.stock.tree, solid, self.before).leftover[0](at)
 
     def _box_of(self, layer: WantedLayer) -> Box | None:
-        """Return the box in which a layer asks for something; None if that is nowhere in the
-        stock."""
+        """Return the box in which a layer must be cut, None if that is outside the stock."""
         if not len(layer.lines):
             return None
         wide = max(layer.shift_mm, 0.0)
@@ -465,9 +469,9 @@ class Leftovers:
         return None if (low >= high).any() else (*low.tolist(), *high.tolist())
 
     def _groove(self, layer: WantedLayer, distance_mm: float) -> Trial | None:
-        """Try whether some move of the groove's own tool passes within the distance of each place
-        of its line, deep enough, and search the grooves of the places of which that does not
-        hold; None where neither shows it."""
+        """Try to prove a groove along its line: at each place some move of the groove's own tool
+        passes within the distance, deep enough. Places where that fails are searched by squares.
+        None if neither proves it."""
         cutter = layer.cutter
         assert cutter is not None
         sagitta = SAGITTA_SHARE * distance_mm
@@ -508,7 +512,7 @@ class Leftovers:
         return trial if trial.holds else None
 
     def _beside(self, layer: WantedLayer, middle: Floats, distance_mm: float) -> Trial:
-        """Return the greatest excess across a groove at places (P, 2) of its line."""
+        """Return the greatest excess found across a groove at places (P, 2) of its line."""
         turn = np.arange(RING_POINTS) * (math.tau / RING_POINTS)
         wide = max(layer.shift_mm - distance_mm, 0.0) * (1.0 - EPS_MM)
         ring = wide * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -518,7 +522,7 @@ class Leftovers:
         return _greatest(at, self._excess(at, distance_mm, layer), self.stock.box_mm)
 
     def _region(self, layer: WantedLayer, distance_mm: float, box: Box | None) -> Trial:
-        """Search the squares of a layer."""
+        """Search a layer by squares within a box."""
         if box is None:
             return Trial(True)
         bracket = greatest_value(
@@ -533,7 +537,7 @@ class Leftovers:
         return _outcome(bracket, distance_mm)
 
     def _upper(self, layer: WantedLayer, squares: Floats, distance_mm: float) -> Floats:
-        """Return upper bounds (K,) of the excess over squares (K, 3)."""
+        """Return upper bounds (K,) of the excess over squares (K, 3), mm."""
         bound = np.full(len(squares), -np.inf)
         for row, corners, values in _pieces(layer, squares, distance_mm):
             high = self.stock.tree.max_heights_over(corners, values, enough=distance_mm)
@@ -555,9 +559,9 @@ class Leftovers:
 def _pieces(
     layer: WantedLayer, squares: Floats, distance_mm: float
 ) -> Iterator[tuple[Ints, Floats, Floats]]:
-    """Yield convex pieces of squares (K, 3) that together hold all that must be cut of these: the
-    square of each (J,), its corners (J, 8, 2), and the depth at these that must be reached, or
-    more (J, 8)."""
+    """Yield convex pieces that together cover all of squares (K, 3) that must be cut: (index of
+    the square (J,), corners (J, 8, 2), depth to be reached at the corners (J, 8), never less than
+    required)."""
     half = squares[:, 2]
     reach = DIAGONAL * half
     near = layer.tangents(squares[:, :2], reach)
@@ -576,8 +580,7 @@ def _pieces(
     inner = asks & ~flat & ~crossed & is_in
 
     def depths(away: Floats) -> Floats:
-        """Return the depth that must be reached, not more than linear, where s is `away` at
-        most."""
+        """Return a linear upper bound of the depth to be reached where s is at most `away`."""
         return np.asarray(layer.base_mm + layer.rise * (away - distance_mm))
 
     square = squares[:, 2, None, None] * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -618,9 +621,9 @@ def _pieces(
 
 
 def _clipped(half: Floats, direction: Floats, limit: Floats) -> Floats:
-    """Return the corners (K, 8, 2) of the parts of squares about 0, with half a side (K,), that
-    lie no less than `limit` (K,) along a `direction` (K, 2); some stand for several. Where nothing
-    remains all are the corner that is nearest to it."""
+    """Return the corners (K, 8, 2) of squares about 0, with half sides (K,), clipped to the
+    half-plane at least `limit` (K,) along `direction` (K, 2). Corners may repeat; where nothing
+    remains, all are the corner nearest to the half-plane."""
     corners = half[:, None, None] * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     off = (corners * direction[:, None]).sum(axis=2) - limit[:, None]
     clipped = np.repeat(corners, 2, axis=1)

@@ -54,8 +54,8 @@ SIZE_SQUARES = 4096
 
 
 class RapidThroughStock(Struct, frozen=True):
-    """A rapid through the stock: its row, a point of the contact, and the height there of the
-    lowest that the tool touches, mm."""
+    """A rapid that touches the stock: its row, the place of the contact, and the height of the
+    lowest point there that the tool touches, mm."""
 
     row: int
     z_mm: float
@@ -68,9 +68,9 @@ def rapids_through_stock(
     tolerance_mm: float = CLEARED_MM,
     before: StockBefore | None = None,
 ) -> list[RapidThroughStock]:
-    """Return the rapids through what the feeds before them, and other set-ups `before`, have left
-    of the stock, in order; `box_mm`: its sides (low x, low y, high x, high y), None without
-    limits."""
+    """Return the rapids that touch the stock as the feeds before them, and other set-ups
+    (`before`), have left it, in order. `box_mm`: the sides of the stock (low x, low y, high x,
+    high y), None: unlimited."""
     start, end = moves.start, moves.end
     low = np.minimum(start[:, 2], end[:, 2]) < STOCK_TOP_MM - HEIGHT_EPS_MM
     is_up = (start[:, :2] == end[:, :2]).all(axis=1) & (end[:, 2] >= start[:, 2])
@@ -92,9 +92,9 @@ def rapid_findings(
     tolerance_mm: float,
     before: StockBefore | None = None,
 ) -> Iterator[Finding]:
-    """Yield RAPID_IN_STOCK for the rapids of a program that get farther than a tolerance into what
-    is not cut before them. Where the moves of its tools are not known, yield it for each rapid
-    below the stock top that may do so."""
+    """Yield RAPID_IN_STOCK for rapids that enter uncut stock by more than the tolerance. If the
+    shapes of the tools are not known (`moves` None), yield it for each rapid below the stock top
+    that may do so."""
     if moves is None:
         rapids = low_rapids(decoded)
     else:
@@ -111,8 +111,8 @@ def rapid_findings(
 
 
 def low_rapids(toolpath: Toolpath) -> list[RapidThroughStock]:
-    """Return the rapids below the stock top that move in XY, or straight down deeper than any feed
-    at the same XY before: all that can be said where tools are not known."""
+    """Return the rapids below the stock top that move in XY, or go straight down deeper than any
+    feed at the same XY before. If the tools are not known, nothing more can be said."""
     start, end = toolpath.starts, toolpath.end
     is_across = np.asarray((start[:, :2] != end[:, :2]).any(axis=1))
     is_low = (toolpath.kind == Kind.RAPID) & are_below_top(toolpath)
@@ -127,7 +127,7 @@ def low_rapids(toolpath: Toolpath) -> list[RapidThroughStock]:
 
 
 def _fed_depths(toolpath: Toolpath, is_across: Bools) -> Floats:
-    """Compute the lowest Z (N,) of feeds before each row since the tool last moved in XY."""
+    """Return (N,) the lowest Z of feeds before each row since the last move in XY."""
     fed_depths, deepest = np.empty(len(toolpath)), math.inf
     feeds = np.where(toolpath.is_feed, toolpath.end[:, 2], math.inf)
     moves = (is_across | toolpath.is_arc).tolist()
@@ -164,8 +164,8 @@ class _Search:
         self.tools: Floats = moves.table[self.rapids.tool]
 
     def follow_a_feed(self) -> Bools:
-        """Return True (R,) for rapids along the line of one feed before, or above it, with a
-        tool of the same shape: they are fine."""
+        """Return the mask (R,) of rapids that run along the line of a single earlier feed, or
+        above it, with a tool of the same shape: these cannot touch the stock."""
         feeds, rapids = self.feeds, self.rapids
         fine = np.zeros(len(rapids), dtype=np.bool_)
         if not len(feeds):
@@ -186,7 +186,7 @@ class _Search:
         return fine
 
     def touching(self, chosen: Ints) -> list[RapidThroughStock]:
-        """Return those of these rapids that touch the stock."""
+        """Return those of the `chosen` rapids that touch the stock."""
         rapid_of, squares = self._first_squares(chosen)
         touches = np.zeros(len(self.rapids), dtype=np.bool_)
         while len(rapid_of):
@@ -198,8 +198,8 @@ class _Search:
         return [self._deepest(rapid) for rapid in chosen[touches[chosen]].tolist()]
 
     def _deepest(self, rapid: int) -> RapidThroughStock:
-        """Return where a rapid that touches the stock is deepest in it, as far as `SIZE_SQUARES`
-        show."""
+        """Return the deepest contact of a rapid that touches the stock, as far as `SIZE_SQUARES`
+        squares show it."""
         _, squares = self._first_squares(np.array([rapid]))
 
         def taken_at(points: Floats) -> Floats:
@@ -222,7 +222,7 @@ class _Search:
 
     def _first_squares(self, chosen: Ints) -> tuple[Ints, Floats]:
         """Return squares (K, 3) that cover what the tools of rapids sweep below the stock top, and
-        the rapid (K,) of each."""
+        the rapid (K,) of each square."""
         begin, end = self.rapids.start[chosen], self.rapids.end[chosen]
         radius, flat, _, rise = self.tools[chosen].T
         depths = STOCK_TOP_MM - np.minimum(begin[:, 2], end[:, 2])
@@ -238,8 +238,8 @@ class _Search:
         return chosen[owners], np.column_stack([middle, half])
 
     def _taken(self, rapids: Ints, points_at: Floats) -> Floats:
-        """Return by how much each rapid (K,) goes below the stock over its point, the first two
-        columns of (K, …), mm."""
+        """Return how far (mm) each rapid (K,) goes below the stock over its point, which is in the
+        first two columns of (K, …)."""
         points = np.ascontiguousarray(points_at[:, :2])
         stock, _ = self.tree.heights(points, self.before[rapids], self.room_mm)
         own_heights = heights_of_moves(
@@ -251,7 +251,8 @@ class _Search:
         return np.where(is_inside, stock - own_heights, -np.inf)
 
     def _most_taken(self, rapids: Ints, squares: Floats) -> Floats:
-        """Return upper bounds (K,) of the same over squares (K, 3)."""
+        """Return upper bounds (K,) of how far each rapid (K,) goes below the stock over its square
+        (K, 3), mm."""
         half = squares[:, 2:]
         reach = math.sqrt(2.0) * squares[:, 2]
         own_heights = heights_of_moves(
@@ -270,6 +271,6 @@ class _Search:
 
 
 def _widened(cutter: CutterProfile, tolerance_mm: float) -> CutterProfile:
-    """Return a cutter; a cylinder for one of no width."""
+    """Return the cutter unchanged, or a thin cylinder in place of one without width."""
     radius = MIN_RADIUS_SHARE * tolerance_mm
     return CutterProfile(radius, radius) if cutter.radius_mm < radius else cutter

@@ -38,10 +38,10 @@ class ToolsOfRows(Struct, frozen=True, eq=False):
 def tools_of_rows(
     decoded: Toolpath, job: Job | None, plan: Operations | None = None
 ) -> ToolsOfRows:
-    """Return the cutter of each row of a program: that of its operation where the program was
-    planned, else the one tool of the job, or of the `plan` of this program, else the tool of the
-    job with the number of the last tool change (before the first one, that of the first
-    operation). OptionError where a tool is not known."""
+    """Return the cutter of each row of a program. That is the tool of the row's operation if the
+    program was planned; else the only tool of the `plan` of this program or of the job; else the
+    job's tool with the number of the last tool change (before the first change, the tool of the
+    first operation). OptionError if a tool is not known."""
     if decoded.operations is not None and decoded.operations.notes:
         notes = decoded.operations.notes
         row = np.searchsorted(decoded.operations.begin, np.arange(len(decoded)), side="right") - 1
@@ -75,8 +75,8 @@ def tools_of_rows(
 
 
 def _of_profiles(profiles: list[CutterProfile], row: Ints) -> ToolsOfRows:
-    """Return the different ones of profiles, and for each row, whose profile is `row` (N,), its
-    index among these."""
+    """Return the distinct profiles, and for each row, whose index among `profiles` is `row` (N,),
+    its index among the distinct ones."""
     cutters = tuple(dict.fromkeys(profiles))
     index = np.array([cutters.index(each) for each in profiles], dtype=np.int64)
     return ToolsOfRows(cutters, index[row])
@@ -91,10 +91,9 @@ def slide_moves(
     z_weight: float = 1.0,
     thin_mm: float | None = None,
 ) -> StockMoves:
-    """Simulate a program and return the moves of the tips that its slides make; they are
-    `z_weight` times nearer to the slides in Z than in the plane, and no farther from them than
-    `thin_mm` (None: THIN_MM or a step). Raises what
-    `LoadedTarget.simulate` raises."""
+    """Simulate a program and return the thinned moves of the tips that its slides make. The moves
+    are no farther from the slides than `thin_mm` (None: THIN_MM or a step), and `z_weight` times
+    nearer in Z. Raises what `LoadedTarget.simulate` raises."""
     machine = target.machine
     axes = (machine.axes.x, machine.axes.y, machine.axes.z)
     step_mm = max(abs(axis.coded_step_mm) for axis in axes)
@@ -122,7 +121,7 @@ def slide_moves(
 
 
 def _bend_mm(decoded: Toolpath, spacing_mm: float) -> float:
-    """Return the distance by which arcs bend away from the lines between their samples, mm."""
+    """Return the largest distance, mm, of an arc from the line between two of its samples."""
     arcs = np.flatnonzero(decoded.is_arc)
     if not len(arcs):
         return 0.0

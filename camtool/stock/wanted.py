@@ -129,7 +129,8 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
         return np.asarray(self.shift_mm + np.where(is_inwards, distances, -distances))
 
     def _are_inwards(self, points: Floats) -> Bools:
-        """Return True (N,) for points from which distances are counted inwards."""
+        """Return the mask (N,) of points on the side of the lines on which distances count as
+        inwards."""
         if self.side == ABOUT:
             return np.zeros(len(points), dtype=np.bool_)
         bulge = np.ascontiguousarray(self.segments.bulge)
@@ -137,8 +138,8 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
         return np.asarray(is_inside == (self.side == INSIDE))
 
     def along(self, middle: Floats, half: Floats) -> tuple[Floats, Floats]:
-        """Return the values at the ends (K, 2) of two linear functions between which s lies along
-        chords, with these middles and half ways (K, 2)."""
+        """Return the values at both ends (K, 2) of two linear functions, a lower and an upper
+        bound of s along chords with these middles and half vectors (K, 2)."""
         if not len(self.lines):
             far = np.full(middle.shape, FAR_MM if self.side == OUTSIDE else -FAR_MM)
             return far, far
@@ -152,14 +153,14 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
         )
 
     def tangents(self, points: Floats, reach: Floats) -> Floats:
-        """Return the upper bounds of `camtool.kernels.offsets.disc_tangents` of the distances from
-        the two nearest lines, within `reach` (N,) of points (N, 2)."""
+        """Return upper bounds (see `camtool.kernels.offsets.disc_tangents`) of the distances from
+        the two nearest lines, valid within `reach` (N,) of the points (N, 2)."""
         curves = self.curves
         return disc_tangents(np.ascontiguousarray(points), reach, curves.rows, curves.tree)
 
     def chords(self, sagitta_mm: float) -> tuple[Floats, Floats]:
-        """Return the ends (J, 2), (J, 2) of chords of the lines and arcs, which lie no farther
-        from these than a sagitta."""
+        """Return starts and ends (J, 2) of chords of the lines and arcs, no farther from these
+        than a sagitta."""
         segments = self.segments
         cosine = 1.0 - np.minimum(sagitta_mm / segments.radius.clip(min=sagitta_mm), 1.0)
         parts = np.abs(segments.sweep) / np.where(segments.is_arc, 2.0 * np.arccos(cosine), 1.0)
@@ -173,8 +174,8 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
 
     def depths(self, min_s: Floats, max_s: Floats, wall_mm: float) -> tuple[Floats, Floats]:
         """Return the least and the greatest depth (N,), mm, for s between `min_s` and `max_s`
-        (N,), with ends that are moved outwards by `wall_mm`; −inf where the layer says nothing: as
-        least if it says nothing for some s, as greatest if for all."""
+        (N,), with the ends of the layer moved outwards by `wall_mm`. −inf stands for no depth: in
+        the least if some s lies outside the layer, in the greatest if all do."""
         low, high = min_s + wall_mm, max_s + wall_mm
         shallow = np.minimum(self.base_mm + self.rise * np.maximum(low, 0.0), self.depth_mm)
         deepest = np.maximum(np.minimum(high, self.reach_mm), 0.0)
@@ -195,8 +196,8 @@ class WantedSolid(Struct, frozen=True, eq=False):
     wall_mm: float = DEFAULT_WALL_MM
 
     def bands(self, points: Floats) -> Floats:
-        """Return low and high (N, 2), mm in the work frame, at points (N, 2) mm; high is inf where
-        nothing must be cut."""
+        """Return the lowest allowed and the highest wanted height (N, 2), mm in the work frame, at
+        points (N, 2); the latter is inf where nothing must be cut."""
         low, high = np.full(len(points), STOCK_TOP_MM), np.full(len(points), np.inf)
         for layers, edge, wall_mm in self._sides(low, high):
             for layer in layers:
@@ -205,8 +206,8 @@ class WantedSolid(Struct, frozen=True, eq=False):
         return np.column_stack([low, high])
 
     def bounds(self, squares: Floats) -> Floats:
-        """Return limits (N, 4), mm, of the bands over squares (N, 3) of middle and half a side:
-        the least and the greatest low, and the least and the greatest high."""
+        """Return bounds (N, 4), mm, of the bands over squares (N, 3) of middle and half side: the
+        least and the greatest low, the least and the greatest high."""
         half = DIAGONAL * squares[:, 2]
         low, high = np.full((2, len(squares)), STOCK_TOP_MM), np.full((2, len(squares)), np.inf)
         for layers, edges, wall_mm in self._sides(low, high):
@@ -234,8 +235,8 @@ class WantedSolid(Struct, frozen=True, eq=False):
 
 
 class CopperNets(Struct, frozen=True, eq=False):
-    """The nets that the operation `name` frees: the closed `contours` of their copper (an odd
-    number of them around it), mm, and how thick it is."""
+    """The copper that the operation `name` frees: the closed `contours` of its nets (copper has an
+    odd number of them around it), mm, and its thickness."""
 
     name: str
     contours: Polylines
@@ -243,8 +244,8 @@ class CopperNets(Struct, frozen=True, eq=False):
 
 
 def wanted_solid(steps: Sequence[Step], wall_mm: float = DEFAULT_WALL_MM) -> WantedSolid:
-    """Return the solid that the operations of a plan leave, from what each took of the drawing and
-    its setting; what cuts no width leaves all."""
+    """Return the solid that the operations of a plan are to leave, from the contours that each
+    took of the drawing and its settings. Tools without width cut nothing of it."""
     may: list[WantedLayer] = []
     must: list[WantedLayer] = []
     names = {step.operation.name for step in steps}
@@ -272,7 +273,7 @@ DRILLED = ("holes", "pins")
 
 
 class _Layers:
-    """The layers of an operation, on whose path tabs stand up to a height, mm."""
+    """The layers of one operation; `tabs_mm`: the height of the tabs along its path."""
 
     def __init__(self, step: Step, tabs_mm: float) -> None:
         self.tabs_mm = tabs_mm
@@ -284,7 +285,7 @@ class _Layers:
         self.closed: Ints = np.flatnonzero(step.chosen.lines.closed)
 
     def may(self) -> Iterator[WantedLayer]:
-        """Yield the layers of what may be cut."""
+        """Yield the layers that the operation may cut."""
         operation, contract, depth = self.operation, self.operation.contract, self.depth_mm
         if contract.cuts == "over":
             yield self._straight(Polylines.of([]), OUTSIDE, depth)
@@ -302,7 +303,7 @@ class _Layers:
             yield from self._grooves(self._lines(), self._aside_mm, is_full=True)
 
     def must(self) -> Iterator[WantedLayer]:
-        """Yield the layers of what must be cut."""
+        """Yield the layers that the operation must cut."""
         operation, contract, tool = self.operation, self.operation.contract, self.operation.tool
         if contract.cuts == "over":
             if self.stock is not None and self.stock.box_mm is not None and tool.kind in MILLS:
@@ -325,9 +326,9 @@ class _Layers:
             yield from self._grooves(self._lines(), 0.0, is_full=False)
 
     def _floors(self) -> Iterator[WantedLayer]:
-        """Yield the floor that the tool reaches; of an adaptive pocket all but the scallop of its
-        corners, unless a finishing pass takes that: what wider tools reach, and what is farther
-        from the walls than the scallop is thick."""
+        """Yield the floor that the tool reaches. Adaptive pockets may leave scallops at their
+        corners unless a finishing pass follows: their floor is what a wider tool reaches, and what
+        is farther from the walls than a scallop is thick."""
         radius_mm, nose_mm = self.operation.tool.radius_mm, self.operation.tool.nose_mm
         is_finish = self.operation.stage == "finish"
         is_limited = self.operation.engagement_rad is not None and not is_finish
@@ -349,21 +350,21 @@ class _Layers:
         shift_mm: float = 0.0,
         reach_mm: float = math.inf,
     ) -> WantedLayer:
-        """Return a layer with vertical walls."""
+        """Return a layer with vertical walls and one depth."""
         return WantedLayer(
             self.name, lines, side, shift_mm, depth_mm, 0.0, depth_mm, reach_mm=reach_mm
         )
 
     def _lines(self, *, closed: bool | None = None) -> Polylines:
-        """Return the chosen lines; the open or the closed ones alone."""
+        """Return the chosen lines; with `closed`, only the closed or only the open ones."""
         lines = self.chosen.lines
         if closed is None:
             return lines
         return lines.select(np.flatnonzero(lines.closed == closed).tolist())
 
     def _region(self) -> Polylines:
-        """Return the region that is cleared, on the left of its closed paths: of bores the
-        circles that are wide enough, the outermost of those within each other."""
+        """Return the region that is cleared, on the left of its closed paths; for bores, the
+        outermost circles that are wide enough."""
         nesting = self.chosen.nesting.among(self.closed)
         if self.operation.contract.takes != "circles":
             return oriented(nesting)
@@ -405,7 +406,7 @@ class _Layers:
         return max(self._leads_mm, 0.5 * self.operation.spare_mm)
 
     def _holes(self) -> Iterator[WantedLayer]:
-        """Return the discs of drilled holes."""
+        """Yield the discs of drilled holes."""
         holes = drilled_holes(self.chosen, self.operation)[0]
         points = [
             Polyline(np.array([[x, y, 0.0], [x + POINT_MM, y, 0.0]])) for x, y in
@@ -414,8 +415,9 @@ class _Layers:
         return self._grooves(Polylines.of(points), 0.0, is_full=True)
 
     def _carved(self, tip_mm: float, *, to_walls: bool) -> WantedLayer:
-        """Return the slopes of a carving, less the flat tip of its bit; `to_walls`: only as far
-        from the edge as the bit is wide, since a floor beyond that is left."""
+        """Return the layer with the slopes of a carving, lowered by the flat tip of its bit.
+        `to_walls`: the layer ends where the bit's width from the edge does, since the floor beyond
+        is left."""
         cone = Cone.of(self.operation)
         radius = cone.radius_at(self.depth_mm)
         return WantedLayer(
@@ -430,8 +432,8 @@ class _Layers:
         )
 
     def _waste(self) -> Iterator[WantedLayer]:
-        """Yield the waste beside the walls: as far as the tool and its leads reach, and its
-        centre on the joins of corners."""
+        """Yield the waste beside the walls, as far as the tool and its leads reach, or the tool's
+        centre on mitred corners."""
         operation, tool = self.operation, self.operation.tool
         reach = 2.0 * tool.radius_mm + operation.spare_mm
         if operation.joins != "round":
@@ -449,9 +451,9 @@ class _Layers:
             yield self._straight(lines, side, self.depth_mm, shift_mm=shift, reach_mm=reach_mm)
 
     def _walls(self) -> Iterator[tuple[Polylines, int]]:
-        """Yield closed lines that bound one region, and the side of them where the waste is. Where
-        the job names the side, those of each depth do, so that a contour in another one is cut on
-        that side too."""
+        """Yield (closed lines that bound one region, the side of them where the waste is). If the
+        job names the side, each nesting depth is a region of its own, so that a contour within
+        another one is cut on that side too."""
         chosen, closed = self.chosen, self.closed
         nesting, rim = chosen.nesting.among(closed), chosen.rim[closed]
         if self.operation.side == "auto":
@@ -508,8 +510,9 @@ class _Layers:
     def _grooves(
         self, lines: Polylines, more_mm: float, *, is_full: bool
     ) -> Iterator[WantedLayer]:
-        """Yield the groove of the tool about lines: the `is_full` one and `more_mm` to both sides,
-        or what of it must be cut: higher by the tabs, and not the foot of a round nose."""
+        """Yield the groove of the tool along lines: as wide as it may be (`is_full`, and `more_mm`
+        wider on both sides), or the part that must be cut: less deep by the tabs, and without the
+        foot of a round nose."""
         if not len(lines):
             return
         tool, depth = self.operation.tool, self.depth_mm

@@ -84,7 +84,7 @@ class SampledDialect(Struct, frozen=True):
 
 def lazy_call(path: str) -> Any:
     """Return a method that calls the function or class at `path` ("package.module:name") with its
-    own arguments; the module is imported at the first call."""
+    own arguments; the module is imported at the first call, so that listing targets stays fast."""
     module, _, name = path.partition(":")
 
     def call(self: Target, *arguments: Any, **named: Any) -> Any:
@@ -144,16 +144,16 @@ class Target(ABC):
         column."""
 
     def read_in(self, data: bytes, machine: Machine[Any, Any], folder: Path | None) -> Toolpath:
-        """Return the same for a program whose file lies in a folder (None: it has none), where the
-        controller looks for others that it calls."""
+        """Return the moves as `read` does, for a program whose file lies in `folder` (None: it has
+        no file), where the controller looks for programs that it calls."""
         return self.read(data, machine)
 
     def check(self, machine: Machine[Any, Any]) -> None:  # noqa: B027 - most need not
         """Raise MachineError for values of a machine that contradict each other."""
 
     def grade_of(self, machine: Machine[Any, Any]) -> Grade:
-        """Return what the model of this machine's controller knows, which is not the exact
-        path."""
+        """Return how much the model of this machine's controller computes (see `Grade`), if that
+        is not the exact path."""
         return machine.target.grade or self.grade
 
     def model(self) -> ControllerModel[Any, Any]:
@@ -165,23 +165,23 @@ class Target(ABC):
         return None
 
     def loop_keys(self, loop: SpeedLoop) -> Mapping[str, Any]:
-        """Return the keys of `[controller]` that say this loop."""
+        """Return the keys of `[controller]` that describe this loop in a machine file."""
         raise NotImplementedError(f"{self.name} has no speed loop")
 
     def servo_ticks(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Iterator[ServoTicks]:
-        """Yield the passes of its speed loops, in order, as many and at the same times as the
+        """Yield the passes of its speed loops in order, as many and at the same times as the
         samples of its model. Raises as `ControllerModel.run`."""
         raise NotImplementedError(f"{self.name} has no speed loop")
 
     def settings_from(self, text: str) -> Sequence[ControllerSetting] | None:
-        """Return the values of a machine file that the controller's own settings say; None for
-        a text that is none of these settings. MachineError for what is missing or cannot be
+        """Return the values for a machine file in a listing of the controller's own settings; None
+        if the text is no such listing. MachineError for settings that are missing or cannot be
         used."""
         return None
 
     def dialect_from(self, data: bytes) -> SampledDialect | None:
-        """Return what a program of a controller shows of its dialect, b"" for nothing; None for a
-        target whose dialect no machine file describes."""
+        """Return what a sample program reveals of its dialect (b"": nothing); None for a target
+        whose dialect is not described by machine files."""
         return None
 
     def compare_settings(
@@ -221,8 +221,8 @@ class Target(ABC):
         return NoWire()
 
     def listing(self, data: bytes, machine: Machine[Any, Any]) -> Listing | None:
-        """Return the program, which `read` accepts, divided into blocks; None without such a
-        listing."""
+        """Return a program that `read` accepts, divided into blocks; None for a dialect without
+        such a listing."""
         return None
 
     def made_elsewhere(self, data: bytes) -> bool:
@@ -231,8 +231,8 @@ class Target(ABC):
         return False
 
     def line_bytes(self, data: bytes, machine: Machine[Any, Any]) -> int:
-        """Return the number of bytes sent over the line to the machine, where it is not the file's
-        size."""
+        """Return the number of bytes sent over the line to the machine; by default the size of the
+        file."""
         return len(data)
 
     def stray_mm(self, machine: Machine[Any, Any]) -> float:
@@ -247,9 +247,9 @@ class Target(ABC):
     def rest(
         self, data: bytes, machine: Machine[Any, Any], first: int
     ) -> tuple[bytes, int] | None:
-        """Return the program from one of its blocks (from 0) on, and how many of its blocks
-        bring the machine there; None: the moves are written again behind an entry. PostError
-        where that cannot be."""
+        """Return the program from block `first` (from 0) on, and the number of its blocks that
+        bring the machine there. None: the caller writes the moves again behind an entry. PostError
+        where a rest is impossible."""
         return None
 
     def twin_kind(self) -> TwinKind:

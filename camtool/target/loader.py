@@ -38,9 +38,9 @@ def resolved_table(
     user: tuple[Table, str] | None = None,
     settings: Sequence[str] = (),
 ) -> tuple[Table, str]:
-    """Return a target's table with the values of a `user`'s file, which has that name, and of
-    `key.key=value` settings, and the name of the last of these sources; MachineError where keys of
-    `needs` are missing."""
+    """Return a target's table with the values of a `user`'s file (its table and name) and of
+    `key.key=value` settings laid over it, and the name of the last of these sources. MachineError
+    if keys of `needs` are missing."""
     table, name = base, base_name
     if user is not None:
         user_table, name = user
@@ -61,12 +61,12 @@ def resolved_table(
 
 
 def extended_table(target: Target, below: Table, above: Table) -> Table:
-    """Return the table of a file laid over that of what it extends."""
+    """Return the table of a file (`above`) laid over the table of what it extends (`below`)."""
     return _overlaid(target, below, {key: above[key] for key in above if key != "extends"})
 
 
 def machine_of(target: Target, table: Table, name: str) -> Machine:
-    """Return a resolved table as a checked machine of this target; MachineError names the wrong
+    """Convert a resolved table to a checked machine of this target; MachineError names the wrong
     key, and `name` as the source."""
     records: Any = reduce(or_, _records(target))
     generic: Any = Machine
@@ -90,12 +90,13 @@ def machine_of(target: Target, table: Table, name: str) -> Machine:
 
 
 def _records(target: Target) -> tuple[type[SlideStart], ...]:
-    """Return the records of `[controller]`."""
+    """Return the record types that `[controller]` may have."""
     return (*target.controllers, PathController)
 
 
 def extended_by(user_file: Path) -> str:
-    """Return the target that a user's machine file extends; MachineError without one."""
+    """Return the name of the target that a user's machine file extends; MachineError if it extends
+    none."""
     extends = read_table(user_file).get("extends")
     if not isinstance(extends, str):
         raise MachineError(
@@ -109,7 +110,7 @@ def extended_by(user_file: Path) -> str:
 
 
 def names_of(base: Table, base_name: str) -> TargetNames:
-    """Return the `[target]` of a target's table, which may lack keys of `needs`."""
+    """Return the `[target]` table of a target's file, even if the file lacks keys of `needs`."""
     return convert(base.get("target", {}), TargetNames, base_name, "target")
 
 
@@ -128,7 +129,7 @@ def _has_all(table: Any, keys: list[str]) -> bool:
 
 
 def _refuse_incomplete(table: Table, name: str) -> None:
-    """Raise MachineError for a table that lacks keys of `needs`."""
+    """Raise MachineError if the table lacks keys of its `needs`."""
     missing = missing_keys(table, name)
     if not missing:
         return
@@ -143,8 +144,8 @@ def _refuse_incomplete(table: Table, name: str) -> None:
 
 
 def _overlaid(target: Target, below: Table, above: Table) -> Table:
-    """`_laid_over`; where `above` names another controller model, the options of the old model
-    are dropped, except those that all controllers have."""
+    """Return the values of `above` over those of `below`. If `above` names another controller
+    model, the options that only the old model has are dropped."""
     old, new = below.get("controller"), above.get("controller")
     if isinstance(old, dict) and isinstance(new, dict) and "model" in new:
         own_options = (
@@ -155,7 +156,7 @@ def _overlaid(target: Target, below: Table, above: Table) -> Table:
 
 
 def _own_options(target: Target, model: object) -> set[str]:
-    """Return the options of this controller model that not all controllers have."""
+    """Return the names of the options that this controller model has and not every controller."""
     shared = {field.name for field in msgspec.structs.fields(SlideStart)}
     return {
         field.name
@@ -166,7 +167,8 @@ def _own_options(target: Target, model: object) -> set[str]:
 
 
 def _laid_over(below: Table, above: Table) -> Table:
-    """`below` with the values of `above`, table by table; neither is changed."""
+    """Return the values of both tables, those of `above` where both have one, nested tables
+    likewise; neither argument is changed."""
     merged = dict(below)
     for key, value in above.items():
         old = merged.get(key)

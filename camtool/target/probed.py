@@ -35,7 +35,8 @@ class ProbedPart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
                 raise ValueError(f"{text!r} is not {count} numbers with commas between them")
 
     def closes(self, mm: Floats, rounding_mm: float) -> Bools:
-        """Return the mask (…) of the places (…, 3) at which the probe is on the part, or in it."""
+        """Return the mask (…) of the places (…, 3), mm, at which the probe touches the part or is
+        inside it."""
         x, y = mm[..., 0], mm[..., 1]
         top = self.probe_mm + x * self.probe_slope_x + y * self.probe_slope_y
         is_on = mm[..., 2] <= top + rounding_mm

@@ -60,7 +60,8 @@ NOT_SAID = "not said"
 
 
 def choices_of(record: type[msgspec.Struct]) -> Iterator[tuple[str, str]]:
-    """Yield the name of each choice of a twin and its values, that of the default first."""
+    """Yield (name, values) of each choice that a twin leaves open; the default value comes
+    first."""
     for each in msgspec.structs.fields(record):
         values = [str(value) for value in get_args(each.type) if isinstance(value, str)]
         default = str(each.default)
@@ -115,7 +116,7 @@ class LoadedTarget(FrozenRecord):
         return self.model.run(toolpath, self.machine, options)
 
     def timed(self, toolpath: Toolpath, options: Options) -> Iterator[TimedChunk]:
-        """Return the motion as of `simulate`, with the times of its samples."""
+        """Return the motion as `simulate` does, with the times of its samples."""
         self.check_options(options)
         return self.model.timed(toolpath, self.machine, options)
 
@@ -139,9 +140,9 @@ class LoadedTarget(FrozenRecord):
         )
 
     def twin(self, choices: Sequence[str] = ()) -> Twin:
-        """Return the virtual controller of this machine, with `key=value` of what its sources
-        leave open. MachineError where there is none, OptionError, which lists what can be
-        chosen, for a choice that there is not."""
+        """Return the virtual controller of this machine, with `key=value` choices for what its
+        sources leave open. MachineError if it has none; OptionError, which lists the choices, for
+        an unknown one."""
         has_twin = type(self.target).twin_kind is not Target.twin_kind
         if has_twin and isinstance(self.machine.controller, PathController):
             raise MachineError(
@@ -172,16 +173,16 @@ class LoadedTarget(FrozenRecord):
         return replace(self, machine=machine_of(self.target, table, name), table=table)
 
     def values(self) -> dict[str, Any]:
-        """Return all values of the machine, by the keys of `--set`; of the dialect only those
-        given."""
+        """Return all values of the machine by the keys of `--set`; of the dialect only those that
+        are given."""
         values: dict[str, Any] = msgspec.to_builtins(self.machine)
         return values | {"dialect": self.table.get("dialect", {})}
 
     def changed_values(self) -> list[tuple[str, str, str]]:
-        """Return (key, value, the target's own value) of all values that differ, as `--set` takes
-        them.
+        """Return (key, value, the target's own value) for all values that differ from the target's
+        own file, as `--set` takes them.
 
-        Keys of `needs` always differ: the target's own value is `not said`.
+        Keys of `needs` always differ: the target's own value is then `not said`.
         """
         import json
 
@@ -234,14 +235,14 @@ def target_names() -> list[str]:
 
 
 def shipped_files() -> dict[str, Path]:
-    """Return the files of the machines that come with the installed targets, by their names."""
+    """Return the files of the machines that come with installed targets, by machine name."""
     modules = tuple(dict.fromkeys(point.module for point in entry_points(GROUP)))
     return dict(_shipped_files(modules))
 
 
 @cache
 def _shipped_files(modules: tuple[str, ...]) -> tuple[tuple[str, Path], ...]:
-    """Return (name, file) of the machines beside the targets of these modules."""
+    """Return (name, file) of the machines in the folders of these target modules."""
     machines = []
     for module in modules:
         try:
@@ -268,7 +269,8 @@ def load_target(
 def loaded_target(
     name: str, user: tuple[Table, str] | None, settings: Sequence[str] = ()
 ) -> LoadedTarget:
-    """Return the same with the table of a user's machine file, and that file's name."""
+    """Load the target `name` as `load_target` does, with the table and the file name of a user's
+    machine file in place of a path."""
     target, file = find_target(name)
     base = base_table(name, target, file)
     table, last = resolved_table(target, base, str(file), user, settings)
@@ -288,8 +290,8 @@ NUMBERS = {
 
 
 def _placeholders(user_table: Table, settings: Sequence[str]) -> Iterator[str]:
-    """Yield the names of the numbers that the user has not given for all axes, neither in the
-    machine file nor by `--set`."""
+    """Yield the names of placeholder numbers that the user has not given for all axes, neither in
+    the machine file nor by `--set`."""
     axes = user_table.get("axes", {})
     given_keys = {f"axes.{axis}.{key}" for axis, keys in axes.items() for key in keys}
     given_keys |= {each.partition("=")[0].strip() for each in settings}
@@ -299,7 +301,8 @@ def _placeholders(user_table: Table, settings: Sequence[str]) -> Iterator[str]:
 
 
 def list_target(name: str) -> ListedTarget:
-    """Return the target `name` for a list, complete or not; raises as `load_target` does."""
+    """Return the entry of a target for a list, even if keys of `needs` are missing; raises as
+    `load_target`."""
     target, file = find_target(name)
     table = base_table(name, target, file)
     needs, names = missing_keys(table, str(file)), names_of(table, str(file))
@@ -310,13 +313,14 @@ def list_target(name: str) -> ListedTarget:
 
 
 def grade_of(target: Target, machine: Machine) -> Grade:
-    """Return what the model of a machine's controller knows."""
+    """Return the grade of a machine: how much the model of its controller computes."""
     exact = isinstance(machine.controller, PathController)
     return "path only" if exact else target.grade_of(machine)
 
 
 def _files_below(name: str) -> tuple[Path, ...]:
-    """Return the files that the file of a machine extends, the lowest first; () for a target."""
+    """Return the files that a machine's file extends, the lowest first; () for a target's own
+    file."""
     if name in own_names() or name not in shipped_files():
         return ()
     below = extended_by(shipped_files()[name])
@@ -350,8 +354,8 @@ def each_target(
 
 
 def own_target_of(name: str) -> str:
-    """Return the installed target that the machine of this name is on: its own name for a
-    target."""
+    """Return the name of the installed target that a machine's file extends in the end; a target's
+    own name is returned unchanged. MachineError for a ring."""
     names = own_names()
     for _ in range(MAX_CHAIN):
         if name in names or name not in shipped_files():
@@ -363,8 +367,8 @@ def own_target_of(name: str) -> str:
 
 
 def base_table(name: str, target: Target, file: Path) -> Table:
-    """Return the table of a target, or of a machine that comes with one, laid over what it
-    extends; with keys of `needs`."""
+    """Return the table of a target, or of a machine that comes with one laid over what it extends;
+    its keys of `needs` are kept."""
     table = read_table(file)
     if name in own_names() or "extends" not in table:
         return table
@@ -381,8 +385,8 @@ def filter_target() -> str | None:
 
 
 def find_target(name: str) -> tuple[Target, Path]:
-    """Return the target of this name and its own machine file; raises as `load_target` does. For a
-    machine that comes with a target: that target, and the machine's file."""
+    """Return (target, machine file) for the name of a target, or of a machine that comes with one;
+    raises as `load_target`."""
     if name not in own_names() and name in shipped_files():
         target, _ = _load(_entry_point(own_target_of(name)))
         return target, shipped_files()[name]
@@ -405,8 +409,8 @@ def _entry_point(name: str) -> EntryPoint:
 
 
 def _load(point: EntryPoint) -> tuple[Target, Path]:
-    """Return the target and its machine file; MachineError, which names it, for a broken
-    plug-in."""
+    """Import a target; return it and its machine file. MachineError for a broken plug-in, with its
+    name."""
     try:
         target = point.load()
         if not isinstance(target, Target):
@@ -478,7 +482,7 @@ def _as_text(value: Any) -> str:
 
 
 def _flat(prefix: str, table: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Nested tables as (`axes.x.travel_mm`, value)."""
+    """Yield nested tables as (`axes.x.travel_mm`, value) pairs."""
     for key, value in table.items():
         name = f"{prefix}.{key}" if prefix else key
         if isinstance(value, dict):

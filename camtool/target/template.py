@@ -66,14 +66,14 @@ def machine_template(
     settings: Sequence[ControllerSetting] = (),
     file: str = "",
 ) -> str:
-    """Return TOML text of the machine `name`, which extends the target `base`; `file` is how flags
-    call it where they do not find it by its name.
+    """Return the TOML text of a machine file `name` that extends the target `base`. `file`: how
+    flags name the file if its name alone is not found.
 
-    The values that are `settings` stand in it with what says them, as comments where they are in
-    doubt. Every other value of the target's
-    own file (`base_text`) is a comment, with its source, for the user to uncomment and change;
-    every axis has `backlash_mm`, since every machine has backlash. `needs` are keys that the user
-    must give. OptionError for a name that is not a word of small letters, digits and hyphens.
+    The `settings` stand in it with their sources, as comments where they are in doubt. Every other
+    value of the target's own file (`base_text`) is a comment with its source, for the user to
+    uncomment and change; every axis has `backlash_mm`, since every machine has backlash. `needs`
+    are keys that the user must give. OptionError for a name that is not a word of small letters,
+    digits and hyphens.
     """
     if not NAME.fullmatch(name):
         raise OptionError(
@@ -120,8 +120,8 @@ def machine_template(
 
 
 def joined_text(texts: Sequence[str]) -> str:
-    """Return the text of a machine file with those of the files that it extends, the lowest first:
-    each key once, as the highest of them says it."""
+    """Return one text for a machine file and the files that it extends (`texts`, the lowest
+    first): each key once, with the value of the highest file that has it."""
     if len(texts) == 1:
         return texts[0]
     tables: dict[str, dict[str, str]] = {}
@@ -143,7 +143,8 @@ def joined_text(texts: Sequence[str]) -> str:
 def _rows(
     table: str, rows: Iterable[str], settings: dict[str, ControllerSetting], needs: set[str]
 ) -> Iterator[str]:
-    """Yield the lines of one table; what is said of it is taken out of `value_of`."""
+    """Yield the lines of one table. Settings that belong to it are written in their place and
+    removed from `settings` (changed in place)."""
     backlash = table not in _AXES or f"{table}.backlash_mm" in settings
     for row in rows:
         key = _KEY.match(row)
@@ -171,7 +172,7 @@ def _line(setting: ControllerSetting, key: str) -> str:
 
 
 def _own_keys(table: str, keys: Iterable[str]) -> list[str]:
-    """Return the names of the keys that stand in this very table."""
+    """Return the last parts of the dotted keys that belong directly to this table."""
     parts = (key.rpartition(".") for key in keys)
     return [name for head, _, name in parts if head == table]
 

@@ -55,28 +55,29 @@ class Terminal:
         self._rest = b""
 
     def encode(self, line: str) -> bytes:
-        r"""Return the bytes of a typed line; `\x13` in it is the byte of that number."""
+        r"""Return the bytes of a typed line; the escape `\x13` in it stands for the byte 0x13."""
         return self.unescape(line) + self.end
 
     def halt(self) -> bytes:
-        """Return the bytes that stop the machine, and note that it was told to stop."""
+        """Return the bytes that stop the machine, and remember that it was told to stop."""
         self.stands = self.runs_on = False
         return self.stop
 
     def is_urgent(self, line: str) -> bool:
-        """Return True if a line stops the machine, or lets it go on, and waits for no answer."""
+        """Return True if a line stops or resumes the machine, and so must not wait for the answers
+        due before it."""
         return False
 
     def decode(self, data: bytes) -> list[str]:
-        """Return the lines to show for these received bytes; an unfinished line is kept for the
-        next call."""
+        """Return the complete lines to show for these received bytes; an unfinished line is kept
+        for the next call."""
         *lines, self._rest = _ENDS.split(self._rest + data)
         if len(self._rest) > MAX_LINE_BYTES:
             lines, self._rest = [*lines, self._rest], b""
         return [self._with_meaning(line) for line in lines if line]
 
     def flush(self) -> list[str]:
-        """Return the unfinished line, if there is one, and forget it."""
+        """Return the unfinished line in a list, [] if there is none, and drop it."""
         partial, self._rest = self._rest, b""
         return [self._with_meaning(partial)] if partial else []
 
@@ -91,7 +92,7 @@ class Terminal:
 
     @staticmethod
     def unescape(line: str) -> bytes:
-        r"""Convert text with escapes such as `\x13` to bytes."""
+        r"""Return the bytes of a text in which escapes such as `\x13` stand for bytes."""
         parts = _ESCAPE.split(line)
         return b"".join(
             bytes([int(part, 16)]) if k % 2 else part.encode("utf-8")

@@ -71,9 +71,9 @@ class Travel(Struct, frozen=True, eq=False):
 
 
 def travel_of(chunks: Iterable[Chunk], *, by_passes: bool = False) -> Travel:
-    """Return the motion of a model that was run with `COMMANDED`. The outputs of a row are evenly
-    spread over its time, and a step of compensation takes as long as an output, or as a pass of
-    the interpolator (`by_passes`)."""
+    """Return the travel of a motion that a model made with `COMMANDED`. The outputs of a row are
+    spread evenly over its time. A compensation step takes as long as an output, or (`by_passes`)
+    as a pass of the interpolator."""
     commanded, seconds, added, begin = [np.empty((0, 3))], [np.empty(0)], [np.empty(0)], 0.0
     for chunk in chunks:
         ledger = chunk.ledger
@@ -111,8 +111,8 @@ class Slides:
         self._pieces: list[TwinTrace] = []
 
     def begin(self, travel: Travel, now: float, block: int) -> None:
-        """Begin a travel, that of the block with this index; one under way is abandoned.
-        Compensation steps at reversals delay what follows them."""
+        """Begin a travel that the block with this index asked for; a travel under way is
+        abandoned. Compensation steps at reversals delay the outputs after them."""
         self.stop(now)
         self._before = self._mechanics.states.copy()
         count = len(travel)
@@ -133,8 +133,8 @@ class Slides:
         return float(due[0]) if len(due) else self.ends_s
 
     def advance(self, now: float) -> tuple[Ints, Ints]:
-        """Make the outputs that are due. Return the steps (K, 3) of the axes in the outputs since
-        the last call, and those of compensation (K, 3) in front of them."""
+        """Make the outputs that are due by `now`. Return the steps (K, 3) of the axes in these
+        outputs, and the compensation steps (K, 3) before each."""
         low = self.done
         high = int(np.searchsorted(self._times, now, side="right"))
         high = max(high, low) if self.ends_s is not None else low
@@ -180,7 +180,7 @@ class Slides:
         return self._pieces[0]
 
     def drain(self) -> TwinTrace:
-        """Return the movements since the last call, and forget them."""
+        """Return the movements since the last call, and drop them."""
         trace, self._pieces = self.trace, []
         return trace
 
@@ -254,7 +254,7 @@ class Twin(ABC):
         """Carry out the action that is due at `self.now`, by `wake_s`."""
 
     def _make_outputs(self) -> None:
-        """Make the outputs that became due."""
+        """Make the outputs that are due; a twin that reports its outputs sends them here."""
         self.slides.advance(self.now)
 
     def _run(self, now: float) -> None:

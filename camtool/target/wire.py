@@ -172,8 +172,8 @@ class ResumePoint(Struct, frozen=True, eq=False):
         return {"journal": self.place_mm, "zero": (0.0, 0.0, 0.0)}.get(self.tool_at)
 
     def refusal(self, at_mm: Place | None, *, restarted: bool) -> str:
-        """Return why the program cannot go on where the controller takes the tool to stand at a
-        place; "" where it can."""
+        """Return the reason why the program cannot resume, if the controller takes the tool to
+        stand at `at_mm`; "" if it can."""
         if self.tool_at:
             return ""
         if at_mm is not None:
@@ -315,20 +315,21 @@ class Conversation(ABC):
 
     @abstractmethod
     def pause(self, now: float) -> None:
-        """Come to rest; PAUSED when the machine stands."""
+        """Pause the program; the state becomes PAUSED when the machine stands."""
 
     @abstractmethod
     def resume(self, now: float) -> None:
-        """Go on after a pause, or after what the user was waited for."""
+        """Resume after a pause, or after a stop at which the user had something to do."""
 
     @abstractmethod
     def stop(self, now: float) -> None:
-        """End for good: what stops the machine is the next thing to be written, whatever is
-        awaited. STOPPED when the machine stands, as far as its protocol can stop it; `why` then
-        says by what that is known, or that it is not."""
+        """Stop the machine and end the conversation. The bytes that stop it are the next to be
+        written, whatever is awaited. The state becomes STOPPED when the machine stands, as far as
+        its protocol can stop it; `why` then says how that is known, or that it is not."""
 
     def hurry(self, now: float) -> None:
-        """Stop harder than `stop` has done, where the protocol can; nobody waits for the end."""
+        """Stop harder than `stop` did, where the protocol can; nobody waits for the end
+        any more."""
         self.stop(now)
 
     def lose_port(self, reason: str, now: float) -> None:
@@ -338,20 +339,22 @@ class Conversation(ABC):
             self._end(WireState.FAILED, "; ".join(filter(None, (reason, self._unattended))))
 
     def override(self, name: Override, percent: int, now: float) -> None:
-        """Change the feed, the rapids or the spindle to a share of what is programmed, as far as
-        the controller can."""
+        """Change feed, rapids or spindle to a percentage of what is programmed, as far as the
+        controller can."""
         self._tell(f"it has no override of its {name} over its line")
 
     @property
     def _unattended(self) -> str:
-        """Return what the machine does if the connection is lost now; "" if it stands still."""
+        """Return a sentence on what the machine does if the connection is lost now; "" if it
+        stands still."""
         return ""
 
     def _write(self, data: bytes) -> None:
         self._out.append(Write(data))
 
     def _unwrite(self) -> bool:
-        """Take back what was to be written and was not handed out yet; True if there was any."""
+        """Withdraw bytes that were to be written and were not handed out yet; return True if there
+        were any."""
         told_actions: list[Action] = [action for action in self._out if isinstance(action, Tell)]
         was_unwritten, self._out = len(told_actions) < len(self._out), told_actions
         return was_unwritten
@@ -397,8 +400,8 @@ class PacketByPacket(Conversation):
         """Write a packet, and set `next_s`."""
 
     def _halt(self, now: float, *, unsent: bool) -> bool:
-        """Stop the machine within a packet; False where the protocol cannot. `unsent`: what was to
-        be written last of it was taken back."""
+        """Stop the machine within a packet; return False if the protocol cannot. `unsent`: the
+        last bytes of the packet were withdrawn before they were written."""
         if unsent:
             self._stopped()
         return unsent
@@ -413,14 +416,14 @@ class PacketByPacket(Conversation):
         self._go_on(now)
 
     def pause(self, now: float) -> None:
-        """Come to rest when the packet that is out is done."""
+        """Pause when the packet under way is done."""
         if self.state is WireState.SENDING:
             self.state = WireState.PAUSING
             if not self._busy:
                 self.state = WireState.PAUSED
 
     def resume(self, now: float) -> None:
-        """Go on with the next packet."""
+        """Resume with the next packet."""
         if self.state is WireState.PAUSING:
             self.state = WireState.SENDING
         elif self.state in HALTS:
@@ -429,7 +432,8 @@ class PacketByPacket(Conversation):
             self._go_on(now)
 
     def stop(self, now: float) -> None:
-        """Send nothing more; stopped when the packet that is out is done or has been halted."""
+        """Send nothing more; the state becomes STOPPED when the packet under way is done or was
+        halted."""
         if self.is_over or self.state is WireState.STOPPING:
             return
         unsent = self._unwrite()
@@ -444,7 +448,7 @@ class PacketByPacket(Conversation):
             )
 
     def _go_on(self, now: float) -> None:
-        """Send the next packet, unless the user is to be waited for."""
+        """Send the next packet, or wait if the user must do something first."""
         if self.done == len(self.packets):
             self._end(WireState.FINISHED)
             return
@@ -458,7 +462,7 @@ class PacketByPacket(Conversation):
         self._send(packet, now)
 
     def _packet_done(self, now: float) -> None:
-        """Note that the packet under way has been executed, and go on."""
+        """Record that the packet under way is executed, and continue."""
         self._busy, self.next_s = False, NEVER
         self.done = self.acknowledged = self.sent
         if self.state is WireState.STOPPING:
@@ -471,8 +475,8 @@ class PacketByPacket(Conversation):
             self._go_on(now)
 
     def _stopped(self, certainty: str = "") -> None:
-        """End the conversation with a machine that stands; `certainty`, or else `stands`, tells
-        the user how far that is sure."""
+        """End the conversation with a machine that stands; `certainty` (by default `stands`) tells
+        the user how sure that is."""
         self._busy = False
         if self._failing:
             self._end(WireState.FAILED, self._failing)
@@ -480,7 +484,7 @@ class PacketByPacket(Conversation):
             self._end(WireState.STOPPED, certainty or self.stands)
 
     def _fail(self, reason: str, now: float) -> None:
-        """Stop the machine where the protocol can, and fail."""
+        """Stop the machine if the protocol can, and end in the state FAILED."""
         if self.is_over or self._failing:
             return
         self._failing, self.state = reason, WireState.STOPPING
@@ -505,8 +509,8 @@ class Hand(Conversation):
 
     @abstractmethod
     def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
-        """Carry out "home", "zero", "jog" or "unlock"; `values` as of `Wire.command`. MachineError
-        where the controller cannot, or is not READY."""
+        """Carry out "home", "zero", "jog" or "unlock"; `values` as for `Wire.command`.
+        MachineError if the controller cannot, or is not READY."""
 
     @abstractmethod
     def hold(self, values: Mapping[str, float], now: float) -> None:
@@ -530,7 +534,7 @@ class Hand(Conversation):
             self.stop(now)
 
     def check_ready(self, action: str) -> None:
-        """Raise MachineError where the machine does not wait for an order."""
+        """Raise MachineError unless the machine is READY for an order."""
         if self.state is not WireState.READY:
             raise MachineError(
                 f"the machine is busy ({self.state.value}): it takes no order to {action}",
@@ -562,16 +566,17 @@ class CommandHand(Hand):
         self._values: Mapping[str, float] = {}
 
     def begin(self, now: float) -> None:
-        """Be ready: nothing is known of the machine but what was known before."""
+        """Become READY. Nothing is asked of the controller, so that only what was known of the
+        machine before is known."""
         self.state, self.place_mm = WireState.READY, self.manner.at_mm
 
     def order(self, action: HandAction, values: Mapping[str, float], now: float) -> None:
-        """Hold the conversation of the command."""
+        """Begin the conversation of a command."""
         manner = replace(self.manner, at_mm=self.place_mm)
         self._begin(action, self._wire.command(action, self._machine, values, manner), now, values)
 
     def hold(self, values: Mapping[str, float], now: float) -> None:
-        """Hold the conversation of the command that moves until it is stopped."""
+        """Begin the conversation of the command that moves until it is stopped."""
         self.order("hold", values, now)
 
     def release(self, now: float) -> None:
@@ -598,7 +603,8 @@ class CommandHand(Hand):
         self._follow()
 
     def receive(self, data: bytes, now: float) -> None:
-        """Hand bytes to the order that is carried out; show others."""
+        """Pass bytes to the conversation of the present order; without one, show them to
+        the user."""
         if self._order is not None:
             self._order.receive(data, now)
             self._follow()
@@ -606,7 +612,7 @@ class CommandHand(Hand):
             self._tell(f"it says: {data.strip()[:60].decode('latin-1')}")
 
     def tick(self, now: float) -> None:
-        """Pass the time to the order that is carried out."""
+        """Pass the time to the conversation of the present order."""
         if self._order is not None and now >= self._order.next_s:
             self._order.tick(now)
             self._follow()
@@ -615,13 +621,13 @@ class CommandHand(Hand):
         """Do nothing: an order by hand has no pause."""
 
     def resume(self, now: float) -> None:
-        """Give the order that waits for it what it waits for."""
+        """Resume the present order where it waits for the user."""
         if self._order is not None:
             self._order.resume(now)
             self._follow()
 
     def stop(self, now: float) -> None:
-        """Stop the order that is carried out, and end."""
+        """Stop the present order, and end."""
         if self.is_over or self.state is WireState.STOPPING:
             return
         if self._order is None:
@@ -633,7 +639,7 @@ class CommandHand(Hand):
         self._follow()
 
     def hurry(self, now: float) -> None:
-        """Stop harder."""
+        """Stop the present order harder."""
         if self._order is not None:
             self._order.hurry(now)
             self._follow()
@@ -643,7 +649,7 @@ class CommandHand(Hand):
         return "" if self._order is None else self._order._unattended
 
     def _follow(self) -> None:
-        """Take over the actions, the place and the state of the order that is carried out."""
+        """Copy actions, place and state from the conversation of the present order."""
         order = self._order
         if order is None:
             return
@@ -670,7 +676,7 @@ class CommandHand(Hand):
             self._tell(order.why)
 
     def _move_to(self, place_mm: Place) -> None:
-        """Note that the tool stands at a place of the work frame."""
+        """Record that the tool stands at a place of the work frame."""
         if self.place_mm is not None and self.machine_mm is not None:
             columns = zip(self.machine_mm, place_mm, self.place_mm, strict=True)
             x, y, z = (machine + place - before for machine, place, before in columns)
@@ -678,7 +684,7 @@ class CommandHand(Hand):
         self.place_mm = place_mm
 
     def _settle(self, order: Conversation) -> None:
-        """Note where an order that is over has left the tool."""
+        """Record where an order that is over has left the tool."""
         is_done = order.state is WireState.FINISHED
         if self._wire.place == "told":
             self.is_homed |= self._action == "home" and is_done
@@ -704,7 +710,7 @@ class CommandHand(Hand):
 
 
 def _moved(place_mm: Place | None, by_mm: Place, sense: float = 1.0) -> Place | None:
-    """Return a place moved by so much; None for none."""
+    """Return the place moved by `sense` × `by_mm`; None for an unknown place."""
     if place_mm is None:
         return None
     x, y, z = (at + sense * by for at, by in zip(place_mm, by_mm, strict=True))
@@ -735,14 +741,14 @@ class TypedLine(Conversation):
         self.next_s = now + SILENT_S
 
     def receive(self, data: bytes, now: float) -> None:
-        """Show answers."""
+        """Show the answers to the user."""
         for line in self._terminal.decode(data):
             self._tell(line)
         self._answered = True
         self.next_s = now + QUIET_S
 
     def tick(self, now: float) -> None:
-        """End when nothing has come for a while, and nothing is due."""
+        """End the conversation when no answer is due and none has come for a while."""
         for line in self._terminal.flush():
             self._tell(line)
         if self._terminal.failed:
@@ -760,10 +766,10 @@ class TypedLine(Conversation):
         """Do nothing: a line has no pause."""
 
     def resume(self, now: float) -> None:
-        """Do nothing."""
+        """Do nothing: a line never waits for the user."""
 
     def stop(self, now: float) -> None:
-        """Send what stops the machine."""
+        """Send the bytes that stop the machine."""
         stop = self._terminal.halt()
         self.state, self.next_s = WireState.STOPPING, now + SILENT_S
         if stop:
@@ -803,15 +809,16 @@ class Wire(ABC):
     absolute places and does not say where it stands."""
 
     def travel_mm(self, machine: Machine[Any, Any]) -> tuple[Place, Place]:
-        """Return the lowest and the highest place of the travel from machine zero, mm; infinite
-        where it is not known."""
+        """Return the lowest and the highest place of the travel, measured from machine zero, mm;
+        infinite where unknown."""
         x, y, z = (math.inf if (each := axis.travel_mm) is None else each for axis in machine.axes)
         u, v, w = (0.0 if math.isfinite(each) else -math.inf for each in (x, y, z))
         return (u, v, w), (x, y, z)
 
     def with_stops(self, data: bytes, machine: Machine[Any, Any], path: Toolpath) -> bytes:
-        """Return a program as the controller is to get it: it stops where the user mounts another
-        tool, if it does not by itself. Blocks stay as they are counted; `path` is what they do."""
+        """Return a program as it is sent to the controller, with stops where the user mounts
+        another tool if the controller does not stop by itself. The numbers of blocks do not
+        change; `path` is what they do."""
         return data
 
     @abstractmethod
@@ -850,8 +857,8 @@ class Wire(ABC):
     def probing(
         self, cycle: ProbeCycle, machine: Machine[Any, Any], manner: Manner
     ) -> Conversation:
-        """Return the conversation that carries out a cycle of touches. MachineError where the
-        controller has no probe."""
+        """Return the conversation that carries out a probing cycle. MachineError if the controller
+        has no probe."""
         raise MachineError(
             f"{machine.target.name} has no command to probe over its line",
             mend="measure by hand; heights can be written into a file of a surface",
@@ -860,8 +867,8 @@ class Wire(ABC):
     def settings(
         self, machine: Machine[Any, Any], manner: Manner, changes: Sequence[str] = ()
     ) -> SettingsConversation:
-        """Return the conversation that asks for the settings, makes these changes ("$110=800") and
-        asks again. MachineError where the controller has none that its line reaches."""
+        """Return the conversation that reads the settings, makes these changes ("$110=800"), and
+        reads them again. MachineError if the controller has no settings that its line reaches."""
         raise MachineError(
             f"{machine.target.name} has no settings that can be read over its line",
             mend="camtool settings compare FILE reads those that stand in a file, such as "
@@ -869,8 +876,8 @@ class Wire(ABC):
         )
 
     def recognised(self, heard: str) -> str:
-        """Return the controller and its state as an answer to `question` says them; "" where it is
-        another."""
+        """Return the name and state of the controller from its answer to `question`; "" if it is
+        another one."""
         return ""
 
     def terminal(self, machine: Machine[Any, Any]) -> Terminal:
@@ -891,8 +898,8 @@ _MENDS = {
 
 
 def port_fault(error: Exception) -> tuple[str, str]:
-    """Return what is wrong with a serial port and its remedy, for an OSError or an exception of
-    pyserial, whose own words are for programmers."""
+    """Return (what is wrong with a serial port, the remedy) for an OSError or an exception of
+    pyserial, whose own texts are for programmers."""
     text = str(error)
     match = re.search(r"\[Errno (\d+)\]", text)
     number = getattr(error, "errno", None) or (int(match[1]) if match else None)

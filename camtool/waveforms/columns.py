@@ -42,8 +42,8 @@ class TimeColumns:
         self._scale = count / (to_s - from_s)
 
     def add(self, begin_s: Floats, end_s: Floats, values: Floats, row: Ints) -> None:
-        """Add `values` (K, L) of rows (K,) that hold from `begin_s` (K,) until `end_s` (K,); rows
-        of NaN count as unknown."""
+        """Add `values` (K, L) that hold from `begin_s` (K,) until `end_s` (K,), in rows (K,) of
+        the toolpath; NaN is unknown."""
         inside = (end_s >= self.from_s) & (begin_s <= self.to_s) & ~np.isnan(values[:, 0])
         index = np.flatnonzero(inside)
         if not len(index):
@@ -75,14 +75,14 @@ def _peak(k: int, values: Floats, begin_s: Floats, row: Ints) -> Peak:
 
 
 class Held:
-    """Turns samples into values that hold until the next sample."""
+    """Converts samples to values that hold until the next sample, and adds them to columns."""
 
     def __init__(self, columns: TimeColumns) -> None:
         self._columns = columns
         self._last: tuple[float, Floats, int] | None = None
 
     def add(self, at_s: Floats, values: Floats, row: Ints) -> None:
-        """Add `values` (K, L) that are reached at `at_s` (K,), in rows (K,)."""
+        """Add `values` (K, L) that are reached at `at_s` (K,), in rows (K,) of the toolpath."""
         if not len(at_s):
             return
         if self._last is not None:
@@ -94,7 +94,7 @@ class Held:
         self._last = float(at_s[-1]), values[-1], int(row[-1])
 
     def finish(self, until_s: float) -> None:
-        """Let the last value hold until the end of the program."""
+        """Hold the last value until the end of the program."""
         if self._last is not None:
             at_s, values, row = self._last
             end_s = np.array([max(until_s, at_s)])
@@ -102,10 +102,11 @@ class Held:
 
 
 class Speeds:
-    """Turns samples into speeds (mm/s): along the path, and of X, Y and Z.
+    """Converts samples to speeds (mm/s) along the path and of X, Y and Z, and adds them to
+    columns.
 
-    Each is measured over `samples` of a row, or over at least `period_s` of moving (0: none);
-    where the machine stands between two samples, it is 0.
+    Each speed is averaged over `samples` samples of a row, or over at least `period_s` of motion
+    (0: none); where the machine stands between two samples, it is 0.
     """
 
     def __init__(
@@ -128,13 +129,14 @@ class Speeds:
             self._measure(starts)
 
     def finish(self, until_s: float) -> None:
-        """Measure what is left, and let the machine stand until the end of the program."""
+        """Add the speeds of the remaining samples, and 0 until the end of the program."""
         if len(self._row):
             self._measure(np.append(self._starts(), len(self._row)))
         self._stand(np.array([self._moved_until_s]), np.array([until_s]), np.array([-1]))
 
     def _starts(self) -> Ints:
-        """Return the first samples of all measurements, of which the last may go on."""
+        """Return the indices of the first samples of all measurements; the last measurement may be
+        incomplete."""
         count = len(self._row)
         is_first = np.ones(count, dtype=np.bool_)
         is_first[1:] = self._begin_s[1:] > self._end_s[:-1] + STANDING_S
@@ -151,8 +153,8 @@ class Speeds:
         return np.flatnonzero(is_first)
 
     def _measure(self, starts: Ints) -> None:
-        """Enter the speeds of the samples before the last of these starts, which begins what is
-        kept."""
+        """Add the speeds of the samples before the last of these starts; the samples after it are
+        kept for the next chunk."""
         first, last = starts[:-1], starts[1:] - 1
         before = np.concatenate([self._start[None, :], self._points])[first]
         begin_s, end_s = self._begin_s[first], self._end_s[last]

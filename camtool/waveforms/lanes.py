@@ -86,7 +86,7 @@ def columns_for(options: PictureOptions) -> int:
 
 
 def lanes_svg(plot: TimePlot, options: PictureOptions) -> str:
-    """Return SVG text of a plot; equal input gives equal bytes."""
+    """Return a plot as SVG text; equal input gives equal bytes."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     head, head_end = title_and_notes(plot.title, plot.notes, width)
     sides = MARGIN + NUMBERS, width - MARGIN
@@ -106,7 +106,8 @@ def lanes_svg(plot: TimePlot, options: PictureOptions) -> str:
 
 
 def time_unit(span_s: float, most_s: float) -> tuple[float, str]:
-    """Return the unit of an axis that is `span_s` long and ends at `most_s`, and its name."""
+    """Return (seconds in the unit, its name) for a time axis that is `span_s` long and ends at
+    `most_s`."""
     chosen = next(((size, name) for size, name, from_s in UNITS if span_s >= from_s), (1e-3, "ms"))
     # A short stretch late in a program: numbers of seven digits are no help.
     return (1.0, "s") if chosen[1] == "ms" and most_s >= 100.0 else chosen
@@ -115,7 +116,7 @@ def time_unit(span_s: float, most_s: float) -> tuple[float, str]:
 def _lane(
     lane: Lane, plot: TimePlot, sides: tuple[float, float], top: float, unit_s: float
 ) -> Iterator[str]:
-    """Yield the ground, the curves and the axis of a lane."""
+    """Yield the SVG of a lane: its background, its curves and its axis of values."""
     (x_low, x_high), bottom = sides, top + lane.height
     low, high = _range(lane)
     scale = lane.height / (high - low)
@@ -151,7 +152,7 @@ def _lane(
 
 
 def _range(lane: Lane) -> tuple[float, float]:
-    """Return the values at the foot and at the top of a lane."""
+    """Return the values at the bottom and at the top of a lane."""
     values = [part[np.isfinite(part)] for curve in lane.curves for part in (curve.low, curve.high)]
     drawn = np.concatenate(values)
     low, high = (float(drawn.min()), float(drawn.max())) if len(drawn) else (0.0, 1.0)
@@ -164,7 +165,8 @@ def _range(lane: Lane) -> tuple[float, float]:
 
 
 def _curve(curve: Trend, sides: tuple[float, float], heights: tuple[float, float, float]) -> str:
-    """Return the band of a curve, column by column, as one line."""
+    """Return the SVG of a curve: the band between its least and largest value, column by column,
+    as one line."""
     (x_low, x_high), (foot, bottom, scale) = sides, heights
     step, path = (x_high - x_low) / len(curve.low), PathData()
     drawn = np.flatnonzero(np.isfinite(curve.low))
@@ -198,7 +200,7 @@ def _curve(curve: Trend, sides: tuple[float, float], heights: tuple[float, float
 
 
 def _strip(strip: Strip, sides: tuple[float, float], top: float) -> Iterator[str]:
-    """Yield a strip of the ribbon, with its name at the left."""
+    """Yield the SVG of a strip of the ribbon, with its name at the left."""
     x_low, x_high = sides
     step, path = (x_high - x_low) / len(strip.on), PathData()
     edges = np.flatnonzero(np.diff(np.concatenate([[False], strip.on, [False]]).astype(np.int8)))
@@ -215,7 +217,7 @@ def _strip(strip: Strip, sides: tuple[float, float], top: float) -> Iterator[str
 def _time_ticks(
     plot: TimePlot, sides: tuple[float, float], unit_s: float
 ) -> tuple[list[float], list[str]]:
-    """Return the places of round times, and their numbers."""
+    """Return the X positions of round times, and the numbers to write there."""
     (x_low, x_high), low, high = sides, plot.from_s / unit_s, plot.to_s / unit_s
     step = round_step((high - low) * TIME_SPACING / (x_high - x_low))
     values = multiples(low, high, step)
@@ -224,7 +226,7 @@ def _time_ticks(
 
 
 def _times(plot: TimePlot, sides: tuple[float, float], top: float, unit: tuple[float, str]) -> str:
-    """Return the numbers of the time axis, from the start of the program."""
+    """Return the SVG of the numbers of the time axis, counted from the start of the program."""
     x_high = sides[1]
     parts = [
         text.label(words, (x, top + 22.0), TextStyle(TICK_CAP, QUIET, "middle"))
@@ -235,8 +237,8 @@ def _times(plot: TimePlot, sides: tuple[float, float], top: float, unit: tuple[f
 
 
 def _legend(plot: TimePlot, top: float, width: float) -> tuple[str, float]:
-    """Return the names of the curves of lanes with several, below the axis, and the end of the
-    page."""
+    """Return the SVG of the legend below the axis, for lanes with several curves, and the Y at
+    which the page ends."""
     shared = [lane for lane in plot.lanes if len(lane.curves) > 1]
     curves = {curve.name: curve for lane in shared for curve in lane.curves}
     if not curves:

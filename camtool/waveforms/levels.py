@@ -108,7 +108,7 @@ class _LevelRun:
         self._falls: list[_Changes] = []
 
     def start(self) -> LineLevels:
-        """Return the moment at which the program starts."""
+        """Return the moment at the start of the program, before any pulse."""
         return LineLevels(
             np.zeros(1, dtype=np.int64),
             self._bytes[None, :].astype(np.uint8),
@@ -117,7 +117,7 @@ class _LevelRun:
         )
 
     def add(self, pulses: Pulses) -> LineLevels:
-        """Return the moments before the next pulses can come."""
+        """Return the moments that are final: those before the next pulses can come."""
         until = int(np.rint(pulses.until_s / self._board.tick_s))
         pulses = in_order([self._waiting, pulses], pulses.until_s)
         ticks = np.rint(pulses.at_s / self._board.tick_s).astype(np.int64)
@@ -159,7 +159,7 @@ class _LevelRun:
         return LineLevels(moments, ports.astype(np.uint8), places, row)
 
     def _of_motor(self, number: int, ticks: Ints, moves: Ints) -> list[_Changes]:
-        """Return the changes of the lines of a motor that moves so at these ticks."""
+        """Return the changes of the lines of motor `number`, which makes `moves` at `ticks`."""
         motor = self._board.motors[number]
         moving = np.flatnonzero(moves)
         if not len(moving):
@@ -176,8 +176,8 @@ class _LevelRun:
         return self._of_driver(motor, at, travel)
 
     def _of_driver(self, motor: StepDirection, at: Ints, travel: Ints) -> list[_Changes]:
-        """Return the changes of a step line and a direction line. A pulse that lasts until the
-        next one has no fall."""
+        """Return the changes of a motor's step and direction lines. The step line does not fall
+        between two pulses if the first lasts until the second."""
         (step_port, step_bit), (way_port, way_bit) = motor.step, motor.direction
         falls = at + max(int(np.rint(motor.width_s / self._board.tick_s)), 1)
         edges = np.concatenate([falls, at])

@@ -88,7 +88,7 @@ def time_plot(
     stretch: TimeSpan = ALL_TIME,
     columns: int = 1000,
 ) -> TimePlot:
-    """Return the content of a plot with so many columns."""
+    """Return the content of a plot with this number of columns."""
     seconds = float(verification.rows.seconds.sum())
     from_s, to_s = stretch.within(seconds)
     makers = {"speed": _speed_lanes, "position": _position_lanes, "error": _error_lanes}
@@ -106,7 +106,8 @@ QUANTITIES: Final = {"speed": 4, "position": 3, "error": 1}
 
 
 def _speed_lanes(verification: Verification, columns: TimeColumns) -> tuple[tuple[Lane, ...], str]:
-    """Return the speed along the path, with the programmed one, and those of the axes."""
+    """Return the lanes with the speed along the path, next to the programmed one, and with the
+    speeds of the axes, and a text about the peak."""
     case = verification.case
     model, machine = case.target.model, case.machine
     samples, period_s = model.samples_per_speed, model.speed_period_s(machine)
@@ -140,7 +141,7 @@ def _speed_lanes(verification: Verification, columns: TimeColumns) -> tuple[tupl
 def _position_lanes(
     verification: Verification, columns: TimeColumns
 ) -> tuple[tuple[Lane, ...], str]:
-    """Return the predicted positions of the slides."""
+    """Return the lanes with the predicted positions of the slides, and a text about them."""
     case, holder = verification.case, Held(columns)
     start = case.decoded.start
     holder.add(np.zeros(1), start[None, :], np.zeros(1, dtype=np.int64))
@@ -163,7 +164,8 @@ def _position_lanes(
 
 
 def _error_lanes(verification: Verification, columns: TimeColumns) -> tuple[tuple[Lane, ...], str]:
-    """Return the distance of the slides from the wanted path where they cut."""
+    """Return the lane with the distance of the slides from the wanted path while cutting, and a
+    text about the peak."""
     holder = Held(columns)
     for timed, errors_mm in errors_over_time(verification.case):
         holder.add(timed.at_s, errors_mm[:, None], timed.chunk.row)
@@ -185,7 +187,8 @@ def _error_lane(columns: TimeColumns, mark: tuple[int, float] | None) -> Lane:
 
 
 def _mark(columns: TimeColumns, peak: Peak, unit: float) -> tuple[int, float] | None:
-    """Return the column and the value of a peak, in these units."""
+    """Return (column, value in the lane's unit) of a peak, None if the plot shows no value
+    at all."""
     if peak.row < 0:
         return None
     share = (max(peak.at_s, columns.from_s) - columns.from_s) / (columns.to_s - columns.from_s)
@@ -193,7 +196,7 @@ def _mark(columns: TimeColumns, peak: Peak, unit: float) -> tuple[int, float] | 
 
 
 def _place(peak: Peak, decoded: Toolpath) -> str:
-    """Return when and in which block a peak is, in words."""
+    """Return text on when and in which block a peak occurs."""
     if peak.row < 0:
         return "at the end"
     block = int(decoded.block[peak.row])
@@ -202,7 +205,7 @@ def _place(peak: Peak, decoded: Toolpath) -> str:
 
 
 def ribbon_of(decoded: Toolpath, seconds: Floats, columns: TimeColumns) -> tuple[Strip, ...]:
-    """Return the strips of feed moves, rapids and stops; `seconds` (N,) of each row."""
+    """Return the strips of feed moves, rapids and stops; `seconds` (N,): the time of each row."""
     kind = decoded.kind
     rapid = (kind == Kind.RAPID) | (kind == Kind.HOME_XY) | (kind == Kind.HOME_Z)
     stands = ~rapid & ~decoded.is_feed
@@ -223,7 +226,8 @@ def _programmed(decoded: Toolpath, seconds: Floats, columns: TimeColumns) -> Tre
 def _row_columns(
     seconds: Floats, is_on: Bools, columns: TimeColumns, values: Floats | None = None
 ) -> TimeColumns:
-    """Return columns of the same times with a value for each of the rows that are `is_on` (N,)."""
+    """Return columns of the same stretch in which each row that `is_on` (N,) has its value while
+    it runs."""
     end_s = np.cumsum(seconds)
     rows = np.flatnonzero(is_on & (seconds > 0.0))
     own = TimeColumns(columns.from_s, columns.to_s, columns.count, 1)

@@ -65,8 +65,8 @@ def scope_svg(
     motors: Sequence[str] | None = None,
     options: PictureOptions = AS_USUAL,
 ) -> str:
-    """Return SVG text of a stretch; equal input gives equal bytes. `motors` to show; None:
-    those that move. OptionError for motors that there are not, and for too many changes."""
+    """Return a stretch as SVG text; equal input gives equal bytes. `motors`: names of those to
+    show (None: those that move). OptionError for unknown motors, and for too many changes."""
     if len(stretch.levels.tick) > MAX_MOMENTS:
         raise OptionError(
             f"{len(stretch.levels.tick):,} changes are more than a picture shows, {MAX_MOMENTS:,}",
@@ -103,12 +103,13 @@ def scope_svg(
 
 
 def _unit(seconds: float) -> tuple[float, str]:
-    """Return the unit, s, in which so many seconds are a number of 1 or more, and its name."""
+    """Return (seconds in the unit, its name) of the largest unit in which this time is at
+    least 1."""
     return next((each for each in UNITS if seconds >= each[0]), UNITS[-1])
 
 
 def _text(value: float) -> str:
-    """Six digits of a number, without an exponent."""
+    """Return a number with six digits, without an exponent."""
     return number(float(f"{value:.6g}"), 9)
 
 
@@ -143,7 +144,7 @@ def _lanes(stretch: Stretch, motors: Sequence[str] | None, top: float) -> list[_
 
 
 def _lane(lane: _Lane, stretch: Stretch, sides: tuple[float, float], scale: float) -> list[str]:
-    """Return the trace of a line between its name and the times of its pulses."""
+    """Return the SVG of a line: its name, its trace, and the times of its pulses."""
     x_low, x_high = sides
     path, foot = PathData(), lane.top + LANE
 
@@ -172,7 +173,7 @@ def _lane(lane: _Lane, stretch: Stretch, sides: tuple[float, float], scale: floa
 
 
 def _pulse_times(lane: _Lane, tick_s: float) -> str:
-    """Return the times for which the line is high and low, such as "4 / 4 ms"."""
+    """Return the times for which the line is high and low as text, such as "4 / 4 ms"."""
     durations = np.diff(lane.tick[1:]) * tick_s
     parts = [durations[lane.level[1:-1] == level] for level in (1, 0) if len(durations)]
     if not all(map(len, parts)) or not parts:
@@ -188,8 +189,8 @@ def _pulse_times(lane: _Lane, tick_s: float) -> str:
 def _axis(
     stretch: Stretch, sides: tuple[float, float], ends: tuple[float, float], scale: float
 ) -> tuple[str, str]:
-    """Return the lines of the grid, and the numbers of the time axis, from the start of the
-    stretch."""
+    """Return the SVG of the grid lines, and of the numbers of the time axis, counted from the
+    start of the stretch."""
     (x_low, x_high), (top, bottom) = sides, ends
     span_s = (stretch.to_tick - stretch.from_tick) * stretch.board.tick_s
     unit_s, unit = _unit(span_s)

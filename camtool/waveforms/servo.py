@@ -162,8 +162,8 @@ class ServoRun:
         return rendered(lambda sized: self.svg(sized, axes), name, options)
 
     def svg(self, options: PictureOptions, axes: Sequence[str] | None = None) -> str:
-        """Return SVG text of the stretch: ω and θ of `axes` (None: those that move) and the
-        error along the path. OptionError for an axis that there is not."""
+        """Return the stretch as SVG text: ω and θ of `axes` (None: those that move) and the error
+        along the path. OptionError for an unknown axis."""
         from_s, to_s = self.shown_s
         columns = TimeColumns(from_s, to_s, columns_for(options), QUANTITIES * len(AXES))
         along = TimeColumns(from_s, to_s, columns.count, 1)
@@ -195,7 +195,7 @@ class ServoRun:
         return 1e3 * self.loop.tick_s
 
     def table(self) -> Iterator[bytes]:
-        """Yield the text of a table of all ticks of the stretch."""
+        """Yield a CSV table of all ticks of the stretch."""
         from_s, to_s = self.shown_s
         names = ["reference", "speed", "drive", "wanted", "reached"]
         heads = [f"{axis.lower()}_{name}" for axis in AXES for name in names]
@@ -242,7 +242,7 @@ def steps_picture(
 def steps_svg(
     title: str, answers: Sequence[StepAnswer], tick_s: float, options: PictureOptions
 ) -> str:
-    """Return SVG text of the answers of axes to a step: speed, position and drive."""
+    """Return SVG text of step responses: speed, position and drive of each axis."""
     seconds = tick_s * len(answers[0].speed)
     lanes = []
     for answer in answers:
@@ -267,7 +267,7 @@ def steps_svg(
 
 
 def _moves(columns: TimeColumns, axis: int) -> bool:
-    """Return True if an axis moves or is asked to."""
+    """Return True if an axis moves or has a reference other than 0."""
     quantities = [axis, 3 + axis]
     return bool(
         (columns.high[quantities] > 0.0).any()
@@ -276,7 +276,7 @@ def _moves(columns: TimeColumns, axis: int) -> bool:
 
 
 def _chosen(names: Sequence[str] | None, moving: list[int]) -> list[int]:
-    """Return the numbers of the axes of these names; those that move by default."""
+    """Return the indices of the named axes; by default of those that move."""
     if names is None:
         return moving
     unknown = [name for name in names if name.upper() not in AXES or len(name) != 1]
@@ -305,7 +305,7 @@ def _axis_lanes(columns: TimeColumns, axis: int) -> Iterator[Lane]:
 
 
 def _by_line(ticks: ServoTicks) -> Iterator[ServoTicks]:
-    """Split ticks where another order begins."""
+    """Yield the ticks divided where another order begins."""
     edges = np.flatnonzero(np.diff(ticks.line)) + 1
     bounds: Ints = np.concatenate([[0], edges, [len(ticks.line)]])
     for low, high in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
@@ -314,7 +314,7 @@ def _by_line(ticks: ServoTicks) -> Iterator[ServoTicks]:
 
 
 def _joined(parts: list[ServoTicks]) -> ServoTicks:
-    """Join ticks that follow one another."""
+    """Return consecutive ticks joined into one record."""
     return ServoTicks(
         *(
             np.concatenate([getattr(part, name) for part in parts])

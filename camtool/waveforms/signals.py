@@ -56,8 +56,8 @@ class Signals:
 
     @classmethod
     def of(cls, data: bytes, target: LoadedTarget, name: str = "") -> Signals:
-        """Return the signals of a program; MachineError for a machine that has none, ProgramError
-        as `Target.read`."""
+        """Return the signals of a program; MachineError for a machine without signals,
+        ProgramError as `Target.read`."""
         model = target.target.signals()
         machine = target.machine.target.name
         if isinstance(model, NoSignals):
@@ -147,10 +147,10 @@ class Signals:
         motors: Sequence[str] | None = None,
         options: PictureOptions = AS_USUAL,
     ) -> Iterator[bytes]:
-        """Yield the bytes of a file of this name: .vcd, .csv, .svg or .png; `motors` and `options`
-        are those of pictures. OutputError for another name, OptionError for a stretch
-        outside of the program, a motor that there is not, and more changes than a table or a
-        picture can have."""
+        """Yield the bytes of a file with this name: .vcd, .csv, .svg or .png; `motors` and
+        `options` apply to pictures. OutputError for another extension; OptionError for a stretch
+        outside the program, an unknown motor, and more changes than a table or a picture can have.
+        """
         suffix = PurePath(name).suffix.lower()
         if suffix not in KINDS:
             raise OutputError("is no file of signals", file=name, mend=f"use {', '.join(KINDS)}")
@@ -179,7 +179,7 @@ class Signals:
             part.unlink(missing_ok=True)
 
     def _stretch(self, from_s: float, span_s: float | None) -> Stretch:
-        """Return what a picture shows; without a span the first changes."""
+        """Return the stretch for a picture; without a span it ends after the first changes."""
         parts, count = [], 0
         for part in self.levels(from_s, span_s):
             parts.append(part)
@@ -199,8 +199,8 @@ class Signals:
         return Stretch(self.board, moments, first, last)
 
     def _ticks(self, from_s: float, span_s: float | None) -> tuple[int, int | None]:
-        """Return the first tick of a stretch and the last; OptionError for numbers that are none
-        of a stretch."""
+        """Return the first and the last tick of a stretch (None: the end of the program);
+        OptionError for negative or infinite times."""
         if not 0.0 <= from_s <= MAX_S:
             raise OptionError(
                 f"a stretch from {from_s:g} s on is none", mend=f"give 0 to {MAX_S:g}"

@@ -25,7 +25,8 @@ PER_S = {"ms": 3, "us": 6}
 
 
 def time_texts(board: Board, tick: Ints) -> list[str]:
-    """Return the times (L,) in the unit of the board, with as many decimals as a tick needs."""
+    """Return the times (L,) as text in the board's unit, with as many decimals as one tick
+    needs."""
     per_unit = round(10.0 ** -PER_S[board.unit] / board.tick_s)
     if per_unit == 1:
         return [str(value) for value in tick.tolist()]
@@ -36,7 +37,7 @@ def time_texts(board: Board, tick: Ints) -> list[str]:
 def table(
     board: Board, moments: Iterable[LineLevels], block: Ints, *, max_rows: int = MAX_ROWS
 ) -> Iterator[bytes]:
-    """Yield the text of a table. `block` (N,): the block of each row of the toolpath, from 1.
+    """Yield the text of a table. `block` (N,): the block (from 1) of each row of the toolpath.
     OptionError for more than `max_rows`."""
     motors = (motor.name.lower() for motor in board.motors)
     yield (",".join([f"time_{board.unit}", *port_names(board), *motors, "block"]) + "\n").encode()

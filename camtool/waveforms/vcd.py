@@ -23,7 +23,7 @@ WORD_BITS = 32
 
 
 def timescale(tick_s: float) -> str:
-    """Return a tick as a dump says it, such as "100 ps".
+    """Return the duration of a tick in the notation of a dump, such as "100 ps".
 
     >>> timescale(1e-3), timescale(1e-10)
     ('1 ms', '100 ps')
@@ -34,7 +34,8 @@ def timescale(tick_s: float) -> str:
 
 
 def _module(port: str) -> str:
-    """Return the name of a port's module: identifiers begin with a letter."""
+    """Return the module name for a port; a letter is put before it, with which identifiers must
+    begin."""
     return port if port[0].isalpha() else f"port_{port}"
 
 
@@ -50,7 +51,8 @@ class _Variable:
         self._last: int | None = None
 
     def changes(self, values: Ints) -> tuple[Ints, list[str]]:
-        """Return the indices (C,) of the moments in which it changes, and the texts for them."""
+        """Return the indices (C,) of the moments at which the variable changes, and the texts of
+        these changes."""
         before = np.concatenate([[values[0] + 1 if self._last is None else self._last], values])
         index = np.flatnonzero(np.diff(before))
         self._last = int(values[-1])
@@ -63,8 +65,8 @@ class _Variable:
 def dump(
     board: Board, moments: Iterable[LineLevels], block: Ints, title: str, end_tick: int | None
 ) -> Iterator[bytes]:
-    """Yield the text of a dump. `block` (N,): the block of each row of the toolpath, from 1;
-    `end_tick`: when it ends, None: with its last change."""
+    """Yield the text of a dump. `block` (N,): the block (from 1) of each row of the toolpath;
+    `end_tick`: the tick at which the dump ends, None: at its last change."""
     lines, ports = lines_of(board), port_names(board)
     wires = [_Variable(k, "wire", 1, line.name) for k, line in enumerate(lines)]
     names = [*(motor.name for motor in board.motors), "block"]

@@ -121,10 +121,10 @@ def radii(wide_mm: float, tool_mm: float, step_mm: float) -> list[float]:
     """Return the radii of the rings of the tool's centre, mm, from the inside out; the last is
     `wide_mm`. The first ring leaves no core, and neighbours are at most a step-over apart.
 
-        >>> radii(1.0, 1.5, 1.2)
-        [1.0]
-        >>> radii(4.5, 1.5, 1.2)
-        [1.35, 2.4, 3.45, 4.5]
+    >>> radii(1.0, 1.5, 1.2)
+    [1.0]
+    >>> radii(4.5, 1.5, 1.2)
+    [1.35, 2.4, 3.45, 4.5]
     """
     first = min(wide_mm, CORE_SHARE * tool_mm)
     count = math.ceil((wide_mm - first) / step_mm * (1.0 - TURN_SLACK))
