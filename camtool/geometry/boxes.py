@@ -67,16 +67,19 @@ class BoxIndex:
             level = np.concatenate([low, high], axis=1)
 
     def touching(self, boxes: Floats) -> tuple[Ints, Ints]:
-        """Return the rows (J,), (J,), in order, of boxes (B, 4) and of the index that have a point
-        in common."""
+        """Return the rows (J,), (J,) of all pairs of a box (B, 4) and one of the index that have a
+        point in common, sorted."""
         hits = [one * self._count + other for one, other in self.pairs(boxes)]
         pairs = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *hits]))
         one, other = np.divmod(pairs, max(self._count, 1))
         return one, other
 
     def pairs(self, boxes: Floats) -> Iterator[tuple[Ints, Ints]]:
-        """Yield the rows of boxes and of the index that have a point in common, in batches that
-        bound the memory; rows of `boxes` never descend, those of the index come in any order."""
+        """Yield the rows of pairs of a box and one of the index that have a point in common, in
+        batches that bound the memory.
+
+        Rows of `boxes` never descend, those of the index come in any order.
+        """
         columns = np.ascontiguousarray(boxes.T)
         waiting = [(0, np.arange(len(boxes)), np.zeros(len(boxes), dtype=np.int64))]
         while waiting:
@@ -98,9 +101,12 @@ class BoxIndex:
 
 
 def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[tuple[Ints, Ints]]:
-    """Yield the rows (J,), (J,) of all boxes xmin, ymin, xmax, ymax no farther apart than
-    `reach_mm`, in batches that bound the memory: by the rows of `a`, and for each from left to
-    right those of `b`."""
+    """Yield the rows (J,), (J,) of all pairs of boxes, xmin, ymin, xmax, ymax, no farther apart
+    than `reach_mm`.
+
+    They come in batches that bound the memory, sorted by the rows of `boxes_a`, and for each of
+    these by the left edges in `boxes_b`.
+    """
     one, other = BoxIndex(boxes_b).touching(_grown_boxes(boxes_a, reach_mm))
     low = np.maximum(boxes_a[one, :2], boxes_b[other, :2])
     high = np.minimum(boxes_a[one, 2:], boxes_b[other, 2:])
@@ -113,8 +119,8 @@ def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[
 
 
 def near_points(points: Floats, places: Floats, reach_mm: float | Floats) -> tuple[Ints, Ints]:
-    """Return the rows (J,), (J,), in order, of all points (P, 2) and places (K, 2) no farther
-    apart than `reach_mm`, which may differ from point to point (P,)."""
+    """Return the rows (J,), (J,), sorted, of all pairs of a point (P, 2) and a place (K, 2) no
+    farther apart than `reach_mm`, a number or one for each point (P,)."""
     search_boxes = _grown_boxes(np.hstack([points, points]), reach_mm)
     one, other = BoxIndex(np.hstack([places, places])).touching(search_boxes)
     difference = points[one] - places[other]
@@ -133,12 +139,12 @@ def _grown_boxes(boxes: Floats, reach_mm: float | Floats) -> Floats:
 def touching_boxes(
     boxes: Floats, same: Ints, differ: Ints, is_searched: Bools, *, max_pairs: int
 ) -> tuple[Ints, Ints]:
-    """Return rows (J,), (J,), the lesser first, of boxes (K, 4) that touch; each pair once.
+    """Return the rows (J,), (J,), the lesser first, of pairs of boxes (K, 4) that touch; each pair
+    once.
 
-    Both have the same number in `same` (K,) and different ones in `differ` (K,), and `is_searched`
-    (K,) is true for one of them. No more than `max_pairs` pairs, and none of boxes that come late
-    in a sweep of more than MAX_COMPARISONS: both bound time and memory, far beyond any real
-    drawing.
+    A pair counts if both have the same number in `same` (K,), different ones in `differ` (K,), and
+    `is_searched` (K,) is true for at least one. Two bounds on time and memory, far beyond any real
+    drawing, cut the result short: `max_pairs` pairs, and MAX_COMPARISONS comparisons in the sweep.
     """
     along_x, along_y = boxes, boxes[:, [1, 0, 3, 2]]
     work, swapped, order = min(
@@ -172,7 +178,8 @@ class IndexedCurves(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, segments: Segments, *, margin_mm: float = 0.0) -> IndexedCurves:
-        """Return the segments with boxes that are grown by a margin on all sides."""
+        """Return the segments as rows, with boxes grown by a margin on all sides, and the tree
+        over these."""
         rows = curve_rows_of(segments)
         boxes = curve_boxes(rows, margin_mm)
         return cls(rows, boxes, tree_of(boxes))
@@ -185,8 +192,10 @@ def curve_rows_of(segments: Segments) -> Floats:
 
 
 def moves_of(segments: Segments, heights: Floats | None = None) -> Moves:
-    """Return the segments with the heights of their starts and ends (K, 2) mm, 0 where they are
-    not given, as `camtool.kernels.near` takes them."""
+    """Return the segments in the form that `camtool.kernels.near` takes.
+
+    `heights` (K, 2) mm are those of their starts and ends, 0 if not given.
+    """
     rows = np.flatnonzero(segments.bulge)
     arc = np.broadcast_to(np.int32(-1), len(segments))
     if len(rows):
@@ -207,8 +216,8 @@ def moves_of(segments: Segments, heights: Floats | None = None) -> Moves:
 
 
 def distances_from(points: Floats, moves: Moves) -> Floats:
-    """Return (P,) mm: how far each of the points (P, 2) is from the nearest of the moves, seen
-    from above."""
+    """Return the distance (P,) mm, seen from above, of each point (P, 2) from the nearest move;
+    inf without any move."""
     places = np.column_stack([points, np.zeros(len(points))])
     distance = np.full(len(points), np.inf)
     if not len(moves.start):
@@ -226,9 +235,11 @@ def distances_from(points: Floats, moves: Moves) -> Floats:
 def nearest_pairs(
     points: Floats, moves: Moves, times: float, slack_mm: float
 ) -> tuple[Floats, Ints, Ints]:
-    """Return (P,) mm, how far each of the points (P, 2) is from the nearest of the moves, and the
-    rows (J,), (J,) of all pairs of a point and a move that is no farther from it than so many
-    `times` that and `slack_mm` more."""
+    """Return the distance (P,) mm of each point (P, 2) from the nearest move, and the rows (J,),
+    (J,) of pairs of a point and a move nearly as near.
+
+    A move is in a pair if its distance is at most `times` the nearest one plus `slack_mm`.
+    """
     distance = distances_from(points, moves)
     reach = times * distance + slack_mm
     places = np.column_stack([points, np.zeros(len(points))])

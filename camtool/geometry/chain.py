@@ -81,11 +81,11 @@ def chain(
 ) -> Chained:
     """Join open paths where their ends meet exactly, then where free ends lie within `gap_mm`.
 
-    Paths of different groups (layers) are never joined; `kinds` says more than `groups` alone. A
-    chain whose own ends meet becomes closed, unless nothing would lie inside (a line and its
-    double). Closed paths stay as they are. Results stand in the order of their first members,
-    travelled as the first one drawn. GeometryError when the gap is negative or not finite, or
-    groups do not fit the paths.
+    Paths of different groups (layers) are never joined; `kinds` replaces `groups` where styles
+    matter too. A chain whose own ends meet becomes closed, unless it would enclose nothing (a line
+    and its double). Closed paths stay as they are. Results are in the order of their first
+    members, and run in the direction in which that one was drawn. GeometryError when the gap is
+    negative or not finite, or the number of groups is not that of the paths.
     """
     if not (np.isfinite(gap_mm) and gap_mm >= 0.0):
         raise GeometryError(f"a gap of {gap_mm} mm is not 0 or more")
@@ -110,8 +110,8 @@ def chain(
 
 
 def numbered(items: Sequence[Hashable] | None, count: int) -> Ints:
-    """Return a number (count,) for each different item, in order of first appearance; 0 for
-    None."""
+    """Return a number (count,) for each item, the same for equal ones, from 0 in order of first
+    appearance; all 0 for None."""
     if items is None:
         return np.zeros(count, dtype=np.int64)
     numbers: dict[Hashable, int] = {}
@@ -119,15 +119,15 @@ def numbered(items: Sequence[Hashable] | None, count: int) -> Ints:
 
 
 def _single_members(paths: Ints) -> tuple[tuple[int, ...], ...]:
-    """Return the members of chains that have one path each."""
+    """Return, for each of these paths, the path alone as the members of a chain."""
     return tuple((index,) for index in paths.tolist())
 
 
 def _sorted_chains(
     lines: Polylines, single: Ints, lots: Sequence[JoinedChains]
 ) -> tuple[Polylines, tuple[tuple[int, ...], ...]]:
-    """Return the paths that are joined to none and all chains, in the order of their first
-    members; and the members."""
+    """Return the single paths and all chains in the order of their first members, and the members
+    of each."""
     if not lots:
         return lines, _single_members(single)
     members = list(_single_members(single))
@@ -146,7 +146,7 @@ def _sorted_chains(
 
 
 def _closed_gaps(lots: Sequence[JoinedChains], layers: Sequence[str]) -> list[Gap]:
-    """Return the bridged gaps, in the order of the first members of their chains."""
+    """Return the gaps that were bridged, in the order of the first members of their chains."""
     numbered_gaps: list[tuple[int, Gap]] = []
     for batch in lots:
         paths = batch.chains.entries // 2
@@ -245,9 +245,9 @@ class Joints(Struct, frozen=True, eq=False):
         members: Sequence[Sequence[int]],
         closed: Bools,
     ) -> tuple[Branch, ...]:
-        """Return the branches with their places, in the order of place, layer and size.
+        """Return the branches with their places, sorted by place, layer and size.
 
-        `members` are the input paths of each result, `closed` says which results are rings.
+        `members` are the input paths of each result, `closed` (results,) is true for closed ones.
         """
         if not self.branches:
             return ()
@@ -280,7 +280,7 @@ class Joints(Struct, frozen=True, eq=False):
 
 
 def joints(ends: Ends, reach: float) -> Joints:
-    """Choose the ends to be joined, within `reach` and within their group (see the top)."""
+    """Choose which ends are joined, within `reach` and within their group (by the rules above)."""
     joining = _Joining.of(ends)
     free_ends = every = np.flatnonzero(np.repeat(ends.is_open, 2))
     is_alone = np.ones(len(joining.mates), dtype=np.bool_)
@@ -319,23 +319,26 @@ class _Joining(Struct, eq=False):
 
     @classmethod
     def of(cls, ends: Ends) -> _Joining:
-        """Begin without any joint."""
+        """Return the state without any joint."""
         no_mates = np.full(len(ends.points), -1, dtype=np.int64)
         segments, arcs = ends.weights[:, 0].copy(), ends.weights[:, 1].copy()
         return cls(ends, no_mates, no_mates.copy(), {}, np.arange(len(ends.group)), segments, arcs)
 
     def join(self, one: Ints, other: Ints) -> int:
-        """Join these pairs in their order, if both ends are free; return how many were."""
+        """Join these pairs of ends in their order, each if both are still free; return the number
+        of joints."""
         return join(one, other, self.mates, self.above, self.segments, self.arcs)
 
     def without_empty_rings(self, one: Ints, other: Ints) -> tuple[Ints, Ints]:
-        """Return the pairs without those of both ends of one path that would enclose no area."""
+        """Return the pairs without those whose two ends are of one path that would enclose no area
+        when closed."""
         segments, arcs = self.ends.weights[one // 2].T
         encloses = (one // 2 != other // 2) | (segments > 2) | ((segments == 2) & (arcs > 0))
         return one[encloses], other[encloses]
 
     def join_clusters(self, one: Ints, other: Ints) -> int:
-        """Join the ends that lie in twos, and the best pairs where more meet; return how many."""
+        """Join ends that lie in pairs, and at branches, where more meet, the best pairs first;
+        return the number of joints."""
         label, size = _clusters(len(self.mates), one, other)
         is_branch = size[label[one]] > 2
         joint_count = self.join(*_sorted_pairs(one[~is_branch], other[~is_branch]))
@@ -346,10 +349,11 @@ class _Joining(Struct, eq=False):
         return joint_count
 
     def note_left(self, is_alone: Bools, exact: tuple[Ints, Ints], reach: float) -> None:
-        """Note a branch where one of the ends that are `is_alone` at their place (2M,) has stayed
-        free though joined ones lie within reach: it may have been meant to meet these.
+        """Note a branch where a lone end has stayed free though joined ends lie within `reach`: it
+        may have been meant to meet these.
 
-        `exact` are the pairs of ends that are not alone.
+        `is_alone` (2M,) is the mask of the ends that no other one meets exactly, `exact` the pairs
+        of the others.
         """
         is_free = is_alone & (self.mates < 0) & (self.node < 0)
         if reach <= POSITION_EPS_MM or not is_free.any():
@@ -374,8 +378,8 @@ class _Joining(Struct, eq=False):
         self.branches.update(_first_ends(self.ends, meeting, label))
 
     def join_clear(self, one: Ints, other: Ints, reach: float) -> int:
-        """Join the ends whose rivals are much farther first (see the top), then the others;
-        return how many. All pairs (J,), (J,) are within `reach`."""
+        """Join the pairs (J,), (J,), all within `reach`, first those whose rivals are much farther
+        (see above), then the others; return the number of joints."""
         distance = np.hypot(*(self.ends.points[one] - self.ends.points[other]).T)
         joint_count, min_distance = 0, float(distance.min(initial=reach))
         for k in range(math.ceil(math.log(reach / min_distance, CLASS_RATIO)), -1, -1):
@@ -407,7 +411,7 @@ _MIX = np.int64(0x9E3779B1)
 
 
 def _near_pairs(ends: Ends, free_ends: Ints, reach: float) -> tuple[Ints, Ints]:
-    """Return the pairs of free ends within `reach` in one group, the lesser end first."""
+    """Return the pairs of free ends of one group within `reach`, the lesser end first."""
     points = ends.points[free_ends]
     # Wider than the reach by a hair, so that rounding cannot put near points two cells apart.
     cells = np.column_stack([ends.group[free_ends // 2], np.floor(points / (reach * _WIDER))])
@@ -423,20 +427,21 @@ _WIDER = 1.0 + 1e-9
 
 
 def _sorted_pairs(one: Ints, other: Ints) -> tuple[Ints, Ints]:
-    """Return pairs of different ends, sorted by their first ones."""
+    """Return the pairs sorted by their first ends."""
     order = np.argsort(one, kind="stable")
     return one[order], other[order]
 
 
 def _clusters(count: int, one: Ints, other: Ints) -> tuple[Ints, Ints]:
-    """Return the least end of each end's cluster, and for each such end the number of ends in
-    it."""
+    """Return for each end the least end of its cluster, ends linked by pairs, and for each least
+    end the number of ends in the cluster."""
     label = clusters(count, one, other)
     return label, np.bincount(label, minlength=count)
 
 
 def _rank_pairs(ends: Ends, one: Ints, other: Ints) -> tuple[Ints, Ints]:
-    """Return pairs at branches, the best first."""
+    """Return the pairs of ends at branches sorted, the best first: by distance, style, turn and
+    place (see above)."""
     distance = np.hypot(*(ends.points[one] - ends.points[other]).T)
     with np.errstate(divide="ignore"):
         steps = np.log(distance / POSITION_EPS_MM) / math.log(CLASS_RATIO)
@@ -457,8 +462,8 @@ def wrapped(angle: Floats) -> Floats:
 
 
 def _place_ranks(ends: Ends, chosen_ends: Ints) -> Ints:
-    """Return the rank (2M,) of the chosen ends by place, direction and the place of the other
-    end."""
+    """Return the rank (2M,) of the chosen ends, sorted by place, direction and the place of their
+    path's other end."""
     x, y = (np.round(ends.points[chosen_ends] / POSITION_EPS_MM)).T
     far_x, far_y = (np.round(ends.points[chosen_ends ^ 1] / POSITION_EPS_MM)).T
     directions = np.round(wrapped(ends.leaving[chosen_ends]) / SAME_TURN_RAD)
@@ -468,7 +473,7 @@ def _place_ranks(ends: Ends, chosen_ends: Ints) -> Ints:
 
 
 def _first_ends(ends: Ends, meeting: Ints, label: Ints) -> dict[int, tuple[int, int]]:
-    """Return, for each branch by its label, its first end by place and the number of ends that
+    """Return for each branch, by its label, its first end by place, and the number of ends that
     meet there."""
     if not len(meeting):
         return {}
@@ -480,7 +485,8 @@ def _first_ends(ends: Ends, meeting: Ints, label: Ints) -> dict[int, tuple[int, 
 
 
 def _split_rings(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
-    """Split rings that pass a branch twice there, each walked from its first end by place."""
+    """Split each ring that passes a branch twice into two rings, by changing `mates` in place; it
+    is walked from its first end by place."""
     if not (node >= 0).any():
         return
 
@@ -522,14 +528,15 @@ class Chains(Struct, frozen=True, eq=False):
         return len(self.rings)
 
     def select(self, selection: Bools, rings: Bools) -> Chains:
-        """Return the chosen chains (C,), as rings or as open chains."""
+        """Return the chains of the mask `selection` (C,), as rings where `rings` (C,) is true,
+        else as open chains."""
         counts = np.diff(self.begins)
         rows = np.repeat(selection, counts)
         begins = np.concatenate([[0], np.cumsum(counts[selection])])
         return Chains(self.entries[rows], begins, rings[selection])
 
     def as_single_paths(self) -> Chains:
-        """Return each path as a chain of its own, travelled as it was drawn."""
+        """Return each path as a chain of its own, in the direction in which it was drawn."""
         count = len(self.entries)
         return Chains(self.entries & ~1, np.arange(count + 1), np.zeros(count, dtype=np.bool_))
 
@@ -545,7 +552,11 @@ class JoinedChains(Struct, frozen=True, eq=False):
 
 
 def join_chains(lines: Polylines, chains: Chains) -> list[JoinedChains]:
-    """Return the chains of these open paths as paths, in up to three lots (see the top)."""
+    """Return the paths made of chains of these open paths, in up to three batches.
+
+    A ring that makes no path is tried as an open chain; an open chain that makes none gives its
+    single paths.
+    """
     results: list[JoinedChains] = []
     remaining = chains
     for _ in range(2):
@@ -567,7 +578,10 @@ def join_chains(lines: Polylines, chains: Chains) -> list[JoinedChains]:
 
 
 def _try_chains(lines: Polylines, chains: Chains) -> tuple[Bools, JoinedChains]:
-    """Return the mask (C,) of the chains that make a path, and these paths."""
+    """Return the mask (C,) of the chains that make a path, and these paths.
+
+    A chain makes none if fewer than two vertices remain, or if it is a ring without an area.
+    """
     vertices, counts, gaps = _chain_vertices(lines, chains)
     is_path = np.asarray(counts >= 2)
     path = np.repeat(np.arange(len(chains)), counts)
@@ -605,8 +619,8 @@ _Gaps = tuple[Ints, Floats, Floats]
 
 
 def _chain_vertices(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Gaps]:
-    """Return the vertices (N, 3) of all chains, the number of vertices of each (C,), and the
-    bridged gaps."""
+    """Return the vertices (N, 3) of all chains, the number of vertices of each (C,), and the gaps
+    that were bridged: chain, place and size."""
     rows, counts = _vertex_rows(lines, chains)
     vertices = lines.vertices[rows]
     is_reversed = np.repeat(chains.entries & 1, counts) == 1
@@ -633,8 +647,8 @@ def _chain_vertices(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Ga
 
 
 def _vertex_rows(lines: Polylines, chains: Chains) -> tuple[Ints, Ints]:
-    """Return the rows of all vertices in the order of travel, and the number of rows of each
-    entry."""
+    """Return the rows of all vertices in the order of travel, and the number of rows of each entry
+    of the chains."""
     path, is_reversed = chains.entries // 2, chains.entries % 2
     counts = np.diff(lines.offsets)[path]
     begin = np.where(is_reversed, lines.offsets[1:][path] - 1, lines.offsets[:-1][path])
@@ -645,10 +659,11 @@ def _vertex_rows(lines: Polylines, chains: Chains) -> tuple[Ints, Ints]:
 def _bridge_gaps(
     vertices: Floats, end: Ints, begin: Ints
 ) -> tuple[Bools, tuple[Bools, Floats, Floats]]:
-    """Move the starts of pieces to the ends of those before them; return the ends that are
-    dropped, and the gaps.
+    """Move the vertices on both sides of each joint together, in place; return a mask of joints of
+    which one vertex is dropped, and the gaps.
 
-    The piece before ends at the row `end`, the one after begins at the row `begin`.
+    The path before a joint ends at the row `end`, the one after it begins at the row `begin`. Gaps
+    are a mask of joints, their places (G, 2) and sizes (G,), mm.
     """
     before, after = vertices[end, :2], vertices[begin, :2]
     size = np.hypot(*(before - after).T)
@@ -664,7 +679,8 @@ def _bridge_gaps(
 
 
 def _without_short(vertices: Floats, owner: Ints, rings: Bools) -> tuple[Floats, Ints]:
-    """Return the vertices without those that moved lines have left on top of each other."""
+    """Return the vertices, and the owner of each, without those that coincide with the next one
+    after lines were moved."""
     while len(vertices) > 1:
         counts = np.bincount(owner, minlength=len(rings))
         last = np.cumsum(counts) - 1
@@ -708,10 +724,10 @@ FINEST_CELLS = 16.0
 
 def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float) -> list[Gap]:
     """Return, for each open path, the gap to the nearest other open end of its group if it looks
-    like one.
+    like one that was meant to meet.
 
     `ends` are those of M paths with `lengths` (M,) mm and `layers`. Each pair of ends comes once;
-    ends that lie on each other are no gap.
+    ends that coincide are no gap.
     """
     gaps: dict[tuple[int, int], Gap] = {}
     is_open = np.flatnonzero(np.repeat(ends.is_open, 2))
@@ -734,7 +750,8 @@ def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float)
 
 
 def _is_gap(ends: Ends, lengths: Floats, one: Ints, other: Ints, size: Floats) -> Bools:
-    """Return the mask of the pairs of near ends that look as if they were meant to meet."""
+    """Return a mask of the pairs of near ends that look as if they were meant to meet: near
+    against the size of their paths, and not side by side."""
     same_path = one // 2 == other // 2
     shorter = np.minimum(lengths[one // 2], lengths[other // 2])
     is_small = size <= np.where(same_path, OWN_GAP_SHARE, GAP_SHARE) * shorter
@@ -743,10 +760,10 @@ def _is_gap(ends: Ends, lengths: Floats, one: Ints, other: Ints, size: Floats) -
 
 
 def _spacing(points: Floats) -> float:
-    """Estimate the mean distance of nearest neighbours for points scattered over the box of these,
-    mm.
+    """Estimate the mean distance, mm, of nearest neighbours among as many points scattered at
+    random over the box of these.
 
-    It is half the square root of the area that each has, and half the length on a line.
+    It is half the square root of the area for each point, or half the length for each on a line.
     """
     width, height = (float(side) for side in np.ptp(points, axis=0))
     count = len(points)
@@ -754,8 +771,8 @@ def _spacing(points: Floats) -> float:
 
 
 def _nearest_ends(points: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
-    """Return rows (J,), the row of the nearest other point (J,) and its distance (J,), within
-    reach."""
+    """Return the rows (J,) of points that have another one within `reach`, the row of the nearest
+    one (J,) and its distance (J,); coinciding points do not count."""
     spread = points.max(axis=0) - points.min(axis=0)
     spacing = float(np.sqrt(spread[0] * spread[1] / len(points)))
     size = min(max(spacing, reach / FINEST_CELLS), reach)

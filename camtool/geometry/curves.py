@@ -98,7 +98,7 @@ class BezierCurve(Struct, frozen=True, eq=False):
         return (len(self.control) - 1.0) * _bernstein(np.diff(self.control, axis=0), t)
 
     def pieces(self) -> Pieces:
-        """Return the curve itself, a single piece."""
+        """Return the curve as its single piece."""
         rows = np.ones((1, len(self.control), 3))
         rows[0, :, :2] = self.control - self.control[0]
         return Pieces(rows, self.control[0], self.control[[0, -1]])
@@ -138,9 +138,10 @@ class EllipseCurve(Struct, frozen=True, eq=False):
         return np.asarray(np.copysign(1.0, self.end - self.start) * along)
 
     def pieces(self) -> Pieces:
-        """Quarters or less: over a half angle h a rational parabola of weights 1, cos h, 1.
+        """Return the arc as pieces of at most a quarter: over a half angle h a rational parabola
+        of weights 1, cos h, 1.
 
-        Its middle control point is the meeting of the end tangents, (cos m, sin m) / cos h.
+        Its middle control point is the intersection of the end tangents, (cos m, sin m) / cos h.
         """
         count = max(1, math.ceil(abs(self.end - self.start) / MAX_PIECE_RAD))
         angle = self.start + (self.end - self.start) * np.arange(2 * count + 1) / (2.0 * count)
@@ -211,9 +212,10 @@ class SplineCurve(Struct, frozen=True, eq=False):
         return np.asarray((slope[:, :2] * weight - value[:, :2] * slope[:, 2:]) / weight**2)
 
     def pieces(self) -> Pieces:
-        """Return the Bézier points of each span a..b between knots: the blossom at (a … a, b … b).
+        """Return each span a..b between knots as a Bézier piece: its control points are the
+        blossom at (a … a, b … b).
 
-        de Boor's triangle with an argument of its own at each level is the blossom.
+        De Boor's triangle with an argument of its own at each level computes the blossom.
         """
         degree, knots, origin = self.degree, self.knots, self.control[0]
         weights = np.asarray(self.weights)[:, None]
@@ -235,7 +237,8 @@ class SplineCurve(Struct, frozen=True, eq=False):
         return Pieces(control, origin, origin + tips[:, :2] / tips[:, 2:])
 
     def _homogeneous(self, t: Floats, order: int) -> Floats:
-        """de Boor's triangle for all t at once: (n, 3) of x·w, y·w, w or their derivatives.
+        """Return (n, 3) x·w, y·w, w at t (n,), or their derivatives for `order` 1, by de Boor's
+        algorithm for all t at once.
 
         The derivative of a spline is a spline of degree p−1 over the inner knots, with control
         points p (c[i+1] − c[i]) / (u[i+p+1] − u[i+1]).
@@ -266,7 +269,7 @@ Pieced = BezierCurve | EllipseCurve | SplineCurve
 
 
 def _bernstein(control: Floats, t: Floats) -> Floats:
-    """Evaluate Bézier curves by de Casteljau for all t at once."""
+    """Evaluate a Bézier curve at t (n,) by de Casteljau's algorithm for all t at once."""
     rows = [np.broadcast_to(point, (len(t), 2)) for point in control]
     share = t[:, None]
     while len(rows) > 1:

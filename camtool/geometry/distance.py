@@ -100,8 +100,8 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
 
 
 def approach(a: Polyline, b: Polyline) -> NearestApproach:
-    """Return the least distance between two paths, and a point on either where it is reached; 0
-    where they cross."""
+    """Return the least distance between two paths, 0 where they cross, and a point on one of them
+    where it is reached."""
     first, second = Segments.of(a), Segments.of(b)
     boxes, other_boxes = segment_boxes(first), segment_boxes(second)
     if len(a.vertices) * len(second) <= FEW_PAIRS:
@@ -119,16 +119,22 @@ def approach(a: Polyline, b: Polyline) -> NearestApproach:
 def approaches(
     lines: Polylines, others: Polylines, pairs: list[tuple[int, int]]
 ) -> list[NearestApproach]:
-    """Return the `approach` of each pair of a path of `lines` and one of `others`; those with few
-    segments are measured together."""
+    """Return the least distance (`approach`) of each pair of a path of `lines` and one of
+    `others`, given by their indices.
+
+    Pairs with few segments are measured together.
+    """
     return list(each_approach(lines, others, pairs))
 
 
 def each_approach(
     lines: Polylines, others: Polylines, pairs: Iterable[tuple[int, int]]
 ) -> Iterator[NearestApproach]:
-    """Yield the same. Pairs are taken some at a time, and those with many segments are measured
-    when they are asked for."""
+    """Yield the results of `approaches` one by one.
+
+    Pairs are taken in batches, and those with many segments are measured only when the caller asks
+    for them.
+    """
     one, other = _PathRows.of(lines), _PathRows.of(others)
     counts, other_counts = np.diff(one.first), np.diff(other.first)
     elements = np.maximum(np.diff(lines.offsets), counts)
@@ -159,7 +165,8 @@ class _PathRows(Struct, frozen=True, eq=False):
     def approaches(
         self, rows: Ints, others: _PathRows, columns: Ints
     ) -> Iterator[NearestApproach]:
-        """Yield the `approach` of each of these rows to one of the others."""
+        """Yield the least distance of each of these paths, `rows`, from the path of `others` in
+        the same place of `columns`."""
         vertices = self.paths.vertices[:, :2]
         pair, i, j = _crossed(self.paths.offsets, rows, others.first, columns)
         distance = point_to_segment(vertices[i], others.segments[j])
@@ -180,8 +187,12 @@ class _PathRows(Struct, frozen=True, eq=False):
 
 
 def _crossed(first: Ints, rows: Ints, other_first: Ints, columns: Ints) -> tuple[Ints, Ints, Ints]:
-    """Return each element of a path with each one of the other of its pair, in order: rows (J,)
-    of the pairs and of both elements, which lie path after path from `first` on."""
+    """Return all combinations of an element of one path with an element of the other, for each
+    pair of paths.
+
+    They are three columns (J,): the pair, the element of one, the element of the other. Elements
+    are numbered path after path, those of path i from first[i] on.
+    """
     across = np.diff(other_first)[columns]
     counts = np.diff(first)[rows] * across
     pair = np.repeat(np.arange(len(rows)), counts)
@@ -191,16 +202,19 @@ def _crossed(first: Ints, rows: Ints, other_first: Ints, columns: Ints) -> tuple
 
 
 def _least(pair: Ints, distance: Floats) -> tuple[Ints, Ints]:
-    """Return the pairs that there are, ascending, and the row of the least distance of each, the
-    first of several."""
+    """Return the pairs that occur, ascending, and for each the row of its least distance, the
+    first of equal ones."""
     order = np.lexsort((distance, pair))
     begins = np.flatnonzero(np.diff(pair, prepend=-1))
     return pair[begins], order[begins]
 
 
 def near_paths(lines: Polylines, targets: Polylines, reach_mm: float) -> Iterator[tuple[int, int]]:
-    """Yield pairs of paths that may come within `reach_mm` of each other: their boxes do, and
-    where they have many segments, the boxes of some of these."""
+    """Yield pairs of paths that may come within `reach_mm` of each other.
+
+    Their boxes do, and for paths with many segments boxes of single segments too; true distances
+    are not measured.
+    """
     one, other = _PathBoxes.of(lines), _PathBoxes.of(targets)
     for rows, columns in box_pairs(one.paths, other.paths, reach_mm=reach_mm):
         counts = np.diff(one.first)[rows] * np.diff(other.first)[columns]
@@ -226,7 +240,8 @@ class _PathBoxes(Struct, frozen=True, eq=False):
         return cls(paths, segment_boxes(segments), first)
 
     def comes_near(self, row: int, others: _PathBoxes, column: int, reach_mm: float) -> bool:
-        """Return True if a box of a segment comes within the reach of one of another path."""
+        """Return True if the box of a segment of this path comes within `reach_mm` of one of the
+        other path."""
         one = self.segments[self.first[row] : self.first[row + 1]]
         other = others.segments[others.first[column] : others.first[column + 1]]
         (low, high), (other_low, other_high) = (
@@ -281,21 +296,22 @@ class _SegmentRows(Struct, frozen=True, eq=False):
         return np.asarray(self.four_b * dots - 2.0 * self.flat * _cross(self.d, from_a))
 
     def expanded(self, origin: Floats) -> tuple[Floats, Floats]:
-        """power(origin + x) = 4b |x|² + linear·x + constant: its linear (N, 2), constant (N,)."""
+        """Return `linear` (N, 2) and `constant` (N,) of power(origin + x) = 4b |x|² + linear·x +
+        constant."""
         a, b = self.a - origin, self.b - origin
         linear = -self.four_b[:, None] * (a + b) - 2.0 * self.flat[:, None] * _turn_left(self.d)
         return linear, self.four_b * _dot(a, b) + 2.0 * self.flat * _cross(self.d, a)
 
     def is_beside(self, points: Floats) -> Bools:
-        """Return True where the nearest point of the full circle or line lies within the
-        segment."""
+        """Return True where the nearest point of the full circle or line lies within the segment,
+        not beyond its ends."""
         after_a = _dot(points - self.a, self.tangent_a) >= 0.0
         before_b = _dot(points - self.b, self.tangent_b) <= 0.0
         return np.asarray(after_a & before_b)
 
 
 def _distance(points: Floats, rows: _SegmentRows) -> Floats:
-    """Return the distance of points to segments; both are broadcast against each other."""
+    """Return the distance of points from segments; both are broadcast against each other."""
     to_a = np.hypot(points[..., 0] - rows.a[..., 0], points[..., 1] - rows.a[..., 1])
     to_b = np.hypot(points[..., 0] - rows.b[..., 0], points[..., 1] - rows.b[..., 1])
     middle = 0.5 * (rows.a + rows.b)
@@ -306,8 +322,8 @@ def _distance(points: Floats, rows: _SegmentRows) -> Floats:
 
 
 def paired_distances(a: Segments, b: Segments) -> tuple[Floats, Floats]:
-    """Return (N,) distances of N pairs of segments, 0 where they cross, and (N, 2) where that
-    is."""
+    """Return the distance (N,) of each of N pairs of segments, 0 where they cross, and a point (N,
+    2) of one of them where it is reached."""
     rows_a, rows_b = _SegmentRows.of(a), _SegmentRows.of(b)
     candidates: list[tuple[Floats, Floats]] = []
     for points in (a.start, a.end):
@@ -328,11 +344,12 @@ def paired_distances(a: Segments, b: Segments) -> tuple[Floats, Floats]:
 def _toward(
     a: Segments, rows_a: _SegmentRows, b: Segments, rows_b: _SegmentRows
 ) -> tuple[Floats, Floats]:
-    """From where `a` comes nearest to the centre of the arc `b`, the distance to `b`.
+    """Return the distance from `b` of the point of `a` that is nearest to the centre of the arc
+    `b`, and that point.
 
-    Infinite where `b` is a line, where the centres coincide (then ends are as near), and where
-    that point is not within `a`. Where a circle lies in the other one, the same from the other
-    side finds the nearest points.
+    It is infinite where `b` is a line, where the centres coincide (then ends are as near), and
+    where that point is not within `a`. If one circle lies within the other, this finds the nearest
+    points with `a` and `b` exchanged.
     """
     centre = np.where(b.is_arc[:, None], b.centre, rows_a.a)
     part = _dot(centre - rows_a.a, rows_a.d) / _dot(rows_a.d, rows_a.d)
@@ -348,12 +365,11 @@ def _toward(
 
 
 def _common_points(a: _SegmentRows, b: _SegmentRows) -> tuple[Floats, Floats]:
-    """Return the two points (N, 2) that the whole lines or circles of each pair share; NaN if
-    none.
+    """Return the two points (N, 2) that the full lines or circles of each pair share; NaN if none.
 
     power(x) = 4b |x|² + l·x + k, and 4b_b·power_a − 4b_a·power_b is linear: the line through both
-    points. (Two lines: power_a itself is it.) On that line, x0 + s e, the power of the rounder
-    one of both is a quadratic in s.
+    points. (Two lines: power_a itself is it.) On that line, x0 + s e, the power of the rounder one
+    of both is a quadratic in s.
     """
     origin = a.a
     linear_a, constant_a = a.expanded(origin)

@@ -41,7 +41,8 @@ def drawing_extents(drawing: Drawing) -> Floats:
 
 
 def facts_of(drawing: Drawing) -> dict[str, Any]:
-    """Return what `camtool check --json` says of a drawing, in its order; lengths in mm."""
+    """Return the object that `camtool check --json` prints for a drawing, keys in its order;
+    lengths in mm."""
     (left_x, right), (bottom, top) = drawing_extents(drawing).tolist()
     return {
         "file": drawing.file,
@@ -72,7 +73,7 @@ def facts_of(drawing: Drawing) -> dict[str, Any]:
 
 
 def drawing_facts(drawing: Drawing) -> dict[str, Any]:
-    """Return all that can be counted, ready for JSON; lengths in mm, places as [x, y].
+    """Return the counts and sizes of a drawing, ready for JSON; lengths in mm, places as [x, y].
 
     `closed`, `open`, `marks`, `lines`, `arcs`: how many. `length_mm`: of all paths. `layers`: by
     name closed, open and marks; `colours` and `line_types`: paths by name ("" is none).
@@ -103,8 +104,11 @@ def drawing_facts(drawing: Drawing) -> dict[str, Any]:
 
 
 def _smallest(drawing: Drawing, segments: Segments) -> dict[str, Any]:
-    """`radius`, `segment`, `contour` (shorter side of its box) and `distance` (between two closed
-    contours): each size_mm, at_mm and paths, or None."""
+    """Return the smallest features of a drawing: each as size_mm, at_mm and paths, or None.
+
+    `radius`, `segment`, `contour` (shorter side of its box) and `distance` (between two closed
+    contours).
+    """
 
     features = {
         "radius": smallest_radius(segments),
@@ -125,7 +129,8 @@ def _smallest(drawing: Drawing, segments: Segments) -> dict[str, Any]:
 
 
 def _layers(drawing: Drawing) -> dict[str, dict[str, int]]:
-    """For each layer its closed and open paths and its marks."""
+    """Return, for each layer by name, the numbers of its closed and open paths and of its
+    marks."""
     rows: dict[str, Counter[str]] = {}
     for name, is_closed in zip(drawing.layers, drawing.paths.closed.tolist(), strict=True):
         rows.setdefault(name, Counter())["closed" if is_closed else "open"] += 1
@@ -136,12 +141,12 @@ def _layers(drawing: Drawing) -> dict[str, dict[str, int]]:
 
 
 def _times(names: Iterable[str]) -> dict[str, int]:
-    """Count equal names, sorted by name."""
+    """Return how often each name occurs, sorted by name."""
     return dict(sorted(Counter(names).items()))
 
 
 def _open_ends(drawing: Drawing) -> list[dict[str, Any]]:
-    """Return both ends of each open path."""
+    """Return both ends of each open path: place, path and layer."""
     paths = np.flatnonzero(~drawing.paths.closed)
     offsets, vertices = drawing.paths.offsets, drawing.paths.vertices
     rows = np.column_stack([offsets[paths], offsets[paths + 1] - 1]).ravel()
@@ -158,7 +163,8 @@ def _gaps(gaps: Iterable[Gap]) -> list[dict[str, Any]]:
 
 
 def _healing(drawing: Drawing) -> dict[str, Any]:
-    """Describe what was corrected, and where the drawing is ambiguous or crosses itself."""
+    """Return counts of the repairs, and the places where the drawing branches or crosses
+    itself."""
     healed = drawing.healing
     return {
         "duplicates": {"count": healed.duplicates, "length_mm": healed.duplicates_mm},
@@ -196,14 +202,16 @@ class Feature(Struct, frozen=True):
 
 
 def smallest_radius(segments: Segments) -> Feature | None:
-    """Return the arc of the least radius and its middle; None without arcs."""
+    """Return the smallest radius of all arcs, placed in the middle of its arc; None without
+    arcs."""
     if not segments.is_arc.any():
         return None
     return _of_row(segments, int(np.argmin(segments.radius)), segments.radius)
 
 
 def shortest_segment(segments: Segments) -> Feature | None:
-    """Return the shortest line or arc and its middle; None without any."""
+    """Return the shortest length of all lines and arcs, placed in the middle of its segment; None
+    without any."""
     if not len(segments):
         return None
     lengths = segment_lengths(segments)
@@ -216,8 +224,8 @@ def _of_row(segments: Segments, row: int, sizes: Floats) -> Feature:
 
 
 def smallest_contour(lines: Polylines) -> Feature | None:
-    """Return the closed path whose box has the shortest shorter side, and the middle of that
-    box."""
+    """Return the shortest side of the boxes of closed paths, placed in the middle of its box; None
+    without any."""
     closed = np.flatnonzero(lines.closed)
     if not len(closed):
         return None
@@ -232,7 +240,7 @@ def narrowest_wall(lines: Polylines) -> Feature | None:
     """Return the least distance between two closed paths, 0 where they cross; None with fewer than
     two.
 
-    Where more than MAX_WALL_PAIRS segments lie as near, it is an upper bound.
+    It is an upper bound only if more than MAX_WALL_PAIRS pairs of segments are candidates for it.
     """
     segments = _closed_segments(lines)
     if segments is None:
@@ -262,8 +270,8 @@ def narrowest_wall(lines: Polylines) -> Feature | None:
 
 
 def _closed_segments(lines: Polylines) -> Segments | None:
-    """Return the segments of closed paths, near paths near each other in the list; None below
-    two."""
+    """Return the segments of closed paths, ordered so that near paths are near each other in the
+    list; None for fewer than two paths."""
     closed = np.flatnonzero(lines.closed)
     if len(closed) < 2:
         return None
@@ -279,8 +287,8 @@ _MORTON_BITS = 16
 
 
 def _spread(numbers: Ints) -> Ints:
-    """Return the bits of each number with a gap before each (Morton order keeps near cells
-    near)."""
+    """Return the bits of each number spread to every second place, for Morton order, which keeps
+    near cells near each other."""
     spread = np.zeros_like(numbers)
     for bit_index in range(_MORTON_BITS):
         spread |= (numbers >> bit_index & 1) << 2 * bit_index
@@ -292,7 +300,8 @@ def _grown(boxes: Floats, margin: float) -> Floats:
 
 
 def _nearer(segments: Segments, one: Ints, other: Ints, nearest: Feature) -> Feature:
-    """Return the least distance of these pairs, if it is below the one found before."""
+    """Return the least distance of these pairs of segments if it is below that of `nearest`, else
+    `nearest`."""
     for begin in range(0, len(one), _PAIRS_AT_A_TIME):
         a, b = one[begin : begin + _PAIRS_AT_A_TIME], other[begin : begin + _PAIRS_AT_A_TIME]
         distance, points = paired_distances(segments[a], segments[b])

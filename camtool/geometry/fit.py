@@ -73,16 +73,16 @@ class Fit(Struct, frozen=True, eq=False):
 
     @property
     def off_mm(self) -> Floats:
-        """(n, 2) mm: the largest and the rms distance, at every vertex those of the whole
-        chain."""
+        """Errors (n, 2) mm, largest and rms; every vertex has those of the whole chain."""
         return np.full((len(self.vertices), 2), (self.max_mm, self.rms_mm))
 
 
 def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
-    """Return arcs and lines within `tolerance_mm` of the curve, G1 wherever the curve is.
+    """Return arcs and lines within `tolerance_mm` of the curve, tangent-continuous wherever the
+    curve is.
 
-    Raises GeometryError when the curve is not finite, or for a tolerance below
-    `POSITION_EPS_MM` (positions nearer than that are one).
+    Raises GeometryError when the curve is not finite, or for a tolerance below `POSITION_EPS_MM`
+    (positions nearer than that are one).
     """
     if not (math.isfinite(tolerance_mm) and tolerance_mm >= POSITION_EPS_MM):
         raise GeometryError(
@@ -97,7 +97,8 @@ def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: flo
     """Return an arc as vertices (n, 3), the last one its end (bulge 0); CCW when the sweep is
     positive.
 
-    More than a half circle is cut into equal parts; a full circle ends exactly where it begins.
+    An arc of more than a half circle is cut into equal parts; a full circle ends exactly where it
+    begins.
     """
     parts = max(1, math.ceil(abs(sweep_rad) / SPAN_TURN_RAD))
     angle = start_rad + sweep_rad * np.arange(parts + 1) / parts
@@ -111,7 +112,7 @@ def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: flo
 
 
 def split_bulges(vertices: Floats, closed: bool) -> Floats:
-    """Cut every arc of more than a half circle (|bulge| > 1) of a path into two halves.
+    """Return the path with every arc of more than a half circle (|bulge| > 1) cut into two halves.
 
     Vertices (n, 3), of an open path the last one without a segment; mm or any other unit.
     """
@@ -135,7 +136,7 @@ def split_bulges(vertices: Floats, closed: bool) -> Floats:
 
 
 def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
-    """Rational pieces, about their origin."""
+    """Return the fit of a curve made of rational Bézier pieces, computed about their origin."""
     if not np.abs(pieces.control).max() <= MAX_SIZE_MM:
         raise GeometryError("a point or a tangent of a curve is not finite")
     control = np.ascontiguousarray(pieces.control)
@@ -151,7 +152,7 @@ def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
 
 
 def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
-    """Return a curve given by functions."""
+    """Return the fit of any other curve, which gives points and tangents."""
     share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
 
     def samples(t: Floats) -> Floats:
@@ -169,12 +170,14 @@ def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
 def _fitted(
     nodes_of: Callable[[float, int], Nodes], samples: Callable[[Floats], Floats], tolerance: float
 ) -> tuple[Floats, Judged, Nodes]:
-    """Return the chain (n, 3) within `tolerance`, its deviations, and the nodes it was chosen
-    from. `samples` gives `MEASURE_STEPS` points of the curve for each step between parameters
-    (n,), and the last one.
+    """Return the chain (n, 3) within `tolerance`, its deviations, and the nodes that it was chosen
+    from.
 
-    A fit whose error turns out too large is done again over finer nodes, since errors peak
-    between them; if that is not enough, with less of the tolerance as well.
+    `nodes_of` gives nodes of a fineness, mm, and a least number; `samples` gives `MEASURE_STEPS`
+    points of the curve for each step between parameters (n,), and the last one.
+
+    A fit whose error turns out too large is repeated with finer nodes, since errors peak between
+    them; if that is not enough, with less of the tolerance as well.
     """
     target, steps, fineness = SEARCH_SHARE * tolerance, MIN_STEPS, tolerance
     for attempt in range(ATTEMPTS):
@@ -223,10 +226,11 @@ class Nodes(Struct, frozen=True, eq=False):
 
 
 def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
-    """Return places of the curve with their tangents: at least `steps` of them, and so many more
-    that the curve between two of them is known within the tolerance; one for a point.
+    """Return points of the curve with their tangents: at least `steps`, and as many more as it
+    takes to know the curve between them within the tolerance.
 
-    Raises GeometryError when the curve's parameters do not rise or its points are not finite.
+    A curve that is a point gives one node. Raises GeometryError when the curve's parameters do not
+    rise or its points are not finite.
     """
     breaks = np.asarray(curve.breaks, dtype=np.float64)
     if len(breaks) < 2 or not np.isfinite(breaks).all() or not (np.diff(breaks) > 0.0).all():
@@ -265,7 +269,7 @@ class _Directions:
         self.min_length = VANISHING_TANGENT * float(lengths.max())
 
     def both_sides(self, t: Floats) -> tuple[Floats, Floats]:
-        """Return directions (n, 2) just before and just after each t."""
+        """Return unit tangents (n, 2), (n, 2) just before and just after each t (n,)."""
         tangent = _finite(self.curve.tangent(t))
         length = np.hypot(tangent[:, 0], tangent[:, 1])
         is_regular = length > self.min_length
@@ -277,7 +281,8 @@ class _Directions:
         return before, after
 
     def one_sided(self, t: Floats, side: float) -> Floats:
-        """Return directions (n, 2) a little before (−1) or after (+1) each t, inside the curve."""
+        """Return unit tangents (n, 2) a little before (`side` −1) or after (+1) each t, inside the
+        curve."""
         place = np.searchsorted(self.breaks, t, side="left" if side < 0.0 else "right")
         place = np.clip(place, 1, len(self.breaks) - 1)
         room = (self.breaks[place] - self.breaks[place - 1]) * side
@@ -300,7 +305,8 @@ class _Directions:
 def _refine(
     nodes: _NodeColumns, curve: Curve, directions: _Directions, tolerance_mm: float
 ) -> None:
-    """Halve steps until each is good, or as short as one position, or too many."""
+    """Insert nodes, in place, in the middle of steps until each step is fine enough, or as short
+    as one position, or there are too many."""
     is_new = np.ones(len(nodes.t) - 1, dtype=np.bool_)
     while is_new.any() and len(nodes.t) < MAX_NODES:
         rows = np.flatnonzero(is_new)
@@ -326,8 +332,11 @@ def _refine(
 
 
 def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: float) -> Bools:
-    """Return the mask of the steps that must be halved, by points (j, steps, 2) of the curve
-    within each step."""
+    """Return the mask of the steps, `rows`, that must be halved: the curve between their ends is
+    not known well enough.
+
+    `probes` (3, steps, 2) are points of the curve within each step, the middle first.
+    """
     error = step_errors(nodes.point, nodes.leave, nodes.arrive, rows, probes)
     arms = probes[0] - nodes.point[rows], probes[0] - nodes.point[rows + 1]
     size = np.maximum(np.hypot(*arms[0].T), np.hypot(*arms[1].T))
@@ -337,7 +346,8 @@ def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: f
 
 
 def _merge_nodes(nodes: _NodeColumns) -> Nodes:
-    """Merge the nodes at one position into one, which is a corner when the tangents differ."""
+    """Return the nodes with those at one position merged into one, which is a corner if the
+    tangents differ."""
     gaps = np.hypot(*np.diff(nodes.point, axis=0).T)
     first = list(range(len(nodes.t)))
     if (gaps <= POSITION_EPS_MM).any():
@@ -354,7 +364,7 @@ def _merge_nodes(nodes: _NodeColumns) -> Nodes:
 
 
 def turns(a: Floats, b: Floats) -> Floats:
-    """Return angles (n,) rad, 0..π, between directions (n, 2)."""
+    """Return the angles (n,) between directions a (n, 2) and b (n, 2), 0 to π rad."""
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return np.asarray(np.abs(np.arctan2(cross, a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1])))
 

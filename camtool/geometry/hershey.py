@@ -64,7 +64,7 @@ _CIRCLE = ((0, -3), (2.1, -2.1), (3, 0), (2.1, 2.1), (0, 3), (-2.1, 2.1), (-3, 0
 
 @lru_cache(maxsize=1)
 def _font() -> MappingProxyType[str, Glyph]:
-    """Return every letter of the font, with the signs that are made from it."""
+    """Return the glyphs of the font by character, with those that are composed from them."""
     from HersheyFonts import HersheyFonts
 
     reader = HersheyFonts()
@@ -84,7 +84,8 @@ def _font() -> MappingProxyType[str, Glyph]:
 
 
 def _composed_glyphs(glyphs: dict[str, Glyph]) -> dict[str, Glyph]:
-    """Signs that the font lacks, on its own grid."""
+    """Return glyphs for characters that the font lacks (µ, ×, °, ø …), composed from its strokes,
+    on its grid."""
     u, plus, zero = glyphs["u"], glyphs["+"], glyphs["O"]
     low_x = min(x for stroke in u.strokes for x, _ in stroke)
     mu = Glyph((*u.strokes, ((low_x, -5.0), (low_x, 16.0))), u.advance)
@@ -122,7 +123,7 @@ BOX = Glyph((((3, -12), (15, -12), (15, 9), (3, 9), (3, -12)),), 18.0)
 
 
 def glyph(letter: str) -> Glyph | None:
-    """Return the strokes of one character, None when they are unknown."""
+    """Return the strokes of one character, None if the font lacks it."""
     letter = _SAME.get(letter, letter)
     font = _font()
     if letter in font:

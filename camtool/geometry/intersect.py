@@ -67,9 +67,9 @@ def crossings(
 
 
 def self_crossings(segments: Segments) -> Crossings:
-    """Return all common points of two different rows, each pair once (row_a < row_b).
+    """Return all common points of two different segments, each pair once (row_a < row_b).
 
-    The end that a row shares with the next one of its path is left out.
+    The end that a segment shares with the next one of its path is left out.
     """
     boxes, frames = segment_boxes(segments), Frames.of(segments)
     parts = []
@@ -86,8 +86,8 @@ def self_crossings(segments: Segments) -> Crossings:
 
 
 def meetings(segments: Segments, row_a: Ints, row_b: Ints) -> tuple[Crossings, Bools]:
-    """Return the common points of the rows a and b, pair by pair; and the mask of those that
-    cross, not touch."""
+    """Return the common points of pairs of segments, row_a[j] with row_b[j], and the mask of those
+    at which they cross and do not only touch."""
     frames = Frames.of(segments)
     crossings = _meetings(frames, frames, row_a, row_b, POSITION_EPS_MM)
     return crossings, ~_touching(crossings, frames, POSITION_EPS_MM)
@@ -100,8 +100,8 @@ def _concatenate(parts: list[Crossings]) -> Crossings:
 
 
 def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Crossings:
-    """Return the common points of row_a[j] of `a` and row_b[j] of `b`, end points before
-    crossings."""
+    """Return the common points of segments row_a[j] of `a` and row_b[j] of `b`: first those at
+    ends, then those within."""
     frames_a, frames_b = a[row_a], b[row_b]
     ends = [frames_a.start, frames_a.end, frames_b.start, frames_b.end]
     common = [
@@ -132,15 +132,16 @@ def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Cro
 
 
 def _locate_on_segments(points: Floats, frames: Frames, eps: float) -> tuple[Bools, Floats]:
-    """Return the mask of the points that lie on their segment, and their lengths along it; NaN is
-    never on it."""
+    """Return the mask of the points (K, 2) within `eps` of their segment, and their distances
+    along it from its start; a NaN lies on none."""
     along = frames.along(points)
     inside = (along >= -eps) & (along <= frames.length + eps)
     return np.asarray(inside & (frames.gap(points) <= eps)), along
 
 
 def _fraction(along: Floats, length: Floats, eps: float) -> Floats:
-    """Return the fraction of the length, exactly 0 or 1 within `eps` of an end."""
+    """Return lengths along segments as fractions of their length, exactly 0 or 1 within `eps` of
+    an end."""
     t = np.where(along <= eps, 0.0, along / length)
     return np.where(along >= length - eps, 1.0, t)
 
@@ -182,8 +183,8 @@ def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
 
 
 def _if_apart(points: Floats, a: Frames, b: Frames, eps: float) -> Floats:
-    """Return the points (K, 2), but NaN where the curves stay within `eps` of each other all
-    along.
+    """Return the points (K, 2), with NaN where the curves stay within `eps` of each other over all
+    their length.
 
     There rounding alone would place a crossing; the ends of what they share are found as ends.
     """
@@ -194,8 +195,8 @@ def _if_apart(points: Floats, a: Frames, b: Frames, eps: float) -> Floats:
 
 
 def _angle_and_bend(points: Floats, a: Frames, b: Frames) -> tuple[Floats, Floats]:
-    """Return the sine of the angle at common points (K, 2), and how much more one curve bends,
-    1/mm."""
+    """Return the sine of the angle between the curves at common points (K, 2), and the difference
+    of their curvatures, 1/mm."""
     tangent_a = a.tangent_at(a.along(points) / a.length)
     tangent_b = b.tangent_at(b.along(points) / b.length)
     same_way = np.where(dot(tangent_a, tangent_b) < 0.0, -1.0, 1.0)
@@ -203,7 +204,8 @@ def _angle_and_bend(points: Floats, a: Frames, b: Frames) -> tuple[Floats, Float
 
 
 def _touching(crossings: Crossings, frames: Frames, eps: float) -> Bools:
-    """Return True for meetings at an end, and where the curves enter each other by `eps` at most.
+    """Return the mask of meetings at an end, or where one curve goes beyond the other by `eps` at
+    most.
 
     Two curves that meet at the angle θ, with curvatures that differ by k, part again after 2θ/k,
     and are θ²/(2k) apart at most until then.
@@ -233,10 +235,8 @@ crossing."""
 
 
 def self_crossings_of(lines: Polylines, layers: Sequence[str]) -> tuple[SelfCrossing, ...]:
-    """Return the places where closed paths cross themselves, path by path, each place once.
-
-    At most about MAX_CROSSINGS.
-    """
+    """Return the places where closed paths cross themselves, path by path, each place once;
+    MAX_CROSSINGS is about the greatest number."""
     if not lines.closed.any():
         return ()
     segments = Segments.of(lines)
@@ -262,7 +262,8 @@ _SAME_MM = 4.0 * POSITION_EPS_MM
 
 
 def _pairs_of_one_path(segments: Segments) -> Iterator[tuple[Ints, Ints]]:
-    """Rows a < b of segments of one path whose boxes touch; two lines in a row cannot cross."""
+    """Yield rows a < b of segments of one path whose boxes touch, in batches; successive lines are
+    left out, as they cannot cross."""
     boxes = segment_boxes(segments)
     margin = 0.5 * POSITION_EPS_MM * np.array([-1.0, -1.0, 1.0, 1.0])
     every = np.ones(len(segments), dtype=np.bool_)
@@ -285,9 +286,10 @@ def _at_vertex(crossings: Crossings) -> Bools:
 
 
 def _pass_through(crossings: Crossings, segments: Segments, frames: Frames) -> Bools:
-    """For meetings at a vertex: whether the passage along a parts that along b.
+    """Return the mask of meetings at a vertex at which the path crosses itself: the directions of
+    passage a separate those of b.
 
-    Each passage has two directions, back along where it came from and on to where it goes.
+    A passage has two directions: back to where the path comes from, and on to where it goes.
     """
     back_a, on_a = _passage(crossings.row_a, crossings.ta, segments, frames)
     back_b, on_b = _passage(crossings.row_b, crossings.tb, segments, frames)
@@ -303,7 +305,8 @@ def _pass_through(crossings: Crossings, segments: Segments, frames: Frames) -> B
 
 
 def _passage(row: Ints, t: Floats, segments: Segments, frames: Frames) -> tuple[Floats, Floats]:
-    """Return the directions (J,) rad back and on at the fraction t of these rows."""
+    """Return the directions (J,), rad, back and onward of the path at the fraction `t` of these
+    segments."""
     before, after = _neighbours(segments)
     arriving_row = np.where(t == 0.0, before[row], row)
     goes = np.where(t == 1.0, after[row], row)
@@ -314,7 +317,7 @@ def _passage(row: Ints, t: Floats, segments: Segments, frames: Frames) -> tuple[
 
 
 def _neighbours(segments: Segments) -> tuple[Ints, Ints]:
-    """Return the rows before and after each row in its closed path."""
+    """Return the rows of the segments before and after each one in its closed path."""
     rows = np.arange(len(segments))
     first = np.searchsorted(segments.path, segments.path)
     last = np.searchsorted(segments.path, segments.path, side="right") - 1
@@ -324,7 +327,8 @@ def _neighbours(segments: Segments) -> tuple[Ints, Ints]:
 
 
 def _one_passage(pairs: Crossings, segments: Segments) -> Bools:
-    """Return True for the vertex that a row shares with the next one of its path."""
+    """Return the mask of pairs that are the vertex between a segment and the next one of its
+    path."""
     _, after = _neighbours(segments)
     a_first = (after[pairs.row_a] == pairs.row_b) & (pairs.ta == 1.0) & (pairs.tb == 0.0)
     b_first = (after[pairs.row_b] == pairs.row_a) & (pairs.tb == 1.0) & (pairs.ta == 0.0)

@@ -23,7 +23,7 @@ SHALLOW_BULGE = 1e-3
 
 
 def path_lengths(lines: Polylines) -> Floats:
-    """Return (M,) length of each path, mm."""
+    """Return the length (M,) of each path, mm."""
     lengths = np.zeros(len(lines))
     for segments in Segments.lots(lines):
         np.add.at(lengths, segments.path, segment_lengths(segments))
@@ -31,7 +31,7 @@ def path_lengths(lines: Polylines) -> Floats:
 
 
 def segment_lengths(segments: Segments) -> Floats:
-    """Return (K,) length of each line and arc, mm."""
+    """Return the length (K,) of each line and arc, mm."""
     chord = segments.end - segments.start
     lengths = np.hypot(chord[:, 0], chord[:, 1])
     # length = radius · |sweep| = chord · (1 + b²) · atan(b)/b
@@ -42,7 +42,7 @@ def segment_lengths(segments: Segments) -> Floats:
 
 
 def signed_areas(lines: Polylines) -> Floats:
-    """Return (M,) area inside each closed path, mm², CCW positive; 0 for open paths.
+    """Return the area (M,) inside each closed path, mm², CCW positive; 0 for open paths.
 
     Exact with arcs: the shoelace formula over the chords and the area between chord and arc.
     """
@@ -62,10 +62,10 @@ def signed_areas(lines: Polylines) -> Floats:
 
 
 def _area_beside(bulge: Floats) -> Floats:
-    """Return the signed area between a chord of length 1 and its arc.
+    """Return the signed area between a chord of length 1 and its arc of this bulge.
 
-    radius²/2 · (sweep − sin sweep)  with  radius = (1 + b²)/(4|b|)  and
-    sin sweep = 4b(1 − b²)/(1 + b²)²;  for small b it is b/3 · (1 + b²/5 + …).
+    radius²/2 · (sweep − sin sweep) with radius = (1 + b²)/(4|b|) and sin sweep = 4b(1 − b²)/(1 +
+    b²)²; for small b it is b/3 · (1 + b²/5 + …).
     """
     shallow = np.abs(bulge) < SHALLOW_BULGE
     b = np.where(shallow, 1.0, bulge)
@@ -86,8 +86,8 @@ def signed_area(p: Polyline) -> float:
 
 
 def segment_boxes(segments: Segments) -> Floats:
-    """Return (K, 4) xmin, ymin, xmax, ymax of each line and arc, mm, exact with the extremes of
-    arcs."""
+    """Return the box (K, 4), xmin, ymin, xmax, ymax, of each line and arc, mm, exact with the
+    extremes of arcs."""
     low = np.minimum(segments.start, segments.end)
     high = np.maximum(segments.start, segments.end)
     rows, points = _extremes(segments)
@@ -97,10 +97,11 @@ def segment_boxes(segments: Segments) -> Floats:
 
 
 def _extremes(segments: Segments) -> tuple[Ints, Floats]:
-    """Return rows of arcs and the points (J, 2) in them where the tangent lies along an axis.
+    """Return the extreme points (J, 2) of arcs, where the tangent is parallel to an axis, and the
+    row (J,) of the arc of each.
 
-    The tangent turns from  chord direction − sweep/2  to  chord direction + sweep/2;  it lies
-    along an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at most.
+    The tangent turns from chord direction − sweep/2 to chord direction + sweep/2; it is parallel
+    to an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at most.
     """
     quarter = 0.5 * np.pi
     rows = np.flatnonzero(segments.is_arc)
@@ -115,7 +116,8 @@ def _extremes(segments: Segments) -> tuple[Ints, Floats]:
 
 
 def path_extents(lines: Polylines) -> Floats:
-    """Return (M, 2, 2) [[xmin, xmax], [ymin, ymax]] of each path, mm, exact with arcs."""
+    """Return the box (M, 2, 2), [[xmin, xmax], [ymin, ymax]], of each path, mm, exact with
+    arcs."""
     low = np.full((len(lines), 2), np.inf)
     high = np.full((len(lines), 2), -np.inf)
     for segments in Segments.lots(lines):
@@ -126,8 +128,8 @@ def path_extents(lines: Polylines) -> Floats:
 
 
 def extents(lines: Polylines) -> Floats:
-    """Return (2, 2) [[xmin, xmax], [ymin, ymax]] of all paths, mm; GeometryError when there are
-    none."""
+    """Return the box (2, 2), [[xmin, xmax], [ymin, ymax]], of all paths, mm; GeometryError when
+    there are none."""
     if len(lines) == 0:
         raise GeometryError("no paths, so there are no extents")
     each = path_extents(lines)
@@ -135,7 +137,8 @@ def extents(lines: Polylines) -> Floats:
 
 
 def point_at(segments: Segments, row_indices: Ints, t: Floats) -> Floats:
-    """Return (J, 2) the points at the fractions t (J,) in 0..1 of the length of these rows, mm."""
+    """Return the points (J, 2), mm, at the fractions t (J,), 0 to 1, of the lengths of these
+    segments."""
     start, end = segments.start.take(row_indices, axis=0), segments.end.take(row_indices, axis=0)
     bulge = segments.bulge.take(row_indices)
     arcs = np.flatnonzero(bulge)
@@ -161,7 +164,7 @@ class ChordPoints(Struct, frozen=True, eq=False):
 
     @property
     def once(self) -> Floats:
-        """The points without the end of each segment: those of a closed path, each once."""
+        """The points without the end of each segment; of a closed path each vertex once."""
         return self.points[self.share < 1.0]
 
 
@@ -181,10 +184,10 @@ def chords_of(segments: Segments, tolerance_mm: float, min_count: int = 1) -> Ch
 
 
 def sample(p: Polyline, step_mm: float) -> Floats:
-    """Return (J, 2) points along the path, all its vertices among them, no farther apart than
-    step_mm.
+    """Return points (J, 2) along the path, on its lines and arcs, no farther apart than `step_mm`,
+    all its vertices among them.
 
-    They lie on the arcs. The first point of a closed path is not repeated at the end.
+    The first point of a closed path is not repeated at the end.
     """
     if not step_mm > 0.0:
         raise GeometryError(f"a step of {step_mm} mm is not above 0")
@@ -220,7 +223,7 @@ class Frames(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, segments: Segments) -> Frames:
-        """Return the frames of the segments, one for each."""
+        """Return the frame of each segment."""
         chord = segments.end - segments.start
         size = np.hypot(chord[:, 0], chord[:, 1])
         unit = chord / size[:, None]
@@ -250,7 +253,7 @@ class Frames(Struct, frozen=True, eq=False):
         return np.asarray(cosine * self.tangent + sine * self.normal)
 
     def gap(self, points: Floats) -> Floats:
-        """Return (K,) distance of each point (K, 2) from the whole line or circle, mm.
+        """Return the distance (K,) mm of each point (K, 2) from the whole line or circle.
 
         With g = k|q|² − 2 n·q the distance from the centre squared is (1 + k g)/k².
         """
@@ -259,10 +262,11 @@ class Frames(Struct, frozen=True, eq=False):
         return np.asarray(np.abs(g) / (1.0 + np.sqrt(np.maximum(1.0 + self.curvature * g, 0.0))))
 
     def along(self, points: Floats) -> Floats:
-        """Return (K,) length along the curve from its start to each point (K, 2) on it, mm.
+        """Return the length (K,) mm along the curve from its start to each point (K, 2) on it,
+        negative before the start.
 
-        Negative before the start. The chord to the point makes half the swept angle with the
-        tangent; points before the start show as half angles beyond the middle of what remains.
+        The chord to the point makes half the swept angle with the tangent; points before the start
+        show as half angles beyond the middle of what remains.
         """
         q = points - self.start
         side = np.where(self.curvature < 0.0, -1.0, 1.0)
@@ -282,5 +286,5 @@ def turn_left(vectors: Floats) -> Floats:
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """Return (K,) inner products of vectors (K, 2)."""
+    """Return the inner products (K,) of vectors (K, 2)."""
     return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1])

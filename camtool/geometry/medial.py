@@ -62,21 +62,23 @@ class MedialTrace(Struct, frozen=True, eq=False):
 
     @property
     def discs(self) -> Floats:
-        """(N, 3) x, y, rho."""
+        """Discs (N, 3): x, y and radius, mm."""
         return np.column_stack([self.x, self.y, self.rho])
 
 
 def concatenated(traces: list[MedialTrace]) -> MedialTrace:
-    """Return the rows of all traces, one trace after the other."""
+    """Return the rows of all traces in one trace."""
     return MedialTrace(*map(np.concatenate, zip(*map(astuple, traces), strict=True)))
 
 
 def discs_at(
     boundary: Boundary, element: Ints, t: Floats, guess: Ints | None = None
 ) -> MedialTrace:
-    """Compute the largest disc within the region that touches each of these places; `guess` (N,
-    2): elements that are likely to be touched besides, which makes it quick. GeometryError where
-    nothing ends a disc: paths that lie on each other enclose no region there."""
+    """Return the largest disc within the region that touches each of these places on the boundary.
+
+    `guess` (N, 2) are elements that the disc probably touches as well; a good guess saves time.
+    GeometryError where nothing ends a disc: paths that lie on each other enclose no region there.
+    """
     result, partner = np.empty((len(t), 4)), np.empty(len(t), dtype=np.int64)
     if guess is None:
         guess = np.column_stack([element, element])
@@ -94,8 +96,8 @@ def discs_at(
 
 
 def medial_trace(region: Polylines, tolerance_mm: float) -> tuple[Boundary, MedialTrace]:
-    """Compute the medial trace of a region: closed paths, outer ones CCW, holes CW, that do not
-    cross."""
+    """Compute the boundary elements and the medial trace of a region: closed paths, outer ones
+    CCW, holes CW, that do not cross."""
     boundary = Boundary.of(region)
     element = np.repeat(np.arange(len(boundary)), FIRST_SAMPLES)
     t = np.tile(np.linspace(0.0, 1.0, FIRST_SAMPLES), len(boundary))
@@ -121,8 +123,11 @@ def _gaps(trace: MedialTrace) -> Bools:
 def _insert_rows(
     trace: MedialTrace, new_rows: MedialTrace, is_open: Bools
 ) -> tuple[MedialTrace, Bools]:
-    """Return the trace with more rows, and its gaps that are open: those beside the new rows that
-    `is_open` names, except gaps too narrow for another number."""
+    """Return the trace with more rows inserted, and the mask of its gaps still to be halved.
+
+    These are the gaps beside those new rows for which `is_open` is true, unless too narrow for
+    another number between.
+    """
     merged = concatenated([trace, new_rows])
     order = np.lexsort((merged.t, merged.element))
     merged = merged.rows(order)
@@ -135,8 +140,11 @@ def _insert_rows(
 def _refine_gaps(
     boundary: Boundary, trace: MedialTrace, open_gaps: Bools, tolerance_mm: float
 ) -> tuple[MedialTrace, Bools]:
-    """Halve all open gaps once, or cut them where the partner changes; a halved gap stays open
-    while the curve deviates from the chord by more than the tolerance."""
+    """Halve all open gaps once, or cut them where the partner changes; return the trace and the
+    mask of the gaps that stay open.
+
+    A halved gap stays open while the curve deviates from its chord by more than the tolerance.
+    """
     rows = np.flatnonzero(open_gaps)
     middle = 0.5 * (trace.t[rows] + trace.t[rows + 1])
     halves = discs_at(boundary, trace.element[rows], middle, _partners(trace, rows))
@@ -155,13 +163,15 @@ def _refine_gaps(
 
 
 def _disc_distance(discs: Floats, other_discs: Floats) -> Floats:
-    """Return the distance (N,) of discs (N, 3) from others: in the plane plus in radius."""
+    """Return the distance (N,) between discs (N, 3): that of their middles plus the difference of
+    their radii."""
     differences = discs - other_discs
     return np.asarray(np.hypot(differences[:, 0], differences[:, 1]) + np.abs(differences[:, 2]))
 
 
 def _events(boundary: Boundary, trace: MedialTrace, rows: Ints) -> tuple[MedialTrace, MedialTrace]:
-    """Return the last disc with the partner of row `rows`, and the first disc with another one."""
+    """Return, by bisection, the last disc with the partner of row `rows`, and the first disc with
+    another one, in the gap after each row."""
     element, partner, guess = trace.element[rows], trace.partner[rows], _partners(trace, rows)
     low, high = trace.t[rows].copy(), trace.t[rows + 1].copy()
     for _ in range(HALVINGS):
@@ -172,13 +182,13 @@ def _events(boundary: Boundary, trace: MedialTrace, rows: Ints) -> tuple[MedialT
 
 
 def _partners(trace: MedialTrace, rows: Ints) -> Ints:
-    """Return (N, 2) the partners at both ends of the gaps behind these rows."""
+    """Return the partners (N, 2) at both ends of the gap after each of these rows."""
     return np.column_stack([trace.partner[rows], trace.partner[rows + 1]])
 
 
 def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
-    """Return the distance (N,) of points (N, 3) from the chords between begin and end (N, 3): the
-    distance in the plane plus the difference of radii."""
+    """Return the distance (N,) of points (N, 3) from the chords between `begin` and `end` (N, 3):
+    in the plane plus in radius."""
     chord, arm = end - begin, points - begin
     square = (chord**2).sum(axis=1)
     part = np.clip((arm * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
@@ -186,8 +196,11 @@ def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
 
 
 def _seen_from_partners(boundary: Boundary, trace: MedialTrace) -> MedialTrace:
-    """Return discs at the touching points on partners that show no such partner next to that
-    place."""
+    """Return the discs of the trace as seen from their partners, where the partner's own rows near
+    that place do not show the element.
+
+    They mark intervals that fell between the samples.
+    """
     is_pair = trace.partner != trace.element
     element, t, partner = (trace.partner[is_pair], trace.u[is_pair], trace.element[is_pair])
     # Numbers that sort as element and place do; places lie in 0 … 1.
@@ -216,7 +229,8 @@ class Boundary(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, region: Polylines) -> Boundary:
-        """Return the elements of closed paths, outer ones CCW and holes CW."""
+        """Return the elements of closed paths, outer ones CCW and holes CW: segments, and reflex
+        corners of their own."""
         segments = Segments.of(region)
         leave, arrive = _tangents(segments)
         before, following = _neighbours(segments.path)
@@ -254,7 +268,8 @@ class Boundary(Struct, frozen=True, eq=False):
 
 
 def _tangents(segments: Segments) -> tuple[Floats, Floats]:
-    """Return (K, 2) unit tangents at the start and at the end: the chord turned by ∓ sweep/2."""
+    """Return the unit tangents (K, 2) at the start and at the end: the chord turned by ∓
+    sweep/2."""
     chord = segments.end - segments.start
     unit = chord / np.hypot(chord[:, 0], chord[:, 1])[:, None]
     cosine, sine = np.cos(0.5 * segments.sweep)[:, None], np.sin(0.5 * segments.sweep)[:, None]
@@ -263,13 +278,13 @@ def _tangents(segments: Segments) -> tuple[Floats, Floats]:
 
 
 def _turns(arrive: Floats, leave: Floats) -> Floats:
-    """Return (K,) turn at each start, left positive, −π … π."""
+    """Return the angle (K,) by which the path turns at each start, left positive, −π … π rad."""
     across = arrive[:, 0] * leave[:, 1] - arrive[:, 1] * leave[:, 0]
     return np.asarray(np.arctan2(across, (arrive * leave).sum(axis=1)))
 
 
 def _neighbours(path: Ints) -> tuple[Ints, Ints]:
-    """Return the rows before and behind each row on its closed path."""
+    """Return the rows before and after each row on its closed path."""
     rows = np.arange(len(path))
     first = np.searchsorted(path, path, side="left")
     last = np.searchsorted(path, path, side="right") - 1
@@ -277,7 +292,7 @@ def _neighbours(path: Ints) -> tuple[Ints, Ints]:
 
 
 def _blocks(table: Floats, segment_box: Floats, place: Ints) -> Floats:
-    """Boxes around BLOCK elements each."""
+    """Return a box (B, 4) around each block of BLOCK successive elements."""
     corners = table[:, [AX, AY]]
     boxes = np.concatenate([corners, corners], axis=1)
     boxes[place] = segment_box

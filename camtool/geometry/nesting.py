@@ -51,7 +51,8 @@ class Nesting(Struct, frozen=True, eq=False, dict=True):
         return self.levels_by(self.lines.closed)
 
     def levels_by(self, holders: Bools) -> Levels:
-        """Return the levels where the closed paths of the mask `holders` (M,) are the holders."""
+        """Return the levels if only the closed paths of the mask `holders` (M,) count as
+        holders."""
         count = len(self.lines)
         pairs = self._pairs
         counts = holders[pairs.holder]
@@ -66,7 +67,7 @@ class Nesting(Struct, frozen=True, eq=False, dict=True):
         return Levels(parent, np.bincount(inner, minlength=count))
 
     def among(self, rows: Ints) -> Nesting:
-        """Return the nesting of the paths in these rows, ascending, without the others."""
+        """Return the nesting of the paths in these rows alone, ascending."""
         return Nesting(self.lines.select(rows), self, rows)
 
     @cached_property
@@ -86,7 +87,8 @@ class _Pairs(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, lines: Polylines) -> _Pairs:
-        """Compare every closed path with the paths within its box that are no larger."""
+        """Return the pairs of these paths: every closed path is compared with the paths within its
+        box that are no larger."""
         no_rows = np.empty(0, dtype=np.int32)
         holder, inner, is_double = [no_rows], [no_rows], [np.empty(0, dtype=np.bool_)]
         areas = np.abs(signed_areas(lines))
@@ -110,7 +112,8 @@ class _Pairs(Struct, frozen=True, eq=False):
         return cls(np.concatenate(holder), np.concatenate(inner), np.concatenate(is_double))
 
     def among(self, rows: Ints, count: int) -> _Pairs:
-        """Return the pairs of which both are among these rows of `count` paths, renumbered."""
+        """Return the pairs whose two paths are both among these rows of `count` paths,
+        renumbered."""
         row_of = np.full(count, -1, dtype=np.int32)
         row_of[rows] = np.arange(len(rows), dtype=np.int32)
         holder, inner = row_of[self.holder], row_of[self.inner]
@@ -119,8 +122,8 @@ class _Pairs(Struct, frozen=True, eq=False):
 
 
 def inside(points: Floats, ring: Segments) -> Bools:
-    """Return the mask (P,) of the points (P, 2) within a closed path; a point on its line may
-    be either."""
+    """Return the mask (P,) of the points (P, 2) inside a closed path; a point on its line may
+    count as either."""
     curves = IndexedCurves.of(ring)
     return insides(
         np.ascontiguousarray(points, dtype=np.float64), curves.rows, ring.bulge, curves.tree
@@ -153,8 +156,8 @@ class _Places(Struct, frozen=True, eq=False):
         )
 
     def contained_paths(self, inner: Ints, j: int) -> tuple[Ints, Ints]:
-        """Return those of the paths `inner` that have all their points within path j, and those
-        that have all of them on its line."""
+        """Return those of the paths `inner` whose points all lie inside path j, and those whose
+        points all lie on its line."""
         ring = self.segments[self.first_segment[j] : self.first_segment[j + 1]]
         curves = IndexedCurves.of(ring)
         arrays = (curves.rows, ring.bulge, curves.tree)
@@ -163,8 +166,7 @@ class _Places(Struct, frozen=True, eq=False):
 
 
 def _within_boxes(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
-    """Yield each of these paths with the paths whose boxes (M, 2, 2) do not reach out of its own:
-    their centres lie in it."""
+    """Yield each path of `holders` with the paths whose boxes (M, 2, 2) lie within its own."""
     low, high = boxes[:, :, 0], boxes[:, :, 1]
     centres = 0.5 * (low + high)
     index = BoxIndex(np.hstack([centres, centres]))
@@ -185,9 +187,9 @@ def _within_boxes(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
 
 
 def oriented(nest: Nesting) -> Polylines:
-    """Return the closed paths in their order, turned so that the regions are on their left.
+    """Return the closed paths, in their order, turned so that the region is on their left.
 
-    Paths held by none, by two, and so on run CCW, the others CW. Open paths: GeometryError.
+    Paths held by none, by two, and so on run CCW, the others CW. GeometryError for an open path.
     """
     lines = nest.lines
     if not lines.closed.all():
@@ -198,9 +200,10 @@ def oriented(nest: Nesting) -> Polylines:
 
 
 def regions(nest: Nesting) -> list[tuple[int, Polylines]]:
-    """Return the row of each outer path, and that path (CCW) with the holes (CW) directly in it.
+    """Return each region: the row of its outer path, and that path (CCW) with the holes (CW)
+    directly in it.
 
-    An island in a hole is the outer path of a region of its own. Open paths: GeometryError.
+    An island in a hole is the outer path of a region of its own. GeometryError for an open path.
     """
     oriented_paths, levels = oriented(nest), nest.levels
     is_hole = levels.depth % 2 == 1

@@ -133,7 +133,7 @@ JOINS = ("round", "mitre", "sharp")
 def offset_shape(
     lines: Polylines, distance_mm: float, *, joins: str = "round", mitre_limit: float = 2.0
 ) -> Polylines:
-    """Compute the boundary of a region shrunk by a distance in mm, or grown by one below 0.
+    """Return the boundary of a region shrunk by a distance in mm, or grown by one below 0.
 
     The region lies on the left of its closed paths: outer ones run CCW, holes CW (`oriented`). So
     do those of the result. Islands merge, split and vanish. Loops come in the order of the first
@@ -141,8 +141,8 @@ def offset_shape(
     themselves.
 
     `joins` says what is about outer corners: "round" arcs at the distance; "mitre", tangents that
-    go on until they meet, cut off at `mitre_limit` times the distance from the corner; or
-    "sharp", a mitre of any length (up to SHARP_LIMIT).
+    go on until they meet, cut off at `mitre_limit` times the distance from the corner; or "sharp",
+    a mitre of any length (up to SHARP_LIMIT).
 
     GeometryError for an open path and for a distance that is not finite, OptionError for joins
     that do not exist and a mitre limit below 1.
@@ -156,10 +156,10 @@ def offset_shape(
 def offset_each(
     lines: Polylines, distance_mm: float, *, joins: str = "round", mitre_limit: float = 2.0
 ) -> tuple[Polylines, Ints]:
-    """Offset each closed path as a region of its own, independently of the others; return the
-    loops and the path that each of the J loops belongs to (J,), ascending.
+    """Return the offset of each closed path as a region of its own: the loops, and for each the
+    path that it belongs to (J,), ascending.
 
-    Paths that lie so far apart that their offsets cannot meet are offset together.
+    Paths that lie so far apart that their offsets cannot meet are computed together.
     """
     offset = _checked_offset(lines, distance_mm, joins, mitre_limit)
     if offset is None or len(lines) == 0:
@@ -185,7 +185,7 @@ def swept_outline(lines: Polylines, radius_mm: float) -> Polylines | None:
     """Return the boundary of all points within a radius of paths, with the region on its left.
 
     The paths may be open, cross themselves and each other, and repeat each other: each has both of
-    its sides as elements, so that whatever ends one of them is there. None where rounding hides
+    its sides as elements, so that whatever bounds one of them is there. None where rounding hides
     how the boundary goes on (MAX_DEAD_END_MM).
     """
     offset = Offset(radius_mm)
@@ -204,8 +204,8 @@ def swept_outline(lines: Polylines, radius_mm: float) -> Polylines | None:
 
 
 def _both_sides(lines: Polylines) -> Polylines:
-    """Return closed paths that have both sides of all paths on their left: open ones there and
-    back, closed ones once each way."""
+    """Return closed paths that go along both sides of all paths: open paths there and back, closed
+    ones once each way."""
     backwards = reverse_lines(lines)
     there_and_back = (
         Polyline(np.concatenate([path.vertices[:-1], back.vertices[:-1]]), closed=True)
@@ -221,7 +221,8 @@ def _both_sides(lines: Polylines) -> Polylines:
 def _checked_offset(
     lines: Polylines, distance_mm: float, joins: str, mitre_limit: float
 ) -> Offset | None:
-    """Check a request to offset closed paths, and return it; None where they stay as they are."""
+    """Check the arguments of an offset of closed paths, and return them as a record; None if the
+    paths stay as they are."""
     if joins not in JOINS:
         raise OptionError(f"unknown joins {joins!r}", mend=f"use one of {', '.join(JOINS)}")
     if joins == "mitre" and not 1.0 <= mitre_limit < math.inf:
@@ -242,8 +243,12 @@ PATHS_AT_A_TIME = 64
 
 
 def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:
-    """Yield groups of rows of boxes (M, 4) no two of which come within twice the reach of each
-    other; those of a group in the order of the plane, so that neighbours are near in it."""
+    """Yield groups of rows of boxes (M, 4): within a group none comes within twice the reach of
+    another.
+
+    The rows of a group are in the order of Hilbert's curve, so that neighbours in the plane are
+    near each other in it.
+    """
     order = hilbert_order(boxes[:, :2], boxes[:, 2:])
     wide = boxes + reach_mm * np.array([-1.0, -1.0, 1.0, 1.0])
     index, group = BoxIndex(wide), np.full(len(boxes), -1)
@@ -259,8 +264,8 @@ def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:
 
 
 def _offset_paths(lines: Polylines, distance_mm: float, offset: Offset) -> tuple[Polylines, Ints]:
-    """Return the boundary of the region of closed paths moved, and the path that each loop (J,)
-    mostly begins along."""
+    """Return the boundary of the region shrunk or grown, and for each of its loops (J,) the path
+    along which it begins."""
     if distance_mm < 0.0:
         offset_lines, sources = _left_of(reverse_lines(lines), offset)
         return reverse_lines(offset_lines), sources
@@ -276,7 +281,8 @@ class Offset(Struct, frozen=True):
 
 
 def _left_of(lines: Polylines, offset: Offset) -> tuple[Polylines, Ints]:
-    """Return the offset to the left, and the path that each of its loops (J,) begins along."""
+    """Return the offset to the left, and for each of its loops (J,) the path along which it
+    begins."""
     stages = shape_stages(lines, offset)
     offset_lines, loop_rows = paths_of(stages.loops, stages.final_slices, stages.trimmed.elements)
     begins = np.array([loop[0] for loop in stages.loops], dtype=np.int64)[loop_rows]
@@ -296,8 +302,8 @@ def _left_of(lines: Polylines, offset: Offset) -> tuple[Polylines, Ints]:
 
 
 def _turns_about(points: Floats, lines: Polylines) -> Ints:
-    """Return the winding number (P,) of closed paths about points (P, 2): the paths around a point
-    that run CCW, less those that run CW."""
+    """Return the winding number (P,) of closed paths about points (P, 2): the number of CCW paths
+    around a point less that of CW ones."""
     turns = np.zeros(len(points), dtype=np.int64)
     signs = np.where(signed_areas(lines) > 0.0, 1, -1).tolist()
     for path, box, sign in zip(lines, path_extents(lines), signs, strict=True):
@@ -343,15 +349,15 @@ Arrays = tuple[Floats, Floats, Floats, Floats]
 
 
 def source_arrays(source: Segments, kites: Floats) -> Arrays:
-    """Return the forbidden zone of elements as the kernels take it: the rows of the source and
-    their tree, the kites (J, 10) of mitres and theirs."""
+    """Return, in the form of the kernels, what elements must not come near: the rows of the source
+    and their tree, the kites (J, 10) of mitres and theirs."""
     curves = IndexedCurves.of(source)
     return curves.rows, curves.tree, kites, tree_of(kite_boxes(kites))
 
 
 def _touching_paths(lines: Polylines) -> Ints:
-    """Return the two paths (J, 2) at each common point of closed paths, except those of
-    neighbours."""
+    """Return the pair of paths (J, 2) at each common point of two segments, except where one
+    follows the other."""
     segments = Segments.of(lines)
     curves = IndexedCurves.of(segments, margin_mm=POSITION_EPS_MM)
     pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
@@ -364,7 +370,7 @@ def _touching_paths(lines: Polylines) -> Ints:
 
 
 def _next_rows(lines: Polylines) -> Ints:
-    """Return the row of the segment that follows each one, of closed paths."""
+    """Return, for each segment of closed paths, the row of the one that follows it."""
     following = np.arange(1, len(lines.vertices) + 1)
     following[lines.offsets[1:] - 1] = lines.offsets[:-1]
     return following
@@ -391,7 +397,7 @@ class Corners(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, frames: Frames, lines: Polylines) -> Corners:
-        """Return the corners of closed paths, whose segments `frames` describe."""
+        """Return the corners of closed paths; `frames` are those of their segments."""
         before = frames.tangent_at(np.ones(len(frames.length)))
         following = _next_rows(lines)
         after = frames.tangent[following]
@@ -400,15 +406,15 @@ class Corners(Struct, frozen=True, eq=False):
         return cls(frames.end, before, after, turn, np.argsort(following, kind="stable"))
 
     def outer(self, offset: Offset) -> Bools:
-        """Return the mask (K,) of the corners where the path turns right so much that the
-        shifted segments part."""
+        """Return the mask (K,) of the outer corners: the path turns right so much that the shifted
+        segments part."""
         gap = 2.0 * offset.distance_mm * np.sin(-0.5 * self.turn)
         return np.asarray(gap > NODE_EPS_MM)
 
 
 def arcs_about(corners: Corners, rows: Ints, offset: Offset) -> tuple[Ints, Segments]:
-    """Return arcs about the outer corners `rows`, and the corner of each; two where one is above
-    π."""
+    """Return the arcs about these outer corners, and the corner of each; a corner of more than π
+    gets two."""
     turn = corners.turn[rows]
     parts = np.where(turn < -np.pi, 2, 1)
     corner = np.repeat(rows, parts)
@@ -439,7 +445,7 @@ class Mitres(Struct, frozen=True, eq=False):
 
     @classmethod
     def about(cls, corners: Corners, rows: Ints, offset: Offset) -> Mitres:
-        """Return the mitres at the outer corners `rows`."""
+        """Return the mitres at these outer corners."""
         half, d = -0.5 * corners.turn[rows], offset.distance_mm
         is_cut = offset.limit * np.cos(half) < 1.0
         reach, cut = np.zeros(len(corners.turn)), np.zeros(len(corners.turn), dtype=np.bool_)
@@ -454,11 +460,10 @@ class Mitres(Struct, frozen=True, eq=False):
         return cls(reach, cut, np.column_stack(columns))
 
     def lines(self, corners: Corners, is_arc: Bools, offset: Offset) -> tuple[Ints, Segments]:
-        """Return the lines about the corners that are not parts of shifted lines, and the corner
-        of each: on from an arc, across where the mitre is cut off, on to an arc. `is_arc` (K, 2)
-        says whether the segments before and after each corner are arcs.
+        """Return the lines of mitres that are no parts of shifted lines, and the corner of each.
 
-        `is_arc` (K, 2) says whether the segments before and after each corner are arcs.
+        They go on from a shifted arc, across where the mitre is cut off, and on to a shifted arc.
+        `is_arc` (K, 2) is true if the segment before, or after, each corner is an arc.
         """
         d, reach = offset.distance_mm, self.reach[:, None]
         left_foot = corners.place + d * turn_left(corners.before)
@@ -492,12 +497,12 @@ class RawOffset(Struct, frozen=True, eq=False):
 
 
 def raw_offset(lines: Polylines, offset: Offset) -> RawOffset:
-    """Compute the raw offset to the left of closed paths: all of the offset, and much that is too
-    near to them.
+    """Return the raw offset of closed paths to the left: all of the offset, and much else that is
+    too near to them.
 
     An arc that bends left with a radius up to the distance has nothing there: every point beyond
-    its centre is nearer to another of its points. Inner corners need no join: the elements
-    beside them cross, there or elsewhere.
+    its centre is nearer to another of its points. Inner corners need no join: the elements beside
+    them cross, there or elsewhere.
     """
     segments = Segments.of(lines)
     frames = Frames.of(segments)
@@ -515,8 +520,8 @@ def raw_offset(lines: Polylines, offset: Offset) -> RawOffset:
 def _shift_segments(
     segments: Segments, frames: Frames, corners: Corners, mitres: Mitres, offset: Offset
 ) -> tuple[Ints, Segments]:
-    """Return the segments at the distance, and the row of each; lines go on to the tips of
-    mitres."""
+    """Return the segments shifted by the distance, lines prolonged to the tips of mitres, and the
+    source row of each."""
     start = segments.start + offset.distance_mm * frames.normal
     end = segments.end + offset.distance_mm * turn_left(corners.before)
     left_over = 1.0 - offset.distance_mm * frames.curvature
@@ -530,7 +535,7 @@ def _shift_segments(
 
 
 def _merge_by_source(sources: list[Ints], parts: list[Segments], kites: Floats) -> RawOffset:
-    """Merge shifted segments and then joins, by their source."""
+    """Return shifted segments and joins merged in the order of their source segments."""
     source = np.concatenate(sources)
     order = np.argsort(source, kind="stable")
     elements = Segments.between(
@@ -549,10 +554,12 @@ cut are judged invalid later."""
 
 
 def trim_raw(raw: RawOffset, source: Arrays, offset: Offset) -> RawOffset:
-    """Remove from the raw offset what is surely too near at both ends of each element.
+    """Return the raw offset without what is surely too near to the source at both ends of each
+    element.
 
-    What goes could never be kept, and what is kept is not cut by it: this only saves cuts, which
-    would grow with the square of the number of elements where the distance is large against them.
+    What is removed could never be kept, and what is kept is not cut by it: this only saves cuts,
+    whose number would grow with the square of the number of elements where the distance is large
+    against them.
     """
     spare = TRIM_SPARE * VALIDITY_EPS_MM
     ends = trimmed_ends(curve_rows_of(raw.elements), source, (offset.distance_mm, spare))
@@ -563,8 +570,8 @@ def trim_raw(raw: RawOffset, source: Arrays, offset: Offset) -> RawOffset:
 
 
 def _cut_to_fractions(elements: Segments, low: Floats, high: Floats) -> Segments:
-    """Return the part of each element between two fractions; elements that are whole stay the
-    same."""
+    """Return the part of each element between two fractions, 0 and 1 for an element that stays
+    whole."""
     cut = np.flatnonzero((low != 0.0) | (high != 1.0))
     start, end, bulge = elements.start.copy(), elements.end.copy(), elements.bulge.copy()
     start[cut] = point_at(elements, cut, low[cut])
@@ -616,7 +623,7 @@ class Slices(Struct, frozen=True, eq=False):
 
 
 def slice_elements(elements: Segments, cutting_elements: Segments | None) -> Slices:
-    """Cut the elements at all meetings with each other and with `cutting_elements`."""
+    """Return the elements cut wherever they meet each other or the `cutting_elements`."""
     eps = NODE_EPS_MM
     curves = IndexedCurves.of(elements, margin_mm=eps)
     pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
@@ -633,7 +640,7 @@ def slice_elements(elements: Segments, cutting_elements: Segments | None) -> Sli
 
 
 def _cut_elements(elements: Segments, rows: Ints, cuts: Floats) -> Slices:
-    """Cut the elements at `cuts` (J, 3), the fraction and the place on the element rows[j]."""
+    """Return the elements cut at `cuts` (J, 3): fraction, x and y on the element rows[j]."""
     count = len(elements)
     every = np.arange(count)
     # Ends come first, so that a node is at an end of an element rather than at a meeting.
@@ -649,7 +656,7 @@ def _cut_elements(elements: Segments, rows: Ints, cuts: Floats) -> Slices:
 
 
 def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
-    """Return the node (P,) of each point (P, 2), and the nodes (N, 2): the first point of each
+    """Return the node (P,) of each point (P, 2), and the nodes (N, 2), each the first point of its
     group.
 
     Points within `eps_mm` share a node, and so do chains of such points.
@@ -660,12 +667,13 @@ def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
 
 
 def valid_slices(slices: Slices, elements: Segments, source: Arrays, offset: Offset) -> Bools:
-    """Return the mask (S,) of the slices of which no measured point is too near to the source, or
+    """Return the mask (S,) of the slices of which no tested point is too near to the source, or
     within a mitre.
 
-    Too near is what falls short of the distance, or is deeper in a kite, by VALIDITY_EPS_MM.
-    The raw offset changes between valid and invalid only where it meets itself, so that one point
-    would do; several guard against slices that are hardly too near anywhere.
+    A point is too near if it falls short of the distance, or lies in a kite, by more than
+    VALIDITY_EPS_MM. The raw offset changes between valid and invalid only where it meets itself,
+    so that one point would do; several guard against slices that are too near by hardly anything
+    anywhere.
     """
     limits = (offset.distance_mm, VALIDITY_EPS_MM)
     curves = curve_rows_of(elements)
@@ -676,9 +684,10 @@ def valid_slices(slices: Slices, elements: Segments, source: Arrays, offset: Off
 
 
 def without_doubles(slices: Slices, elements: Segments) -> Slices:
-    """Remove repeated slices, and pairs that run to and fro along each other.
+    """Return the slices without repeated ones, and without pairs that run to and fro along each
+    other.
 
-    Such a pair encloses nothing: it is where the offset falls apart, or collapses to a line.
+    Such a pair encloses nothing: there the offset splits into two, or collapses to a line.
     """
     middle = 0.5 * (slices.t0 + slices.t1)
     eps = 2.0 * NODE_EPS_MM
@@ -686,16 +695,17 @@ def without_doubles(slices: Slices, elements: Segments) -> Slices:
 
 
 def without_dead_ends(slices: Slices) -> Slices:
-    """Keep the slices that others lead to and lead on from."""
+    """Return the slices to whose begin another slice leads, and from whose end another one leads
+    on."""
     return slices[leading_on(*slices.ends)]
 
 
 def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
     """Return the rows of the slices of each loop, in order; no loop passes a node twice.
 
-    At a node where several slices leave, the leftmost one is taken: the region that is far
-    enough from the source is on the left, and so it falls into parts that only touch. Each loop
-    begins with its first slice, and they come in the order of these.
+    At a node where several slices leave, the leftmost one is taken: the region that is far enough
+    from the source is on the left, and parts of it that only touch become loops of their own. Each
+    loop begins with its first slice, and they come in the order of these.
     """
     rows, begins = traced(curve_rows_of(elements), slices.element, slices.span, slices.ends)
     if len(rows) == 0:
@@ -710,10 +720,10 @@ def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
 
 
 def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> tuple[Polylines, Ints]:
-    """Return clean closed paths of loops of slices, and the loop of each; slices of one element
-    become one.
+    """Return clean closed paths of loops of slices, and the loop of each; successive slices of one
+    element become one segment.
 
-    Segments up to POSITION_EPS_MM go. A path of which nothing is left goes, and so does one whose
+    Segments up to POSITION_EPS_MM are dropped, and so are paths of which nothing remains or whose
     mean width, area over half the length, is no more than that.
     """
     eps = POSITION_EPS_MM

@@ -42,10 +42,10 @@ _Spans = list[tuple[float, float]]
 
 
 def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapped:
-    """Remove what lies twice, within `groups` (M,) numbers; see the top. What is shorter than
-    `within_mm` is left out with the overlap beside it.
+    """Return the paths without what lies on another path of the same group, `groups` (M,).
 
-    What is shorter than `within_mm` is left out with the overlap beside it.
+    The rules are at the top of this file. A remainder shorter than `within_mm` is left out with
+    the overlap beside it.
     """
     unchanged = Unlapped(lines, np.arange(len(lines)), 0, 0.0)
     if not _may_be_loose(lines).any():
@@ -83,7 +83,7 @@ def _may_be_loose(lines: Polylines) -> Bools:
 
 
 def _intervals(lines: Polylines, groups: Ints, tolerance: float) -> Intervals:
-    """Return an interval for each loose path, and for each segment of the others."""
+    """Return an interval for each loose path as a whole, and for each segment of the others."""
     segments = Segments.of(lines)
     counts = np.bincount(segments.path, minlength=len(lines))
     first = np.cumsum(counts) - counts
@@ -124,7 +124,8 @@ def _intervals(lines: Polylines, groups: Ints, tolerance: float) -> Intervals:
 
 
 def _remaining_spans(items: Intervals, laps: Covers, tolerance: float) -> dict[int, _Spans]:
-    """Return the remaining spans of each loose interval that is covered by what stays."""
+    """Return the spans, mm along it, that remain of each loose interval after removing what other
+    intervals cover; only of those that lose something."""
     rank = _ranks(items, distinct(np.concatenate([laps.a, laps.b])))
     # A loose interval yields to what is not loose, and to loose ones that rank before it.
     yields = ~items.loose[laps.b] | (rank[laps.b] < rank[laps.a])
@@ -151,8 +152,8 @@ def _remaining_spans(items: Intervals, laps: Covers, tolerance: float) -> dict[i
 
 
 def _ranks(intervals: Intervals, rows: Ints) -> Ints:
-    """Return the rank (K,) of each interval: the longest first, then by place, independent of the
-    order in which they were drawn."""
+    """Return the rank (K,) of each interval: longest first, then by place, so that the order of
+    drawing decides nothing."""
     of_line = intervals.start + 0.5 * intervals.length[:, None] * intervals.direction
     middle = np.where(np.isnan(intervals.centre), of_line, intervals.centre)
     low = np.where(np.isnan(intervals.low), 0.0, np.mod(intervals.low, 2.0 * math.pi))
@@ -164,7 +165,7 @@ def _ranks(intervals: Intervals, rows: Ints) -> Ints:
 
 
 def _subtract_span(spans: _Spans, low: float, high: float, tolerance: float) -> _Spans:
-    """Return the spans without low … high; crumbs no longer than `tolerance` go too."""
+    """Return the spans without low … high; remainders no longer than `tolerance` are dropped."""
     if high <= low:
         return spans
     cut: _Spans = []
@@ -180,7 +181,8 @@ def _subtract_span(spans: _Spans, low: float, high: float, tolerance: float) -> 
 def _span_path(
     lines: Polylines, intervals: Intervals, row: int, span: tuple[float, float]
 ) -> Polylines:
-    """Return a span of a loose interval as a path that runs as the interval was drawn."""
+    """Return a span of a loose interval as a path, in the direction in which the interval was
+    drawn."""
     path = lines[int(intervals.path[row])].vertices
     begin, end = span
     if math.isnan(intervals.radius[row]):
@@ -229,8 +231,8 @@ MIN_SHARED_TOLERANCES = 32.0
 """Intervals that share less than this many times their tolerance count as apart."""
 
 BINS = 50
-"""Number of bins into which the directions of lines are sorted; 2/SHORTEST_SHARES rad is less than
-one bin."""
+"""Number of bins into which the directions of lines are sorted. Lines that share enough differ in
+direction by at most 2/MIN_SHARED_TOLERANCES rad, which is less than one bin."""
 
 MAX_PAIRS = 2_000_000
 
@@ -272,7 +274,8 @@ class Covers(Struct, frozen=True, eq=False):
 
 
 def covers(all_of: Intervals, within_mm: float) -> Covers:
-    """Find every interval that covers part of a loose one of another path of its group."""
+    """Return every pair of which one interval covers part of a loose one of another path of its
+    group."""
     coverings: list[Covers] = []
     count = 0
     for part in chain(_on_lines(all_of, within_mm), _on_circles(all_of, within_mm)):
@@ -286,7 +289,8 @@ def covers(all_of: Intervals, within_mm: float) -> Covers:
 
 
 def _on_lines(items: Intervals, within_mm: float) -> Iterator[Covers]:
-    """Bin by bin: lines of nearly one direction, turned level so that their boxes are flat."""
+    """Yield the covers of lines, for one bin of directions after the other, turned level so that
+    their boxes are flat."""
     lines = np.flatnonzero(~np.isnan(items.direction[:, 0]))
     angle = np.arctan2(items.direction[lines, 1], items.direction[lines, 0])
     of_bin = np.round(angle / (np.pi / BINS)).astype(np.int64) % BINS
@@ -303,7 +307,7 @@ def _on_lines(items: Intervals, within_mm: float) -> Iterator[Covers]:
 
 
 def _level_boxes(intervals: Intervals, rows: Ints, angle: float, margin: float) -> Floats:
-    """Return (R, 4) boxes of lines turned by −angle, grown by the margin."""
+    """Return the boxes (R, 4) of lines turned by −angle, grown by the margin."""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     start = intervals.start[rows]
     end = start + intervals.length[rows, None] * intervals.direction[rows]
@@ -313,9 +317,11 @@ def _level_boxes(intervals: Intervals, rows: Ints, angle: float, margin: float) 
 
 
 def _shared_line(intervals: Intervals, a: Ints, b: Ints, tolerance: float) -> Covers:
-    """Compute the stretch that each line a has in common with the line b of the same row.
+    """Return the stretch that each line of `a` has in common with the line of `b` in the same
+    place.
 
-    Along a, the distance of b's line is linear: it is largest at the ends of what they share.
+    The distance of the lines is linear along them, so that it is largest at the ends of the
+    stretch.
     """
     along, length_b = intervals.direction[a], intervals.length[b]
     from_a = intervals.start[b] - intervals.start[a]
@@ -335,8 +341,11 @@ def _shared_line(intervals: Intervals, a: Ints, b: Ints, tolerance: float) -> Co
 
 
 def _on_circles(intervals: Intervals, within_mm: float) -> Iterator[Covers]:
-    """Yield arcs on one circle. Circles of a grid of holes have equal centres in x, or in y,
-    and equal radii: on a slanted line their centres are apart."""
+    """Yield the covers of arcs on one circle.
+
+    Circles of a grid of holes have equal centres in x, or in y, and equal radii: only along a
+    slanted line are their centres apart, so that boxes are laid along one.
+    """
     arcs = np.flatnonzero(~np.isnan(intervals.radius))
     is_searched = intervals.loose[arcs]
     if not is_searched.any():
@@ -357,8 +366,11 @@ def _on_circles(intervals: Intervals, within_mm: float) -> Iterator[Covers]:
 
 
 def _shared_circle(intervals: Intervals, a: Ints, b: Ints, tolerance: float) -> Iterator[Covers]:
-    """Yield the stretches that each arc a has in common with the arc b of the same row: b may
-    cover a's beginning and its end, from two turns."""
+    """Yield the stretches that each arc of `a` has in common with the arc of `b` in the same
+    place.
+
+    There are two yields, since b may cover both the begin and the end of a.
+    """
     radius, turn = intervals.radius[a], 2.0 * np.pi
     lead_angle = np.mod(intervals.low[b] - intervals.low[a], turn)
     for shift in (lead_angle * radius, (lead_angle - turn) * radius):

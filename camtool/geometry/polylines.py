@@ -98,7 +98,7 @@ class Polylines:
 
     @classmethod
     def of(cls, paths: Iterable[Polyline]) -> Polylines:
-        """Return columns of single paths, which were checked when they were made."""
+        """Return the columns of single paths, which were checked when they were made."""
         items = list(paths)
         counts = np.array([0] + [len(path.vertices) for path in items], dtype=np.int64)
         vertices = [path.vertices for path in items] or [np.empty((0, 3))]
@@ -111,8 +111,8 @@ class Polylines:
 
     @classmethod
     def joined(cls, parts: Sequence[Polylines]) -> Polylines:
-        """Return the paths of all parts, one part after the other; the part itself where only one
-        has any."""
+        """Return the paths of all parts, one part after the other; the part itself if it alone has
+        paths."""
         parts = [part for part in parts if len(part)]
         if len(parts) == 1:
             return parts[0]
@@ -141,7 +141,7 @@ class Polylines:
 
     def select(self, indices: Iterable[int] | Ints) -> Polylines:
         """Return the paths of these indices, in this order; self if every path is selected.
-        IndexError for one that is not there."""
+        IndexError for an index out of range."""
         if not isinstance(indices, np.ndarray):
             indices = np.fromiter((int(index) for index in indices), dtype=np.int64)
         selection: Ints = indices.astype(np.int64)
@@ -167,15 +167,16 @@ class Polylines:
 
 
 def next_vertices(offsets: Ints) -> Ints:
-    """Return the vertex (N,) that follows each one of the paths with these offsets: the first one
-    follows the last."""
+    """Return for each vertex (N,) the row of the next one of its path, for the last one that of
+    the first."""
     following = np.arange(1, offsets[-1] + 1)
     following[offsets[1:] - 1] = offsets[:-1]
     return following
 
 
 def segment_rows(lines: Polylines) -> Ints:
-    """Return the vertex (K,) that each segment leaves, in the order of `Segments.of`."""
+    """Return for each segment (K,) the row of the vertex that it leaves, in the order of
+    `Segments.of`."""
     keep = np.ones(len(lines.vertices), dtype=np.bool_)
     keep[lines.offsets[1:][~lines.closed] - 1] = False
     return np.flatnonzero(keep)
@@ -208,14 +209,15 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
 
     @classmethod
     def lots(cls, lines: Polylines) -> Iterator[Segments]:
-        """Yield all segments of the paths, in order, at most SEGMENTS_AT_ONCE at a time."""
+        """Yield all segments of the paths, in order, in batches of at most SEGMENTS_AT_ONCE."""
         rows = segment_rows(lines)
         for first in range(0, len(rows), SEGMENTS_AT_ONCE):
             yield cls.leaving(lines, rows[first : first + SEGMENTS_AT_ONCE])
 
     @classmethod
     def leaving(cls, lines: Polylines, rows: Ints) -> Segments:
-        """Return the segments that leave these vertices (K,), which are no ends of open paths."""
+        """Return the segments that leave these vertices (K,), none of which is the end of an open
+        path."""
         vertices, offsets = lines.vertices, lines.offsets
         path = np.searchsorted(offsets, rows, side="right") - 1
         following = rows + 1
@@ -274,8 +276,8 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
 
 
 def _check_vertices(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Floats:
-    """Return the vertices, read-only and normalised, a copy unless they are read-only and normal
-    already; GeometryError when they are no polylines."""
+    """Return the vertices, read-only and normalised (not copied if they are both already);
+    GeometryError when they are no polylines."""
     array = np.asarray(vertices, dtype=np.float64)
     is_own = array is vertices and array.flags.owndata and not array.flags.writeable
     if not is_own:
@@ -310,13 +312,14 @@ def _check_vertices(vertices: Floats, offsets: Ints, closed: Bools | list[bool])
 
 
 def _is_short(segments: Segments) -> Bools:
-    """Return the mask (K,) of the segments whose ends are equal positions."""
+    """Return the mask (K,) of the segments whose ends are one position."""
     chord = segments.end - segments.start
     return np.asarray(np.hypot(chord[:, 0], chord[:, 1]) <= POSITION_EPS_MM)
 
 
 def _refuse(is_bad: Bools, message: str, offsets: Ints) -> None:
-    """Raise GeometryError with path and vertex of the first bad row, if there is one."""
+    """Raise GeometryError, with path and vertex, for the first row of the mask `is_bad`, if there
+    is one."""
     if not is_bad.any():
         return
     row = int(np.argmax(is_bad))
@@ -340,8 +343,8 @@ def reverse(p: Polyline) -> Polyline:
 
 
 def reverse_lines(lines: Polylines, is_chosen: Bools | None = None) -> Polylines:
-    """Return the paths with all (or those of `is_chosen` (M,)) travelled backwards, as `reverse`
-    does."""
+    """Return the paths with all, or those of the mask `is_chosen` (M,), travelled backwards, as
+    `reverse` does."""
     if is_chosen is not None and not is_chosen.any():
         return lines
     counts = np.diff(lines.offsets)
@@ -374,8 +377,8 @@ def begin_at(p: Polyline, start_index: int) -> Polyline:
 
 
 def begin_lines_at(lines: Polylines, begins: Ints) -> Polylines:
-    """Return the paths begun at these of their vertices (M,), as `begin_at` does; 0 for open
-    ones."""
+    """Return the paths with other starts, as `begin_at` does: `begins` (M,) are vertices of each
+    path, 0 for open ones."""
     if not (lines.closed | (begins == 0)).all():
         raise GeometryError("an open path can only begin at an end")
     if not begins.any():
@@ -394,13 +397,13 @@ def begin_lines_at(lines: Polylines, begins: Ints) -> Polylines:
 
 
 def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bools, Ints]:
-    """Return the mask (N,) of the vertices to keep, and the number of points that each path
-    repeats (M,).
+    """Return the mask (N,) of the vertices to keep, and for each path the number of points (M,)
+    that it repeats.
 
-    `vertices` (N, 3) of x, y, bulge, mm, path after path, `counts` (M,) of each. A vertex is kept
-    when it lies off the one kept before it; its bulge becomes, in place, that of the last vertex
-    on it, for a bulge belongs to what leaves. A closed path's repeated first point at its end
-    goes uncounted: it says "closed" once more.
+    `vertices` (N, 3) of x, y, bulge, mm, path after path, `counts` (M,) of each. A vertex is
+    dropped when it coincides with the one kept before it, which takes over its bulge, in place: a
+    bulge belongs to the segment that leaves. The first point of a closed path, repeated at its
+    end, is dropped without being counted: it says "closed" once more.
     """
     first = np.cumsum(counts) - counts
     filled = counts > 0
@@ -418,16 +421,21 @@ def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bool
 
 
 def encloses(vertices: Floats, owner: Ints, counts: Ints) -> Bools:
-    """Return the mask (M,), false for paths of two vertices (of `counts` (M,)) without a bulge:
-    there and back along one line encloses nothing; it is that line, once. `owner` (N,) names
-    each vertex's path."""
+    """Return the mask (M,), false for paths of two vertices without a bulge: closed, they would
+    run to and fro along one line.
+
+    `owner` (N,) is the path of each vertex, `counts` (M,) the number of vertices of each path.
+    """
     bent = np.bincount(owner, weights=vertices[:, 2] != 0.0, minlength=len(counts))
     return np.asarray((counts != 2) | (bent != 0.0))
 
 
 def _leave_out(path: Floats, keep: Bools) -> None:
-    """Remove vertices of one path from `keep`, which is false for those on the one before them:
-    those on the last one that is kept, which takes the bulge of the last of these."""
+    """Drop repeated vertices of one path by changing `keep` and bulges in place.
+
+    `keep` comes with false for vertices that coincide with the one before them. It becomes false
+    for those that coincide with the last one kept, which takes the bulge of the last of them.
+    """
     next_row = 0
     for row in np.flatnonzero(~keep).tolist():
         if row < next_row:
@@ -446,7 +454,8 @@ def _leave_out(path: Floats, keep: Bools) -> None:
 
 
 def _drop_closing(vertices: Floats, keep: Bools, owner: Ints, first: Ints, closed: Bools) -> None:
-    """Remove vertices at the end of closed paths from `keep` that lie on their first one."""
+    """Drop vertices at the end of closed paths that coincide with their first one, by changing
+    `keep` in place."""
     waiting = closed.copy()
     while waiting.any():
         rows = np.flatnonzero(keep)

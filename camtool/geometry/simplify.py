@@ -68,8 +68,11 @@ def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
 
 
 def rounding_noise(points: Floats) -> float:
-    """Estimate how far rounding to decimals has moved the points, mm: from the fewest decimals
-    with which all of them can be written, `NOISE_MM` when none of `DECIMALS` suffice."""
+    """Estimate by how much rounding to decimals has moved the points, mm.
+
+    It follows from the fewest decimals with which all of them can be written; `NOISE_MM` if none
+    of `DECIMALS` suffice.
+    """
     for decimals in DECIMALS:
         units = points * 10.0**decimals
         if np.abs(units - np.round(units)).max() <= GRID_SHARE:
@@ -80,7 +83,8 @@ def rounding_noise(points: Floats) -> float:
 def _replace_chords(
     vertices: Floats, noise: float, tolerance_mm: float
 ) -> tuple[Floats, list[tuple[int, int]]]:
-    """Return the open path with its arcs, and the first and last vertex of each before."""
+    """Return the open path with runs of chords replaced by arcs, and for each arc the first and
+    last vertex of its run before that."""
     keep = np.ones(len(vertices), dtype=np.bool_)
     arcs: list[tuple[int, int]] = []
     inserted: list[tuple[int, Floats]] = []
@@ -114,15 +118,19 @@ def _replace_chords(
 
 
 def _line_runs(vertices: Floats) -> list[tuple[int, int]]:
-    """Return the first and last vertex of each run of lines without an arc between."""
+    """Return the first and last vertex of each longest run of successive lines."""
     straight: Bools = np.concatenate([[False], vertices[:-1, 2] == 0.0, [False]])
     edges = np.flatnonzero(np.diff(straight.astype(np.int8)))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _arcs(start: Floats, end: Floats, circle: Floats) -> Iterator[Floats]:
-    """Yield the vertices of the arc about `circle` (centre, radius, sweep) from start to end: two
-    rows, or three with a point in its middle when it is more than a half circle."""
+    """Yield candidates for the arc about `circle` (centre, radius, sweep) from start to end, as
+    vertices.
+
+    Up to a half circle it has two rows, above it three, with a point in the middle; near a half
+    circle both are tried.
+    """
     centre, radius, sweep = circle[:2], float(circle[2]), float(circle[3])
     turn = math.copysign(1.0, sweep)
     if np.array_equal(start, end):
@@ -162,10 +170,10 @@ class MergedPaths(Struct, frozen=True, eq=False):
 
 
 def without_tiny(lines: Polylines, limit_mm: float) -> MergedPaths:
-    """Merge the segments below `limit_mm` into their neighbours, with no vertex moved by more than
-    that.
+    """Return the paths with segments below `limit_mm` merged into their neighbours; no vertex
+    moves by more than that.
 
-    A path of which too little would be left stays as it is.
+    A path of which too little would remain stays as it is.
     """
     has_short = np.zeros(len(lines), dtype=np.bool_)
     for segments in Segments.lots(lines):
@@ -184,8 +192,8 @@ def without_tiny(lines: Polylines, limit_mm: float) -> MergedPaths:
 
 
 def _merge_vertices(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints, Ints]:
-    """Return, for each vertex of the new path, the old one whose place it takes, and the one whose
-    bulge it takes."""
+    """Return, for each vertex of the new path, the old vertex whose place it takes, and the one
+    whose bulge it takes."""
     bulges = path.vertices[:, 2]
     count = len(bulges)
     place, bend = np.arange(count), np.arange(count)
@@ -211,7 +219,8 @@ def _merge_vertices(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints
 
 
 def _path_of(path: Polyline, place: Ints, bend: Ints) -> Polyline | None:
-    """Return the path of these vertices; None when it is no path, or nothing has changed."""
+    """Return the path with these places and bulges; None when it is no path, or nothing has
+    changed."""
     if len(place) == len(path.vertices) or len(place) < 2:
         return None
     vertices = path.vertices[place]

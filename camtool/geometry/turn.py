@@ -24,7 +24,8 @@ class Turn(Struct, frozen=True):
 
     @classmethod
     def about(cls, axis: str, line_mm: float) -> Turn:
-        """Return the map that turns over about a line along "x" or "y", so far from zero."""
+        """Return the map that turns a part over about a line along the axis "x" or "y"; `line_mm`
+        is the place of the line on the other axis."""
         if axis == "y":
             return cls((-1.0, 1.0), (2.0 * line_mm, 0.0))
         return cls((1.0, -1.0), (0.0, 2.0 * line_mm))
@@ -41,7 +42,7 @@ class Turn(Struct, frozen=True):
         return Turn(self.signs, (x, y))
 
     def then(self, other: Turn) -> Turn:
-        """Return this map, followed by another one."""
+        """Return the map that applies this one first, then the other."""
         x, y = (one * two for one, two in zip(self.signs, other.signs, strict=True))
         return Turn((x, y), other.point(self.shift_mm))
 
@@ -54,7 +55,8 @@ class Turn(Struct, frozen=True):
         return x, y
 
     def points(self, points: Floats) -> Floats:
-        """Return the images of points, or of squares (J, 2 or more) by their middles."""
+        """Return the images of points, columns x and y first (J, 2 or more); further columns are
+        unchanged."""
         turned_points = points.copy()
         turned_points[:, :2] = points[:, :2] * self.signs + self.shift_mm
         return turned_points

@@ -67,7 +67,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
 
 # The walk over an SVG document.
 #
-# Every element is visited with what its ancestors say (`Scope`): the map to mm, the style, the
+# Every element is visited with what its ancestors say (`SvgScope`): the map to mm, the style, the
 # layer, the size that percentages are of. Shapes become pieces, and texts when they are wanted;
 # what cannot be cut (images, hidden things) is counted. Layers are Inkscape's, else the groups
 # right under the root, else "0".
