@@ -63,8 +63,11 @@ NUMBERS_FOOT = 32.0
 
 
 def render_beside(scenes: Sequence[Scene], name: str, options: PictureOptions = AS_USUAL) -> bytes:
-    """Return SVG or PNG bytes of the scenes for a file of this name; OutputError for other
-    extensions, OptionError for .html and for what a scene does not have."""
+    """Return the SVG or PNG bytes of the scenes, by the extension of `name`.
+
+    OutputError for other extensions, OptionError for .html and for options that ask for what a
+    scene does not have.
+    """
     if PurePath(name).suffix.lower() == ".html":
         raise OptionError(
             "an .html page shows one scene", file=name, mend="side by side, use .svg or .png"
@@ -73,8 +76,8 @@ def render_beside(scenes: Sequence[Scene], name: str, options: PictureOptions = 
 
 
 def draw_beside(scenes: Sequence[Scene], options: PictureOptions = AS_USUAL) -> str:
-    """Return the scenes as SVG text; equal input gives equal bytes. ValueError when there are
-    none."""
+    """Return the scenes beside each other as SVG text; equal input gives equal bytes. ValueError
+    when there are none."""
     if not scenes:
         raise ValueError("no scene to draw")
     if options.view != "plan":
@@ -107,7 +110,7 @@ def draw_beside(scenes: Sequence[Scene], options: PictureOptions = AS_USUAL) -> 
 
 
 def _views(contents: Sequence[Content], options: PictureOptions) -> tuple[PanelGrid, list[View]]:
-    """Return the grid of panels and the view of each; views differ in the height of the head.
+    """Return the grid of panels and the view of each; they differ in the height of their heads.
 
     The fit runs twice, since the width of the colour bar follows from the height of the plots.
     """
@@ -128,19 +131,20 @@ def _views(contents: Sequence[Content], options: PictureOptions) -> tuple[PanelG
 
 
 def _scale(contents: Sequence[Content]) -> MapScale | None:
-    """Return the scale of the colours of all; None where none has a map."""
+    """Return the largest scale of colours among the contents; None where none is coloured by a
+    map."""
     scales = [scale for scale in map(scale_of, contents) if scale is not None]
     return max(scales, key=lambda scale: scale.top, default=None)
 
 
 def _top_um(contents: Sequence[Content]) -> float | None:
-    """Return the end of the colour map of all; None where no path is predicted."""
+    """Return the largest end of the colour map of errors, µm; None where no path is predicted."""
     return max((one.trace.top_um for one in contents if one.trace is not None), default=None)
 
 
 def _unified(contents: Sequence[Content]) -> list[Content]:
-    """Return the contents with one window, one map of errors, and one colour for each name of a
-    layer."""
+    """Return the contents with the same window, the same map of errors, and one colour for each
+    layer name."""
     top_um = _top_um(contents)
     window = union([one.window for one in contents if not one.is_empty])
     names = dict.fromkeys(group.name for one in contents for group in one.groups)
@@ -162,7 +166,7 @@ def _unified(contents: Sequence[Content]) -> list[Content]:
 
 
 def _entries(contents: Sequence[Content], view: View) -> list[LegendEntry]:
-    """Return the legend of all, each entry once, with the layers of all drawings."""
+    """Return one legend for all contents, each entry once, with the layers of all drawings."""
     groups = {(group.name, group.colour): group for one in contents for group in one.groups}
     every = tuple(groups.values())
     entries = [entry for one in contents for entry in legend_of(replace(one, groups=every), view)]
@@ -174,7 +178,8 @@ def _title(scenes: Sequence[Scene]) -> str:
 
 
 def _polars(scenes: Sequence[Scene], number: int, options: PictureOptions) -> str:
-    """Return the same circle of each scene, all magnified alike."""
+    """Return the SVG text of the polar plots of circle `number` of each scene, all with the same
+    magnification."""
     plots = [polar.circle_pair(scene, number) for scene in scenes]
     columns = columns_of(len(plots), wide=False)
     page = page_units(columns, options)
@@ -224,7 +229,8 @@ class PanelGrid(Struct, frozen=True):
     rows: tuple[float, ...] = ()
 
     def with_bodies(self, height: float) -> PanelGrid:
-        """Return the grid with its rows, whose panels have this height below their heads."""
+        """Return the grid with the heights of its rows, given the height of a panel below its
+        head."""
         rows = [0.0]
         for top in self.downs[:: self.columns]:
             rows.append(rows[-1] + top + height)
@@ -236,12 +242,12 @@ class PanelGrid(Struct, frozen=True):
         return across, self.rows[index // self.columns]
 
     def moved(self, index: int, box: PageBox) -> PageBox:
-        """Return a box of a panel on the page."""
+        """Return a box given in a panel's own coordinates in those of the page."""
         x, y = self.corner(index)
         return PageBox(box.left + x, box.top + y, box.right + x, box.bottom + y)
 
     def around(self, boxes: Sequence[PageBox]) -> PageBox:
-        """Return the box round the boxes of all panels, on the page."""
+        """Return the box on the page around the given boxes, one of each panel."""
         boxes_moved = [self.moved(index, box) for index, box in enumerate(boxes)]
         return PageBox(
             min(box.left for box in boxes_moved),
@@ -251,8 +257,8 @@ class PanelGrid(Struct, frozen=True):
         )
 
     def place_panels(self, panels: Sequence[Sequence[str]]) -> list[str]:
-        """Return the panels in their places; the ids of their parts begin with that of the
-        panel."""
+        """Return a group for each panel, moved to its place; the ids inside begin with the panel's
+        id, to be unique."""
         groups = []
         for index, parts in enumerate(panels):
             name = f"panel-{index + 1}"
@@ -264,23 +270,26 @@ class PanelGrid(Struct, frozen=True):
 
 
 def columns_of(count: int, *, wide: bool) -> int:
-    """Number of panels side by side."""
+    """Return the number of panels side by side: 1 if they are `wide`, else about the square root
+    of their number."""
     return 1 if wide else math.ceil(math.sqrt(count))
 
 
 def page_units(columns: int, options: PictureOptions) -> float:
-    """Return units of a page with this number of columns."""
+    """Return the width, in units of the page, of a page with so many columns."""
     page = page_width(options.size_px or SVG_WIDTH_PX)
     return page if columns == 1 else round(GROWN * page)
 
 
 def panel_width(columns: int, room: float) -> float:
-    """Return the width of each of `columns` panels, margins included, in a width of `room`."""
+    """Return the width of each of `columns` panels, margins included, that share the width
+    `room`."""
     return float(math.floor((room + (columns - 1) * MARGIN) / columns))
 
 
 def grid_of(heads: Sequence[Head], columns: int, page: float, bar: float = 0.0) -> PanelGrid:
-    """Return the grid for panels of these titles and notes; a width of `bar` stays free."""
+    """Return the grid for panels with these titles and notes; a strip of width `bar` at the right
+    stays free for the colour bar."""
     width = panel_width(columns, page - bar)
     drawn = [title_and_notes(title, notes, width, lines=TITLE_LINES) for title, notes in heads]
     downs = [bottom for _, bottom in drawn]

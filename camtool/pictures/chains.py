@@ -46,7 +46,7 @@ class Chain(Struct, frozen=True, eq=False):
     closed: bool = False
 
     def lengths(self) -> Floats:
-        """Return (n,) mm: the true length of each move."""
+        """Return the true length (n,) mm of each move."""
         lengths = np.empty(len(self.sweep))
         for low, part in self.parts():
             chord = np.diff(part.points, axis=0)
@@ -57,16 +57,16 @@ class Chain(Struct, frozen=True, eq=False):
         return lengths
 
     def parts(self) -> Iterator[tuple[int, Chain]]:
-        """Yield its moves, some thousand at a time, as open chains; and the number of the
-        first."""
+        """Yield the moves as open chains of at most MOVES_AT_ONCE, each with the index of its
+        first move."""
         for low in range(0, len(self.sweep), MOVES_AT_ONCE):
             high = low + MOVES_AT_ONCE
             points, centre = self.points[low : high + 1], self.centre[low:high]
             yield low, Chain(points, centre, self.sweep[low:high])
 
     def at(self, index: int, share: float) -> tuple[tuple[float, float], float]:
-        """Return the point at `share` (0 … 1) of move `index`, and the direction of travel
-        there, rad."""
+        """Return the point (x, y) mm at `share` (0 … 1) of move `index`, and the direction of
+        travel there, rad."""
         begin, end = self.points[index], self.points[index + 1]
         sweep = float(self.sweep[index])
         if sweep == 0.0:
@@ -98,7 +98,7 @@ class MoveChains(Struct, frozen=True, eq=False):
 
 
 def moves_of(toolpath: Toolpath) -> MoveChains:
-    """Return the moves of a toolpath, sorted by how they are drawn."""
+    """Return the moves of a toolpath, grouped by how they are drawn."""
     cuts, slopes, rapid, is_downward = toolpath.by_parts(_how_drawn).T
     # A step straight down within a cut, as from one pass to the next, is not drawn as a plunge.
     follows = _follows(cuts, cuts | (toolpath.kind == Kind.RAPID))
@@ -114,8 +114,8 @@ def moves_of(toolpath: Toolpath) -> MoveChains:
 
 
 def _how_drawn(toolpath: Toolpath) -> Bools:
-    """Return (N, 4) which rows cut in XY, which of these change Z as well, which are rapids in
-    XY, and which go straight down at a feed."""
+    """Return four masks (N, 4): rows that cut in XY, those of them that change Z as well, rapids
+    in XY, and feeds straight down."""
     step = toolpath.end - toolpath.starts
     across = np.hypot(step[:, 0], step[:, 1]) > POSITION_EPS_MM
     cuts = toolpath.is_feed & (across | toolpath.is_arc)
@@ -126,8 +126,8 @@ def _how_drawn(toolpath: Toolpath) -> Bools:
 
 
 def _follows(cuts: Bools, is_counted: Bools) -> Bools:
-    """Return (N,) true where, of the rows that are `is_counted`, the last one before a row is
-    one of the `cuts`."""
+    """Return the mask (N,) of the rows before which the last row of `is_counted` is one of the
+    `cuts`."""
     rows = np.flatnonzero(is_counted)
     marks = np.zeros(len(cuts), dtype=np.int8)
     # What a row that is counted says holds from the next one on.
@@ -139,14 +139,17 @@ def _follows(cuts: Bools, is_counted: Bools) -> Bools:
 
 
 def _places(points: Floats) -> Floats:
-    """Return each place once, in the order of their first occurrence."""
+    """Return each place once, in order of first occurrence."""
     _, first = np.unique(points, axis=0, return_index=True)
     return points[np.sort(first)]
 
 
 def _chains(toolpath: Toolpath, is_chosen: Bools) -> tuple[Chain, ...]:
-    """Return runs of the chosen rows, each line or arc once: passes at several depths, and a
-    line there and back, look the same. No move in XY lies between the rows of a run."""
+    """Return the chosen rows as chains, each line or arc once: passes at several depths, and a
+    line there and back, look the same.
+
+    No move in XY lies between the rows of a chain.
+    """
     rows = np.flatnonzero(is_chosen)
     if not len(rows):
         return ()
@@ -166,15 +169,15 @@ def _chains(toolpath: Toolpath, is_chosen: Bools) -> tuple[Chain, ...]:
 
 
 def _part_runs(toolpath: Toolpath) -> Bools:
-    """Return (N,) true for moves in XY and all rapids."""
+    """Return the mask (N,) of moves in XY and all rapids, which interrupt a chain."""
     across = (toolpath.starts[:, :2] != toolpath.end[:, :2]).any(axis=1)
     moves = toolpath.is_motion & (across | toolpath.is_arc)
     return np.asarray(moves | (toolpath.kind == Kind.RAPID))
 
 
 def _first_times(toolpath: Toolpath, rows: Ints) -> Ints:
-    """Indices, ascending, of those of the moves (J,) that are the first along their line or arc,
-    in either direction."""
+    """Return the ascending indices, into `rows`, of moves that are the first along their line or
+    arc, in either direction."""
     begin, end = toolpath.starts_of(rows)[:, :2], toolpath.end[rows, :2]
     is_backward = (begin[:, 0] > end[:, 0]) | (
         (begin[:, 0] == end[:, 0]) & (begin[:, 1] > end[:, 1])
@@ -193,7 +196,8 @@ def _first_times(toolpath: Toolpath, rows: Ints) -> Ints:
 
 
 def _single_chains(begin: Floats, end: Floats) -> tuple[Chain, ...]:
-    """Straight moves, each once in either direction: dashes over dashes would look like a line."""
+    """Return straight moves as chains, each once in either direction: dashes drawn over dashes
+    would look like a line."""
     chains: dict[tuple[tuple[float, ...], ...], Chain] = {}
     for a, b in zip(begin, end, strict=True):
         chain = Chain(np.array([a, b]), np.full((1, 2), np.nan), np.zeros(1))
@@ -216,8 +220,8 @@ def chains_of(lines: Polylines) -> tuple[Chain, ...]:
 
 
 def chains_between(segments: Segments) -> tuple[Chain, ...]:
-    """Return lines and arcs as chains: a chain goes on while each begins where the one before
-    ended."""
+    """Return lines and arcs as chains; a new chain begins where a segment does not begin at the
+    end of the one before."""
     if not len(segments):
         return ()
     is_break = np.hypot(*(segments.start[1:] - segments.end[:-1]).T) > POSITION_EPS_MM
@@ -252,7 +256,8 @@ def path_data(chains: Iterable[Chain]) -> str:
 
 
 def _is_flat(chain: Chain, index: int, sweep: float) -> bool:
-    """Return True if an arc lies nearer to its chord than `POSITION_EPS_MM`.
+    """Return True if an arc lies nearer to its chord than `POSITION_EPS_MM`, so that a line is
+    drawn.
 
     height = chord/2 · tan(sweep/4); renderers are inexact for radii of kilometres.
     """
@@ -271,7 +276,8 @@ def _arc(data: PathData, chain: Chain, index: int, sweep: float) -> None:
 
 
 def chains_box(chains: Sequence[Chain]) -> Floats | None:
-    """[[xmin, xmax], [ymin, ymax]] mm of the true lines and arcs; None when there are none."""
+    """Return the box [[xmin, xmax], [ymin, ymax]] mm of the true lines and arcs; None when there
+    are none."""
     if not chains:
         return None
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
@@ -283,7 +289,7 @@ def chains_box(chains: Sequence[Chain]) -> Floats | None:
 
 
 def _lots(chains: Iterable[Chain]) -> Iterator[list[Chain]]:
-    """Yield all moves of the chains, some thousand at a time, as open chains."""
+    """Yield all moves of the chains as lists of open chains, about MOVES_AT_ONCE moves in each."""
     lot: list[Chain] = []
     count = 0
     for chain in chains:
@@ -298,7 +304,7 @@ def _lots(chains: Iterable[Chain]) -> Iterator[list[Chain]]:
 
 
 def _halved(chains: Sequence[Chain]) -> Segments:
-    """Return all moves as segments, each arc as two: a full circle has no bulge."""
+    """Return all moves as segments, each arc as two halves: a full circle has no bulge."""
     begin = np.concatenate([chain.points[:-1] for chain in chains])
     end = np.concatenate([chain.points[1:] for chain in chains])
     centre = np.concatenate([chain.centre for chain in chains])
@@ -340,14 +346,14 @@ class _Pieces(Struct, frozen=True, eq=False):
 
 
 def reversals_of(toolpath: Toolpath) -> Floats:
-    """Return (R, 2) mm: the places of reversals, in order; both axes may reverse at one."""
+    """Return the places (R, 2) mm where X or Y reverses, in order; both may reverse at one."""
     pieces = _pieces(toolpath)
     is_reversal = _sign_changes(pieces.signs[:, 0]) | _sign_changes(pieces.signs[:, 1])
     return np.asarray(pieces.begin[is_reversal & toolpath.is_feed[pieces.row]])
 
 
 def _sign_changes(signs: Ints) -> Bools:
-    """Return (P,) whether the sign differs from the last one before it that was not 0."""
+    """Return the mask (P,) of nonzero signs that differ from the last nonzero one before."""
     changes: Bools = np.zeros(len(signs), dtype=np.bool_)
     moving = np.flatnonzero(signs)
     changes[moving[1:]] = signs[moving[1:]] != signs[moving[:-1]]
@@ -355,7 +361,8 @@ def _sign_changes(signs: Ints) -> Bools:
 
 
 def _pieces(toolpath: Toolpath) -> _Pieces:
-    """Return all moves in their order, arcs cut at the multiples of 90°."""
+    """Return all moves in their order, with arcs cut at the multiples of 90°, so that no piece
+    reverses an axis."""
     starts, ends, sweeps = toolpath.starts[:, :2], toolpath.end[:, :2], toolpath.sweeps()
     rows = np.flatnonzero(toolpath.is_motion)
     is_arc = toolpath.is_arc[rows] & (sweeps[rows] != 0.0)
@@ -385,8 +392,8 @@ def _pieces(toolpath: Toolpath) -> _Pieces:
 
 
 def _quarters(begin: Floats, sweep: Floats) -> tuple[Floats, Ints]:
-    """Of arcs (A,): the first multiple of 90° strictly inside, in the order of travel, and how
-    many there are. Lines, of sweep 0, have none."""
+    """Return for arcs (A,) the first multiple of 90° strictly inside, in the order of travel, and
+    the number of them; 0 for lines, of sweep 0."""
     low = np.minimum(begin, begin + sweep) + MIN_PIECE_RAD
     high = np.maximum(begin, begin + sweep) - MIN_PIECE_RAD
     low_quarter, high_quarter = np.ceil(low / QUARTER_RAD), np.floor(high / QUARTER_RAD)
@@ -402,16 +409,20 @@ def _signs(lengths: Floats) -> Ints:
 
 
 def cuts_of(toolpath: Toolpath, is_chosen: Bools) -> tuple[Chain, ...]:
-    """Return the chosen ones of the rows (N,) that cut in XY, each line or arc once."""
+    """Return as chains those rows of the mask `is_chosen` (N,) that cut in XY, each line or arc
+    once."""
     return _chains(toolpath, is_chosen & toolpath.by_parts(_how_drawn)[:, 0])
 
 
 def tapers(
     toolpath: Toolpath, radius_at: Callable[[float], float], is_chosen: Bools | None = None
 ) -> tuple[Chain, ...]:
-    """Return the outline, CCW, of each cut at the surface for feeds below the stock top (of the
-    `is_chosen` rows (N,) alone), with a tool of `radius_at(depth)` mm: the hull of the discs at
-    its ends. () for more moves than MAX_TAPERS."""
+    """Return the outline, CCW, of each cut at the surface, for a tool whose radius changes with
+    the depth.
+
+    For each feed below the stock top (among the rows of `is_chosen` (N,)) it is the hull of the
+    discs at both ends, of radius `radius_at(depth)` mm. () for more moves than MAX_TAPERS.
+    """
     below = toolpath.is_feed & (np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2]) < 0.0)
     rows = np.flatnonzero(below if is_chosen is None else below & is_chosen)
     if len(rows) > MAX_TAPERS:
@@ -432,7 +443,7 @@ def tapers(
 
 
 def _places_along(start: Floats, end: Floats, centre: Floats, sweep: float) -> Floats:
-    """Return (K, 3) mm: the ends of a line; of an arc those of its chords."""
+    """Return points (K, 3) mm along a move: the ends of a line, or of the chords of an arc."""
     count = math.ceil(abs(sweep) / TAPER_ARC_RAD)
     if count < 2:
         return np.stack([start, end])
@@ -446,7 +457,7 @@ def _hull(one: Floats, radius: float, other: Floats, last: float) -> Chain | Non
     """Return the outline of two discs and what lies between them; None for points.
 
     Their common tangents touch both where the radius makes the angle φ with the line from one to
-    the other, cos φ = (r − s) / d; there are none where one disc holds the other.
+    the other, cos φ = (r − s) / d; there are none where one disc contains the other.
     """
     if max(radius, last) < MIN_TAPER_MM:
         return None
@@ -463,7 +474,7 @@ def _hull(one: Floats, radius: float, other: Floats, last: float) -> Chain | Non
 
 def _round(arcs: Sequence[tuple[Floats, float, float, float]]) -> Chain:
     """Return a closed chain of arcs (centre, radius, first angle, turn), each in two halves,
-    and the lines between them."""
+    joined by lines."""
     points, centres, sweeps = list[Floats](), list[Floats](), list[float]()
     for centre, radius, begin, turn in arcs:
         for k in range(3):

@@ -104,19 +104,20 @@ def bin_colours(*, dark: bool = False) -> tuple[str, ...]:
 
 
 def on_dark(colour: str) -> str:
-    """Return the colour of the dark palette for one of the light palette; KeyError for any
-    other."""
+    """Return the colour of the dark palette that replaces one of the light palette; KeyError for
+    any other."""
     return _DARK[colour]
 
 
 def darkened(svg: str) -> str:
-    """Return a picture in the dark palette: only the colours of its fills and strokes change."""
+    """Return a picture with the colours of its fills and strokes replaced by those of the dark
+    palette."""
     instead = _DARK | dict(zip(bin_colours(), bin_colours(dark=True), strict=True))
     return _PAINT.sub(lambda match: f'{match[1]}="{instead[match[2]]}"', svg)
 
 
 def channels(colour: str) -> tuple[int, int, int]:
-    """Red, green and blue of "#rrggbb", 0 … 255."""
+    """Return red, green and blue, 0 … 255, of "#rrggbb"."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 

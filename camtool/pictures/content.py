@@ -163,7 +163,7 @@ class Content(Struct, frozen=True, eq=False, dict=True):
         return chains_of(Polylines.of([Polyline(np.array(corners), closed=True)]))
 
     def straight(self, ends: Sequence[tuple[Place, Place]]) -> tuple[Chain, ...]:
-        """Return a line between each two places that differ."""
+        """Return a straight chain between the two places of each pair, if they differ."""
         lines = [
             Polyline(np.array([(*one, 0.0), (*other, 0.0)]))
             for one, other in ends
@@ -226,8 +226,8 @@ def content_of(scene: Scene, options: PictureOptions = AS_USUAL) -> Content:
 
 
 def _groups(drawing: Drawing, chains: Sequence[Chain], *, is_alone: bool) -> tuple[Group, ...]:
-    """Return the layers in the order of their first paths: pale below a toolpath, in strong
-    colours when the drawing is alone."""
+    """Return the drawing's paths by layer, in the order of their first paths: pale below a
+    toolpath, in strong colours if the drawing is alone."""
     names = tuple(dict.fromkeys(drawing.layers))
     members: dict[str, list[Chain]] = {name: [] for name in names}
     for name, chain in zip(drawing.layers, chains, strict=True):
@@ -256,7 +256,7 @@ def _places(drawing: Drawing) -> Places:
 
 
 def cropped(x: float, y: float, width: float, height: float) -> Floats:
-    """Return the window (2, 2) mm of a part of the plane."""
+    """Return the window (2, 2) mm, [[xmin, xmax], [ymin, ymax]], of a rectangle."""
     return np.array([[x, x + width], [y, y + height]])
 
 
@@ -286,6 +286,6 @@ def _window(
 
 
 def _grid(points: Floats) -> list[list[float]]:
-    """Points as whole multiples of `POSITION_EPS_MM`."""
+    """Return points as whole multiples of `POSITION_EPS_MM`, to compare them."""
     counts: list[list[float]] = np.rint(points / POSITION_EPS_MM).tolist()
     return counts

@@ -73,8 +73,8 @@ def draw(scene: Scene, options: PictureOptions = AS_USUAL) -> str:
 
 
 def panel(content: Content, page: PageLayout) -> list[str]:
-    """Head, plot and axes of one of several scenes; the plot is clipped, so that it covers none of
-    its neighbours."""
+    """Return head, plot and axes of one of several scenes as SVG; the plot is clipped, so that it
+    covers none of its neighbours."""
     box = page.view.box
     sides = (box.left, box.top, box.width, box.height)
     plot: Look = dict(zip(("x", "y", "width", "height"), sides, strict=True))
@@ -90,8 +90,7 @@ def panel(content: Content, page: PageLayout) -> list[str]:
 
 
 def png(svg: str, width_px: int) -> bytes:
-    """Return the PNG of an SVG text, `width_px` wide; OptionError for a width that no picture
-    has."""
+    """Return an SVG text rendered as a PNG of this width; OptionError for a width out of range."""
     check_width(width_px)
     import resvg_py
 
@@ -102,7 +101,7 @@ def png(svg: str, width_px: int) -> bytes:
 
 
 def _plot(content: Content, view: View) -> list[str]:
-    """Return the SVG of the plot, with a label where there is nothing to draw."""
+    """Return the SVG of the layers, or a label where there is nothing to draw."""
     layers = draw_layers(content, Plot(view))
     if not content.is_empty:
         return layers
@@ -111,7 +110,7 @@ def _plot(content: Content, view: View) -> list[str]:
 
 
 def _scales_and_legend(content: Content, page: PageLayout) -> list[str]:
-    """Colour bar, legend and scale bar."""
+    """Return the SVG of the colour bar, the legend and the scale bar."""
     box, parts = page.view.box, []
     scale = scale_of(content)
     if scale is not None:
@@ -122,8 +121,10 @@ def _scales_and_legend(content: Content, page: PageLayout) -> list[str]:
 
 
 def render(scene: Scene, name: str, options: PictureOptions = AS_USUAL) -> bytes:
-    """Return SVG, PNG or HTML bytes of the scene for a file of this name; OutputError for other
-    extensions. HTML is the viewer's page, which takes no options."""
+    """Return the SVG, PNG or HTML bytes of the scene, by the extension of `name`.
+
+    OutputError for other extensions. HTML is the viewer's page, which takes no options.
+    """
     if PurePath(name).suffix.lower() == ".html":
         from camtool.pictures.viewer.page import viewer_page
 
@@ -132,8 +133,11 @@ def render(scene: Scene, name: str, options: PictureOptions = AS_USUAL) -> bytes
 
 
 def rendered(drawn: Callable[[PictureOptions], str], name: str, options: PictureOptions) -> bytes:
-    """Return SVG or PNG bytes for a file of this name; `drawn` makes SVG text by options with a
-    width. OutputError for other extensions."""
+    """Return SVG or PNG bytes, by the extension of `name`, of what `drawn` makes: SVG text for
+    options with a width.
+
+    OutputError for other extensions.
+    """
     suffix = PurePath(name).suffix.lower()
     if suffix not in (".svg", ".png"):
         raise OutputError("is not a picture file", file=name, mend="use .svg or .png")

@@ -35,15 +35,19 @@ class EngagementTrace(Struct, frozen=True, eq=False):
 
 
 def steps_of(bound_rad: Floats) -> Ints:
-    """Return the steps of the map (M,) of engagements (M,) rad, AIR for NaN and for those that are
-    no more than the bounds are uncertain: a chip that counts is engaged by more."""
+    """Return the step of the colour map (M,) for each engagement (M,) rad.
+
+    It is AIR for NaN and for engagements below the uncertainty of the bounds: a chip that counts
+    is engaged by more.
+    """
     angle = np.nan_to_num(bound_rad)
     steps = np.clip(np.degrees(angle) / TOP_DEG * BINS, 0.0, BINS - 1).astype(np.int64)
     return np.where(angle > COARSE_RAD, steps, AIR)
 
 
 def engagement_trace(scene: Scene) -> EngagementTrace | None:
-    """Return the moves of a scene; None where it has none, or where the tool is not known."""
+    """Return the moves of a scene at a feed, with their steps of the colour map; None where it has
+    none, or the tool is not known."""
     judged = scene.engagement
     if judged is None:
         return None
@@ -57,7 +61,7 @@ def engagement_trace(scene: Scene) -> EngagementTrace | None:
 
 
 def engagement_layer(trace: EngagementTrace, view: View, pen: float) -> str:
-    """Return the coloured moves, in mm."""
+    """Return the SVG of the coloured moves, in mm."""
     low, high = view.x_range
     decimals, apart_mm = decimals_in(high - low), MERGED_SHARE * (high - low)
     paths = []
@@ -75,8 +79,8 @@ def engagement_layer(trace: EngagementTrace, view: View, pen: float) -> str:
 
 
 def _lines(begin: Floats, end: Floats, apart_mm: float) -> list[list[list[float]]]:
-    """Return moves that follow each other as lines of points, without those nearer to the one
-    before than a distance, but with all ends."""
+    """Return successive moves as lines of points; points nearer than `apart_mm` to the one before
+    are left out, except ends of lines."""
     lines: list[list[list[float]]] = []
     last: list[float] | None = None
     for one, other in zip(begin.tolist(), end.tolist(), strict=True):

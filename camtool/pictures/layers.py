@@ -91,7 +91,7 @@ class LineGroup(Struct, frozen=True, eq=False):
         return bool(self.chains)
 
     def draw(self, plot: Plot) -> str:
-        """Return the lines in mm."""
+        """Return the SVG of the lines, in mm."""
         mm, look = plot.view.mm, {"fill": "none", **self.look}
         look["stroke-width"] = mm(float(look["stroke-width"]))
         if "stroke-dasharray" in look:
@@ -100,7 +100,7 @@ class LineGroup(Struct, frozen=True, eq=False):
         return plot.lines(self.id, self.chains, look)
 
     def entries(self, view: View) -> Iterator[LegendEntry]:
-        """Yield its line of the legend."""
+        """Yield its entry in the legend."""
         look = self.look
         dashes = str(look.get("stroke-dasharray", ""))
         swatch = line_swatch(str(look["stroke"]), float(look["stroke-width"]), dashes)
@@ -120,11 +120,11 @@ class DotGroup(Struct, frozen=True, eq=False):
         return bool(self.places)
 
     def draw(self, plot: Plot) -> str:
-        """Return the marks, in units of the page."""
+        """Return the SVG of the marks, in units of the page."""
         return plot.dots(self.id, self.places, self.look)
 
     def entries(self, view: View) -> Iterator[LegendEntry]:
-        """Yield its line of the legend, if any of the marks is in view."""
+        """Yield its entry in the legend, if any of the marks is in view."""
         if any(view.shows(*place) for place in self.places):
             yield LegendEntry(dot_swatch(self.look), self.name)
 
@@ -142,11 +142,11 @@ class TextGroup(Struct, frozen=True, eq=False):
         return bool(self.places)
 
     def draw(self, plot: Plot) -> str:
-        """Return the texts, in units of the page."""
+        """Return the SVG of the texts, in units of the page."""
         return plot.texts(self.id, self.texts, self.places, self.colour)
 
     def entries(self, view: View) -> Iterator[LegendEntry]:
-        """None."""
+        """Yield no entry: the legend does not name texts."""
         yield from ()
 
 
@@ -195,25 +195,25 @@ class Layer(Struct, frozen=True):
         )
 
     def parts_in(self, content: Content) -> list[Part]:
-        """Return its parts that are not empty."""
+        """Return the parts of the layer that are not empty."""
         return [part for part in self.parts(content) if part] if self.parts else []
 
     def svg(self, content: Content, plot: Plot) -> str:
-        """Return its SVG; empty when nothing of it is in view."""
+        """Return the SVG of the layer; "" when nothing of it is in view."""
         if self.draw is not None:
             return self.draw(content, plot)
         parts = (part.draw(plot) for part in self.parts_in(content))
         return "\n".join(part for part in parts if part)
 
     def entries(self, content: Content, view: View) -> Iterable[LegendEntry]:
-        """Return its lines of the legend."""
+        """Return the entries of the layer in the legend."""
         if self.legend is not None:
             return self.legend(content, view)
         return [entry for part in self.parts_in(content) for entry in part.entries(view)]
 
 
 def line_swatch(colour: str, width: float, dashes: str = "") -> str:
-    """Return a piece of line."""
+    """Return the SVG of a piece of line, for the legend."""
     look: Look = {"stroke": colour, "stroke-width": width, "fill": "none"}
     if dashes:
         look["stroke-dasharray"] = dashes
@@ -223,12 +223,12 @@ def line_swatch(colour: str, width: float, dashes: str = "") -> str:
 
 
 def dot_swatch(look: Look) -> str:
-    """Return a round mark in the middle of the swatch."""
+    """Return the SVG of a round mark in the middle of the swatch, for the legend."""
     return element("circle", {"cx": SWATCH / 2.0, "cy": 0.0, **look})
 
 
 def map_swatch(width: float) -> str:
-    """Return a piece of line in all colours of the map."""
+    """Return the SVG of a piece of line in all colours of the map, for the legend."""
     step = SWATCH / BINS
     pieces = []
     for index, colour in enumerate(bin_colours()):
@@ -244,7 +244,7 @@ def map_swatch(width: float) -> str:
 
 
 def _drawing(content: Content, plot: Plot) -> str:
-    """Return the lines of the drawing, a group for each of its layers."""
+    """Return the SVG of the lines of the drawing, a group for each of its layers."""
     is_alone = content.is_drawing_alone
     width = plot.pen(ALONE_PEN if is_alone else DRAWING_PEN, content.outlines)
     groups = [
@@ -269,7 +269,8 @@ def _drawing_legend(content: Content, view: View) -> Iterator[LegendEntry]:
 
 
 def _noted(content: Content) -> list[Part]:
-    """Open ends, drill centres, places where a contour is ambiguous, and faults of the stock."""
+    """Return marks for open ends, drill centres, crossings and branches of contours, and faults of
+    the stock."""
     places = content.places
     return [
         DotGroup("gaps", "open end", places.gaps.tolist(), GAP_MARK),
@@ -288,7 +289,7 @@ def faults_of(scene: Scene) -> DotGroup:
 
 
 def _swept(content: Content, plot: Plot) -> str:
-    """Return the cuts at the true width of the tool."""
+    """Return the SVG of the cuts at the true width of the tool."""
     ends: Look = {"stroke-linecap": "round", "stroke-linejoin": "round"}
     groups = []
     for index, each in enumerate(content.swept):
@@ -317,7 +318,7 @@ def swept_words(scene: Scene) -> str:
 
 
 def _travel_legend(content: Content, view: View) -> Iterator[LegendEntry]:
-    """Only where a side of the frame is in view."""
+    """Yield the size of the table's travel, if a side of its frame is in view."""
     wide, high = content.scene.travel_mm or (0.0, 0.0)
     (x0, x1), (y0, y1) = view.x_range, view.y_range
     overlaps = x0 <= wide and x1 >= 0.0 and y0 <= high and y1 >= 0.0
@@ -327,8 +328,8 @@ def _travel_legend(content: Content, view: View) -> Iterator[LegendEntry]:
 
 
 def _stock(content: Content) -> list[Part]:
-    """Return the outline of the stock, where the job says where it lies, and the line about
-    which the part is turned over."""
+    """Return the outline of the stock, if the job says where it lies, and the line about which the
+    part is turned over."""
     scene, parts = content.scene, list[Part]()
     if scene.stock_mm is not None:
         left, low, right, high = scene.stock_mm
@@ -347,7 +348,8 @@ def _pins(content: Content) -> list[Part]:
 
 
 def _feeds(content: Content, plot: Plot) -> str:
-    """Solid lines, slopes in the colour of plunges; pale and thin below a predicted path."""
+    """Return the SVG of the feeds: solid lines, slopes in the colour of plunges; pale and thin
+    below a predicted path."""
     moves, pale = content.moves, content.trace is not None
     cuts = (*moves.feeds, *moves.ramps)
     pen = plot.round_pen(plot.pen(0.6 * FEED_PEN if pale else FEED_PEN, cuts))
@@ -406,7 +408,8 @@ INSPECTED_PEN = 2.2
 
 
 def _inspected(content: Content) -> list[Part]:
-    """Return a line from end to end of each dimension, in the colour of its verdict."""
+    """Return the line from end to end of each inspected dimension, in the colour of its
+    verdict."""
     parts: list[Part] = []
     for verdict, colour in VERDICTS.items():
         own_dimensions = [each for each in content.scene.inspected if each.verdict == verdict]
@@ -417,7 +420,7 @@ def _inspected(content: Content) -> list[Part]:
 
 
 def _sizes(content: Content) -> list[Part]:
-    """Return the ends of each dimension, and its size beside it."""
+    """Return the ends of each inspected dimension, and its size beside it."""
     parts: list[Part] = []
     every = content.scene.inspected
     for verdict, colour in VERDICTS.items():
@@ -455,7 +458,7 @@ def _zero_legend(content: Content, view: View) -> Iterator[LegendEntry]:
 
 
 def _cross(place: tuple[float, float], size: float, name: Look) -> str:
-    """Return a cross with a ring."""
+    """Return the SVG of a cross with a ring around its centre."""
     data = PathData()
     for dx, dy in ((size, 0.0), (0.0, size)):
         data.move(place[0] - dx, place[1] - dy)
@@ -656,13 +659,13 @@ def layer_of(name: str) -> Layer:
 
 
 def usual_layers() -> frozenset[str]:
-    """Return the names of the layers that are shown where none are named."""
+    """Return the names of the layers that are shown if none are named."""
     return frozenset(layer.name for layer in LAYERS if layer.usual)
 
 
 def chosen(names: Iterable[str], excluded: Iterable[str]) -> frozenset[str]:
-    """Return the layers `names` (none: the usual ones) except those `excluded`; OptionError for
-    unknown names, and when no layer is left."""
+    """Return the layers `names` (none: the usual ones) without those `excluded`; OptionError for
+    unknown names, and when no layer remains."""
     shown, left_out = set(names), set(excluded)
     available = layer_names()
     for name in sorted(shown | left_out):
@@ -678,24 +681,25 @@ def chosen(names: Iterable[str], excluded: Iterable[str]) -> frozenset[str]:
 
 
 def from_the_ground_up() -> list[Layer]:
-    """Return all layers, each after those that it covers."""
+    """Return all layers, the lowest first."""
     return sorted(LAYERS, key=lambda layer: layer.height)
 
 
 def layers_in(content: Content) -> list[str]:
-    """Return the names of the layers that a picture has, whether in its window or not."""
+    """Return the names of the layers that are not empty, whether they are in the window or not."""
     return [layer.name for layer in LAYERS if layer.is_in(content)]
 
 
 def legend_of(content: Content, view: View) -> list[LegendEntry]:
-    """Return the legend of the layers that are in the picture."""
+    """Return the entries of the legend, for all layers in the picture."""
     present = (layer for layer in LAYERS if layer.is_in(content))
     ordered = sorted(present, key=lambda layer: layer.place)
     return [entry for layer in ordered for entry in layer.entries(content, view)]
 
 
 def draw_layers(content: Content, plot: Plot) -> list[str]:
-    """Draw the layers as SVG, the lowest first: a group of all layers in mm, then the others."""
+    """Return the SVG of the layers, the lowest first: a group of all layers in mm, then the
+    others."""
     present = [layer for layer in from_the_ground_up() if layer.is_in(content)]
     lines = [layer.ground(content, plot) for layer in present if layer.ground is not None]
     lines += [layer.svg(content, plot) for layer in present if layer.in_mm]

@@ -41,7 +41,7 @@ def has_limits(scene: Scene) -> bool:
 
 
 def draw_limits(scene: Scene, options: PictureOptions) -> str:
-    """Return SVG text of the plot of the scene's dimensions with limits."""
+    """Return SVG text of the plot of all inspected dimensions that have limits."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     every = [each for each in scene.inspected if each.upper_mm is not None]
     shown = every
@@ -104,7 +104,7 @@ def _line(x0: float, y0: float, x1: float, y1: float) -> str:
 
 
 def _bar(x0: float, x1: float, y: float) -> str:
-    """Return a line with a mark across each end."""
+    """Return the SVG of a horizontal line with a short mark across each end."""
     data = PathData()
     for x in (x0, x1):
         data.move(x, y - 0.2 * ROW)

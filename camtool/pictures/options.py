@@ -79,7 +79,7 @@ AS_USUAL = PictureOptions()
 
 
 def check_width(width_px: int) -> None:
-    """Raise OptionError for a width that no picture has."""
+    """Raise OptionError for a width out of range."""
     if not MIN_PX <= width_px <= MAX_PX:
         raise OptionError(
             f"a picture cannot be {width_px} pixels wide",
@@ -88,10 +88,8 @@ def check_width(width_px: int) -> None:
 
 
 def points_for(pictures: Sequence[str]) -> int | None:
-    """Return the number of points of the slides' path to keep for pictures of these file names.
-
-    It is 0 when there are no pictures, and None for the default number.
-    """
+    """Return the number of points of the slides' path to keep for pictures with these file names:
+    0 without pictures, None for the default number."""
     if any(name.lower().endswith(".html") for name in pictures):
         return POINTS_OF_A_PAGE
     return None if pictures else 0

@@ -53,12 +53,13 @@ class Overlay(Struct, frozen=True, eq=False):
 
 
 def render_overlay(overlay: Overlay, name: str, options: PictureOptions = AS_USUAL) -> bytes:
-    """Return SVG or PNG bytes for a file of this name; OutputError for other extensions."""
+    """Return SVG or PNG bytes of the overlay, by the extension of `name`; OutputError for other
+    extensions."""
     return rendered(lambda sized: draw_overlay(overlay, sized), name, options)
 
 
 def draw_overlay(overlay: Overlay, options: PictureOptions = AS_USUAL) -> str:
-    """Return the paths as SVG text; equal input gives equal bytes."""
+    """Return the overlay as SVG text; equal input gives equal bytes."""
     size_px = options.size_px or SVG_WIDTH_PX
     page = page_width(size_px)
     head, top = title_and_notes(overlay.title, overlay.notes, page)
@@ -95,7 +96,7 @@ def _entries(overlay: Overlay) -> list[LegendEntry]:
 
 
 def _paths(overlay: Overlay, view: View) -> str:
-    """Return all paths in mm."""
+    """Return the SVG of all paths, in mm."""
     moves = moves_of(overlay.wanted)
     chains = (*moves.feeds, *moves.ramps)
     plot = Plot(view)

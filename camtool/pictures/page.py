@@ -72,7 +72,7 @@ class PageLayout(Struct, frozen=True, eq=False):
 
 
 def page_of(content: Content, width: float = PAGE) -> PageLayout:
-    """Return the page of a picture of one scene."""
+    """Return the layout of the page for a picture of one scene."""
     head, head_end = title_and_notes(content.scene.title, content.notes, width)
     top = head_end + HEAD_GAP
     shapes = (WIDEST, TALLEST) if content.crop_mm is None else CROP_SHAPES
@@ -90,8 +90,8 @@ def page_of(content: Content, width: float = PAGE) -> PageLayout:
 def table_of(
     entries: Sequence[LegendEntry], view: View, plots: PageBox
 ) -> tuple[list[list[LegendEntry]], float]:
-    """Return the rows of the legend below the plots, and the middle of the view's scale bar in
-    them."""
+    """Return the rows of the legend below the plots, and the page height of the middle of the
+    scale bar, which stands at the end of one of them."""
     bar = scale_bar_width(view) + BAR_ROOM
     table, row = rows_beside(entries, bar, plots.width)
     return table, plots.bottom + LEGEND_DROP + row * ROW_STEP
@@ -104,9 +104,11 @@ def fitted(
     shapes: tuple[float, float],
     margin_of: Callable[[View], float] = lambda view: 0.0,
 ) -> tuple[View, Ticks]:
-    """Return the view of a window on a page of this width, and its ticks; `margin_of` gives the
-    width that a view needs right of it. Fitted `FITS` times: the room for numbers follows from
-    the scale."""
+    """Return the view of a window on a page of this width, and its ticks.
+
+    `margin_of` gives the width that a view needs at its right. The fit is repeated `FITS` times,
+    since the room for the numbers follows from the scale.
+    """
     left, right = MARGIN + GUESSED_LEFT, width - MARGIN
     for _ in range(FITS):
         view = fit(window, left, top, right, shapes)
@@ -122,8 +124,10 @@ def foot_of(rows: list[list[LegendEntry]], legend_y: float) -> float:
 
 
 def mat(box: PageBox, width: float, height: float) -> str:
-    """Paper round the plot of a page, which hides what leaves the plot. A clip would do the same,
-    but takes the renderer as long as all lines together."""
+    """Return the SVG of the paper around the plot, which hides whatever reaches out of it.
+
+    A clip would do the same, but takes the renderer as long as all lines together.
+    """
     path = PathData()
     paper = PageBox(0.0, 0.0, width, height + math.ceil(width / MIN_PX))
     for each in (paper, box):
@@ -137,8 +141,8 @@ def mat(box: PageBox, width: float, height: float) -> str:
 
 
 def sheet(name: str, sizes: tuple[float, float], options: PictureOptions, *parts: str) -> str:
-    """Return the SVG text of a picture: its parts on paper of `sizes` (width and height in
-    units of the page), in the size and the palette of the options."""
+    """Return the SVG text of a picture: its parts on paper of `sizes` (width and height in units
+    of the page), in the size and the palette that the options ask for."""
     width, height = sizes
     size_px = options.size_px or SVG_WIDTH_PX
     root: Look = {
@@ -184,27 +188,27 @@ ENGAGEMENT_SCALE = MapScale(TOP_DEG, "engaged (°)", 30.0, "engagement-scale")
 
 
 def scale_of(content: Content) -> MapScale | None:
-    """Return the scale of the colours of a picture; None where nothing is coloured by a map."""
+    """Return the scale of the colours of a picture; None if nothing is coloured by a map."""
     if content.trace is not None:
         return MapScale(content.trace.top_um)
     return None if content.engaged is None else ENGAGEMENT_SCALE
 
 
 def _name(entry: LegendEntry) -> str:
-    """Return the text of an entry, shortened to `MAX_ENTRY_WIDTH`."""
+    """Return the text of a legend entry, shortened to `MAX_ENTRY_WIDTH`."""
     return text.shortened(entry.name, ENTRY.cap, MAX_ENTRY_WIDTH)
 
 
 def _width(entry: LegendEntry) -> float:
-    """Return the width of an entry in its row, with the gap to the next."""
+    """Return the width of a legend entry in its row, with the gap to the next."""
     return SWATCH + SWATCH_GAP + text.width(_name(entry), ENTRY.cap) + ENTRY_GAP
 
 
 def title_and_notes(
     name: str, notes: Sequence[str], page: float = PAGE, *, lines: int = 1
 ) -> tuple[str, float]:
-    """Return the SVG of title, on at most `lines` lines, and notes at the top of a page of this
-    width, and the height at which they end."""
+    """Return the SVG of the title, on at most `lines` lines, and of the notes, at the top of a
+    page of this width; and the height at which they end."""
     room = page - 2.0 * MARGIN
     y = MARGIN
     parts = []
@@ -237,8 +241,11 @@ def _title_lines(name: str, room: float, max_lines: int) -> list[str]:
 
 
 def rows_of(entries: Sequence[LegendEntry], first: float, room: float) -> list[list[LegendEntry]]:
-    """Return the entries in rows: the first row no wider than `first`, the others than `room`;
-    the first row stays empty when no entry fits into it."""
+    """Return the entries in rows, the first no wider than `first`, the others no wider than
+    `room`.
+
+    The first row stays empty if no entry fits into it.
+    """
     rows: list[list[LegendEntry]] = []
     if entries and _width(entries[0]) - ENTRY_GAP > first:
         rows.append([])
@@ -256,8 +263,12 @@ def rows_of(entries: Sequence[LegendEntry], first: float, room: float) -> list[l
 def rows_beside(
     entries: Sequence[LegendEntry], bar: float, room: float
 ) -> tuple[list[list[LegendEntry]], int]:
-    """Return the rows, and the one that leaves `bar` free at its end: the first, where an entry
-    fits beside that, else the last one with so much room, else a row of its own."""
+    """Return the rows of the legend, and the index of the row at whose end a width of `bar` stays
+    free.
+
+    This is the first row if an entry fits beside the bar, else the last row with so much room,
+    else a row of its own.
+    """
     first = room - bar
     if not entries or _width(entries[0]) - ENTRY_GAP <= first:
         return rows_of(entries, first, room), 0
@@ -269,7 +280,7 @@ def rows_beside(
 
 
 def legend_rows(table: Sequence[Sequence[LegendEntry]], left_x: float, middle: float) -> str:
-    """Return the rows of the legend, the first centred on height `middle`."""
+    """Return the SVG of the rows of the legend, the first centred on the height `middle`."""
     parts = []
     for index, row in enumerate(table):
         across, height = left_x, middle + index * ROW_STEP
@@ -283,7 +294,8 @@ def legend_rows(table: Sequence[Sequence[LegendEntry]], left_x: float, middle: f
 
 
 def legend_below(entries: Sequence[LegendEntry], top: float, width: float) -> tuple[str, float]:
-    """Return the legend below `top` on a page of this width, and the height of that page."""
+    """Return the SVG of the legend below `top`, on a page of this width, and the height of that
+    page."""
     if not entries:
         return "", round(top + MARGIN)
     room = width - 2.0 * MARGIN
@@ -293,8 +305,8 @@ def legend_below(entries: Sequence[LegendEntry], top: float, width: float) -> tu
 
 
 def colour_bar_labels(scale: MapScale, height: float) -> list[tuple[float, str]]:
-    """Return (value, text) along the colour bar: round numbers, and the largest error at the
-    top."""
+    """Return the values along the colour bar and their texts: round numbers, and the largest error
+    at the top."""
     top_um = scale.top
     if scale.step is not None:
         return [(value, number(value)) for value in multiples(0.0, top_um, scale.step)]
@@ -316,7 +328,7 @@ def colour_bar_width(scale: MapScale, height: float) -> float:
 
 
 def colour_bar(scale: MapScale, box: PageBox) -> str:
-    """Return the colour map with its numbers, right of the plot and as high."""
+    """Return the SVG of the colour bar with its numbers, right of the plot and as high."""
     bar_x = box.right + BAR_GAP
     step = box.height / BINS
     parts = []
@@ -374,7 +386,7 @@ class Ticks(Struct, frozen=True):
     y: tuple[float, ...]
 
     def text(self, value: float) -> str:
-        """Return the number at a tick."""
+        """Return the text of the number at a tick."""
         return number(value, decimals_of(self.step_mm))
 
     @property
@@ -384,7 +396,7 @@ class Ticks(Struct, frozen=True):
 
 
 def ticks_of(view: View) -> Ticks:
-    """Ticks whose numbers cannot touch."""
+    """Return ticks at the smallest round step whose numbers do not touch."""
     spacing = MIN_SPACING
     while True:
         step = round_step(spacing / view.scale)
@@ -398,7 +410,7 @@ def ticks_of(view: View) -> Ticks:
 
 
 def ground(view: View, ticks: Ticks) -> str:
-    """Ground and grid of the plot, below everything."""
+    """Return the SVG of the ground and the grid of the plot, below everything else."""
     box, grid = view.box, PathData()
     for x in ticks.x:
         grid.move(view.page(x, 0.0)[0], box.top)
@@ -421,7 +433,8 @@ LATHE_AXES = "X, axis (mm)", "Y, radius (mm)"
 
 
 def axes_around(view: View, ticks: Ticks, names: tuple[str, str] = PLANE_AXES) -> str:
-    """Frame, ticks and numbers, above the plot, and the names of both axes."""
+    """Return the SVG of the frame, the ticks, their numbers, and the names of both axes, above the
+    plot."""
     box, marks, labels = view.box, PathData(), []
     unit = text.width(names[0], TICK_CAP)
     base = box.bottom + TICK + LABEL_GAP + TICK_CAP
@@ -457,7 +470,7 @@ def _tick(marks: PathData, place: tuple[float, float], step: tuple[float, float]
 
 
 def _minor(marks: PathData, view: View, ticks: Ticks) -> None:
-    """Short ticks that divide each step: one of 2, 20 … into four, others into five."""
+    """Add short ticks to `marks`: they divide each step into five, a step of 2, 20 … into four."""
     is_two = f"{ticks.step_mm:.0e}".startswith("2")
     step = ticks.step_mm / (4.0 if is_two else 5.0)
     for x in multiples(*view.x_range, step):
@@ -467,7 +480,7 @@ def _minor(marks: PathData, view: View, ticks: Ticks) -> None:
 
 
 def scale_bar_length(view: View) -> tuple[float, str]:
-    """Return a round length in mm, and its text."""
+    """Return a round length for the scale bar, mm, and its text."""
     length = round_length(BAR_SHARE * view.box.width / view.scale)
     if length < 1.0:
         return length, f"{number(length * 1000.0, decimals_of(length * 1000.0))} µm"
@@ -475,13 +488,13 @@ def scale_bar_length(view: View) -> tuple[float, str]:
 
 
 def scale_bar_width(view: View) -> float:
-    """Room that the bar and its label need."""
+    """Return the width, in units of the page, that the scale bar and its label need."""
     length, name = scale_bar_length(view)
     return length * view.scale + 12.0 + text.width(name, TICK_CAP)
 
 
 def scale_bar(view: View, right: float, middle: float) -> str:
-    """Return a bar of round length with its label, ending at `right`, centred on height
+    """Return the SVG of the scale bar with its label, ending at `right`, centred on the height
     `middle`."""
     length, name = scale_bar_length(view)
     begin = right - length * view.scale

@@ -36,9 +36,11 @@ class Picture:
         return draw(self.scene, self.options)
 
     def render(self, name: str) -> bytes:
-        """Return the bytes of a file of this name: .svg, .png, or .html, the viewer's page of
-        one scene, without options. OutputError for other extensions, OptionError for options
-        that do not fit."""
+        """Return the bytes of a file with this name: .svg, .png, or .html, the viewer's page of
+        one scene, without options.
+
+        OutputError for other extensions, OptionError for options that do not fit.
+        """
         if isinstance(self.scene, tuple):
             return render_beside(self.scene, name, self.options)
         if isinstance(self.scene, Overlay):
@@ -46,7 +48,7 @@ class Picture:
         return render(self.scene, name, self.options)
 
     def save(self, file: str | Path) -> None:
-        """Write the file, by its extension; raises as `render` does."""
+        """Write the picture to a file, in the format of its extension; raises as `render` does."""
         Path(file).write_bytes(self.render(str(file)))
 
     def __repr__(self) -> str:
@@ -66,8 +68,12 @@ MIN_SHARE = 0.02
 
 
 def closeups(scene: Scene, options: PictureOptions) -> Iterator[tuple[str, PictureOptions]]:
-    """Caption and options of each close-up; none where nothing was predicted. Size and ground are
-    those of `options`, the rest is as usual."""
+    """Yield the caption and the options of each close-up of a scene: the place of the largest
+    error, and the worst circle.
+
+    There are none where nothing was predicted. Size and ground are those of `options`, the rest is
+    as usual.
+    """
     usual = PictureOptions(size_px=options.size_px, dark=options.dark)
     points, errors = scene.trace_points, scene.trace_error_mm
     if points is not None and errors is not None and scene.worst and len(points):
@@ -95,9 +101,12 @@ LAID = frozenset({"drawing", "stock", "pins", "zero"})
 def on_stock(
     scene: Scene, swept_mm: tuple[float, float, float, float] | None = None
 ) -> tuple[Scene, PictureOptions] | None:
-    """Return the scene of the drawing on its stock, with part zero, pins, the line about which it
-    is turned over, and the box that tools and holders pass over, and its options; None without a
-    drawing."""
+    """Return a scene of the drawing on its stock and the options to draw it; None without a
+    drawing.
+
+    It shows part zero, pins, the line about which the part is turned over, and `swept_mm`, the box
+    that tools and holders pass over.
+    """
     if scene.drawing is None:
         return None
     laid = Scene(

@@ -62,7 +62,7 @@ class Plot(Struct, frozen=True):
     # Lines, in mm.
 
     def pen(self, base: float, chains: Iterable[Chain]) -> float:
-        """Line width on the page: `base`, or thinner where lines are crowded."""
+        """Return the line width in units of the page: `base`, or less where lines are crowded."""
         view = self.view
         length = sum(self._length_shown(chain) for chain in chains) * view.scale
         if length == 0.0:
@@ -71,8 +71,11 @@ class Plot(Struct, frozen=True):
         return max(min(base, room), THINNEST)
 
     def _length_shown(self, chain: Chain) -> float:
-        """About how many mm of a chain are in view: of each move whose box touches the window its
-        length, but no more than the window's diagonal."""
+        """Return about how many mm of a chain are in view.
+
+        Each move whose box touches the window counts with its length, but with no more than the
+        window's diagonal.
+        """
         low, high = np.array([self.view.x_range, self.view.y_range]).T
         lengths = chain.lengths()
         is_near = np.empty(len(lengths), dtype=np.bool_)
@@ -84,7 +87,7 @@ class Plot(Struct, frozen=True):
         return float(lengths[is_near].sum())
 
     def round_pen(self, width: float) -> Look:
-        """Return a pen of a width on the page."""
+        """Return the look of a pen with round ends, of this width on the page."""
         return {
             "fill": "none",
             "stroke-width": self.view.mm(width),
@@ -93,15 +96,16 @@ class Plot(Struct, frozen=True):
         }
 
     def path(self, chains: Sequence[Chain]) -> str:
-        """Return lines and arcs as one path."""
+        """Return the SVG of lines and arcs as one path."""
         return element("path", {"d": path_data(chains)})
 
     def lines(self, name: str, chains: Sequence[Chain], look: Look) -> str:
-        """Return lines and arcs of one look as a group; empty without any."""
+        """Return the SVG of lines and arcs of one look as a group; "" without any."""
         return element("g", {"id": name, **look}, self.path(chains)) if chains else ""
 
     def body(self, chains: Sequence[Chain]) -> str:
-        """Return a light fill of what is closed (even-odd, so that holes stay open)."""
+        """Return the SVG of a light fill of the closed chains (even-odd, so that holes stay
+        open)."""
         closed = [chain for chain in chains if chain.closed]
         if not closed or len(closed) > MAX_BODIES:
             return ""
@@ -109,23 +113,24 @@ class Plot(Struct, frozen=True):
         return element("g", {"id": "body"}, element("path", fill))
 
     def frame(self, name: str, size_mm: tuple[float, float], colour: str) -> str:
-        """Return a rectangle whose lower left corner is part zero."""
+        """Return the SVG of a rectangle of this size whose lower left corner is part zero."""
         sides: Look = {"x": 0.0, "y": 0.0, "width": size_mm[0], "height": size_mm[1]}
         line: Look = {"fill": "none", "stroke": colour, "stroke-width": self.view.mm(2.0)}
         return element("g", {"id": name}, element("rect", {**sides, **line}))
 
     def trace(self, trace: ErrorTrace, width: float) -> str:
-        """Return the path of the slides, coloured by its error."""
+        """Return the SVG of the predicted path of the slides, coloured by its error."""
         return trace_layer(trace, self.view, width)
 
     def engagement(self, trace: EngagementTrace, width: float) -> str:
-        """Return the moves of the slides, coloured by engagement."""
+        """Return the SVG of the moves of the slides, coloured by engagement."""
         return engagement_layer(trace, self.view, width)
 
     # Marks, in units of the page.
 
     def dots(self, name: str, places: Iterable[Place], look: Look) -> str:
-        """Round marks at places in mm: each is drawn, smaller where there are very many."""
+        """Return the SVG of round marks at places in mm, made smaller where there are very
+        many."""
         shown = [self.view.page(*place) for place in places if self.view.shows(*place)]
         if not shown:
             return ""
@@ -140,7 +145,8 @@ class Plot(Struct, frozen=True):
         return element("g", {"id": name, **line}, *marks)
 
     def arrows(self, chains: Sequence[Chain]) -> str:
-        """Return arrows in the direction of travel: none on a short chain, four at most on any."""
+        """Return the SVG of arrows in the direction of travel: none on a short chain, at most four
+        on any."""
         view = self.view
         lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
         long = [index for index, length in enumerate(lengths) if length >= MIN_LENGTH_WITH_ARROW]
@@ -160,12 +166,13 @@ class Plot(Struct, frozen=True):
         return element("g", {"id": "arrows"}, element("path", {"d": str(data), "fill": FEED}))
 
     def texts(self, name: str, texts: Sequence[str], places: Sequence[Place], colour: str) -> str:
-        """Short texts beside their places, none over another."""
+        """Return the SVG of short texts beside their places; a text that would cover another is
+        left out."""
         labels = labels_beside(texts, places, self.view)
         return _group(name, [_written(label, colour) for label in labels])
 
     def ranks(self, name: str, places: Sequence[Place], look: Look) -> str:
-        """Return a ring at each place with its number, in the colour of the ring."""
+        """Return the SVG of a ring at each place with its number, in the colour of the ring."""
         ranks = [str(rank) for rank in range(1, len(places) + 1)]
         labels = labels_beside(ranks, places, self.view)
         rings = []
@@ -176,8 +183,12 @@ class Plot(Struct, frozen=True):
 
 
 def _along(chain: Chain, low: float, high: float) -> tuple[tuple[float, float], float]:
-    """Point and heading in the middle of the longest move or part of a move between two shares of
-    the chain's length: away from corners."""
+    """Return a point for an arrow, and the direction of travel there, between two shares of a
+    chain's length.
+
+    It is the middle of the longest move, or part of a move, between these, and so away from
+    corners.
+    """
     ends = np.cumsum(chain.lengths())
     begins = np.concatenate([[0.0], ends[:-1]])
     first = np.maximum(begins, low * ends[-1])
@@ -189,7 +200,8 @@ def _along(chain: Chain, low: float, high: float) -> tuple[tuple[float, float], 
 
 
 def _arrow(data: PathData, place: tuple[float, float], heading: float) -> None:
-    """A slim arrowhead with its middle at `place`; heading in page directions (Y down)."""
+    """Add a slim arrowhead to the path data, with its middle at `place`; `heading` is an angle on
+    the page (Y down)."""
     cos, sin = math.cos(heading), math.sin(heading)
     half = ARROW_LENGTH / 2.0
     corners = ((half, 0.0), (-half, ARROW_WIDTH), (-half / 2.0, 0.0), (-half, -ARROW_WIDTH))
@@ -209,7 +221,8 @@ class Label(Struct, frozen=True):
 
 
 def labels_beside(texts: Sequence[str], places: Sequence[Place], view: View) -> list[Label]:
-    """Texts beside their places in mm, none over another: one that finds no room is left out."""
+    """Return labels for texts beside their places in mm; one that finds no free room is left
+    out."""
     labels: list[Label] = []
     for words, place in list(zip(texts, places, strict=True))[:MAX_LABELS]:
         if not view.shows(*place):
@@ -226,7 +239,8 @@ def labels_beside(texts: Sequence[str], places: Sequence[Place], view: View) -> 
 def _label_box(
     words: str, place: tuple[float, float], direction: tuple[float, float]
 ) -> tuple[float, float, float, float]:
-    """Return the box of a text to the right or left of a place, and below or above it."""
+    """Return the box of a text beside a place: right or left of it, and below or above it, by the
+    signs of `direction`."""
     wide = text.width(words, CAP)
     left_x = place[0] + AWAY if direction[0] > 0.0 else place[0] - AWAY - wide
     top = place[1] + 0.5 * AWAY if direction[1] > 0.0 else place[1] - 0.5 * AWAY - CAP

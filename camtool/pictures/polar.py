@@ -39,9 +39,11 @@ class CircleErrors(Struct, frozen=True, eq=False):
 
 
 def circle_pair(scene: Scene, circle_number: int) -> tuple[CircleErrors, ...]:
-    """Return the `circle_number`-th circle of the scene, from 1, and the same circle cut in the
-    other direction, if there is one, counterclockwise first. OptionError if there is no such
-    circle."""
+    """Return the circle with this number, from 1, and the same circle cut in the other direction,
+    if there is one; counterclockwise first.
+
+    OptionError if there is no such circle.
+    """
     if not 1 <= circle_number <= len(scene.rounds):
         count = len(scene.rounds)
         raise OptionError(
@@ -57,8 +59,8 @@ def circle_pair(scene: Scene, circle_number: int) -> tuple[CircleErrors, ...]:
 
 
 def draw_polar(scene: Scene, number: int, options: PictureOptions) -> str:
-    """Return SVG text of the plot of the `number`-th circle of the scene, from 1; OptionError
-    when there is none."""
+    """Return SVG text of the polar plot of the circle with this number, from 1; OptionError when
+    there is none."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     circles = circle_pair(scene, number)
     errors = [circle.errors_um for circle in circles]
@@ -71,7 +73,7 @@ def draw_polar(scene: Scene, number: int, options: PictureOptions) -> str:
 
 
 def entries(circles: Sequence[CircleErrors]) -> list[LegendEntry]:
-    """Return the legend: the direction of each circle, where there are two."""
+    """Return the entries of the legend: the direction of each circle, if there are two."""
     if len(circles) < 2:
         return []
     return [
@@ -81,7 +83,8 @@ def entries(circles: Sequence[CircleErrors]) -> list[LegendEntry]:
 
 
 def notes(circles: Sequence[CircleErrors], dial: Dial) -> tuple[str, ...]:
-    """Return the circle, its figures, and the magnification of its errors."""
+    """Return the notes: centre and radius of the circle, its figures, and the magnification of its
+    errors."""
     first = circles[0].one
     x, y = first.centre_mm
     magnified = dial.per_um * UM_PER_MM * first.radius_mm / dial.base
@@ -158,19 +161,22 @@ class Dial(Struct, frozen=True):
     step_um: float
 
     def at(self, angle: float, error_um: float) -> tuple[float, float]:
-        """Page place of a radial error."""
+        """Return the place on the page of a radial error at an angle."""
         radius = self.base + error_um * self.per_um
         x, y = self.middle
         return x + radius * math.cos(angle), y - radius * math.sin(angle)
 
     def centred_below(self, top: float, width: float) -> Dial:
-        """Return the dial below `top`, in the middle of the width."""
+        """Return the dial moved below `top`, to the middle of the width."""
         return replace(self, middle=(0.5 * width, top + ROOM + self.outer))
 
 
 def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
-    """Return the dial of errors (B, 3) µm of circles on a plot of this width, its middle at (0,
-    0); the largest error of all, outward or inward, just fits."""
+    """Return the dial for errors (B, 3) µm of circles, on a plot of this width, with its middle at
+    (0, 0).
+
+    It is scaled so that the largest error of all, outward or inward, just fits.
+    """
     outer = 0.5 * width - MARGIN - ROOM
     errors = np.concatenate([each.ravel() for each in errors_um])
     finite = errors[np.isfinite(errors)]
@@ -185,7 +191,7 @@ def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
 
 
 def plot(errors_um: Sequence[Floats], dial: Dial) -> list[str]:
-    """Return the SVG of rings, the ends of the axes, and the errors (B, 3) µm of each circle;
+    """Return the SVG of the rings, the ends of the axes, and the errors (B, 3) µm of each circle;
     bands lie below lines."""
     bands, lines = [], []
     for errors, (line, pale) in zip(errors_um, PENS, strict=False):
@@ -197,7 +203,7 @@ def plot(errors_um: Sequence[Floats], dial: Dial) -> list[str]:
 
 
 def _ring_errors(dial: Dial) -> list[float]:
-    """µm of each ring on the plot."""
+    """Return the radial error, µm, that each ring of the plot stands for."""
     low = math.ceil(-0.95 * dial.base / dial.per_um / dial.step_um)
     high = math.floor((dial.outer - dial.base + 1e-6) / dial.per_um / dial.step_um)
     return [k * dial.step_um for k in range(low, high + 1)]
@@ -215,7 +221,7 @@ def _rings(dial: Dial) -> str:
 
 
 def _quadrants(dial: Dial) -> str:
-    """Return a line to each end of an axis, where that axis reverses, with its name."""
+    """Return the SVG of a line to each end of an axis, where that axis reverses, with its name."""
     data, labels = PathData(), []
     (x, y), outer, style = dial.middle, dial.outer, TextStyle(CAP, INK, "middle")
     for index, name in enumerate(AXES):
@@ -229,8 +235,8 @@ def _quadrants(dial: Dial) -> str:
 
 
 def _band(errors: Floats, dial: Dial, colour: str, pale: str) -> tuple[str, str]:
-    """Return a band from the least to the largest error, and a line of the mean; open where the
-    slides never were."""
+    """Return the SVG of a band from the least to the largest error, and of a line of the mean;
+    both are interrupted where the slides never were."""
     step = 2.0 * math.pi / len(errors)
     band, line = PathData(), PathData()
     for run in _runs(np.isfinite(errors[:, 1])):
@@ -257,7 +263,8 @@ def _stroke(data: PathData, points: list[tuple[float, float]]) -> None:
 
 
 def _runs(has_error: np.ndarray) -> list[list[int]]:
-    """Return runs of consecutive bins, once round; a whole circle ends where it begins."""
+    """Return the indices of consecutive bins that have an error, once around the circle; a full
+    circle repeats its first bin at the end."""
     count = len(has_error)
     if has_error.all():
         return [list(range(count + 1))]
@@ -273,8 +280,11 @@ def _runs(has_error: np.ndarray) -> list[list[int]]:
 
 
 def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
-    """Return the numbers of the rings, µm, along the direction where they hide least. A number
-    that would hide an error is left out where at least `MIN_LABELS` remain."""
+    """Return the SVG of the numbers of the rings, µm, along the direction in which they hide the
+    fewest errors.
+
+    Numbers that would hide an error are left out if at least `MIN_LABELS` others remain.
+    """
     places = np.array([_places(errors, dial) for errors in errors_um]).reshape(-1, 2)
     clear, numbers = [], []
     for degrees in LABELS_DEG:
@@ -291,7 +301,7 @@ def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
 
 
 def _places(errors_um: Floats, dial: Dial) -> Floats:
-    """Return (3 B, 2) places on the page of the least, mean and largest errors; NaN where the
+    """Return the places (3 B, 2) on the page of the least, mean and largest errors; NaN where the
     slides never were."""
     angle = (np.arange(len(errors_um)) + 0.5) * (2.0 * np.pi / len(errors_um))
     radius = dial.base + errors_um * dial.per_um
@@ -301,7 +311,8 @@ def _places(errors_um: Floats, dial: Dial) -> Floats:
 
 
 def _numbers(dial: Dial, angle: float) -> list[tuple[str, tuple[float, float], PageBox]]:
-    """Return (number, where its baseline begins, its box) of each ring with a number."""
+    """Return the text of each number, the start of its baseline and its box, for the rings that
+    have a number along this angle."""
     every = max(1, math.ceil(2.2 * CAP / (dial.step_um * dial.per_um)))
     shown = [e for e in _ring_errors(dial) if round(e / dial.step_um) % every == 0]
     numbers = []

@@ -69,7 +69,7 @@ class Camera(Struct, frozen=True):
         return math.sqrt(1.0 - self.sine * self.sine)
 
     def place(self, x: float, y: float, z: float) -> tuple[float, float]:
-        """Return the place on the picture, mm, to the right and up."""
+        """Return where a point of the part appears on the picture: mm to the right and mm up."""
         fx, fy = self.direction
         return x * fy - y * fx, z * self.cosine + (x * fx + y * fy) * self.sine
 
@@ -118,8 +118,8 @@ class Stage(Struct, frozen=True, eq=False):
 def stage_of(
     height_map: HeightMap, thickness_mm: float, moves: StockMoves | None, margin: float
 ) -> Stage:
-    """Return the map on a board, with `margin` (a share of its longer side) of the board around
-    it."""
+    """Return the height map on a board that reaches beyond it by `margin`, a share of its longer
+    side."""
     bottom = -thickness_mm
     heights = np.where(height_map.heights <= bottom + THROUGH_MM, bottom, height_map.heights)
     rows, columns = heights.shape
@@ -142,8 +142,11 @@ def stage_of(
 
 
 def _marks(height_map: HeightMap, moves: StockMoves) -> Heights:
-    """Return how much the marks of the tool catch the light (NY, NX), −1 … 1: the cosine of twice
-    the angle between the cut and the diagonal; 0 where nothing cut, or straight down."""
+    """Return how much the tool marks of each cell (NY, NX) catch the light, −1 … 1.
+
+    It is the cosine of twice the angle between the cut and the diagonal; 0 where nothing cut, or
+    straight down.
+    """
     travel = moves.end[:, :2] - moves.start[:, :2]
     square = travel[:, 0] * travel[:, 0] + travel[:, 1] * travel[:, 1]
     catch = np.where(
@@ -155,12 +158,13 @@ def _marks(height_map: HeightMap, moves: StockMoves) -> Heights:
 
 
 def light_of(colour: str) -> Floats:
-    """Return the light (3,) of a colour "#rrggbb"."""
+    """Return the light (3,), 0 … 1, of a colour "#rrggbb": the squares of its channels."""
     return np.array(channels(colour), dtype=np.float64) ** 2 / 255.0**2
 
 
 def floor_colours(count: int) -> Octets:
-    """Return the colours (count, 3) of floors in the open, from the top to the deepest."""
+    """Return the colours (count, 3) of unshaded floors, from the top of the stock to the
+    deepest."""
     share = np.arange(count)[:, None] / (count - 1)
     top, low = light_of(TOP), light_of(DEEP)
     light = AMBIENT + SKY + KEY * CAMERAS["iso"].light[2]
@@ -175,8 +179,11 @@ def picture_of(
     sizes: tuple[int, int],
     ground: str,
 ) -> Octets:
-    """Return the picture (H, W, 3) of a window (left, low, right, high; mm on the picture) with
-    `sizes` (W, H) pixels; the board has the colour `ground`."""
+    """Return the pixels (H, W, 3) of a window (left, low, right, high; mm on the picture) with
+    `sizes` (W, H).
+
+    The board has the colour `ground`.
+    """
     wide, high = sizes[0] * SAMPLES, sizes[1] * SAMPLES
     pixel = (window[2] - window[0]) / wide
     cell = np.empty((high, wide), dtype=np.int32)
@@ -226,7 +233,7 @@ class _LitStage(Struct, frozen=True, eq=False):
 
 
 def _lit(stage: Stage, camera: Camera) -> _LitStage:
-    """Compute the light on a stage."""
+    """Return the stage with the light that falls on its cells."""
     return _LitStage(
         stage,
         *_facing(stage, camera),
@@ -240,7 +247,7 @@ def _lit(stage: Stage, camera: Camera) -> _LitStage:
 def _colours(
     lit: _LitStage, cell: npt.NDArray[np.int32], level: Heights, ground: Floats
 ) -> Heights:
-    """Return the light (H, W, 3) of each pixel."""
+    """Return the light (H, W, 3) of each pixel, given the cell that it shows and its height."""
     stage, size = lit.stage, lit.stage.size_mm
     is_ground = cell == -1
     wall = (cell < 0) & ~is_ground
@@ -275,7 +282,8 @@ def _colours(
 
 
 def _facing(stage: Stage, camera: Camera) -> tuple[Heights, Heights]:
-    """Return how far each cell (NY, NX) faces the lamp, 0 … 1: as a floor, and as a wall."""
+    """Return how directly each cell (NY, NX) faces the lamp, 0 … 1: once as a floor, and once as a
+    wall."""
     heights, cell = stage.heights, np.float32(stage.cell_mm)
     flat = _towards(_lesser(heights, 1) / cell, _lesser(heights, 0) / cell, camera)
     smooth = heights
@@ -292,8 +300,11 @@ def _towards(x: Heights, y: Heights, camera: Camera) -> Heights:
 
 
 def _lesser(heights: Heights, axis: int) -> Heights:
-    """Return the lesser of the steps to both neighbours, 0 where they differ in sign: floors
-    beside walls stay level."""
+    """Return the slope of each cell along an axis, mm from cell to cell: the lesser of the steps
+    to both neighbours.
+
+    It is 0 where the two differ in sign, and at the edges, so that floors beside walls stay level.
+    """
     step = np.diff(heights, axis=axis)
     zeros = np.zeros_like(heights.take([0], axis=axis))
     step_behind = np.concatenate([zeros, step], axis=axis)
@@ -305,12 +316,12 @@ def _lesser(heights: Heights, axis: int) -> Heights:
 
 
 def _central(heights: Heights, axis: int) -> Heights:
-    """Half the step between both neighbours."""
+    """Return half the difference of both neighbours of each cell along an axis."""
     return np.asarray(0.5 * (np.roll(heights, -1, axis) - np.roll(heights, 1, axis)))
 
 
 def _mean(heights: Heights, reach: int, axis: int) -> Heights:
-    """Return the mean of 2 · reach + 1 cells along an axis; edges repeat."""
+    """Return the mean of 2 · reach + 1 cells along an axis, for each cell; edges repeat."""
     widths = [(0, 0), (0, 0)]
     widths[axis] = (reach + 1, reach)
     total = np.cumsum(np.pad(heights, widths, mode="edge"), axis=axis, dtype=np.float64)
@@ -322,7 +333,8 @@ def _mean(heights: Heights, reach: int, axis: int) -> Heights:
 
 
 def _shadows(heights: Heights, light: tuple[float, float, float], cell_mm: float) -> Heights:
-    """Return the height (NY, NX) below which the lamp does not shine."""
+    """Return the height (NY, NX) of the shadow over each cell: below it the lamp does not
+    shine."""
     x, y, z = light
     if abs(x) > abs(y):
         return np.ascontiguousarray(
@@ -349,7 +361,7 @@ def _shadows(heights: Heights, light: tuple[float, float, float], cell_mm: float
 
 
 def _openness(stage: Stage, size_mm: float) -> Heights:
-    """Return the share of the sky (NY, NX) that neighbours leave to each cell, about."""
+    """Return about which share (NY, NX) of the sky each cell sees past its neighbours."""
     heights = stage.heights
     open_sky = np.ones_like(heights)
     for share, weight in NEARBY:
@@ -366,7 +378,8 @@ def _openness(stage: Stage, size_mm: float) -> Heights:
 
 
 def _fade(stage: Stage) -> Heights:
-    """1 (NY, NX) over the stock, falling to 0 at the edges of the board."""
+    """Return weights (NY, NX) that are 1 over the stock and fall to 0 at the edges of the
+    board."""
     parts = []
     for count in stage.heights.shape:
         edge = np.minimum(np.arange(count), np.arange(count)[::-1]).astype(np.float32)
@@ -375,8 +388,8 @@ def _fade(stage: Stage) -> Heights:
 
 
 def _enlarged(thin: Heights, step: int, shape: tuple[int, ...]) -> Heights:
-    """Return the values between cells that lie `step` apart, from one to the next in a straight
-    line."""
+    """Return the array enlarged to `shape` by linear interpolation; `step` is the distance of its
+    cells in the result."""
     for axis in (0, 1):
         place = np.arange(shape[axis], dtype=np.float32) / np.float32(step)
         low = np.minimum(place.astype(np.int64), thin.shape[axis] - 1)
@@ -387,7 +400,7 @@ def _enlarged(thin: Heights, step: int, shape: tuple[int, ...]) -> Heights:
 
 
 def png_of(pixels: Octets) -> bytes:
-    """Return the bytes of a PNG of pixels (H, W, 3)."""
+    """Return pixels (H, W, 3) encoded as a PNG."""
     high, wide, _ = pixels.shape
     rows = np.zeros((high, 1 + 3 * wide), dtype=np.uint8)
     # Each row as differences from the row above (filter 2 of the format): half as many bytes.
@@ -408,5 +421,5 @@ def png_of(pixels: Octets) -> bytes:
 
 
 def data_uri(png: bytes) -> str:
-    """Return the address under which an SVG holds a PNG."""
+    """Return a PNG as a data URI, to be embedded in SVG."""
     return "data:image/png;base64," + base64.b64encode(png).decode("ascii")

@@ -145,7 +145,7 @@ class Round(Struct, frozen=True, eq=False):
     both_circular_mm: float = math.nan
 
     def errors(self) -> Floats:
-        """Return (B, 3) mm: least, mean and largest radial error of each bin; NaN where the
+        """Return the least, mean and largest radial error (B, 3), mm, of each bin; NaN where the
         slides never were."""
         has_samples = self.bins[:, 0] > 0.0
         errors = np.full((len(self.bins), 3), np.nan)
@@ -177,7 +177,7 @@ class StockPair(Struct, frozen=True, eq=False):
     before: StockBefore | None = None
 
     def engagement(self, toolpath: Toolpath) -> Engagement:
-        """Return the engagement of the tools along the moves, which are those of a toolpath."""
+        """Return the engagement of the tools along the moves, which are those of this toolpath."""
         from camtool.stock.engagement import engagement_of
 
         return engagement_of(self.moves, toolpath, self.box_mm if self.known else None)
@@ -225,7 +225,7 @@ class Playback(Struct, frozen=True, eq=False):
 
 
 def by_feed(toolpath: Toolpath, rapid_mm_min: float) -> Playback:
-    """Compute the times of a toolpath without a simulation.
+    """Return the times of a toolpath without a simulation.
 
     Each move runs at its feed, rapids at `rapid_mm_min` (inf: in no time), and dwells last their
     seconds.
@@ -246,8 +246,8 @@ def by_feed(toolpath: Toolpath, rapid_mm_min: float) -> Playback:
 
 
 def scene_of_drawing(drawing: Drawing, title: str = "") -> Scene:
-    """Return the scene of a drawing alone, with its size; the title is its file unless one is
-    given."""
+    """Return the scene of a drawing alone, with a note of its size; the title is its file unless
+    one is given."""
     note = f"{len(drawing.marks)} points" if drawing.marks else "nothing drawn"
     if len(drawing.paths):
         (left, right), (bottom, top) = extents(drawing.paths).tolist()
@@ -268,7 +268,8 @@ def scene_of(
     wanted_path: Toolpath | None = None,
     target: LoadedTarget | None = None,
 ) -> Scene:
-    """Return the scene of what is given; with a verification, of the predicted path as well.
+    """Return the scene of what is known of a part: drawing, toolpath, verification; with a
+    verification, the predicted path as well.
 
     `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer;
     `tabs` are the places (x, y) mm of tabs. `wanted_path` are the moves that the program should
@@ -329,7 +330,7 @@ def scene_of(
 
 
 def _with_other_half(section: Drawing) -> Drawing:
-    """Return a half section with its mirror image on the other side of the axis, Y 0."""
+    """Return a half section with its mirror image on the other side of the axis, Y = 0."""
     paths = section.paths
     other = Polylines(paths.vertices * [1.0, -1.0, -1.0], paths.offsets, paths.closed)
     return replace(
@@ -346,7 +347,8 @@ def _with_other_half(section: Drawing) -> Drawing:
 def _before(
     drawing: Drawing | None, job: Job | None, machine: Machine | None
 ) -> Callable[[], StockBefore] | None:
-    """Return the function that gives what set-ups before that of a job have cut."""
+    """Return a function that computes what earlier set-ups of the part have cut; None if the job
+    is not one of several set-ups."""
     if drawing is None or job is None or machine is None or job.setup_of is None:
         return None
     from camtool.stock.before import planned_before
@@ -359,7 +361,8 @@ FLIP_SHARE = 0.04
 
 
 def _flips(job: Job) -> tuple[tuple[tuple[float, float], tuple[float, float]], ...]:
-    """Return the ends of the lines about which the part is turned over, over all of the stock."""
+    """Return the ends of each line about which the part is turned over; they reach a little beyond
+    the stock."""
     from camtool.planning.naming import flip_lines_of
 
     box = None if job.stock is None else job.stock.box_mm
@@ -384,7 +387,7 @@ MIN_BESIDE_MM = 0.01
 
 
 def _as_planned(path: Toolpath, job: Job | None) -> StockMoves:
-    """Return the moves of a toolpath through the stock, as planned."""
+    """Return the moves of a toolpath through the stock, exactly as planned."""
     from camtool.stock.moves import stock_moves_of_toolpath
     from camtool.stock.slides import tools_of_rows
 
@@ -400,7 +403,8 @@ def _stock_pair(
     bands: Callable[[float], Callable[[Floats], Floats]] | None,
     before: Callable[[], StockBefore] | None,
 ) -> Callable[[], StockPair] | None:
-    """Return the function that gives the moves that cut the stock."""
+    """Return a function that computes the moves that cut the stock, and those that should; None
+    without a toolpath."""
     if toolpath is None:
         return None
 
@@ -431,7 +435,8 @@ def stock_pair(
     box_mm: tuple[float, float, float, float] | None,
     thickness_mm: float | None,
 ) -> StockPair:
-    """Return the stock that moves cut; what is None of its box is as large as they need."""
+    """Return the stock that these moves cut; where its box or thickness is None, it is as large as
+    they need."""
     from camtool.stock.cut import cut_box
 
     box, depth = box_mm, thickness_mm or 0.0
@@ -447,8 +452,8 @@ def stock_pair(
 def _bands(
     drawing: Drawing | None, job: Job | None, wanted_path: Toolpath | None, machine: Machine | None
 ) -> Callable[[float], Callable[[Floats], Floats]] | None:
-    """Return the function that gives the heights which a drawing and its job allow, as
-    `StockPair` has it; None where the wanted moves are not those of a plan of them."""
+    """Return a function that computes the heights which drawing and job allow (see `StockPair`);
+    None if the wanted moves are not those of a plan."""
     if drawing is None or job is None or machine is None:
         return None
     if wanted_path is None or wanted_path.operations is None:
@@ -464,8 +469,8 @@ def _bands(
 
 
 def rounds_of(verification: Verification) -> tuple[Round, ...]:
-    """Return the full circles as polar plots show them, each with the number of the same circle
-    cut in the other direction."""
+    """Return the full circles for polar plots, each with the number of the same circle cut in the
+    other direction."""
     from camtool.verification.circles import CirclePairs
 
     circles = verification.circles
@@ -496,8 +501,8 @@ def rounds_of(verification: Verification) -> tuple[Round, ...]:
 def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
     """Return the width of the cut at the surface, mm; None if it changes along the path.
 
-    A V bit, or a round nose, is as wide as it is deep: it has one width where one operation cuts
-    level, that of its deepest pass.
+    The width of a V bit, or a round nose, depends on its depth: it has one width if a single
+    operation cuts level, that of its deepest pass.
     """
     from camtool.verification.case import nose_of, tool_mm
 
@@ -515,9 +520,11 @@ def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
 
 
 def _turns(job: Job, toolpath: Toolpath) -> tuple[tuple[int, Tool], ...]:
-    """Return the tools that cut in turn, each with the first row of its turn: those of the
-    operations of a plan, else those of the job with the numbers that the program calls; ()
-    where it calls others of several, or none."""
+    """Return the tools in the order in which they cut, each with the first row that it cuts.
+
+    They are those of the operations of a plan, else those of the job with the numbers that the
+    program calls; () if the program calls other numbers, or none although there are several tools.
+    """
     from camtool.planning.link import tool_note
 
     first = job.operations[0].tool if job.operations else None
@@ -540,8 +547,8 @@ def _turns(job: Job, toolpath: Toolpath) -> tuple[tuple[int, Tool], ...]:
 
 
 def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:
-    """Return the table's travel, mm, if the path lies in it with part zero at its lower left
-    corner; None otherwise: where the travel lies is not known then."""
+    """Return the table's travel, mm, if the path lies within it with part zero at its lower left
+    corner; else None, since then the place of the travel is not known."""
     if toolpath is None or machine is None:
         return None
     x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm
@@ -558,8 +565,8 @@ def _playback(
     listing: Callable[[], Listing | None] | None,
     bounds: ReportTable,
 ) -> Callable[[], Playback] | None:
-    """Return the function that gives how the toolpath runs: as simulated where there is a
-    verification, otherwise by its feeds."""
+    """Return a function that computes the times of the toolpath: as simulated if there is a
+    verification, else by its feeds."""
     if toolpath is None or machine is None:
         return None
 
@@ -581,7 +588,7 @@ def _playback(
 
 
 def _bounds(drawing: Drawing | None, job: Job | None, toolpath: Toolpath | None) -> ReportTable:
-    """Return the table of how far drawing, stock and program reach along the axes."""
+    """Return the table of the extents of drawing, stock and program along the axes."""
     from camtool.verification.report import mm
 
     boxes: list[tuple[str, list[list[float]]]] = []
@@ -601,8 +608,8 @@ def _bounds(drawing: Drawing | None, job: Job | None, toolpath: Toolpath | None)
 
 
 def _tables(report: Report) -> Iterator[ReportTable]:
-    """Yield the tables of a report: its figures, findings, worst moves, contours and
-    dimensions, none without a line."""
+    """Yield the tables of a report that have lines: figures, findings, worst moves, contours and
+    dimensions."""
     lines = report.to_text(findings=False).splitlines()
     facts = [(line[:NAME_WIDTH].strip(), line[NAME_WIDTH:].strip()) for line in lines]
     yield ReportTable("Report", (), tuple(map(TableLine, facts)))
@@ -617,13 +624,13 @@ def _tables(report: Report) -> Iterator[ReportTable]:
 
 
 def _place_in(words: str) -> tuple[float, float] | None:
-    """Return the place that a finding names, mm."""
+    """Return the place (x, y) mm that the text of a finding names, None if it names none."""
     match = _WHERE.search(words)
     return None if match is None else (float(match[1]), float(match[2]))
 
 
 def _faults(report: Report) -> tuple[tuple[float, float], ...]:
-    """Return the places of the findings of the stock, remarks left out."""
+    """Return the places of the findings about the stock, except remarks."""
     from camtool.stock.findings import StockCode
 
     codes = {each.name for each in StockCode}
@@ -642,7 +649,8 @@ def _findings(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
 
 
 def _worst(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
-    """Return the worst moves, which the report numbers from 1."""
+    """Return the title, headings and lines of the table of worst moves, which the report numbers
+    from 1."""
     lines = [
         TableLine(
             (

@@ -87,7 +87,7 @@ class StockSection(Struct, frozen=True, eq=False):
 
 
 def section_svg(title: str, section: StockSection, options: PictureOptions = AS_USUAL) -> str:
-    """Return SVG text of a section; equal input gives equal bytes. ValueError for a profile
+    """Return the SVG text of a section; equal input gives equal bytes. ValueError for a profile
     without two different places."""
     low, high = float(section.profile[0, 0]), float(section.profile[-1, 0])
     if not high > low:
@@ -127,14 +127,14 @@ def section_svg(title: str, section: StockSection, options: PictureOptions = AS_
 
 
 def height_factor(length_mm: float, height_mm: float) -> float:
-    """Return the round number by which heights are drawn larger, so that the section is no flatter
+    """Return the round factor by which heights are drawn larger, so that the picture is no flatter
     than a plot may be."""
     factor = SHAPES[0] * length_mm / (1.3 * height_mm)
     return 1.0 if factor <= 1.0 else min(round_step(factor), MAX_FACTOR)
 
 
 def _lines(section: StockSection, view: View, factor: float) -> list[str]:
-    """Return the material, its surface, and the wanted heights."""
+    """Return the SVG of the material, its surface, and the wanted heights."""
     profile = section.profile.tolist()
     surface, body = PathData(), PathData()
     bottom = section.foot_mm if section.bottom_mm is None else section.bottom_mm
@@ -159,7 +159,8 @@ def _lines(section: StockSection, view: View, factor: float) -> list[str]:
 
 
 def _wanted_heights(section: StockSection, view: View, factor: float) -> str:
-    """Return the path data of the wanted heights; interrupted where there is no limit."""
+    """Return the path data of the least and greatest wanted heights, interrupted where there is no
+    limit."""
     data = PathData()
     if section.wanted is None:
         return ""
@@ -175,7 +176,7 @@ def _wanted_heights(section: StockSection, view: View, factor: float) -> str:
 
 
 def _axes(section: StockSection, view: View, factor: float) -> tuple[str, str]:
-    """Return the ground with its grid, and the frame with ticks and numbers."""
+    """Return the SVG of the ground with its grid, and of the frame with ticks and numbers."""
     box, grid, marks, labels = view.box, PathData(), PathData(), []
     step = round_step(GAP_UNITS / view.scale)
     base = box.bottom + TICK + LABEL_GAP + TICK_CAP

@@ -140,8 +140,11 @@ class Solid(Struct, frozen=True, eq=False):
 
 
 def draw_solid(scene: Scene, options: PictureOptions) -> str:
-    """Return SVG text of a view of the stock; OptionError where moves or tools are not known,
-    or the wanted moves of the views that need them."""
+    """Return SVG text of a view of the stock.
+
+    OptionError if moves or tools are not known, or if the view needs wanted moves and there are
+    none.
+    """
     if scene.cut is None:
         raise OptionError(
             f"the view {options.view} shows the stock, and nothing cuts it here",
@@ -158,7 +161,7 @@ def draw_solid(scene: Scene, options: PictureOptions) -> str:
 
 
 def _window(pair: StockPair, options: PictureOptions) -> Box:
-    """Return the part of the plane that is shown, mm."""
+    """Return the part of the plane that is shown: left, lower, right and upper edge, mm."""
     if options.crop_mm is not None:
         x, y, wide, high = options.crop_mm
         return x, y, x + wide, y + high
@@ -168,7 +171,8 @@ def _window(pair: StockPair, options: PictureOptions) -> Box:
 
 
 def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
-    """Return the map of the part of the stock in a window, as fine as the picture."""
+    """Compute the height map of the part of the stock in a window, as fine as the pixels of the
+    picture."""
     side = max(window[2] - window[0], window[3] - window[1])
     # From above, what lies beside the window throws shadows into it.
     margin = 0.1 * side if options.view in FROM_ABOVE else 0.0
@@ -203,7 +207,7 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
 def _wanted_heights(
     pair: StockPair, stock_map: HeightMap, box: Box, options: PictureOptions
 ) -> tuple[Floats, Floats]:
-    """Return the least and the greatest height (NY, NX) mm that are wanted in each cell."""
+    """Return the least and the greatest height (NY, NX) mm that is wanted in each cell."""
     if pair.bands is not None:
         bands = pair.bands(WALL_CELLS * stock_map.cell_mm)
         rows = [
@@ -228,7 +232,8 @@ def _wanted_heights(
 
 
 def _extreme(heights: np.ndarray, extreme: np.ufunc) -> np.ndarray:
-    """Return the greatest or the least height within BESIDE_CELLS of each cell."""
+    """Return for each cell the greatest or least height within BESIDE_CELLS of it; `extreme` is
+    np.maximum or np.minimum."""
     for axis in (0, 1):
         pad = [(0, 0), (0, 0)]
         pad[axis] = (BESIDE_CELLS, BESIDE_CELLS)
@@ -240,7 +245,7 @@ def _extreme(heights: np.ndarray, extreme: np.ufunc) -> np.ndarray:
 
 
 def _notes(solid: Solid, options: PictureOptions) -> tuple[str, ...]:
-    """Return the lines below the title: stock size, deepest cut and greatest difference."""
+    """Return the lines below the title: size of the stock, deepest cut and greatest difference."""
     left, bottom, right, top = solid.pair.box_mm
     sizes = (right - left, top - bottom, solid.pair.thickness_mm)
     size_text = " × ".join(number(size, 2) for size in sizes)
@@ -267,7 +272,7 @@ def _notes(solid: Solid, options: PictureOptions) -> tuple[str, ...]:
 def _from_above(
     scene: Scene, solid: Solid, options: PictureOptions, head: str, head_end: float
 ) -> str:
-    """Return the page of a view with axes."""
+    """Return the SVG text of a view from above, with axes."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     left, bottom, right, top = _window(solid.pair, options)
     shapes = (WIDEST, TALLEST) if options.crop_mm is None else CROP_SHAPES
@@ -298,7 +303,7 @@ def _from_above(
 def _from_outside(
     scene: Scene, solid: Solid, options: PictureOptions, head: str, top: float
 ) -> str:
-    """Return the page of a view of the block with its sizes."""
+    """Return the SVG text of a view of the block from outside, with its sizes."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     camera, bar = CAMERAS[options.view], _bar_of(solid, options)
     level, is_below = options.view in LEVEL, options.view == "bottom"
@@ -335,8 +340,11 @@ def _from_outside(
 
 
 def _on_the_stock(marks: DotGroup, solid: Solid, camera: Camera) -> DotGroup:
-    """Return marks at (x, y) mm moved to where the camera sees their places on the stock; those
-    beside the stock are left out. Marks behind a higher part of the stock are seen through it."""
+    """Return marks at (x, y) mm moved to where the camera sees those places on the surface of the
+    stock; marks beside the stock are left out.
+
+    Marks behind a higher part of the stock are seen through it.
+    """
     at = np.array(marks.places, dtype=np.float64).reshape(-1, 2)
     heights = solid.height_map.at(at).clip(-solid.pair.thickness_mm)
     rows = np.column_stack([at, heights])[~np.isnan(heights)].tolist()
@@ -344,7 +352,7 @@ def _on_the_stock(marks: DotGroup, solid: Solid, camera: Camera) -> DotGroup:
 
 
 def _stage(solid: Solid, bar: MmBar, options: PictureOptions) -> Stage:
-    """Return the stage of the picture, with the colours of differences."""
+    """Return the stage of the picture; in views of differences its cells have their colours."""
     stage = stage_of(solid.height_map, solid.pair.thickness_mm, solid.pair.moves, BOARD_SHARE)
     if solid.off_mm is None:
         return stage
@@ -361,8 +369,10 @@ def _stage(solid: Solid, bar: MmBar, options: PictureOptions) -> Stage:
 def _raster(
     stage: Stage, camera: Camera, view: View, box: PageBox, options: PictureOptions
 ) -> str:
-    """Return the image that fills a box of the page, its pixels those of the picture as it is
-    written, or of one that is MAX_RASTER_PX wide."""
+    """Return the SVG image of the stage that fills a box of the page.
+
+    It has one pixel for each pixel of the picture, up to a picture width of MAX_RASTER_PX.
+    """
     size_px = options.size_px or SVG_WIDTH_PX
     per_unit = min(size_px, MAX_RASTER_PX) / page_width(size_px)
     left, right = math.floor(box.left * per_unit), math.ceil(box.right * per_unit)
@@ -381,7 +391,7 @@ def _raster(
 
 
 def _ghost(scene: Scene, camera: Camera, view: View) -> str:
-    """Return the drawn contours on the top of the stock."""
+    """Return the SVG of the drawn contours, laid on the top of the stock."""
     if scene.drawing is None or not len(scene.drawing.paths):
         return ""
     # The plane of the drawing, as the camera sees it: three places give the matrix.
@@ -398,7 +408,8 @@ def _ghost(scene: Scene, camera: Camera, view: View) -> str:
 
 
 def _deepest(solid: Solid, camera: Camera, view: View) -> str:
-    """Return the face of the block, and the outline of the deepest cuts behind it, dashed."""
+    """Return the SVG of the block's front face, and of the outline of the deepest cuts behind it,
+    dashed."""
     front = camera.direction[0] == 0.0
     low = solid.height_map.heights.min(axis=0 if front else 1).clip(-solid.pair.thickness_mm)
     begins = np.concatenate([[0], np.flatnonzero(np.diff(low)) + 1])
@@ -424,7 +435,7 @@ def _deepest(solid: Solid, camera: Camera, view: View) -> str:
 
 
 def _entries(scene: Scene, options: PictureOptions) -> list[LegendEntry]:
-    """Return the legend."""
+    """Return the entries of the legend."""
     if options.view in LEVEL:
         return [LegendEntry(line_swatch(OUTLINE, GHOST_PEN, DASHES), "deepest cuts behind")]
     if scene.drawing is None or not len(scene.drawing.paths) or options.view in ("top", "bottom"):
@@ -436,7 +447,7 @@ def _entries(scene: Scene, options: PictureOptions) -> list[LegendEntry]:
 
 
 def _corners(solid: Solid, camera: Camera) -> Floats:
-    """Return the corners of the block (8, 2) on the picture, mm: X changes first, then Y, then
+    """Return the corners (8, 2) of the block on the picture, mm: X changes fastest, then Y, then
     Z."""
     (left, right), (bottom, top) = _extents(solid)
     heights = (-solid.pair.thickness_mm, 0.0)
@@ -446,15 +457,15 @@ def _corners(solid: Solid, camera: Camera) -> Floats:
 
 
 def _extents(solid: Solid) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return ends of the block that is shown in X and in Y, mm; the map may reach beyond it by
-    less than a cell."""
+    """Return the lowest and highest X, and Y, of the shown part of the block, mm; the map may
+    reach beyond it by less than a cell."""
     left, bottom = solid.height_map.corner_mm
     right, top = solid.ends_mm
     return (left, right), (bottom, top)
 
 
 def _sizes(solid: Solid, camera: Camera, view: View) -> str:
-    """Return the width, the depth and the thickness of the block beside its lower edges."""
+    """Return the SVG of width, depth and thickness of the block, beside its lower edges."""
     corners = [view.page(*place) for place in _corners(solid, camera).tolist()]
     across, along = ((high - low) for low, high in _extents(solid))
     names = (f"{number(across, 1)} mm", f"{number(along, 1)} mm")
@@ -513,7 +524,7 @@ class MmBar(Struct, frozen=True, eq=False):
         return BAR_GAP + max(BAR_WIDTH + 12.0 + widest, text.width(self.name, TICK_CAP))
 
     def draw(self, box: PageBox) -> str:
-        """Return the bar right of the plot, no higher than MAX_BAR."""
+        """Return the SVG of the bar, right of the plot and no higher than MAX_BAR."""
         height = min(box.height - 2.0 * NAME_LIFT, MAX_BAR)
         bar_x, top = box.right + BAR_GAP, 0.5 * (box.top + box.bottom - height)
         sides: Look = {"x": bar_x, "y": top, "width": BAR_WIDTH, "height": height}
@@ -535,7 +546,7 @@ class MmBar(Struct, frozen=True, eq=False):
 
 
 def _bar_of(solid: Solid, options: PictureOptions) -> MmBar:
-    """Return the bar of a picture: depths, or differences from the wanted heights."""
+    """Return the colour bar of a picture: of depths, or of differences from the wanted heights."""
     if solid.off_mm is None:
         return MmBar("depth (mm)", solid.deepest_mm or 1.0, floor_colours(BAR_STEPS), True)
     colours = [channels(colour) for colour in bin_colours(dark=options.dark)]

@@ -42,17 +42,18 @@ def number(value: float, decimals: int = LENGTH_DECIMALS) -> str:
 
 
 def clean(text: str) -> str:
-    """`text` with what XML 1.0 cannot hold (control characters, lone surrogates) replaced."""
+    """Return the text with "�" in place of what XML 1.0 cannot hold: control characters, lone
+    surrogates."""
     return re.sub(_NOT_XML, _NO_XML, text)
 
 
 def one_line(text: str) -> str:
-    """`text` with every run of white space made one space."""
+    """Return the text with every run of white space replaced by one space."""
     return " ".join(text.split())
 
 
 def escape(text: str) -> str:
-    """`text` for use between tags and inside a double-quoted attribute."""
+    """Return the text escaped for use between tags and inside a double-quoted attribute."""
     escaped = clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     escaped = escaped.replace('"', "&quot;")
     # A reader would turn bare white space of an attribute into blanks.
@@ -69,7 +70,7 @@ def element(name: str, attributes: Attributes, *children: str) -> str:
 
 
 def title(text: str) -> str:
-    """Return the element that names its parent to people and to screen readers."""
+    """Return a `<title>` element, which tells people and screen readers what its parent shows."""
     return f"<title>{escape(text)}</title>"
 
 
@@ -91,15 +92,16 @@ class PathData:
         return self._text.tell() > 0
 
     def move(self, x: float, y: float) -> None:
-        """Begin a new subpath."""
+        """Begin a new subpath at this point."""
         self._add("M", x, y)
 
     def line(self, x: float, y: float) -> None:
-        """A straight line to here."""
+        """Add a straight line to this point."""
         self._add("L", x, y)
 
     def arc(self, x: float, y: float, *, radius: float, sweep_rad: float) -> None:
-        """A circular arc to here, |sweep| < 2π; a positive sweep turns from +X towards +Y.
+        """Add a circular arc to this point, |sweep| < 2π; a positive sweep turns from +X towards
+        +Y.
 
         In SVG, large-arc is 1 for |sweep| > π, and sweep-flag is 1 for growing angles.
         """
@@ -109,7 +111,7 @@ class PathData:
         self._text.write(f"A{size} {size} 0 {large} {growing} {end}")
 
     def close(self) -> None:
-        """A straight line to the beginning of the subpath."""
+        """Close the subpath by a straight line to its beginning."""
         self._text.write("Z")
 
     def _add(self, command: str, x: float, y: float) -> None:

@@ -34,12 +34,12 @@ def _glyph_or_box(letter: str) -> Glyph:
 
 
 def width(text: str, cap: float) -> float:
-    """Return the width on the page of `text` at this height of capitals."""
+    """Return the width of a text on the page; `cap` is the height of its capitals."""
     return sum(_glyph_or_box(letter).advance for letter in one_line(text)) * cap / CAP_UNITS
 
 
 def shortened(text: str, cap: float, limit: float) -> str:
-    """`text` on one line, cut and ended with "…" when it is wider than `limit`."""
+    """Return the text on one line, cut and ended with "…" if it is wider than `limit`."""
     text = one_line(text)
     if width(text, cap) <= limit:
         return text
@@ -52,8 +52,10 @@ def shortened(text: str, cap: float, limit: float) -> str:
 
 
 def wrapped(text: str, cap: float, limit: float) -> list[str]:
-    """`text` as lines no wider than `limit`, broken at blanks but not before a unit; a longer word
-    is shortened."""
+    """Return the text broken into lines no wider than `limit`.
+
+    Lines break at blanks but not before a unit; a longer word is shortened.
+    """
     lines: list[str] = []
     for word in filter(None, _UNIT.split(one_line(text))):
         longer = f"{lines[-1]} {word}" if lines else word
@@ -67,8 +69,8 @@ def wrapped(text: str, cap: float, limit: float) -> list[str]:
 def label(
     text: str, place: tuple[float, float], style: TextStyle, *, full_text: str | None = None
 ) -> str:
-    """Return the strokes of `text` with its baseline at `place`; `full_text` is the text for
-    screen readers."""
+    """Return the SVG of a text in strokes with its baseline at `place`; `full_text` is the text
+    for screen readers."""
     data = strokes(text, place, style)
     spoken = text if full_text is None else full_text
     return element(
@@ -80,7 +82,7 @@ def label(
 
 
 def strokes(text: str, place: tuple[float, float], style: TextStyle) -> str:
-    """Return the path data of a label; empty when there is nothing to see."""
+    """Return the path data of the strokes of a text; "" when there is nothing to see."""
     shown = one_line(text)
     scale = style.cap / CAP_UNITS
     x = place[0] - {"start": 0.0, "middle": 0.5, "end": 1.0}[style.anchor] * width(
@@ -98,7 +100,7 @@ def strokes(text: str, place: tuple[float, float], style: TextStyle) -> str:
 
 
 def stroke_of(style: TextStyle) -> Look:
-    """Return the pen of a label."""
+    """Return the look of the pen that draws labels of this style."""
     return {
         "fill": "none",
         "stroke": style.colour,

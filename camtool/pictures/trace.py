@@ -47,8 +47,10 @@ class ErrorTrace(Struct, frozen=True, eq=False):
 
 
 def trace_of(scene: Scene, times: float = 1.0) -> ErrorTrace | None:
-    """Return the predicted path of a scene, its errors drawn `times` as large where the wanted
-    path is known; None when there is none or it never cuts."""
+    """Return the predicted path of a scene; None when there is none or it never cuts.
+
+    Where the wanted path is known, its errors are drawn `times` as large.
+    """
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or not cutting.any():
         return None
@@ -64,15 +66,16 @@ def trace_of(scene: Scene, times: float = 1.0) -> ErrorTrace | None:
 
 
 def bins_of(trace: ErrorTrace) -> Ints:
-    """Return (T−1,) the step of the map for each piece of the path, by the larger error of its
-    ends; −1 where the tool does not cut."""
+    """Return the step of the colour map for each piece of the path (T−1,), by the larger error of
+    its ends; −1 where the tool does not cut."""
     worse = np.maximum(trace.error_um[:-1], trace.error_um[1:])
     step = np.minimum((worse / trace.top_um * BINS).astype(np.int64), BINS - 1)
     return np.where(trace.cutting[1:], step, -1)
 
 
 def lines_by_step(trace: ErrorTrace, window_mm: float) -> list[list[Floats]]:
-    """For each step of the map, its lines: arrays (n, 2) of points, n ≥ 2."""
+    """Return for each step of the colour map the lines in its colour: arrays (n, 2) of points, n ≥
+    2."""
     keep = _kept_rows(trace, MERGED_SHARE * window_mm)
     drawn_part = ErrorTrace(
         trace.points[keep],
@@ -92,8 +95,8 @@ def lines_by_step(trace: ErrorTrace, window_mm: float) -> list[list[Floats]]:
 
 
 def _kept_rows(trace: ErrorTrace, apart_mm: float) -> Ints:
-    """Return rows of the points to draw: those at least `apart_mm` from the one before, and all
-    ends of cuts."""
+    """Return the rows of the points to draw: those at least `apart_mm` from the one drawn before,
+    and all ends of cuts."""
     cutting = trace.cutting
     ends = np.ones(len(cutting), dtype=np.bool_)
     ends[1:-1] = (cutting[1:-1] != cutting[:-2]) | (cutting[1:-1] != cutting[2:])
@@ -108,12 +111,12 @@ def _kept_rows(trace: ErrorTrace, apart_mm: float) -> Ints:
 
 
 def decimals_in(window_mm: float) -> int:
-    """Return the number of decimals of coordinates in a window of this width."""
+    """Return the number of decimals that coordinates need in a window of this width."""
     return max(0, math.ceil(-math.log10(FINEST_SHARE * window_mm)))
 
 
 def round_pen(view: View, pen: float) -> Look:
-    """Return the look of lines of a pen's width with round ends and joints."""
+    """Return the look of a pen of this width with round ends and joints."""
     return {
         "fill": "none",
         "stroke-width": view.mm(pen),
@@ -123,7 +126,7 @@ def round_pen(view: View, pen: float) -> Look:
 
 
 def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
-    """Return the coloured path, in mm."""
+    """Return the SVG of the coloured path, in mm."""
     (low, high), colours = view.x_range, bin_colours()
     decimals = decimals_in(high - low)
     paths = []
@@ -147,8 +150,8 @@ def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
 
 
 def exaggerated(points: Floats, wanted_path: Segments, times: float) -> Floats:
-    """Return (T, 2) mm: points (T, 2) mm moved `times` as far from the nearest point of
-    `wanted_path`."""
+    """Return points (T, 2) mm moved away from the nearest point of `wanted_path` to `times` their
+    distance."""
     if not len(points) or not len(wanted_path):
         return points
     foot = nearest_points(points, wanted_path)
@@ -156,8 +159,8 @@ def exaggerated(points: Floats, wanted_path: Segments, times: float) -> Floats:
 
 
 def nearest_points(points: Floats, wanted_path: Segments) -> Floats:
-    """Return (T, 2) mm: of the lines and arcs of `wanted_path`, the point nearest to each of the
-    points."""
+    """Return for each of the points the nearest point (T, 2) mm on the lines and arcs of
+    `wanted_path`."""
     from camtool.kernels.fits import nearest_rows
 
     boxes = segment_boxes(wanted_path)
@@ -174,7 +177,8 @@ def nearest_points(points: Floats, wanted_path: Segments) -> Floats:
 
 
 def _project_on_arcs(points: Floats, wanted_path: Segments, row: Ints) -> Floats:
-    """Project points on arcs along the ray from the centre; off the arc, take its nearer end."""
+    """Return the nearest point on an arc, row by row: along the ray from its centre, or else the
+    nearer end of the arc."""
     spoke = points - wanted_path.centre[row]
     length = np.hypot(spoke[:, 0], spoke[:, 1])
     along = spoke / np.where(length > 0.0, length, 1.0)[:, None]

@@ -68,7 +68,7 @@ class View(Struct, frozen=True):
     centre: tuple[float, float]
 
     def page(self, x: float, y: float) -> tuple[float, float]:
-        """Page place of a point in mm: Y is up in mm and down on the page."""
+        """Return the place on the page of a point in mm: Y is up in mm and down on the page."""
         across = (self.box.left + self.box.right) / 2.0
         middle_y = (self.box.top + self.box.bottom) / 2.0
         return (
@@ -77,7 +77,7 @@ class View(Struct, frozen=True):
         )
 
     def matrix(self) -> str:
-        """Return the SVG transform that does what `page` does."""
+        """Return the SVG transform that maps mm to the page as `page` does."""
         x, y = self.page(0.0, 0.0)
         return f"matrix({self.scale:.9g} 0 0 {-self.scale:.9g} {x:.9g} {y:.9g})"
 
@@ -104,7 +104,7 @@ class View(Struct, frozen=True):
 
 
 def page_width(size_px: int) -> float:
-    """Return units of the page of a picture that is `size_px` wide."""
+    """Return the width, in units of the page, of a picture that is `size_px` wide."""
     low, high = ORDINARY_PX
     if low <= size_px <= high:
         return PAGE
@@ -129,7 +129,8 @@ def points_box(points: Floats) -> Floats | None:
 
 
 def window(part: Floats | None, surroundings: Floats | None) -> Floats:
-    """Return the window, mm: the part, with what is around it unless that is far away."""
+    """Return the window to show, mm: the part with its surroundings, or the part alone if these
+    reach far away from it."""
     joined = union([part, surroundings])
     if joined is None:
         half = EMPTY_WINDOW_MM / 2.0
@@ -148,8 +149,11 @@ def fit(
     right: float,
     shapes: tuple[float, float] = (WIDEST, TALLEST),
 ) -> View:
-    """Return the view of a window in a box from `left` to `right`, of the window's shape;
-    `shapes` are the least and the greatest height, as a share of the width."""
+    """Return the view that shows a window in a box from `left` to `right`.
+
+    The box has the shape of the window; `shapes` are the least and the greatest height, as a share
+    of the width.
+    """
     sizes = shown[:, 1] - shown[:, 0]
     left, top, right = float(math.ceil(left)), float(math.ceil(top)), float(math.floor(right))
     width = right - left
@@ -186,5 +190,5 @@ def decimals_of(step: float) -> int:
 
 
 def multiples(low: float, high: float, step: float) -> list[float]:
-    """Return the multiples of `step` in low … high."""
+    """Return the multiples of `step` from low to high."""
     return [k * step for k in range(math.ceil(low / step), math.floor(high / step) + 1)]

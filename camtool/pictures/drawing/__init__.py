@@ -13,7 +13,8 @@ from importlib.resources import files
 
 
 def drawing_page(width_mm: float, height_mm: float, grid_mm: float) -> bytes:
-    """Return the page for a sheet of this size, whose lower left corner is part zero."""
+    """Return the HTML page for drawing on a sheet of this size, mm, whose lower left corner is
+    part zero."""
     folder = files(__package__)
     page, style, script = (
         (folder / f"drawing.{suffix}").read_text(encoding="utf-8")

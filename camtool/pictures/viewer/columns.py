@@ -59,8 +59,8 @@ ones, or as far as these are known, where that is more."""
 
 
 def columns_of(content: Content, run: Playback | None) -> Columns:
-    """Return the columns of numbers that the page's script draws by functions of its own (moves,
-    drawing, trace …); a column is empty where the scene has nothing of that kind."""
+    """Return the columns that the page's script draws by functions of its own (moves, drawing,
+    trace …); those that the scene lacks are empty."""
     scene = content.scene
     places = {
         "start_at": content.moves.starts,
@@ -76,8 +76,8 @@ def columns_of(content: Content, run: Playback | None) -> Columns:
 
 
 def part_columns(name: str, part: Part) -> Columns:
-    """Return the columns of a part of a layer, which begin with `name`: the places of dots and
-    texts, or from where to where lines and arcs go."""
+    """Return the columns of a part of a layer, with names that begin with `name`: places of dots
+    and texts, or ends of lines and arcs."""
     if not isinstance(part, LineGroup):
         return {f"{name}_at": np.array(part.places, dtype=FLOAT).reshape(-1, 2)}
     chains = part.chains
@@ -100,8 +100,10 @@ class StockBox(Struct, frozen=True):
 
 
 def height_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
-    """Return the heights that the stock should have, and those that the set-ups before have
-    left; empty where they are not known, or nothing was cut before."""
+    """Return the heights that the stock should have, and those that earlier set-ups have left.
+
+    They are empty if they are not known, or nothing was cut before.
+    """
     goal, heights_before = None, None
     if stock is not None and pair is not None:
         left, low, right, _ = stock.box
@@ -119,8 +121,12 @@ def height_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
 
 
 def _run_columns(name: str, heights: HeightMap | None, stock: StockBox | None) -> Columns:
-    """Heights row by row on the grid of the stock, each as often as the column of counts says, in
-    shares of 1/GOAL_COUNTS of its thickness; empty without heights."""
+    """Return heights as two columns: values, and how often each is repeated, row by row on the
+    grid of the stock.
+
+    A value counts shares of 1/GOAL_COUNTS of its thickness; both columns are empty without
+    heights.
+    """
     values, counts = np.empty(0, dtype=INT), np.empty(0, dtype=INT)
     if heights is not None and stock is not None:
         shares = np.rint(heights.heights.ravel() * (GOAL_COUNTS / -stock.bottom))
@@ -132,10 +138,12 @@ def _run_columns(name: str, heights: HeightMap | None, stock: StockBox | None) -
 
 
 def slide_columns(pair: StockPair | None, rows: int, cell_mm: float) -> Columns:
-    """Return the moves of the tips that cut the stock: where the first one begins and each one
-    ends, and how many of them each of the `rows` of the toolpath makes. Moves between which
-    nothing bends by more than a share of `cell_mm` are one; there are MAX_POINTS at most, if
-    need be coarser."""
+    """Return the moves of the tool tips that cut the stock, and how many of them each of the
+    `rows` of the toolpath makes.
+
+    Places are where the first move begins and where each one ends. Successive moves that bend by
+    less than a share of `cell_mm` become one; there are MAX_POINTS at most, if need be coarser.
+    """
     moves = None if pair is None else pair.moves
     if moves is None or not len(moves):
         no_counts = np.empty(0, dtype=INT)
@@ -162,8 +170,11 @@ ENTRY_DEG = -1.0
 
 
 def engagement_columns(pair: StockPair | None, toolpath: Toolpath | None) -> Columns:
-    """Return the greatest engagement of the tool in each of N rows outside of entries, degrees:
-    ENTRY_DEG for rows of entries alone, NaN where nothing is cut; empty where no tool is known."""
+    """Return the greatest engagement of the tool in each of N rows, degrees, entries left out.
+
+    It is ENTRY_DEG for rows that only enter, NaN where nothing is cut, and the column is empty
+    where no tool is known.
+    """
     result = np.full(0 if toolpath is None else len(toolpath), np.nan)
     if pair is None or toolpath is None or not len(pair.moves) or len(pair.moves) > MAX_ENGAGED:
         return {"move_engaged": result[:0].astype(FLOAT)}
@@ -182,8 +193,8 @@ Named = dict[str, tuple[str, int, int] | tuple[str, int, int, float]]
 
 
 def packed(columns: Columns) -> tuple[Named, bytes]:
-    """Return ({name: (type, byte offset, count)}, all bytes); a column of counts has its unit
-    besides."""
+    """Return all columns as bytes, and a table {name: (type, byte offset, count)} of them; a
+    column of counts has its unit as well."""
     named: Named = {}
     parts: list[bytes] = []
     offset = 0
@@ -209,7 +220,10 @@ def packed(columns: Columns) -> tuple[Named, bytes]:
 
 def stepped(numbers: npt.NDArray[np.integer], stride: int) -> bytes:
     """Return integers as differences from the number `stride` before, in as many bytes as each
-    needs: 7 bits a byte, the lowest first; the highest bit says that more follow."""
+    needs.
+
+    A byte holds 7 bits, the lowest first; its highest bit says that more follow.
+    """
     flat = numbers.ravel().astype(np.int64)
     steps = flat - np.concatenate([np.zeros(stride, dtype=np.int64), flat[:-stride]])[: len(flat)]
     zigzag = (steps << 1) ^ (steps >> 63)
@@ -224,8 +238,8 @@ def stepped(numbers: npt.NDArray[np.integer], stride: int) -> bytes:
 
 
 def drawing_layers(drawing: Drawing) -> list[str]:
-    """Return the drawing's layers in the order of their first paths, then of their first
-    points."""
+    """Return the names of the drawing's layers, in the order of their first paths, then of their
+    first marks."""
     return list(dict.fromkeys((*drawing.layers, *(mark.layer for mark in drawing.marks))))
 
 
@@ -288,8 +302,11 @@ def _moves(scene: Scene, run: Playback | None) -> Columns:
 
 
 def _wide(scene: Scene, toolpath: Toolpath) -> npt.NDArray[np.generic]:
-    """Return (N, 2) mm: how wide the tool cuts on each side at the start and the end of each
-    feed, where that changes with its depth or from tool to tool; (0, 2) where it does not."""
+    """Return how far (N, 2) mm the tool cuts to each side at the start and the end of each feed;
+    (0, 2) if that is the same all over.
+
+    It changes with the depth of a tapered tool, and from tool to tool.
+    """
     turns = scene.turns if scene.nose is None else ((0, scene.nose),)
     if not turns:
         return np.empty((0, 2), dtype=FLOAT)
@@ -306,7 +323,7 @@ def _wide(scene: Scene, toolpath: Toolpath) -> npt.NDArray[np.generic]:
 
 
 def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
-    """0 rapids and events, 1 level feeds, 2 feeds that change Z."""
+    """Return the sort of each row: 0 rapids and events, 1 level feeds, 2 feeds that change Z."""
     if not len(toolpath):
         return np.empty(0, dtype=BYTE)
     rise = np.abs(toolpath.end[:, 2] - toolpath.starts[:, 2]) > POSITION_EPS_MM
@@ -315,8 +332,8 @@ def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:
 
 
 def _wanted_columns(wanted_path: Segments | None) -> Columns:
-    """Return the wanted path: where each line or arc ends, and where those begin that do not
-    begin at the end of the one before."""
+    """Return the wanted path: the end of each line or arc, and the begin of those that do not
+    continue the one before."""
     if wanted_path is None or not len(wanted_path):
         zeros = np.empty(0)
         return {
@@ -341,7 +358,7 @@ def _arc_columns(
     centre: Floats,
     sweep: Floats,
 ) -> Columns:
-    """Pack the indices of rows that are arcs, and centre x, y and sweep of each."""
+    """Return the indices of the rows that are arcs, and the centre x, y and sweep of each."""
     rows = np.flatnonzero(is_arc)
     bends = np.column_stack([centre[rows], sweep[rows]])
     return {f"{name}_arc": rows.astype(INT), f"{name}_bend": bends.astype(FLOAT)}
@@ -367,8 +384,10 @@ class Traced(Struct, frozen=True, eq=False):
 
 
 def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
-    """Return the predicted path of a scene, in colours of a map that ends at `top_um`.
-    ValueError when the playback does not have a row for each of its points."""
+    """Return the predicted path of a scene, coloured by a map that ends at `top_um`.
+
+    ValueError when the playback does not have a row for each of its points.
+    """
     worst = np.array(scene.worst, dtype=np.float64).reshape(-1, 2)
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or run is None or not len(run.trace_row):
@@ -395,8 +414,8 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
 
 
 def _offsets(points: Floats, is_chosen: np.ndarray, wanted_path: Segments | None) -> Floats:
-    """Return (T, 2) mm: the vector from the nearest point of the wanted path to each chosen
-    point, else 0."""
+    """Return the vector (T, 2) mm from the nearest point of the wanted path to each chosen point;
+    0 for the others."""
     offsets = np.zeros_like(points)
     if wanted_path is not None and len(wanted_path) and is_chosen.any():
         offsets[is_chosen] = points[is_chosen] - nearest_points(points[is_chosen], wanted_path)
@@ -437,8 +456,12 @@ COARSER = 4.0
 
 
 def thinned(points: Floats, bins: Ints, largest_mm: float, max_points: int = MAX_POINTS) -> Ints:
-    """Ascending rows of the points (T, 2) mm, with their colours (T,), that are kept: among them
-    the ends of all pieces of one colour, unless these alone are more than `max_points`."""
+    """Return the ascending rows of the points (T, 2) mm to keep, so that the path changes by no
+    more than need be.
+
+    The ends of all pieces of one colour, `bins` (T,), are kept, unless these alone are more than
+    `max_points`.
+    """
     kept_rows = np.arange(len(points))
     near_mm = finest_mm(largest_mm)
     while True:
@@ -454,14 +477,14 @@ def thinned(points: Floats, bins: Ints, largest_mm: float, max_points: int = MAX
 
 
 def finest_mm(largest_mm: float) -> float:
-    """Return the distance by which a path with this largest error may be coarser, mm: also the
+    """Return by how much, mm, a path with this largest error may be simplified; this is also the
     unit of its points."""
     return max(min(FINEST_MM, FINEST_SHARE * largest_mm), MIN_UNIT_MM)
 
 
 def _halved(points: Floats, bins: Ints, kept_rows: Ints, near_mm: float) -> Ints:
-    """Return the rows without those of the 2nd, 4th, … points that may be left out; the first
-    and the last one stay."""
+    """Return the rows without those of the 2nd, 4th, … points that lie near enough to the line
+    between their neighbours; the first and the last row stay."""
     middle = np.arange(1, len(kept_rows) - 1, 2)
     before, point, after = kept_rows[middle - 1], kept_rows[middle], kept_rows[middle + 1]
     # The colour of a piece is that of the point that it leads to.

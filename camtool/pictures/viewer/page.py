@@ -87,9 +87,11 @@ _SLOT = re.compile(r"\{([a-z]+)\}")
 
 
 def viewer_page(scene: Scene, live: str = "") -> bytes:
-    """Return the HTML file of a scene, UTF-8. Without a playback in the scene every move runs
-    at its feed. `live`: HTML of the state of a program that is being sent. ValueError when the
-    playback is that of another toolpath."""
+    """Return the HTML file of a scene, UTF-8.
+
+    Without a playback in the scene every move runs at its feed. `live`: HTML of the state of a
+    program that is being sent. ValueError when the playback is that of another toolpath.
+    """
     run, content = _run(scene), content_of(scene)
     traced = traced_of(scene, run, _top_um(scene, run))
     rows, columns = _rows(content)
@@ -168,8 +170,8 @@ MIN_STEP_MM = 0.005
 
 
 def _cutting(scene: Scene, pair: StockPair | None, stock: StockBox | None) -> dict[str, object]:
-    """Return the stock, the cutters with the first row of the turn of each, and what is known
-    of the tools above their flutes, for JSON."""
+    """Return, for JSON, the stock, the cutting profiles and the bodies of the tools, each with the
+    first row that it cuts."""
     if pair is None or stock is None:
         return {"stock": None, "cutters": [], "bodies": []}
     begins = np.flatnonzero(np.diff(pair.moves.tool, prepend=-1))
@@ -183,8 +185,8 @@ def _cutting(scene: Scene, pair: StockPair | None, stock: StockBox | None) -> di
 
 
 def _body(tool: Tool) -> tuple[float | None, ...]:
-    """Return the length of a tool's edges, the radius of its shank, its stickout, and radius and
-    length of its holder, mm; None where not known."""
+    """Return the length of a tool's edges, the radius of its shank, its stickout, and the radius
+    and length of its holder, mm; None for what is not known."""
 
     def half(diameter: float | None) -> float | None:
         return None if diameter is None else 0.5 * diameter
@@ -199,8 +201,10 @@ def _body(tool: Tool) -> tuple[float | None, ...]:
 
 
 def _stock_of(scene: Scene) -> StockPair | None:
-    """Return the stock and the moves that cut it; those of a point where no tool is known; None
-    without moves."""
+    """Return the stock and the moves that cut it; None without moves.
+
+    Where no tool is known, the moves are those of a point.
+    """
     toolpath = scene.toolpath
     if toolpath is None or not toolpath.is_motion.any():
         return None
@@ -227,8 +231,8 @@ def _box_of(pair: StockPair) -> StockBox:
 
 
 def _rows(content: Content) -> tuple[list[dict[str, object]], Columns]:
-    """Return the layers that the script draws by their parts, from the ground up, and their
-    columns."""
+    """Return the layers that the script draws from their parts, the lowest first, and the columns
+    of these parts."""
     rows: list[dict[str, object]] = []
     columns: Columns = {}
     for layer in from_the_ground_up():
@@ -245,7 +249,7 @@ def _rows(content: Content) -> tuple[list[dict[str, object]], Columns]:
 
 
 def _part_style(part: Part) -> dict[str, object]:
-    """Return name, colours and widths of a part, on light and on dark ground, for JSON."""
+    """Return, for JSON, the name, colours and widths of a part, on light and on dark ground."""
     if isinstance(part, TextGroup):
         return {"texts": part.texts, "line": _light_and_dark(part.colour)}
     look = part.look
@@ -262,13 +266,13 @@ def _part_style(part: Part) -> dict[str, object]:
 
 
 def _light_and_dark(colour: str | float) -> dict[str, str] | None:
-    """Return a colour on light and on dark ground; None for none."""
+    """Return a colour for light and for dark ground; None if there is none."""
     paint = str(colour)
     return None if paint == "none" else {"light": paint, "dark": on_dark(paint)}
 
 
 def _ambiguous(drawing: Drawing) -> list[tuple[float, float]]:
-    """Open ends, crossings and branches, (x, y) mm."""
+    """Return the places (x, y) mm of open ends, crossings and branches."""
     healing = drawing.healing
     places = [gap.at_mm for gap in drawing.gaps]
     places += [one.at_mm for one in healing.crossings] + [one.at_mm for one in healing.branches]
@@ -306,13 +310,13 @@ def _policy(script: str, style: str) -> str:
 
 
 def _json(value: Mapping[str, object]) -> str:
-    """Return JSON in ASCII without any character that has a meaning in HTML."""
+    """Return JSON in ASCII without characters that have a meaning in HTML."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
 def _one_line(words: str) -> str:
-    """Words without line breaks: these separate the lines of the program."""
+    """Return the text without line breaks, which separate the lines of the program."""
     return words.replace("\r", " ").replace("\n", " ")
 
 
@@ -354,7 +358,7 @@ _ID = re.compile(' id="[^"]*"')
 
 
 def circles_of(scene: Scene) -> str:
-    """Return the HTML of the plots in the order of the report; empty without a full circle."""
+    """Return the HTML of the plots of full circles, in the order of the report; "" without any."""
     # The same circle in the other direction is in the plot of the first one.
     first = [
         number
@@ -393,8 +397,8 @@ def _figure(scene: Scene, circle_number: int) -> str:
 
 
 def _joined(errors_um: Floats) -> Floats:
-    """Return (B, 3) least, mean and largest error of neighbours joined; NaN where all of them
-    are."""
+    """Return least, mean and largest error (B, 3) of groups of neighbouring bins, so that few
+    enough remain; NaN where all of a group are."""
     joined_count = max(1, math.ceil(len(errors_um) / BINS_SHOWN))
     if len(errors_um) % joined_count:
         return errors_um
