@@ -305,8 +305,8 @@ class _Directions:
 def _refine(
     nodes: _NodeColumns, curve: Curve, directions: _Directions, tolerance_mm: float
 ) -> None:
-    """Insert nodes, in place, in the middle of steps until each step is fine enough, or as short
-    as one position, or there are too many."""
+    """Halve steps, by inserting nodes in place, until each step is fine enough, or as short as one
+    position, or there are too many."""
     is_new = np.ones(len(nodes.t) - 1, dtype=np.bool_)
     while is_new.any() and len(nodes.t) < MAX_NODES:
         rows = np.flatnonzero(is_new)

@@ -37,7 +37,7 @@ class Turn(Struct, frozen=True):
 
     @property
     def back(self) -> Turn:
-        """Return the inverse map."""
+        """The inverse map."""
         x, y = (-sign * by for sign, by in zip(self.signs, self.shift_mm, strict=True))
         return Turn(self.signs, (x, y))
 

@@ -86,14 +86,14 @@ class Floor(Struct, frozen=True, eq=False):
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
     def has(self, points: Floats) -> Bools:
-        """Return the mask (P,) of the points (P, 2) on the floor."""
+        """Return the mask (P,) of the points (P, 2) that lie on the floor."""
         is_inside = self._holds(self.layer.inwards(points), 0.0)
         is_inside &= self.solid.bands(points)[:, 0] >= -self.depth_mm - SAME_DEPTH_MM
         return np.asarray(is_inside & self.is_beyond_tabs(points))
 
     def meets(self, squares: Floats) -> Bools:
-        """Return the mask (K,) of the squares (K, 3), middle and half a side, that may have
-        points of the floor."""
+        """Return the mask (K,) of the squares (K, 3), middle and half a side, that may contain a
+        point of the floor."""
         reach = math.sqrt(2.0) * squares[:, 2]
         is_near = self._holds(self.layer.inwards(squares[:, :2]), reach)
         is_near &= self.solid.bounds(squares)[:, 1] >= -self.depth_mm - SAME_DEPTH_MM
@@ -109,7 +109,8 @@ class Floor(Struct, frozen=True, eq=False):
         return np.asarray(self._beyond_tabs(points) > 0.0)
 
     def _beyond_tabs(self, points: Floats) -> Floats:
-        """Return how far (P,) points lie beyond the discs of the tabs, mm; inf without any."""
+        """Return the distance (P,) mm of points from the nearest disc of a tab, negative inside;
+        inf without tabs."""
         distances = [np.hypot(*(points - tab[:2]).T) - tab[2] for tab in self.tabs]
         return np.asarray(np.min(distances, axis=0) if distances else np.full(len(points), np.inf))
 
@@ -126,7 +127,8 @@ class Floors:
     """The floors that the operations of a plan leave."""
 
     def __init__(self, steps: Sequence[Step], beside_mm: float) -> None:
-        """Take the steps, and by how much the slides are off in the plane at most, mm."""
+        """Take the steps of the plan, and the largest distance, mm in the plane, of the slides
+        from the planned path."""
         self._exact = wanted_solid(steps, 0.0)
         band_mm = MARGIN_MM + beside_mm
         self._solid = WantedSolid(self._exact.may, (), band_mm)
@@ -140,7 +142,7 @@ class Floors:
         self._tabs = np.array(tabs, dtype=np.float64).reshape(-1, 3)
 
     def at(self, place_mm: tuple[float, float]) -> Floor | None:
-        """Return the floor at a place in the work frame; None where none is asked for, and on a
+        """Return the floor at a place in the work frame; None where nothing is to be cut, and on a
         slope."""
         places = np.array([place_mm])
         low = float(self._exact.bands(places)[0, 0])
@@ -161,8 +163,8 @@ class Floors:
         return Floor(place_mm, part, self._solid, begins, self._tabs, depth_wanted, is_line)
 
     def places(self) -> Iterator[tuple[float, float]]:
-        """Yield a place on each floor, several on some: in closed regions the one of a lattice
-        that is farthest from the walls, on lines their middle."""
+        """Yield at least one place on each floor: in a closed region that point of a lattice which
+        is farthest from the walls, on a line its middle."""
         for layer in self._exact.must:
             for line in layer.lines:
                 single = replace(layer, lines=Polylines.of([line]))
@@ -193,8 +195,8 @@ def _points_along(layer: WantedLayer) -> Floats:
 
 
 def _part_of(layer: WantedLayer, place_mm: tuple[float, float]) -> WantedLayer:
-    """Return the layer with those of its lines alone that bound the floor at a place: the contour
-    around it with the islands in it, or the nearest line."""
+    """Return the layer with only those of its lines that bound the floor at a place: the contour
+    around it with its islands, or the nearest line."""
     lines = layer.lines
     if layer.side == INSIDE:
         levels = Nesting(lines).levels
@@ -219,8 +221,12 @@ def _is_within(line: Polyline, place_mm: tuple[float, float]) -> bool:
 
 
 def depths_of(floors: Sequence[Floor], moves: StockMoves) -> list[FloorDepths | None]:
-    """Measure floors in the stock after moves, whose Z is exact to 1 / Z_WEIGHT of what they are
-    beside the slides; None where the band beside the walls leaves nothing of a floor."""
+    """Measure floors in the stock that these moves leave; None for a floor that lies wholly within
+    the band beside its walls.
+
+    The Z of the moves must be exact to 1 / Z_WEIGHT of their uncertainty in the plane
+    (`beside_mm`), which is added to the bounds.
+    """
     tree, slack = stock_tree(moves), moves.beside_mm / Z_WEIGHT
     measured = (
         (_along_line if floor.is_line else _over_region)(floor, tree, moves.beside_mm)
@@ -234,7 +240,8 @@ def depths_of(floors: Sequence[Floor], moves: StockMoves) -> list[FloorDepths | 
 
 
 def _along_line(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths | None:
-    """Measure the deepest across a line, within the band beside it, all along it."""
+    """Measure the deepest point across a line, all along it, for the slides anywhere within
+    `beside_mm` of their path."""
     points, band = _points_along(floor.layer), floor.solid.wall_mm
     points = points[floor.is_beyond_tabs(points)]
     if not len(points):
@@ -248,7 +255,8 @@ def _along_line(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths 
 
 
 def _over_region(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths | None:
-    """Bracket the heights over a floor."""
+    """Find bounds of the least and the greatest depth of a floor, by branch and bound over its
+    region."""
 
     def greatest(value: Callable[[Floats], Floats], upper: Callable[[Floats], Floats]) -> float:
         maximum = greatest_value(
@@ -276,9 +284,11 @@ def _over_region(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths
 
 
 def proposed_floors(drawing: Drawing, job: Job, machine: Machine) -> Iterator[Dimension]:
-    """Yield the depth of each floor that a job cuts into a drawing, and the thickness that is left
-    under those of pockets if the job knows its stock; places in the frame of the drawing. What
-    goes through the stock has none."""
+    """Yield a dimension for the depth of each floor that a job cuts, and for the thickness left
+    under those of pockets if the job knows its stock.
+
+    Places are in the frame of the drawing. Cuts through the stock have none.
+    """
     placement = replace(job.placement, copies=(1, 1), pitch_mm=(0.0, 0.0))
     single = replace(job, placement=placement)
     floors = Floors(planned(drawing, single, machine, undivided=True).steps, 0.0)

@@ -65,7 +65,8 @@ class CircleFeature(Struct, frozen=True, eq=False):
         return is_on_arc
 
     def distance_mm(self, place: Place) -> float:
-        """Return the radial distance of a place from the arcs; infinite beside them."""
+        """Return the radial distance of a place from the arcs; infinite at an angle that no arc
+        covers."""
         x, y = place[0] - self.centre_mm[0], place[1] - self.centre_mm[1]
         slack = BIND_MM / max(self.radius_mm, BIND_MM)
         on_arc = self.has(np.array([math.atan2(y, x)]), slack)[0]
@@ -212,7 +213,7 @@ def _box(feature: Feature) -> tuple[float, float, float, float]:
 
 
 def features_of(paths: Polylines) -> Features:
-    """Find the circles and edges of all paths, in order; collinear segments form one edge, and
+    """Return the circles and edges of all paths, in order; collinear segments form one edge, and
     arcs of one path about one centre form one circle."""
     return Features(each for index, path in enumerate(paths) for each in _of_path(index, path))
 
@@ -256,8 +257,11 @@ def _edges(index: int, segments: Segments, *, closed: bool) -> Iterator[EdgeFeat
 
 
 def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension | Finding:
-    """Find the features of a dimension; return it with them, or the finding that says why there
-    are none. Those along Z have none in the drawing."""
+    """Return a dimension with the features that it measures, or the finding that says why none, or
+    several, fit.
+
+    Depths and thicknesses have no features in the drawing and are always bound.
+    """
     if dimension.kind == "distance":
         return _distance(dimension, features, file)
     if dimension.kind in DEPTHS:
@@ -296,8 +300,11 @@ def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension 
 
 
 def _closed_circle_first(circles: list[CircleFeature]) -> list[CircleFeature]:
-    """Of circles about one centre return the closed one if there is exactly one: a dimension there
-    is of the hole, not of a fillet around it."""
+    """Return the closed circle alone if exactly one of these concentric circles is closed, else
+    all of them.
+
+    A dimension there is that of the hole, not of a fillet around it.
+    """
     closed = [each for each in circles if each.is_closed]
     return closed if len(closed) == 1 else circles
 

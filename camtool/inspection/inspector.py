@@ -109,8 +109,8 @@ class _FarCut(Struct, frozen=True, eq=False):
         return replace(self.cut, side=side, stations=stations, seen=is_seen)
 
     def stations_here(self, values: Floats | Bools) -> Any:
-        """Return values (L, S) of stations in the order of the stations in the frame of the
-        dimensions: those of an edge begin at the same end, those of a circle at its right."""
+        """Return values (L, S) of stations reordered for the frame of the dimensions, in which
+        stations of a circle begin at another angle."""
         if isinstance(self.feature, EdgeFeature):
             return values
         spokes = (self.cut.side * self.cut.stations.normals) * np.array(self.turn.signs)
@@ -121,8 +121,10 @@ class _FarCut(Struct, frozen=True, eq=False):
         return values_here
 
     def edges(self, machine: Machine, wider_mm: float) -> Floats:
-        """Return the machined edge (L, S) mm in the frame of the dimensions; left of an edge is
-        its right in a frame that is turned over."""
+        """Return the position (L, S) mm of the machined edge in the frame of the dimensions.
+
+        What is left of an edge in one frame is right of it in another that is turned over.
+        """
         slides = self.inspector.slides(machine).wider(0.5 * wider_mm)
         edges = edge_at(self.feature, self.cut, rows_of(slides, self.cut, self.feature))
         mirrored = isinstance(self.feature, EdgeFeature) and self.turn.is_over
@@ -140,7 +142,11 @@ class _OtherSetups:
         self.setups: list[JobSetup] = []
 
     def cut_of(self, drawn: Feature, placed: Feature, copy: int) -> Cut | None:
-        """Return the cut of a feature that another set-up cuts; None if none does."""
+        """Return the cut of a feature by another set-up, in the frame of the dimensions; None if
+        no set-up cuts it.
+
+        The set-up is posted and simulated when it is first needed.
+        """
         run, setup = self._run, _setup_that_cuts(self._run, drawn.path)
         if setup is None:
             return None
@@ -212,11 +218,11 @@ class Inspector:
     def sizes(
         self, variant: MachineVariant | None = None, left_mm: Mapping[int, float] | None = None
     ) -> list[MachinedSize]:
-        """Compute the sizes of the dimensions on a variant of the machine (None: that of the run);
+        """Return the sizes of the dimensions on a variant of the machine (None: that of the run);
         NaN for features that are not cut.
 
-        `left_mm`: additional allowance on the walls of these paths of the drawing. The path of the
-        tool and the edge that it cuts move outwards by it.
+        `left_mm`: additional allowance, mm, on the walls of these paths of the drawing, by path.
+        The path of the tool and the edge that it cuts move outwards by it.
         """
         edges = self._edges(variant or MachineVariant(self._target.machine))
         allowances = left_mm or {}
@@ -235,8 +241,8 @@ class Inspector:
         return sizes
 
     def _edges(self, variant: MachineVariant) -> dict[int, Floats]:
-        """Compute the machined edge (L, S) mm of each cut on a variant of the machine, as
-        `edge_at` does; the keys are the `id` of the cuts."""
+        """Return the position (L, S) mm of the machined edge of each cut on a variant of the
+        machine, as `edge_at` does, by the `id` of the cut."""
         if not any(each.cuts for each in self.dimensions):
             return {}
         cached = self._edges_of
@@ -267,21 +273,27 @@ class Inspector:
         }
 
     def values(self, variant: MachineVariant) -> Floats:
-        """Compute best fit, least and largest local size (3 D,) mm of each of D dimensions."""
+        """Return best fit, least and largest local size (3 D,) mm of each of D dimensions."""
         sizes = self.sizes(variant)
         return np.array([(each.fit_mm, each.low_mm, each.high_mm) for each in sizes]).reshape(-1)
 
     def machined(self, variant: MachineVariant) -> Floats:
-        """Compute the positions (T,) mm of the edges of all cuts on a variant of the machine, one
-        cut after the other, NaN where one is not cut; then the three values of each depth."""
+        """Return the positions (T,) mm of the edges of all cuts on a variant of the machine, one
+        cut after the other, NaN where an edge is not cut.
+
+        Three values of each depth follow.
+        """
         edges = self._edges(variant).values()
         depths = (self._depth(each, variant) for each in self.dimensions if each.floor is not None)
         sizes = ((each.fit_mm, each.low_mm, each.high_mm) for each in depths)
         return np.concatenate([np.zeros(0), *(each.reshape(-1) for each in edges), *sizes])
 
     def _depth(self, each: Inspected, variant: MachineVariant) -> MachinedSize:
-        """Measure a depth or a thickness on a variant of the machine. What changes the motion in
-        the plane alone changes no depth."""
+        """Measure a depth or a thickness on a variant of the machine.
+
+        A change of the motion in the plane alone changes no depth, so that one simulation serves
+        all variants of the same Z.
+        """
         z = variant.machine.axes.z
         if z not in self._depths_by_z:
             mean_machine = without_scatter(MachineVariant(self._target.machine)).machine
@@ -303,7 +315,8 @@ class Inspector:
         return MachinedSize(thick - depth_here, thick - greatest, thick - smallest)
 
     def _leave_out_narrow_floors(self, not_inspected: list[tuple[Dimension, Finding]]) -> None:
-        """Leave out floors of which the band beside their walls leaves nothing."""
+        """Move dimensions of floors that lie wholly within the band beside their walls to
+        `not_inspected`, in place."""
         if not any(each.floor is not None for each in self.dimensions):
             return
         variant = MachineVariant(self._target.machine)
@@ -322,8 +335,11 @@ class Inspector:
             self.dimensions = tuple(each for each in self.dimensions if each not in narrow_floors)
 
     def measured(self, nodes: Floats, weights: Floats) -> Floats:
-        """Compute the values (N, 3 D) mm of N parts whose edges are mixed with the weights (N, M)
-        from the edges `nodes` (M, T) of M parts."""
+        """Return the values (N, 3 D) mm of N parts.
+
+        The edges of each part are mixed, with the weights (N, M), from the edges `nodes` (M, T) of
+        M simulated parts.
+        """
         cuts = {id(cut): cut for each in self.dimensions for cut in each.cuts}
         own_edges: dict[int, tuple[Floats, Floats]] = {}  # levels, and the nodes' edges there
         begin = 0
@@ -386,9 +402,11 @@ class Inspector:
 
 
 def _edges_of(bound: BoundDimension) -> Floats:
-    """Return the weights (E, 2) in X and Y of the edges that determine a dimension: a centre is
-    midway between two edges, a zone is as wide as the error of one. Round features have edges on
-    all sides, which count in X and in Y alike."""
+    """Return the weights (E, 2), in X and Y, of the edges that determine a dimension.
+
+    A centre is midway between two edges, a zone is as wide as the error of one. Round features
+    have edges on all sides, which count in X and in Y alike.
+    """
     kind = bound.dimension.kind
     if kind in DEPTHS:
         return np.array([[0.0, 0.0, 1.0]])
@@ -530,8 +548,8 @@ class ToolAt:
     """Cutting width of the tool of each wanted row at the surface."""
 
     def __init__(self, wanted_moves: Toolpath, job: Job, diameter_mm: float | None) -> None:
-        """Take the tools of the operations that the wanted moves name; without names, one tool of
-        this diameter (None: no width)."""
+        """Take the tools of the operations that the wanted moves name; if they name none, one tool
+        of this diameter (None: no width)."""
         rows = np.arange(len(wanted_moves))
         starts, ends = wanted_moves.starts_of(rows)[:, 2], wanted_moves.end[:, 2]
         self.z = np.maximum(starts, ends)
@@ -585,8 +603,8 @@ def swept_trace(trace: SlideTrace, follows: Ints, tool: ToolAt) -> SweptSegments
 
 
 def _points(wanted_cuts: CutMoves) -> int:
-    """Return the number of points of the path of the slides for chords within `CHORD_MM` of the
-    smallest arc."""
+    """Return the number of points of the slides' path at which chords stay within `CHORD_MM` of
+    the smallest arc."""
     arcs = wanted_cuts.segments.is_arc
     if not arcs.any():
         return TRACE_POINTS

@@ -196,7 +196,8 @@ def _ascending(first: float, second: float, upwards: bool) -> tuple[float, float
 
 
 def _ordered(lower: float, upper: float, text: str, *, sizes: bool = False) -> tuple[float, float]:
-    """Return both limits, −0 as 0; OptionError unless the upper one is above the lower one."""
+    """Return both limits, with −0 as 0; OptionError unless the upper one is above the lower
+    one."""
     if not (math.isfinite(lower) and math.isfinite(upper)):
         raise OptionError(f"limits {text!r} are not finite", mend=_EXAMPLES)
     lower, upper = round(lower, 9) + 0.0, round(upper, 9) + 0.0

@@ -10,24 +10,25 @@ A trial is a job file: it is read, posted, read back from its bytes, simulated a
     feed                   of these operations
     how arcs, corners …    are drawn, where the controller has a choice (`Target.ways`)
 
-Trials go by the number of changes, with allowances (of however many contours) as one of them, and
-then by what they cost, as above: what takes no time comes before what takes time. The first that
-holds is the answer. Programs of the same bytes are judged once. Nothing is drawn by lot.
+Trials with fewer changes come first, all allowances together counting as one change; among these
+the order is that of the list above: changes that cost no cutting time come before those that do.
+The first job that satisfies all dimensions is returned. Programs of the same bytes are judged
+once. The search is deterministic.
 
-Allowances. With so much more left on a wall, the tool's path runs so much farther from it, and so
-does the edge that it cuts along. So the sizes of a part follow for any allowances from the edges
-of one simulation (`Inspector.sizes`): they are linear in them, but for the profile of a line,
-which is convex. With the upper limit U, the lower L and the standard uncertainty u of a dimension,
+Allowances. If a wall keeps an allowance a, the tool's path and the edge that it cuts move outwards
+by a. So the sizes of a part follow for any allowances from the edges of one simulation
+(`Inspector.sizes`): they are linear in the allowances, except the profile of a line, which is
+convex. With the upper limit U, the lower L and the standard uncertainty u of a dimension,
 
     maximise Σ_d t_d − ε Σ_c |a_c|
     with t_d ≤ FAR_ENOUGH,   u t_d ≤ U − high(a),   u t_d ≤ low(a) − L
 
 is a linear programme; a convex size enters by its tangents at all a that were tried. The trial
-that follows says whether it is so.
+that follows confirms the result, or not.
 
-A certificate says why nothing holds: the dimension that is farthest from holding, and for each
-number of the machine, alone, how good it would have to be. It is found by bisection; each value
-is that of a job that was posted, simulated and inspected anew.
+A certificate explains why no job holds: the dimension that is farthest from holding, and for each
+number of the machine the value that it alone would need. The value is found by bisection, and each
+step posts, simulates and inspects a job anew.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ MAX_INPUTS_ASKED = 2
 """Number of uncertainties, the largest first, whose required value is computed."""
 
 
-# What is asked, and what is tried.
+# The question (`MeetingCase`), proposals, trials, and the answer (`Meeting`).
 
 
 class MeetingCase(Struct, frozen=True, eq=False):
@@ -187,8 +188,11 @@ class MeetingTrial(Struct, frozen=True, eq=False):
 
 
 def margin(each: InspectedReport) -> float:
-    """Return by how many standard uncertainties a dimension is within its nearer limit, for the
-    worst values of unknown inputs within their bounds."""
+    """Return the distance of a dimension within its nearer limit, in standard uncertainties,
+    negative beyond it.
+
+    Unknown inputs have their worst values within their bounds.
+    """
     lower, upper = _limits_mm(each)
     return min(upper - each.high_mm, each.low_mm - lower) / _standard_mm(each)
 
@@ -259,8 +263,11 @@ def meet(
     case: MeetingCase, max_trials: int = DEFAULT_TRIALS, progress: Progress | None = None
 ) -> Meeting:
     """Find the cheapest change of the job after which all dimensions hold; if there is none, the
-    best one and a certificate. The result is never worse than the start. Raises the errors of
-    `post` and `inspect` for the job as it is."""
+    best one and a certificate.
+
+    The result is never worse than the job as it is. Raises the errors of `post` and `inspect` for
+    that job.
+    """
     _check_readable(case)
     asked_dimensions = tuple(
         each
@@ -285,7 +292,7 @@ def meet(
 
 
 def _check_readable(case: MeetingCase) -> None:
-    """Raise OptionError for dimensions that cannot be inspected with any job."""
+    """Raise OptionError for dimensions that no change of the job can make inspectable."""
     wanted_dimensions = [each for each in case.tolerances.dimensions if each.asks]
     read = (
         each
@@ -313,8 +320,11 @@ def find_cheapest(
     max_trials: int,
 ) -> tuple[MeetingTrial, bool]:
     """Return the trial with the fewest changes that holds, the first of several, or else the one
-    with the best score; and True if all proposals before it were tried, at most `max_trials`. At
-    most one of each list in `choices` is applied, the cheapest first."""
+    with the best score.
+
+    The second value is True if every proposal before it was tried, False if `max_trials` ended the
+    search. At most one proposal of each list in `choices`, the cheapest first, is applied.
+    """
     best, trials = before, {JobChanges(): before}
     for count, proposal in enumerate(_proposals(choices, trials), start=1):
         if count > max_trials:
@@ -333,8 +343,11 @@ def find_cheapest(
 def _proposals(
     choices: Sequence[Sequence[JobChanges]], trials: Mapping[JobChanges, MeetingTrial]
 ) -> Iterator[JobChanges]:
-    """Yield all proposals of up to MAX_CHANGES changes, by their number; for each number the
-    allowances found by a trial with one change less come first."""
+    """Yield all proposals of up to MAX_CHANGES changes, those with fewer changes first.
+
+    Among those with the same number, allowances that a trial with one change less has computed
+    come first.
+    """
     for count in range(1, MAX_CHANGES + 1):
         for base in list(trials.values()):
             if base.proposal.count == count - 1 and base.left and not base.proposal.left:
@@ -345,8 +358,8 @@ def _proposals(
 
 
 def levers(bench: Bench, before: MeetingTrial) -> list[list[JobChanges]]:
-    """Return lists of possible changes, the cheapest first; at most one of each list is
-    applied."""
+    """Return lists of alternative changes, the cheapest list first; at most one change of each
+    list is applied."""
     job, target = bench.job, bench.case.target
     machine = target.machine
     short_paths = {path for k in before.short for path in before.paths[k]}
@@ -381,7 +394,8 @@ OTHER_WORDS = {"direction": ("climb", "conventional"), "start": ("longest-line",
 
 
 def _other_words(key: str, row: int, operation: Operation) -> list[JobChanges]:
-    """Return the alternative values of a key of an operation, if its kind has that key."""
+    """Return a change to each other value of a key of an operation; none if its kind lacks that
+    key."""
     if not is_known(key, operation.kind):
         return []
     value_now = getattr(operation, OPERATION[key].field)
@@ -394,15 +408,15 @@ def _other_words(key: str, row: int, operation: Operation) -> list[JobChanges]:
 
 
 def _slower_feeds(row: int, operation: Operation, machine: Machine) -> list[JobChanges]:
-    """Return slower feeds of an operation."""
+    """Return changes to slower feeds of an operation, FEED_SHARES of its own."""
     feed = operation.feed_mm_min or machine.feed.default_mm_min
     words = (f"{share * feed:.6g}mm/min" for share in FEED_SHARES)
     return [JobChanges((Change("feed", word, row, f"{feed:.6g}mm/min"),)) for word in words]
 
 
 def _rows(job: Job) -> Iterator[tuple[int, int, Operation]]:
-    """Return the operations, except finishing passes, with their rows in the file and in the
-    job."""
+    """Return an iterator over the operations except finishing passes: row in the file, index in
+    the job, operation."""
     first = [k for k, each in enumerate(job.operations) if each.stage != "finish"]
     return ((row, k, job.operations[k]) for row, k in enumerate(first))
 
@@ -414,7 +428,7 @@ class JobContours(Struct, frozen=True, eq=False):
     """The contours of a job by the names of their entities. `cut`: names that the operation in
     each row of the file takes; `walls`: those with allowances; `depth`: number of contours around
     each; `head`: walls with the same head move alike, since an operation cannot be divided;
-    `max_mm`: largest change of the allowance of a wall; `of_path`: name of each drawn path."""
+    `most_mm`: largest change of the allowance of a wall; `of_path`: name of each drawn path."""
 
     cut: dict[int, tuple[str, ...]]
     walls: dict[int, tuple[str, ...]]
@@ -425,7 +439,7 @@ class JobContours(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, case: MeetingCase, job: Job) -> JobContours:
-        """Collect the contours of a job."""
+        """Return the contours of a job that cuts the drawing of this case."""
         placed_drawing = place(case.drawing, job)
         sides = Sides.of(placed_drawing, job, case.target.machine.defaults.cut_depth_mm)
         depths: dict[str, set[int]] = {}
@@ -458,18 +472,22 @@ class JobContours(Struct, frozen=True, eq=False):
         return cls(cut, walls, depth, head, max_allowance, case.drawing.sources)
 
     def cutting(self, paths: Iterable[int]) -> set[int]:
-        """Return the rows of the file that cut some paths of the drawing."""
+        """Return the rows of the job file whose operations cut any of these paths of the
+        drawing."""
         names = {self.of_path[path] for path in paths}
         return {row for row, cut_names in self.cut.items() if names.intersection(cut_names)}
 
     def together(self, paths: Iterable[int]) -> tuple[str, ...]:
-        """Return the names of some paths of the drawing that other contours have too."""
+        """Return the names of these paths of the drawing that other paths have as well."""
         names = dict.fromkeys(self.of_path[path] for path in paths)
         return tuple(name for name in names if self.of_path.count(name) > 1)
 
     def left(self, by_name: Mapping[str, float]) -> tuple[Left, ...]:
-        """Return the allowances on walls, mm by the names of contours, as parts of operations:
-        inner contours before those around them."""
+        """Return the allowances on walls, mm by the name of the contour, as changes of operations.
+
+        An operation with several allowances is divided: inner contours come before those around
+        them.
+        """
         parts_found: list[Left] = []
         for row, names in self.walls.items():
             if not any(by_name.get(name) for name in names):
@@ -492,7 +510,8 @@ class JobContours(Struct, frozen=True, eq=False):
         return tuple(parts_found)
 
     def by_name(self, allowances: Iterable[Left]) -> dict[str, float]:
-        """Return the allowances by name, from parts of operations (inverse of `allowances`)."""
+        """Return the allowances, mm by the name of the contour, of changes of operations: the
+        inverse of `left`."""
         return {
             name: each.by_mm
             for each in allowances
@@ -503,9 +522,11 @@ class JobContours(Struct, frozen=True, eq=False):
 def closed_form(
     inspector: Inspector, verdicts: Sequence[InspectedReport | None], contours: JobContours
 ) -> dict[str, float]:
-    """Compute the additional allowance on the wall of each contour, mm, that centres the sizes
-    best; {} if none helps. `verdicts` are those of the inspector's dimensions, None for those that
-    could not be measured."""
+    """Return the additional allowance on the wall of each contour, mm by its name, that centres
+    the sizes best; {} if none helps.
+
+    `verdicts` are those of the inspector's dimensions, None for those that could not be measured.
+    """
     rows = [(k, each) for k, each in enumerate(verdicts) if each is not None]
     short_names = {
         contours.of_path[path]
@@ -542,8 +563,11 @@ def closed_form(
 def _best_left(
     sizes: Callable[[Floats], Floats], limits: Floats, standards: Floats, max_allowances: Floats
 ) -> Floats:
-    """Solve the linear programme above for the allowances (C,); `sizes` maps (C,) to sizes (D, 2),
-    and `limits` (D, 2) are the upper and the lower ones, infinite for none."""
+    """Solve the linear programme at the top for the allowances (C,), mm.
+
+    `sizes` maps (C,) to sizes (D, 2), and `limits` (D, 2) are the upper and the lower ones,
+    infinite for none.
+    """
     count, dims = len(max_allowances), len(limits)
     # x = t_1 … t_D, then what is left and what is taken, both 0 or more, of each contour.
     goal = np.concatenate([-np.ones(dims), np.full(2 * count, PER_MM)])
@@ -634,8 +658,8 @@ class Bench(Struct, eq=False, dict=True):
         return trial
 
     def try_changes(self, proposal: JobChanges) -> MeetingTrial | None:
-        """Post the job with the changes of a proposal and inspect the part. Return the trial; None
-        if the job cannot be cut or the program has errors."""
+        """Post the job with the changes of a proposal, inspect the part, and return the trial;
+        None if the job cannot be cut or the program has errors."""
         self.trials += 1
         self.progress.done += 1
         try:
@@ -651,7 +675,7 @@ class Bench(Struct, eq=False, dict=True):
         return replace(self._known[digest], proposal=proposal)
 
     def run_of(self, proposal: JobChanges) -> Run:
-        """Post and inspect the job of a proposal."""
+        """Return the run of a proposal's job, posted and inspected."""
         return inspect(self._posted(proposal, self._target(proposal)), self.case.tolerances)
 
     def tables_of(self, proposal: JobChanges) -> Table:
@@ -666,9 +690,12 @@ class Bench(Struct, eq=False, dict=True):
         return post_drawing(self.case.drawing, job, target, brief=True)
 
     def _judge(self, run: Run, proposal: JobChanges) -> MeetingTrial:
-        """Judge the program of a proposal. A size beyond its limit is in with a probability of at
-        most one half: then the simulations for its uncertainty are skipped, and the uncertainty of
-        the job as it is is used."""
+        """Judge the program of a proposal.
+
+        A size beyond its limit is within it with a probability of at most one half: then the
+        simulations for its uncertainty are skipped, and the uncertainty of the original job is
+        used.
+        """
         inspector = Inspector(run, self.case.tolerances.dimensions)
         verdicts: list[InspectedReport | None] = list(self._predict_verdicts(inspector))
         is_beyond = any(each is None or each.verdict == "out" for each in verdicts)
@@ -702,8 +729,11 @@ class Bench(Struct, eq=False, dict=True):
         return replace(trial, left=self.contours.left({**so_far, **total}))
 
     def _predict_verdicts(self, inspector: Inspector) -> Iterator[InspectedReport | None]:
-        """Return the dimensions with their sizes and the verdicts that follow with the
-        uncertainties of the job as it is; None for those that are not cut or new."""
+        """Yield each dimension with its sizes, and the verdict that follows if its uncertainty is
+        that of the original job.
+
+        None for a dimension that is not cut, or that the original job did not cut.
+        """
         for one, size in zip(inspector.dimensions, inspector.sizes(), strict=True):
             stated = self._first.get(_key_of(one))
             if stated is None or not math.isfinite(size.low_mm + size.high_mm):
@@ -717,7 +747,8 @@ class Bench(Struct, eq=False, dict=True):
             yield replace(predicted, verdict=verdict)
 
     def certificate(self, best: MeetingTrial) -> Certificate:
-        """Explain why the best trial does not hold."""
+        """Return the explanation why the best trial does not hold, and which better numbers of the
+        machine would make it hold."""
         binding = best.binding
         if binding is None:
             return Certificate(None)
@@ -742,8 +773,8 @@ class Bench(Struct, eq=False, dict=True):
         return Certificate(binding, (), tuple(needs), exactly, self.contours.together(paths))
 
     def _needed_value(self, number: _Number, best: MeetingTrial) -> float | None:
-        """Return the value of a number of the machine nearest to its present one with which all
-        dimensions hold; None if there is none."""
+        """Return, by bisection, the value of a number of the machine nearest to its present one
+        with which all dimensions hold; None if there is none."""
 
         def holds(value: float) -> bool:
             return self._holds(best, [number.setting(value)])
@@ -758,8 +789,8 @@ class Bench(Struct, eq=False, dict=True):
         return rounded if holds(rounded) else number.at(holding)
 
     def _holds(self, best: MeetingTrial, settings: Sequence[str]) -> bool:
-        """Return True if the proposal holds on a machine with other numbers, with the
-        allowances for it."""
+        """Return True if the proposal holds on a machine with these settings, allowances being
+        adapted to it."""
         proposal = best.proposal + JobChanges(settings=tuple(settings))
         trial = self.try_changes(proposal)
         for _ in range(REFINED):
@@ -770,7 +801,7 @@ class Bench(Struct, eq=False, dict=True):
 
 
 def _key_of(each: Inspected) -> tuple[str, int | None]:
-    """Return a key that identifies a dimension in every program."""
+    """Return a key that identifies a dimension in every program: its source and its copy."""
     return each.bound.dimension.source, each.copy
 
 
@@ -799,7 +830,7 @@ class _Number(Struct, frozen=True):
     """Of a map of backlash, whose mean it is: each cell is as much nearer to the best as that."""
 
     def setting(self, value: float) -> str:
-        """Return the machine's setting of this value, as for `--set`."""
+        """Return the setting, in the form of `--set`, that gives the number this value."""
         if not self.cells:
             return f"{self.key}={value!r}"
         share = (value - self.best) / (self.now - self.best)
@@ -810,14 +841,16 @@ class _Number(Struct, frozen=True):
         return f"{self.key}={rows}"
 
     def at(self, share: float) -> float:
-        """Return the value at this share of the way to its best."""
+        """Return the value at a share of the way from the present value, 0, to the best one, 1."""
         return self.now + share * (self.best - self.now)
 
 
 def _mechanics(machine: Machine) -> Iterator[_Number]:
-    """Return backlash, scale and squareness, if they are not at their best. Backlash is at its
-    best where it equals the compensation that the controller adds at reversals
-    (`camtool.inspection.uncertainty`)."""
+    """Yield backlash, scale and squareness, each unless it is at its best.
+
+    Backlash is at its best where it equals the compensation that the controller adds at reversals
+    (`camtool.inspection.uncertainty`).
+    """
     for index, name in enumerate("xy"):
         axis, cells = (machine.axes.x, machine.axes.y)[index], machine.play_map.used[index]
         ratio = axis.real_step_mm / axis.coded_step_mm
@@ -834,8 +867,8 @@ def _mechanics(machine: Machine) -> Iterator[_Number]:
 
 
 def _standards(machine: Machine, binding: InspectedReport) -> Iterator[_Number]:
-    """Return the standard uncertainties that contribute to that of a dimension, the largest
-    first."""
+    """Yield the standard uncertainties of the machine that contribute to that of a dimension, the
+    largest first."""
     for each in binding.contributions:
         scatter = each.input.endswith(REPEATABILITY)
         key = f"{'axes' if scatter else 'uncertainty'}.{each.input}"
@@ -849,14 +882,14 @@ REPEATABILITY = "repeatability_mm"
 
 
 def _value_at(record: object, key: str) -> object:
-    """Return the value at a key such as "axes.x.backlash_mm"."""
+    """Return the value of a record at a key such as "axes.x.backlash_mm"."""
     for name in key.split("."):
         record = getattr(record, name)
     return record
 
 
 def _rounded(value: float, best: float) -> float:
-    """Round a value to few digits, towards the best one."""
+    """Return the value rounded to few digits, towards the best one."""
     difference = abs(value - best)
     if difference == 0.0:
         return value
@@ -870,7 +903,8 @@ MAX_NAMED = 4
 
 
 def to_text(meeting: Meeting) -> str:
-    """Format the dimensions before and after, the changes and the certificate for people."""
+    """Format the dimensions before and after, the changes and the certificate as readable text,
+    not JSON."""
     before = {each.name: each for each in meeting.before.verdicts}
     rows = [("", "limits, mm", "as it is", "", "then", "")]
     for each in meeting.after.verdicts:
@@ -908,7 +942,7 @@ def _limits(each: InspectedReport) -> str:
 
 
 def change_lines(proposal: JobChanges) -> Iterator[str]:
-    """Return one line for each change."""
+    """Yield a line of text for each change."""
     for each in proposal.left:
         if not each.by_mm:
             continue
@@ -929,7 +963,7 @@ def change_lines(proposal: JobChanges) -> Iterator[str]:
 
 
 def _certificate_lines(meeting: Meeting) -> Iterator[str]:
-    """Return the lines of the certificate."""
+    """Yield the lines of text of the certificate."""
     certificate = meeting.certificate
     assert certificate is not None
     if certificate.binding is None:
@@ -1027,12 +1061,12 @@ ALL_HOLD, NOT_ALL_HOLD = "Every dimension of ", "NOT ALL dimensions of "
 
 
 def is_proposal(data: bytes) -> bool:
-    """Return True for a job file that a proposal was written to."""
+    """Return True if this is the content of a job file that `meet` has written."""
     return data.startswith((f"# {ALL_HOLD}".encode(), f"# {NOT_ALL_HOLD}".encode()))
 
 
 def _head(case: MeetingCase, best: MeetingTrial) -> Iterator[str]:
-    """Return the comments at the top of a job file."""
+    """Yield the lines of the comment at the top of the proposed job file."""
     name = one_line(PurePath(case.drawing.file).name)
     target = case.target.machine.target.name
     count, short_count = len(best.verdicts) + best.missing, len(best.short) + best.missing

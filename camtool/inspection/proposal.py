@@ -49,10 +49,13 @@ _HEADER = """\
 def propose_file(
     drawing: Drawing, floors: Iterable[Dimension] = ()
 ) -> tuple[str, tuple[Finding, ...], tuple[DrawingError, ...]]:
-    """Return the text of a file with the dimensions of this drawing and of `floors` that a job
-    cuts into it, the findings about its callouts, and the callouts whose limits are wrong: these
-    are written without limits. A dimension that fits no drawn feature is a comment. InputError for
-    a drawing without anything to measure."""
+    """Return the text of a tolerance file with the dimensions of this drawing and the `floors`
+    that a job cuts into it.
+
+    Further values are the findings about its callouts, and the errors of callouts whose limits are
+    wrong: these are written without limits. A dimension that fits no drawn feature becomes a
+    comment. InputError for a drawing without anything to measure.
+    """
     faults: list[DrawingError] = []
     said_dimensions, findings = dimensions_of(drawing, faults=faults)
     features = features_of(drawing.paths)
@@ -98,7 +101,7 @@ def propose_file(
 
 
 def _row(each: Dimension) -> str:
-    """Format one [[dimension]]."""
+    """Return a [[dimension]] of the file as text."""
     lines = ["", "[[dimension]]", f"name = {toml_string(each.name)}", f'kind = "{each.kind}"']
     if each.kind == "distance":
         first, second = each.places_mm
@@ -158,8 +161,8 @@ def _sizes(features: Iterable[Feature], closed: Sequence[bool]) -> Iterator[Dime
 
 
 def _slot(features: Sequence[Feature]) -> tuple[tuple[Place, Place, float], ...] | None:
-    """Return start, end and direction of the width and of the length of a slot; None for other
-    paths."""
+    """Return start, end and direction of the width and of the length of a slot; None for a path
+    that is none."""
     ends = [each for each in features if isinstance(each, CircleFeature)]
     edges = [each for each in features if isinstance(each, EdgeFeature)]
     if len(ends) != 2 or len(edges) != 2:
@@ -178,7 +181,7 @@ def _slot(features: Sequence[Feature]) -> tuple[tuple[Place, Place, float], ...]
 
 
 def _overall(name: str, features: Sequence[Feature]) -> Iterator[Dimension]:
-    """Return the overall sizes of a path along x and y."""
+    """Yield the overall sizes of a path along x and y."""
     for axis, letter in enumerate("xy"):
         direction = np.eye(2)[axis]
         ends = [_outermost(features, direction, side) for side in (-1.0, 1.0)]

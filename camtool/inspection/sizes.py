@@ -84,7 +84,7 @@ class SweptSegments(Struct, frozen=True, eq=False, dict=True):
     row: Ints
 
     def of(self, selection: Ints | Bools) -> SweptSegments:
-        """Select the segments of a mask or of indices."""
+        """Return the segments that a mask or indices select."""
         return SweptSegments(
             self.a[selection],
             self.b[selection],
@@ -94,7 +94,7 @@ class SweptSegments(Struct, frozen=True, eq=False, dict=True):
         )
 
     def of_rows(self, rows: Ints) -> SweptSegments:
-        """Select the segments of some rows (R,), which are sorted."""
+        """Return the segments of these wanted rows (R,), which are sorted."""
         order, row = self._by_row
         first, last = np.searchsorted(row, rows), np.searchsorted(row, rows, side="right")
         counts = last - first
@@ -107,8 +107,8 @@ class SweptSegments(Struct, frozen=True, eq=False, dict=True):
         return order, self.row[order]
 
     def wider(self, by_mm: float) -> SweptSegments:
-        """Return the segments for a tool whose radius is larger by `by_mm`; paths without width
-        are not changed."""
+        """Return the segments with a tool radius larger by `by_mm`; paths of tools without width
+        stay as they are."""
         radius = np.where(self.radius > 0.0, np.maximum(self.radius + by_mm, 0.0), 0.0)
         return SweptSegments(self.a, self.b, radius, self.z, self.row)
 
@@ -169,12 +169,14 @@ def envelope(
     levels_mm: Floats = SURFACE,
     above_mm: float = 0.0,
 ) -> Floats:
-    """Compute the position (L, S) mm of the machined edge along each normal at L falling depths,
-    above 0 where material is left, at the stations `mask` (L, S); infinite where no segment
-    clears it, or only more than `above_mm` (not 0) above the middle of all.
+    """Return the position (L, S) mm of the machined edge along each station's normal at L falling
+    depths; above 0 material is left.
 
-    Segments that cross a normal themselves come first, which is quick, and gives a bound: of the
-    others only those can matter whose discs reach below it.
+    Only the stations of `mask` (L, S) are computed. It is infinite where no segment clears the
+    station; with `above_mm` also where what clears it lies more than that above the middle of all.
+
+    Segments that cross a normal themselves are measured first, which is quick and gives a bound:
+    of the others only those can matter whose discs reach below it.
     """
     crossing = _envelope(feature, stations, swept, mask, levels_mm, -math.inf)
     bound = math.inf
@@ -198,7 +200,7 @@ def _envelope(
     levels_mm: Floats,
     bound_mm: float,
 ) -> Floats:
-    """Compute `envelope` (L, S) mm of the segments that can reach below `bound_mm`; with −∞, of
+    """Return the `envelope` (L, S) mm of the segments that can reach below `bound_mm`; with −∞, of
     those that cross a normal themselves."""
     positions = np.full((len(levels_mm), len(stations.places)), np.inf)
     segment, station = _pairs(feature, stations, swept, bound_mm)
@@ -239,8 +241,8 @@ def _envelope(
 def _pairs(
     feature: Feature, stations: Stations, swept: SweptSegments, bound_mm: float
 ) -> tuple[Ints, Ints]:
-    """Return the pairs of segments and stations that can meet: segments whose discs reach the
-    normal below `bound_mm`."""
+    """Return the rows of pairs of a segment and a station whose normal its discs may reach below
+    `bound_mm`."""
     count = len(stations.places)
     if isinstance(feature, CircleFeature):
         centre = np.asarray(feature.centre_mm)
@@ -278,9 +280,11 @@ def _pairs(
 
 
 def _reach(radius: Floats, least_v: Floats, bound_mm: float) -> Floats:
-    """Compute how far (K,) to either side a disc can lie and still reach below `bound_mm` on a
-    normal, when its centre is no lower than `least_v`: v − √(r² − u²) ≤ bound needs u² ≤ r² − (v −
-    bound)²."""
+    """Return how far (K,) mm beside a normal the centre of a disc may lie, if the disc is to reach
+    below `bound_mm` on it.
+
+    The centre is no lower than `least_v`: v − √(r² − u²) ≤ bound needs u² ≤ r² − (v − bound)².
+    """
     if bound_mm == -math.inf:
         return np.zeros(len(radius))
     below = np.maximum(least_v - bound_mm, 0.0)
@@ -291,10 +295,11 @@ def _reach(radius: Floats, least_v: Floats, bound_mm: float) -> Floats:
 
 
 def cut_of(feature: Feature, wanted_moves: SweptSegments) -> Cut | None:
-    """Find the wanted moves that cut a feature and how; None if none do.
+    """Return how the wanted moves cut a feature; None if they do not.
 
     A tool that tapers makes a feature only where it runs along it, or where its edge at the
-    surface is the feature itself: a chamfer is none."""
+    surface is the feature itself: a chamfer is none.
+    """
     straight = np.isfinite(wanted_moves.z)
     walls = _cut_of(feature, wanted_moves.of(straight))
     tapering = _cut_of(feature, wanted_moves.of(~straight))
@@ -304,7 +309,7 @@ def cut_of(feature: Feature, wanted_moves: SweptSegments) -> Cut | None:
 
 
 def _cut_of(feature: Feature, wanted_moves: SweptSegments) -> tuple[Cut, float] | None:
-    """Return the cut of a feature by these moves and their distance from it, mm; None if they do
+    """Return the cut of a feature by these moves, and their distance from it, mm; None if they do
     not cut it."""
     near_moves = _near_feature(feature, wanted_moves)
     v, is_beside = _offsets(feature, wanted_moves, near_moves)
@@ -345,8 +350,8 @@ def _cut_of(feature: Feature, wanted_moves: SweptSegments) -> tuple[Cut, float] 
 
 
 def _levels(swept: SweptSegments) -> Floats:
-    """Return the heights (L,) mm of all moves, falling; at the highest one all moves count, and
-    all tapered tools."""
+    """Return the heights (L,) mm of all moves, falling; the first is infinite: there all moves
+    count, tapered tools too."""
     heights = distinct(np.round(swept.z[np.isfinite(swept.z)] / SAME_LEVEL_MM) * SAME_LEVEL_MM)
     below = heights[:-1][::-1]
     if len(below) >= MAX_LEVELS:
@@ -355,7 +360,8 @@ def _levels(swept: SweptSegments) -> Floats:
 
 
 def _near_feature(feature: Feature, swept: SweptSegments) -> Ints:
-    """Select the segments whose boxes come within reach of the box of the feature."""
+    """Return the indices of the segments whose boxes come within reach of the box of the
+    feature."""
     if isinstance(feature, CircleFeature):
         low = np.asarray(feature.centre_mm) - feature.radius_mm
         high = np.asarray(feature.centre_mm) + feature.radius_mm
@@ -368,8 +374,11 @@ def _near_feature(feature: Feature, swept: SweptSegments) -> Ints:
 
 
 def _offsets(feature: Feature, swept: SweptSegments, indices: Ints) -> tuple[Floats, Bools]:
-    """Compute the distances (J,) mm of the midpoints of segments from the feature, above 0 outside
-    of a circle and left of an edge; and the mask of those beside it and within reach."""
+    """Return the distances (J,) mm of the midpoints of segments from the feature, and the mask of
+    those beside it and within reach.
+
+    Distances are above 0 outside of a circle and left of an edge.
+    """
     middle = 0.5 * (swept.a[indices] + swept.b[indices])
     if isinstance(feature, CircleFeature):
         spoke = middle - np.asarray(feature.centre_mm)
@@ -397,16 +406,18 @@ class MachinedSize(Struct, frozen=True):
 
 
 def edge_at(feature: Feature, cut: Cut, swept: SweptSegments) -> Floats:
-    """Compute the position (L, S) mm of the machined edge of a feature at each depth, outwards
-    from a circle and to the left of an edge; NaN where it is not cut. `swept` is the path of the
-    slides."""
+    """Return the position (L, S) mm of the machined edge of a feature at each depth, outwards from
+    a circle and to the left of an edge; NaN where it is not cut.
+
+    `swept` is the path of the slides.
+    """
     edges = envelope(feature, cut.stations, swept, cut.seen, levels_mm=cut.levels_mm)
     edges[~np.isfinite(edges)] = np.nan
     return np.asarray(cut.side * edges)
 
 
 def rows_of(swept: SweptSegments, cut: Cut, feature: Feature) -> SweptSegments:
-    """Select the segments of the slides near a feature that belong to the moves that cut it."""
+    """Return the segments of the slides near a feature that belong to the moves that cut it."""
     own_moves = swept.of_rows(cut.rows)
     own_moves = own_moves.of(_near_feature(feature, own_moves))
     return replace(own_moves, radius=np.zeros(len(own_moves.a))) if cut.on_path else own_moves
@@ -415,9 +426,11 @@ def rows_of(swept: SweptSegments, cut: Cut, feature: Feature) -> SweptSegments:
 def size_of(
     bound: BoundDimension, cuts: Sequence[Cut], edges: Sequence[Floats]
 ) -> MachinedSize | None:
-    """Compute the size of a dimension from the cuts of its features and the positions (L, S) of
-    their machined edges, as from `edge_at`, in the order of `bound.features`; None if one is not
-    cut. Below the deepest cut of a feature its deepest edge counts."""
+    """Return the size of a dimension; None if one of its features is not cut.
+
+    `edges` are the positions (L, S) of the machined edges, as from `edge_at`, in the order of
+    `bound.features`. Below the deepest cut of a feature its deepest edge counts.
+    """
     levels = [cut.levels_mm for cut in cuts]
     values = sizes_of(bound, levels, [each[None] for each in edges])[0]
     return MachinedSize(*values.tolist()) if np.isfinite(values).all() else None
@@ -426,9 +439,11 @@ def size_of(
 def sizes_of(
     bound: BoundDimension, levels_mm: Sequence[Floats], edges_of_features: Sequence[Floats]
 ) -> Floats:
-    """Compute best fit, least and largest local size (N, 3) mm of N parts at once.
+    """Return best fit, least and largest local size (N, 3) mm of N parts at once.
+
     `edges_of_features` (N, L, S) are the positions of the edges of each feature at its depths
-    `levels_mm` (L,); NaN where one is not cut. A station counts if it is cut on all N parts."""
+    `levels_mm` (L,); NaN where one is not cut. A station counts if it is cut on all N parts.
+    """
     every = distinct(np.concatenate(levels_mm))[::-1]
     sizes_by_level: list[Floats] = []
     last: list[Floats] = []
@@ -451,8 +466,11 @@ def sizes_of(
 
 
 def distinct_levels(nodes: Floats) -> Ints:
-    """Return the depths of a feature at which its edges differ from those at the next deeper kept
-    depth on any of M parts: `nodes` (M, L, S) mm."""
+    """Return the indices of the depths at which the edges of a feature, on any of M parts, differ
+    from those at the next deeper index returned.
+
+    `nodes` (M, L, S) mm are the positions of the edges.
+    """
     kept_levels = [nodes.shape[1] - 1]
     for level in range(nodes.shape[1] - 2, -1, -1):
         if not _are_equal(nodes[:, level], nodes[:, kept_levels[-1]]):
@@ -474,7 +492,7 @@ def _cut_on_all(offsets: Floats) -> Bools:
 
 
 def _sizes(bound: BoundDimension, edges: Sequence[Floats]) -> Floats:
-    """Compute the sizes (N, 3) mm of N parts whose features have their edges at `edges` (N, S)
+    """Return the sizes (N, 3) mm of N parts whose features have their edges at `edges` (N, S)
     each."""
     kind = bound.dimension.kind
     if kind == "distance":
@@ -510,15 +528,16 @@ def _sizes(bound: BoundDimension, edges: Sequence[Floats]) -> Floats:
 
 
 def _zones(wide_mm: Floats) -> Floats:
-    """Return (N, 3) sizes of zones of these widths (N,): best fit, least and largest are equal."""
+    """Return the sizes (N, 3) of tolerance zones of these widths (N,): best fit, least and largest
+    are equal."""
     return np.column_stack([wide_mm, wide_mm, wide_mm])
 
 
 def _interpolate(
     x: Floats, nodes_x: Floats, values: Floats, period: float | None = None
 ) -> Floats:
-    """Interpolate values (N, Q) at x (Q,) linearly between those (N, J) at `nodes_x` (J,), which
-    may wrap around after a period."""
+    """Return values (N, Q) at x (Q,), interpolated linearly between those (N, J) at `nodes_x`
+    (J,), which may wrap around after a period."""
     number = np.arange(len(nodes_x), dtype=np.float64)
     if period is not None:
         nodes_x, x = np.mod(nodes_x, period), np.mod(x, period)
@@ -535,8 +554,7 @@ def _interpolate(
 
 
 def _circle_points(circle: CircleFeature, offsets: Floats) -> Floats:
-    """Compute the points, X and Y (2, N, J) mm, of machined circles, by angle, where they are
-    cut."""
+    """Return the points of machined circles where they are cut, by angle: X and Y (2, N, J) mm."""
     stations = stations_of(circle, 1)
     is_cut = _cut_on_all(offsets)
     places, normals = stations.places[is_cut].T[:, None], stations.normals[is_cut].T[:, None]
@@ -544,8 +562,11 @@ def _circle_points(circle: CircleFeature, offsets: Floats) -> Floats:
 
 
 def _lengths(vectors: Floats) -> Floats:
-    """Compute the lengths (N, J) of vectors (2, N, J): sizes of parts, whose squares are far from
-    the range of floats, so that the root is exact enough and much faster than `numpy.hypot`."""
+    """Return the lengths (N, J) of vectors (2, N, J).
+
+    Squares of sizes of parts are far from the limits of floats, so that the root is exact enough
+    and much faster than `numpy.hypot`.
+    """
     x, y = vectors
     return np.asarray(np.sqrt(x * x + y * y))
 
@@ -605,8 +626,11 @@ def _values(end: DistanceEnd, offsets: Floats, direction: Floats) -> _Values:
 
 
 def _distances_between(first: _Values, second: _Values) -> Floats:
-    """Compute the distance (N, 3) of two ends: point by point if both are edges side by side,
-    otherwise between any two of their points."""
+    """Return the distance (N, 3), best fit, least and largest, of two ends on N parts.
+
+    It is measured point by point if both are edges side by side, otherwise between any two of
+    their points.
+    """
     fit = second.fit_mm - first.fit_mm
     if first.across is not None and second.across is not None:
         low, high = second.across.min(), second.across.max()
@@ -629,8 +653,8 @@ def _distances_between(first: _Values, second: _Values) -> Floats:
 
 
 def _widths(table: Floats, offsets: Floats) -> Floats:
-    """Compute the widths (N,) mm of the narrowest zones around deviations (N, J) by functions (J,
-    K)."""
+    """Return the widths (N,) mm of the narrowest zones that contain deviations (N, J) less a
+    combination of the functions `table` (J, K)."""
     ones = np.ones((len(table), 1))
     rows = np.vstack([np.hstack([table, ones]), np.hstack([-table, ones])])
     middle = offsets.mean(axis=1, keepdims=True)
@@ -647,12 +671,13 @@ VIOLATION_EPS_MM = 1e-12
 
 
 def minimise(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
-    """Minimise goal · x over x (K,) subject to rows (J, K) x ≥ bounds (J,)."""
+    """Return x (K,) that minimises goal · x subject to rows (J, K) x ≥ bounds (J,)."""
     return np.asarray(minimise_many(goal, rows, bounds[None])[0])
 
 
 def minimise_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
-    """Minimise goal · x, x (N, K), for N bounds (N, J) with the same rows.
+    """Return x (N, K), each of which minimises goal · x subject to the same rows and its own
+    bounds (N, J).
 
     Uses the dual simplex method, from a wide box: K conditions hold exactly; the most violated one
     replaces one of them until none is violated. Conditions that are optimal for the first bounds
@@ -668,8 +693,11 @@ def minimise_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
 
 
 def _exchange(goal: Floats, every: Floats, limits: Floats, active: Ints) -> tuple[Floats, Ints]:
-    """Exchange active conditions (N, K) of rows (J, K) and their limits (N, J) until none is
-    violated; return x (N, K) and the conditions that are active then."""
+    """Return x (N, K) and its active conditions (N, K), after exchanging the given ones until none
+    is violated.
+
+    Conditions are the rows `every` (J, K) with `limits` (N, J).
+    """
     active, solutions = active.copy(), np.zeros(active.shape)
     open_ = np.arange(len(active))
     for _ in range(MAX_EXCHANGES):

@@ -72,11 +72,13 @@ def dimensions_of(
     *,
     faults: list[DrawingError] | None = None,
 ) -> tuple[tuple[Dimension, ...], tuple[Finding, ...]]:
-    """Collect the dimensions of a drawing, those of the file first, with nominal sizes and limits
-    as far as they are known, and the findings about them. A dimension that fits no feature is
-    included. Raises CamtoolError for a file or a callout whose limits are wrong, with its place
-    and how to correct it; if `faults` is given, the errors of callouts are added to it, and these
-    dimensions have no limits."""
+    """Return the dimensions of a drawing, those of the file first, with nominal sizes and limits
+    as far as they are known, and the findings about them.
+
+    A dimension that fits no feature is included. Raises CamtoolError for a file or a callout whose
+    limits are wrong, with its place and how to correct it; if `faults` is given, the errors of
+    callouts are added to it, and these dimensions have no limits.
+    """
     if isinstance(tolerances_file, Path):
         tolerances_file = read_tolerances(tolerances_file)
     general, stated = tolerances_file or ("", ())
@@ -146,8 +148,11 @@ def _deviations(limits: Limits) -> tuple[float, float]:
 def _with_limits(
     dimension: Dimension, bound: BoundDimension | Finding, file: str, findings: list[Finding]
 ) -> list[Dimension]:
-    """Return the dimension with its limits, now that the size of its feature is known, or without
-    limits if its nominal size differs. A dimension without a feature keeps what is known."""
+    """Return the dimension with its limits, now that the size of its feature is known, in a list;
+    [] and a finding if its nominal size differs from the drawn one.
+
+    A dimension without a feature keeps what is known.
+    """
     drawn = bound.drawn_mm if isinstance(bound, BoundDimension) else dimension.nominal_mm
     if dimension.kind in DEPTHS:
         drawn = dimension.nominal_mm
@@ -179,7 +184,7 @@ def unbound_findings(drawing: Drawing, dimensions: Iterable[Dimension]) -> list[
 
 
 def _measures(dimension: Dimension, bound: BoundDimension | Finding) -> object:
-    """Return a key of what is measured; for a dimension that fits no feature, of the places that
+    """Return a key of what a dimension measures; if it fits no feature, a key of the places that
     it names."""
     if isinstance(bound, BoundDimension) and dimension.kind not in DEPTHS:
         return measured_by(bound)
@@ -189,7 +194,8 @@ def _measures(dimension: Dimension, bound: BoundDimension | Finding) -> object:
 
 
 def measured_by(bound: BoundDimension) -> object:
-    """Return a key of what is measured, equal for two dimensions of the same feature."""
+    """Return a key of what a dimension measures, equal for two dimensions of the same features and
+    direction."""
     if not bound.ends:
         return bound.dimension.kind, tuple(map(id, bound.features))
     x, y = (round(float(part), 3) + 0.0 for part in bound.direction)
@@ -198,7 +204,7 @@ def measured_by(bound: BoundDimension) -> object:
 
 
 def _with_unique_names(dimensions: Sequence[Dimension]) -> Iterator[Dimension]:
-    """Give every dimension a name of its own."""
+    """Yield the dimensions, each with a name that no other one has."""
     names = [each.name for each in dimensions]
     names_used: set[str] = set()
     for each in dimensions:
@@ -245,8 +251,10 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_tolerances(path: Path) -> Asked:
-    """Read the general tolerance of a file ("" for none) and its dimensions; CamtoolError with
-    file, place and correction for invalid content."""
+    """Read a tolerance file: its general tolerance ("" for none) and its dimensions.
+
+    CamtoolError with file, place and correction for invalid content.
+    """
     file = str(path)
     file_table = read_table(path)
     if isinstance(file_table.get("dimension"), dict):
@@ -276,7 +284,7 @@ def read_tolerances(path: Path) -> Asked:
 
 @contextmanager
 def _with_place(file: str, place: str) -> Iterator[None]:
-    """Add file and place to an error of the block."""
+    """Add file and place to a CamtoolError raised in the `with` block."""
     try:
         yield
     except OptionError as error:
@@ -469,7 +477,7 @@ def _callout_dimensions(
     findings: list[Finding],
     faults: list[DrawingError] | None,
 ) -> Iterator[Dimension]:
-    """Return the dimensions of a callout: one, or as many as its text counts."""
+    """Yield the dimensions of a callout: one, or as many as its text counts."""
     place = f"{file}, {callout.source}"
     text = one_line(callout.text)
     if callout.scale != 1.0:
@@ -532,7 +540,7 @@ _OF_SIGN: dict[str, Kind] = {"Ø": "diameter", "R": "radius"}
 
 
 def _by_sign(measured: Dimension, sign: str) -> Dimension:
-    """Convert a radius to a diameter if the text has Ø, and back for R."""
+    """Return the dimension as a diameter if the text has Ø, as a radius if it has R."""
     kind = _OF_SIGN.get(sign, measured.kind)
     if measured.kind == "distance" or kind == measured.kind or measured.nominal_mm is None:
         return measured
@@ -555,8 +563,8 @@ def _limits(callout: Callout, parsed: CalloutText, nominal_mm: float) -> Limits 
 def _repeat_by_count(
     one: Dimension, count: int, features: Features, place: str, findings: list[Finding]
 ) -> Iterator[Dimension]:
-    """Return the dimension and the same of the other circles of its size, if there are as many as
-    it counts; otherwise the dimension alone, with a finding."""
+    """Yield the dimension for each of the `count` circles of its size; if there are more or fewer,
+    the dimension alone, with a finding."""
     if count == 1:
         yield one
         return

@@ -247,12 +247,13 @@ def inputs_of(
     depths: bool = False,
     flip_errors_mm: Sequence[float | None] = (),
 ) -> Inputs:
-    """Collect the uncertain inputs of this machine with a tool of this diameter (0: no width);
-    with `depths` those of Z and of the stock too. `flip_errors_mm`: how far set-ups may lie beside
-    each other, one for each that is turned over (None: not known).
+    """Return the uncertain inputs of this machine with a tool of this diameter (0: no width); with
+    `depths` those of Z and of the stock too.
 
-    What nothing depends on is left out: the uncertainty of a compensation of 0, that of a tool
-    without width, and scatter that is not modelled. Sizes are predicted without scatter.
+    `flip_errors_mm`: how far set-ups may lie beside each other, one for each that is turned over
+    (None: not known). What nothing depends on is left out: the uncertainty of a compensation of 0,
+    that of a tool without width, and scatter that is not modelled. Sizes are predicted without
+    scatter.
     """
     stated = machine.uncertainty
     inputs: list[Input] = []
@@ -452,7 +453,7 @@ def _varied(variant: MachineVariant, **records: Any) -> MachineVariant:
 
 
 def without_scatter(variant: MachineVariant) -> MachineVariant:
-    """Return the variant whose axes arrive at their mean positions."""
+    """Return the variant without scatter: its axes always arrive at their mean positions."""
     axes = variant.machine.axes
     if not any(axis.repeatability_mm for axis in axes):
         return variant
@@ -473,9 +474,12 @@ def opposite_edges(direction_rad: float) -> Floats:
 
 
 def edges_of(features: Sequence[tuple[int, Floats]]) -> Floats:
-    """Return weights (K, E, 2), or (K, E, 3) where one has Z, from the weights (E_f, 2) or
-    (E_f, 3) of some features, each with a number of values, such as a least and a greatest
-    diameter. Features share no edges."""
+    """Return the weights (K, E, 2), or (K, E, 3) if one has Z, of the edges of all features
+    together.
+
+    Each feature has weights (E_f, 2) or (E_f, 3), and a number of values, such as 2 for a least
+    and a greatest diameter. Features share no edges.
+    """
     axes = max((own_weights.shape[1] for _, own_weights in features), default=2)
     rows = sum(count for count, _ in features)
     weights = np.zeros((rows, sum(len(own_weights) for _, own_weights in features), axes))
@@ -591,7 +595,7 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
 
 
 def _edges_as_sizes(nodes: Floats, weights: Floats) -> Floats:
-    """Return the edges (N, T) themselves as sizes."""
+    """Return the mixed edges (N, T) themselves: the measurement of values that are edges."""
     return np.asarray(weights @ nodes)
 
 
@@ -603,9 +607,12 @@ def propagate(
     measure: Measure = _edges_as_sizes,
     extremes: bool = False,
 ) -> Budget:
-    """Return the budget of K values: by at most eleven simulations, fourteen where the values are
-    `extremes` (minima and maxima along a feature), and one more measurement where the tool has a
-    width. `edges` (K, E, 2 or 3) are the weights of the values' edges."""
+    """Return the budget of K values, from simulations of a few variants of the machine.
+
+    There are at most eleven, fourteen where the values are `extremes` (minima and maxima along a
+    feature), and one more measurement where the tool has a width. `edges` (K, E, 2 or 3) are the
+    weights of the values' edges.
+    """
     base = without_scatter(inputs.variant)
     factors, covariance = inputs.factors, inputs.covariance
     spread = np.sqrt(np.clip(np.diag(factors @ covariance @ factors.T), 0.0, None))
@@ -714,9 +721,11 @@ def _weights_of(
     rows: Sequence[Sequence[int]],
     count: int,
 ) -> Floats:
-    """Compute the weights (N, M) of the M simulated machines in N machines at `offsets` (N, D)
-    along the directions: piecewise linear between the nodes, extrapolated beyond the outer
-    ones."""
+    """Return the weights (N, M) with which M simulated machines are mixed into N machines at
+    `offsets` (N, D) along the directions.
+
+    They are piecewise linear between the nodes, and extrapolated beyond the outer ones.
+    """
     weights = np.zeros((len(offsets), count))
     weights[:, 0] = 1.0
     each = np.arange(len(offsets))
@@ -734,9 +743,11 @@ def _weights_of(
 
 
 def _normals(count: int, draws: int) -> Floats:
-    """Draw standard normal samples (N, P), each column the middles of N equally likely intervals
-    in random order (a Latin hypercube), transformed so that their covariance is exactly the unit
-    matrix."""
+    """Return standard normal samples (N, P), whose covariance is exactly the unit matrix.
+
+    Each column holds the middles of N equally likely intervals in random order (a Latin hypercube)
+    before it is transformed.
+    """
     random, middles = np.random.default_rng(SEED), _quantiles(draws)
     columns = [random.permutation(middles) for _ in range(count)]
     every = np.column_stack(columns) if columns else np.zeros((draws, 0))
@@ -755,7 +766,8 @@ def _quantiles(count: int) -> Floats:
 
 
 def _weights(edges: Floats, each: Input) -> Floats:
-    """Return the weights (K, 2E) or (K, 3E) of the edges with the shares of an input."""
+    """Return the weights (K, 2E) or (K, 3E) of the edges multiplied by an input's shares in X, Y
+    and Z."""
     shared: Floats = edges * np.array(each.edges[: edges.shape[2]])
     return shared.reshape(len(edges), -1)
 
@@ -782,8 +794,11 @@ class Draws(Struct, frozen=True, eq=False):
 
 
 def monte_carlo(values: Values, inputs: Inputs, edges: Floats, draws: int, seed: int) -> Draws:
-    """Simulate variants drawn from the joint normal distribution of the inputs, each with its own
-    scatter of the axes. Unknown inputs keep their value; a backlash below 0 becomes 0."""
+    """Return the values of variants drawn from the joint normal distribution of the inputs, each
+    simulated with its own scatter of the axes.
+
+    Unknown inputs keep their value; a backlash below 0 becomes 0.
+    """
     random = np.random.default_rng(seed)
     process = next((each for each in inputs.each if all(each.edges)), None)
     samples = []
@@ -881,7 +896,7 @@ def probability(low: float, high: float, covariance: Floats, limits: tuple[float
 
 
 def _sigmas(inside: float, standard: float) -> float:
-    """Return the distance inside a limit in standard deviations; ±inf if it is certain."""
+    """Return the distance inside a limit, in standard deviations; ±inf if the value is certain."""
     if standard < CERTAIN:
         return math.inf if inside >= 0.0 else -math.inf
     return inside / standard

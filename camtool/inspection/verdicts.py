@@ -67,11 +67,12 @@ class Tolerances(Struct, frozen=True):
 
 
 def inspect(run: Run, tolerances: Tolerances) -> Run:
-    """Add the verdicts of its dimensions to the report of a run, and the findings about them. A
-    run without a verification (of a program with errors) is returned unchanged. If a verdict is
-    required and no dimension with limits was inspected, that is an error.
+    """Return the run with the verdicts of its dimensions in its report, and the findings about
+    them.
 
-    Raises OptionError where the job scales the part.
+    A run without a verification (of a program with errors) is returned unchanged. If a verdict is
+    required and no dimension with limits was inspected, that is an error. Raises OptionError where
+    the job scales the part.
     """
     if run.verification is None or run.drawing is None or run.job is None:
         return run
@@ -103,7 +104,8 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
 
 
 def _without_read(findings: Iterable[Finding], run: Run) -> list[Finding]:
-    """Return the findings without those about drawing dimensions that are now inspected."""
+    """Return the findings without those that say that the drawing's dimensions were skipped: they
+    are inspected now."""
     from camtool.importers.dxf.walk import CALLOUTS
 
     skipped = () if run.drawing is None else run.drawing.skipped
@@ -127,14 +129,15 @@ hold."""
 
 
 def _as_error(finding: Finding) -> Finding:
-    """Return the finding, as an error if it says that a dimension is not inspected."""
+    """Return the finding unchanged, or as an error if it says that a dimension is not
+    inspected."""
     is_error = finding.code in NOT_INSPECTED
     return replace(finding, severity=Severity.ERROR) if is_error else finding
 
 
 def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Finding]:
-    """Return the verdicts of all dimensions, in order, and a finding for each dimension whose
-    feature the slides leave, or may leave on a machine that differs by an uncertainty."""
+    """Yield the verdict of each dimension, in order, or a finding if the slides miss its feature,
+    or may miss it on a machine that differs by an uncertainty."""
     if not inspector.dimensions:
         return
     inputs = inputs_of(
@@ -156,8 +159,8 @@ def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Fi
 
 
 def _verdict(each: Inspected, size: MachinedSize, budget: Budget, first: int) -> InspectedReport:
-    """Return the verdict of a dimension whose values are the three from `first` on in the
-    budget."""
+    """Return the verdict of a dimension; its values in the budget are three, from the index
+    `first` on."""
     bound, limits = each.bound, each.bound.dimension.limits
     zone = bound.dimension.kind in ZONES
     lower = upper = None
@@ -226,7 +229,8 @@ def _contributions(budget: Budget, value: int) -> tuple[ContributionReport, ...]
 
 
 def _likely_um(one: ContributionReport) -> float:
-    """Return a standard uncertainty: that of a uniform distribution if only a bound is known."""
+    """Return the standard uncertainty of a contribution; if only a bound is known, that of a
+    uniform distribution within it."""
     if one.um is None:
         return math.inf if one.at_most_um is None else one.at_most_um / math.sqrt(3.0)
     return one.um
@@ -235,16 +239,18 @@ def _likely_um(one: ContributionReport) -> float:
 def _decided(
     budget: Budget, first: int, limits: tuple[float | None, float]
 ) -> tuple[float | None, str]:
-    """Decide the verdict of a dimension whose values are the three from `first` on, and its
-    probability to be within limits: with unknown inputs the least favourable one; None if they
-    leave the verdict open."""
+    """Return the probability that a dimension is within its limits, and the verdict that follows.
+
+    Its values in the budget are three, from the index `first` on. With unknown inputs the
+    probability is the least favourable one; None if they leave the verdict open.
+    """
     low, high = first + 1, first + 2
     lower, upper = -math.inf if limits[0] is None else limits[0], limits[1]
     off_low, off_high = (float(budget.at_most[value].sum()) for value in (low, high))
 
     def chance(share: float) -> float:
-        """Return the probability with limits widened by a share of the bounds of all unknown
-        inputs."""
+        """Return the probability to be within the limits, widened by a share of the bounds of all
+        unknown inputs."""
         wide = lower - share * off_low, upper + share * off_high
         return budget.probability(low, high, wide)
 
@@ -271,8 +277,11 @@ def _word(chance: float) -> str:
 def _deciding(
     size: MachinedSize, budget: Budget, limits: tuple[float | None, float | None], first: int
 ) -> int:
-    """Return the index of the value of a dimension that is nearest to its limit, in standard
-    uncertainties, or that unknown inputs change most; the best fit without limits."""
+    """Return the index of the value that decides a dimension's verdict: the one nearest to its
+    limit, in standard uncertainties, after the worst change by unknown inputs.
+
+    Without limits it is the best fit.
+    """
     lower, upper = limits
     if upper is None:
         return first
@@ -289,7 +298,7 @@ def _deciding(
 
 
 def _shown_between(each: Inspected) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two places in the work frame between which a picture shows the dimension."""
+    """Return the two places in the work frame between which a picture draws the dimension."""
     bound = each.bound
     if each.floor is not None:
         return each.floor.place_mm, each.floor.place_mm
@@ -312,7 +321,7 @@ def _shown_between(each: Inspected) -> tuple[tuple[float, float], tuple[float, f
 
 
 def _findings(verdicts: Iterable[InspectedReport], require: Required | None) -> Iterator[Finding]:
-    """Return a finding for each dimension that is out or undecided; an error if a verdict is
+    """Yield a finding for each dimension that is out or undecided; an error if a verdict is
     required."""
     for each in verdicts:
         if each.verdict not in ("out", "undecided") or each.upper_mm is None:

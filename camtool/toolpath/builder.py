@@ -246,8 +246,8 @@ class _Column:
 
 
 def _as_rows(columns: Sequence[Ints | Floats | float], count: int) -> Iterator[tuple[float, ...]]:
-    """Yield `count` tuples of numbers, one for each row of these columns; a column that is a
-    single number repeats it."""
+    """Return an iterator over `count` tuples of numbers, one for each row of these columns; a
+    column that is a single number repeats it."""
     parts: list[Any] = []
     for column in columns:
         if isinstance(column, np.ndarray):

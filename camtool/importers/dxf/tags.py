@@ -119,7 +119,7 @@ class Tags(ABC):
 
 
 def lots(rows: Ints) -> Iterator[Ints]:
-    """Yield the rows in batches of AT_ONCE."""
+    """Return an iterator over the rows in batches of AT_ONCE."""
     return (rows[first : first + AT_ONCE] for first in range(0, len(rows), AT_ONCE))
 
 
