@@ -90,9 +90,10 @@ class ReadOptions(FrozenRecord):
     `units.MM_PER_UNIT`). `tolerance_mm`: how far fitted arcs may lie from a curve; `gap_mm`: open
     ends nearer than this are joined: both on the part, which is `scale` times as large as what
     is drawn. With `chain_gaps` false only equal ends are joined; `across_layers` joins ends of
-    different layers too. `dpi`: pixels per inch of SVG's px (None: what the program that
-    wrote the file took, else DPI). `format`: one of FORMATS, over what
-    the content looks like. `select`: which entities.
+    different layers too. `box_only`: only the box of the drawing is asked for, so that curves
+    within it may be read as their chords. `dpi`: pixels per inch of SVG's px (None: what the
+    program that wrote the file took, else DPI). `format`: one of FORMATS, over what the content
+    looks like. `select`: which entities.
 
     `text`: one of TEXTS. `recognise_arcs`: chords on one circle become arcs again. `layout`: a
     layout of a DXF by name instead of model space; `dimensions`: read the lines of dimensions.
@@ -192,6 +193,7 @@ class ReadOptions(FrozenRecord):
         ),
     ] = "outline"
     scale: float = 1.0
+    box_only: bool = False
     chain_gaps: bool = True
     select: Selection = Selection()
 
@@ -269,6 +271,7 @@ class Reading(TypedDict, total=False):
     scale: float
     dpi: float | None
     format: str | None
+    box_only: bool
     chain_gaps: bool
     across_layers: bool
     text: str

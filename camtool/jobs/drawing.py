@@ -6,11 +6,14 @@ misspelt layer must not leave a part of the work undone.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
+from camtool.importers.options import Selection
 from camtool.importers.pieces import NAMED, NoMatchError
 from camtool.importers.read import read_bytes
 from camtool.patterns import guess, matches
@@ -57,21 +60,35 @@ def read_to_scale(
     read: Callable[[ReadOptions], Drawing], options: ReadOptions, job: Job
 ) -> Drawing:
     """Read a drawing at the scale of the job. If the job fits the drawing into a size, the scale
-    is computed from the drawing, which is read again until its scale and the fit agree."""
+    is computed from the drawing, which is read again until its scale and the fit agree; at first
+    only for its box, where the job takes all of it."""
     if job.placement.fit_mm is None:
         return read(replace(options, scale=job.placement.scale))
     from camtool.planning.place import SCALE_SHARE, part_scale
 
-    drawing = read(replace(options, scale=1.0))
+    box_only = _takes_all(job, options)
+    drawing = read(replace(options, scale=1.0, box_only=box_only))
     for _ in range(MAX_LOOKS - 1):
-        try:
+        scale = made_for = drawing.made_for
+        with suppress(OptionError):  # planning reports it, with its place in the job
             scale = part_scale(drawing, job)
-        except OptionError:  # planning reports it, with its place in the job
-            return drawing
-        if abs(scale - drawing.made_for) <= SCALE_SHARE * drawing.made_for:
-            return drawing
-        drawing = read(replace(options, scale=scale))
+        if abs(scale - made_for) <= SCALE_SHARE * made_for:
+            if not box_only:
+                return drawing
+            scale = made_for
+        drawing, box_only = read(replace(options, scale=scale)), False
     return drawing
+
+
+def _takes_all(job: Job, options: ReadOptions) -> bool:
+    """True if the job takes all that is drawn, and its box is one along the axes of the
+    drawing."""
+    quarters = job.placement.rotate_rad / (0.5 * math.pi)
+    return (
+        options.select == Selection()
+        and quarters == round(quarters)
+        and not any(operation.layers or operation.colours for operation in job.operations)
+    )
 
 
 def layers_of(job: Job) -> tuple[str, ...]:
