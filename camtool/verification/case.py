@@ -42,8 +42,9 @@ WORST_LISTED = 10
 
 
 def nose_of(job: Job) -> Tool | None:
-    """Return a tool of the shape with which all operations cut, a V bit or a mill with a nose;
-    None for one that is as wide at its tip, and for several."""
+    """Return a tool with the tip with which all operations cut, if that is narrower than the tool
+    (a V bit, a mill with a nose). None for tools as wide at their tip as above, and for several
+    tools."""
     tools = [operation.tool for operation in job.operations]
     shapes = {(tool.kind, tool.tip_angle_rad, tool.tip_diameter_mm) for tool in tools}
     noses = {tool.nose_mm for tool in tools}
@@ -54,14 +55,15 @@ def nose_of(job: Job) -> Tool | None:
 
 
 def tool_mm(job: Job) -> float | None:
-    """Return the diameter of the tool with which all operations cut, mm; None for several or
-    none."""
+    """Return the diameter of the tool with which all operations cut, mm; None if there are
+    several, or none."""
     diameters = {operation.tool.diameter_mm for operation in job.operations}
     return (diameters.pop() or None) if len(diameters) == 1 else None
 
 
 def coverage_of(machine: Machine) -> float:
-    """Return the tolerance of coverage in XY on a machine, mm, without its dialect's stray."""
+    """Return the tolerance within which a contour counts as cut on this machine, mm in XY, without
+    the deviation that its dialect allows itself (`stray_mm`)."""
     axes = (machine.axes.x, machine.axes.y)
     coarse = max(axis.coded_step_mm for axis in axes)
     unit = max(axis.resolution_mm or 0.0 for axis in axes)

@@ -61,8 +61,9 @@ NO_FIGURES = CircleFigures(math.nan, math.nan, math.nan, math.nan)
 
 
 def full_circles(cuts: CutMoves, gap_mm: float) -> list[FullCircle]:
-    """Return runs of consecutive level arcs that cut about one centre in one direction and make a
-    full turn; of circles below each other (passes, or a helix and its last turn) the deepest.
+    """Return the full circles of the cuts: runs of consecutive level arcs about one centre, in one
+    direction, that make a full turn. Of circles below each other (passes, or a helix and its last
+    turn) only the deepest is returned.
 
     `gap_mm`: by how much centres and radii may differ, and how much of the circumference may be
     missing (a writer may close an arc by a line).
@@ -95,8 +96,8 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[FullCircle]:
 
 
 def _deepest(circles: list[FullCircle], gap_mm: float) -> list[FullCircle]:
-    """Return the deepest of circles below each other, in their order; all of several equally
-    deep."""
+    """Return the deepest of the circles that lie below each other, in their order; several if they
+    are equally deep."""
     lowest: dict[tuple[object, ...], float] = {}
     keys = []
     for circle in circles:
@@ -122,7 +123,8 @@ def _circle(toolpath: Toolpath, run: Ints, radius: float) -> FullCircle:
 
 
 def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
-    """Return G, F max, F min and D of the bins (720, 9) of `camtool.kernels.judging`."""
+    """Return G, F max, F min and D, computed from the bins (720, 9) of
+    `camtool.kernels.judging`."""
     filled = bins[bins[:, 0] > 0.0]
     if len(filled) < MIN_BINS:
         return NO_FIGURES
@@ -138,13 +140,15 @@ def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
 
 
 def mean_points(filled: Floats) -> Floats:
-    """Return (J, 2) mean points about the programmed centre, of bins (J, 9) that are not empty."""
+    """Return the mean points (J, 2) of bins (J, 9) that are not empty, relative to the programmed
+    centre."""
     return np.asarray(filled[:, 1:3] / filled[:, :1])
 
 
 def mean_radii(bins: Floats) -> Floats:
-    """Return (B,) mean radius of each of the bins (B, 9) that make a whole turn, NaN for empty
-    ones: the mean point of an arc of angle w lies at sin(w/2)/(w/2) of the radius."""
+    """Return the mean radius (B,) in each of the bins (B, 9) of a whole turn, NaN for empty ones.
+    The mean point of an arc of angle w lies at sin(w/2)/(w/2) of the radius, which is corrected
+    for."""
     half = np.pi / len(bins)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = bins[:, 1:3] / bins[:, :1]
@@ -152,8 +156,8 @@ def mean_radii(bins: Floats) -> Floats:
 
 
 def circular_error(filled: Floats) -> float:
-    """Return G from bins (J, 9) that are not empty, J ≥ 1; NaN where they do not surround the
-    centre."""
+    """Return the circular error G from J ≥ 1 bins (J, 9) that are not empty; NaN if they do not
+    surround the centre."""
     mean = mean_points(filled)
     if not _surrounds(mean):
         return math.nan
@@ -170,12 +174,12 @@ def _surrounds(points: Floats) -> bool:
 
 
 def least_squares_centre(points: Floats) -> Floats:
-    """Return centre (2,) of the circle with the least sum of squared radial distances to points
-    (J, 2).
+    """Return the centre (2,) of the circle with the least sum of squared radial distances to
+    points (J, 2).
 
     Gauss-Newton from the origin: with d = |p − c| and u = (p − c)/d, the residual d − R changes by
-    −u·δc − δR, so each round solves the 3 × 3 normal equations of [u, 1] (δc, R) = d.
-    The origin must lie inside the points.
+    −u·δc − δR, so each round solves the 3 × 3 normal equations of [u, 1] (δc, R) = d. The origin
+    must lie inside the points.
     """
     centre = np.zeros(2)
     for _ in range(FIT_ROUNDS):
@@ -240,7 +244,8 @@ class BidirectionalFigures(Struct, frozen=True):
 
 
 def reversal_figures(bins: Floats, ccw: bool) -> ReversalFigures:
-    """Return the reversals of one circle from its bins (B, 9) about the programmed centre."""
+    """Return the reversal figures of one circle, computed from its bins (B, 9) about the
+    programmed centre."""
     radius = mean_radii(bins)
     with np.errstate(invalid="ignore"):
         smallest, largest = np.sqrt(bins[:, 3]), np.sqrt(bins[:, 6])
@@ -255,8 +260,8 @@ def reversal_figures(bins: Floats, ccw: bool) -> ReversalFigures:
 def _steps(
     radius: Floats, smallest: Floats, largest: Floats, turn: int
 ) -> tuple[list[float], list[float]]:
-    """Return steps and spikes at the lower edges of the bins at `QUADRANTS_DEG`; `turn` is +1 for
-    growing angles."""
+    """Return the step and the spike of the radius at each angle of `QUADRANTS_DEG` (the lower edge
+    of a bin); `turn`: +1 if the angle grows along the circle, else −1."""
     count = len(radius)
     edge_bins = (np.array(QUADRANTS_DEG) * count // 360)[:, None]
     reach = np.arange(NEAR_BINS, FAR_BINS)
@@ -277,7 +282,8 @@ def _steps(
 
 
 def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
-    """Return B of X and of Y by least squares; NaN when less than half of the bins are filled."""
+    """Return the reversal values B of X and Y by least squares; NaN if less than half of the bins
+    are filled."""
     is_filled = np.isfinite(radius)
     if is_filled.sum() < len(radius) // 2:
         return math.nan, math.nan
@@ -288,8 +294,8 @@ def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
 
 @cache
 def _terms(count: int, turn: float) -> Floats:
-    """Return (B, 5): by how much one unit of c, e_x, e_y, B_x and B_y changes the radius in each
-    of `count` bins."""
+    """Return (B, 5): the change of the radius in each of `count` bins for one unit of c, e_x, e_y,
+    B_x and B_y."""
     angle = (np.arange(count) + 0.5) * (2.0 * np.pi / count)
     cos, sin = np.cos(angle), np.sin(angle)
     # With growing angles, sin > 0 after 0°, and cos < 0 after 90°.
@@ -305,7 +311,8 @@ class CirclePairs:
     first are kept, and only until the second is done."""
 
     def __init__(self, circles: Sequence[FullCircle]) -> None:
-        """Each counterclockwise circle takes the first free clockwise one as its partner."""
+        """Pair each counterclockwise circle with the first clockwise one that has no
+        partner yet."""
         self._circles = circles
         self._partner: dict[int, int] = {}
         self._waiting: dict[int, Floats] = {}
@@ -327,7 +334,8 @@ class CirclePairs:
         return self._partner.get(circle)
 
     def add(self, circle: int, bins: Floats) -> list[BidirectionalFigures]:
-        """Take the bins of a circle; the figures of the pair if its partner is done already."""
+        """Add the bins of a circle; return the figures of its pair in a list if the partner was
+        added before, else []."""
         partner = self._partner.get(circle)
         if partner is None:
             return []
@@ -342,8 +350,8 @@ class CirclePairs:
 
 
 def bidirectional_figures(circle: FullCircle, bins: Floats) -> BidirectionalFigures:
-    """Return the figures of a circle from the bins (2 B, 9) of both directions; NaN without
-    points."""
+    """Return the figures of a circle cut in both directions, from the bins (2 B, 9) of both; NaN
+    without points."""
     filled = bins[bins[:, 0] > 0.0]
     if len(filled) == 0:
         return BidirectionalFigures(circle, math.nan, math.nan)

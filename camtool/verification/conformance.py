@@ -90,7 +90,8 @@ class Conformance(Struct, frozen=True, eq=False):
 def conformance_of(
     decoded: Toolpath, request: ProgramRequest, *, flat_cuts: bool, sample_mm: float
 ) -> Conformance:
-    """Compare the moves of a program with those that the job asks for."""
+    """Compare the cutting moves of a program with those that the job asks for, both in place and
+    in settings."""
     decoded_side = Side.of(decoded.first(decoded.executed_rows), flat_cuts=flat_cuts)
     count = len(decoded_side.cuts.rows)
     if _equal_toolpaths(decoded, request.written):
@@ -150,16 +151,16 @@ class ProgramRequest(Struct, frozen=True, eq=False):
 
 
 class MatchingMoves(Struct, frozen=True, eq=False):
-    """A number (N,) for each move of two sides, equal for moves of the same kind, start, end and
-    centre."""
+    """A number (N,) for each move of both sides; moves of the same kind, start, end and centre
+    have the same number."""
 
     decoded: Ints
     written: Ints
 
     @classmethod
     def of(cls, decoded: Toolpath, written: Toolpath) -> MatchingMoves:
-        """Number the moves of both sides; points are the same within rounding
-        (POSITION_EPS_MM)."""
+        """Number the moves of both sides. Points within POSITION_EPS_MM, by rounding, are the
+        same."""
         numbers = np.concatenate([_numbers(decoded), _numbers(written)])
         number = np.unique(numbers, axis=0, return_inverse=True)[1].reshape(-1)
         return cls(number[: len(decoded)], number[len(decoded) :])
@@ -209,7 +210,8 @@ def compare_places(
     request: ProgramRequest,
     sample_mm: float,
 ) -> PlaceComparison:
-    """Compare `decoded`, the decoded side, with `other`, the written side, and the reverse."""
+    """Compare where `decoded` (the program) and `other` (what camtool would write) cut, in both
+    directions; `goal` is the side of the wanted moves."""
     limits = request.limits_mm
     holes = compare_holes(decoded, other, limits)
     from_decoded = near_pairs(decoded.cuts, ~matching.in_written, other.moves, limits, sample_mm)
@@ -240,8 +242,8 @@ def compare_places(
 
 
 def _changed_ends(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
-    """Yield MOVES_CHANGED for a program with the same moves as written, some of which end a little
-    elsewhere."""
+    """Yield MOVES_CHANGED if the program has the same sequence of moves as written, but some end
+    slightly elsewhere."""
     if not np.array_equal(decoded.kind, written.kind):
         return
     distances = np.linalg.norm(decoded.end - written.end, axis=1)
@@ -257,7 +259,8 @@ def _changed_ends(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
 
 
 def _near_wanted(pairs: NearPairs, wanted_moves: MoveIndex, limits: Limits) -> None:
-    """Mark samples near a wanted move as near, even where the writer would move otherwise."""
+    """Mark, in place, samples near a wanted move as covered even where no written move is near
+    them."""
     unmatched = np.flatnonzero(np.isinf(pairs.distance))
     point, _, distance = wanted_moves.pairs_within(
         pairs.samples.points[unmatched], pairs.samples.z[unmatched], limits
@@ -268,7 +271,8 @@ def _near_wanted(pairs: NearPairs, wanted_moves: MoveIndex, limits: Limits) -> N
 def _written_from_cut(
     pairs: NearPairs, wanted_moves: MoveIndex, decoded: MoveIndex, limits: Limits
 ) -> None:
-    """Mark written samples as near where the program cuts the wanted move behind them."""
+    """Mark, in place, written samples as covered where the program cuts the wanted move from which
+    they were written."""
     unmatched = np.flatnonzero(np.isinf(pairs.distance))
     part = pairs.samples.of(unmatched)
     nearest, wrong_depth = nearest_at_height(part, None, wanted_moves, limits)
@@ -286,7 +290,8 @@ _EXTRA = EXTRA_CUT_ELSEWHERE, EXTRA_CUT_OTHER_DEPTH, EXTRA_CUT_NOTHING_ASKED
 
 
 def _missing_findings(pairs: NearPairs, undrilled: Bools, limits: Limits) -> Iterator[Finding]:
-    """Yield CONTOUR_MISSING for written contours, at the block that cuts nearest."""
+    """Yield CONTOUR_MISSING for written contours that the program does not cut, with the block
+    that cuts nearest."""
     decoded = pairs.other_moves.cuts
 
     def block(part: UncoveredContour) -> str:
@@ -297,7 +302,7 @@ def _missing_findings(pairs: NearPairs, undrilled: Bools, limits: Limits) -> Ite
 
 
 def _extra_findings(pairs: NearPairs, drilled: Bools, limits: Limits) -> Iterator[Finding]:
-    """Yield EXTRA_CUT for contours of the program, at their own blocks."""
+    """Yield EXTRA_CUT for contours of the program that nobody asked for, with their own blocks."""
 
     def block(part: UncoveredContour) -> str:
         return block_name(pairs.cuts.toolpath, part.row)
@@ -312,7 +317,8 @@ def _uncovered_findings(
     sentences: PlaceSentences,
     place: Callable[[UncoveredContour], str],
 ) -> Iterator[Finding]:
-    """Yield a finding for each contour of which a sample is near nothing on the other side."""
+    """Yield a finding for each contour with a sample that is not near any cut of the other
+    side."""
     samples = pairs.samples.of(np.flatnonzero(np.isinf(pairs.distance)))
     nearest_moves = nearest_at_height(samples, None, pairs.other_moves, limits)
     parts = list(uncovered_contours(pairs.cuts, samples, nearest_moves, drilled, limits))
@@ -322,8 +328,8 @@ def _uncovered_findings(
 def _plunge_findings(
     side: Side, other_sides: tuple[Side, Side], matching: MatchingMoves, limits: Limits
 ) -> Iterator[Finding]:
-    """Yield EXTRA_CUT for feeds straight down to where no cut was asked for, except holes, which
-    are compared by `hole_findings`."""
+    """Yield EXTRA_CUT for plunges (feeds straight down) where no cut was asked for; holes are left
+    to `compare_holes`."""
     toolpath = side.toolpath
     rows = np.flatnonzero(side.plunges & ~matching.in_written)
     rows = rows[~_is_at_place(toolpath.end[rows, :2], side.holes.places)]
@@ -344,7 +350,7 @@ def _plunge_findings(
 
 
 def _is_at_place(points: Floats, places: Floats) -> Bools:
-    """Return (J,) true for points (J, 2) that are one of the places (K, 2)."""
+    """Return the mask (J,) of points (J, 2) that coincide with one of the places (K, 2)."""
     place_set = {tuple(place) for place in np.rint(places / POSITION_EPS_MM).astype(int).tolist()}
     rounded = np.rint(points / POSITION_EPS_MM).astype(int).tolist()
     return np.array([tuple(point) in place_set for point in rounded], dtype=np.bool_)
@@ -400,8 +406,9 @@ COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
 def compare_settings(
     side: Side, other: Side, matching: MatchingMoves, pairs: Ints, request: ProgramRequest
 ) -> tuple[Finding, ...]:
-    """Compare feeds, spindle, tool, coolant, corners, dwells, clearance and end; `pairs` (P, 2)
-    are rows of both sides that lie on each other, besides those that are alike."""
+    """Return findings on feeds, spindle, tool, coolant, corners, dwells, clearance and end.
+    `pairs` (P, 2): rows of both sides that lie on each other, in addition to those with equal
+    moves."""
     setting_pairs = _SettingPairs.of(side, other, matching, pairs, request.limits_mm)
     return (
         *_feed_findings(setting_pairs, request),
@@ -429,9 +436,9 @@ class _SettingPairs(Struct, frozen=True, eq=False):
     def of(
         cls, side: Side, other: Side, matching: MatchingMoves, pairs: Ints, limits: Limits
     ) -> _SettingPairs:
-        """Pair rows: the given pairs, all rows that are alike, each plunge that is not alike with
-        every written plunge, and each cut without any of these with the written moves at its
-        middle, whatever their direction."""
+        """Pair the rows of both sides whose settings are compared: the given pairs, all equal
+        moves, each remaining plunge with every written plunge, and each remaining cut with the
+        written moves at its middle, whatever their direction."""
         at_work, other_at_work = side.cuts.is_cut | side.plunges, other.cuts.is_cut | other.plunges
         rows, written = np.flatnonzero(at_work), np.flatnonzero(other_at_work)
         # One of several written rows that are alike, with the same settings, is enough.
@@ -463,8 +470,8 @@ class _SettingPairs(Struct, frozen=True, eq=False):
         return cls(side.toolpath, other.toolpath, rows, every)
 
     def differing(self, is_equal: Bools) -> tuple[Ints, Ints]:
-        """Return (R,) rows without a pair that is equal, `is_equal` (P,), and the written row of
-        one pair of each."""
+        """Return the rows (R,) none of whose pairs is in the mask `is_equal` (P,), and for each
+        the written row of one of its pairs."""
         fine = np.zeros(len(self.decoded), dtype=np.bool_)
         fine[self.pairs[is_equal, 0]] = True
         rows, first = np.unique(self.pairs[:, 0], return_index=True)
@@ -473,8 +480,8 @@ class _SettingPairs(Struct, frozen=True, eq=False):
 
 
 def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats, Ints]:
-    """Return (N,) each: feed, spindle speed in rev/min (CCW negative, SETTING_OFF when it is
-    off), tool, and an index of COOLANTS."""
+    """Return (N,) each: feed, spindle speed in rev/min (negative for CCW, SETTING_OFF if off),
+    tool number, and index in COOLANTS."""
     kind = toolpath.kind
     turning = np.where(kind == Kind.SPINDLE_CCW, -toolpath.value, toolpath.value)
     spindle = (kind >= Kind.SPINDLE_CW) & (kind <= Kind.SPINDLE_OFF)
@@ -488,19 +495,21 @@ def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats, Ints]:
 
 
 def _last_row(is_given: Bools) -> Ints:
-    """Return (N,) the last row up to each where it is `is_given`, −1 before the first."""
+    """Return (N,) the last row up to and including each that is in the mask, −1 before the
+    first."""
     return np.asarray(np.maximum.accumulate(np.where(is_given, np.arange(len(is_given)), -1)))
 
 
 def _last_value(is_given: Bools, values: Floats) -> Floats:
-    """Return (N,) the last `is_given` value up to each row, 0 before the first."""
+    """Return (N,) the value of the last row up to and including each that is in the mask, 0 before
+    the first."""
     last = _last_row(is_given)
     return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), 0.0)
 
 
 def _feed_findings(setting_pairs: _SettingPairs, request: ProgramRequest) -> Iterator[Finding]:
-    """Yield FEED_DIFFERS: an error for feeds that the job names, a remark for those it leaves to
-    the machine.
+    """Yield FEED_DIFFERS: an error for feeds that the job names, a remark for feeds that it leaves
+    to the machine.
 
     On a machine that applies the feed to its faster axis, the speed along a line is higher by the
     ratio of its length to its run on that axis. A coarse grid changes the direction of short
@@ -536,16 +545,16 @@ def _feed_findings(setting_pairs: _SettingPairs, request: ProgramRequest) -> Ite
 def _by_severity(
     rows: Ints, twins: Ints, is_requested: Bools
 ) -> Iterator[tuple[bool, int, int, int]]:
-    """Divide rows (R,), compared with written rows `twins` (R,), into those whose setting
-    the job asks for, `is_requested` (R,), and the others: yield for each part that has any whether
-    it is asked for, its first row, the written row of that, and the number of its rows."""
+    """Group rows (R,), compared with written rows `twins` (R,), by whether the job asks for their
+    setting (`is_requested` (R,)). Yield for each group that is not empty: is it asked for, its
+    first row, the written row of that, and the number of rows."""
     for is_asked, is_part in ((True, is_requested), (False, ~is_requested)):
         if is_part.any():
             yield (is_asked, int(rows[is_part][0]), int(twins[is_part][0]), int(is_part.sum()))
 
 
 def _air_feed_findings(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
-    """Yield FEED_DIFFERS, a warning, for moves at a feed where a rapid was written."""
+    """Yield FEED_DIFFERS, a warning, for moves at a feed where camtool would write a rapid."""
     rapids = np.flatnonzero(written.kind == Kind.RAPID)
     feeds = np.flatnonzero(written.is_feed)
     lines = np.flatnonzero(decoded.is_feed & ~decoded.is_arc)
@@ -566,8 +575,8 @@ def _air_feed_findings(decoded: Toolpath, written: Toolpath) -> Iterator[Finding
 
 
 def _speed_ratios(toolpath: Toolpath) -> Floats:
-    """Return (N,) ratio of the length of a line in XY to its run on the faster axis, 1 to √2; 1
-    for other rows."""
+    """Return (N,) the ratio of a line's length in XY to its run on the faster axis, 1 to √2; 1 for
+    other rows."""
     run = np.abs(toolpath.end - toolpath.starts)[:, :2]
     faster = run.max(axis=1)
     line = ~toolpath.is_arc & (faster > 0.0)
@@ -590,8 +599,8 @@ def _spindle_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
 def _unequal_settings(
     setting_pairs: _SettingPairs, column: int
 ) -> Iterator[tuple[bool, str, float, float, int]]:
-    """Compare a column of `_settings`. Yield for the moves whose setting the job asks for, and for
-    the others: whether it is asked for, the first block, its value and the written one, and the
+    """Compare a column of `_settings`. Yield, for the moves whose setting the job asks for and
+    then for the others: is it asked for, the first block, its value and the written one, and the
     number of moves."""
     decoded, written = (
         _settings(each)[column] for each in (setting_pairs.decoded, setting_pairs.written)
@@ -666,8 +675,8 @@ def _corner_tolerances(toolpath: Toolpath) -> Floats:
 def _dwell_findings(
     decoded: Toolpath, written: Toolpath, request: ProgramRequest
 ) -> Iterator[Finding]:
-    """Yield SETTING_DIFFERS where the tool dwells for less than was asked, and where it dwells for
-    longer: a warning in the stock, where it rubs, else a remark."""
+    """Yield SETTING_DIFFERS for dwells shorter than asked, and for longer ones: a warning in the
+    stock, where the tool rubs, else a remark."""
     written_dwells, decoded_dwells = (
         np.flatnonzero(each.kind == Kind.DWELL) for each in (written, decoded)
     )
@@ -692,8 +701,8 @@ def _dwell_findings(
 def _long_dwell_findings(
     decoded: Toolpath, written: Toolpath, decoded_dwells: Ints, goals: Ints, limits: Floats
 ) -> Iterator[Finding]:
-    """Yield SETTING_DIFFERS where the tool dwells for longer than was asked; `decoded_dwells` and
-    `goals` are the rows of dwells."""
+    """Yield SETTING_DIFFERS for dwells longer than asked; `decoded_dwells` and `goals` are the
+    rows of dwells on both sides."""
     one, other = decoded_dwells, goals
     longer: dict[bool, list[tuple[int, float, float]]] = {True: [], False: []}
     visited: set[int] = set()
@@ -750,7 +759,7 @@ def _clearance_findings(
 
 
 def _severity(low_mm: float, request: ProgramRequest) -> Severity:
-    """Return ERROR where the tool touches the stock or the job names the height, else WARNING."""
+    """Return ERROR if the tool touches the stock or the job names the height, else WARNING."""
     touching = low_mm <= STOCK_TOP_MM + request.limits_mm[1]
     return Severity.ERROR if touching or request.safe_z_named else Severity.WARNING
 

@@ -32,7 +32,7 @@ class ContrastRow(msgspec.Struct, frozen=True):
 
 
 def contrast_row(name: str, report: Report) -> ContrastRow:
-    """Return the row of one report."""
+    """Return the table row of one report."""
     error = report.error_um
     circular = [circle.G_um for circle in report.circles if circle.G_um is not None]
     return ContrastRow(
@@ -77,7 +77,8 @@ def contrast_table(rows: Sequence[ContrastRow]) -> str:
 
 
 def worst_place(verdicts: Iterable[Verification]) -> tuple[float, float]:
-    """Return (x, y) mm of the largest error of all; part zero when nothing cuts."""
+    """Return the place (x, y), mm, of the largest error among all variants; part zero if nothing
+    cuts."""
     best, place = -1.0, (0.0, 0.0)
     for verdict in verdicts:
         trace = verdict.trace

@@ -72,7 +72,8 @@ Limits = tuple[float, float]
 
 
 class Coverage(Struct, frozen=True, eq=False):
-    """The match of the rows, the rounding error, and CONTOUR_MISSING and EXTRA_CUT findings."""
+    """The result of a comparison of cuts: the match of the rows, the rounding error, and
+    CONTOUR_MISSING and EXTRA_CUT findings."""
 
     match: Match
     rounding: Figure
@@ -87,8 +88,8 @@ class Side(Struct, frozen=True, eq=False, dict=True):
 
     @classmethod
     def of(cls, toolpath: Toolpath, *, flat_cuts: bool) -> Side:
-        """Return the toolpath with its cutting moves; `flat_cuts` as `camtool.verification.cuts`
-        says."""
+        """Return the side for a toolpath, with its cutting moves; `flat_cuts` as in
+        `camtool.verification.cuts`."""
         return cls(toolpath, cut_moves(toolpath, flat_cuts=flat_cuts))
 
     @cached_property
@@ -195,8 +196,8 @@ def cover(
 
 def _contours_from(cuts: CutMoves, goal: CutMoves, row_from: Indices | None) -> tuple[Ints, Ints]:
     """Return (C,) the wanted contour from which all rows of each decoded contour were written, and
-    (W,) the only decoded contour with rows of each wanted contour; ANY_CONTOUR where there is
-    none."""
+    (W,) the decoded contour that alone has rows of each wanted contour; ANY_CONTOUR if there is no
+    such contour."""
     of_decoded = np.full(cuts.contour_count, ANY_CONTOUR, dtype=np.int64)
     of_wanted = np.full(goal.contour_count, ANY_CONTOUR, dtype=np.int64)
     if row_from is not None and len(of_wanted):
@@ -222,9 +223,9 @@ def _contours_from(cuts: CutMoves, goal: CutMoves, row_from: Indices | None) -> 
 def _nearest_in_own_contour(
     cuts: CutMoves, samples: CutSamples, own_contour: Ints, goal: Goal
 ) -> tuple[NearestMoves, Ints]:
-    """Return the nearest move of the `own_contour` wanted contour (C,) to each sample (S,), and
-    that contour; ANY_CONTOUR for the samples of contours that have none, or do not lie within the
-    limits of it."""
+    """Return for each sample (S,) the nearest move of the wanted contour `own_contour` (C,) of its
+    contour, and the number of that wanted contour; ANY_CONTOUR for samples of contours that have
+    none or do not keep within the limits of it."""
     count, fit = len(samples.points), np.asarray(own_contour != ANY_CONTOUR)
     nearest = NearestMoves(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
     contours = cuts.contour[cuts.row[samples.segment]]
@@ -244,9 +245,9 @@ def _nearest_in_own_contour(
 
 
 def _judged_together(cuts: CutMoves, own_contour: Ints, alike_rows: Ints) -> Indices:
-    """Return (N,) a group number of each row: rows of one contour are judged together, but those
-    of contours all of whose rows lie `alike_rows` rows of their `own_contour` contour are judged
-    one by one."""
+    """Return (N,) the group number of each row. Rows of one contour are judged together; if all
+    rows of a contour are `alike_rows` (see `_rows_alike`) and it has an `own_contour`, they are
+    judged one by one."""
     alike_counts, every = (
         np.bincount(cuts.contour[rows], minlength=len(own_contour))
         for rows in (alike_rows, cuts.rows)
@@ -257,8 +258,8 @@ def _judged_together(cuts: CutMoves, own_contour: Ints, alike_rows: Ints) -> Ind
 
 
 def _rows_copied(goal: CutMoves, alike_rows: Ints, row_from: Indices | None) -> Bools:
-    """Return (N,) true for the wanted rows from which one was written that lies `alike_rows`
-    them."""
+    """Return the mask (N,) of wanted rows from which a row in `alike_rows` was written, which
+    therefore need no further comparison."""
     has_copy = np.zeros(len(goal.contour), dtype=np.bool_)
     if row_from is not None:
         has_copy[row_from[alike_rows]] = True
@@ -266,8 +267,8 @@ def _rows_copied(goal: CutMoves, alike_rows: Ints, row_from: Indices | None) -> 
 
 
 def _rows_alike(cuts: CutMoves, goal: CutMoves, limits: Limits, row_from: Indices | None) -> Ints:
-    """Return the rows that cut along a line or an arc, and alone were written from a move of the
-    same kind beside which they lie: each point of them lies within the limits of it.
+    """Return the rows that cut along a line or arc, that alone were written from a move of the
+    same kind, and each point of which lies within the limits of that move.
 
     Two points that run along two lines at once are nowhere farther apart than at one of the ends.
     On two arcs they are no farther apart than both centres and, at one of the ends, both spokes,
@@ -308,7 +309,8 @@ def _rows_alike(cuts: CutMoves, goal: CutMoves, limits: Limits, row_from: Indice
 
 
 def _radius_differences(toolpath: Toolpath, arcs: Ints | Indices) -> Floats:
-    """Return (J,) mm: the distance of the end of each arc from the circle through its start."""
+    """Return (J,) mm: the distance of the end of each arc from the circle about its centre through
+    its start."""
     centre = toolpath.centre[arcs]
     start_radius, end_radius = (
         np.hypot(*(points[:, :2] - centre).T)
@@ -325,9 +327,9 @@ def _fits_contour(
     limits: Limits,
     spacing_mm: float,
 ) -> Bools:
-    """Return (C,) true for the contours of one side all of whose rows (N,) have a copy within the
-    limits, and for those that lie within the limits of their `own_contour` contour (C,) of the
-    other side, where they have one: it holds the copies of their rows."""
+    """Return the mask (C,) of contours of one side that the other side cuts within the limits:
+    those all of whose rows are in `has_copy` (N,), and those that keep within the limits of their
+    `own_contour` (C,) on the other side."""
     is_whole = np.ones(len(own_contour), dtype=np.bool_)
     is_whole[cuts.contour[cuts.rows[~has_copy[cuts.rows]]]] = False
     fit = np.asarray(is_whole | (own_contour != ANY_CONTOUR))
@@ -355,9 +357,10 @@ _EXTRA = EXTRA_CUT, EXTRA_CUT_AT_DEPTH, EXTRA_CUT_NONE_WANTED
 
 
 class UncoveredContour(Struct, frozen=True):
-    """The sample of a contour with the largest `distance` (mm, inf without any cuts) from the
-    other side, where that does not cut a `share` of its samples; `nearest` is the segment there,
-    −1 for none. `wrong_depth`: the other side cuts at this place, but at another depth."""
+    """A contour that the other side does not cut completely: its sample with the largest
+    `distance` from the other side (mm, inf if that cuts nothing), the `share` of its samples that
+    are not cut, and the `nearest` segment at that sample (−1: none). `wrong_depth`: the other side
+    cuts there, but at another depth."""
 
     contour: int
     row: int
@@ -375,11 +378,12 @@ def uncovered_contours(
     drilled: Bools,
     limits: Limits,
 ) -> Iterator[UncoveredContour]:
-    """Yield the contours of which a part is not cut by the other side, by all samples of each.
+    """Yield the contours of which a part is not cut by the other side; `samples` must be all
+    samples of each.
 
     `nearest_found` is the result of `nearest_at_height` for the samples, `drilled` (C,) the
-    contours that are holes on the other side. Slopes within the tolerance of the stock top are
-    excepted: they may be flat moves on it, which cut nothing.
+    contours that are holes on the other side. Slopes within the tolerance of the stock top are not
+    counted: they may be flat moves on it, which cut nothing.
     """
     nearest_moves, wrong_depth = nearest_found
     failing = np.flatnonzero(wrong_depth | (nearest_moves.distance > limits[0]))
@@ -414,7 +418,8 @@ def uncovered_findings(
     sentences: PlaceSentences,
     place: Callable[[UncoveredContour], str],
 ) -> Iterator[Finding]:
-    """Yield a finding for each of these contours of `cuts`; `place` names the block or contour."""
+    """Yield a finding for each of these contours of `cuts`; `place` returns the text that names
+    its block or contour."""
     elsewhere, other_depth, nothing_near = sentences
     for part, other_count in first_items(parts):
         is_finite = np.isfinite(part.distance)
@@ -430,7 +435,7 @@ def uncovered_findings(
 
 
 def _contour_name(cuts: CutMoves, part: UncoveredContour) -> str:
-    """Return `contour 3 (layer and entity)`."""
+    """Return the name of a contour, such as `contour 3 (layer and entity)`."""
     source = cuts.toolpath.text(part.row)
     return f"contour {part.contour + 1}" + (f" ({source})" if source else "")
 
@@ -455,7 +460,8 @@ class Holes(Struct, frozen=True, eq=False):
 
 
 def holes_of(toolpath: Toolpath) -> Holes:
-    """Return the holes that a toolpath drills, in order."""
+    """Return the holes that a toolpath drills, in order: positions where it goes down at a feed
+    and neither of the moves before and after cuts."""
     across = moves_across(toolpath)
     flat = across | (toolpath.kind == Kind.HOME_XY)
     cutting = cutting_rows(toolpath, flat_cuts=False, across=across)
@@ -473,8 +479,9 @@ def holes_of(toolpath: Toolpath) -> Holes:
 
 
 def contours_drilled(cuts: CutMoves, holes: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
-    """Return (C,) the contours that are holes on the other side, and (H,) those holes: all of the
-    contour lies within the first limit of the hole, and their depths agree within the second.
+    """Return the mask (C,) of contours that are holes on the other side, and the mask (H,) of
+    these holes. The whole contour must lie within the first limit of the hole, and their depths
+    must agree within the second.
 
     A contour smaller than the resolution of a dialect becomes a plunge, which cuts the same.
     """
@@ -511,7 +518,7 @@ class HoleComparison(Struct, frozen=True, eq=False):
 
 
 def compare_holes(decoded: Side, goal: Side, limits: Limits) -> HoleComparison:
-    """Compare the holes of a program with the wanted ones and with small contours:
+    """Compare the holes of a program with the wanted holes and with small contours.
     CONTOUR_MISSING for wanted holes that the program does not drill, EXTRA_CUT for holes that are
     not wanted."""
     drilled, wanted_stand = contours_drilled(decoded.cuts, goal.holes, limits)
@@ -530,8 +537,8 @@ def _unpaired_findings(
     stand: Bools,
     sentences: tuple[Sentence, Sentence],
 ) -> Iterator[Finding]:
-    """Yield a finding for each hole that the other side lacks; `sentences`: for no hole at its
-    position, and for one of another depth."""
+    """Yield a finding for each hole that the other side lacks. `sentences`: for a hole without one
+    at its position, and for one of another depth; `stand`: the mask of holes to leave out."""
     no_hole, other_depth = sentences
     has_position, paired = _has_hole(holes, other_holes, limits_mm)
     unpaired = np.flatnonzero(~paired & ~stand).tolist()
@@ -545,8 +552,8 @@ def _unpaired_findings(
 
 
 def _has_hole(holes: Holes, other_holes: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
-    """Return (H,) true for holes with one of the others at their position, and (H,) for those with
-    one that is as deep."""
+    """Return the mask (H,) of holes for which the other side has a hole at the same position, and
+    the mask (H,) of those for which one is also equally deep."""
     has_position, is_paired = (
         np.zeros(len(holes), dtype=np.bool_),
         np.zeros(len(holes), dtype=np.bool_),
@@ -572,7 +579,7 @@ rounded by up to 1.41 units in all, which turns a longer move by no more than 32
 
 
 def encloses_area(cuts: CutMoves, gap_mm: float) -> Bools:
-    """Return (C,) true for contours that enclose an area; others (open paths, paths there and
+    """Return the mask (C,) of contours that enclose an area. Others (open paths, paths there and
     back) may be cut from either end."""
     return np.asarray(loops(cuts, gap_mm)[:, 0] != NO_LOOP)
 
@@ -587,9 +594,9 @@ def direction_findings(
     """Yield CUT_OTHER_WAY for contours of a program that are cut in the direction opposite to that
     of the moves from which it was written, `source`; `row_from` as in `cover`.
 
-    A move beside the one that it was written from, in the same direction, is not turned, nor is a
-    row whose middle lies on the contour that it came from, in the same direction; the others are
-    compared with everything.
+    Rows that run beside the move from which they were written, in its direction, are fine without
+    a search, and so are rows whose middle lies on the contour they came from, in its direction.
+    All others are compared with every move.
     """
     cuts = decoded.cuts
     is_open = cuts.is_cut
@@ -624,8 +631,8 @@ def direction_findings(
 
 
 def _same_direction(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indices) -> Bools:
-    """Return (J,) true where the chords of these rows have the direction of those of the rows they
-    came from; false for full circles."""
+    """Return the mask (J,) of rows whose chord has the direction of the chord of the row they came
+    from; False for full circles."""
     is_same = np.empty(len(rows), dtype=np.bool_)
     for low in range(0, len(rows), ROWS_AT_ONCE):
         batch = rows[low : low + ROWS_AT_ONCE]
@@ -641,8 +648,8 @@ def _same_direction(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indi
 def _cosines(
     cuts: CutMoves, samples: CutSamples, other_moves: MoveIndex, nearest: NearestMoves
 ) -> Floats:
-    """Return (S,) cosine of the angle between the move of each sample and the move of the other
-    side that was found; 0 where none was."""
+    """Return (S,) the cosine of the angle between the move of each sample and the move of the
+    other side nearest to it; 0 if none was found."""
     cosine = np.zeros(len(samples.points))
     with_move = np.flatnonzero(nearest.segment >= 0)
     part, segments = samples.of(with_move), nearest.segment[with_move]
@@ -687,8 +694,8 @@ class NearPairs(Struct, eq=False):
 def near_pairs(
     cuts: CutMoves, rows: Bools, other_moves: MoveIndex, limits: Limits, sample_mm: float
 ) -> NearPairs:
-    """Pair samples on these rows (N,) of one side, about `sample_mm` apart, with all moves of the
-    other side within the limits."""
+    """Pair samples on the rows in the mask `rows` (N,) of one side, about `sample_mm` apart, with
+    all moves of the other side within the limits."""
     samples = _with_ends(cuts, sample_cuts(cuts, sample_mm, np.flatnonzero(rows[cuts.row])))
     point, move, distance = other_moves.pairs_within(samples.points, samples.z, limits)
     nearest_mm = np.full(len(samples.points), np.inf)
@@ -701,8 +708,8 @@ def near_pairs(
 
 
 def _with_ends(cuts: CutMoves, samples: CutSamples) -> CutSamples:
-    """Return the samples with the last one of each row moved to the programmed end, which need not
-    lie on the circle of an arc."""
+    """Return the samples with the last one of each row moved to the programmed end, since the end
+    of an arc need not lie on the circle of its start."""
     row = cuts.row[samples.segment]
     last = (samples.segment == cuts.first[row + 1] - 1) & (samples.share == 1.0)
     points = np.where(last[:, None], cuts.toolpath.end[row, :2], samples.points)
@@ -710,7 +717,7 @@ def _with_ends(cuts: CutMoves, samples: CutSamples) -> CutSamples:
 
 
 def headings(segments: Segments, indices: Ints, share: Floats) -> Floats:
-    """Return (J, 2) unit directions of the segments `indices` at parts `share` of their
+    """Return the unit directions (J, 2) of the segments `indices` at the shares `share` of their
     lengths."""
     chord = (segments.end - segments.start)[indices]
     # The tangent turns evenly from half the sweep before the chord to half the sweep behind it.
@@ -720,8 +727,9 @@ def headings(segments: Segments, indices: Ints, share: Floats) -> Floats:
 
 
 def reversed_samples(compared: NearPairs, round_trip: Bools, limits: Limits) -> Ints:
-    """Return the samples on moves that the other side cuts only in the opposite direction; only
-    contours that enclose an area count (`round_trip` (P,) of each pair)."""
+    """Return the indices of samples on moves that the other side cuts only in the opposite
+    direction. Only contours that enclose an area count (`round_trip` (P,): the mask of pairs on
+    such contours)."""
     cuts, samples, count = compared.cuts, compared.samples, len(compared.distance)
     is_along = np.zeros(count, dtype=np.bool_)
     is_along[compared.point[compared.cosine > MIN_SAME_COSINE]] = True
@@ -757,12 +765,12 @@ are."""
 
 
 def at_point(point: Floats | tuple[float, float]) -> str:
-    """Return `(1.234, 5.678) mm`."""
+    """Return a point as text: `(1.234, 5.678) mm`."""
     return f"({float(point[0]):.3f}, {float(point[1]):.3f}) mm"
 
 
 def block_name(toolpath: Toolpath, row: int) -> str:
-    """Return `block 12` (from 1, as people count), or `move 12` when no program was read."""
+    """Return `block 12` (counted from 1), or `move 12` if no program was read."""
     return block_of(toolpath, row) if toolpath.block[row] >= 0 else f"move {row + 1}"
 
 

@@ -48,8 +48,8 @@ class CutMoves(Struct, frozen=True, eq=False):
     contour: Indices
 
     def heights(self, indices: Ints | Indices) -> Floats:
-        """Return (J, 2) mm: the heights of the starts and ends of these segments, between which
-        their height changes evenly: the segments of a row are equal parts of it."""
+        """Return (J, 2) mm: the heights at the start and the end of these segments. The height
+        changes evenly in between: the segments of a row are equal parts of it."""
         row = self.row[indices]
         begin, end = self.toolpath.starts_of(row)[:, 2], self.toolpath.end[row, 2]
         part_counts = self.first[row + 1] - self.first[row]
@@ -76,7 +76,7 @@ class CutMoves(Struct, frozen=True, eq=False):
         return np.sort(self.ends_z, axis=1)
 
     def slopes(self, indices: Ints) -> Bools:
-        """Return (J,) true where the height changes along these segments."""
+        """Return the mask (J,) of segments along which the height changes."""
         begin, end = self.heights(indices).T
         return np.asarray(begin != end)
 
@@ -96,7 +96,7 @@ class CutMoves(Struct, frozen=True, eq=False):
         return int(self.contour.max(initial=-1)) + 1
 
     def contour_ends(self) -> tuple[Ints, Ints]:
-        """Return first and last row of each contour (C,), (C,)."""
+        """Return the first and the last row (C,), (C,) of each contour."""
         rows = self.rows
         change = np.flatnonzero(np.diff(self.contour[rows]))
         begin = rows[np.concatenate([[0], change + 1])] if len(rows) else rows
@@ -104,15 +104,15 @@ class CutMoves(Struct, frozen=True, eq=False):
         return begin, finish
 
     def is_closed(self, gap_mm: float) -> Bools:
-        """Return (C,) true where a contour ends within gap_mm of its start."""
+        """Return the mask (C,) of contours that end within `gap_mm` of their start."""
         begin, finish = self.contour_ends()
         gap = self.toolpath.end[finish, :2] - self.toolpath.starts_of(begin)[:, :2]
         return np.asarray(np.hypot(gap[:, 0], gap[:, 1]) <= gap_mm)
 
 
 def row_lengths(toolpath: Toolpath) -> Floats:
-    """Return (N,) mm: length of each row in XY, 0 for events; of an arc, its start radius times
-    its sweep."""
+    """Return (N,) mm: the length of each row in XY, 0 for events; for an arc, its start radius
+    times its sweep."""
     return toolpath.by_parts(_lengths)
 
 
@@ -136,8 +136,8 @@ def is_flat(toolpath: Toolpath) -> bool:
 
 
 def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool, across: Bools | None = None) -> Bools:
-    """Return (N,) true for the rows that cut, by the rule of this module; false after the END.
-    `across` (N,): the rows that move in XY, where these are known."""
+    """Return the mask (N,) of rows that cut, by the rule of this module; False after END. `across`
+    (N,): the mask of rows that move in XY, if already known."""
     across = moves_across(toolpath) if across is None else across
     is_drawn_flat = flat_cuts and is_flat(toolpath)
     cutting = across & (toolpath.is_feed if is_drawn_flat else feeds_below_top(toolpath))
@@ -146,12 +146,13 @@ def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool, across: Bools | None = 
 
 
 def moves_across(toolpath: Toolpath) -> Bools:
-    """Return (N,) true for the rows that move in XY."""
+    """Return the mask (N,) of rows that move in XY."""
     return toolpath.by_parts(lambda part: _lengths(part) > POSITION_EPS_MM)
 
 
 def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
-    """Return the cutting moves of a toolpath as segments; `flat_cuts` as the module says."""
+    """Return the cutting moves of a toolpath as segments; `flat_cuts` as described in the
+    module."""
     cutting = cutting_rows(toolpath, flat_cuts=flat_cuts)
     arcs = np.flatnonzero(toolpath.is_arc & cutting)
     sweep = toolpath.sweeps_of(arcs)
@@ -167,9 +168,9 @@ def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
 def _segments(
     toolpath: Toolpath, row: Indices, first: Indices, arcs: tuple[Ints, Floats]
 ) -> Segments:
-    """Return a segment for each part of each row: segment k is of row `row[k]` (K,), row r owns
-    segments first[r]:first[r+1]. `arcs`: the rows (J,) that are arcs, and their sweeps (J,) rad.
-    Points between the parts of an arc lie at the radius of its start."""
+    """Return one segment for each part of each row: segment k belongs to row `row[k]` (K,), and
+    row r owns segments first[r]:first[r+1]. `arcs`: the rows (J,) that are arcs, and their sweeps
+    (J,), rad. Points between the parts of an arc lie at the radius of its start."""
     bulge = np.broadcast_to(np.zeros(1), len(row))
     path = np.broadcast_to(np.int64(0), len(row))  # the segments of a toolpath are all of one
     if not len(arcs[0]) and len(row) and row[0] > 0 and (np.diff(row) == 1).all():
@@ -197,7 +198,7 @@ def _segments(
 
 
 def _rotate(points: Floats, centre: Floats, angle: Floats) -> Floats:
-    """Return points (J, 2) turned about their centres (J, 2) by angles (J,) rad."""
+    """Return points (J, 2) rotated about their centres (J, 2) by angles (J,), rad."""
     spoke = points - centre
     cos, sin = np.cos(angle), np.sin(angle)
     x = centre[:, 0] + cos * spoke[:, 0] - sin * spoke[:, 1]
@@ -206,7 +207,8 @@ def _rotate(points: Floats, centre: Floats, angle: Floats) -> Floats:
 
 
 def _contours(toolpath: Toolpath, cutting: Bools) -> Indices:
-    """Return (N,) contour of each row: a new one begins after the tool has left the stock."""
+    """Return (N,) the contour of each row, −1 for rows that do not cut; a new contour begins after
+    the tool has left the stock."""
     breaks = np.cumsum(toolpath.by_parts(_leaves_stock) & ~cutting, dtype=np.int32)[cutting]
     contour = np.full(len(toolpath), -1, dtype=np.int32)
     contour[cutting] = np.cumsum(np.diff(breaks, prepend=breaks[:1]) != 0, dtype=np.int32)
@@ -214,8 +216,8 @@ def _contours(toolpath: Toolpath, cutting: Bools) -> Indices:
 
 
 def _leaves_stock(toolpath: Toolpath) -> Bools:
-    """Return (N,) true for homing and for rows that move, but for feeds straight down or up in the
-    stock."""
+    """Return the mask (N,) of rows in which the tool may leave the stock: homing and all moves,
+    except feeds straight down or up within the stock."""
     rises = toolpath.end[:, 2] != toolpath.starts[:, 2]
     flat = _lengths(toolpath) > POSITION_EPS_MM
     moves = toolpath.is_motion & (flat | rises)
@@ -234,16 +236,16 @@ class CutSamples(Struct, frozen=True, eq=False):
     share: Floats
 
     def of(self, indices: Ints) -> CutSamples:
-        """Return the samples with these indices."""
+        """Return the samples at these indices."""
         return CutSamples(
             self.points[indices], self.segment[indices], self.z[indices], self.share[indices]
         )
 
 
 def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> CutSamples:
-    """Return points on the true lines and arcs, about `spacing_mm` apart; with `only`, on those
-    segments alone. The spacing is wider where there would be more than `MAX_SAMPLES` points, but
-    each segment has at least `MIN_PARTS` parts."""
+    """Return points on the true lines and arcs, about `spacing_mm` apart; with `only`, just on
+    these segments. The spacing is wider if there would be more than `MAX_SAMPLES` points, but each
+    segment has at least `MIN_PARTS` parts."""
     indices = np.arange(len(cuts.segments)) if only is None else only
     lengths = segment_lengths(cuts.segments[indices])
     spacing = max(spacing_mm, float(lengths.sum()) / MAX_SAMPLES)
@@ -257,9 +259,9 @@ def samples_by_parts(
     at_once: int = MAX_SAMPLES,
     group: Indices | None = None,
 ) -> Iterator[CutSamples]:
-    """Yield the samples of `sample_cuts` on the rows (N,) that are true, in parts of whole rows,
-    or of rows (N,) with one number `group`, with about `at_once` samples each, so that memory does
-    not grow with the program. The spacing is that of all cuts."""
+    """Yield the samples of `sample_cuts` on the rows in the mask `rows` (N,), about `at_once` at a
+    time, so that memory does not grow with the program. Each batch holds whole rows, or all rows
+    (N,) with one number in `group`. The spacing is that for all cuts."""
     segments, parts, ends = _sample_batches(cuts, spacing_mm, rows, at_once, group)
     for low, high in pairwise([0, *ends, len(segments)]):
         if low < high:
@@ -269,8 +271,8 @@ def samples_by_parts(
 def _sample_batches(
     cuts: CutMoves, spacing_mm: float, rows: Bools, at_once: int, group: Indices | None
 ) -> tuple[Ints, Indices, list[int]]:
-    """Return for `samples_by_parts` the segments (T,), the number of parts of each (T,), and the
-    indices at which all batches but the last end."""
+    """Return for `samples_by_parts`: the segments (T,), the number of parts of each (T,), and the
+    indices at which all batches except the last end."""
     lengths = segment_lengths(cuts.segments)
     spacing = max(spacing_mm, float(lengths.sum()) / MAX_SAMPLES)
     segments = np.flatnonzero(rows[cuts.row])
@@ -286,12 +288,12 @@ def _sample_batches(
 
 
 def _parts(lengths: Floats, spacing_mm: float) -> Ints:
-    """Return (K,) the number of parts into which each segment is sampled."""
+    """Return (K,) the number of equal parts into which each segment is divided by samples."""
     return np.maximum(np.ceil(lengths / spacing_mm).astype(np.int64), MIN_PARTS)
 
 
 def _samples(cuts: CutMoves, indices: Ints, parts: Ints) -> CutSamples:
-    """Return the ends of the equal parts of the segments `indices`."""
+    """Return samples at the ends of the equal parts of the segments `indices`."""
     owner = np.repeat(np.arange(len(parts)), parts + 1)
     steps = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
     share, segment = steps / parts[owner], indices[owner]
@@ -316,8 +318,9 @@ NO_LOOP = -1
 
 
 def loops(cuts: CutMoves, gap_mm: float) -> Ints:
-    """Return (C, 2) first and last row of the loop of each contour, NO_LOOP where it has none.
-    Points within `gap_mm` of each other count as one."""
+    """Return (C, 2) the first and the last row of the loop of each contour: its longest closed
+    part with an area. NO_LOOP if it has none. Points within `gap_mm` of each other count as one.
+    """
     begin, finish = cuts.contour_ends()
     contour_loops = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
     is_whole = cuts.is_closed(gap_mm) & _is_level(cuts)
@@ -350,7 +353,7 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
 
 
 def is_in_loop(cuts: CutMoves, contour_loops: Ints) -> Bools:
-    """Return (N,) true for the cutting rows that belong to the loop of their contour."""
+    """Return the mask (N,) of cutting rows that belong to the loop of their contour."""
     first, last = contour_loops[contour_loops[:, 0] != NO_LOOP].T
     inside = np.zeros(len(cuts.contour) + 1, dtype=np.int8)
     inside[first] += 1
@@ -359,7 +362,7 @@ def is_in_loop(cuts: CutMoves, contour_loops: Ints) -> Bools:
 
 
 def _is_level(cuts: CutMoves) -> Bools:
-    """Return (C,) true for contours at one height."""
+    """Return the mask (C,) of contours that stay at one height."""
     low, high = np.full(cuts.contour_count, np.inf), np.full(cuts.contour_count, -np.inf)
     for begin in range(0, len(cuts.segments), ROWS_AT_ONCE):
         batch = np.arange(begin, min(begin + ROWS_AT_ONCE, len(cuts.segments)))
@@ -370,8 +373,8 @@ def _is_level(cuts: CutMoves) -> Bools:
 
 
 def _lengths_and_areas(toolpath: Toolpath, rows: Indices) -> Floats:
-    """Return (R, 2) the length of each of these moves (R,) in mm, and the signed area in mm²
-    between it and the origin.
+    """Return (R, 2): the length of each of these moves (R,), mm, and the signed area between it
+    and the origin, mm².
 
     Green's theorem: half the cross product of the ends of a move, and for an arc of sweep t the
     area (r²/2)(t − sin t) of its circular segment on top.
@@ -389,10 +392,10 @@ def _lengths_and_areas(toolpath: Toolpath, rows: Indices) -> Floats:
 def _longest_loop(
     sums: Floats, places: Floats, latest: Indices, gap_mm: float
 ) -> tuple[int, int] | None:
-    """Return first and last row, from 0, of the loop of one contour, which begins and whose rows
-    end at `places` (R + 1, 2); `sums` (R + 1, 2) of what `_lengths_and_areas` gives for the rows
-    before each place, and `latest` (R + 1,) the latest place before each that is the same, below 0
-    for none."""
+    """Return the first and the last row (from 0) of the loop of one contour, None if it has none.
+    `places` (R + 1, 2): the start of the contour and the ends of its rows; `sums` (R + 1, 2):
+    cumulative sums of `_lengths_and_areas` up to each place; `latest` (R + 1,): the latest earlier
+    place at the same point, negative if there is none."""
     best, max_length = None, 0.0
     for first in range(0, len(places), ROWS_AT_ONCE):
         high = first + np.flatnonzero(latest[first : first + ROWS_AT_ONCE] >= 0)

@@ -66,8 +66,8 @@ class SlideExtents:
     """Boxes of the slides' path in the rows that determine sizes, and closure errors."""
 
     def __init__(self, start: Floats, decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> None:
-        """Begin with the slides at `start` (3,) mm; `goal` holds the wanted moves, and `match`
-        says to which wanted row and contour each decoded row belongs."""
+        """Begin with the slides at `start` (3,) mm. `goal` holds the wanted moves; `match` maps
+        each decoded row to its wanted row and contour."""
         count, contour = goal.cuts.contour_count, match.contour
         self._counts = np.zeros(len(contour), dtype=np.bool_)
         self._begins = self._counts.copy()
@@ -102,8 +102,8 @@ class SlideExtents:
         return float(np.hypot(gap[:, 0], gap[:, 1]).max()) if len(gap) else math.nan
 
     def add(self, low: int, box: tuple[Floats, Floats], end: Floats) -> None:
-        """Take the rows from `low` on, which come in order: the lowest and highest positions of
-        the slides (R, 2), (R, 2) mm, infinite where they did not move, and the last ones (R, 2)
+        """Add rows from `low` on, which come in order: the lowest and highest positions of the
+        slides (R, 2), (R, 2), mm, infinite where they did not move, and the last positions (R, 2),
         mm, NaN there."""
         rows = slice(low, low + len(end))
         is_known = np.isfinite(end[:, 0])
@@ -125,11 +125,11 @@ class SlideExtents:
 
 
 def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[PredictedSize]:
-    """Yield X and Y of the whole part, then of each closed contour of the wanted moves (`goal`),
-    by the extents of the slides.
+    """Yield the sizes in X and Y of the whole part, then of each closed contour of the wanted
+    moves (`goal`), predicted from the extents of the slides.
 
-    Contours to which no row belongs are left out (a finding names them), and so is what makes no
-    edge, where edges are known.
+    Contours to which no row belongs are left out (a finding names them), and so are contours that
+    cut no edge, if edges are known.
     """
     if not slides.has_sizes:
         return
@@ -162,11 +162,11 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Pre
 
 
 class _Edges(Struct, frozen=True, eq=False):
-    """The edges of C contours: which of them `counts` in sizes (C,), boxes (C, 2, 2) mm of the
-    `nominal` edge and of the `predicted` one, the distance `rough` (C,) mm that the line to which
-    it belongs is planned to keep from its nominal edge, and what `DrawnEdges` says of each.
-    `own_boxes`: the nominal box of what the contour cuts of its line; `listed` (C,): it is no ring
-    within that."""
+    """The edges of C contours: the mask `counts` (C,) of those that count in sizes; boxes (C, 2,
+    2), mm, of the `nominal` and of the `predicted` edge; the distance `rough` (C,), mm, that the
+    contour's line is planned to keep from its nominal edge; and the record of `DrawnEdges` for
+    each. `own_boxes`: the nominal box of what the contour cuts of its line; `listed` (C,): False
+    for rings inside it."""
 
     counts: Bools
     nominal: Floats
@@ -179,8 +179,8 @@ class _Edges(Struct, frozen=True, eq=False):
 
 
 def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
-    """Return the edges that the contours of the wanted moves cut, of which `centre` (C, 2, 2) are
-    the boxes, and `slide` (C, 2, 2) those of the slides; these are the edges where none is
+    """Return the edges that the contours of the wanted moves cut. `centre`, `slide` (C, 2, 2): the
+    boxes of these contours and of the slides on them; these boxes are the edges where none are
     known."""
     cuts, drawn = goal.cuts, goal.cuts.toolpath.drawn
     count = len(centre)
@@ -211,7 +211,7 @@ def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
 
 
 def _edge_of(cuts: CutMoves) -> Ints:
-    """Return (C,) the edge of each contour: an index, UNKNOWN_EDGE or NO_EDGE."""
+    """Return (C,) the edge that each contour cuts: an index, UNKNOWN_EDGE or NO_EDGE."""
     drawn, rows = cuts.toolpath.drawn, cuts.rows
     if drawn is None:
         return np.full(cuts.contour_count, UNKNOWN_EDGE)
@@ -221,9 +221,8 @@ def _edge_of(cuts: CutMoves) -> Ints:
 
 
 def _finest_contours(edges: _Edges, is_seen: Bools) -> Ints:
-    """Return the contours that decide a size, of those (C,) that are `is_seen`: where several
-    lines cut one edge, as in roughing and finishing, those of the line that comes nearest to
-    it."""
+    """Return the contours in the mask `is_seen` (C,) that decide a size. Where several lines cut
+    the same edge, as in roughing and finishing, those of the line nearest to the edge decide."""
     rows = np.flatnonzero(is_seen)
     boxes = edges.nominal[rows].reshape(len(rows), 4)
     _, groups = np.unique(boxes, axis=0, return_inverse=True)
@@ -233,8 +232,8 @@ def _finest_contours(edges: _Edges, is_seen: Bools) -> Ints:
 
 
 def _joint_size(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
-    """Return (2,) size in X and Y of all boxes (C, 2, 2) together, and (2,) where it is that of
-    lines which the tool's centre follows."""
+    """Return (2,) the size in X and Y of all boxes (C, 2, 2) together, and (2,) True where lines
+    that the tool's centre follows (`followed` (C,)) determine it."""
     low, high = boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)
     walls = boxes[~followed]
     if not len(walls):
@@ -244,9 +243,9 @@ def _joint_size(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
 
 
 def _is_final_pass(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
-    """Return (C,) true for contours below which no contour of the same box is cut: passes between
-    which the tool leaves the stock are contours of their own. `boxes` (C, 2, 2) and `lowest` (C,)
-    are as `_extents` gives them."""
+    """Return the mask (C,) of contours below which no contour with the same box is cut. Passes
+    between which the tool leaves the stock are separate contours. `boxes` (C, 2, 2) and `lowest`
+    (C,) come from `_extents`."""
     rows = boxes.transpose(0, 2, 1).reshape(-1, 4)
     is_known = np.isfinite(rows[:, 0])
     keys = np.full(rows.shape, np.iinfo(np.int64).min)
@@ -258,7 +257,7 @@ def _is_final_pass(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
 
 
 def _is_looped(goal: LoopedCuts) -> Bools:
-    """Return (C,) true for contours whose size is that of their loop, not of all that they
+    """Return the mask (C,) of contours whose size is that of their loop, not of all that they
     clear."""
     drawn, edge = goal.cuts.toolpath.drawn, _edge_of(goal.cuts)
     closed = np.asarray(goal.loops[:, 0] != NO_LOOP)
@@ -268,16 +267,16 @@ def _is_looped(goal: LoopedCuts) -> Bools:
 
 
 def _wanted_rows(goal: LoopedCuts) -> Bools:
-    """Return (W,) the wanted rows that determine sizes: those of loops, and of contours without
-    one."""
+    """Return the mask (W,) of wanted rows that determine sizes: those of loops, and those of
+    contours without a loop."""
     cuts, looped = goal.cuts, np.append(_is_looped(goal), False)[goal.cuts.contour]
     return np.asarray(cuts.is_cut & (is_in_loop(cuts, goal.loops) | ~looped))
 
 
 def _sized_rows(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
-    """Return the decoded rows that determine the sizes: for wanted contours with a loop the rows
-    of their decoded loops, where there are any; otherwise the rows that follow a wanted row that
-    does."""
+    """Return the decoded rows that determine sizes: for a wanted contour with a loop, the rows of
+    its decoded loops if there are any; otherwise the rows that follow a wanted row that determines
+    sizes."""
     if len(decoded.cuts.rows) == 0 or len(goal.cuts.rows) == 0:
         return np.empty(0, dtype=np.int64)
     wanted_contour, has_loop = match.contour, np.append(_is_looped(goal), False)
@@ -291,9 +290,9 @@ def _sized_rows(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
 
 
 def _extents(cuts: CutMoves, counts: Bools) -> tuple[Floats, Floats]:
-    """Return (C, 2, 2) mm: box [[x low, x high], [y low, y high]] of the rows of each contour that
-    count, `counts` (N,), and (C,) mm: the lowest height of their ends; infinite for a contour
-    without any."""
+    """Return (C, 2, 2) mm, the box [[x low, x high], [y low, y high]] of each contour's rows in
+    the mask `counts` (N,), and (C,) mm, the lowest height of their ends; infinite for a contour
+    without such rows."""
     low_corner = np.full((cuts.contour_count, 2), np.inf)
     high_corner = np.full((cuts.contour_count, 2), -np.inf)
     lowest = np.full(cuts.contour_count, np.inf)
@@ -312,8 +311,8 @@ def _extents(cuts: CutMoves, counts: Bools) -> tuple[Floats, Floats]:
 def _axis_sizes(
     name: str, nominal: tuple[Floats, Bools], predicted: tuple[Floats, Bools]
 ) -> Iterator[PredictedSize]:
-    """Yield X and Y of a size, as `_joint_size` gives it; of the tool's centre where either of
-    both is."""
+    """Yield the sizes in X and Y, from pairs as `_joint_size` returns them; a size counts as that
+    of the tool's centre if its nominal or its predicted part is."""
     of_centre = nominal[1] | predicted[1]
     for k, axis in enumerate("XY"):
         sizes_mm = float(nominal[0][k]), float(predicted[0][k])

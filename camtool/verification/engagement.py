@@ -70,7 +70,8 @@ class EngagementJudged(Struct, frozen=True, eq=False):
     def reports(
         self, decoded: Toolpath, request: StockRequest | None, in_stock: tuple[Finding, ...]
     ) -> tuple[EngagementReport, ...] | None:
-        """Return the rows of the report; `in_stock`: the findings of the stock."""
+        """Return the rows of the report, None if no engagement was judged; `in_stock`: the
+        findings about the stock."""
         if self.rows is None:
             return None
         lefts = [each.measured or 0.0 for each in in_stock if each.code is StockCode.MATERIAL_LEFT]
@@ -94,7 +95,7 @@ class EngagementJudged(Struct, frozen=True, eq=False):
 def judge_engagement(
     slides: ProgramSlides, request: StockRequest | None, gates: Gates | None
 ) -> EngagementJudged:
-    """Bound the engagement of each operation where one of them, or a gate, limits it."""
+    """Bound the engagement of each operation, if at least one of them or a gate has a limit."""
     case, job = slides.case, slides.job
     decoded, gate_rad = case.decoded, None if gates is None else gates.engagement_rad
     own: list[tuple[int, str, float | None]] = [(0, "", None)]
@@ -121,5 +122,6 @@ def judge_engagement(
 
 
 def _limit_of(operation: Operation) -> tuple[str, float | None]:
-    """Return the name of an operation, and its own limit of engagement, rad."""
+    """Return the name of an operation, and the limit of engagement that it sets, rad (None: no
+    limit)."""
     return operation.name or operation.kind, operation.engagement_rad

@@ -49,7 +49,7 @@ class Figure:
         self._pieces = np.empty((0, PIECE_COLUMNS))
 
     def add(self, errors: Floats, points: Floats, rows: Ints | Indices) -> None:
-        """Add errors (J,) mm, measured at points (J, 2) mm of these rows (J,)."""
+        """Add errors (J,), mm, which were measured at points (J, 2), mm, in these rows (J,)."""
         if len(errors) == 0:
             return
         self.count += len(errors)
@@ -79,7 +79,8 @@ class Figure:
         self._histogram += histogram.reshape(BINS, -1).sum(axis=1)
 
     def add_pieces(self, which: int, pieces: list[Floats]) -> None:
-        """Add the errors of pieces of lines (`camtool.kernels.lines`) that no histogram has."""
+        """Add the histogram of errors along pieces of lines (`camtool.kernels.lines`), which
+        `add_sizes` does not have."""
         own = [part[part[:, WHICH] == which] for part in pieces]
         self._pieces = np.concatenate([self._pieces, *own])
 
@@ -114,18 +115,19 @@ class Figure:
 
 
 def _below(pieces: Floats, bin_index: int) -> int:
-    """Count the errors of pieces in a bin and in those before it."""
+    """Return the number of errors of pieces in a bin and in all bins before it."""
     return count_below(pieces, _edge(bin_index + 1))
 
 
 def _edge(bin_index: int) -> float:
-    """Return the least number of a bin."""
+    """Return the lower edge of a bin, the least number that falls in it."""
     bits = np.array([bin_index + BEFORE_FIRST], dtype=np.int64)
     return float(np.left_shift(bits, SHIFT).view(np.float64)[0])
 
 
 def _first_at_least(count_wanted: int, guess: int, count: Callable[[int], int]) -> int:
-    """Return the first bin up to which there are so many, searched from a good guess on."""
+    """Return the first bin up to which there are at least `count_wanted` errors; the search starts
+    at `guess`."""
     low, high, step = -1, guess, 1
     while high < BINS - 1 and count(high) < count_wanted:
         low, high, step = high, min(high + step, BINS - 1), 2 * step
@@ -156,16 +158,17 @@ class RowBlock(Struct, frozen=True, eq=False):
         return slice(self.low, self.low + len(self.columns))
 
     def count(self, column: int) -> Ints:
-        """Return (R,) a column of whole numbers."""
+        """Return a column of whole numbers (R,)."""
         return self.columns[:, column].astype(np.int64)
 
     def largest(self, column: int, is_seen: Bools) -> Floats:
-        """Return (R,) a column of largest errors, NaN but for the rows that are `is_seen` (R,)."""
+        """Return a column of largest errors (R,), NaN except in the rows of the mask `is_seen`
+        (R,)."""
         return np.where(is_seen, self.columns[:, column], np.nan)
 
 
 def empty_columns(count: int) -> Floats:
-    """Return (count, 19) columns of `camtool.kernels.judging` for rows without samples."""
+    """Return the columns (count, 19) of `camtool.kernels.judging` for rows without samples yet."""
     columns = np.zeros((count, at.ROW_COLUMNS))
     columns[:, [at.LOW_X, at.LOW_Y]] = np.inf
     columns[:, [at.HIGH_X, at.HIGH_Y]] = -np.inf
@@ -192,8 +195,8 @@ class RowFigures:
         *,
         keep_ledger: bool = False,
     ) -> None:
-        """`steps_mm`: the coded steps of X and Y; `worst`: so many rows are known as such;
-        `keep_ledger`: keep the ledger of each row."""
+        """Begin without rows. `steps_mm`: the coded steps of X and Y; `worst`: the number of worst
+        rows to list; `keep_ledger`: keep the ledger of each row."""
         count = len(cuts.contour)
         self._toolpath, self._steps_mm = cuts.toolpath, steps_mm
         self.total = np.full(count, np.nan)
@@ -206,7 +209,7 @@ class RowFigures:
         self._sum = 0.0
 
     def add(self, block: RowBlock) -> None:
-        """Add the next rows, all of whose samples are judged."""
+        """Add the next rows; all their samples must have been judged."""
         columns = block.columns
         samples, known_samples = block.count(at.SAMPLES), block.count(at.KNOWN)
         if self.books.ledger is not None:
@@ -252,7 +255,7 @@ class RowFigures:
 
 
 def _larger_error(previous: float, errors: Floats) -> float:
-    """Return the largest known error, mm; NaN without any."""
+    """Return the largest of `previous` and the errors, mm, ignoring NaN; NaN if all are."""
     known_errors = errors[np.isfinite(errors)]
     return float(np.fmax(previous, known_errors.max())) if len(known_errors) else previous
 
@@ -276,8 +279,8 @@ class LedgerSums:
         self.iterations, self.cutting_iterations, self.compensation_s = 0, 0, 0.0
 
     def add(self, ledger: Ledger, is_cut: Bools) -> None:
-        """Add the ledger of a chunk, with each row at most once; `is_cut` (N,): the rows that
-        cut."""
+        """Add the ledger of a chunk, which has each row at most once; `is_cut` (N,): the mask of
+        rows that cut."""
         rows = ledger.row
         if self.ledger is not None:
             self.ledger.add(ledger)
@@ -314,7 +317,7 @@ class Tally(Struct, frozen=True, eq=False):
 
 
 def tally_of(books: LedgerSums, decoded: Toolpath, is_cut: Bools) -> Tally:
-    """Return the sums over all rows; `is_cut` (N,): the rows that cut."""
+    """Return the sums over all rows; `is_cut` (N,): the mask of rows that cut."""
     dwell = decoded.kind == Kind.DWELL
     return Tally(
         steps=books.steps,
@@ -367,8 +370,8 @@ class ContourSums:
         self._total, self._at = np.full(count, -np.inf), np.zeros((count, 2))
 
     def add(self, block: RowBlock, samples: Ints, errors: tuple[Floats, Floats, Floats]) -> None:
-        """Add the next rows: `samples` (R,) with a total error; the largest `errors` (R,) of
-        interpolation and mechanics, and in all."""
+        """Add the next rows: `samples` (R,), the number of samples with a total error; `errors`,
+        each (R,), the largest of interpolation, of mechanics and in all."""
         contour = self._match.contour[block.rows]
         known_rows = np.flatnonzero((samples > 0) & (contour >= 0))
         contours, columns = contour[known_rows], block.columns[known_rows]
@@ -390,7 +393,7 @@ class ContourSums:
         self._at[worst_contours] = columns[worst][:, [at.TOTAL_X, at.TOTAL_Y]]
 
     def figures(self) -> Iterator[ContourFigures]:
-        """Yield the figures of each of these contours."""
+        """Yield the figures of each contour with a known error."""
         every = np.flatnonzero(self._row >= 0)
         for low in range(0, len(every), CONTOURS_AT_ONCE):
             batch = every[low : low + CONTOURS_AT_ONCE]
@@ -417,8 +420,8 @@ class WorstRows:
         self.found = np.empty((0, 6))
 
     def add(self, block: RowBlock, errors: tuple[Floats, Floats, Floats]) -> None:
-        """Add the next rows and their largest `errors` (R,) of interpolation and mechanics, and in
-        all."""
+        """Add the next rows; `errors`, each (R,), are their largest of interpolation, of mechanics
+        and in all."""
         inner, lag, total = errors
         rows = np.flatnonzero(~np.isnan(total))
         rows = rows[np.lexsort((rows, -total[rows]))][: self._count]
@@ -436,8 +439,8 @@ class MissedEnds:
         self.count, self.row, self.most_mm = 0, -1, 0.0
 
     def add(self, low: int, differences: Floats, steps_mm: tuple[float, float]) -> None:
-        """Add the distances (R, 2) mm of the controller from the ends of the rows from `low`
-        on."""
+        """Add the distances (R, 2), mm, of the controller from the programmed ends of the rows
+        from `low` on."""
         missed_rows = np.flatnonzero((differences > END_STEPS * np.array(steps_mm)).any(axis=1))
         if len(missed_rows):
             distances = np.hypot(*differences[missed_rows].T)
@@ -450,7 +453,7 @@ class MissedEnds:
 
 
 def contour_names(cuts: CutMoves) -> list[str]:
-    """Return `contour 3 (CUT/CIRCLE 3C)` for each contour: they are numbered from 1."""
+    """Return a name for each contour, such as `contour 3 (CUT/CIRCLE 3C)`, numbered from 1."""
     sources = [cuts.toolpath.text(row) for row in cuts.contour_ends()[0].tolist()]
     return [
         f"contour {number}" + (f" ({source})" if source else "")

@@ -79,9 +79,9 @@ def own_match(cuts: CutMoves, circles: list[FullCircle]) -> Match:
 
 
 def match_through_compensation(match: Match, rows: Ints, goal: Goal) -> Match:
-    """Return the match with the wanted rows from a match with the rows of a compensated toolpath:
-    `rows` (S,) is the wanted row of each compensated row. Compensation may divide contours
-    and circles."""
+    """Return the match with wanted rows, given a match with the rows of a compensated toolpath;
+    `rows` (S,) is the wanted row of each compensated row. Compensation may divide contours and
+    circles."""
     is_known = match.row >= 0
     row = np.where(is_known, rows[np.maximum(match.row, 0)], -1) if len(rows) else match.row
     contour = np.where(is_known, goal.moves.cuts.contour[np.maximum(row, 0)], -1)
@@ -100,8 +100,9 @@ def match_through_compensation(match: Match, rows: Ints, goal: Goal) -> Match:
 def nearest_at_height(
     samples: CutSamples, choice: Ints | None, moves: MoveIndex, limits_mm: tuple[float, float]
 ) -> tuple[NearestMoves, Bools]:
-    """Return the move nearest to each sample at its own height; where no move is near at that
-    height, the nearest at any height, and true (S,) where that one is near.
+    """Return the nearest move to each sample at its own height, and a mask (S,). Where no move is
+    near at that height, the nearest one at any height is returned, and the mask is True if that is
+    near in XY.
 
     `choice` (S,): the only contour to compare with, constant along a segment; only its near moves
     are found. None: all contours. `limits_mm`: what is near, in XY and in height.
@@ -126,7 +127,7 @@ def nearest_at_height(
 
 def match_contours(cuts: CutMoves, samples: CutSamples, nearest: NearestMoves, goal: Goal) -> Ints:
     """Return (S,) the wanted contour to which the decoded contour of each sample belongs,
-    ANY_CONTOUR for none. `nearest` is changed in place to the nearest move of that contour."""
+    ANY_CONTOUR if none. `nearest` is changed in place: to the nearest moves of that contour."""
     wanted_moves = goal.moves
     contours = cuts.contour[cuts.row[samples.segment]]
     belongs = np.full(len(contours), ANY_CONTOUR, dtype=np.int64)
@@ -153,8 +154,8 @@ def match_contours(cuts: CutMoves, samples: CutSamples, nearest: NearestMoves, g
 
 
 def _candidates(contours: Indices, nearest_contours: Indices) -> list[Ints]:
-    """Return for each try (C,): the wanted contour nearest to most samples, then the next, −1 for
-    none.
+    """Return one array (C,) for each try: the wanted contour nearest to most samples of each
+    decoded contour, then the second, and so on; −1 if there are no more.
 
     `contours` (S,) is the decoded contour of each sample (ascending), `nearest_contours` (S,) the
     wanted one.
@@ -194,8 +195,8 @@ def match_rows(
     nearest_moves: NearestMoves,
     goal: Goal,
 ) -> None:
-    """Fill in the match of each row of `cuts` that has samples, which are all of its own;
-    `belongs` (S,) and `nearest_moves` are the result of `match_contours`."""
+    """Fill `match` in place for the rows of `cuts` that have samples; all samples of such a row
+    must be given. `belongs` (S,) and `nearest_moves` are the result of `match_contours`."""
     wanted_moves = goal.moves
     rows = cuts.row[samples.segment]
     if len(rows) == 0 or len(wanted_moves.cuts.segments) == 0:
@@ -214,14 +215,13 @@ def match_rows(
 
 
 def with_neighbours(match: Match) -> Match:
-    """Return the match, with the largest distance of the drawing from each row and its
-    neighbours."""
+    """Return the match with each `off_mm` raised to the largest of the row and its neighbours."""
     return replace(match, off_mm=_with_neighbours(match.off_mm, match.contour))
 
 
 def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:
-    """Return the largest value of each row (N,) and of its neighbours in its contour, because
-    slides lag behind."""
+    """Return (N,) the larger of each row's value and those of its neighbours in its contour:
+    slides lag behind, and so may still be on the row before."""
     rows = np.flatnonzero(contour >= 0)
     max_off = off_mm.copy()
     for low in range(0, len(rows) - 1, ROWS_AT_ONCE):
@@ -234,8 +234,8 @@ def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:
 
 
 def _common_values(values: Ints | Indices, offsets: Ints) -> Ints:
-    """Return (R,) the value of all inner samples of each run, −1 where they differ; at its first
-    and last sample a row touches its neighbours."""
+    """Return (R,) the value that all inner samples of each run share, −1 if they differ. The first
+    and last samples are ignored, since there a row touches its neighbours."""
     inner = np.column_stack([offsets[:-1] + 1, offsets[1:] - 1]).ravel()
     low = np.minimum.reduceat(values, inner)[::2]
     high = np.maximum.reduceat(values, inner)[::2]

@@ -35,8 +35,7 @@ TRAVEL_EPS_MM = 1e-6
 
 
 def program_findings(case: Case) -> tuple[Finding, ...]:
-    """Return the findings that need no motion: what the decoded moves and the machine alone
-    say."""
+    """Return the findings that need no simulation, only the decoded moves and the machine."""
     decoded, machine = case.decoded, case.machine
     quantised = case.target.model.quantised(decoded, machine)
     cuts = cut_moves(quantised, flat_cuts=is_flat(decoded))
@@ -51,8 +50,7 @@ def program_findings(case: Case) -> tuple[Finding, ...]:
 def motion_findings(
     cuts: CutMoves, case: Case, tally: Tally, extents: Floats, rows: RowFigures
 ) -> tuple[Finding, ...]:
-    """Return all findings that need the motion or the machine; `extents` (3, 2) mm of the
-    toolpath."""
+    """Return the findings that need the motion; `extents` (3, 2), mm, of the toolpath."""
     decoded, machine = cuts.toolpath, case.machine
     return (
         *_endless_arcs(decoded, machine, tally),
@@ -80,9 +78,9 @@ def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator
 
 
 def _missed_ends(quantised: Toolpath, case: Case, rows: RowFigures) -> Iterator[Finding]:
-    """Yield END_NOT_REACHED for moves that end beside their programmed ends, except endless arcs:
-    a remark where all are within the tolerance of coverage and of the corners that the program
-    allows (G64 P, Q)."""
+    """Yield END_NOT_REACHED for moves that end beside their programmed ends, except endless arcs.
+    It is a remark if all are within the tolerance of coverage and of the corner rounding that the
+    program allows (G64 P, Q)."""
     ends = rows.missed_by_others
     if ends.count == 0:
         return
@@ -113,8 +111,8 @@ def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:
 
 
 def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[Finding]:
-    """Yield MANY_REVERSALS where there are too many for the size of the part: the error at each
-    one does not shrink with the part."""
+    """Yield MANY_REVERSALS if there are many for the size of the part: the error at each reversal
+    does not shrink with the part."""
     count, limit = int(tally.cutting_reversals[:2].sum()), machine.limits.max_reversals
     if limit is None or count <= limit:
         return
@@ -125,7 +123,7 @@ def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[
 
 
 def _size_mm(cuts: CutMoves) -> float:
-    """Return the larger side of the box around the ends of all cuts."""
+    """Return the longer side of the bounding box of the ends of all cuts, mm."""
     if not len(cuts.rows):
         return 0.0
     toolpath = cuts.toolpath

@@ -68,10 +68,10 @@ class MoveIndex:
         choice: Ints | None,
         limits_mm: tuple[float, float],
     ) -> NearestMoves:
-        """Return the nearest move within the first limit in XY, and the second in height at its
-        place nearest to the point (more on slopes, where a shift in XY changes the height), of
-        points (J, 2) at heights (J,) mm; of equally near moves the last. `choice` (J,): the only
-        contour whose moves are found, neighbours of one contour together; None: those of all."""
+        """Return the nearest move to each of points (J, 2) at heights (J,), mm: within the first
+        limit in XY, and within the second in height at its nearest place (more on slopes, where a
+        shift in XY changes the height). Of equally near moves the last is returned. `choice` (J,):
+        the only contour to search, equal for consecutive points of one contour; None: all."""
         if len(points) == 0:  # the tables need not be made
             return NearestMoves(np.empty(0), np.empty(0, dtype=np.int64))
         places = np.column_stack([points, height])
@@ -80,8 +80,8 @@ class MoveIndex:
         )
 
     def nearest_of_all(self, points: Floats, height: Floats, from_mm: float) -> NearestMoves:
-        """Return the nearest move at any distance and height, which is expected within
-        `from_mm`."""
+        """Return the nearest move to each point at any distance and height; the search begins
+        within `from_mm`."""
         nearest_moves = NearestMoves(
             np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64)
         )
@@ -98,12 +98,12 @@ class MoveIndex:
     def pairs_within(
         self, points: Floats, height: Floats, limits_mm: tuple[float, float]
     ) -> tuple[Ints, Ints, Floats]:
-        """Return all pairs (point, move) within the limits, as `nearest` takes them, in order, and
-        their distances in XY, mm."""
+        """Return all pairs (point, move) within the limits of `nearest`, in order, as two index
+        arrays, and their distances in XY, mm."""
         return pairs(self._moves, np.column_stack([points, height]), limits_mm)
 
     def shares(self, points: Floats, indices: Ints) -> Floats:
-        """Return (J,) the position along segment which[j], from 0 to 1, of its point nearest to
+        """Return (J,) the position along segment indices[j], from 0 to 1, of its point nearest to
         point j."""
         moves = self._moves
         start = moves.start[indices]
@@ -126,7 +126,7 @@ class MoveIndex:
     def _runs(self, choice: Ints | None, count: int) -> Ints:
         """Group consecutive points that are compared with the same contour.
 
-        Returns a row for each group, (R, 4): its first point and the end of its points, the first
+        Returns (R, 4), a row for each group: its first point and the end of its points, the first
         move and the end of the moves of that contour. Without `choice`, all `count` points are one
         group, which is compared with all moves.
         """
@@ -146,7 +146,8 @@ class MoveIndex:
 
 
 def run_offsets(labels: Ints | Indices, longest: int) -> Ints:
-    """Return offsets (G+1,) of the runs of equal labels (J,), cut to at most `longest` items."""
+    """Return the offsets (G + 1,) of runs of equal labels (J,); runs longer than `longest` are
+    divided."""
     if len(labels) == 0:
         return np.zeros(1, dtype=np.int64)
     change = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1])
@@ -156,7 +157,7 @@ def run_offsets(labels: Ints | Indices, longest: int) -> Ints:
 
 
 def run_peaks(values: Floats, offsets: Ints) -> Ints:
-    """Return (G,) index of the first largest value in each run."""
+    """Return (G,) the index of the largest value in each run, of equal values the first."""
     run = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     largest = np.maximum.reduceat(values, offsets[:-1])
     hits = np.flatnonzero(values == largest[run])
@@ -164,6 +165,7 @@ def run_peaks(values: Floats, offsets: Ints) -> Ints:
 
 
 def ranges(first: Ints, count: Ints) -> Ints:
-    """Return first[0], first[0]+1, … (count[0] of them), first[1], …"""
+    """Return the concatenated index ranges first[k], first[k] + 1, … with count[k] indices
+    each."""
     skipped = np.cumsum(count) - count
     return np.repeat(first - skipped, count) + np.arange(int(count.sum()))

@@ -200,11 +200,12 @@ class _Lines(Struct, frozen=True, eq=False):
         return cls(paths, segments, Frames.of(segments), path_extents(paths))
 
     def signed_distances(self, points: Floats) -> tuple[Floats, Floats, Ints]:
-        """Return (J,) mm the signed distance of points from the nearest line, left of it positive;
-        (J, 2) the unit direction in which it grows; (J,) the nearest segment.
+        """Return for points (J, 2): (J,) mm, the signed distance from the nearest line, positive
+        to its left; (J, 2), the unit direction in which it grows; (J,), the index of the nearest
+        segment.
 
         Measured from the start of a segment of curvature k, with the point at x along the tangent
-        and y along the left normal, the foot is  atan2(k x, 1 − k y) / k  along.
+        and y along the left normal, the foot is atan2(k x, 1 − k y) / k along.
         """
         segment = nearest(points, self.segments).segment
         frames = self.frames[segment]
@@ -272,20 +273,21 @@ class _Path(Struct, frozen=True, eq=False):
         )
 
     def near_mm(self, radius_mm: float) -> float:
-        """Return the distance within which a move follows a track of a tool of this radius, mm."""
+        """Return the distance, mm, within which a move counts as following a track of a tool with
+        this radius."""
         size = 0.0 if not len(self.boxes) else float(np.hypot(*np.diff(self.boxes[0])[:, 0]))
         nearness = min(NEAR_MM, NEAR_SIZE * size) if size else NEAR_MM
         return min(nearness, NEAR_SHARE * radius_mm) if radius_mm > 0.0 else nearness
 
     def thin(self) -> _Path:
-        """Return at most `SEARCH_POINTS` of the points, evenly chosen."""
+        """Return the path with at most `SEARCH_POINTS` points, evenly chosen."""
         every = max(1, -(-len(self.points) // SEARCH_POINTS))
         return replace(self, points=self.points[::every], length=self.length[::every])
 
 
 def _boxes_of(cuts: CutMoves, limit_mm: float) -> Floats:
-    """Return (B, 2, 2) mm: the boxes of the loops of all contours, of the whole where one has
-    none; and that of everything first."""
+    """Return (B, 2, 2) mm: the box of everything, then for each contour the box of its loop, or of
+    the whole contour if it has none."""
     contour_loops = loops(cuts, limit_mm)
     first, last = cuts.contour_ends()
     has_loop = contour_loops[:, 0] >= 0
@@ -316,11 +318,11 @@ def register(
     limit_mm: float,
     flat_cuts: bool,
 ) -> Registration:
-    """Find what of a drawing, in the work frame, a program cuts.
+    """Find which lines of a drawing (in the work frame) a program cuts.
 
-    `tool_diameter_mm`: the tool, None where it is to be found; `align`: the drawing may lie
-    elsewhere. `limit_mm`: how far moves may be from a track without a finding. DrawingError for a
-    drawing without lines.
+    `tool_diameter_mm`: the tool, None if it is to be found; `align`: the drawing may lie
+    elsewhere, and its place is searched for. `limit_mm`: how far moves may be from a track without
+    a finding. DrawingError for a drawing without lines.
     """
     if not len(drawing.paths.vertices):
         raise DrawingError(
@@ -355,7 +357,7 @@ def _shift_lines(lines: Polylines, shift: tuple[float, float]) -> Polylines:
 
 
 def _tools_of(toolpath: Toolpath) -> Ints:
-    """Return (N,) the number of the tool of each row, −1 before any is mounted."""
+    """Return (N,) the number of the tool mounted in each row, −1 before the first is mounted."""
     changes = toolpath.kind == Kind.TOOL_CHANGE
     latest = np.maximum.accumulate(np.where(changes, np.arange(len(changes)), -1))
     number = np.append(np.nan_to_num(toolpath.value, nan=-1.0), -1.0)
@@ -363,7 +365,8 @@ def _tools_of(toolpath: Toolpath) -> Ints:
 
 
 def _empty_registration(running: Toolpath, findings: Sequence[Finding]) -> Registration:
-    """Return the registration of a program that follows nothing, with findings that say so."""
+    """Return the registration of a program that follows nothing of the drawing, with findings that
+    say so."""
     report = FoundReport(shift_mm=(0.0, 0.0), aligned=False, followed=0.0)
     return Registration((0.0, 0.0), running, tuple(findings), report, None)
 
@@ -385,7 +388,8 @@ class _Place(Struct, frozen=True):
 def _find_place(
     path: _Path, lines: _Lines, *, align: bool
 ) -> tuple[tuple[float, float] | None, list[Finding]]:
-    """Return the shift of the drawing (x, y) mm, None where none fits, and findings on it."""
+    """Return the shift (x, y), mm, of the drawing under the program, None if none fits, and
+    findings about it."""
     few = path.thin()
     as_drawn = _Place((0.0, 0.0), _followed_share(few, lines, np.zeros(2)))
     if not align and as_drawn.share >= MIN_FOLLOWED_SHARE:
@@ -429,8 +433,8 @@ def _find_place(
 
 
 def _best_other_frame(path: _Path, lines: _Lines) -> tuple[str, _Place] | None:
-    """Return another scale, mirror or turn of the drawing with which the path follows it well, as
-    the flag that makes it; None without any."""
+    """Return the command-line flag of the scale, mirror or turn with which the path follows the
+    drawing best, and its place; None if none fits well."""
     frames = []
     scales = [
         (flag, size * np.eye(2)) for flag, size in SCALES if _is_about_size(path, lines, size)
@@ -449,7 +453,7 @@ def _best_other_frame(path: _Path, lines: _Lines) -> tuple[str, _Place] | None:
 
 
 def _is_about_size(path: _Path, lines: _Lines, size: float) -> bool:
-    """Return True if the cuts are about `size` times as large as the drawing."""
+    """Return True if the cuts are roughly `size` times as large as the drawing."""
     if not len(path.boxes) or not len(lines.boxes):
         return False
     ratio = NEAR_SCALE_RATIO if 0.5 < size < 2.0 else FAR_SCALE_RATIO
@@ -459,7 +463,8 @@ def _is_about_size(path: _Path, lines: _Lines, size: float) -> bool:
 
 
 def _rival_places(best: _Place, places: Sequence[_Place]) -> list[_Place]:
-    """Return the other places that explain as much of the path."""
+    """Return the other places that explain about as much of the path as the best, so that the
+    place is ambiguous."""
     return [
         each
         for each in places
@@ -469,8 +474,8 @@ def _rival_places(best: _Place, places: Sequence[_Place]) -> list[_Place]:
 
 
 def _refined_places(path: _Path, lines: _Lines) -> list[_Place]:
-    """Return the places of the path on the drawing, the one that follows it most first; places
-    nearer than VOTE_MM count once."""
+    """Return the candidate places of the drawing, refined, the one that explains most of the path
+    first; places nearer than VOTE_MM count once."""
     places: list[_Place] = []
     for shift in _candidate_shifts(path, lines):
         refined = _refine_shift(path, lines, shift)
@@ -481,7 +486,7 @@ def _refined_places(path: _Path, lines: _Lines) -> list[_Place]:
 
 
 def _candidate_shifts(path: _Path, lines: _Lines) -> Floats:
-    """Return (C, 2) shifts with the most votes."""
+    """Return (C, 2) mm: the shifts with the most votes from boxes, arc centres and holes."""
     drawn = _largest_boxes(lines.boxes)
     path_boxes = np.concatenate([path.boxes[:1], _largest_boxes(path.boxes[1:])])
     total_box = np.stack(
@@ -529,7 +534,7 @@ def _candidate_shifts(path: _Path, lines: _Lines) -> Floats:
 
 
 def _largest_boxes(boxes: Floats) -> Floats:
-    """Return the `MAX_MARKS` largest boxes."""
+    """Return the `MAX_MARKS` largest of the boxes."""
     size = np.diff(boxes)[..., 0].sum(axis=1)
     return boxes[np.argsort(-size, kind="stable")[:MAX_MARKS]]
 
@@ -541,7 +546,8 @@ def _centres_of(lines: _Lines) -> Floats:
 
 
 def _refine_shift(path: _Path, lines: _Lines, shift: Floats) -> Floats:
-    """Return a shift, moved until the path keeps to the lines, or to one distance from them."""
+    """Improve a shift until the path keeps to the lines, or to a single distance from them; return
+    it."""
     shift = np.array(shift, dtype=np.float64)
     for width in WIDTHS_MM:
         distance, normal, _ = lines.signed_distances(path.points - shift)
@@ -565,8 +571,8 @@ def _refine_shift(path: _Path, lines: _Lines, shift: Floats) -> Floats:
 
 
 def _peak_distance(distances: Floats, length: Floats, width: float) -> float:
-    """Return the distance that most of the path keeps, within `width`; 0 where that is the
-    line."""
+    """Return the distance from the lines that most of the path keeps, to within `width`; 0 if it
+    runs on the lines."""
     bins = max(width, BIN_MM)
     bin_of, counts = _distance_histogram(distances, length, bins)
     pairs = counts + np.append(counts[1:], 0.0)
@@ -579,8 +585,8 @@ def _peak_distance(distances: Floats, length: Floats, width: float) -> float:
 
 
 def _distance_histogram(distances: Floats, length: Floats, bins: float) -> tuple[Ints, Floats]:
-    """Return the bin of each distance, and the length of the path in each bin; none in the last,
-    which is farther than any tool is wide."""
+    """Return the bin of each distance, and the length of the path in each bin. The last bin, for
+    distances farther than any tool is wide, counts as empty."""
     max_bin = int(MAX_RADIUS_MM / bins) + 2
     bin_of = np.minimum(distances / bins, max_bin).astype(np.int64)
     counts = np.bincount(bin_of, length, minlength=max_bin + 1).astype(np.float64)
@@ -589,7 +595,8 @@ def _distance_histogram(distances: Floats, length: Floats, bins: float) -> tuple
 
 
 def _followed_share(path: _Path, lines: _Lines, shift: Floats) -> float:
-    """Return the part of the path that keeps to the lines, or to one distance from them."""
+    """Return the share of the path that keeps to the lines, or to a single distance from them;
+    without cuts, the share of the holes that lie on the centres of arcs."""
     if len(path.points) == 0:
         drilled = near_points(path.holes - shift, _centres_of(lines), NEAR_MM)[0]
         return len(distinct(drilled)) / max(len(path.holes), 1)
@@ -632,11 +639,11 @@ class _Tracks(Struct, frozen=True, eq=False):
 
 
 def _tracks_of(lines: Polylines, radius_mm: float, contours: Ints) -> _Tracks:
-    """Return the tracks beside the contours `contours` for a tool of a radius; on them for a
-    radius of 0.
+    """Return the tracks of a tool of this radius beside the contours of these indices, or on them
+    for a radius of 0.
 
-    Closed contours have round and sharp corners outside; an open one has one track that goes
-    round it.
+    Closed contours have round and sharp corners outside; an open one has one track that goes round
+    it.
     """
     if radius_mm == 0.0:
         zeros = np.zeros(len(contours), dtype=np.int64)
@@ -666,25 +673,25 @@ def _tracks_of(lines: Polylines, radius_mm: float, contours: Ints) -> _Tracks:
 
 
 def _orient_ccw(lines: Polylines) -> Polylines:
-    """Return closed paths, each reversed where it runs clockwise."""
+    """Return closed paths with the clockwise ones reversed."""
     return reverse_lines(lines, np.asarray(signed_areas(lines) < 0.0))
 
 
 def _doubled_path(path: Polyline) -> Polyline:
-    """Return an open path as a closed one of no width."""
+    """Return an open path as a closed one that runs there and back."""
     vertices_back = reverse(path).vertices
     return Polyline(np.concatenate([path.vertices[:-1], vertices_back[:-1]]), closed=True)
 
 
 def _is_on_track(points: Floats, tracks: _Tracks, near_mm: float) -> Bools:
-    """Return (J,) true for points that lie on a track."""
+    """Return the mask (J,) of points within `near_mm` of a track."""
     if len(tracks.paths) == 0:
         return np.zeros(len(points), dtype=np.bool_)
     return np.asarray(nearest(points, Segments.of(tracks.paths)).distance <= near_mm)
 
 
 def _candidate_radii(distances: Floats, length: Floats) -> list[float]:
-    """Return the distances from the nearest line that much of a path keeps, the most kept
+    """Return the distances from the nearest line that large parts of the path keep, the most kept
     first."""
     bin_of, counts = _distance_histogram(distances, length, BIN_MM)
     min_length = MIN_PEAK_SHARE * float(length.sum())
@@ -725,7 +732,7 @@ class _Cells(Struct, frozen=True, eq=False):
     cut: Bools
 
     def share(self, count: int) -> Floats:
-        """Return (T,) the part of each track that is cut."""
+        """Return (T,) the share of each track that is cut; `count`: the number of tracks."""
         total_mm = np.bincount(self.track, self.length, minlength=count)
         return np.asarray(
             np.bincount(self.track, self.length * self.cut, minlength=count)
@@ -744,7 +751,7 @@ class _FollowedTracks(Struct, frozen=True, eq=False):
 
 
 class _Follower(Struct, frozen=True, eq=False):
-    """A program over a drawing that lies where it belongs."""
+    """A program and a drawing that lies under it in the right place."""
 
     program: Side
     path: _Path
@@ -818,7 +825,7 @@ class _Follower(Struct, frozen=True, eq=False):
         return Registration(shift, cuts_toolpath, tuple(findings), report, width or None)
 
     def _row_lengths(self) -> Floats:
-        """Return (N,) mm: the length of the segments of each row."""
+        """Return (N,) mm: the length of the cuts of each row."""
         sizes = segment_lengths(self.cuts.segments)
         lengths: Floats = np.bincount(
             self.cuts.row, sizes, minlength=len(self.cuts.contour)
@@ -828,8 +835,8 @@ class _Follower(Struct, frozen=True, eq=False):
     def _radius(
         self, indices: Ints, given_mm: float | None
     ) -> tuple[_RadiusTrial | None, list[Finding]]:
-        """Return the radius with which most of the points `indices` follow tracks, and its
-        tracks."""
+        """Return the radius with which most of the points `indices` follow tracks, with these
+        tracks (None if none fits), and findings."""
         points, length = self.path.points[indices], self.path.length[indices]
         distances = np.abs(self.lines.signed_distances(points)[0])
         radii = _candidate_radii(distances, length)
@@ -881,7 +888,8 @@ class _Follower(Struct, frozen=True, eq=False):
     def _try_radius(
         self, points: Floats, length: Floats, radius: float, slack: float
     ) -> _RadiusTrial:
-        """Return the tracks of a radius that are followed, and the points that follow them."""
+        """Return the trial of a radius: the tracks that are followed, and the points that follow
+        them."""
         nearness = self.path.near_mm(radius) + slack
         count = len(self.lines.paths)
         every = np.arange(count)
@@ -898,7 +906,8 @@ class _Follower(Struct, frozen=True, eq=False):
         return _RadiusTrial(radius, tracks, follows, float(length[follows].sum()))
 
     def _contours_at(self, points: Floats, radius: float, nearness: float) -> Bools:
-        """Return (M,) true for contours from which any point is as far as the radius."""
+        """Return the mask (M,) of contours to which any of the points comes as near as the
+        radius."""
         is_reached = np.zeros(len(self.lines.paths), dtype=np.bool_)
         distances, _, segment = self.lines.signed_distances(points)
         is_reached[
@@ -907,7 +916,7 @@ class _Follower(Struct, frozen=True, eq=False):
         return is_reached
 
     def _cells(self, tracks: _Tracks, nearness: float) -> _Cells:
-        """Return points along tracks, and which of them the program cuts."""
+        """Return points along the tracks, and the mask of those that the program cuts."""
         segments = Segments.of(tracks.paths)
         sizes = segment_lengths(segments)
         spacing = max(TRACK_MM, float(sizes.sum()) / MAX_TRACK_POINTS)
@@ -922,7 +931,8 @@ class _Follower(Struct, frozen=True, eq=False):
         return _Cells(segments.path[owner], places, (sizes / parts)[owner], cut)
 
     def _join_trials(self, parts: Sequence[tuple[_RadiusTrial, int]]) -> _FollowedTracks | None:
-        """Return the tracks of all tools, each once."""
+        """Return the followed tracks of all tools, those that run on a line once; None if there
+        are none."""
         parts = [(trial, number) for trial, number in parts if len(trial.tracks.paths)]
         if not parts:
             return None
@@ -941,7 +951,8 @@ class _Follower(Struct, frozen=True, eq=False):
         return _FollowedTracks(tracks, radius, tool, self._cells(tracks, nearness))
 
     def _drilled_circles(self, followed: _FollowedTracks | None) -> Bools:
-        """Return (M,) the circles in whose middle a hole is drilled, and that are not cut."""
+        """Return the mask (M,) of circles that have a drilled hole in their middle and are not
+        cut."""
         is_drilled = np.zeros(len(self.lines.paths), dtype=np.bool_)
         holes = self.path.holes
         if not len(holes):
@@ -957,7 +968,8 @@ class _Follower(Struct, frozen=True, eq=False):
     def _not_cut_findings(
         self, followed: _FollowedTracks | None, drilled: Bools
     ) -> Iterator[Finding]:
-        """Yield a finding for each contour that nothing cuts, and for each that is cut in part."""
+        """Yield a finding for each contour that is not cut, and for each that is only
+        partly cut."""
         count = len(self.lines.paths)
         cut = np.zeros(count, dtype=np.bool_)
         if followed is not None:
@@ -989,8 +1001,9 @@ class _Follower(Struct, frozen=True, eq=False):
             )
 
     def _into_part_findings(self, followed: _FollowedTracks, rows: Bools) -> Iterator[Finding]:
-        """Yield a finding for each move that follows nothing and comes nearer to the nearest line
-        than the tool may that cuts along one side of it, or lies on its other side."""
+        """Yield CUT_INTO_PART for moves that follow no track and cut into a part: contours cut
+        along one side define where the tool must stay, and the move comes nearer than the tool's
+        radius, or is on the wrong side."""
         lines, loose = self.lines, np.flatnonzero(~rows[self.path.row])
         if not len(loose):
             return
@@ -1028,8 +1041,8 @@ class _Follower(Struct, frozen=True, eq=False):
             )
 
     def _beside_findings(self, rows: Bools, offsets: Floats) -> Iterator[Finding]:
-        """Yield findings on cuts that follow nothing, and on those that follow from afar:
-        `offsets` (J,) mm, by points of the rows (N,) that follow."""
+        """Yield CUTS_BESIDE for cuts that follow no track, and OFF_DRAWING if the tracks are
+        followed at a distance (`offsets` (J,), mm) beyond the limit."""
         length, toolpath = self._row_lengths(), self.cuts.toolpath
         loose = np.flatnonzero(self.cuts.is_cut & ~rows)
         if len(loose) and rows.any():
@@ -1043,14 +1056,15 @@ class _Follower(Struct, frozen=True, eq=False):
             yield OFF_DRAWING(measured=float(offsets.max()), limit=self.limit_mm)
 
     def name(self, index: int) -> str:
-        """Return `layer/entity` of a contour."""
+        """Return the name `layer/entity` of a contour."""
         layer, source = self.drawing.layers[index], self.drawing.sources[index]
         return f"{layer}/{source}"
 
 
 def _sides_followed(tracks: _Tracks, share: Floats) -> Ints:
-    """Return the tracks that are followed: of each side with enough cut the variant with most of
-    it, and where no side has enough, the best."""
+    """Return the indices of the tracks that are followed: for each side with enough of its track
+    cut, the variant (round or sharp corners) that is cut most; for a contour without such a side,
+    the track that is cut most."""
     best: dict[tuple[int, int, int], int] = {}
     for k, (contour, side) in enumerate(
         zip(tracks.contour.tolist(), tracks.side.tolist(), strict=True)
@@ -1074,7 +1088,8 @@ def _sides_followed(tracks: _Tracks, share: Floats) -> Ints:
 
 
 def _side_counts(followed: _FollowedTracks | None, drilled: Bools, count: int) -> dict[str, int]:
-    """Return the number of contours that are cut on each side, drilled, and not cut."""
+    """Return the number of contours that are cut inside, on and outside the line, drilled, and not
+    cut."""
     counts = {"outside": 0, "inside": 0, "on_line": 0}
     cut: set[int] = set()
     if followed is not None:
@@ -1163,7 +1178,7 @@ class _RowTracks(Struct, frozen=True, eq=False):
 
 
 def _as_cuts(paths: Polylines) -> CutMoves:
-    """Return paths as moves at height 0, each a contour of its own, a row for each segment."""
+    """Return paths as cutting moves at height 0: each path is a contour, each segment a row."""
     segments = Segments.of(paths)
     count = len(segments)
     unknown = np.full(count, np.nan)
@@ -1182,7 +1197,7 @@ def _as_cuts(paths: Polylines) -> CutMoves:
 
 
 def _with_tracks(follower: _Follower, followed: _FollowedTracks, follow: _RowTracks) -> Toolpath:
-    """Return the program with the tracks in the place of the moves that follow them."""
+    """Return the program with the moves that follow tracks replaced by the tracks themselves."""
     toolpath = follower.cuts.toolpath
     rows = np.flatnonzero(follow.rows)
     if not len(rows):
@@ -1221,14 +1236,15 @@ def _with_tracks(follower: _Follower, followed: _FollowedTracks, follow: _RowTra
 
 
 def _close_turns(kind: Ints, end: Floats) -> None:
-    """Let whole turns end exactly where they begin, or rounding would make nothing of them."""
+    """Set, in place, the ends of full circles exactly to their starts; otherwise rounding would
+    reduce them to nothing."""
     gaps = np.hypot(*np.diff(end[:, :2], axis=0, prepend=end[:1, :2]).T)
     for row in np.flatnonzero(are_arcs(kind) & (gaps <= POSITION_EPS_MM)).tolist():
         end[row, :2] = end[row - 1, :2]
 
 
 def _link(end: Sequence[float] | Floats, feed: float, chain: int) -> tuple[Any, ...]:
-    """Return a line to the start of the next chain, as the columns of `_splice_tracks`."""
+    """Return a line to the start of the next chain as columns for `_splice_tracks`."""
     centre = np.full((1, 2), np.nan)
     return np.array([Kind.LINE]), np.array([end]), centre, np.array([feed]), chain
 
@@ -1240,10 +1256,9 @@ def _splice_tracks(
     built: tuple[Floats, Ints, Cuts],
     track: Ints,
 ) -> Toolpath:
-    """Return the rows of the program that follow nothing, and between them the moves along the
-    tracks.
+    """Return the program with the moves along the tracks in place of the rows that follow them.
 
-    Chain k stands for the rows from chains[0][k] to chains[1][k], and is on the track track[k].
+    Chain k replaces the rows from chains[0][k] to chains[1][k], and runs along the track track[k].
     What leads to a chain ends where it begins, and what follows it begins where it ends.
     """
     toolpath, (vertices, runs, moves) = follower.cuts.toolpath, built

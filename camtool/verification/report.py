@@ -522,7 +522,7 @@ class Report(msgspec.Struct, frozen=True):
         return "\n".join(lines)
 
     def to_markdown(self) -> str:
-        """Return the report as Markdown, for a pull request or a job's record."""
+        """Return the report as Markdown, for a pull request or the record of a job."""
         return page_markdown(ReportPage(self.source or self.target, self, self.findings))
 
     def notes(self) -> tuple[str, ...]:
@@ -539,12 +539,12 @@ class Report(msgspec.Struct, frozen=True):
         return self.reversals.cutting.x + self.reversals.cutting.y
 
     def with_findings(self, findings: Iterable[Finding]) -> Report:
-        """Return the same report with these findings."""
+        """Return the report with these findings in place of its own."""
         return replace(self, findings=finding_reports(findings))
 
 
 def finding_reports(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
-    """Return the findings as records of the report, in order, each once."""
+    """Return the findings as records of the report, in order, without repeats."""
     return tuple(
         FindingReport(
             code=finding.code.name,
@@ -560,7 +560,7 @@ def finding_reports(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
 
 
 def rounded_or_none(value: float | None, scale: float = 1.0) -> float | None:
-    """Return `value` · scale, rounded for the report, never −0; None for values that are not
+    """Return `value` · scale rounded for the report, with 0 in place of −0; None if it is not
     finite."""
     if value is None or not math.isfinite(value):
         return None
@@ -568,7 +568,7 @@ def rounded_or_none(value: float | None, scale: float = 1.0) -> float | None:
 
 
 def rounded(value: float) -> float:
-    """Return a known number, rounded for the report, never −0."""
+    """Return a finite number rounded for the report, with 0 in place of −0."""
     return round(float(value), DECIMALS) or 0.0
 
 
@@ -591,7 +591,7 @@ class Gates(FrozenRecord):
 def gate_findings(
     report: Report, gates: Gates, findings: Iterable[Finding] = ()
 ) -> Iterator[Finding]:
-    """Yield ABOVE_GATE for each limit that the report, or a gouge among the findings of planning,
+    """Yield ABOVE_GATE for each limit that a figure of the report, or a gouge among the findings,
     exceeds, or whose figure is not known."""
     if gates.error_mm is not None:
         yield from _error_gate(report.error_um.total.max, gates.error_mm * UM_PER_MM)
@@ -616,8 +616,8 @@ def gate_findings(
 def stock_gate_findings(
     subject: str, limit_mm: float, bracket: Bracket | None
 ) -> Iterator[Finding]:
-    """Yield ABOVE_GATE where the `subject` of the stock, "gouge" or "leftover", exceeds its limit,
-    is not proved to keep to it, or (None) is not known."""
+    """Yield ABOVE_GATE if the "gouge" or "leftover" of the stock (`subject`) exceeds its limit, is
+    not proved to keep it, or (`bracket` None) is not known."""
     flag, limit_um = f"--max-{subject}", limit_mm * UM_PER_MM
     if bracket is None:
         yield ABOVE_GATE_NO_STOCK(where=flag, limit=limit_um, what=subject)
@@ -643,8 +643,8 @@ def stock_gate_findings(
 def engagement_gate_findings(
     limit_rad: float, rows: Sequence[OperationEngagement], reason: str = ""
 ) -> Iterator[Finding]:
-    """Yield ABOVE_GATE where the greatest engagement of all operations exceeds its limit, and for
-    each that is not judged; `reason`: why none is."""
+    """Yield ABOVE_GATE if the greatest engagement exceeds the limit, and for each operation that
+    was not judged; `reason`: why none was."""
     limit, flag = math.degrees(limit_rad), "--max-engagement"
     unknown = [f"{each.words}: {each.reason}" for each in rows if each.greatest_rad is None]
     for words in [reason] if reason else unknown:
@@ -686,7 +686,7 @@ def duration(seconds: float) -> str:
 
 
 def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
-    """Yield (name, value) of each line of the summary."""
+    """Yield the lines of the summary as (name, value)."""
     steps, extents = report.steps, report.extents_mm
     method = report.interpolator
     if method in ("dsm", "dda", "stairs"):
@@ -756,7 +756,7 @@ def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
 
 
 def _engagement_words(item: EngagementReport) -> str:
-    """Return the greatest engagement of an operation beside its limit."""
+    """Return text on the greatest engagement of an operation and its limit."""
     if item.greatest_deg is None:
         return f"{item.operation or 'program'}: not judged"
     words = f"{item.operation or 'program'}: {item.greatest_deg:.2f}° at most"
@@ -771,7 +771,7 @@ def _engagement_words(item: EngagementReport) -> str:
 
 
 def inspected_words(item: InspectedReport) -> str:
-    """Return a dimension in one line: its limits, its predicted sizes, its verdict."""
+    """Return one line of text on a dimension: its limits, its predicted sizes, its verdict."""
     words = f"{item.name}: {item.asked}"
     size = f"{item.fit_mm:.4f} mm"
     if item.high_mm > item.low_mm:
@@ -797,7 +797,7 @@ def _unknown_words(item: ContributionReport) -> str:
 
 
 def _chance(probability: float) -> str:
-    """Return a probability in per cent, never rounded to certainty."""
+    """Return a probability as text in per cent, never as 0 or 100 %."""
     share = 100.0 * probability
     if share > 99.9:
         return "over 99.9 %"
@@ -805,7 +805,7 @@ def _chance(probability: float) -> str:
 
 
 def _asked_words(counts: AskedReport) -> str:
-    """Return in words how many moves are exactly those that camtool would write."""
+    """Return text on how many moves are exactly those that camtool would write."""
     if counts.alike == counts.moves:
         return f"all {counts.moves} cutting moves are those that camtool writes"
     return (
@@ -815,7 +815,8 @@ def _asked_words(counts: AskedReport) -> str:
 
 
 def _found_words(part: FoundReport) -> Iterator[str]:
-    """Yield in words the part of the drawing that the program cuts, the tool, and its distance."""
+    """Yield text on the part of the drawing that the program cuts, the tool, and the distance
+    between both."""
     if not part.tools and not part.drilled:
         yield "nothing of the drawing"
         return
@@ -843,7 +844,7 @@ def _found_words(part: FoundReport) -> Iterator[str]:
 
 
 def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
-    """Yield tool, spindle, feeds, depth and passes, one line per operation."""
+    """Yield one line for each operation: tool, spindle, feeds, depth and passes."""
     for each in operations[:MAX_OPERATIONS]:
         name = one_line(each.name or each.kind)
         tool_name = one_line(f" {each.tool_name}") if each.tool_name else ""
@@ -869,8 +870,8 @@ def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
 
 
 def remarks(report: Report) -> str:
-    """Return remarks on the largest error: its reference where it is not the drawing, and gouges,
-    which it does not count."""
+    """Return remarks on the largest error: what it refers to, if not the drawing, and gouges,
+    which it does not include."""
     words = "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
     gouges = [each for each in report.findings if each.code == ProgramCode.GOUGE.name]
     if gouges:
@@ -881,8 +882,8 @@ def remarks(report: Report) -> str:
 
 
 def gouged_mm(findings: Iterable[Finding | FindingReport]) -> float:
-    """Return lower bound of how deep the tool cuts into what stays, mm, by the findings GOUGE; 0
-    when none says. Each has the distance from a wall that was found, and that which was needed."""
+    """Return a lower bound of how deep the tool cuts into what must stay, mm, from the GOUGE
+    findings (needed minus found distance from a wall); 0 if there are none."""
     return max(
         (
             each.limit - each.measured
@@ -896,19 +897,20 @@ def gouged_mm(findings: Iterable[Finding | FindingReport]) -> float:
 
 
 def _shape_words(shape: ShapeReport) -> str:
-    """Return overcut and undercut of a round tool in words."""
+    """Return text on overcut and undercut of a round tool."""
     overcut_text = f"overcut {shape.overcut_um:.2f} µm deep, {shape.overcut_mm2:.4f} mm²"
     under = f"undercut {shape.undercut_um:.2f} µm, {shape.undercut_mm2:.4f} mm²"
     return f"{overcut_text}; {under} (tool {shape.tool_diameter_mm:g} mm)"
 
 
 def move_name(block: int | None, move: int) -> str:
-    """Return a move by its block, or by its own number where there are no blocks."""
+    """Return the name of a move: its block, or its own number if there are no blocks."""
     return f"block {block}" if block is not None else f"move {move}"
 
 
 def _before_words(report: Report) -> str:
-    """Return the figures of the same job without measures against reversals and backlash."""
+    """Return text on the figures of the same job without measures against reversals and
+    backlash."""
     before = report.before
     if before is None or before.time_s is None:
         return "not known: the job without these measures cannot be cut"
@@ -928,7 +930,7 @@ _MaxRmsP95 = tuple[float | None, float | None, float | None]
 
 
 def _by_source(error: Errors) -> dict[str, _MaxRmsP95]:
-    """Return maximum, rms and 95th percentile of the error of each source, µm."""
+    """Return (maximum, rms, 95th percentile) of the error of each source, µm, by its name."""
     inside = error.interpolation
     return {
         "fit": (error.fit.max, error.fit.rms, None),
@@ -957,8 +959,7 @@ def percent(value: float | None) -> str:
 
 
 def _fixed_decimals(value: float, places: int) -> str:
-    """Return a number with so many decimals and a true minus; what is rounded to zero has no
-    sign."""
+    """Return a number as text with `places` decimals and a true minus sign; zero has no sign."""
     text = f"{abs(value):.{places}f}"
     return f"−{text}" if value < 0.0 and float(text) else text
 
@@ -1011,7 +1012,7 @@ class ReportPage(Struct, frozen=True):
 
 
 def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
-    """Return (name, value) of the machine and the settings, in order."""
+    """Return the rows (name, value) on the machine and the settings, in order."""
     digests = [("machine", f"{setup.machine}, digest {setup.machine_sha256}")]
     if setup.program_sha256 is not None:
         digests.append(("program", f"digest {setup.program_sha256}"))
@@ -1022,14 +1023,15 @@ def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
 
 
 def shorten(words: str) -> str:
-    """Return the text, shortened to `NAME_SHOWN` characters."""
+    """Return the text shortened to `NAME_SHOWN` characters."""
     return words if len(words) <= NAME_SHOWN else words[: NAME_SHOWN - 1] + "…"
 
 
 def page_json(page: ReportPage) -> str:
-    """Return the report's own keys, with `title`, `verdict` and `setup` before them; indented.
+    """Return indented JSON with the report's keys after `title`, `verdict` and `setup`.
 
-    Where the program could not be judged, only `findings` follow."""
+    If the program could not be judged, only `findings` follow these.
+    """
     body: dict[str, Any] = {"title": page.title, "verdict": page.verdict}
     body["setup"] = None if page.setup is None else asdict(page.setup)
     if page.report is not None:
@@ -1052,8 +1054,8 @@ class ReportSheet(Struct, frozen=True):
 
 
 def sheets(report: Report) -> Iterator[ReportSheet]:
-    """Yield inspected dimensions, errors by source, sizes, circles, contours and worst moves,
-    without empty tables."""
+    """Yield the tables of a page that are not empty: inspected dimensions, errors by source,
+    sizes, circles, contours and worst moves."""
     every = (
         _inspection_sheet(report),
         _error_sheet(report),
@@ -1133,7 +1135,7 @@ def _both_ways_sheet(report: Report) -> ReportSheet:
 
 
 def _contour_sheet(report: Report) -> ReportSheet:
-    """Return the contours, by falling error."""
+    """Return the table of contours, the largest error first."""
     heads = (
         "contour",
         "where",
@@ -1199,8 +1201,8 @@ SETUP_FINDINGS = 6
 
 
 def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
-    """Yield (name, value) of the place of the stock, the extents of the program, and its time and
-    tools."""
+    """Yield (name, value) lines for mounting the stock: its place, the extents of the program,
+    time and tools."""
     plan, extents = report.planned, report.extents_mm
     if plan is not None and plan.setup:
         yield "set-up", plan.setup
@@ -1235,7 +1237,7 @@ def _stock_words(stock: PlannedStock) -> str:
 
 
 def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "drawing") -> str:
-    """Return in words the place of X0 Y0 and Z0 on the stock and on the drawing."""
+    """Return text on where X0 Y0 and Z0 lie on the stock and on the drawing."""
     places = {
         "drawing": "is the drawing's own zero",
         "lower-left": "is the lower left corner of the contours that are cut",
@@ -1265,7 +1267,7 @@ def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "d
 
 
 def setup_sheets(plan: Planned) -> Iterator[ReportSheet]:
-    """Yield the tools in the order of use, and the operations."""
+    """Yield the table of tools in the order of use, and the table of operations."""
     rows = tuple(
         (
             _tool_called(plan, row),
@@ -1286,8 +1288,8 @@ MIN_CLAMP_MM = 3.0
 
 
 def _clamp_words(plan: Planned, swept_mm: tuple[float, float, float, float]) -> str:
-    """Return the strips of the stock over which no tool and no holder passes, or the box outside
-    of which none does where the stock is not known."""
+    """Return text on where clamps may go: the strips at the edges of the stock over which neither
+    tool nor holder passes; if the stock is not known, the box that they stay within."""
     lacks_holder = [tool.holder_diameter_mm is None for tool in plan.tools]
     subject = (
         "no tool or holder passes"
@@ -1311,7 +1313,7 @@ def _clamp_words(plan: Planned, swept_mm: tuple[float, float, float, float]) -> 
 
 
 def _touch_words(places: tuple[tuple[float, float] | None, ...]) -> str:
-    """Return where each tool that is mounted later touches the stock, to set Z0 again."""
+    """Return text on where each tool that is mounted later touches the stock, to set Z0 again."""
     words = ["where it is whole" if at is None else f"at X{at[0]:.4g} Y{at[1]:.4g}"
              for at in places]  # fmt: skip
     where = words[:1] if len(set(words)) == 1 else words
@@ -1319,7 +1321,8 @@ def _touch_words(places: tuple[tuple[float, float] | None, ...]) -> str:
 
 
 def _by_hand(report: Report) -> Iterator[str]:
-    """Yield the tabs to cut, by operation and tool, and the pieces to take out."""
+    """Yield lines on what is done by hand: tabs to cut, by operation and tool, and loose pieces to
+    take out."""
     plan = report.planned
     for each in () if plan is None else plan.operations:
         if plan is not None and each.tabs:
@@ -1333,7 +1336,8 @@ def _by_hand(report: Report) -> Iterator[str]:
 
 
 def _tool_called(plan: Planned, row: int) -> str:
-    """Return `1 mill`, or the tool's place in the order where it has neither number nor name."""
+    """Return a name of a tool such as `1 mill`, or its place in the order if it has neither number
+    nor name."""
     tool = plan.tools[row]
     number = "" if tool.number is None else f"T{tool.number}"
     return f"{number} {tool.name}".strip() or f"({row + 1})"
@@ -1373,7 +1377,8 @@ def _setup_operations(plan: Planned) -> tuple[tuple[str, ...], tuple[tuple[str, 
 def _within_words(
     value: float | None, digits: int, limits: tuple[float, float | None] | None
 ) -> str:
-    """Return a number beside its limits: `0.04 (0.02 to 0.06)`; a dash where it is not known."""
+    """Return a number and its limits as text, such as `0.04 (0.02 to 0.06)`; a dash for an unknown
+    number."""
     if value is None:
         return "–"
     shown = f"{value:.{digits}g}"
@@ -1384,7 +1389,7 @@ def _within_words(
 
 
 def gravest_findings(page: ReportPage) -> tuple[FindingReport, ...]:
-    """Return the findings that one must know at the machine, errors first."""
+    """Return the findings that the operator must know at the machine, errors first."""
     grave = [each for each in page.findings if each.severity in _GRAVEST_FIRST]
     return tuple(sorted(grave, key=lambda item: _GRAVEST_FIRST[item.severity]))
 
@@ -1407,8 +1412,8 @@ _BROKEN = {"@": "@<!-- -->", "://": ":<!-- -->//", "www.": "www<!-- -->."}
 
 
 def page_markdown(page: ReportPage) -> str:
-    """Return the page, at most PAGE_BYTES long; where something is left out, its last line says
-    so."""
+    """Return the page as Markdown of at most PAGE_BYTES; if something is left out, its last line
+    says so."""
     lines: list[str] = []
     room = PAGE_BYTES
     for line in _markdown_lines(page):
@@ -1421,7 +1426,7 @@ def page_markdown(page: ReportPage) -> str:
 
 
 def markdown_words(words: str) -> str:
-    """Return the text, shortened and escaped, as one line of Markdown."""
+    """Return the text shortened and escaped, as one line of Markdown."""
     line = shorten(one_line(words))
     escaped = "".join("\\" + sign if sign in _MARKS else sign for sign in line)
     for mark, broken in _BROKEN.items():
@@ -1543,7 +1548,7 @@ def _escape(text: str) -> str:
 
 
 def _attribute(text: str) -> str:
-    """Return a text for an attribute, or between tags, of HTML."""
+    """Return a text escaped for an attribute, or between tags, of HTML."""
     from html import escape  # other reports need none of it
 
     return escape(text, quote=True)
@@ -1577,7 +1582,7 @@ def _html_lines(page: ReportPage) -> Iterator[str]:
 
 
 def _html_setup(page: ReportPage, report: Report) -> Iterator[str]:
-    """Yield the setup sheet for the machine; printed it fills the first side."""
+    """Yield the HTML of the setup sheet for the machine; printed, it fills the first page."""
     if report.planned is None:
         return
     yield f'<section class="setup"><h2>{SETUP}</h2>'
@@ -1620,8 +1625,8 @@ def _html_findings(page: ReportPage) -> Iterator[str]:
 
 
 def _html_table(sheet: ReportSheet, *, with_heads: bool = False) -> Iterator[str]:
-    """Yield the table; `with_heads`: each cell knows its heading, for windows too narrow for
-    columns."""
+    """Yield the HTML of a table. `with_heads`: each cell repeats its column heading, for windows
+    too narrow for columns."""
     kinds = ["" if n < sheet.words else ' class="number"' for n in range(len(sheet.heads))]
     heads = zip(kinds, sheet.heads, strict=True)
     yield '<div class="wide"><table class="rows">\n<thead><tr>'

@@ -29,8 +29,8 @@ POINTS = 4000
 def section_findings(
     decoded: Toolpath, target: LoadedTarget, steps: Sequence[Step], simulation: Options
 ) -> Iterator[Finding]:
-    """Yield a finding for each section that was turned: how deep the predicted cut goes into it,
-    and how much of it is left."""
+    """Yield a finding for each turned section: how deep the predicted cut goes into it, and how
+    much of it is left."""
     turned = [
         (index, step)
         for index, step in enumerate(step for step in steps if step.runs)

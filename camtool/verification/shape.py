@@ -131,7 +131,7 @@ class Cutter(Struct, frozen=True):
 
 def cutter_of(options: VerifyOptions, cuts: CutMoves) -> Cutter | None:
     """Return the tool for these moves. A V bit of unknown diameter is as wide as the deepest cut
-    needs. None without a tool, and for one without width."""
+    needs. None if there is no tool, or it has no width."""
     diameter = options.tool_diameter_mm or 0.0
     if not diameter and options.nose is not None and len(cuts.ends_z):
         diameter = 2.0 * options.nose.radius_at(max(-float(cuts.ends_z.min()), 0.0))
@@ -140,7 +140,7 @@ def cutter_of(options: VerifyOptions, cuts: CutMoves) -> Cutter | None:
 
 def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
     """Return the number of points that a trace of these moves needs for the shape; None without a
-    tool, and where that would be too many.
+    tool, and if that would be too many.
 
     Chords of s mm are s²/(8 r) off an arc of radius r, so s ≤ √(8 r tolerance) for the smallest
     arc is enough. A trace has a point every 2 length / points mm, or up to twice as far apart, and
@@ -159,7 +159,8 @@ def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
 
 
 def _cross_too_often(segments: Segments) -> bool:
-    """Return True if the chords of segments cross each other more than `MAX_CROSSINGS` times."""
+    """Return True if the chords of the segments cross each other more than `MAX_CROSSINGS` times;
+    the search ends after `MAX_PAIRS` pairs."""
     boxes = segment_boxes(segments)
     looked_at = crossings = 0
     for rows in BoxIndex(boxes).pairs(boxes):
@@ -174,15 +175,15 @@ def _cross_too_often(segments: Segments) -> bool:
 
 
 def _left_of(start: Floats, end: Floats, point: Floats) -> Floats:
-    """Return (J,) mm²: the area that a line (J, 2), (J, 2) and a point (J, 2) span, above 0 on the
-    left."""
+    """Return (J,) mm²: twice the signed area of the triangle of a line (J, 2), (J, 2) and a point
+    (J, 2), positive if the point is on the left."""
     (along_x, along_y), (x, y) = (end - start).T, (point - start).T
     return np.asarray(along_x * y - along_y * x)
 
 
 class WantedShape(Struct, frozen=True, eq=False):
-    """The region (of shapely) that a tool should remove; how deep (mm) the wanted path itself cuts
-    into what must stay, and where."""
+    """The region (a shapely geometry) that a tool should remove; how deep (mm) the wanted path
+    itself cuts into what must stay, and where."""
 
     cutter: Cutter
     region: Any
@@ -194,7 +195,7 @@ def wanted_shape(
     cuts: CutMoves, cutter: Cutter, protected: Sequence[ProtectedRegion] = ()
 ) -> WantedShape | None:
     """Return the region that the tool covers along the wanted moves; with `protected`, along its
-    runs, without what must stay. None when nothing is cut."""
+    runs, minus what must stay. None if nothing is cut."""
     import shapely
 
     if not protected:
@@ -220,8 +221,8 @@ def wanted_shape(
 def overcut_findings(
     shape: WantedShape | None, planned: Collection[Code | TargetCode]
 ) -> Iterator[Finding]:
-    """Yield OVERCUT for a plan that cuts into what must stay, unless GOUGE is among the codes of
-    its findings already."""
+    """Yield OVERCUT if the plan itself cuts into what must stay, unless planning has reported
+    GOUGE (`planned`: the codes of its findings)."""
     if shape is None or shape.beyond_mm <= OVERCUT_MM or ProgramCode.GOUGE in planned:
         return
     x, y = shape.at_mm
@@ -231,8 +232,8 @@ def overcut_findings(
 def machined_shape(
     trace: SlideTrace, motion: CommandedMotion, goal: WantedShape
 ) -> MachinedShape | None:
-    """Compare what the tool covers along the trace of a motion with what it should cover; None
-    when nothing is cut."""
+    """Compare what the tool covers along the trace of a motion with what it should cover; None if
+    nothing is cut."""
     cutter, tolerance = goal.cutter, goal.cutter.tolerance_mm
     runs = _runs(trace) if cutter.nose is None else _rows_with_heights(trace, motion)
     swept = _swept_by_runs(runs, cutter)
@@ -246,8 +247,8 @@ def machined_shape(
 def _area_outside(
     one: Any, other: Any, tolerance: float
 ) -> tuple[float, float, tuple[float, float]]:
-    """Return area (mm²) of `one` outside `other`, its depth (mm) and its place; 0 for depths
-    within the tolerance of chords."""
+    """Return the area (mm²) of `one` outside `other`, the depth (mm) of that area and its place; 0
+    for depths within the tolerance of chords."""
     import shapely
 
     rest = shapely.difference(one, other)
@@ -268,8 +269,8 @@ def _area_outside(
 
 
 def _deepest(region: Any, edges: Moves, spacing_mm: float) -> tuple[float, tuple[float, float]]:
-    """Return the greatest distance from the edges (mm) of the points of a boundary, no more than
-    `spacing_mm` apart, and its place.
+    """Return the greatest distance (mm) of a region's boundary from the edges, and its place; the
+    boundary is sampled at most `spacing_mm` apart.
 
     A strip may be deeper between its corners than at them. On a line between two corners no point
     is farther than half the sum of both distances and of its length, so most lines need no points.
@@ -304,15 +305,15 @@ class _Lines(Struct, frozen=True, eq=False):
 
 
 def _swept_by(segments: Segments, ends_z: Floats, cutter: Cutter) -> Any:
-    """Return the region that the tool covers at the surface along moves, with the heights (K, 2)
-    of their ends; None without moves."""
+    """Return the region that the tool covers at the surface along moves; `ends_z` (K, 2): the
+    heights of their ends. None without moves."""
     if cutter.nose is None:
         return _swept_band(_joined(segments), cutter)
     return _swept_hulls(_chord_lines(segments, ends_z, cutter.tolerance_mm), cutter)
 
 
 def _swept_band(paths: Polylines, cutter: Cutter) -> Any:
-    """Return the region within the tool's radius of paths; None without paths."""
+    """Return the region within the tool's radius of the paths; None without paths."""
     import shapely
 
     if len(paths) == 0:
@@ -389,8 +390,8 @@ class CommandedMotion(Struct, frozen=True, eq=False):
     effects: Effects
 
     def slides(self) -> tuple[Ints, Floats, Floats]:
-        """Return (K,) rows, (K, 2) mm positions of the slides in XY and (K,) mm commanded heights
-        of samples along the exact path."""
+        """Return samples along the exact path: rows (K,), positions of the slides in XY (K, 2),
+        mm, and commanded heights (K,), mm."""
         length = float(move_lengths(self.toolpath).sum())
         spacing = max(SLIDE_SPACING_MM, length / MAX_SLIDE_SAMPLES)
         samples = PathSamples(self.toolpath, spacing)
@@ -401,8 +402,8 @@ class CommandedMotion(Struct, frozen=True, eq=False):
 
 
 def _runs(trace: SlideTrace) -> list[tuple[Floats, Floats]]:
-    """Return the cutting runs of a trace, each as points (J, 2) mm with heights (J,) of 0, from
-    the position before the run on."""
+    """Return the cutting runs of a trace, each as points (J, 2), mm, and heights (J,) of 0; a run
+    starts at the position before it."""
     which = np.flatnonzero(trace.cutting)
     if not len(which):
         return []
@@ -414,12 +415,12 @@ def _runs(trace: SlideTrace) -> list[tuple[Floats, Floats]]:
 
 
 def _rows_with_heights(trace: SlideTrace, motion: CommandedMotion) -> list[tuple[Floats, Floats]]:
-    """Return the cutting rows of a trace, each as points (J, 2) mm with their commanded heights
-    (J,) mm; where the slides wait while the height changes, the row is divided before and behind.
+    """Return the cutting rows of a trace, each as points (J, 2), mm, and commanded heights (J,),
+    mm. A row is divided where the slides wait while the height changes.
 
     The height is commanded along the path, not along the way of the slides: at a reversal a slide
-    waits in its backlash while Z moves on. Slides on the exact path say how far along the trace
-    each height is reached.
+    waits in its backlash while Z moves on. Slides simulated on the exact path tell how far along
+    the trace each height is reached.
     """
     which = np.flatnonzero(trace.cutting)
     if not len(which):
@@ -448,13 +449,13 @@ def _rows_with_heights(trace: SlideTrace, motion: CommandedMotion) -> list[tuple
 
 
 def _lengths(points: Floats) -> Floats:
-    """Return (J,) mm: how far each of the points (J, 2) of a line is from its start, along it."""
+    """Return (J,) mm: the distance of each point (J, 2) of a polyline from its start, along it."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
 def _swept_by_runs(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> Any:
     """Return the region that the tool covers along runs, simplified within the tolerance; None
-    without any."""
+    without runs."""
     import shapely
 
     count = np.array([len(places) for places, _ in runs if len(places) > 1])
@@ -481,8 +482,7 @@ def _swept_by_runs(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> Any
 
 
 def _joined(segments: Segments) -> Polylines:
-    """Return paths of moves: each goes on while the next move begins where the last one ends, and
-    is closed where it comes back to its start."""
+    """Return the paths of connected moves; a path is closed if it comes back to its start."""
     begins = np.ones(len(segments), dtype=np.bool_)
     begins[1:] = (segments.start[1:] != segments.end[:-1]).any(axis=1)
     first = np.flatnonzero(begins)
@@ -501,7 +501,7 @@ def _joined(segments: Segments) -> Polylines:
 
 def _cutting_moves(protected: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:
     """Return the cutting moves of the runs, and the heights (K, 2) of their ends. Of equal moves
-    at several heights one is enough, unless the tool is narrower at its tip."""
+    at several heights only one is kept, unless the tool is narrower at its tip."""
     rows = [np.hstack([run[:-1], run[1:]]) for run in protected.runs]
     moves = np.concatenate([np.empty((0, 8)), *rows])
     lowest = np.minimum(moves[:, 2], moves[:, 6])
@@ -514,8 +514,8 @@ def _cutting_moves(protected: ProtectedRegion, cutter: Cutter) -> tuple[Segments
 
 
 def _protected_area(protected: ProtectedRegion, swept: Any, tolerance: float) -> Any:
-    """Return the region that must stay around a swept one: smaller than drawn by the depth that
-    shall be cut into it, and by `KEPT_SLACK_MM`."""
+    """Return the region that must stay near a swept one, shrunk by the depth that may be cut into
+    it and by `KEPT_SLACK_MM`."""
     import shapely
 
     low_x, low_y, high_x, high_y = shapely.bounds(swept).tolist()

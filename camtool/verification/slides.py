@@ -142,7 +142,7 @@ class SlidePass:
         )
 
     def run(self, steps: FusedRun, progress: Progress) -> None:
-        """Judge all rows of a controller that is simulated and judged in one compiled loop."""
+        """Judge all rows of a controller that simulates and judges in one compiled loop."""
         for low, high in pairwise(self._bounds(0, steps.rows)):
             self._close(low)
             ledger = steps.judge(low, high, self._task, self._sums)
@@ -150,7 +150,8 @@ class SlidePass:
             progress.done = high
 
     def finish(self) -> SlideTrace:
-        """End of the motion: evaluate what remains; the path of the slides, thinned."""
+        """Evaluate the rows and circles that remain at the end of the motion; return the thinned
+        path of the slides."""
         self._close(len(self._is_cut))
         self._sum_up()
         sums = self._sums
@@ -161,8 +162,8 @@ class SlidePass:
         return trace_of(sums, self._start, self._is_cut, self._most)
 
     def _bounds(self, low: int, high: int) -> list[int]:
-        """Return `low`, `high` and the rows between them before which circles are evaluated or
-        figures summed up."""
+        """Return `low`, `high`, and between them the rows before which circles are evaluated or
+        figures are summed up."""
         ends = {int(self._last[circle]) + 1 for circle in self._closing}
         inner = sorted(ends.union(range(0, high, ROWS_AT_ONCE)))
         return [low, *(row for row in inner if low < row < high), high]
@@ -209,7 +210,7 @@ class Tasks:
     """Makes the tasks of the compiled judge, each for a block of rows."""
 
     def __init__(self, paths: Paths, match: Match, slot: Ints) -> None:
-        """Index the wanted moves; `slot` (C,): the bins of each circle."""
+        """Index the wanted moves; `slot` (C,): the set of bins that each circle uses."""
         self._paths, self._match = paths, match
         self._slot = np.append(slot, -1)  # the last one is for none, −1
         row = paths.wanted.row  # an arc of more than a half circle has two segments
@@ -226,7 +227,7 @@ class Tasks:
         self._directions = bin_directions()
 
     def _boxes(self, indices: Ints | Indices) -> Floats:
-        """Return (J, 4) mm: the boxes of these moves that cut."""
+        """Return (J, 4) mm: the bounding boxes of these cutting moves."""
         ends = _ends(self._paths.wanted, self._rows[indices])
         segments, (first, last) = self._paths.wanted.segments, np.array(ends, dtype=np.int64)
         boxes, parted = segment_boxes(segments[first]), np.flatnonzero(first < last)
@@ -236,7 +237,7 @@ class Tasks:
         return boxes
 
     def of(self, low: int, high: int) -> Task:
-        """Return the task of the rows low:high."""
+        """Return the task of the compiled judge for the rows low:high."""
         match, toolpath, rows = self._match, self._paths.decoded.toolpath, np.arange(low, high)
         cuts = self._paths.decoded.is_cut[low:high]
         of_row = np.where(cuts, np.cumsum(cuts) - 1, -1)
@@ -264,8 +265,8 @@ class Tasks:
         )
 
     def _ranges(self, contours: Indices) -> Ints:
-        """Return (R, 2) begin and end (not included) of the contours `contours` (R,), or of all
-        moves."""
+        """Return (R, 2) the range (begin, end) of the wanted moves of each contour in `contours`
+        (R,); all moves for ANY_CONTOUR."""
         every = contours == ANY_CONTOUR
         low = np.where(every, 0, self._begins[contours])
         high = np.where(every, len(self._rows), self._begins[np.where(every, 0, contours + 1)])
@@ -285,8 +286,8 @@ def _sums(rows: int, slots: int, trace: TraceSize) -> Sums:
 
 
 def _rows_of_circles(circle: Indices, count: int) -> tuple[Ints, Ints]:
-    """Return (count,), (count,) first and last row of each circle; last is −1 for a circle without
-    rows. `circle` (N,) is the circle of each row."""
+    """Return the first and the last row (count,), (count,) of each circle; the last is −1 for a
+    circle without rows. `circle` (N,): the circle of each row."""
     first = np.full(count, len(circle), dtype=np.int64)
     last = np.full(count, -1, dtype=np.int64)
     rows = np.flatnonzero(circle >= 0)
@@ -296,8 +297,8 @@ def _rows_of_circles(circle: Indices, count: int) -> tuple[Ints, Ints]:
 
 
 def _slots(first: Ints, last: Ints) -> Ints:
-    """Return (C,) the number of the bins that each circle uses: circles with overlapping rows use
-    different ones."""
+    """Return (C,) the number of the set of bins that each circle uses; circles with overlapping
+    rows use different sets."""
     slot = np.full(len(first), -1, dtype=np.int64)
     busy: list[tuple[int, int]] = []
     free_slots: list[int] = []
@@ -318,8 +319,8 @@ def _in_order(first: Ints, last: Ints) -> Iterator[int]:
 
 
 def move_heights(cuts: CutMoves) -> Floats:
-    """Return (J, 2) mm: the lowest and highest points of the moves that cut; one row, seen as
-    many, where all are at one height."""
+    """Return (J, 2) mm: the lowest and the highest point of each cutting move; a single row
+    broadcast to all if they have one height."""
     rows = cuts.rows
     heights_mm = np.empty((len(rows), 2))
     for low in range(0, len(rows), ROWS_AT_ONCE):
@@ -332,13 +333,13 @@ def move_heights(cuts: CutMoves) -> Floats:
 
 
 def _ends(cuts: CutMoves, rows: Ints | Indices) -> tuple[Indices, Indices]:
-    """Return (J,), (J,) the first and the last segment of each of these rows, which cut."""
+    """Return the first and the last segment (J,), (J,) of each of these cutting rows."""
     return cuts.first[rows], cuts.first[rows + 1] - 1
 
 
 def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
-    """Return the moves of the rows low:high that cut, one for each, as columns of the compiled
-    judge."""
+    """Return the cutting moves of the rows low:high, one for each row, as the columns that the
+    compiled judge reads."""
     begin = cuts.first[low]
     segments = cuts.segments[begin : cuts.first[high]]
     first, last = _ends(cuts, low + np.flatnonzero(cuts.contour[low:high] >= 0))
@@ -390,8 +391,8 @@ class TraceSize(Struct, frozen=True, eq=False):
 
 
 def trace_size(decoded: Toolpath, spacing_mm: float, max_points: int) -> TraceSize:
-    """Return which samples of the slides' path are kept, when these are `spacing_mm` apart: each
-    n-th, so that about half of `max_points` are kept and twice as long a path has room."""
+    """Return which samples of the slides' path are kept, given that they are `spacing_mm` apart:
+    every n-th, so that about half of `max_points` are kept and a path twice as long still fits."""
     if max_points == 0:
         return TraceSize(decoded.start[None, :2], 0, 1)
     lengths = row_lengths(decoded)
@@ -402,9 +403,9 @@ def trace_size(decoded: Toolpath, spacing_mm: float, max_points: int) -> TraceSi
 
 
 def trace_of(sums: Sums, start: Floats, cutting: Bools, max_points: int) -> SlideTrace:
-    """Return the start (1, 2) mm and the samples that the judge kept, none for a stride of 0.
-    Where they are more than `max_points` (more rows than points), runs of them are reduced to the
-    sample with the largest error. `cutting` (N,): the rows that cut."""
+    """Return the start (1, 2), mm, and the samples that the judge kept (none for a stride of 0).
+    If these are more than `max_points` (more rows than points), each run of them is reduced to the
+    sample with the largest error. `cutting` (N,): the mask of rows that cut."""
     written, pending = int(sums.pen[WRITTEN]), unwritten(sums.pen)
     sums.trace[written : written + len(pending)] = pending
     count = written + len(pending) + 1

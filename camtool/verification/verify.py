@@ -91,7 +91,7 @@ class Verification:
     circles: tuple[SeenCircle, ...] = ()
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
-        """Return the verification with these findings, in its report too."""
+        """Return the verification, and the report in it, with these findings."""
         return replace(self, report=self.report.with_findings(findings), findings=findings)
 
     def with_planning(self, plan: Planned, before: BaselineReport | None) -> Verification:
@@ -105,7 +105,7 @@ class Verification:
 
 
 def verify(case: Case, progress: Progress | None = None) -> Verification:
-    """Simulate the program of a case and judge it, against the wanted moves if there are any.
+    """Simulate the program of a case and judge it against the wanted moves, if there are any.
 
     `progress` is told how many rows are judged. Raises what `LoadedTarget.simulate` raises.
     """
@@ -119,7 +119,8 @@ def verify(case: Case, progress: Progress | None = None) -> Verification:
 def judge(
     case: Case, motion: Iterable[Chunk] | FusedRun, progress: Progress | None = None
 ) -> Verification:
-    """Judge a case by the chunks of its motion, or by a run that is judged as it is simulated."""
+    """Judge a case by the chunks of its motion, or by a run that is judged while it is
+    simulated."""
     progress = progress or Progress()
     paths, coverage, conformance, direction_faults = compare_cuts(case)
     cuts, wanted_cuts = paths.decoded, paths.wanted
@@ -165,8 +166,9 @@ def judge(
 def compare_cuts(
     case: Case,
 ) -> tuple[Paths, Coverage, Conformance | None, tuple[Finding, ...]]:
-    """Compare the decoded with the wanted cuts: return the paths by which the slides are judged,
-    coverage, conformance and CUT_OTHER_WAY. The tables of the search are freed on return."""
+    """Compare the decoded with the wanted cuts. Return the paths by which the slides are judged,
+    the coverage, the conformance (None if nothing else is asked of the program), and CUT_OTHER_WAY
+    findings. The search tables are freed on return."""
     # Where the wanted moves have no motion in Z, all feed moves cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
     quantised = case.target.model.quantised(case.decoded, case.machine)
@@ -196,7 +198,9 @@ def _with_loops(case: Case, paths: Paths) -> tuple[LoopedCuts, LoopedCuts]:
 def _coverage(
     case: Case, sides: tuple[Side, Side], goal: Goal, *, flat_cuts: bool, is_judged: bool
 ) -> Coverage:
-    """Match and compare the decoded side with the wanted one, which may be compensated."""
+    """Match the decoded side to the wanted one and compare both. If the job compensates, the
+    decoded side is compared with the compensated moves, and the match is carried over to the
+    wanted ones."""
     decoded, wanted_side = sides
     if case.wanted is None:
         return Coverage(own_match(decoded.cuts, goal.circles), Figure(), ())
@@ -216,7 +220,8 @@ def _coverage(
 def _direction_findings(
     case: Case, decoded: Side, wanted_side: Side, *, flat_cuts: bool
 ) -> tuple[Finding, ...]:
-    """Return CUT_OTHER_WAY for contours that are cut against the moves they were written from."""
+    """Return CUT_OTHER_WAY findings for contours cut in the direction opposite to the moves they
+    were written from."""
     if case.written_from is None:
         return ()
     source = wanted_side
@@ -237,8 +242,8 @@ def _conformance(case: Case, *, flat_cuts: bool) -> Conformance | None:
 def _all_findings(
     case: Case, coverage: Coverage, conformance: Conformance | None, motion: tuple[Finding, ...]
 ) -> tuple[Finding, ...]:
-    """Return the findings of all stages in their order, each once; where is cut is judged by
-    registration, else by conformance, else by coverage."""
+    """Return the findings of all stages in order, without repeats. Where the program cuts is
+    judged by registration if there was one, else by conformance, else by coverage."""
     if case.registration is not None:
         places = case.registration.findings
     elif conformance is not None and conformance.place:
@@ -277,8 +282,8 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         trace: SlideTrace,
         shape: WantedShape | None = None,
     ) -> Report:
-        """Return the report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides,
-        and the wanted `shape`, where it is compared."""
+        """Return the report; `extents` (3, 2), mm, of the decoded toolpath, `trace` of the slides,
+        and the wanted `shape` if it is compared."""
         case, tally = self.case, self.tally
         options = case.options
         link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)
@@ -341,8 +346,8 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         )
 
     def _fit(self) -> record.MaxRms:
-        """Return the distance of the drawing from the wanted cutting moves, without that of
-        placing it; the rms is over the moves that are not exact."""
+        """Return the distance of the drawing from the wanted cutting moves (maximum and rms, µm),
+        without the part that placing it adds. The rms is over the moves that are not exact."""
         drawn, rows = self.goal.cuts.toolpath.drawn, self.goal.cuts.rows
         if self.case.wanted is None or drawn is None or not len(rows):
             return record.MaxRms()
@@ -354,7 +359,7 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         )
 
     def _off_um(self, off_mm: float) -> float | None:
-        """Return a distance from the drawing; None where none is known."""
+        """Convert a distance from the drawing to µm; None if such distances are not known."""
         is_known = self.case.wanted is not None and self.case.wanted.drawn is not None
         return rounded(off_mm * UM_PER_MM) if is_known else None
 
@@ -444,7 +449,7 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         )
 
     def _source(self, row: int) -> str:
-        """Return layer and entity of the wanted move to which a decoded row belongs."""
+        """Return layer and entity of the wanted move that a decoded row follows."""
         wanted_row = int(self.coverage.match.row[row])
         return self.goal.cuts.toolpath.text(wanted_row) if wanted_row >= 0 else ""
 
@@ -481,8 +486,8 @@ class ReportBuilder(Struct, frozen=True, eq=False):
 
 
 def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
-    """Return the largest difference in height between the slide and the quantised moves, at the
-    ends of rows that cut, mm; NaN when none does.
+    """Return the largest difference in height between the slide and the quantised moves, mm, at
+    the ends of rows that cut; NaN if none does.
 
     Within a row Z does not reverse, and it ends where the program says, so its error follows from
     the ends of the rows alone, whatever the controller does between them.
@@ -500,7 +505,7 @@ def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
 
 
 def assumptions(case: Case) -> tuple[str, ...]:
-    """Return the assumptions of times and figures, a sentence each."""
+    """Return the assumptions behind times and figures, one sentence each."""
     link = case.machine.link
     assumed = case.target.model.assumptions(case.decoded, case.machine)
     if link.baud is None:
@@ -510,7 +515,7 @@ def assumptions(case: Case) -> tuple[str, ...]:
 
 
 def _block(case: Case, row: int) -> int | None:
-    """Return the block (from 1) from which a row was read."""
+    """Return the block (from 1) from which a row was read, None if no program was read."""
     block = int(case.decoded.block[row])
     return block + 1 if block >= 0 else None
 
