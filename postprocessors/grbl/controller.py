@@ -64,7 +64,8 @@ class GrblModel(SampledModel[GrblController, GrblDialect]):
     """grbl 1.1: chords, whole steps, trapezoids planned ahead."""
 
     def fused_run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> LineRun | None:
-        """Return the lines of all rows; None where the mechanics differ from place to place."""
+        """Return the motion as lines of whole steps, judged in closed form; None where the
+        mechanics differ from place to place."""
         path = self.quantised(toolpath, machine)
         mechanics = self.mechanics(path, machine, options)
         if not mechanics.even:
@@ -74,16 +75,16 @@ class GrblModel(SampledModel[GrblController, GrblDialect]):
         return LineRun(blocks, rows, coded_steps_mm(machine), mechanics, rounds=True)
 
     def sampled(self, path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
-        """Yield the rows up to the end of the program."""
+        """Yield the motion of the rows up to the end of the program."""
         return _rows_to_end(path, machine)
 
     def mechanics(self, path: Toolpath, machine: _Machine, options: Options) -> Mechanics:
-        """Return the slides at the step that is nearest to the start of the path."""
+        """Return the mechanics with the slides at the step nearest to the start of the path."""
         start_mm = _nearest_steps(path.start.astype(np.float32), machine) * coded_steps_mm(machine)
         return Mechanics(machine, start_mm, options.effects)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Return chords, and Bresenham lines."""
+        """Return "chords": arcs as chords, and lines by Bresenham's algorithm."""
         return "chords"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
@@ -99,8 +100,8 @@ class GrblModel(SampledModel[GrblController, GrblDialect]):
 
 
 def _rows_to_end(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
-    """Return the rows up to the end of the program; ProgramError for rows that cannot be
-    followed."""
+    """Return the motion of the rows up to the end of the program; ProgramError for rows that
+    cannot be followed."""
     controller = _controller(machine)
     check_rows(path, path.executed_rows)
     return sample_rows(path.first(path.executed_rows), machine, controller)
@@ -129,9 +130,9 @@ class PlannedBlocks(Struct, frozen=True, eq=False):
 def plan_rows(
     path: Toolpath, machine: _Machine, controller: GrblController
 ) -> Iterator[PlannedBlocks]:
-    """Yield the planned blocks of all rows, some thousand at a time. Planned with each window are
-    the block before it, for the corner between them, and as many blocks behind it as the ring
-    holds."""
+    """Yield the planned blocks of all rows, some thousand at a time. Each window is planned
+    together with the block before it, for the corner between them, and with as many blocks behind
+    it as the ring buffer holds."""
     window = controller.buffer_blocks - 1
     parts, stops = blocks_of(path, machine, controller), stops_of(path, controller)
     pending: list[Blocks] = []
@@ -170,7 +171,7 @@ def sample_rows(
 
 
 def dwells_of(path: Toolpath, low: int, high: int, controller: GrblController) -> Floats:
-    """Return (high − low,) s that the rows low:high dwell."""
+    """Return (high − low,) seconds of dwell in the rows low:high."""
     seconds = np.zeros(high - low)
     dwells = low + np.flatnonzero(path.kind[low:high] == Kind.DWELL)
     values = path.value[dwells].tolist()
@@ -179,7 +180,7 @@ def dwells_of(path: Toolpath, low: int, high: int, controller: GrblController) -
 
 
 def idle_delay_s(controller: GrblController) -> float:
-    """Return the time, s, that it waits at each stop ($1)."""
+    """Return the seconds that the machine waits at each stop ($1)."""
     waits = controller.firmware == "grbl" and controller.idle_delay_ms != ALWAYS_ON
     return controller.idle_delay_ms / 1000.0 if waits else 0.0
 
@@ -188,7 +189,7 @@ class GrblSamples:
     """All step events of some rows, numbered from 0; none are held."""
 
     def __init__(self, planned: PlannedBlocks, seconds: Floats, machine: _Machine) -> None:
-        """`seconds` (B,) of the planned blocks."""
+        """Prepare the samples of planned blocks. `seconds` (B,): the duration of each block."""
         blocks = planned.blocks
         self._blocks, self._low = blocks, planned.low
         self._planned, self._seconds = planned, seconds
@@ -199,7 +200,7 @@ class GrblSamples:
 
     @staticmethod
     def lines(rows: SampledRows) -> LineRows:
-        """Return the lines of rows whose samples these are."""
+        """Return the lines of whole steps in these rows."""
         assert isinstance(rows.samples, GrblSamples)
         blocks = rows.samples._blocks
         columns = (blocks.row, blocks.start, blocks.way)
@@ -211,7 +212,7 @@ class GrblSamples:
         )
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Return the row and position of the events low:high."""
+        """Return the row and the position of each of the step events low:high."""
         blocks = self._blocks
         begin = int(np.searchsorted(self._offsets, low, side="right")) - 1
         end = int(np.searchsorted(self._offsets, high, side="left"))
@@ -227,7 +228,7 @@ class GrblSamples:
         return np.repeat(row, np.diff(bounds)), commanded
 
     def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
-        """Return (K,) s from the starts of their rows to the events low:high."""
+        """Return (K,) seconds from the start of its row to each of the step events low:high."""
         plan, row = self._planned.plan, self._blocks.row
         block = np.searchsorted(self._offsets, np.arange(low, high), side="right") - 1
         event = np.arange(low + 1, high + 1) - self._offsets[block]
@@ -237,7 +238,7 @@ class GrblSamples:
         return np.asarray(begin_s[block] + plan.moments_s(self._planned.squares, block, way_mm))
 
     def steps(self, bounds: Ints) -> Ints:
-        """Return steps of each axis between events."""
+        """Return the number of steps of each axis between the step events `bounds`."""
         block = np.searchsorted(self._offsets, bounds, side="right") - 1
         begin = int(block[0])
         travel = self._blocks.way[begin : int(block[-1]) + 1].astype(np.int64)
@@ -251,7 +252,7 @@ class GrblSamples:
 
 
 def _controller(machine: _Machine) -> GrblController:
-    """Return the machine's controller; MachineError for a compensation that grbl does not do."""
+    """Return the machine's controller; MachineError for a compensation that grbl cannot make."""
     for name, axis in zip("xyz", machine.axes, strict=True):
         if axis.compensation_mm > 0.0:
             raise MachineError(
@@ -263,8 +264,8 @@ def _controller(machine: _Machine) -> GrblController:
 
 
 def dwell_s(seconds: float, firmware: str = "grbl") -> float:
-    """Return how long a dwell really lasts, s, which is counted in 32-bit floats: `delay_sec` of
-    grbl and grblHAL, `mc_dwell` of FluidNC."""
+    """Return the real duration of a dwell, s, which the firmware counts in 32-bit floats:
+    `delay_sec` of grbl and grblHAL, `mc_dwell` of FluidNC."""
     if firmware == "FluidNC":
         return math.floor(np.float32(1000.0) * np.float32(seconds)) / 1000.0
     per_second = np.float32(1.0 / DWELL_STEP_S)
@@ -326,7 +327,7 @@ NO_BLOCKS = Blocks(_NONE, _NONE, _NONE.reshape(0, 3), _NONE.reshape(0, 3))
 
 
 def join_blocks(parts: list[Blocks]) -> Blocks:
-    """Concatenate blocks that follow one another."""
+    """Concatenate parts of consecutive blocks."""
     return Blocks(
         np.concatenate([part.row for part in parts]),
         np.concatenate([part.target for part in parts]),
@@ -336,8 +337,8 @@ def join_blocks(parts: list[Blocks]) -> Blocks:
 
 
 def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Iterator[Blocks]:
-    """Yield the blocks of a program, `ROWS_AT_ONCE` at a time; ProgramError for positions
-    beyond all that grbl can count."""
+    """Yield the blocks of a program, `ROWS_AT_ONCE` rows at a time; ProgramError for positions
+    beyond grbl's counters."""
     begin, target_count = _nearest_steps(path.start[None, :].astype(np.float32), machine), 0
     for low in range(0, len(path), ROWS_AT_ONCE):
         rows = np.arange(low, min(low + ROWS_AT_ONCE, len(path)))
@@ -349,8 +350,8 @@ def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> 
 def blocks_from(
     begin: Ints, path: Toolpath, rows: Ints, machine: _Machine, controller: GrblController
 ) -> tuple[Blocks, Ints, int]:
-    """Return the blocks of rows (R,), which follow one another, from `begin` (1, 3) steps on;
-    where the last of them ends; and how many targets there are."""
+    """Return the blocks of the consecutive rows `rows` (R,), which begin at `begin` (1, 3) steps;
+    the position where the last block ends; and the number of targets."""
     targets = targets_of(path, rows, machine, controller)
     stop = _nearest_steps(targets.mm, machine)
     is_far = (np.abs(stop) > MAX_STEPS).any(axis=1)
@@ -370,7 +371,8 @@ def blocks_from(
 
 
 def _nearest_steps(mm: Singles, machine: _Machine) -> Ints:
-    """Return (..., 3) steps: the 32-bit product, to the nearest whole, halves away from zero."""
+    """Return positions as (..., 3) whole steps: the product in 32-bit floats, halves rounded away
+    from zero."""
     steps_per_mm = np.array([1.0 / axis.coded_step_mm for axis in machine.axes], dtype=np.float32)
     product = (mm * steps_per_mm).astype(np.float64)
     return np.asarray(np.copysign(np.floor(np.abs(product) + 0.5), product).astype(np.int64))
@@ -390,7 +392,7 @@ def speeds_of(
     Along a unit vector u no axis exceeds its own limit, so a block is limited to min(limit / |u|).
     At a corner between u1 and u2, with θ the angle between −u1 and u2, a circle touches both at
     `junction_deviation_mm` δ from the corner, and is followed (for its speed alone) at the
-    acceleration a that u2 − u1 allows:  v² = a δ sin(θ/2) / (1 − sin(θ/2)).
+    acceleration a that u2 − u1 allows: v² = a δ sin(θ/2) / (1 − sin(θ/2)).
 
     The timer cannot wait longer than `least_step_hz` says, so slower blocks run at that rate.
     """
@@ -439,7 +441,7 @@ class Stops(Struct, frozen=True, eq=False):
     lit: Bools | None
 
     def before(self, blocks: Blocks) -> Bools:
-        """Return the mask (B,) of the blocks before which the machine stands."""
+        """Return a mask (B,), true for blocks before which the machine comes to rest."""
         if not len(blocks):
             return np.zeros(0, dtype=np.bool_)
         first, last = int(blocks.row[0]), int(blocks.row[-1])
@@ -451,9 +453,9 @@ class Stops(Struct, frozen=True, eq=False):
 
 
 def stops_of(path: Toolpath, controller: GrblController) -> Stops:
-    """Return events that say what holds already stop nothing. In laser mode neither does
-    another power, but a target without a step stops a laser of constant power (M3), which is
-    then set at once (`mc_line`)."""
+    """Return the rows at which the machine comes to rest. Events that repeat what is in force stop
+    nothing. In laser mode a change of power does not either, but a target without a step stops a
+    laser of constant power (M3), whose power is then set at once (`mc_line`)."""
     rows = np.isin(path.kind, EVENTS_AT_REST)
     coolant = np.flatnonzero(np.isin(path.kind, COOLANT))
     kind = np.append(Kind.COOLANT_OFF, path.kind[coolant])
@@ -503,8 +505,8 @@ class Targets(Struct, frozen=True, eq=False):
 def targets_of(
     path: Toolpath, rows: Ints, machine: _Machine, controller: GrblController
 ) -> Targets:
-    """Return the targets that these consecutive rows (R,) give the planner; rows without motion
-    give none."""
+    """Return the targets that the consecutive rows `rows` (R,) give to the planner; rows without
+    motion give none."""
     kind = path.kind[rows]
     ends = as_read(path.end[rows], machine)
     begins = as_read(path.starts_of(rows), machine)
@@ -522,11 +524,11 @@ def targets_of(
 
 
 def as_read(values: Floats, machine: _Machine) -> Singles:
-    """Numbers as `read_float` (nuts_bolts.c) makes them from their digits.
+    """Return the values that `read_float` (nuts_bolts.c) makes of the digits of these numbers.
 
-    The digits are one whole number, which is multiplied by 0.01 and 0.1 until the point is where
-    it belongs, each time rounded. How many decimals were written `dialect.decimals` says; a
-    number that has others is taken as the nearest float.
+    The digits form one integer, which is multiplied by 0.01 and 0.1 until the decimal point is in
+    its place, with rounding at each step. `dialect.decimals` gives the number of decimals; a
+    number that has more is taken as the nearest float.
     """
     nearest_single = values.astype(np.float32)
     decimals = machine.dialect.decimals
@@ -576,8 +578,8 @@ class _Chords:
         self._turn = np.where(clockwise, downward, upward).astype(np.float32)
 
     def segments(self, controller: GrblController) -> Ints:
-        """Return (J,) chords of each: ⌊|½ φ r| / √(δ (2r − δ))⌋, δ the arc tolerance; at least
-        the one to the end."""
+        """Return (J,) the number of chords of each arc: ⌊|½ φ r| / √(δ (2r − δ))⌋ with the arc
+        tolerance δ, and at least 1."""
         tolerance = np.float32(controller.arc_tolerance_mm)
         half = tolerance * (np.float32(2.0) * self._radius - tolerance)
         arc_length = np.abs(np.float32(0.5) * self._turn * self._radius)
@@ -587,10 +589,10 @@ class _Chords:
         return np.maximum(truncated, 1)
 
     def points(self, segments: Ints, first: Ints, correction: int) -> tuple[Ints, Singles]:
-        """Return the indices (P,) of the targets inside arcs, and their positions (P, 3) mm.
+        """Return the targets inside arcs: (P,) the arc of each, and their positions (P, 3) mm.
 
-        A radius vector is turned by the angle of a chord, θ, with cos θ ≈ 1 − θ²/2 and
-        sin θ ≈ θ − θ³/6; after `correction` turns the next one is computed anew.
+        A radius vector is turned by the angle of a chord, θ, with cos θ ≈ 1 − θ²/2 and sin θ ≈ θ −
+        θ³/6; after `correction` turns the next one is computed anew.
         """
         inner = segments - 1
         arc = np.repeat(np.arange(len(segments)), inner)
@@ -618,7 +620,8 @@ class _Chords:
         return np.repeat(first, inner) + number - 1, points
 
     def _heights(self, segments: Ints, arc: Ints) -> Singles:
-        """Z of the chords' ends within the arcs: an equal rise added each time."""
+        """Return the Z of the targets inside arcs: an equal rise is added at each, with rounding
+        to 32 bits."""
         z: Singles = self._begin[arc, 2].copy()
         rise = (self._end[:, 2] - self._begin[:, 2]) / segments.astype(np.float32)
         last_targets = np.cumsum(segments - 1)

@@ -100,7 +100,7 @@ SPINDLE: Final = {3: Kind.SPINDLE_CW, 4: Kind.SPINDLE_CCW, 5: None}
 
 
 def error(number: int, place: int | str | None, subject: str = "", mend: str = "") -> LineFault:
-    """Return a line that grbl answers with this error."""
+    """Return the fault of a line that grbl answers with this error number."""
     return LineFault(f"{WHY[number].format(subject)} (error:{number})", place, mend)
 
 
@@ -185,7 +185,7 @@ class GrblParser:
         self._use_frame()
 
     def _machine(self, place: tuple[float, float, float]) -> list[float]:
-        """Return a place that is given from machine zero."""
+        """Return a place given in machine coordinates as a position of the parser."""
         return [a + b for a, b in zip(place, self._zero, strict=True)]
 
     @property
@@ -199,8 +199,7 @@ class GrblParser:
     def continue_from(
         self, motion: int | None, feed: float, place: tuple[float, float, float]
     ) -> None:
-        """Adopt motion, feed and position behind blocks of plain moves that were read by
-        columns."""
+        """Adopt motion, feed and position after plain blocks that were read by columns."""
         self.modes.motion = self.modes.motion if motion is None else motion
         self.feed = feed
         if place != tuple(self.position):
@@ -208,7 +207,7 @@ class GrblParser:
         self.position[:] = place
 
     def rewind(self) -> None:
-        """M2 and M30 set most modes back; units, feed and offsets stay (`gc_execute_line`)."""
+        """Reset most modes, as M2 and M30 do; units, feed and offsets stay (`gc_execute_line`)."""
         self.ended = False
         self.modes = ParserModes(motion=1, inches=self.modes.inches)
         self._use_frame()
@@ -216,7 +215,8 @@ class GrblParser:
     # Steps 1 and 2: the words
 
     def line(self, text: str) -> None:
-        """A line without blanks and comments, in capitals; Fault where grbl refuses it."""
+        """Execute a line, which is in capitals without blanks and comments; LineFault where grbl
+        refuses it."""
         jogs = text.startswith("$")
         if jogs and not text.startswith("$J="):
             raise error(3, 0, mend="send it before the program")
@@ -272,7 +272,7 @@ class GrblParser:
     def _g_word(
         self, block: GrblBlock, number: int, hundredths: int, name: str, column: int
     ) -> str:
-        """Set what a G word says; its group."""
+        """Store what a G word sets in the block, and return its modal group."""
         modes = block.modes
         if number in (10, 28, 30, 92) and hundredths == 0:
             self._use(block, NON_MODAL, column)
@@ -320,7 +320,7 @@ class GrblParser:
     def _plain_g_word(
         self, block: GrblBlock, number: int, name: str, column: int
     ) -> tuple[str, int]:
-        """Return the group of a G word without decimals, and what it sets."""
+        """Return the modal group of a G word without decimals, and the value that it sets."""
         if number in (4, 10, 53):
             block.once = f"G{number}"
             return "one block", number
@@ -401,7 +401,7 @@ class GrblParser:
             self._execute(block, target, centre, feed)
 
     def _words(self, block: GrblBlock) -> dict[int, float]:
-        """Return the coordinates of a block by axis, mm."""
+        """Return the coordinates of a block in mm, keyed by axis."""
         mm = MM_PER_INCH if block.modes.inches else 1.0
         coordinates = block.numbers
         return {k: coordinates[axis] * mm for k, axis in enumerate("XYZ") if axis in coordinates}
@@ -413,7 +413,8 @@ class GrblParser:
             raise error(33, None, "a probing move that ends where it starts")
 
     def _feed_of(self, block: GrblBlock, mm: float, *, jogs: bool) -> float:
-        """Return the feed of the block: mm/min, or in G93 turns of its move a minute."""
+        """Return the feed of the block: mm/min; with G93 the inverse of the move's duration,
+        1/min."""
         numbers, modes = block.numbers, block.modes
         if jogs:
             if "F" not in numbers:
@@ -464,7 +465,7 @@ class GrblParser:
     def _arc(
         self, block: GrblBlock, target: list[float], axes: list[int], mm: float, unused: set[str]
     ) -> tuple[float, float]:
-        """Return the centre of an arc on the machine, in the order of its plane."""
+        """Return the centre of an arc on the machine, in the axis order of its plane."""
         numbers, modes = block.numbers, block.modes
         first, second, _ = PLANES[modes.plane * 10]
         if not axes:
@@ -489,8 +490,8 @@ class GrblParser:
     def _by_radius(
         self, block: GrblBlock, x: float, y: float, radius: float, target: list[float]
     ) -> tuple[float, float]:
-        """Return the offset of the centre: on the left of the chord for a counter-clockwise arc
-        of at most half a turn, on the other side for a negative R."""
+        """Return the offset of the centre of an arc given by its radius: on the left of the chord
+        for a counter-clockwise arc of at most half a turn, on the other side for a negative R."""
         column = block.at["R"]
         if target == self.position:
             raise error(33, column, "an arc by its radius that ends where it starts")
@@ -509,7 +510,8 @@ class GrblParser:
     def _check_radii(
         self, offset: tuple[float, float], end: tuple[float, float], column: int
     ) -> None:
-        """The radii at both ends are nearly the same."""
+        """Raise error 33 where the radii at both ends of an arc differ by more than grbl
+        allows."""
         dialect = self._dialect
         r1, r2 = math.hypot(*offset), math.dist(end, offset)
         gap = abs(r1 - r2)
@@ -522,7 +524,7 @@ class GrblParser:
     # Step 4: execution
 
     def _jog(self, block: GrblBlock, target: list[float], feed: float) -> None:
-        """A line at its own feed, which changes no mode."""
+        """Add a jog: a line at a feed of its own, which changes no mode."""
         if block.groups - {"distance", "units", "one block"} or block.once not in ("", "G53"):
             raise error(16, block.at.get("G"))
         self.notes.jogs.append(self.index)
@@ -563,13 +565,14 @@ class GrblParser:
             self._stop(block.flow)
 
     def _come_to_rest(self) -> None:
-        """Add a dwell of 0 s: the machine comes to rest and nothing else happens, where grbl waits
-        for its buffer to run empty (`protocol_buffer_synchronize`)."""
+        """Add a dwell of 0 s where grbl waits for its buffer to run empty
+        (`protocol_buffer_synchronize`): the machine comes to rest, and nothing else happens."""
         self._path.event(Kind.DWELL, 0.0)
 
     def _spindle(self, block: GrblBlock, before: ParserModes) -> None:
-        """Spindle or laser. In laser mode another power goes with the move of its block; in a
-        block that moves nothing grbl waits, and sets it at once."""
+        """Add the event of the spindle or laser, if it changes. In laser mode a change of power
+        comes with the move of its block; in a block without motion grbl waits for rest and sets it
+        at once."""
         speed = block.numbers.get("S", self._speed)
         has_changed = (speed or 0.0) != (self._speed or 0.0)
         self._speed = speed
@@ -586,8 +589,8 @@ class GrblParser:
 
     @staticmethod
     def _relights(block: GrblBlock, before: ParserModes) -> bool:
-        """Return True if, in laser mode, a block without motion goes from cuts to rapids, or
-        back, under constant power (M3), which switches the power."""
+        """Return True if a block without motion changes from cuts to rapids or back while a laser
+        has constant power (M3): that switches the power."""
         cuts = (1, 2, 3)
         return before.spindle == Kind.SPINDLE_CW and (
             (before.motion in cuts) != (block.modes.motion in cuts)
@@ -610,7 +613,7 @@ class GrblParser:
         self._use_frame()
 
     def _use_frame(self) -> None:
-        """Set the frame in force for the moves that follow; coordinates are those of the tool
+        """Apply the frame in force to the moves that follow; coordinates are those of the tool
         tip."""
         frame = self._frames[self.modes.frame]
         x, y, z = (a + b for a, b in zip(frame, self._offset, strict=True))
@@ -645,7 +648,8 @@ class GrblParser:
             self._use_frame()
 
     def _set_frame(self, block: GrblBlock, words: dict[int, float]) -> None:
-        """G10 L2: its zero lies there; L20: the tool stands there in it."""
+        """Execute G10: L2 sets the zero of a frame on the machine; L20 sets it so that the tool
+        has these coordinates."""
         number = math.trunc(block.numbers.get("P", 0.0))
         frame = number - 1 if number > 0 else self.modes.frame
         place = self._frames[frame]
@@ -663,7 +667,8 @@ class GrblParser:
         self._use_frame()
 
     def _go_home(self, action: str, words: dict[int, float], target: list[float]) -> None:
-        """Move by way of the coordinates to the stored place, in the axes that are named."""
+        """Execute G28 or G30: move by way of the block's coordinates to the stored place, in the
+        axes that are named."""
         home = self._home_of(action)
         if words:
             self._go(Kind.RAPID, target, 0.0)
@@ -724,7 +729,8 @@ class GrblParser:
         return math.hypot(math.hypot(*start_arm) * turn, rise)
 
     def _try_homing(self, block: GrblBlock, target: list[float]) -> bool:
-        """Add the machine's homing event for G53 G0 to machine zero; True if the block is that."""
+        """Add the machine's homing event for a G53 G0 to machine zero; return True if the block is
+        one."""
         named = tuple(axis for axis in "XYZ" if axis in block.numbers)
         kind = {("X", "Y"): Kind.HOME_XY, ("Z",): Kind.HOME_Z}.get(named)
         if kind is None or any(block.numbers[axis] for axis in named):
@@ -776,12 +782,12 @@ def _coolant_kind(modes: ParserModes) -> Kind:
 
 
 def target_length(block: GrblBlock, mm: float) -> float:
-    """Return the length of the tool that G43.1 and G49 set, mm."""
+    """Return the length of the tool that G43.1 or G49 sets, mm."""
     return block.numbers["Z"] * mm if block.length == "set" else 0.0
 
 
 def _number(text: str) -> float:
-    """Return a number as grbl reads it: its first eight digits count."""
+    """Return the value of a number as grbl reads it: only its first eight digits count."""
     if len(text) <= MAX_DIGITS:
         return float(text)
     digits, digits_read = 0, []

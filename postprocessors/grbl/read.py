@@ -50,8 +50,8 @@ COMMENT: Final = re.compile(r"\([^)]*\)?|;.*")
 
 
 def read_program(data: bytes, machine: GrblMachine) -> Toolpath:
-    """Return the moves of a program; ProgramError with block, line and column, and grbl's
-    error."""
+    """Return the moves of a program; ProgramError with block, line, column and grbl's error
+    number."""
     bounds.check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     check_ascii(data)  # bytes above 7F are commands to grbl, wherever they stand
     path = _Reader(data, machine).read()
@@ -81,7 +81,7 @@ class _Reader:
         self._realtime: list[int] = []
 
     def read(self) -> Toolpath:
-        """Read the program and return its moves, which hold the findings about it."""
+        """Read the program and return its moves, which hold the findings on it."""
         number, parser = 0, self.parser
         while number < self._lines.count:
             if parser.reads_columns and not parser.ended:
@@ -96,7 +96,8 @@ class _Reader:
         return self.path.finish(self._findings())
 
     def _line(self, raw: str, number: int) -> None:
-        """A line as it comes in: without blanks and comments, in capitals."""
+        """Execute a line as it comes in: remove blanks and comments, convert to capitals, and
+        count the blocks."""
         comments = "".join(COMMENT.findall(raw)) if "(" in raw or ";" in raw else ""
         text = COMMENT.sub("", raw) if comments else raw
         if any(sign in comments for sign in "!?~"):
@@ -133,8 +134,8 @@ class _Reader:
         raise ProgramError(fault.message, where=where, mend=fault.mend) from None
 
     def _decode_plain(self, blocks: PlainBlocks) -> int:
-        """Add the rows of plain blocks, up to the first that is no move which grbl surely
-        executes."""
+        """Add the rows of plain blocks, up to the first that grbl may not execute as a plain move,
+        and return the number of these blocks."""
         parser, path = self.parser, self.path
         motion = -1 if parser.modes.motion == 80 else 10 * parser.modes.motion
         mm = 25.4 if parser.modes.inches else 1.0
@@ -179,16 +180,16 @@ _DROPPED: Final = str.maketrans("", "", " \t/")
 
 
 def _columns(raw: str) -> list[int]:
-    """Return the columns, from 0, of the characters of a line that grbl keeps."""
+    """Return the columns, from 0, of those characters of a line that grbl keeps."""
     blanked = COMMENT.sub(lambda match: " " * len(match[0]), raw)
     return [k for k, sign in enumerate(blanked) if sign not in " \t/"]
 
 
 def _too_slow(path: Toolpath, machine: GrblMachine) -> Iterator[Finding]:
-    """FEED_TOO_SLOW: cuts slower than the longest tick of the timer allows.
+    """Yield FEED_TOO_SLOW for cuts slower than the longest tick of the timer allows.
 
-    A line of d mm whose leading axis makes n steps is never slower than d/n mm times the least
-    rate of steps; an arc not slower than where it runs along an axis.
+    A line of d mm whose leading axis makes n steps cannot be slower than d/n mm times the lowest
+    step rate; an arc cannot be slower than where it runs along an axis.
     """
     if not isinstance(machine.controller, GrblController):
         return

@@ -54,8 +54,8 @@ _MORE = {
 
 
 def settings_of(text: str) -> list[ControllerSetting] | None:
-    """Return the values of a machine file that a listing says, None for a text without settings;
-    MachineError for a setting that is missing, doubled, or no number."""
+    """Return the values for a machine file that a listing of `$$` contains, None for a text
+    without settings; MachineError for a setting that is missing, doubled, or not a number."""
     values: dict[int, tuple[str, int]] = {}
     for line, row in enumerate(text.splitlines(), 1):
         match = _SETTING.search(row)
@@ -89,8 +89,8 @@ def settings_of(text: str) -> list[ControllerSetting] | None:
 
 
 def _doubt(setting: ControllerSetting) -> str:
-    """Return why a setting of a machine with a spindle says nothing of it; "" where it does. Of
-    a laser the same number is the usual full power."""
+    """Return why a setting may not describe a machine with a spindle; "" if it does. For a laser
+    the same number is the usual full power."""
     never_set = setting.said == f"${FULL_SPEED}" and setting.value == FACTORY_FULL_SPEED
     return NEVER_SET if never_set else ""
 
@@ -167,8 +167,8 @@ NEAR_MM = 0.005
 
 
 def beyond_travel(text: str, zero_mm: Place, reach_mm: tuple[Place, Place]) -> str:
-    """Return why a program is certain to end in ALARM:2, by a listing and the work zero on the
-    machine; "" where it is not. With soft limits ($20) grbl stays between −travel and 0 of each
+    """Return why a program is certain to end in ALARM:2, from a listing and the work zero on the
+    machine; "" if it is not. With soft limits ($20) grbl stays between −travel and 0 on each
     axis."""
     numbers = {int(number): float(value) for number, value in _SETTING.findall(text)}
     if not numbers.get(20):
@@ -189,7 +189,8 @@ def beyond_travel(text: str, zero_mm: Place, reach_mm: tuple[Place, Place]) -> s
 def _difference(
     setting: ControllerSetting, expected: float | None, inverse: bool = False
 ) -> list[str]:
-    """Return a sentence where a setting is not what the machine file says, if it says anything."""
+    """Return a sentence if a setting differs from the machine file, else nothing; also nothing
+    where the file has no value for it."""
     value = float(setting.value)  # type: ignore[arg-type]
     shown = 1.0 / value if inverse else value
     if expected is None or abs(shown - expected) <= LISTED_TOLERANCE:

@@ -49,7 +49,7 @@ class GrblSignals(SignalModel):
     """Steps and directions of three axes on port D."""
 
     def board(self, machine: _Machine) -> Board:
-        """Return the lines of the three drivers."""
+        """Return the signal lines of the three drivers."""
         return Board(
             tuple(
                 StepDirection(name, ("PORTD", 2 + k), ("PORTD", 5 + k), STEP_PULSE_S)
@@ -64,7 +64,7 @@ class GrblSignals(SignalModel):
         )
 
     def pulses(self, toolpath: Toolpath, machine: _Machine) -> Iterator[Pulses]:
-        """Yield the steps of all ticks."""
+        """Yield the step pulses of all ticks."""
         path = GrblModel().quantised(toolpath, machine)
         clock = _Clock(path, machine)
         for planned in plan_to_end(path, machine):
@@ -93,7 +93,7 @@ class _Clock:
         self._cycles = 0
 
     def window(self, planned: PlannedBlocks) -> Iterator[Pulses]:
-        """Yield the pulses of the blocks of a window."""
+        """Yield the pulses of a window of blocks."""
         blocks, row = planned.blocks, planned.blocks.row - planned.low
         dwells_s = dwells_of(self._path, planned.low, planned.high, self._controller)
         dwelt = np.cumsum(np.rint(dwells_s * CLOCK_HZ).astype(np.int64))
@@ -125,7 +125,7 @@ class _Clock:
 
 
 def _segments(planned: PlannedBlocks) -> Segments:
-    """Return the segments of the blocks of a window."""
+    """Return the stepper segments of a window of blocks."""
     count, plan = len(planned.blocks), planned.plan
     squares = (planned.squares * MIN_PER_S**2).astype(np.float32)
 
@@ -143,8 +143,8 @@ def _segments(planned: PlannedBlocks) -> Segments:
 
 
 def _steps_of(blocks: Blocks, stretch: _Stretch, end: int) -> Pulses:
-    """Return the steps of a stretch. A block of n steps of an axis in N events has its step j
-    in the eighth ⌊4 N (2 j − 1) / n⌋ + 1 of a step of N: where the counter, which begins at
+    """Return the steps of a stretch. In a block of N step events, step j of an axis with n steps
+    comes in the eighth ⌊4 N (2 j − 1) / n⌋ + 1 of an event: where the counter, which begins at
     half, first exceeds the whole."""
     first = np.flatnonzero(np.diff(stretch.block, prepend=-1))
     block = stretch.block[first]

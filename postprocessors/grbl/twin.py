@@ -232,8 +232,8 @@ def _float_text(value: float, decimals: int) -> str:
 
 
 def _read_float(text: str, place: int) -> tuple[float, int] | None:
-    """Parse a number at a place of a line as `read_float` (nuts_bolts.c) does; its value and its
-    end."""
+    """Parse the number at a place of a line as `read_float` (nuts_bolts.c) does; return its value
+    and its end, None for no number."""
     match = re.compile(r"([+-]?)(\d*)(\.?)(\d*)").match(text, place)
     assert match is not None
     whole_digits, decimals = match[2], match[4]
@@ -296,8 +296,8 @@ class _Memory:
         )
 
     def load(self, number: int, line: bytearray) -> bool:
-        """Load a text into the line buffer; False, and the text is emptied, if its checksum is
-        wrong."""
+        """Load a text into the line buffer. If its checksum is wrong, empty the text and return
+        False."""
         line[:] = self._texts[number]
         if self._sums[number] == _checksum(line):
             return True
@@ -311,8 +311,8 @@ class _Memory:
         self._sums[number] = _checksum(line)
 
     def restore(self, selection: str) -> None:
-        """$RST: `$` settings, `#` frames and places, `*` all. Of the texts only two bytes become
-        0, and not the one of their sum."""
+        """Execute $RST: `$` resets settings, `#` frames and stored places, `*` everything. Of the
+        texts only two bytes become 0, and not the byte of their checksum."""
         if selection in "$*":
             self.settings = {n: _single(value) for n, value in sorted(self.defaults().items())}
         if selection in "#*":
@@ -331,7 +331,7 @@ class _Memory:
 
 
 def _checksum(text: bytes | bytearray) -> int:
-    """Return the checksum of eeprom.c, which forgets all but whether the sum was 0."""
+    """Return the checksum of eeprom.c, which depends only on whether the sum was 0."""
     total = 0
     for octet in text:
         total = ((1 if total else 0) + octet) % 256
@@ -367,7 +367,7 @@ class _Parser(GrblParser):
         self.checking = False
 
     def line(self, text: str) -> None:
-        """Parse a line; Fault where grbl refuses it."""
+        """Parse a line; LineFault where grbl refuses it."""
         self.actions, self.flow, self.probes, self.jogs = [], None, 0, False
         super().line(text)
 
@@ -417,7 +417,7 @@ class _Parser(GrblParser):
         return target
 
     def _use_frame(self) -> None:
-        """Do nothing: moves are written in coordinates of the machine."""
+        """Do nothing: the twin's moves are in machine coordinates."""
 
     def _shift(self) -> list[float]:
         return [0.0, 0.0, 0.0]
@@ -509,7 +509,7 @@ class _Parser(GrblParser):
         return list(self._memory.homes[action])
 
     def rewind(self) -> None:
-        """M2 and M30 set most modes back; in check mode the zero of the frame stays."""
+        """Reset most modes, as M2 and M30 do; in check mode the zero of the frame stays."""
         self.modes = ParserModes(motion=1, inches=self.modes.inches)
         if not self.checking:
             self.places = list(self._memory.frames[0])
@@ -549,8 +549,8 @@ class GrblTwin(Twin):
     def _travel_ends(
         self, machine: Machine[GrblController, GrblDialect], zero: Floats
     ) -> tuple[Floats, Floats] | None:
-        """Return the positions, mm, at which slides close the limit switches, at both ends of the
-        travel; None without switches."""
+        """Return the lower and upper positions, mm, at which the slides close the limit switches;
+        None without switches."""
         if self._choices.homing == "off":
             return None
         travel = [axis.travel_mm or DEFAULTS[130] for axis in machine.axes]
@@ -565,8 +565,8 @@ class GrblTwin(Twin):
         self._main = self._forever()
 
     def connect(self, now: float) -> bytes:
-        """Reset the board by DTR, as if the power came on. The slides stay where they are, and
-        their place there counts as the place at which the twin was made."""
+        """Reset the board by DTR, as if it were switched on. The slides stay where they are, and
+        that place counts as the one at which the twin was created."""
         output = self.advance(now)
         if self._choices.opening == "nothing":
             return output
@@ -586,11 +586,11 @@ class GrblTwin(Twin):
         return np.asarray(self._signs * (self._slide_steps() - self._origin))
 
     def _set_steps(self, steps: Ints) -> None:
-        """Set the steps that it counts as its position; nothing moves."""
+        """Set the position counter; nothing moves."""
         self._origin = self._slide_steps() - self._signs * steps
 
     def _mm(self, steps: Ints) -> list[float]:
-        """Convert steps to positions on the machine, with the firmware's arithmetic."""
+        """Convert step counts to positions on the machine, mm, with the firmware's arithmetic."""
         pairs = zip(steps.tolist(), self._steps_per_mm(), strict=True)
         return [_single(np.float32(n) / np.float32(per)) if per else 0.0 for n, per in pairs]
 
@@ -647,7 +647,7 @@ class GrblTwin(Twin):
             self._rx.append(octet)
 
     def _kill(self) -> None:
-        """Reset (`mc_reset`): stop spindle and coolant, and the motors too if they run."""
+        """Reset (`mc_reset`): stop spindle and coolant, and also the motors if they run."""
         if "reset" in self._flags:
             return
         self._flags.add("reset")
@@ -662,14 +662,14 @@ class GrblTwin(Twin):
             self._go_idle()
 
     def _go_idle(self) -> None:
-        """End the motion of the motors (`st_go_idle`); unless they stay on, nothing else happens
-        for `$1`."""
+        """End the motion of the motors (`st_go_idle`). Unless they stay on, nothing else happens
+        for the time `$1`."""
         delay = self._memory.settings[1]
         if (delay != ALWAYS_ON or self._alarm or self._state == "Sleep") and self._state != "Home":
             self._motor_s = self.now + delay / 1000.0
 
     def next_s(self) -> float | None:
-        """It says nothing at an output."""
+        """Return the time of the next wake-up: outputs of steps send nothing."""
         return self.wake_s()
 
     def wake_s(self) -> float | None:
@@ -711,7 +711,7 @@ class GrblTwin(Twin):
     # The main program.
 
     def _forever(self) -> Wait:
-        """Begin, work until a reset, and begin anew (main.c)."""
+        """Start, work until a reset, and start again (main.c)."""
         while True:
             self._clear()
             self._starting = False
@@ -727,7 +727,7 @@ class GrblTwin(Twin):
                 yield self.now + self._memory.settings[1] / 1000.0
 
     def _clear(self) -> None:
-        """Set all state that a reset forgets to its initial value."""
+        """Set all state that a reset clears to its initial value."""
         self._rx, self._line = bytearray(), bytearray(TEXT_BYTES)
         self._flags: set[str] = set()
         self._motion_overrides: set[int] = set()
@@ -757,7 +757,7 @@ class GrblTwin(Twin):
         self._adopt_position()
 
     def _adopt_position(self) -> None:
-        """Let planner and parser begin where the slides are."""
+        """Set the positions of planner and parser to that of the slides."""
         self._planned: Ints = self._steps[None, :]
         self._parser.set_position(self._mm(self._steps))
 
@@ -788,7 +788,7 @@ class GrblTwin(Twin):
                 yield None
 
     def _execute_and_answer(self, raw: bytes) -> Wait:
-        """Execute a line and send its answer. A reset in the midst of it stays in force, and the
+        """Execute a line and send its answer. A reset during its execution stays in force, and the
         answer is ok."""
         self._ending = ""
         try:
@@ -948,7 +948,7 @@ class GrblTwin(Twin):
             self._state = "Sleep"
 
     def _resume(self) -> None:
-        """Cycle start: begin to move, or go on."""
+        """Execute a cycle start: begin to move, or resume a hold."""
         if self._state == "Door" and "ajar" not in self._suspend:
             if "restored" in self._suspend:
                 self._state = "Idle"
@@ -968,14 +968,15 @@ class GrblTwin(Twin):
             self._set_out()
 
     def _set_out(self) -> None:
-        """The first segments are made, and the motors wake."""
+        """Start the motion of the ring's first block: wake the motors and plan its first
+        segments."""
         self._running, self._phases, self._speed = True, [], 0.0
         self._fresh_rpm = True
         self._set_block_power(self._ring[0])
         self._plan_block()
 
     def _end_cycle(self) -> None:
-        """Carry out the flag of motors that have come to rest."""
+        """Execute the flag that the motors have come to rest."""
         if (
             self._state in ("Hold", "Door", "Sleep")
             and not self._soft_limit_hit
@@ -1061,7 +1062,8 @@ class GrblTwin(Twin):
         return self._state, frozenset(self._suspend), self._stop_override, self._fresh_rpm
 
     def _wait_retracted(self, spindle: Kind | None, rpm: float, cooled: tuple[bool, bool]) -> Wait:
-        """Stop spindle and coolant; then sleep for ever, or wait at the open door and go on."""
+        """Stop spindle and coolant; then sleep for ever, or wait at the open door until the
+        program is resumed."""
         if "retracted" not in self._suspend:
             self._stop_override = ""
             self._switch_off()
@@ -1092,7 +1094,7 @@ class GrblTwin(Twin):
             self._flags.add("start")
 
     def _spindle_while_held(self, spindle: Kind | None, rpm: float) -> None:
-        """Stop the spindle of a held machine, and start it again."""
+        """Stop the spindle of a held machine, or start it again."""
         if self._stop_override == "begin":
             if self._parser.modes.spindle is not None:
                 self._spin(None, 0.0)
@@ -1116,7 +1118,7 @@ class GrblTwin(Twin):
     # Spindle and coolant.
 
     def _speed_of(self, rpm: float) -> tuple[float, bool]:
-        """Return the speed that it reports, and whether its output is on
+        """Return the speed that the controller reports, and whether its output is on
         (`spindle_compute_pwm_value`)."""
         min_rpm, max_rpm = self._memory.settings[31], self._memory.settings[30]
         percent = np.float32(0.010) * np.float32(self._spindle_percent)
@@ -1152,8 +1154,8 @@ class GrblTwin(Twin):
             self._spin(spindle, rpm)
 
     def _set_block_power(self, block: _Planned) -> None:
-        """Set the spindle's output for the segments of a block; in laser mode that of M4 follows
-        the speed, so that it is off when the block is over."""
+        """Set the spindle's output for the segments of a block. In laser mode with M4 the power
+        follows the speed, so it is off when the block has ended."""
         adjusted = self._is_set(32) and block.spindle == Kind.SPINDLE_CCW
         if block.spindle is None:
             self._rpm, self._lit = 0.0, False
@@ -1241,8 +1243,8 @@ class GrblTwin(Twin):
         return OK
 
     def _is_beyond_travel(self, target: Sequence[float]) -> bool:
-        """Return True if a place is beyond the travel, which begins at machine zero and goes
-        down."""
+        """Return True if a place is outside the travel, which extends from machine zero in the
+        negative direction."""
         travel = [self._memory.settings[130 + k] for k in range(3)]
         return any(
             value > 0.0 or value < -travel_mm
@@ -1267,7 +1269,7 @@ class GrblTwin(Twin):
     def _line_to(
         self, path: Toolpath, row: int, power: float, owner: int, *, jogs: bool = False
     ) -> Wait:
-        """Put a move into the ring, block by block; wait while the ring is full (`mc_line`)."""
+        """Put the blocks of a move into the ring; wait while the ring is full (`mc_line`)."""
         if self._is_set(20) and not jogs:
             yield from self._soft_check(path.end[row].tolist())
         if self._state == "Check":
@@ -1324,7 +1326,7 @@ class GrblTwin(Twin):
     # The probe and the switches.
 
     def _limits(self) -> list[bool]:
-        """Return which limit switches its pins report as closed, for X, Y and Z."""
+        """Return for X, Y and Z whether the pin of the limit switch reports it as closed."""
         if self._ends_mm is None:
             closed = [False] * 3
         else:
@@ -1332,19 +1334,19 @@ class GrblTwin(Twin):
         return [each != self._is_set(5) for each in closed]
 
     def _beyond_switches(self, mm: Floats, ends_mm: tuple[Floats, Floats]) -> Bools:
-        """Return the mask (…, 3) of the axes whose slides at `mm` lie beyond the switches at
-        their ends."""
+        """Return a mask (…, 3), true for axes whose slide at `mm` is beyond the switch at its
+        end."""
         (low, high), eps = ends_mm, 0.5 * self._slide_step_mm
         return np.asarray((mm > high + eps) | (mm < low - eps))
 
     def _touches_probe(self) -> bool:
-        """Return True if the probe counts as touching; $6, and G38.4 and G38.5, invert it."""
+        """Return True if the probe counts as touching; $6, and G38.4 and G38.5, invert the pin."""
         closed = bool(self._closes_probe(self.slides.commanded_mm))
         return (closed != self._is_set(6)) != self._away
 
     def _closes_probe(self, mm: Floats) -> Bools:
-        """Return the mask (…) of the places (…, 3) at which the probe is on the blank, or in
-        it."""
+        """Return a mask (…), true for places (…, 3) at which the probe touches the blank or is
+        inside it."""
         machine_zero = np.array(self._machine.controller.machine_zero_mm)
         return self._choices.closes(mm - machine_zero, 0.5 * float(self._slide_step_mm[2]))
 
@@ -1353,7 +1355,8 @@ class GrblTwin(Twin):
         return self._probing is None
 
     def _probe(self, path: Toolpath, motion: int, stood: list[float]) -> Wait:
-        """G38.2 to G38.5 (`mc_probe_cycle`)."""
+        """Execute G38.2 to G38.5 (`mc_probe_cycle`): move until the probe touches, and report
+        where."""
         if self._state == "Check":
             return
         target = list(self._parser.position)
@@ -1393,8 +1396,8 @@ class GrblTwin(Twin):
         return f"[PRB:{self._lengths_text(self._mm(self._probe_steps))}:{int(self._probed)}]\r\n"
 
     def _check_contacts(self) -> None:
-        """Compare probe and limit switches with their last state, where a travel reaches a
-        contact."""
+        """Compare probe and limit switches with their last state, at the times when a travel
+        reaches one of them."""
         if self._probing is not None and self._touches_probe():
             self._probing = None
             self._probe_steps = self._steps
@@ -1407,8 +1410,8 @@ class GrblTwin(Twin):
                 self._alarm = HARD_LIMIT
 
     def _contact_times(self, commanded: Floats, seconds: Floats) -> list[float]:
-        """Return the times at which the probe or a switch changes on a travel: the first time of
-        each."""
+        """Return the times during a travel at which the probe and each switch change for the first
+        time."""
         start, times = self.slides.commanded_mm, list[float]()
         path = np.concatenate([start[None, :], commanded])
         masks = list[Bools]()
@@ -1660,7 +1663,7 @@ class GrblTwin(Twin):
     def _home_to(
         self, axes: list[int], sign: list[int], far_mm: float, rate: float, approaches: bool
     ) -> Wait:
-        """Move all axes alike; in an approach each until its switch closes."""
+        """Move all axes at the same rate; in an approach, each until its switch closes."""
         step_mm = self._slide_step_mm
         counts = [round(far_mm * self._memory.settings[100 + axis]) for axis in axes]
         event_count = max(counts)
@@ -1717,7 +1720,8 @@ class GrblTwin(Twin):
             yield from self._realtime()
 
     def _steps_to_switch(self, axis: int, sign: int, count: int) -> int | None:
-        """Return the steps after which the switch of an axis closes; None if it does not."""
+        """Return the number of steps after which the switch of an axis closes; None if it does not
+        close."""
         if self._ends_mm is None:
             return 0 if self._is_set(5) else None
         direction = int(self._signs[axis]) * sign
@@ -1796,7 +1800,7 @@ class GrblTwin(Twin):
 
     def _exit_speed(self) -> float:
         """Return the highest speed at the end of the current block from which the planned blocks
-        behind it can still slow down."""
+        behind it can still brake."""
         square, ring = 0.0, self._ring
         for k in range(len(ring) - 1, 0, -1):
             block = ring[k]
@@ -1805,7 +1809,8 @@ class GrblTwin(Twin):
         return float(np.sqrt(square))
 
     def _replan_later(self) -> None:
-        """Schedule a new plan behind the pieces of the block that are fixed already."""
+        """Schedule a new plan that begins behind those pieces of the block that can no longer
+        change."""
         done_pieces = math.floor((self.now - self._piece_s) / SEGMENT_S + SEGMENT_S / 100.0)
         self._turn_at_s = self._piece_s + (done_pieces + SEGMENTS) * SEGMENT_S
 
@@ -1847,7 +1852,7 @@ class GrblTwin(Twin):
         self._touches = self._contact_times(travel.commanded, travel.seconds)
 
     def _progress(self, now: float) -> tuple[float, float]:
-        """Return the distance done of the current block, mm, and its speed."""
+        """Return the distance done in the current block, mm, and the speed there."""
         elapsed, covered = now - self._begun_s, self._done_mm
         for seconds, v, a in self._phases:
             t = min(seconds, elapsed)
@@ -1857,11 +1862,12 @@ class GrblTwin(Twin):
         return covered, _end_speed(self._phases)
 
     def _speed_ahead(self) -> float:
-        """Return the speed that it reports: that at the end of the pieces that are fixed."""
+        """Return the speed that the controller reports: that at the end of the pieces that can no
+        longer change."""
         return self._progress(self.now + (SEGMENTS - 0.5) * SEGMENT_S)[1]
 
     def _block_over(self) -> None:
-        """End the travel: that of the whole block, or with a hold only its deceleration."""
+        """End the travel: that of the whole block, or during a hold that of the deceleration."""
         block = self._ring[0]
         self._events += self.slides.done
         self._done_mm += _distance(self._phases, sum(each[0] for each in self._phases))
@@ -1888,13 +1894,14 @@ LENGTH_EPS_MM: Final = 1e-9
 
 
 def _strip(raw: bytes) -> str:
-    """Return a line as `protocol_main_loop` hands it on: capitals, without blanks and comments."""
+    """Return a line as `protocol_main_loop` passes it on: capitals, without blanks and
+    comments."""
     text = re.sub(r"\([^)]*\)?|;.*", "", raw.decode("latin-1"))
     return "".join(sign for sign in text if sign > " " and sign != "/").upper()
 
 
 def _code(fault: LineFault) -> int:
-    """Return grbl's number of an error; 20, unsupported, for what only this twin refuses."""
+    """Return grbl's number of an error; 20, unsupported, for lines that only this twin refuses."""
     match = re.search(r"\(error:(\d+)\)", fault.message)
     return int(match[1]) if match else 20
 
@@ -1904,7 +1911,7 @@ def _coolant_of(modes: ParserModes) -> tuple[bool, bool]:
 
 
 def _percent(percent: int, changes: Mapping[int, int | None], changes_wanted: set[int]) -> int:
-    """Return an override after the real-time bytes received."""
+    """Return the override, %, after the real-time bytes received."""
     for octet, change in changes.items():
         if octet in changes_wanted:
             percent = 100 if change is None else percent + change
@@ -1917,8 +1924,8 @@ def _percent(percent: int, changes: Mapping[int, int | None], changes_wanted: se
 def _trapezoid(
     distance: float, v: float, nominal: float, a: float, exit_speed: float
 ) -> list[Phase]:
-    """Return the phases from the speed v over `distance` mm: accelerate to `nominal`, and slow
-    down to `exit_speed` at the end, as far as the acceleration allows."""
+    """Return the phases of a move over `distance` mm from the speed v: accelerate to `nominal`,
+    and brake to `exit_speed` at the end, as far as the acceleration allows."""
     if v * v - 2.0 * a * distance >= exit_speed * exit_speed and v > exit_speed:
         return _slow_down(distance, v, a)
     phases: list[Phase] = []
@@ -1938,8 +1945,8 @@ def _trapezoid(
 
 
 def _slow_down(distance: float, v: float, a: float) -> list[Phase]:
-    """Return the phase in which the speed v falls at the rate a: to rest, or over `distance`
-    mm."""
+    """Return the phase in which the speed v falls at the rate a: to rest, or over `distance` mm if
+    that is shorter."""
     end = float(np.sqrt(max(v * v - 2.0 * a * distance, 0.0)))
     return [((v - end) / a, v, -a)] if v > 0.0 else []
 
@@ -1964,7 +1971,7 @@ SPEED_EPS_MM_S: Final = 1e-9
 
 
 def _times_at(phases: list[Phase], distances: Floats) -> Floats:
-    """Return the times (K,) s at which `distances` (K,) mm, ascending, are covered."""
+    """Return the times (K,) s at which the distances (K,) mm, ascending, are reached."""
     times, begin, covered = np.zeros(len(distances)), 0.0, 0.0
     for k, (seconds, v, a) in enumerate(phases):
         length = v * seconds + 0.5 * a * seconds * seconds

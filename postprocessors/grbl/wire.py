@@ -205,7 +205,7 @@ class GrblWire(Wire):
     )
 
     def packets(self, data: bytes, machine: GrblMachine, forecast: Forecast) -> Sequence[Packet]:
-        """Return a packet for each line with words, without blanks and comments."""
+        """Return one packet for each line with words, without blanks and comments."""
         packets = list(_packets(data, forecast))
         for packet in packets:
             if len(packet.data) > BUFFER_BYTES - len(PROBE):
@@ -222,7 +222,7 @@ class GrblWire(Wire):
         return GrblConversation(packets, machine, manner)
 
     def terminal(self, machine: GrblMachine) -> GrblTerminal:
-        """Return the terminal, which explains numbers of errors, alarms and settings."""
+        """Return the terminal, which explains the numbers of errors, alarms and settings."""
         return GrblTerminal()
 
     def command(
@@ -239,7 +239,8 @@ class GrblWire(Wire):
         return GrblConversation((), machine, manner, (hand_line(action, values).rstrip(b"\n"),))
 
     def probing(self, cycle: ProbeCycle, machine: GrblMachine, manner: Manner) -> GrblProbing:
-        """G38.3 to each place, and G10 L20 where a zero is set."""
+        """Return the conversation that touches by G38.3 at each place, and sets a zero by G10
+        L20."""
         return GrblProbing(cycle, machine, manner)
 
     def travel_mm(self, machine: GrblMachine) -> tuple[Place, Place]:
@@ -252,11 +253,13 @@ class GrblWire(Wire):
     def settings(
         self, machine: GrblMachine, manner: Manner, changes: Sequence[str] = ()
     ) -> GrblSettings:
-        """Return the conversation that reads the settings, writes each change, and reads again."""
+        """Return the conversation that reads the settings, writes each change, and reads them
+        again."""
         return GrblSettings(machine, manner, changes)
 
     def recognised(self, heard: str) -> str:
-        """Return its version, which it says when the port resets it, and how it stands."""
+        """Return grbl's version, which it sends when the port resets it, and its state; "" if
+        `heard` has neither."""
         version = _VERSION.search(heard)
         status = _STATUS.search(heard)
         words = [version[0]] if version else ["grbl"]
@@ -265,13 +268,14 @@ class GrblWire(Wire):
         return ": ".join(words) if version or status else ""
 
     def hand(self, machine: GrblMachine, manner: Manner) -> GrblHand:
-        """Return one conversation for all orders: `command` would reset grbl before each."""
+        """Return one conversation for all orders by hand: `command` would reset grbl before
+        each."""
         return GrblHand(machine, manner)
 
 
 def _packets(data: bytes, forecast: Forecast) -> Iterator[Packet]:
-    """Yield the lines that are blocks, as their reader counts them; a line that stops the
-    program has the comments since the last block as its note."""
+    """Yield the packets of the lines that are blocks, as their reader counts them. A line that
+    stops the program carries the comments since the last block as its note."""
     block, notes = 0, list[str]()
     for line in re.split(r"\r\n|\n|\r", data.decode("latin-1")):
         notes += [(one or other).strip() for one, other in _COMMENT.findall(line)]
@@ -380,12 +384,12 @@ class GrblConversation(Conversation):
     # What the user wants.
 
     def begin(self, now: float) -> None:
-        """Ask for the state; a controller that resets with the port reports it by itself."""
+        """Ask for the state. A controller that the port resets reports it by itself."""
         self._answered = now
         self._poll(now)
 
     def pause(self, now: float) -> None:
-        """Hold the feed."""
+        """Send a feed hold."""
         self._resumes = False
         if self.state is WireState.SENDING:
             self.state, self._halted = WireState.PAUSING, now
@@ -393,7 +397,7 @@ class GrblConversation(Conversation):
             self._write(HOLD)
 
     def resume(self, now: float) -> None:
-        """Go on where it was held; behind a single block, the next one."""
+        """Resume from a hold; after a single block, send the next one."""
         if self.state is WireState.PAUSING:  # grbl passes over ~ until it stands
             self._resumes = True
         elif self.state in HALTS:
@@ -405,7 +409,8 @@ class GrblConversation(Conversation):
             self._go_on(now, anew=True)
 
     def stop(self, now: float) -> None:
-        """Feed hold, and a reset when it stands; homing hears nothing but the reset."""
+        """Send a feed hold, and a reset when the machine stands. While homing, grbl reacts to
+        nothing but a reset."""
         if self.is_over or self.state is WireState.STOPPING:
             return
         self._unwrite()
@@ -421,18 +426,18 @@ class GrblConversation(Conversation):
             self._poll(now)
 
     def hurry(self, now: float) -> None:
-        """Reset it at once, though it moves and its place is lost."""
+        """Reset grbl at once, although it moves and loses its position."""
         self.stop(now)
         if not self.is_over and not self._reset_sent:
             self._reset(now)
 
     def override(self, name: Override, percent: int, now: float) -> None:
-        """Real-time bytes, one after another as it reports them carried out."""
+        """Send real-time bytes, each after the report that shows the one before carried out."""
         self._aims[name] = override_aim(name, percent)
         self._steer(name)
 
     def _steer(self, name: Override) -> None:
-        """Send the next byte on the way to the override that is wanted."""
+        """Send the next byte towards the override that is wanted."""
         step = override_step(name, self._aims[name], self.overrides.get(name, 100))
         if step:
             self._write(step)
@@ -441,7 +446,7 @@ class GrblConversation(Conversation):
             del self._aims[name]
 
     def _fail(self, reason: str, now: float) -> None:
-        """Stop, and say why."""
+        """Stop the machine, and give the reason."""
         if not self.is_over and not self._failing:
             self._failing = reason
             self.stop(now)
@@ -459,7 +464,7 @@ class GrblConversation(Conversation):
     # The clock.
 
     def tick(self, now: float) -> None:
-        """Ask for reports, and notice answers that do not come."""
+        """Ask for reports, and notice answers that are overdue."""
         if self.is_over:
             return
         patience = self.manner.patience_s
@@ -567,8 +572,8 @@ class GrblConversation(Conversation):
             self._fail(f"an answer that it cannot have meant: {line[:40]!r}", now)
 
     def _take_message(self, line: str) -> None:
-        """Handle messages and startup lines; in the greeting also any other line, which a port
-        that has just been opened may give, unless it names another firmware."""
+        """Handle messages and startup lines. During the greeting any other line is accepted too,
+        since a port that has just been opened may send some, unless it names another firmware."""
         if self._phase == "greeting" and line.startswith("[MSG:") and "unlock" not in line:
             self._messages.append(line[5:].rstrip("]"))
         elif self._phase == "greeting" and re.match(r"grbl", line, re.IGNORECASE):
@@ -588,8 +593,8 @@ class GrblConversation(Conversation):
             self._tell(f"{message} {startup[1]}")
 
     def _unknown(self) -> str:
-        """Return why it fails where nothing was understood: what was heard, and what that may
-        be."""
+        """Return why the conversation fails where nothing was understood: what was received, and
+        what that may be."""
         text = "".join(chr(octet) if 0x20 <= octet < 0x7F else " " for octet in self._heard)
         text, strange = (
             " ".join(text.split())[:60],
@@ -620,7 +625,7 @@ class GrblConversation(Conversation):
         return "".join(f"; {each}" for each in reasons)
 
     def _advice(self) -> str:
-        """Return why it is locked and what to do, by its settings."""
+        """Return why grbl is locked and what to do, judged by its settings."""
         values = dict(each[1:].split("=", 1) for each in self._listing)
         if set(self._closed) & set("XYZ"):
             mend = "move it off the switch by hand, or set $5 if it is not pressed, then --unlock"
@@ -674,7 +679,7 @@ class GrblConversation(Conversation):
             self._at_rest(now)
 
     def _stopping(self, state: str, now: float) -> None:
-        """Handle a report while the machine is to stop: reset it when it stands."""
+        """Handle a report while the machine is being stopped: reset it when it stands."""
         if self._reset_sent:
             return
         self._moves = self._moves + 1 if state in ("Run", "Jog") else 0
@@ -696,7 +701,7 @@ class GrblConversation(Conversation):
 
     def _where(self, fields: str, now: float) -> None:
         """Store the position in the work frame from the fields of a status report, and whether the
-        feed falls from one report to the next: the machine slows down."""
+        feed falls from one report to the next, which means that the machine slows down."""
         values = dict(field.split(":", 1) for field in fields.split("|") if field)
         feed, before = values.get("FS", values.get("F", "")).partition(",")[0], self._feed
         self._feed = float(feed) if _FEED.fullmatch(feed) else 0.0
@@ -735,7 +740,7 @@ class GrblConversation(Conversation):
                 self.place_mm = _difference(self.machine_mm, offset)
 
     def _check_first_report(self, state: str, now: float) -> None:
-        """Handle its first report: begin only with a controller at rest, and reset it, so that
+        """Handle the first report: go on only with a controller at rest, and reset it, so that
         nothing of an earlier sender is left in its buffer."""
         if state == "Idle":
             if self._resets == 0:
@@ -782,7 +787,8 @@ class GrblConversation(Conversation):
             self._restarted = True
 
     def _ready(self, now: float) -> None:
-        """Begin, unless the program is to go on where the controller does not take it to stand."""
+        """Begin to send. Fail if a program that continues finds the machine at another place than
+        it needs; tell the controller its place if the user stated it."""
         if self._standing is not None:
             place_said, stated_place = self.machine_mm, self._standing.said_mm
             place = _difference(place_said, self._offset) if place_said and self._offset else None
@@ -802,7 +808,7 @@ class GrblConversation(Conversation):
 
     def _check_query(self, line: str, now: float) -> None:
         """Handle the answer to a query: all lines before it must have been answered, and the query
-        not yet."""
+        itself not yet."""
         head = self._out_lines[0] if self._out_lines else None
         if self.state is WireState.STOPPING:
             return
@@ -816,7 +822,7 @@ class GrblConversation(Conversation):
                 self._compare_modes(line)
 
     def _compare_modes(self, line: str) -> None:
-        """Refuse a program that would begin in other modes than it expects."""
+        """Fail if the program would begin in other modes than it expects."""
         modes, unset = set(line[4:-1].split()), set(BEGINS_IN)
         for packet in self.packets:
             text = packet.data.decode("latin-1")
@@ -867,7 +873,7 @@ class GrblConversation(Conversation):
         self._go_on(now)
 
     def _confirm(self) -> None:
-        """A query was answered: everything before it has been taken."""
+        """Record that a query was answered: grbl has taken all lines before it."""
         self._confirmed = self.acknowledged
         self._unconfirmed = sum(len(line.data) for line in self._out_lines)
         self.done = max(self.done, self._confirmed - self._depth)
@@ -893,7 +899,7 @@ class GrblConversation(Conversation):
     # Sending.
 
     def _go_on(self, now: float, *, anew: bool = False) -> None:
-        """Write what may be written now."""
+        """Write the lines that fit into grbl's buffer now."""
         if self.state is not WireState.SENDING or self._phase in ("greeting", "settings"):
             return
         if self._commands:
@@ -949,7 +955,8 @@ class GrblConversation(Conversation):
         self._write(line.data)
 
     def _at_rest(self, now: float) -> None:
-        """Two reports in a row say that it stands, and nothing has been answered between them."""
+        """Handle a rest, which is two Idle reports in a row without an answer between them: finish
+        the program, go on, or fail if an answer is missing."""
         if self._phase == "settings":
             return
         if self._out_lines:
@@ -968,8 +975,8 @@ class GrblConversation(Conversation):
             self._go_on(now)
 
     def _dwell_s(self) -> float:
-        """Return the total dwell, s, of the lines that are sent and not answered: the machine may
-        report Idle for so long."""
+        """Return the total dwell, s, of the lines that are sent but not answered: for that time
+        the machine may report Idle although it is not done."""
         packets_out = {line.packet for line in self._out_lines}
         return sum(
             packet.seconds
@@ -984,7 +991,7 @@ class GrblConversation(Conversation):
         self._write(RESET)
 
     def _stops(self) -> bool:
-        """Return True if a block that stops the program is among those under way."""
+        """Return True if a block that stops the program is among those sent and not yet done."""
         texts = (packet.data.decode("latin-1") for packet in self._under_way())
         return any(_PAUSES.search(text) for text in texts)
 
@@ -1020,9 +1027,9 @@ OVERRIDE_RANGE: Final = (10, 200)
 
 
 def override_step(name: Override, percent: int, before: int) -> bytes:
-    """Return the next byte on the way of an override from one share of 100 % to another, b"" at
-    its end. grbl keeps a flag for each of these bytes and no count (system.c), so that a second
-    one is lost unless the first has been carried out."""
+    """Return the next byte that changes an override from `before` towards `percent`, b"" when it
+    is there. grbl keeps one flag for each of these bytes and no count (system.c), so a second one
+    is lost unless the first has been carried out."""
     if percent == before:
         return b""
     if name == "rapid":
@@ -1036,7 +1043,7 @@ def override_step(name: Override, percent: int, before: int) -> bytes:
 
 
 def override_aim(name: Override, percent: int) -> int:
-    """Return the override, %, that grbl can have and that is the nearest one."""
+    """Return the override, %, nearest to `percent` that grbl can have."""
     if name == "rapid":
         return min(RAPIDS, key=lambda percentage: abs(percentage - percent))
     low, high = OVERRIDE_RANGE
@@ -1120,7 +1127,7 @@ TOUCHES_MEND: Final = "lift it, look at its cable, or set $6 if it is not closed
 
 
 def _probe_line(step: ProbeStep) -> bytes:
-    """Return the line of grbl that makes a step of a cycle."""
+    """Return the line that makes a step of a probing cycle."""
     axes = "".join(f"{axis.upper()}{value:.4f}" for axis, value in step.axes.items())
     if step.action == "zero":
         return f"G21G10L20P0{axes}\n".encode()
@@ -1147,7 +1154,7 @@ class GrblSettings(GrblConversation, SettingsConversation):
         return True  # it stays locked, which changes nothing
 
     def tick(self, now: float) -> None:
-        """Notice a line whose answer does not come, though reports do."""
+        """Notice a line whose answer is overdue, although reports come."""
         head = self._out_lines[0] if self._out_lines else None
         if head is not self._awaited:
             self._awaited, self._awaited_since = head, now
@@ -1187,7 +1194,8 @@ class GrblSettings(GrblConversation, SettingsConversation):
 
 
 def listed_settings(lines: Sequence[str]) -> dict[int, str]:
-    """Return the values of a listing by their numbers; ValueError for a line that is none."""
+    """Return the values of a listing by their numbers; ValueError for a line that is no
+    setting."""
     pairs = (line.removeprefix("$").partition("=")[::2] for line in lines)
     return {int(number): value for number, value in pairs}
 
@@ -1200,8 +1208,8 @@ def _are_equal(value: str, other: str) -> bool:
 
 
 def _setting_order(line: str) -> tuple[int, int]:
-    """Return the key that sorts changes: homing is switched on before and off behind the soft
-    limits, which need it."""
+    """Return a sort key for changes: homing is switched on before the soft limits, which need it,
+    and off after them."""
     number = int(line[1:].partition("=")[0])
     if number == HOMING_SETTING:
         return (-1 if float(line.partition("=")[2]) else 1), number
@@ -1234,7 +1242,7 @@ class GrblHand(GrblConversation, Hand):
         self._begin(action, hand_line(action, values), now)
 
     def say(self, line: str, now: float) -> None:
-        """A real-time byte goes out at once, a line when it is ready."""
+        """Send a real-time byte at once, another line when grbl is ready for it."""
         word = line.strip()
         if word in ("?", "!", "~"):
             self._write(word.encode())
@@ -1258,7 +1266,7 @@ class GrblHand(GrblConversation, Hand):
         self._poll(now)
 
     def hold(self, values: Mapping[str, float], now: float) -> None:
-        """Begin the chain of jogs."""
+        """Begin a held jog, which is a chain of short jogs."""
         self.check_ready("jog")
         if self.says == "Alarm":
             raise MachineError("it is locked", mend="home it, or unlock it if its place is known")
@@ -1269,14 +1277,16 @@ class GrblHand(GrblConversation, Hand):
         self._lengthen(now)
 
     def release(self, now: float) -> None:
-        """Cancel the jog; a piece that grbl has not read yet is cancelled when it has."""
+        """Cancel the held jog; a piece that grbl has not read yet is cancelled as soon as it
+        has."""
         if self._held:
             self._held, self._released = {}, True
             self._write(JOG_CANCEL)
             self._poll(now)
 
     def _lengthen(self, now: float) -> None:
-        """Add a piece to a held jog, where it would end before the machine can stop."""
+        """Append a short jog to a held jog when it would otherwise end before the machine can
+        stop."""
         if not self._held:
             return
         self._schedule_poll(now)
@@ -1304,7 +1314,7 @@ class GrblHand(GrblConversation, Hand):
         self._queued_s = max(self._queued_s, now) + piece_s
 
     def tick(self, now: float) -> None:
-        """Lengthen a held jog; ask for reports."""
+        """Lengthen a held jog, and ask for reports."""
         if self._held:
             self._lengthen(now)
             if now < self._polled + POLL_FACTOR * self.manner.late_s:
@@ -1323,7 +1333,8 @@ class GrblHand(GrblConversation, Hand):
         super()._line(line, now)
 
     def _answer(self, line: str, now: float) -> None:
-        """A refusal of an order is told, and changes nothing."""
+        """Handle an answer; the refusal of an order is shown to the user and ends nothing but that
+        order."""
         if not self._out_lines or self._phase == "greeting" or self.state is not WireState.SENDING:
             super()._answer(line, now)
             return
@@ -1355,7 +1366,7 @@ class GrblHand(GrblConversation, Hand):
             self.state, self.why = WireState.READY, f"it is locked{self._reasons}"
 
     def _end(self, state: WireState, why: str = "") -> None:
-        """Behind an order it is ready for the next one."""
+        """Become ready for the next order instead of ending, when an order is finished."""
         if state is WireState.FINISHED and self.state is WireState.SENDING:
             self.state, self.why, self._released = WireState.READY, "", False
             self.is_homed |= self._homes_now
@@ -1366,7 +1377,7 @@ class GrblHand(GrblConversation, Hand):
 
 def hand_line(action: str, values: Mapping[str, float]) -> bytes:
     """Return the line that homes ("home"), unlocks ("unlock"), makes the place zero of G54
-    ("zero") or jogs by so much ("jog"); `values` as of `Wire.command`."""
+    ("zero") or jogs by these lengths ("jog"); `values` as of `Wire.command`."""
     if action in ("home", "unlock"):
         return HOMING if action == "home" else UNLOCKING
     axes = "".join(f"{axis.upper()}{values[axis]:.3f}" for axis in "xyz" if axis in values)
@@ -1445,7 +1456,7 @@ class GrblTerminal(Terminal):
         self._homes = 0  # the answers that are due up to that of homing
 
     def halt(self) -> bytes:
-        """Stop the machine; while it homes only a reset stops it."""
+        """Return the bytes that stop the machine: a feed hold, or a reset while it homes."""
         stop = super().halt()
         self._typed = True  # the reports that follow are to be seen
         if not self._homes:
@@ -1454,16 +1465,16 @@ class GrblTerminal(Terminal):
         return RESET
 
     def is_urgent(self, line: str) -> bool:
-        """Return True for holds, resets and the command to go on."""
+        """Return True for holds, resets and the command to resume."""
         return line.strip().lower() in ("!", "~", "^x", r"\x18", r"\x84", r"\x85")
 
     def decode(self, data: bytes) -> list[str]:
-        """Return the lines to show, without reports that only the knocking asked for."""
+        """Return the lines to show, without the reports that only the first query asked for."""
         return [line for line in super().decode(data) if self._typed or not line.startswith("<")]
 
     def encode(self, line: str) -> bytes:
-        """Return a real-time byte as it is, without an end and without an answer due but for the
-        banner of a reset; other lines as everywhere."""
+        """Return a real-time byte as it is, without a line end; only a reset has an answer, its
+        banner. Other lines are encoded as for all wires."""
         word, self._typed = line.strip(), True
         if word in ("?", "!", "~"):
             return word.encode()
@@ -1478,7 +1489,7 @@ class GrblTerminal(Terminal):
         return super().encode(word)
 
     def meaning(self, line: str) -> str:
-        """Explain errors, alarms, settings and reports."""
+        """Return the meaning of an error, alarm, setting or report."""
         if line == "ok" or line.startswith("error:"):
             self.due, self._homes = max(self.due - 1, 0), max(self._homes - 1, 0)
         self.ready = self.ready or _parse_report(line)
@@ -1525,5 +1536,5 @@ SWITCHES: Final = {
 
 
 def _switches(letters: str) -> str:
-    """Return words for the letters of `Pn:`."""
+    """Return the names of the switches for the letters of `Pn:`."""
     return ", ".join(SWITCHES.get(letter, f"limit of {letter}") for letter in letters)

@@ -33,7 +33,8 @@ BY_HAND = ("the spindle does not stop by itself: stop it",)
 
 
 def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
-    """Return the program; PostError names the move that cannot be written or done."""
+    """Return the program of a toolpath; PostError names the move that cannot be written or
+    done."""
     dialect = machine.dialect
     before = BY_HAND if machine.spindle.switched == "hand" else ()
 
@@ -82,8 +83,8 @@ def _words(event: Event, dialect: GrblDialect) -> tuple[str, ...]:
 
 
 def _change(event: Event, dialect: GrblDialect) -> tuple[str, ...]:
-    """Return a stop for another tool, spindle and coolant off; nothing for the tool that is
-    mounted before the program."""
+    """Return the blocks that stop for another tool, with spindle and coolant off; nothing for the
+    tool that is mounted before the program."""
     if event.mounted_before and dialect.tool_change != "pause":
         return ()
     if dialect.tool_change == "refuse":

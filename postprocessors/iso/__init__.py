@@ -44,12 +44,12 @@ class Iso(Target):
         check_machine(machine)
 
     def grade_of(self, machine: IsoMachine) -> Grade:
-        """Return what the machine's planner knows."""
+        """Return what is known of the machine's planner: the grade of its model."""
         planner = planner_of(machine)
         return machine.target.grade or ("path only" if planner is None else planner.grade)
 
     def stray_mm(self, machine: IsoMachine) -> float:
-        """Return the distance that lines may have from the arcs that they replace."""
+        """Return the greatest distance between arcs and the lines that replace them, mm."""
         arcs = machine.dialect.arcs
         replaced = arcs.form == "chords" or not arcs.helices
         return machine.defaults.fit_tolerance_mm if replaced else 0.0

@@ -41,7 +41,7 @@ _REMARK: Final = re.compile(r"[();]")
 
 
 def check_machine(machine: IsoMachine) -> None:
-    """Raise MachineError for the first thing that is wrong."""
+    """Raise MachineError for the first fault of a machine file."""
     _Check(machine).all()
 
 
@@ -127,7 +127,7 @@ class _Check:
             )
 
     def _letters(self) -> str:
-        """Return the letters of lengths that the writer uses."""
+        """Return the address letters under which the writer outputs lengths."""
         letters = "XYZ"
         form = self._dialect.arcs.form
         letters += {"radius": "R", "chords": ""}.get(form, "IJ")
@@ -277,7 +277,7 @@ class _Check:
             )
 
     def _check_words(self, key: str, template: str) -> None:
-        """Refuse a word that stands twice in a block."""
+        """Refuse a template in which a word stands twice."""
         letters, groups = set[str](), set[str]()
         for letter, number in _WORD.findall(template):
             if letter == "M" or (number.startswith("{") and letter == "G"):
@@ -296,7 +296,7 @@ class _Check:
             letters.add(letter)
 
     def _check_needs(self) -> None:
-        """Refuse a dialect that cannot say what the machine has."""
+        """Refuse a dialect that lacks words for what the machine has."""
         dialect, machine = self._dialect, self._machine
         events = dialect.events
         scaled = [
@@ -399,7 +399,7 @@ class _Check:
     # What is alike, and what must not appear
 
     def _check_apart(self) -> None:
-        """Refuse two events of the same blocks: the reader could not tell them apart."""
+        """Refuse two events with the same blocks: the reader could not tell them apart."""
         keys_of_blocks = dict[tuple[str, ...], str]()
         for each in event_patterns(self._dialect):
             blocks = tuple(pattern.pattern for pattern in each.lines)
@@ -440,7 +440,7 @@ class _Check:
     # As the reader takes it
 
     def _check_as_read(self) -> None:
-        """Refuse head and foot that the reader would not take, that cut, or that end the
+        """Refuse a head or foot that the reader would not accept, that cuts, or that ends the
         program."""
         dialect = self._dialect
         for key in ("head", "foot"):
@@ -460,7 +460,7 @@ class _Check:
             self._check_event(each)
 
     def _check_modes(self, lines: Sequence[str]) -> None:
-        """Refuse a head that leaves other modes than those in which programs are written."""
+        """Refuse a head that sets other modes than those in which programs are written."""
         complaint = contradiction_of(self._data(lines), self._machine)
         if complaint:
             self._fail(

@@ -32,7 +32,7 @@ class CycleWords(Struct):
 
 
 def cycles_of(dialect: IsoDialect) -> dict[int, CycleWords]:
-    """Return the cycles of a dialect, by their G code, tenfold."""
+    """Return the cycles of a dialect, keyed by ten times their G code."""
     cycles = {}
     for kind in KINDS:
         template: str = getattr(dialect.cycles, kind)
@@ -44,7 +44,8 @@ def cycles_of(dialect: IsoDialect) -> dict[int, CycleWords]:
 
 
 def cycle_code(template: str) -> int | None:
-    """Return the G code, tenfold, by which a template is known: that of 73 to 89; None without."""
+    """Return ten times the G code by which a template is recognised, one of 73 to 89; None without
+    such a code."""
     codes = [round(float(code) * 10.0) for code in re.findall(r"G(\d+(?:\.\d)?)", template)]
     return next((code for code in codes if 730 <= code < 900 and code != 800), None)
 
@@ -58,13 +59,13 @@ class HoleMoves(Struct, frozen=True):
     returns_high: bool
 
     def rapid(self, x: float, y: float, z: float) -> None:
-        """Go there as a rapid, if it is elsewhere."""
+        """Add a rapid to this place, unless the tool is there already."""
         place = self._part(x, y, z)
         if place != self.moves.path.position:
             self.moves.rapid(*place)
 
     def line(self, x: float, y: float, z: float) -> None:
-        """Go there at the feed."""
+        """Add a cut at the feed to this place."""
         self.moves.line(*self._part(x, y, z))
 
     def _part(self, x: float, y: float, z: float) -> tuple[float, float, float]:
@@ -72,7 +73,7 @@ class HoleMoves(Struct, frozen=True):
 
 
 def run_hole(hole: HoleMoves, cycle: CycleWords, at: tuple[float, float], height: float) -> None:
-    """Add the moves of one hole, to which the tool comes at a height."""
+    """Add the moves of one hole at `at`; the tool comes to it at Z `height`."""
     x, y = at
     bottom, level = cycle.values["z"], cycle.values["r"]
     out = max(height, level) if hole.returns_high else level
@@ -92,7 +93,8 @@ def run_hole(hole: HoleMoves, cycle: CycleWords, at: tuple[float, float], height
 
 
 def _peck(hole: HoleMoves, cycle: CycleWords, at: tuple[float, float]) -> None:
-    """Down by bites: out to R between them (G83), or back by a little (G73)."""
+    """Add the moves down to the bottom by pecks, with a retract to R between them (G83) or a short
+    one that breaks the chip (G73)."""
     x, y = at
     bottom, level, bite = cycle.values["z"], cycle.values["r"], cycle.values["q"]
     if (level - bottom) / bite > bounds.MAX_MOVES:

@@ -49,7 +49,7 @@ class KlipperModel(TimedModel):
     """Klipper's toolhead on a cartesian machine."""
 
     def planned(self, path: Toolpath, machine: _Machine) -> PlannedMoves:
-        """Return the moves as its look-ahead plans them."""
+        """Return the moves with the speeds that its look-ahead plans."""
         controller = machine.controller
         assert isinstance(controller, KlipperController)
         lines, row = with_chords(path, *_chords(path, controller.arc_resolution_mm))
@@ -62,7 +62,7 @@ class KlipperModel(TimedModel):
         return PlannedMoves(lines, row, length, acceleration, *speeds)
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """Return the assumptions of the times, a sentence each."""
+        """Return the assumptions behind the times, as sentences for the report."""
         controller = machine.controller
         assert isinstance(controller, KlipperController)
         return (
@@ -97,10 +97,10 @@ def look_ahead(
     controller: KlipperController,
 ) -> Floats:
     """Return (3, K) (mm/s)²: the squares of the speeds at the start, in the middle and at the end
-    of moves between two stops.
+    of each of K moves between two stops.
 
-    They come into a queue one by one; as soon as it holds enough time, its first moves are planned
-    with what is known by then.
+    Moves enter a queue one by one. As soon as the queue holds enough time, its first moves are
+    planned with what is known until then.
     """
     deviation, ratio = _junction_deviation_mm(controller), 1.0 - controller.minimum_cruise_ratio
     delta = 2.0 * length * acceleration
@@ -131,15 +131,15 @@ class _Queue:
         self.first = 0
 
     def join(self, k: int) -> None:
-        """Limit the speed at the start of move k by what came before it."""
+        """Limit the speed at the start of move k by the moves before it."""
         reached = self._start[k - 1] + self._delta[k - 1]
         start = min(self._limit[k], self._limit[k - 1], reached, self._corner[k])
         self._start[k] = start
         self._mcr_start[k] = min(start, self._mcr_start[k - 1] + self._mcr_delta[k - 1])
 
     def flush(self, high: int, *, lazy: bool = False) -> None:
-        """Plan the moves up to `high`, to a stop behind them; if `lazy`, only those before the
-        last peak of speed, which a move that is yet to come can hardly change.
+        """Plan the moves up to `high`, with a stop behind them. If `lazy`, plan only those before
+        the last peak of speed, which a later move can hardly change.
 
         A move cannot accelerate where the speed at its start is limited only by what the moves
         behind it can brake: such moves wait for the peak of an earlier one. `mcr`: the same plan
@@ -175,14 +175,14 @@ class _Queue:
 
 
 def _junction_deviation_mm(controller: KlipperController) -> float:
-    """Return δ of the square corner velocity."""
+    """Return the junction deviation δ that belongs to the square corner velocity, mm."""
     square = controller.square_corner_velocity_mm_s**2
     return square * (math.sqrt(2.0) - 1.0) / controller.max_accel_mm_s2
 
 
 def corners(unit: Floats, delta: Floats, acceleration: Floats, deviation_mm: float) -> Floats:
-    """Return (K,) (mm/s)²: the highest speed at the start of each move that its corner with the
-    one before allows; the first one's is 0, and inf where two are straight on."""
+    """Return (K,) (mm/s)²: the square of the highest speed at the start of each move that the
+    corner with the move before allows; 0 for the first move, inf where two moves are collinear."""
     result = np.full(len(unit), np.inf)
     result[:1] = 0.0
     cosine = -(unit[1:] * unit[:-1]).sum(axis=1)
@@ -199,7 +199,8 @@ def corners(unit: Floats, delta: Floats, acceleration: Floats, deviation_mm: flo
 
 
 def _chords(path: Toolpath, resolution_mm: float) -> tuple[Ints, Floats]:
-    """Return how many moves each row is (N,), and the ends (P, 3) of all but their last ones."""
+    """Return the number of moves that each row becomes (N,), and the ends (P, 3) mm of all but the
+    last move of each row."""
     counts = np.ones(len(path), dtype=np.int64)
     arcs = np.flatnonzero(path.is_arc)
     begin, end, centre = path.starts_of(arcs), path.end[arcs], path.centre[arcs]

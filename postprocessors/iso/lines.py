@@ -48,7 +48,8 @@ class OperatorMessage(Struct, frozen=True):
 
 
 def items_of(data: bytes, machine: IsoMachine) -> Iterator[Block | OperatorMessage]:
-    """Yield the blocks and messages of a program; ProgramError where a line is none."""
+    """Yield the blocks and messages of a program; ProgramError at the first line that is
+    neither."""
     bounds.check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     check_ascii(data)
     dialect: IsoDialect = machine.dialect
@@ -82,7 +83,7 @@ def items_of(data: bytes, machine: IsoMachine) -> Iterator[Block | OperatorMessa
 
 
 def fail(fault: LineFault, index: int, line: int) -> NoReturn:
-    """Raise the ProgramError of a fault, with its place."""
+    """Raise ProgramError for a fault in this line and block."""
     column = fault.at + 1 if isinstance(fault.at, int) else 1
     where = f"block {index + 1}, line {line + 1}, column {column}"
     raise ProgramError(fault.message, where=where, mend=fault.mend) from None
@@ -111,7 +112,7 @@ def _without_comments(raw: str, dialect: IsoDialect) -> str:
 
 
 def _message_pattern(dialect: IsoDialect) -> re.Pattern[str] | None:
-    """Return the pattern of messages; None where these look like comments."""
+    """Return the pattern of messages; None where messages look like comments."""
     template = dialect.events.message
     if "".join(template.replace("{text}", "").split()) in ("", "()", ";"):
         return None
@@ -132,7 +133,8 @@ class EventPattern(Struct, frozen=True):
     fields: tuple[tuple[str, str], ...]
 
     def values(self, texts: Sequence[str]) -> list[str] | None:
-        """Return the texts of the fields, in order; None where these blocks are others."""
+        """Return the texts of the template's fields, in order; None if these blocks do not match
+        the template."""
         found_values = list[str]()
         for pattern, text in zip(self.lines, texts, strict=True):
             match = pattern.fullmatch(text)
@@ -143,7 +145,7 @@ class EventPattern(Struct, frozen=True):
 
 
 def pattern_of(template: str) -> tuple[re.Pattern[str], list[tuple[str, str]]]:
-    """Return the pattern of a template, without blanks, and the fields of it."""
+    """Return the pattern of a template, without blanks, and its fields."""
     packed = "".join(template.split())
     fields = [
         (field[2], field[1] or "")
@@ -158,7 +160,8 @@ def _with_gaps(template: str) -> str:
 
 
 def event_patterns(dialect: IsoDialect) -> list[EventPattern]:
-    """Return the patterns of all events: those of more blocks first, and of fewer fields."""
+    """Return the patterns of all events: those of more blocks first, then those with fewer
+    fields."""
     patterns = []
     for key in EVENT_KEYS:
         templates: tuple[str, ...] = getattr(dialect.events, key)
@@ -185,7 +188,7 @@ EVENT_KEYS: Final = (
 
 
 def _variants(key: str, templates: Sequence[str]) -> Iterator[Sequence[str]]:
-    """Yield the blocks of an event, and those of a spindle whose speed is not said."""
+    """Yield the blocks of an event; for a spindle also those in which its speed is not given."""
     if not templates:
         return
     yield templates
@@ -201,13 +204,14 @@ FEED_MODES: Final = {"per-minute": "G94", "per-revolution": "G95", "inverse-time
 
 
 def with_modes(template: str, dialect: IsoDialect) -> str:
-    """Return a template of head or foot with its modes; its number stays a field."""
+    """Return a template of the head or foot with its modes filled in; the program's number remains
+    a field."""
     template = template.replace("{units}", dialect.unit.word)
     return template.replace("{feeds}", FEED_MODES[dialect.feeds.mode])
 
 
 def speed_field(dialect: IsoDialect) -> tuple[str, float | None]:
-    """Return the field that says the spindle's speed, and its value at `spindle.max_rpm`."""
+    """Return the field that gives the spindle's speed, and its value at `spindle.max_rpm`."""
     templates = " ".join((*dialect.events.spindle_cw, *dialect.events.spindle_ccw))
     for name, scale in SPEED_SCALES.items():
         if f"{{{name}}}" in templates:

@@ -70,7 +70,7 @@ class MarlinModel(TimedModel):
     """Marlin's planner on a cartesian machine."""
 
     def planned(self, path: Toolpath, machine: _Machine) -> PlannedMoves:
-        """Return the moves as its ring of blocks plans them."""
+        """Return the moves with the speeds that its ring buffer of blocks plans."""
         controller = machine.controller
         assert isinstance(controller, MarlinController)
         lines, row = with_chords(path, *_chords(path, controller))
@@ -96,7 +96,7 @@ class MarlinModel(TimedModel):
         return PlannedMoves(lines, row, length, acceleration, entry, peak, exit, extra_s)
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """Return the assumptions of the times, a sentence each."""
+        """Return the assumptions behind the times, as sentences for the report."""
         controller = machine.controller
         assert isinstance(controller, MarlinController)
         corner = f"a junction deviation of {controller.junction_deviation_mm:g} mm (M205 J)"
@@ -112,15 +112,15 @@ class MarlinModel(TimedModel):
 
 
 def _nearest_steps(path: Toolpath, machine: _Machine) -> Ints:
-    """Return (M + 1, 3) steps: the start and all ends, halves away from zero."""
+    """Return (M + 1, 3) steps: the start and all ends of moves, halves rounded away from zero."""
     scaled = np.concatenate([path.start[None, :], path.end]) / coded_steps_mm(machine)
     nearest = np.copysign(np.floor(np.abs(scaled) + 0.5), scaled)
     return np.asarray(nearest.astype(np.int64))
 
 
 def kept_steps(steps: Ints, min_steps: int) -> Ints:
-    """Return (M + 1, 3) where the machine is after each move: one of fewer than `min_steps` steps
-    of every axis is dropped, and the next one begins where it began."""
+    """Return (M + 1, 3) the position after each move, in steps: a move of fewer than `min_steps`
+    steps on every axis is dropped, and the next one begins where it began."""
     travel = np.abs(np.diff(steps, axis=0)).max(axis=1, initial=0)
     if not ((travel > 0) & (travel < min_steps)).any():
         return steps
@@ -134,9 +134,9 @@ def kept_steps(steps: Ints, min_steps: int) -> Ints:
 
 
 def slowed(length: Floats, speed: Floats, controller: MarlinController) -> Floats:
-    """Return the speeds (K,) mm/s of the moves behind a stop: those that come while the buffer is
-    less than half full, and are short, get more time (SLOWDOWN). Moves come faster than they are
-    cut, so that each finds as many before it as there are."""
+    """Return the speeds (K,) mm/s of the moves after a stop. Short moves that come while the
+    buffer is less than half full are slowed down (SLOWDOWN). Moves are assumed to come faster than
+    they are executed, so that the buffer holds all moves before each."""
     ahead = np.arange(2, min(len(speed), controller.buffer_blocks // 2))
     own_s = length[ahead] / speed[ahead]
     missing_s = np.maximum(controller.min_segment_ms / 1000.0 - own_s, 0.0)
@@ -149,7 +149,7 @@ def _limits(
     length: Floats, unit: Floats, events: Floats, machine: _Machine
 ) -> tuple[Floats, Floats]:
     """Return the highest speed (M,) mm/s that the axes allow, and the acceleration (M,) mm/s² of
-    each move; that is made of whole steps/s² of the axis with the most steps."""
+    each move, which is a whole number of steps/s² of the axis with the most steps."""
     controller = machine.controller
     assert isinstance(controller, MarlinController)
     moves = length > 0.0
@@ -172,7 +172,7 @@ def _limits(
 def _corners(
     length: Floats, unit: Floats, speed: Floats, acceleration: Floats, machine: _Machine
 ) -> Floats:
-    """Return (K,) mm/s: the highest speed at the start of each move, 0 for the first one."""
+    """Return (K,) mm/s: the highest speed at the start of each move, 0 for the first."""
     controller = machine.controller
     assert isinstance(controller, MarlinController)
     if controller.classic_jerk_mm_s is not None:
@@ -195,7 +195,7 @@ def _corners(
 
 
 def _angles(cosine: Floats) -> Floats:
-    """Return (K,) rad: the angles of these cosines, 0 to 1, as its table has them."""
+    """Return the angles (K,) rad of cosines from 0 to 1, as Marlin's table approximates them."""
     share = 1.0 - np.append(0.5 ** np.arange(ANGLE_PARTS), 1e-6)
     angle = np.arccos(share) * ANGLE_FACTOR
     angle[0], angle[-1] = 0.5 * math.pi, math.acos(share[-1])
@@ -207,8 +207,8 @@ def _angles(cosine: Floats) -> Floats:
 
 
 def jerk_corners(unit: Floats, speed: Floats, jerk_mm_s: tuple[float, float, float]) -> Floats:
-    """Return (K,) mm/s: the highest speed at the start of each move by classic jerk; at the first
-    one the speed to which it may jump, which Marlin does not use: it begins at rest.
+    """Return (K,) mm/s: the highest speed at the start of each move by classic jerk; for the first
+    the speed to which it may jump, which Marlin does not use: it begins at rest.
 
     The corner is passed at the lower speed of both moves, times the factor by which no axis
     changes its speed by more than its jerk; or at the safe speeds of both, at which the machine
@@ -247,10 +247,10 @@ class _Rates(Struct, frozen=True, eq=False):
     down: Floats
 
     def seconds(self) -> Floats:
-        """Return (K,) s: how long each block takes.
+        """Return (K,) seconds that each block takes.
 
-        The stepper waits a step at the rate that it has reached before, first twice at the rate of
-        the start. So a ramp from a low rate takes longer than its integral, and one to a low rate
+        The stepper times each step by the rate reached before it, the first two by the rate of the
+        start. So a ramp from a low rate takes longer than its integral, and one to a low rate
         shorter. The `EXACT` slowest steps of each ramp are added up one by one.
         """
         waits = np.minimum(self.up, self.events - 1.0)
@@ -276,8 +276,8 @@ class _Rates(Struct, frozen=True, eq=False):
 
 
 def _rates(plan: SpeedPlan, squares: Floats, events: Floats, min_step_hz: float) -> _Rates:
-    """Return the blocks as `calculate_trapezoid_for_block` makes them: whole rates, not below
-    `min_step_hz` at their ends."""
+    """Return the step rates of blocks as `calculate_trapezoid_for_block` computes them: whole
+    numbers, not below `min_step_hz` at the ends."""
     per_mm = events / plan.length_mm
     nominal = np.ceil(plan.speed_mm_s * per_mm)
     first, last = (
@@ -294,7 +294,8 @@ def _rates(plan: SpeedPlan, squares: Floats, events: Floats, min_step_hz: float)
 
 
 def _chords(path: Toolpath, controller: MarlinController) -> tuple[Ints, Floats]:
-    """Return how many moves each row is (N,), and the ends (P, 3) of all but their last ones."""
+    """Return the number of moves that each row becomes (N,), and the ends (P, 3) mm of all but the
+    last move of each row."""
     counts = np.ones(len(path), dtype=np.int64)
     arcs = np.flatnonzero(path.is_arc)
     begin, end, centre = path.starts_of(arcs), path.end[arcs], path.centre[arcs]
@@ -323,7 +324,7 @@ def _chords(path: Toolpath, controller: MarlinController) -> tuple[Ints, Floats]
 
 
 def _turns(clockwise: Bools, arm: Floats, aim: Floats, begin: Floats, end: Floats) -> Floats:
-    """Return (J,) rad that arcs turn by, CCW positive."""
+    """Return the angles (J,) rad by which arcs turn, CCW positive."""
     cross = arm[:, 0] * aim[:, 1] - arm[:, 1] * aim[:, 0]
     turn = np.arctan2(cross, (arm * aim).sum(axis=1))
     turn = np.where(clockwise & (turn > 0.0), turn - 2.0 * np.pi, turn)

@@ -68,7 +68,7 @@ PLANNERS: Final[Mapping[str, Planner]] = {
 
 
 def controller_records() -> tuple[type[SlideStart], ...]:
-    """Return the records that `[controller]` may be, besides that of the exact path."""
+    """Return the records that `[controller]` may be read into, besides that of the exact path."""
     return tuple(planner.record for planner in PLANNERS.values())
 
 
@@ -85,8 +85,8 @@ def model_of(machine: AnyMachine) -> ControllerModel[Any, Any]:
 
 
 def seconds_of(toolpath: Toolpath, machine: AnyMachine) -> Floats | None:
-    """Return (N,) s that the controller takes for each row; None where nobody knows, or nobody
-    asks."""
+    """Return (N,) seconds that the controller takes for each row; None where no planner gives them
+    or they are not asked for."""
     if machine.dialect.comments.show in ("none", "header"):
         return None
     with suppress(CamtoolError):
@@ -102,19 +102,20 @@ class PlannedModel(ControllerModel[Any, Any]):
         return model_of(machine).run(toolpath, machine, options)
 
     def interpolation(self, toolpath: Toolpath, machine: AnyMachine, options: Options) -> str:
-        """Return the planner's word for the report."""
+        """Return the planner's name for its interpolation."""
         return model_of(machine).interpolation(toolpath, machine, options)
 
     def quantised(self, toolpath: Toolpath, machine: AnyMachine) -> Toolpath:
-        """Return the moves as the planner rounds them."""
+        """Return the toolpath with its places as the planner rounds them."""
         return model_of(machine).quantised(toolpath, machine)
 
     def spacing_mm(self, toolpath: Toolpath, machine: AnyMachine) -> float:
-        """Return the distance of its samples."""
+        """Return the distance between the planner's samples, mm."""
         return model_of(machine).spacing_mm(toolpath, machine)
 
     def seconds(self, toolpath: Toolpath, machine: AnyMachine) -> Floats | None:
-        """Return (N,) s that each row takes, where the planner knows it without the motion."""
+        """Return (N,) seconds that each row takes; None where the planner does not know them
+        without the motion."""
         return model_of(machine).seconds(toolpath, machine)
 
     def assumptions(self, toolpath: Toolpath, machine: AnyMachine) -> tuple[str, ...]:
@@ -124,11 +125,11 @@ class PlannedModel(ControllerModel[Any, Any]):
     def findings(
         self, toolpath: Toolpath, machine: AnyMachine, options: Options
     ) -> tuple[Finding, ...]:
-        """Return what only the planner can find."""
+        """Return the findings of the planner itself."""
         return model_of(machine).findings(toolpath, machine, options)
 
     def fused_run(
         self, toolpath: Toolpath, machine: AnyMachine, options: Options
     ) -> FusedRun | None:
-        """Return the planner's fused run, if it has one."""
+        """Return the planner's fused run; None if it has none."""
         return model_of(machine).fused_run(toolpath, machine, options)

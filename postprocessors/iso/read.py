@@ -97,12 +97,14 @@ Point = tuple[float, float, float]
 
 
 def read_program(data: bytes, machine: IsoMachine) -> Toolpath:
-    """Return the moves of a program; ProgramError with block, line and column."""
+    """Return the moves of a program; ProgramError with block, line and column for data that are no
+    program."""
     return _Reader(machine).read(data)
 
 
 def contradiction_of(data: bytes, machine: IsoMachine) -> str:
-    """Return what modes these blocks leave that the dialect's own words contradict; "" if none."""
+    """Return the first mode that these blocks leave in contradiction to the dialect's own words,
+    as text; "" if there is none."""
     reader = _Reader(machine)
     before = replace(reader._modes)
     reader.read(data)
@@ -118,7 +120,7 @@ def contradiction_of(data: bytes, machine: IsoMachine) -> str:
 
 
 def listing_of(data: bytes, machine: IsoMachine) -> Listing:
-    """Return the blocks of a program, as `read_program` counts them."""
+    """Return the blocks of a program, counted as `read_program` does."""
     blocks = (item for item in items_of(data, machine) if isinstance(item, Block))
     return Listing(tuple(block.text.strip() for block in blocks))
 
@@ -194,7 +196,7 @@ class _Reader:
     # The program as a whole
 
     def read(self, data: bytes) -> Toolpath:
-        """Read the program and return its moves, which hold the findings about it."""
+        """Read the program and return its moves, which hold the findings on it."""
         items = list(items_of(data, self._machine))
         if not any(isinstance(item, Block) for item in items):
             raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
@@ -237,7 +239,8 @@ class _Reader:
     # Events
 
     def _event(self, items: list[Block | OperatorMessage], k: int) -> int:
-        """Read the blocks of an event, and return how many they are; 0 where there is none."""
+        """Read the blocks of an event from item k on, and return their number; 0 where no event
+        begins."""
         first = items[k]
         assert isinstance(first, Block)
         packed = first.packed
@@ -261,7 +264,7 @@ class _Reader:
                 self._words(block)
 
     def _add_event(self, event: EventPattern, texts: list[str]) -> None:
-        """Add the row of an event with the texts of its fields."""
+        """Add the row of an event whose fields have these texts."""
         kind, modes = EVENTS[event.key], self._modes
         values = {
             name: self._number(letter, text)
@@ -285,13 +288,13 @@ class _Reader:
             self.path.event(kind)
 
     def _speed(self, value: float) -> float:
-        """Return rev/min of what a program says."""
+        """Return a spindle speed as the program gives it, in rev/min."""
         if self._speed_scale is None:
             return value
         return value / self._speed_scale * (self._machine.spindle.max_rpm or math.nan)
 
     def _switch_spindle(self) -> None:
-        """Add the row of the spindle as it turns now."""
+        """Add the row of the spindle's current direction and speed."""
         modes = self._modes
         kind = SPINDLE[modes.spindle]
         if kind == Kind.SPINDLE_OFF:
@@ -312,7 +315,7 @@ class _Reader:
         return value / 10.0**decimals
 
     def _words(self, block: Block) -> list[_Word]:
-        """Return the words of a block; LineFault where it is no row of words."""
+        """Return the words of a block; LineFault where it is not a row of words."""
         words, at = list[_Word](), 0
         text = block.text.rstrip()
         while at < len(text):
@@ -334,7 +337,7 @@ class _Reader:
         return words
 
     def _block(self, block: Block) -> int:
-        """Read a row of words; the number of blocks that were read, 1."""
+        """Execute a block of words; return the number of blocks read, 1."""
         is_fixed = any(pattern.fullmatch(block.packed) for pattern in self._fixed)
         if is_fixed and not _is_row_of_words(block.text):
             return 1
@@ -366,12 +369,12 @@ class _Reader:
         return x, y, z
 
     def to_part(self, place: Point) -> Point:
-        """Return a place of the program in the frame of the part."""
+        """Return a place of the program's coordinates in the frame of the part."""
         x, y, z = (value + shift for value, shift in zip(place, self._shift, strict=True))
         return x, y, z
 
     def _home(self, axes: str) -> None:
-        """Go to machine zero with these axes."""
+        """Add the row that sends these axes to machine zero."""
         x, y, z = self.path.position
         zero = self._zero
         self._moves.moved = True
@@ -399,7 +402,7 @@ class _Execution:
             self._sort(word)
 
     def _sort(self, word: _Word) -> None:
-        """Put a word to those of its kind."""
+        """Put a word into the group of its kind."""
         if word.letter == "G":
             code = round(word.value * 10.0)
             group = GROUPS.get(code)
@@ -470,7 +473,7 @@ class _Execution:
         return self._values[letter].value
 
     def _length(self, letter: str) -> float:
-        """Return the number of a word as mm."""
+        """Return the number of a word in mm."""
         return self._take(letter) * (25.4 if self._modes.inches else 1.0)
 
     def _take_feed(self) -> None:
@@ -527,7 +530,7 @@ class _Execution:
             modes.returns_high = codes["return of cycles"] == 980
 
     def _set_frame(self, code: int) -> None:
-        """Take another work frame: before the first move it is that of the part."""
+        """Select another work frame; the one selected before the first move is the part's."""
         modes, reader, places = self._modes, self._reader, self._dialect.work_offsets_mm
         if reader._moves.moved:
             names = [f"G{each // 10}" for each in (modes.frame, code)]
@@ -561,7 +564,7 @@ class _Execution:
         return "".join(axis for axis in "XYZ" if axis in self._values)
 
     def _target(self) -> Point:
-        """Return where the axis words lead, in the coordinates of the program."""
+        """Return the place to which the axis words lead, in the coordinates of the program."""
         place = list(self._reader.position)
         for k, axis in enumerate("XYZ"):
             if axis in self._values:
@@ -570,7 +573,7 @@ class _Execution:
         return place[0], place[1], place[2]
 
     def _go_home(self) -> None:
-        """G28: by way of a point, to machine zero."""
+        """Execute G28: go to machine zero by way of a point."""
         reader, axes = self._reader, self._axes()
         if axes:
             via = self._target()
@@ -612,7 +615,7 @@ class _Execution:
         self._arc(target, ccw=motion == ARC_CCW)
 
     def _set_feed(self, length_mm: float) -> None:
-        """Set the feed of the next move, mm/min, by the mode of feeds."""
+        """Set the feed of the next move, of `length_mm`, in mm/min, by the mode of feeds."""
         modes, reader = self._modes, self._reader
         feed = modes.feed
         if modes.feed_mode == 930:
@@ -628,7 +631,7 @@ class _Execution:
         reader._moves.feed = feed
 
     def _go_in_machine_frame(self, axes: str) -> None:
-        """G53: coordinates of the machine."""
+        """Execute G53: go to coordinates of the machine frame."""
         reader = self._reader
         values = {axis: self._length(axis) for axis in axes}
         place = list(reader.path.position)
@@ -742,7 +745,7 @@ class _Execution:
         self._modes.cycle = CycleWords(cycle.kind, cycle.letters, {})
 
     def _hole(self, code: int) -> None:
-        """A hole of the cycle in force."""
+        """Execute a block of the cycle in force: update its values and drill one hole."""
         modes, reader, cycle = self._modes, self._reader, self._modes.cycle
         assert cycle is not None
         if reader._moves.plane != 170:
@@ -779,14 +782,14 @@ class _Execution:
 
 
 def _agree(event: EventPattern, texts: list[str]) -> bool:
-    """Return True if fields of the same name, such as the tool and its length, have the same
+    """Return True if fields with the same name, such as the tool and its length, have the same
     text."""
     pairs = {(name, text) for (name, _), text in zip(event.fields, texts, strict=True)}
     return len(pairs) == len({name for name, _ in pairs})
 
 
 def _is_known(word: _Word, cycles: dict[int, CycleWords]) -> bool:
-    """Return True if a code means something by itself."""
+    """Return True if a code has a meaning by itself."""
     if word.letter == "M":
         return word.value in KNOWN_M
     code = round(word.value * 10.0)
@@ -800,7 +803,7 @@ def _is_row_of_words(text: str) -> bool:
 
 
 def _explain(text: str) -> str:
-    """Return why no word begins here."""
+    """Return the reason why no word begins here."""
     sign = text[:1]
     signs = {
         "#": "a parameter, which this dialect has not",

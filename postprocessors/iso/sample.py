@@ -46,11 +46,11 @@ class _Line(Struct, frozen=True):
     words: list[tuple[str, str]]
 
     def number(self, letter: str) -> float | None:
-        """Return the number of a letter; None where the block has none."""
+        """Return the number behind a letter; None where the block does not have it."""
         return next((float(text) for own, text in self.words if own == letter), None)
 
     def codes(self, letter: str) -> list[float]:
-        """Return the codes of G or M."""
+        """Return the numbers of all G or M codes in the block."""
         return [float(text) for own, text in self.words if own == letter]
 
     @property
@@ -66,18 +66,18 @@ class _Sample(Struct):
     questions: list[OpenKey] = field(default_factory=list)
 
     def say(self, key: str, value: float | int | str | Sequence[str], reason: str) -> None:
-        """Note a value and what shows it."""
+        """Record the value of a key and what in the program shows it."""
         self.settings.append(ControllerSetting(key, value, reason))
 
     def ask(self, key: str, text: str, default: float | int | str, *choices: str) -> None:
-        """Note a question."""
+        """Record a question that the program leaves open, with its default and choices."""
         is_list = key.startswith("dialect.events.")
         self.questions.append(OpenKey(key, text, default, choices, is_list))
 
 
 def sampled_dialect(data: bytes) -> SampledDialect:
-    """Return the keys that a program shows, and those that it leaves open; ProgramError for what
-    is no program of G-code."""
+    """Return the keys that a program shows, and the questions that it leaves open; ProgramError
+    for data that are no program in G-code."""
     text = data.decode("latin-1")
     sample = _Sample()
     lines = list(_lines(text))
@@ -113,7 +113,8 @@ def _lines(text: str) -> Iterator[_Line]:
 
 
 def _motions(lines: Sequence[_Line]) -> list[tuple[int, int]]:
-    """Return (index, code) of the blocks that move: those with axes while G0 to G3 is in force."""
+    """Return (index, code) of the blocks that move: those with axis words while G0 to G3 is in
+    force."""
     motion, moves = -1, []
     for index, line in enumerate(lines):
         codes = line.codes("G")
@@ -232,7 +233,8 @@ def _has(lines: Sequence[_Line], letter: str, code: float) -> bool:
 
 
 def _see_arcs(lines: Sequence[_Line], sample: _Sample) -> None:
-    """Tell offsets from centres by the radii at start and end, and see circles and helices."""
+    """Distinguish offsets from centres by the radii at start and end of arcs, and recognise full
+    circles and helices."""
     place, motion = {"X": 0.0, "Y": 0.0, "Z": 0.0}, 0.0
     misses = {"offsets": 0.0, "centre": 0.0}
     by_radius = by_centre = circles = helices = 0
@@ -293,7 +295,8 @@ def _or(value: float | None, default: float) -> float:
 def _see_frame(
     lines: Sequence[_Line], motions: Sequence[tuple[int, int]], sample: _Sample
 ) -> None:
-    """Blocks before the first move and behind the last one, without events."""
+    """Record units and mode of feeds, the blocks before the first move (head) and those behind the
+    last one (foot), without events."""
     inches = _has(lines, "G", 20.0)
     sample.say(
         "dialect.program.units", "in" if inches else "mm", "G20" if inches else "no G20 is there"
@@ -324,8 +327,8 @@ _UNITS: Final = {
 
 
 def _without_events(line: _Line) -> str:
-    """Return a block of head or foot; "" for one that starts, stops or changes something that has
-    a key of its own."""
+    """Return a block of the head or foot as text; "" for a block that starts, stops or changes
+    something that has a key of its own."""
     if any(code in (2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 30.0) for code in line.codes("M")):
         return ""
     codes = line.codes("G")
@@ -340,7 +343,7 @@ def _without_events(line: _Line) -> str:
 
 
 def _see_events(lines: Sequence[_Line], sample: _Sample) -> None:
-    """Blocks that switch spindle and coolant, change tools, and wait."""
+    """Record the blocks that switch spindle and coolant, change tools, and wait."""
     starts = {}
     for code, key in ((3.0, "spindle_cw"), (4.0, "spindle_ccw")):
         block = next((line for line in lines if code in line.codes("M")), None)
@@ -419,7 +422,7 @@ def _ask_dwell(sample: _Sample) -> None:
 
 
 def _see_cycles(lines: Sequence[_Line], sample: _Sample) -> None:
-    """Cycles of holes, whose letters are those of the block that begins them."""
+    """Record the cycles of holes, with the letters of the block that begins each."""
     names = {"X": "{x}", "Y": "{y}", "Z": "{z}", "R": "{r}", "Q": "{q}", "F": "{f}", "P": "{ms}"}
     has_drill = False
     for code, kind in _CYCLES.items():
@@ -446,7 +449,7 @@ def _see_cycles(lines: Sequence[_Line], sample: _Sample) -> None:
 
 
 def _ask_what_is_open(sample: _Sample) -> None:
-    """Questions that no program answers."""
+    """Ask the questions that programs do not answer."""
     values = {each.key: each.value for each in sample.settings}
     if values.get("dialect.words.point") == "always":
         sample.ask(

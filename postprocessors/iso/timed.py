@@ -53,7 +53,7 @@ class PlannedMoves(Struct, frozen=True, eq=False):
     extra_s: Floats | None = None
 
     def ramps_s(self) -> Floats:
-        """Return (3, M) s: how long each accelerates, cruises and brakes."""
+        """Return (3, M) seconds that each move accelerates, cruises and brakes."""
         moves = self.length > 0.0
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             first = (self.peak - self.entry) / self.acceleration
@@ -63,7 +63,7 @@ class PlannedMoves(Struct, frozen=True, eq=False):
         return np.where(moves, [first, steady, last], 0.0)
 
     def seconds(self) -> Floats:
-        """Return (M,) s that each move takes."""
+        """Return (M,) seconds that each move takes."""
         seconds = np.asarray(self.ramps_s().sum(axis=0))
         return seconds if self.extra_s is None else seconds + self.extra_s
 
@@ -73,22 +73,23 @@ class TimedModel(ControllerModel[Any, Any]):
 
     @abstractmethod
     def planned(self, path: Toolpath, machine: _Machine) -> PlannedMoves:
-        """Return the moves of a program up to its end, in its order."""
+        """Return the moves of a program up to its end, in order, with their speeds."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """Yield the motion; ProgramError, which names the block, for rows that cannot be
+        """Yield the motion in chunks; ProgramError, which names the block, for rows that cannot be
         followed."""
         path = self._to_end(toolpath, machine)
         mechanics = Mechanics(machine, path.start, options.effects)
         return row_chunks(self._sampled(path, machine), mechanics, options.chunk_steps)
 
     def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
-        """Return (N,) s that each row takes."""
+        """Return (N,) seconds that each row takes."""
         blocks = self._sampled(self._to_end(toolpath, machine), machine)
         return row_seconds(blocks, len(toolpath))
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
-        """Return a coded step, or more where the program would have too many samples."""
+        """Return the distance between samples, mm: a coded step, or more where the program would
+        have too many samples."""
         return sample_spacing_mm(toolpath, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
@@ -129,7 +130,7 @@ class MoveSamples(CountedSamples):
         self.first = self.first[np.searchsorted(row, np.arange(rows + 1))]
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Return row and position of the samples low:high."""
+        """Return the row and the position of each of the samples low:high."""
         move, points = super().window(low, high)
         for axis, step in enumerate(self._step_mm):
             points[:, axis] = to_steps(points[:, axis], step) * step
@@ -137,10 +138,11 @@ class MoveSamples(CountedSamples):
 
 
 def with_chords(path: Toolpath, counts: Ints, inner: Floats) -> tuple[Toolpath, Ints]:
-    """Return the toolpath with lines in place of its arcs, and the row (M,) of each move.
+    """Return the toolpath with lines in place of its arcs, and the given row (M,) of each of its
+    moves.
 
-    `counts` (N,) moves of each row, at least 1; `inner` (M − N, 3) mm: the ends of all moves but
-    the last one of each row, in order.
+    `counts` (N,): the number of moves that each row becomes, at least 1; `inner` (M − N, 3) mm:
+    the ends of all but the last move of each row, in order.
     """
     row = np.repeat(np.arange(len(path)), counts)
     end = path.end[row]
@@ -155,15 +157,16 @@ def with_chords(path: Toolpath, counts: Ints, inner: Floats) -> tuple[Toolpath, 
 
 def profile(plan: SpeedPlan, squares: Floats) -> Floats:
     """Return (3, K) mm/s: the speeds at the start, at the peak and at the end of each move of a
-    plan, with the `squares` (K + 1,) of its method."""
+    plan. `squares` (K + 1,): the squares of the speeds at the ends of moves, from one of the
+    plan's methods."""
     first, last = np.sqrt(squares[:-1]), np.sqrt(squares[1:])
     reach = plan.acceleration_mm_s2 * plan.length_mm + 0.5 * (first**2 + last**2)
     return np.stack([first, np.minimum(plan.speed_mm_s, np.sqrt(reach)), last])
 
 
 def directions(path: Toolpath) -> tuple[Floats, Floats]:
-    """Return the lengths (M,) mm of straight moves, 0 of events and of moves below
-    `MIN_MOVE_MM`, and unit vectors (M, 3), 0 where the length is."""
+    """Return the lengths (M,) mm of straight moves, 0 for events and moves below `MIN_MOVE_MM`;
+    and their unit vectors (M, 3), 0 where the length is 0."""
     travel = np.diff(path.end, axis=0, prepend=path.start[None, :])
     length = np.sqrt((travel**2).sum(axis=1))
     moves = length >= MIN_MOVE_MM
@@ -172,8 +175,8 @@ def directions(path: Toolpath) -> tuple[Floats, Floats]:
 
 
 def sections(moving: Ints, stops: Bools) -> Iterator[Ints]:
-    """Yield the indices `moving` (K,) in parts between which the machine stands: `stops` (M,) are
-    the rows at which it does."""
+    """Yield the indices `moving` (K,) in sections between stops; `stops` (M,): a mask of the rows
+    at which the machine stands still."""
     passed = np.concatenate([[0], np.cumsum(stops)])[moving]
     for part in np.split(moving, np.flatnonzero(np.diff(passed)) + 1):
         if len(part):

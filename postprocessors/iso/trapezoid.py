@@ -36,7 +36,7 @@ class TrapezoidModel(TimedModel):
     """Trapezoids of speed along the programmed moves."""
 
     def interpolation(self, *_: object) -> str:
-        """Return "path": nothing is interpolated."""
+        """Return "path": lines and arcs are followed exactly."""
         return "path"
 
     def planned(self, path: Toolpath, machine: _Machine) -> PlannedMoves:
@@ -55,7 +55,7 @@ class TrapezoidModel(TimedModel):
         return PlannedMoves(path, np.arange(len(path)), length, acceleration, *speeds)
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """Return the assumptions of the times, a sentence each."""
+        """Return the assumptions behind the times, as sentences for the report."""
         corner = machine.controller.corner_mm_s
         return (
             "the controller follows every line and arc exactly, at even accelerations",
@@ -64,7 +64,7 @@ class TrapezoidModel(TimedModel):
 
 
 def _tangents(path: Toolpath, length: Floats) -> tuple[Floats, Floats]:
-    """Return unit vectors (N, 3) at the beginning and at the end of each move."""
+    """Return the unit tangents (N, 3) at the start and at the end of each move."""
     _, chord = directions(path)
     begins, ends = chord.copy(), chord.copy()
     arcs = np.flatnonzero(path.is_arc & (length > 0.0))
@@ -82,7 +82,7 @@ def _tangents(path: Toolpath, length: Floats) -> tuple[Floats, Floats]:
 
 def _limits(path: Toolpath, unit: Floats, machine: _Machine) -> tuple[Floats, Floats]:
     """Return the highest speed (N,) mm/s and the acceleration (N,) mm/s² of each move. An arc
-    keeps the limits of the slower of X and Y all along."""
+    keeps the limits of the slower of X and Y throughout."""
     rate = axis_limits(machine, "max_rate_mm_min") / 60.0
     acceleration = axis_limits(machine, "acceleration_mm_s2")
     rapid = machine.limits.rapid_mm_min or np.inf
@@ -99,7 +99,7 @@ def _limits(path: Toolpath, unit: Floats, machine: _Machine) -> tuple[Floats, Fl
 
 
 def _corners(begins: Floats, ends: Floats, corner_mm_s: float) -> Floats:
-    """Return (K,) mm/s: the highest speed at the start of each move; 0 for the first one."""
+    """Return (K,) mm/s: the highest speed at the start of each move; 0 for the first."""
     cosine = np.clip((begins[1:] * ends[:-1]).sum(axis=1), -1.0, 1.0)
     sine = np.sqrt(0.5 * (1.0 + cosine))  # of half the angle between the way back and the way on
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

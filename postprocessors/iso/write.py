@@ -75,7 +75,8 @@ _EVENT_KEYS: Final = {
 
 
 def write_program(toolpath: Toolpath, machine: IsoMachine) -> Program:
-    """Return the program; PostError names the move that cannot be written or done."""
+    """Return the program of a toolpath; PostError names the move that cannot be written or
+    done."""
     check(toolpath, machine)
     form = TextForm(machine)
     dialect, unit = machine.dialect, machine.dialect.unit
@@ -153,7 +154,8 @@ def write_program(toolpath: Toolpath, machine: IsoMachine) -> Program:
 
 
 def _lowered(toolpath: Toolpath, machine: IsoMachine) -> tuple[LoweredToolpath, list[Finding]]:
-    """Return arcs that the dialect does not have as lines, and long ones in parts."""
+    """Return the toolpath with arcs that the dialect does not have as lines, and with long arcs in
+    parts."""
     rules = machine.dialect.arcs
     same = LoweredToolpath(toolpath, np.arange(len(toolpath)))
     is_arc = toolpath.is_arc
@@ -180,7 +182,8 @@ def _lowered(toolpath: Toolpath, machine: IsoMachine) -> tuple[LoweredToolpath, 
 
 
 def _shared(seconds: Floats, row: Ints) -> Floats:
-    """Return the times (M,) of the rows that replace those of `seconds`, in equal shares."""
+    """Return (M,) seconds of the rows that replace those of `seconds`: each row's time in equal
+    shares among its replacements, whose `row` (M,) names it."""
     counts = np.bincount(row, minlength=len(seconds))
     return np.asarray((seconds / np.maximum(counts, 1))[row])
 
@@ -205,7 +208,7 @@ class TextForm:
         }.get(dialect.feeds.mode, dialect.feeds.decimals)
 
     def length(self, letter: str, units: Ints, written: Bools) -> WordColumn:
-        """Return the words of lengths, in units of their last decimal."""
+        """Return the words of a length letter; `units` count its last decimal."""
         words = self._words
         if words.point == "never" and letter in words.whole_letters:
             return WordColumn(letter, units, written, plus=words.plus_sign)
@@ -219,7 +222,7 @@ class TextForm:
         )
 
     def feed(self, units: Ints, written: Bools) -> WordColumn:
-        """Return the F words, in units of their last decimal."""
+        """Return the F words; `units` count their last decimal."""
         return self._column("F", units, written, self.feed_decimals)
 
     def code(self, kind: Codes, written: Bools) -> WordColumn:
@@ -249,12 +252,12 @@ class TextForm:
         )
 
     def lengths(self, letter: str, values: Floats) -> list[str]:
-        """Return the numbers (K,) of lengths, as texts."""
+        """Return lengths (K,) as the texts of their numbers."""
         every = np.ones(len(values), dtype=np.bool_)
         return _texts(self.length(letter, units_of(values, self.decimals), every))
 
     def value(self, letter: str, value: float) -> str:
-        """Return a number that is no length: a time, a speed, a percentage."""
+        """Return the text of a number that is no length: a time, a speed, a percentage."""
         words = self._words
         if words.point == "never" and letter and letter in words.whole_letters:
             units = units_of(np.array([value]), self.decimals)
@@ -271,13 +274,13 @@ class TextForm:
         return _texts(column)[0]
 
     def frame_line(self, template: str) -> str:
-        """Return a line of head or foot."""
+        """Return a line of the head or foot with its fields filled in."""
         for field, text in self.modes.items():
             template = template.replace(field, text)
         return template.replace("{number}", f"{self.number:04}")
 
     def fill(self, template: str, values: Mapping[str, Callable[[str], str]]) -> str:
-        """Return a template with its fields replaced by the texts of `values`, each of which is
+        """Return a template with its fields replaced by the texts that `values` give; each is
         called with the letter before its field."""
         return _FIELD.sub(
             lambda field: f"{field['letter'] or ''}{values[field['name']](field['letter'] or '')}",
@@ -292,7 +295,7 @@ def _texts(column: WordColumn) -> list[str]:
 
 
 def _columns(sent: Sent, path: Toolpath, machine: IsoMachine, form: TextForm) -> list[WordColumn]:
-    """Return the words of the motions among the rows."""
+    """Return the words of all motions among the rows, one column for each letter."""
     dialect, motion = machine.dialect, sent.is_motion
     rows = np.flatnonzero(motion)
     turns = np.zeros(len(motion), dtype=np.bool_)
@@ -325,7 +328,7 @@ def _columns(sent: Sent, path: Toolpath, machine: IsoMachine, form: TextForm) ->
 def _centre_words(
     sent: Sent, path: Toolpath, is_arc: Bools, dialect: IsoDialect, form: TextForm
 ) -> Iterator[WordColumn]:
-    """Yield the words that say the centres of arcs."""
+    """Yield the columns of words that give the centres of arcs."""
     if not is_arc.any():
         return
     if dialect.arcs.form == "radius":
@@ -344,8 +347,9 @@ def _centre_words(
 
 
 def _feeds(path: Toolpath, machine: IsoMachine) -> tuple[Ints, list[Finding]]:
-    """Return (N,) feeds in whole units of the F word, 0 where none; those of inverse times are
-    of each minute, and `_inverse_times` makes them."""
+    """Return the feeds (N,) in whole units of the F word, 0 where there is none; and the findings
+    on rounding. With inverse time, feeds are per minute here, and `_inverse_times` makes the
+    words."""
     feeds = machine.dialect.feeds
     if feeds.mode == "inverse-time":
         return np.where(path.is_feed, 1, 0).astype(np.int64), []
@@ -375,7 +379,7 @@ def _refuse_none(path: Toolpath, is_bad: Bools) -> None:
 
 
 def _speeds(path: Toolpath) -> Floats:
-    """Return (N,) rev/min in force at each row; 0 where the spindle stands."""
+    """Return (N,) rev/min of the spindle at each row; 0 where it stands."""
     kinds = (Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.SPINDLE_OFF)
     switched = np.isin(path.kind, kinds)
     values = np.where(path.kind == Kind.SPINDLE_OFF, 0.0, path.value)
@@ -384,7 +388,8 @@ def _speeds(path: Toolpath) -> Floats:
 
 
 def _inverse_times(sent: Sent, path: Toolpath, machine: IsoMachine, form: TextForm) -> Ints:
-    """Return (M,) the feed over the length of each cut, 1/min, in units of the F word."""
+    """Return (M,) the inverse time of each cut, its feed divided by its length, 1/min, in units of
+    the F word."""
     unit = 10.0**-form.decimals
     start = np.concatenate([units_of(path.start, form.decimals)[None, :], sent.end[:-1]])
     travel = (sent.end - start) * unit
@@ -420,7 +425,8 @@ class _EventWords:
         self._events = machine.dialect.events
 
     def blocks(self, event: Event) -> Sequence[str]:
-        """Return the blocks of an event; PostError for what the dialect cannot say."""
+        """Return the blocks of an event; PostError for an event that the dialect cannot
+        express."""
         key = _EVENT_KEYS.get(event.kind)
         if key is None:
             raise event.refuse(f"a {event.kind.name} has no block in this dialect")
@@ -455,8 +461,8 @@ class _EventWords:
             raise event.refuse(f"a {event.kind.name} without a value of 0 or more")
 
     def _spindle(self, event: Event, templates: Sequence[str]) -> list[str]:
-        """Return the blocks that start the spindle; without a speed those words that do not say
-        it."""
+        """Return the blocks that start the spindle; without a known speed, words that contain it
+        are left out."""
         if math.isnan(event.value):
             blocks_without = [_without_fields(template) for template in templates]
             if any("{" in template for template in blocks_without):
@@ -489,19 +495,20 @@ def _times(seconds: float, form: TextForm) -> Mapping[str, Callable[[str], str]]
 
 
 def _without_fields(template: str) -> str:
-    """Return a template without the words that have a field."""
+    """Return a template without the words that contain a field."""
     return re.sub(r"(?<![A-Za-z0-9_=])[A-Z]\{\w+\} ?", "", template).strip()
 
 
 def _head(form: TextForm, dialect: IsoDialect) -> tuple[list[str], list[str]]:
-    """Return the blocks of the head, and its lines that are no blocks."""
+    """Return the blocks of the head, and those of its lines that are no blocks."""
     lines = [form.frame_line(template) for template in dialect.program.head]
     names = [line for line in lines if _UNNAMED_LINE.match(line)]
     return [line for line in lines if not _UNNAMED_LINE.match(line)], names
 
 
 def _footer(path: Toolpath, form: TextForm, dialect: IsoDialect, *, spindle_on: bool) -> list[str]:
-    """Out of the material (below Z 0) to the highest Z, spindle off, foot, end."""
+    """Return the last lines of a program: retract out of the material (from below Z 0) to the
+    highest Z, spindle off, foot, end."""
     program = dialect.program
     heights = np.append(path.end[:, 2], path.start[2])
     last = float(path.end[-1, 2]) if len(path) else 0.0
@@ -519,14 +526,14 @@ def _footer(path: Toolpath, form: TextForm, dialect: IsoDialect, *, spindle_on: 
 
 
 def _measures_lengths(dialect: IsoDialect) -> bool:
-    """Return True if the length of a tool counts from its change on."""
+    """Return True if a tool's length is in force from its change on."""
     return dialect.events.first_tool == "program" and any(
         "G43" in template for template in dialect.events.tool_change
     )
 
 
 def _mounted_by_hand(toolpath: Toolpath, dialect: IsoDialect) -> Iterator[Finding]:
-    """Report that the program does not name the first tool."""
+    """Yield a finding if the program does not name the first tool."""
     events = dialect.events
     by_hand = events.first_tool == "by-hand" or not events.tool_change
     if by_hand and mounted_before(toolpath).any():
@@ -552,8 +559,8 @@ class _Remarks:
         self._unsafe = re.compile(f"[^A-Za-z0-9 {re.escape(comments.characters)}]")
 
     def line(self, comment: str) -> str:
-        """Return a comment, given in parentheses: a message where it begins with the mark of
-        one."""
+        """Return a comment, given in parentheses, in the dialect's style; as a message where it
+        begins with a message's mark."""
         text = comment[1:-1]
         is_message = text.startswith(_MESSAGE)
         text = self._unsafe.sub("_", text.removeprefix(_MESSAGE))
@@ -571,7 +578,7 @@ class _Remarks:
 
 
 def _holes(path: Toolpath, dialect: IsoDialect) -> list[CycleHole]:
-    """Return the holes that the dialect has a cycle for."""
+    """Return the holes for which the dialect has a cycle."""
     if not dialect.cycles.use:
         return []
     return [hole for hole in holes_of(path) if _template(hole, dialect)]
@@ -591,8 +598,8 @@ def _constant(text: str) -> Callable[[str], str]:
 def _cycle_blocks(
     holes: Sequence[CycleHole], feeds: Ints, machine: IsoMachine, form: TextForm
 ) -> dict[int, Sequence[str]]:
-    """Return the blocks of each hole by its first row at a feed. Holes that follow each other
-    and look alike are one cycle with several places."""
+    """Return the blocks of each hole, by its first row at a feed. Consecutive holes of equal
+    depth, height and peck share one cycle with several places."""
     cycles = machine.dialect.cycles
     unit = 10.0**-form.decimals
     bites = np.array([hole.bite or 0.0 for hole in holes])
