@@ -45,7 +45,7 @@ class FlashcutSignals(SignalModel):
     """The bytes of the ports 0x378 and 0xBC00."""
 
     def board(self, machine: _Machine) -> Board:
-        """Return the lines of the four motors."""
+        """Return the coil lines of the four motors."""
         states = states_per_step(machine.controller)
         return Board(
             tuple(
@@ -62,7 +62,7 @@ class FlashcutSignals(SignalModel):
         )
 
     def pulses(self, toolpath: Toolpath, machine: _Machine) -> Iterator[Pulses]:
-        """Yield the states of all coils."""
+        """Yield the states of all coils, in order of time."""
         run = FlashcutRun(toolpath, machine, OUTPUTS)
         states = _CoilRun(toolpath, run, machine)
         for batch in run.batches():
@@ -70,7 +70,7 @@ class FlashcutSignals(SignalModel):
 
 
 def states_per_step(controller: FlashcutController) -> int:
-    """Return the states of the coils that a step takes."""
+    """Return the number of coil states in a step."""
     return controller.coil_states_per_step or 2 * controller.half_periods_per_step
 
 
@@ -103,7 +103,8 @@ class _CoilRun:
         self._pending = Pulses.none(len(PLACES))
 
     def pulses(self, batch: TimerBatch) -> Pulses:
-        """Return the states of the next batch that are surely before those of the one after it."""
+        """Return the coil states of a batch that surely come before all states of the next
+        batch."""
         filled = batch.filled
         move, since = batch.issued.move[:filled], batch.issued.since_ms[:filled]
         times = self._clock.take(batch)
@@ -125,7 +126,7 @@ class _CoilRun:
         return self._released([self._states_of(each) for each in steps], safe_ms)
 
     def _compensation(self, times: MoveTimes, k: int) -> list[_Steps]:
-        """Return the steps of the compensation before a move, with those of the spindle."""
+        """Return the compensation steps before move `k`, with those of the spindle."""
         counts, ways = times.added[k], times.ways[k]
         row, each_ms = int(times.first_row[k]), int(times.added_step_ms[k])
         total = int(counts.sum())
@@ -144,8 +145,8 @@ class _CoilRun:
     def _axis_steps(
         self, moves: Ints, move: Ints, since: Ints, begin_ms: Ints, row: Ints, steps: list[_Steps]
     ) -> Ints:
-        """Append the steps of the three axes; return the last one of each, ms within the last
-        move."""
+        """Append the steps of the three axes to `steps`; return the time of the last step of each
+        axis, ms since the start of the last move."""
         lasts = np.zeros(3, dtype=np.int64)
         carried = self._done is not None
         for axis in range(3):
@@ -174,7 +175,7 @@ class _CoilRun:
     def _spindle_steps(
         self, move: Ints, since: Ints, begin_ms: Ints, row: Ints, half: Ints, steps: list[_Steps]
     ) -> None:
-        """Append the steps of the spindle, one with each of the longer axis."""
+        """Append the steps of the spindle: one with each step of the longer axis."""
         firings = since // half
         before = np.zeros_like(firings)
         before[1:] = np.where(move[1:] == move[:-1], firings[:-1], 0)
@@ -188,7 +189,7 @@ class _CoilRun:
         steps.append(_Steps(SPINDLE, from_ms, to_ms, sense, row[fires], added))
 
     def _states_of(self, steps: _Steps) -> Pulses:
-        """Return the states of these steps."""
+        """Return the coil states of these steps."""
         turning = np.flatnonzero(steps.sense)
         number = np.tile(np.arange(1, self._states + 1), len(turning))
         index = np.repeat(turning, self._states)
@@ -199,7 +200,7 @@ class _CoilRun:
         return Pulses(at_ms / MS_PER_S, moves, steps.row[index], steps.is_added[index], 0.0)
 
     def _released(self, parts: list[Pulses], safe_ms: int) -> Pulses:
-        """Return the states up to this time, and keep the others."""
+        """Return the states up to `safe_ms`, and keep later ones for the next call."""
         pulses = in_order([self._pending, *parts], safe_ms / MS_PER_S)
         count = int(np.searchsorted(pulses.at_s, pulses.until_s, side="right"))
         self._pending = pulses.part(count, len(pulses.at_s))

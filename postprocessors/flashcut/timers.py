@@ -13,23 +13,23 @@ PERIOD_GUARD = 1e-6
 
 
 def shortest_ms(has_one_axis: Bools, controller: FlashcutController) -> Floats:
-    """Return (N,) ms: the shortest half period of moves, which are of one axis `has_one_axis`
-    (N,) or of two."""
+    """Return (N,) the shortest half period, ms, of moves of one axis (`has_one_axis` (N,)) or of
+    two."""
     both_ms = float(controller.half_period_ms)
     one = controller.single_axis_half_period_ms
     return np.where(has_one_axis, both_ms if one is None else min(float(one), both_ms), both_ms)
 
 
 def feeds_of(half_period_ms: Floats, step_mm: float, controller: FlashcutController) -> Floats:
-    """Return (N,) mm/min of the longer axis at these half periods."""
+    """Return (N,) the feeds of the longer axis at these half periods, mm/min."""
     return 60_000.0 * step_mm / (controller.half_periods_per_step * (half_period_ms + 1.0))
 
 
 def half_periods_ms(
     feed_mm_min: Floats, step_mm: float, has_one_axis: Bools, controller: FlashcutController
 ) -> Floats:
-    """Return (N,) whole ms: half periods of the longer axis at these feeds (inf: rapids), of moves
-    of one axis `has_one_axis` (N,) or of two.
+    """Return (N,) the half periods of the longer axis, whole ms, at these feeds (inf: rapids), for
+    moves of one axis (`has_one_axis` (N,)) or of two.
 
     A step takes some half periods P, each of which is a millisecond late:
 
@@ -44,8 +44,8 @@ def half_periods_ms(
 def steps_too_many(
     longer: Ints, shorter: Ints, half_period: Ints, controller: FlashcutController
 ) -> Ints:
-    """Return (N,) steps that the shorter axis makes beyond its own, of moves of `longer` ≥
-    `shorter` ≥ 0 steps; see `steps`, which makes them one by one."""
+    """Return (N,) the surplus steps of the shorter axis in moves of `longer` ≥ `shorter` ≥ 0
+    steps; `steps` makes them one by one."""
     divisor = np.maximum(shorter, 1)
     if controller.clock == "late-longer":
         made_steps = shorter * (half_period + 1) // half_period

@@ -92,14 +92,13 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
 
 
 def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> LoweredToolpath:
-    """Long slanted lines in pieces that the machine's timers do exactly; PostError when they would
-    be too many. XY and Z are apart.
+    """Return the toolpath with long slanted lines in pieces that the machine's timers make
+    exactly; PostError when there would be too many. XY and Z must be separate already.
 
     The timers make the shorter axis too long where it has more steps than the half period P has
-    milliseconds (docs/controllers/flashcut.md). A line of n and m ≤ n steps becomes
-    K = ⌈m / (P − 1)⌉ pieces; piece k ends at the whole steps next to k·n/K and k·m/K from its
-    start, so that the controller, which rounds the travel of each piece by itself, has nothing to
-    round.
+    milliseconds (docs/controllers/flashcut.md). A line of n and m ≤ n steps becomes K = ⌈m / (P −
+    1)⌉ pieces; piece k ends at the whole steps next to k·n/K and k·m/K from its start, so that the
+    controller, which rounds the travel of each piece by itself, has nothing to round.
     """
     controller = machine.controller
     if not isinstance(controller, FlashcutController):
@@ -125,7 +124,8 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> LoweredToolpa
 
 
 def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> LoweredToolpath:
-    """Return each row in `count` (N,) pieces; `steps` (N, 2) of the whole row."""
+    """Return the toolpath with each row divided into `count` (N,) pieces; `steps` (N, 2): those of
+    the whole row."""
     row = np.repeat(np.arange(len(count)), count)
     part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
     inner = np.flatnonzero(part + 1 < count[row])
@@ -179,7 +179,8 @@ class _Blocks:
     (E,): before which of them each event of the table stands."""
 
     def __init__(self, table: PlainRows, feeds: Ints, dialect: FlashcutDialect) -> None:
-        """`feeds` (M,) of the rows of the table in units of F."""
+        """Find the blocks of all moves. `feeds` (M,): the feed of each row of the table in units
+        of F."""
         self._table, self._feeds = table, feeds
         begin, end, moves = table.starts, table.end, table.moves
         rapid, arc = table.kind == Kind.RAPID, table.is_arc
@@ -203,7 +204,7 @@ class _Blocks:
         self._feed = self._ahead | ((changes & ~has_feed_block)[self.row] & last)
 
     def words(self, dialect: FlashcutDialect, decimals: int) -> list[WordColumn]:
-        """Return the words of the blocks; `decimals` of a feed."""
+        """Return the words of the blocks, one column for each letter; `decimals` of a feed."""
         table, row = self._table, self.row
         decimals_kept = None if dialect.trailing_zeros else 1
         before, end = table.starts[row], table.end[row]

@@ -63,7 +63,7 @@ class Linuxcnc(Target):
         return read_program(data, machine, folder)
 
     def signals(self) -> NoSignals:
-        """None; docs/signals.md."""
+        """Return `NoSignals`, which says why there are none (docs/signals.md)."""
         return NoSignals(
             "its program has no steps: the step generator or the servos of the machine's HAL "
             "follow the trajectory",

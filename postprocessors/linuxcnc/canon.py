@@ -51,7 +51,7 @@ class Canon(PartMoves):
         return len(self.path) - self._events
 
     def event(self, kind: Kind, value: float | None = None) -> None:
-        """A row of an event, when it is due."""
+        """Add a row of an event, behind the moves that still wait for their ends."""
         self._events += 1
         block = self.path.block
         if not self.queue:
@@ -66,7 +66,7 @@ class Canon(PartMoves):
         self.queue.append(later)
 
     def wait(self, move: Queued) -> None:
-        """A move whose end may still change."""
+        """Queue a move whose end may still change."""
         move.block, move.source = self.path.block, self.path.source
         move.feed = self.feed
         self.queue.append(move)

@@ -21,7 +21,7 @@ _PARTS: Final = re.compile(r"%d|%f|%\.(\d)f|#(\d+)|#<([^>]*)>")
 
 
 def obey_comment(text: str, parameters: Parameters) -> str | None:
-    """Carry out a comment that is a command. Return the text shown to the operator, or None;
+    """Execute a comment that is a command. Return the text shown to the operator, or None;
     LineFault for a comment that stops the program."""
     word, _, argument = text.partition(",")
     word = word.lower()

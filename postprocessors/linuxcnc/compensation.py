@@ -64,7 +64,8 @@ class Compensation:
         return self.side != 0 and self.radius > 0.0
 
     def scale(self, factor: float) -> None:
-        """Multiply the radius, the places and the queued moves: another unit of length."""
+        """Multiply the radius, the places and the queued moves by `factor`, after a change of the
+        unit of length."""
         self.radius *= factor
         self.programmed = [value * factor for value in self.programmed]
         if self._from is not None:
@@ -75,8 +76,8 @@ class Compensation:
                 move.centre = move.centre[0] * factor, move.centre[1] * factor
 
     def switch_off(self, centre: list[float]) -> bool:
-        """Carry out G40: the last move ends beside its end. True if the cutter was beside the
-        path."""
+        """Execute G40: the last queued move ends beside its programmed end. Return True if the
+        cutter was beside the path."""
         was_beside = self.active and not self.first
         if was_beside:
             self._end_at(centre[0], centre[1])
@@ -84,13 +85,14 @@ class Compensation:
         return was_beside
 
     def settle(self, centre: list[float]) -> None:
-        """A stop: what waits ends where it is."""
+        """End the queued moves where the cutter's centre is, since the machine stops here."""
         self._end_at(centre[0], centre[1])
 
     # Moves; each gives where the cutter's centre comes to stand
 
     def line(self, kind: Kind, target: list[float], centre: list[float]) -> list[float]:
-        """Return a straight move to a programmed point, from where the centre stands."""
+        """Queue a straight move to a programmed point, from `centre`, where the cutter's centre
+        is; return where that ends."""
         return (self._entry_line if self.first else self._line)(kind, target, centre)
 
     def _entry_line(self, kind: Kind, target: list[float], centre: list[float]) -> list[float]:
@@ -152,7 +154,8 @@ class Compensation:
         return end
 
     def _round(self, kind: Kind, corner: Flat, angle: float, centre: list[float]) -> None:
-        """About a corner, to where the next move begins."""
+        """Go round a corner, by an arc (a line for a rapid) about it, to where the next move
+        begins."""
         x = corner[0] + self.radius * math.cos(angle)
         y = corner[1] + self.radius * math.sin(angle)
         self._end_at(centre[0], centre[1])
@@ -164,10 +167,10 @@ class Compensation:
         self._from = x, y
 
     def _arc_then_line(self, arc: Queued, direction: Flat) -> Flat:
-        """Intersect the offset of an arc with the offset of the line that follows it.
+        """Return where the offset of an arc meets the offset of the line that follows it.
 
-        With the arc's centre c, the offset line lies d2 from it along its normal theta; the
-        offset arc has the radius `old`: they meet at an angle acos(d2 / old) beside the normal.
+        With the arc's centre c, the offset line has the distance d2 from c along its normal theta;
+        the offset arc has the radius `old`: they meet at an angle acos(d2 / old) from the normal.
         """
         op, (cx, cy) = self.programmed, arc.centre
         old = math.hypot(cy - arc.end[1], cx - arc.end[0])
@@ -184,11 +187,12 @@ class Compensation:
         return cx + old * math.cos(angle), cy + old * math.sin(angle)
 
     def arc(self, arc: ProgrammedArc, centre: list[float], spread: float) -> list[float]:
-        """Return an arc, from where the centre stands."""
+        """Queue an arc from `centre`, where the cutter's centre is; return where that ends."""
         return self._entry_arc(arc, centre, spread) if self.first else self._arc(arc, centre)
 
     def _entry_arc(self, arc: ProgrammedArc, centre: list[float], spread: float) -> list[float]:
-        """Onto the path along another arc, which ends beside the end."""
+        """Queue the arc that leads onto the compensated path, and ends beside the programmed end;
+        return where it ends."""
         if math.hypot(arc.end[0] - centre[0], arc.end[1] - centre[1]) <= self.radius:
             raise LineFault(
                 "the arc onto the compensated path is no larger than the tool's radius"
@@ -262,8 +266,8 @@ class Compensation:
         return end
 
     def _line_then_arc(self, arc: ProgrammedArc, theta: float, across: float, new: float) -> Flat:
-        """Intersect the offset of a line with the offset, of radius `new`, of the arc that follows
-        it."""
+        """Return where the offset of a line meets the offset, of radius `new`, of the arc that
+        follows it."""
         inside = arc.turn * self.side > 0
         part = (across + self.radius if inside else across - self.radius) / new if new else 2.0
         if not -1.0 <= part <= 1.0:
@@ -274,8 +278,8 @@ class Compensation:
         return arc.centre[0] + new * math.cos(angle), arc.centre[1] + new * math.sin(angle)
 
     def _arc_then_arc(self, before: Queued, arc: ProgrammedArc, new: float) -> Flat:
-        """Intersect two offset arcs, by the triangle of both radii and the distance of the
-        centres."""
+        """Return where two offset arcs meet, from the triangle of both radii and the distance of
+        the centres."""
         (px, py), (cx, cy) = before.centre, arc.centre
         old = math.hypot(py - before.end[1], px - before.end[0])
         centre_distance = math.hypot(py - cy, px - cx)
@@ -299,7 +303,8 @@ class Compensation:
         return queue[0] if queue and isinstance(queue[0], Queued) else None
 
     def _end_at(self, x: float, y: float) -> None:
-        """The waiting moves end here, and are made; Fault where one would turn round for it."""
+        """End the queued moves at a point and add them to the path; LineFault where one of them
+        would have to turn round for that."""
         moves = [move for move in self._canon.queue if isinstance(move, Queued)]
         if not moves:
             self._canon.flush()
@@ -330,7 +335,8 @@ class Compensation:
 
 
 def sweep_of(start: Flat, centre: Flat, turn: int, end: Flat) -> float:
-    """Return the signed sweep of an arc, rad, full turns included; positive counter-clockwise."""
+    """Return the signed sweep of an arc, rad, with its full turns; positive is
+    counter-clockwise."""
     alpha = math.atan2(start[1] - centre[1], start[0] - centre[0])
     beta = math.atan2(end[1] - centre[1], end[0] - centre[0])
     if turn > 0:

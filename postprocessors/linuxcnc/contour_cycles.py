@@ -71,18 +71,18 @@ class Segment(Struct):
         return abs(self.start - self.centre)
 
     def copy(self) -> Segment:
-        """Return a copy that may be moved."""
+        """Return a copy that may be changed."""
         return Segment(self.start, self.end, self.centre, self.ccw, self.corner)
 
     def change(self, change: Callable[[complex], complex], *, mirrors: bool = False) -> None:
-        """Move all of its points."""
+        """Map all points of the segment by `change`."""
         self.start, self.end = change(self.start), change(self.end)
         if self.centre is not None:
             self.centre = change(self.centre)
             self.ccw ^= mirrors
 
     def offset(self, distance: float) -> None:
-        """Shift the segment to its right by the distance."""
+        """Move the segment to its right by a distance."""
         if self.centre is None:
             chord = self.start - self.end
             self.start += 1j * distance * chord / abs(chord)
@@ -142,7 +142,7 @@ class LatheContour:
     # Frames
 
     def exchange_axes(self) -> None:
-        """Turn by a quarter."""
+        """Exchange X and Z of the contour, by a quarter turn."""
         self._change(lambda p: p * -1j, lambda p: p * 1j, mirrors=False)
 
     def mirror(self) -> None:
@@ -165,24 +165,24 @@ class LatheContour:
         self._back.append((back, mirrors))
 
     def go(self, how: str, end: complex, centre: complex = 0j) -> None:
-        """Emit a move in the frame of the program."""
+        """Emit a move to a point of the contour's frame."""
         if sum(mirrors for _, mirrors in self._back) % 2 and how in ("cw", "ccw"):
             how = "cw" if how == "ccw" else "ccw"
         self.emit(how, self.original(end), self.original(centre))
 
     def original(self, point: complex) -> complex:
-        """Return a point in the frame of the program."""
+        """Return a point of the contour in the frame of the program."""
         for back, _ in reversed(self._back):
             point = back(point)
         return point
 
     def arc(self, each: Segment, end: complex) -> None:
-        """Follow an arc to a point of it."""
+        """Emit the arc of a segment up to a point of it."""
         assert each.centre is not None
         self.go("ccw" if each.ccw else "cw", end, each.centre)
 
     def draw(self, each: Segment) -> None:
-        """Follow a segment to its end."""
+        """Emit a whole segment."""
         if each.centre is None:
             self.go("line", each.end)
         else:
@@ -191,7 +191,7 @@ class LatheContour:
     # Preparing
 
     def finish_corners(self) -> None:
-        """Give fillets and chamfers their places."""
+        """Fit the fillets and chamfers between their neighbours."""
         segments = self.segments
         for before, each, after in zip(segments, segments[1:], segments[2:], strict=False):
             if each.corner:
@@ -199,7 +199,7 @@ class LatheContour:
         self.segments = [segments[0]] + [each for each in segments[1:] if each.size >= SHORT]
 
     def check_monotonic(self) -> None:
-        """Raise Fault where Z rises along the contour."""
+        """Raise LineFault where Z rises along the contour."""
         first = self.segments[0]
         if (first.end - first.start).real > 0.0:
             first.start = complex(first.end.real, first.start.imag)
@@ -211,7 +211,7 @@ class LatheContour:
             )
 
     def shift_outwards(self, distance: float) -> None:
-        """Offset all but the first segment, in steps of half the smallest of them."""
+        """Offset all segments but the first, in steps of half the length of the shortest."""
         first, last = self.segments[0], self.segments[-1]
         direction, across = first.end - first.start, last.start - first.start
         if across and (direction / across).imag < 0.0:
@@ -267,7 +267,7 @@ class LatheContour:
             index += 1
 
     def count(self) -> None:
-        """Count a step; Fault where there is no end of them."""
+        """Count a step of the cycle; LineFault where there are so many that it may never end."""
         self.steps += 1
         if self.steps > MAX_STEPS:
             raise LineFault(
@@ -279,7 +279,7 @@ class LatheContour:
     # Cutting
 
     def rough(self, how: int, depth: float, escape: float) -> None:
-        """Cut level by level: all (0), no pockets (1), or pockets only (2)."""
+        """Cut level by level. `how`: everything (0), no pockets (1), or pockets only (2)."""
         segments, cutting = self.segments, how
         tops = [segments[0].start]
         at, index = tops[0], 0
@@ -317,8 +317,8 @@ class LatheContour:
     def _cut(
         self, index: int, at: complex, x: float, depth: float, escape: float
     ) -> tuple[int, complex, bool]:
-        """Cut levels from x down, until the contour climbs; return its segment, the place, and
-        True if the contour ends."""
+        """Cut levels from x downwards until the contour climbs. Return the index of the segment
+        reached, the place, and True if the contour ends there."""
         segments = self.segments
         while index < len(segments):
             while x - TOLERANCE > at.imag:
@@ -360,7 +360,8 @@ class LatheContour:
         return index, at, True
 
     def _dive(self, each: Segment, at: complex, x: float, *, fast: bool) -> tuple[bool, complex]:
-        """Go down along a segment, to the level at most; True if it does not go down."""
+        """Follow a segment downwards, to the level x at most. Return True if it does not go down,
+        and the place reached."""
         if each.centre is None:
             if each.start.imag <= each.end.imag + TOLERANCE:
                 return True, at
@@ -390,7 +391,8 @@ class LatheContour:
         return False, end
 
     def _climb(self, each: Segment, at: complex) -> tuple[bool, complex]:
-        """Go up along a segment; True if it falls from somewhere on."""
+        """Follow a segment upwards. Return True if it descends from some point on, and the place
+        reached."""
         if each.centre is None:
             if each.end.imag + TOLERANCE < each.start.imag:
                 return True, at
@@ -406,7 +408,8 @@ class LatheContour:
         return each.ccw, end
 
     def _climb_only(self, each: Segment, at: complex) -> complex:
-        """Go up along what is not below the present level."""
+        """Follow the part of a segment that is not below the present level upwards; return the
+        place reached."""
         if each.centre is None and each.end.imag < each.start.imag:
             return at
         met = each.crossings(at.imag)
@@ -427,7 +430,7 @@ class LatheContour:
         return end
 
     def _summit(self, each: Segment) -> complex:
-        """Return the highest point of a counter-clockwise arc, or its end before that."""
+        """Return the highest point of a counter-clockwise arc, or its end if that comes before."""
         assert each.centre is not None
         if each.end.real >= each.centre.real:
             return each.end
@@ -443,7 +446,7 @@ def _mirror_z(point: complex) -> complex:
 
 
 def _finish_corner(before: Segment, corner: Segment, after: Segment) -> None:
-    """Cut two segments off where an offset of both meets, and put the corner's between them."""
+    """Cut two segments off where their offsets meet, and fit the corner between them."""
     copies = before.copy(), after.copy()
     for distance in (corner.corner, -corner.corner):
         copies = before.copy(), after.copy()
@@ -466,7 +469,7 @@ def _finish_corner(before: Segment, corner: Segment, after: Segment) -> None:
 
 
 def _intersect(before: Segment, after: Segment) -> None:
-    """Let two segments end and begin where both meet."""
+    """Move the end of one segment and the start of the next to where both meet."""
     if before.centre is not None and after.centre is not None:
         a, b, c = after.radius, before.radius, abs(after.centre - before.centre)
         if not c:
@@ -500,7 +503,7 @@ def _intersect(before: Segment, after: Segment) -> None:
 def run_cycle(
     machine: InterpreterState, moves: BlockMotions, words: dict[str, float], motion: int
 ) -> None:
-    """Carry out G70, G71 or G72."""
+    """Execute G70, G71 or G72."""
     cycle, how = divmod(motion, 10)
     name = f"G{motion / 10:g}"
     side = machine.compensation.side
@@ -554,7 +557,7 @@ def _finish(
     parts: int,
     approach: Callable[[complex], None],
 ) -> None:
-    """G70: along the contour, in passes from the distance D to E."""
+    """Execute G70: follow the contour in passes, whose distances from it go from D to E."""
     contour.segments[0].start = target
     rest = LatheContour([each.copy() for each in contour.segments[1:]], contour.emit)
     rest.mirror()
@@ -583,7 +586,8 @@ def _rough(
     how: int,
     across: bool,
 ) -> None:
-    """G71, and across the axis G72: level by level down to the distance D from the contour."""
+    """Execute G71 or, with `across`, G72: cut level by level down to the distance D from the
+    contour."""
     segments = contour.segments
     ways = [each.end - each.start for each in (segments[0], segments[-1])]
     if across and abs(ways[1].imag) > 0.0 and ways[0].real * (target - last).real < 0.0:
@@ -612,7 +616,7 @@ def _segments(
     absolute: bool,
     centres: bool,
 ) -> tuple[list[Segment], complex]:
-    """Return the segments of a contour's sub, and where it ends."""
+    """Return the segments that a contour's sub describes, and the point where it ends."""
     segments: list[Segment] = []
     for block in machine.read_sub(label):
         motion = motion_of(machine, block)

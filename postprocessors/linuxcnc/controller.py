@@ -89,19 +89,20 @@ class LinuxcncModel(SampledModel[LinuxcncController, LinuxcncDialect]):
     samples_per_speed = 1
 
     def speed_period_s(self, machine: _Machine) -> float:
-        """Return the period in which its trajectory planner runs."""
+        """Return the period of the trajectory planner, s."""
         return machine.controller.servo_period_s
 
     def sampled(self, path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
-        """Yield the rows up to the end of the program."""
+        """Yield the motion of the rows up to the end of the program."""
         return _rows_to_end(path, machine)
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
-        """Return a coded step, or what a million samples of the whole program allow."""
+        """Return the distance between samples, mm: a coded step, or more where the whole program
+        would have more than a million samples."""
         return sample_spacing_mm(toolpath, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """Blends, or the path alone."""
+        """Return "blend" if the program blends corners, "path" if it follows the path exactly."""
         blends = any(mode.corners == "blend" for mode in _path_modes(toolpath, machine))
         return "blend" if blends else "path"
 
@@ -115,8 +116,8 @@ class LinuxcncModel(SampledModel[LinuxcncController, LinuxcncDialect]):
 
 
 def _rows_to_end(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
-    """Return the rows up to the end of the program; ProgramError for rows that cannot be
-    followed."""
+    """Return the motion of the rows up to the end of the program; ProgramError for rows that
+    cannot be followed."""
     rows = path.executed_rows
     check_rows(path, rows)
     return _Run(path.first(rows), machine).blocks()
@@ -153,7 +154,7 @@ class _Run:
     """
 
     def __init__(self, path: Toolpath, machine: _Machine) -> None:
-        """Raise MachineError for missing limits."""
+        """Read limits and path modes; MachineError for missing limits."""
         self._path, self._machine = path, machine
         self._rules = _rules(_modes(path, machine), machine)
         self._begins, length = begins_of(path, self._rules.modes)
@@ -162,7 +163,7 @@ class _Run:
         self._passed_mm = 0.0, 0.0  # before the rows of a block: by rows, and by moves
 
     def blocks(self) -> Iterator[SampledRows]:
-        """Yield all rows."""
+        """Yield the motion of all rows, some thousand at a time."""
         first_places = 2 * np.arange(0, len(self._path), ROWS_AT_ONCE)
         first = sorted(
             {self._move_at_row(int(k)) for k in np.searchsorted(self._begins, first_places)}
@@ -172,13 +173,13 @@ class _Run:
                 yield self._block(low, high)
 
     def _move_at_row(self, move: int) -> int:
-        """Return this move, or the first behind it that begins where a row does."""
+        """Return this move, or the first after it that begins where a row begins."""
         while self._place(move) % 2:
             move += 1
         return move
 
     def _block(self, low: int, high: int) -> SampledRows:
-        """Return the rows of the moves low:high."""
+        """Return the motion of the moves low:high with its rows."""
         base, rows = self._place(low - MOVES_BEFORE), 2 * len(self._path)
         before = min(low, MOVES_BEFORE)
         own_moves = slice(before, before + high - low)
@@ -210,12 +211,12 @@ class _Run:
         return SampledRows(block_rows.start, block_rows.stop, first, samples, seconds)
 
     def _place(self, move: int) -> int:
-        """Return the place at which a move begins."""
+        """Return the place at which a move begins, counted in half rows."""
         begins = self._begins
         return int(begins[max(move, 0)]) if move < len(begins) else 2 * len(self._path)
 
     def _planned(self, low: int, high: int) -> PlannedWindow:
-        """Plan the moves between two places."""
+        """Return the plan of the moves between two places."""
         part, modes = self._path.part(low // 2, (high + 1) // 2), self._rules.modes
         part, origin = halve_arcs(part, modes.merging_mm(part.mode))
         own_rows = slice(low % 2, len(part) - high % 2)
@@ -232,9 +233,10 @@ class _Run:
         overlaps_and_cuts: tuple[Floats, Bools],
         done_count: int,
     ) -> Floats:
-        """Return (N,) s of each block, less its overlap (N,) with the next; from rest to rest
-        it takes whole servo periods, and `REST_PERIODS`. Short ones of the cuts (N,) change
-        their speed evenly. The next plan begins behind the first `done_count` of these."""
+        """Return (N,) seconds of each block, without the time in which it overlaps the next
+        (`overlaps` (N,)). From rest to rest the time is a whole number of servo periods, with
+        `REST_PERIODS` more. Very short cuts change their speed evenly over their whole length. The
+        next plan begins behind the first `done_count` blocks."""
         overlaps, cuts = overlaps_and_cuts
         period_s = self._machine.controller.servo_period_s
         seconds = plan.seconds(squares)
@@ -268,8 +270,8 @@ class LinuxcncSamples(CountedSamples):
         spacing_mm: float,
         passed_mm: tuple[float, float],
     ) -> None:
-        """`passed_mm`: the lengths of all rows and of all moves before these, so that positions do
-        not depend, in their last bits, on where a block begins."""
+        """Prepare the samples of a window. `passed_mm`: the lengths of all rows and of all moves
+        before it, so that the last bits of positions do not depend on where a window begins."""
         path, moves, corners = window_plan.tangents.path, window_plan.moves, window_plan.corners
         super().__init__(path, machine, spacing_mm)
         self._origin, self._profile = window_plan.origin, profile
@@ -297,18 +299,19 @@ class LinuxcncSamples(CountedSamples):
         return float(self._by_rows[row]), float(self._by_moves[move])
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Return the row and position of the samples low:high."""
+        """Return the row and the position of each of the samples low:high."""
         row, points = super().window(low, high)
         return self._origin[row], points
 
     def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
-        """Return (K,) s from the starts of their rows to the samples low:high."""
+        """Return (K,) seconds from the start of its row to each of the samples low:high."""
         row, share = self.places(low, high)
         along = self._into[row] + share * self._row_length[row]
         return self._profile.moments_s(row, self._into[row], along)
 
     def points(self, row: Ints, share: Floats) -> Floats:
-        """Return (K, 3) mm: the points at shares (K,) of the ways of rows (K,), blended."""
+        """Return (K, 3) mm: the points at fractions `share` (K,) of the lengths of rows (K,), on
+        blends where there are any."""
         points = super().points(row, share)
         if self._blends is not None:
             self._blends.put(row, share, points)
@@ -316,7 +319,8 @@ class LinuxcncSamples(CountedSamples):
 
 
 def _corner_columns(corners: PlannerCorners) -> Floats:
-    """Return the corners as columns of the compiled blends, and one behind the last move."""
+    """Return the corners as columns for the compiled blends, with an empty one behind the last
+    move."""
     count = len(corners.reach)
     table = np.zeros((count + 1, at.CORNER_COLUMNS))
     table[:, at.RAMP] = np.append(corners.ramp, 1.0)
@@ -336,14 +340,14 @@ def _corner_columns(corners: PlannerCorners) -> Floats:
 def _speeds(
     window_plan: PlannedWindow, places: slice, rules: CornerRules, before: EntryState
 ) -> tuple[Bools, SpeedPlan]:
-    """Return blends and moves as blocks of their own. At even places of all (2 M,) stands the
-    blend before a move, then the move: which of them last and lie in `places`, and these. A line
-    that joins the blend at its end is no block of its own. No block is faster than its length in
-    `MIN_PERIODS` (`tpComputeOptimalVelocity`).
+    """Return blends and moves as separate blocks of a speed plan, and a mask (2 M,) of those that
+    have a length and lie in `places`. Even places of the mask are the blends before moves, odd
+    ones the moves. A line that joins the blend at its end is not a block of its own. No block is
+    faster than its length in `MIN_PERIODS` (`tpComputeOptimalVelocity`).
 
-    In the mode "blend" the last move before a wait accelerates by half: it was kept ready for a
-    blend that never came (`tcGetOverallMaxAccel`). So do moves that overlap. In all modes it is
-    entered no faster than it could stop within its half, for a blend could have taken the other
+    In the mode "blend" the last move before a wait has half the acceleration: it was kept ready
+    for a blend that never came (`tcGetOverallMaxAccel`). So do moves that overlap. In all modes it
+    is entered no faster than it could stop within its half, for a blend could have taken the other
     half (`tpCalculateOptimizationInitialVel`).
     """
     moves, corners = window_plan.moves, window_plan.corners
@@ -366,8 +370,8 @@ def _speeds(
 
 
 def _lengths(moves: PlannerMoves, corners: PlannerCorners) -> tuple[Floats, Floats]:
-    """Return the lengths (M,) mm of moves without their blends, 0 of lines that join one, and the
-    lengths (M,) mm of the lines that join the blends at the starts of moves."""
+    """Return two arrays (M,), mm: the lengths of moves without their blends, 0 for lines that join
+    a blend; and the lengths of the lines that join the blend at the start of each move."""
     own_length = moves.length - corners.reach_on
     own_length[:-1] -= corners.reach[1:]
     np.maximum(own_length, 0.0, out=own_length)
@@ -403,8 +407,8 @@ class _Profile(Struct, frozen=True, eq=False):
         squares: Floats,
         lasting: Bools,
     ) -> _Profile:
-        """Return the times with what each blend and move takes, `part_seconds` (2 M + 1,);
-        `lasting` (2 M,): those that are blocks of the plan."""
+        """Return the profile of times from the time of each blend and move, `part_seconds` (2 M +
+        1,); `lasting` (2 M,): a mask of those that are blocks of the plan."""
         begin_s, end_s = _blend_seconds(window_plan, part_seconds)
         own_s = part_seconds[1::2]
         path, moves = window_plan.tangents.path, window_plan.moves
@@ -419,8 +423,9 @@ class _Profile(Struct, frozen=True, eq=False):
         return cls(window_plan, begin_s, own_s, end_s, rows_s, origin_s, plan, squares, block)
 
     def moments_s(self, row: Ints, into: Floats, along: Floats) -> Floats:
-        """Return (K,) s from the starts of the program's rows to `along` (K,) mm of the moves
-        of rows (K,) of the path, which begin `into` (K,) mm of these."""
+        """Return (K,) seconds from the start of the program's row to the point `along` (K,) mm on
+        the row `row` (K,) of the path, which begins `into` (K,) mm behind the start of the
+        program's row."""
         moves, corners = self.window_plan.moves, self.window_plan.corners
         move = moves.row_of[row]
         reach, length = np.append(corners.reach, 0.0), moves.length[move]
@@ -447,8 +452,9 @@ class _Profile(Struct, frozen=True, eq=False):
     def _put_overlaps(
         self, moment_s: Floats, move: Ints, along: Floats, overlap_s: Floats
     ) -> None:
-        """Put moments (K,) where moves overlap to the time that the two share, `overlap_s` (M,),
-        which begins with the second one: as `LinuxcncSamples` puts the points."""
+        """Set the moments (K,) that lie where two moves overlap to the time that both share,
+        `overlap_s` (M,), which begins with the second move, as `LinuxcncSamples` places the
+        points."""
         corners, length = self.window_plan.corners, self.window_plan.moves.length
         before, behind = np.append(corners.before, 0.0), np.append(corners.after, 0.0)
         turn = _turn_of(before, behind, np.append(corners.ramp, 1.0))
@@ -464,15 +470,15 @@ class _Profile(Struct, frozen=True, eq=False):
 
 
 def _part_of(reached: Floats, length: Floats) -> Floats:
-    """Return (K,) the part 0 … 1 of `length` (K,) that `reached` (K,) is; 1 of nothing."""
+    """Return (K,) `reached` divided by `length`, limited to 0 … 1; 1 where the length is 0."""
     parts = np.ones(len(length))
     np.divide(reached, length, out=parts, where=length > 0.0)
     return np.clip(parts, 0.0, 1.0)
 
 
 def _blend_seconds(window_plan: PlannedWindow, part_seconds: Floats) -> tuple[Floats, Floats]:
-    """Return (M,), (M,) s of the blends at the start and at the end of each move, with what each
-    blend and move takes, `part_seconds` (2 M + 1,).
+    """Return two arrays (M,), s: the times of the blends at the start and at the end of each move,
+    from the time of each blend and move, `part_seconds` (2 M + 1,).
 
     Half of a blend belongs to the row on either side, and a line that joins it to the row before;
     the rows of a merged line share its time by their lengths.
@@ -488,7 +494,7 @@ def _blend_seconds(window_plan: PlannedWindow, part_seconds: Floats) -> tuple[Fl
 
 
 def _in_turns(blends: Floats | float, moves: Floats) -> Floats:
-    """Return (2 M,) of the blends before moves (M,), and of the moves."""
+    """Return (2 M,) the values of blends and moves alternately: `blends` before `moves` (M,)."""
     values = np.empty(2 * len(moves))
     values[0::2], values[1::2] = blends, moves
     return values
@@ -498,9 +504,9 @@ def _tangential_limits(
     moves: PlannerMoves, modes: CornerModes, corners: PlannerCorners
 ) -> tuple[Floats, Floats]:
     """Return the acceleration (M,) along each move, mm/s², without the shares that kinks at its
-    ends and a last stop take, and the highest speed (M,) of arcs with it, mm/s. Of an arc before a
-    wait half of the acceleration is kept for turning: the planner never finishes it for a next
-    move."""
+    ends and a last stop take; and the highest speed (M,) of arcs at that acceleration, mm/s. For
+    an arc before a wait half of the acceleration is kept for the turning: the planner never
+    completes it for a next move."""
     lost_share = np.maximum(corners.lost_share, np.append(corners.lost_share[1:], 0.0))
     last = moves.last
     overlapped = corners.overlap > 0.0
@@ -523,24 +529,28 @@ class CornerModes(Struct, frozen=True, eq=False):
     table: Floats
 
     def blend(self, mode: Ints) -> Bools:
-        """Return (K,) whether the corners behind moves of a mode (K,) are blended."""
+        """Return a mask (K,), true where corners behind moves of these modes (K,) are blended."""
         return np.asarray(self.table[:, 0][mode] > 0.0)
 
     def stop(self, mode: Ints) -> Bools:
-        """Return (K,) whether they are met with a stop."""
+        """Return a mask (K,), true where the machine stops at corners behind moves of these
+        modes."""
         return np.asarray(self.table[:, 1][mode] > 0.0)
 
     def tolerance_mm(self, mode: Ints) -> Floats:
-        """Return (K,) how far blends may leave them; inf: as far as the moves allow."""
+        """Return (K,) the greatest distance of blends from their corners; inf: as far as the moves
+        allow."""
         return np.asarray(self.table[:, 2][mode])
 
     def merging_mm(self, mode: Ints) -> Floats:
-        """Return (K,) within which lines are merged; 0: never."""
+        """Return (K,) the tolerance within which lines are merged, mm; 0: they are never
+        merged."""
         return np.asarray(self.table[:, 3][mode])
 
 
 def _modes(path: Toolpath, machine: _Machine) -> CornerModes:
-    """Return the path mode of each row: that of the program, else that of the machine file."""
+    """Return the rules of the path mode of each row, which is that of the program or else that of
+    the machine file."""
     return CornerModes(
         np.array(
             [
@@ -553,8 +563,8 @@ def _modes(path: Toolpath, machine: _Machine) -> CornerModes:
 
 
 def _path_modes(path: Toolpath, machine: _Machine) -> tuple[PathMode, ...]:
-    """Return the path modes of the program, and last (at −1) that of the machine file, if any row
-    leaves the mode to it."""
+    """Return the path modes of the program; the last (index −1) is that of the machine file, if a
+    row has none of its own."""
     silent = len(path) == 0 or bool((path.mode < 0).any())
     return (*path.modes, _machine_mode(machine)) if silent else path.modes
 
@@ -601,9 +611,8 @@ MIN_PERIODS = 1.02
 
 
 def halve_arcs(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
-    """Replace each arc that bows out by less than `tolerance_mm` (N,) of its row by two lines over
-    its middle (ARC_FEED, emccanon.cc). Return the rows, and for each the row that it comes
-    from."""
+    """Replace each arc whose sagitta is below `tolerance_mm` (N,) of its row by two lines over its
+    middle (ARC_FEED, emccanon.cc). Return the rows, and for each the row that it comes from."""
     every = np.arange(len(path))
     arcs = np.flatnonzero(path.is_arc & (tolerance_mm > 0.0))
     if len(arcs) == 0:
@@ -628,11 +637,11 @@ def halve_arcs(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
 
 
 def merge_rows(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
-    """Return the rows with the ends of merged lines on their common line, and the line of each row
-    (N,); `tolerance_mm` (N,) of each row, 0: it is not merged.
+    """Return the rows with the ends of merged lines moved onto their common line, and (N,) the
+    line of each row. `tolerance_mm` (N,) of each row; 0: it is not merged.
 
-    Only feed moves with one feed and one path mode, and nothing but moves of no length between
-    them, are merged; any event, an MSG comment too, ends a line.
+    Only feed moves with the same feed and path mode, and with nothing but moves of no length
+    between them, are merged; any event, an MSG comment too, ends a line.
     """
     count = len(path)
     if not tolerance_mm.any():
@@ -649,8 +658,8 @@ def merge_rows(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
 
 
 def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
-    """Return the places where moves begin (M,), the first at 0, and the length of each row with
-    its end where `merge_rows` leaves it (N,)."""
+    """Return the places (M,) where moves begin, the first at 0, counted in half rows; and (N,) the
+    length of each row with the end that `merge_rows` gives it."""
     length, begins = np.zeros(len(path)), [np.zeros(1, dtype=np.int32)]
     low, end = 0, 2 * len(path)
     at_once = max(ROWS_AT_ONCE, MAX_CHAIN_POINTS + 2)  # more than one line has
@@ -704,9 +713,9 @@ class PlannerMoves(Struct, frozen=True, eq=False):
         return np.append(self.waits[1:], np.ones(min(len(self.waits), 1), dtype=np.bool_))
 
     def tangential(self, indices: Ints, overall: Floats) -> tuple[Floats, Floats]:
-        """Return (K,) mm/s² along moves (K,) that accelerate by `overall` (K,) in all, and (K,)
-        mm/s, the highest speed with that: what turning at it leaves, where that is more than
-        half, else half (`pmCircleActualMaxVel`)."""
+        """Return for moves (K,) with the total acceleration `overall` (K,): the acceleration along
+        them, mm/s², and the highest speed at it, mm/s. The tangential part is what turning at full
+        speed leaves, but at least half (`pmCircleActualMaxVel`)."""
         bend, part = self.bend[indices], NORMAL_RATIO * overall
         steep = bend > part
         tangent_share = np.sqrt(np.maximum(1.0 - (bend / overall) ** 2, 0.0))
@@ -717,7 +726,7 @@ class PlannerMoves(Struct, frozen=True, eq=False):
 
 
 def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> PlannerMoves:
-    """Return the moves of merged rows."""
+    """Return the planner's moves of merged rows."""
     path, period_s = tangents.path, rules.period_s
     row_length = move_lengths(path)
     length: Floats = np.bincount(chain, row_length, minlength=len(path)).astype(np.float64)
@@ -754,22 +763,22 @@ class Tangents:
         self.arms = PolarArcs(path, path.is_arc)
 
     def arm_of(self, arcs: Ints) -> Ints:
-        """Return (J,) the index in `arms` of rows that are arcs."""
+        """Return (J,) the indices in `arms` of rows that are arcs."""
         return np.searchsorted(self.arms.row, arcs)
 
     def at_starts(self, rows: Ints) -> Floats:
-        """Return (K, 3) unit tangents at the starts of rows (K,), which move."""
+        """Return (K, 3) unit tangents at the starts of rows (K,), which must have a length."""
         return self._at(rows, self.arms.radius, 0.0)
 
     def at_ends(self, rows: Ints, *, level: bool = False) -> Floats:
         """Return (K, 3) unit tangents at the ends of rows (K,); with `level` without the rise of
-        arcs."""
+        helices."""
         return self._at(rows, self.arms.end_radius, 1.0, level=level)
 
     def pushed_at_starts(self, rows: Ints, acceleration: Floats, speed: Floats) -> Floats:
-        """Return (K, 3) unit vectors of what accelerates a tool at the starts of rows (K,):
-        along lines, and of arcs along and inward, at accelerations (K,) and half of speeds
-        (K,)."""
+        """Return (K, 3) unit vectors of the tool's acceleration at the starts of rows (K,): along
+        the tangent; for arcs also inward, by the tangential acceleration (K,) and half of the
+        speed (K,)."""
         push = self._at(rows, self.arms.radius, 0.0, level=True)
         arcs = np.flatnonzero(are_arcs(self.path.kind[rows]))
         arm = self.arm_of(rows[arcs])
@@ -799,8 +808,8 @@ class Tangents:
 def _arc_limits(
     arms: PolarArcs, arm: Ints, length: Floats, limits: tuple[Floats, Floats]
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the highest speed of arcs, their acceleration, and how much of it turns them at
-    that speed."""
+    """Return the highest speed of arcs, their total acceleration, and the centripetal part of it
+    at that speed."""
     rate, acceleration = limits
     v_xy, a_xy = rate[:2].min(), acceleration[:2].min()
     r, r_end, sweep = arms.radius[arm], arms.end_radius[arm], np.abs(arms.sweep[arm])
@@ -824,12 +833,12 @@ def _covered_share(x: Floats, ramp: Floats) -> Floats:
 
 
 def _turn_of(before: Floats, after: Floats, ramp: Floats) -> Floats:
-    """Return (M,) the part x of the time of an overlap at which the first move lacks as much as
-    the second has gone: there the tool is nearest to the corner, and one ends and the other
-    begins.
+    """Return (M,) the fraction x of the time of an overlap at which the rest of the first move
+    equals what the second has covered: there the tool is nearest to the corner, and the first move
+    ends and the second begins.
 
-    (1 − x)² before falls, and gone(x) behind grows, so that they meet once: by bisection. 0.5
-    where nothing overlaps.
+    The rest, (1 − x)² `before`, falls, and the covered length, `_covered_share`(x) `after`, grows,
+    so they meet once; found by bisection. 0.5 where nothing overlaps.
     """
     low, high = np.zeros(len(before)), np.ones(len(before))
     ramp = np.where(before > 0.0, ramp, 1.0)
@@ -845,10 +854,10 @@ TURN_ROUNDS = 40
 
 
 def _turning_radius(r: Floats, growth: Floats, rise: Floats) -> Floats:
-    """Return the radius by which the planner bounds the speed of arcs of radius r at their
-    start, which grow by `growth` a radian (`pmCircleEffectiveMinRadius`, blendmath.c). It takes
-    the whole rise for that of a radian, so that helices may be faster than their curvature
-    says."""
+    """Return the radius by which the planner limits the speed of arcs of radius r at their start,
+    which grow by `growth` per radian (`pmCircleEffectiveMinRadius`, blendmath.c). It takes the
+    whole rise for that of one radian, so that helices may be faster than their curvature
+    allows."""
     inner = growth**2 + r**2
     spiral = inner**1.5 / (inner + growth**2)
     return np.asarray(spiral + rise**2 / spiral)
@@ -962,12 +971,12 @@ class Bends(Struct, frozen=True, eq=False):
         return np.asarray(0.5 * np.arccos(cosine))
 
     def subset(self, indices: Ints) -> Bends:
-        """Return a subset of the corners."""
+        """Return the bends at these corners."""
         return Bends(self.before[indices], self.after[indices])
 
 
 def corners_of(moves: PlannerMoves, tangents: Tangents, rules: CornerRules) -> PlannerCorners:
-    """Compute speed, overlap or blend at the start of each move."""
+    """Return the speed, overlap or blend at the start of each move."""
     bends = Bends(
         tangents.at_ends(np.roll(moves.row, 1)),  # nothing comes of that before the first
         tangents.at_starts(moves.row),
@@ -1001,7 +1010,7 @@ def _meet(
     joinable: Bools,
     rules: CornerRules,
 ) -> PlannerCorners:
-    """Return all corners, where blends at the starts of moves use so much (M,) mm of them.
+    """Return all corners, where the blends at the starts of moves take `used_mm` (M,) of them.
     Lines that overlap with the move before, or wait for the spindle behind a rapid, are not
     `joinable` (M,) (`tcCanConsume`)."""
     count = len(moves.length)
@@ -1050,9 +1059,9 @@ def _choose(
     used_mm: Floats,
     rules: CornerRules,
 ) -> None:
-    """Let moves overlap at the corners `rows` (K,), or meet at the speed that passes for straight
-    `kink` (K,), or be rounded, as it seems the fastest, the first of equals
-    (`tpChooseBestBlend`)."""
+    """Decide how the moves at the corners `rows` (K,) meet, and change `corners` accordingly: by
+    overlap, by the speed `kink` (K,) at which the corner counts as straight, or by the blend; the
+    planner takes the fastest by its estimate, the first of equals (`tpChooseBestBlend`)."""
     arc = corners.speed[rows]
     overlap = _worth(moves, tangents, rows, used_mm, rules)
     overlaps = (overlap >= kink) & (overlap >= arc)
@@ -1082,7 +1091,7 @@ def _overlaps(
     overall: Floats,
     modes: CornerModes,
 ) -> _Overlaps:
-    """Compute the overlaps of moves at corners (`tpComputeBlendVelocity`), from the accelerations
+    """Return the overlaps of moves at corners (`tpComputeBlendVelocity`), from the accelerations
     along both moves and the lengths that count for them; `overall` (K,) is the acceleration of the
     second move with its turning part."""
     one, other = rates
@@ -1109,9 +1118,9 @@ def _overlaps(
 def _worth(
     moves: PlannerMoves, tangents: Tangents, rows: Ints, used_mm: Floats, rules: CornerRules
 ) -> Floats:
-    """Return (K,) mm/s that the planner thinks an overlap is worth, before it knows the next
-    corner: half of each move may be gone by then, bends take their part, and arcs keep half for
-    turning."""
+    """Return (K,) the speed, mm/s, by which the planner rates an overlap before it knows the next
+    corner: it assumes that half of each move may be used up by then, that bends take their part of
+    the acceleration, and arcs half for turning."""
     rates = [
         LAST_PART * (1.0 - rules.kink_ratio) * moves.acceleration[k]
         * np.where(moves.is_arc[k], TANGENT_RATIO, 1.0)
@@ -1132,7 +1141,7 @@ def _overlap(
     rows: Ints,
     rules: CornerRules,
 ) -> None:
-    """Fill in how moves overlap at the corners `rows` (K,)."""
+    """Fill in the overlap of the moves at the corners `rows` (K,)."""
     one, _ = moves.tangential(rows - 1, LAST_PART * moves.acceleration[rows - 1])
     other, _ = moves.tangential(rows, LAST_PART * moves.acceleration[rows])
     lengths = moves.length[rows - 1], moves.length[rows]
@@ -1167,9 +1176,10 @@ def _rounds(
     planar: Floats,
     rules: CornerRules,
 ) -> _Rounds:
-    """Return the blends at the corners `rows` (K,) in planes of the unit normals (K, 3), which use
-    at most `longest` (K,) mm of either move; `planar` (K,) mm/s: no faster than that, or than the
-    axes in that plane, whichever is more (`blendParamKinematics`, `blendComputeParameters`).
+    """Return the blends at the corners `rows` (K,), in planes of the unit normals (K, 3). They use
+    at most `longest` (K,) mm of either move, and are no faster than the larger of `planar` (K,)
+    mm/s and the speed of the axes in that plane (`blendParamKinematics`,
+    `blendComputeParameters`).
 
     In the plane no axis exceeds its limit when the whole is limited to min(limit / √(1 − m²)).
     """
@@ -1206,9 +1216,9 @@ def _fill(
     left_mm: Floats,
     rules: CornerRules,
 ) -> None:
-    """Fill in blends that reach so far on both moves, with centre and spokes `shape` (3, K, 3),
-    where they are `is_valid` (K,). They leave `left_mm` (K,) of the moves before, inf of those
-    that may not join."""
+    """Fill in the blends that are valid (`is_valid` (K,)): `reach` on both moves, with the centre
+    and both spokes in `shape` (3, K, 3). They leave `left_mm` (K,) of the move before; inf where
+    that move may not join."""
     rows, shape = rows[is_valid], shape[:, is_valid]
     length = np.linalg.norm(shape[1], axis=1) * _angle_between(shape[1], shape[2])
     speed = rounds.speed[is_valid]
@@ -1300,7 +1310,8 @@ def _side(
     *,
     ends: bool,
 ) -> _Side:
-    """Return the moves `rows` (K,) at corners (K,), which end there, or begin."""
+    """Return the geometry on one side of the corners (K,): that of the moves `rows` (K,), which
+    end there (`ends`) or begin there."""
     is_arc, arms = moves.is_arc[rows], tangents.arms
     arcs = np.flatnonzero(is_arc)
     arm = tangents.arm_of(moves.row[rows[arcs]])
@@ -1345,7 +1356,8 @@ def _round_arcs(
     joinable: Bools,
     rules: CornerRules,
 ) -> None:
-    """Fill in the blends at corners with arcs, all in XY, at the corners `rows`."""
+    """Fill in the blends at the corners `rows` between moves one of which is an arc; all lie in
+    XY."""
     if len(rows) == 0:
         return
     theta_tan = bends.theta
@@ -1402,7 +1414,7 @@ def _round_arcs(
 def _centre_of(
     corner: Floats, side_sign: Floats, radius: Floats, first: _Side, last: _Side
 ) -> Floats:
-    """Return (K,) the centres of circles of a radius (K,) that touch both sides, those nearest
+    """Return (K,) the centres of circles of a radius (K,) that touch both sides, the ones nearest
     to the corners; NaN where there are none."""
     distance = [side.sign * radius + side.radius for side in (first, last)]
     # A line and an arc: at `radius` beside the line, `distance` from the arc's centre.
@@ -1429,12 +1441,12 @@ def _centre_of(
 
 
 def _angle_between(one: Floats, other: Floats) -> Floats:
-    """Return (K,) rad between vectors (K, 3)."""
+    """Return (K,) the angles between vectors (K, 3), rad."""
     across = np.linalg.norm(np.cross(one, other), axis=-1)
     return np.asarray(np.arctan2(across, (one * other).sum(axis=-1)))
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Return (M, 3) of length 1; vectors of none stay."""
+    """Return vectors (M, 3) scaled to length 1; vectors of length 0 are unchanged."""
     length = np.linalg.norm(vectors, axis=1)
     return np.asarray(vectors / np.where(length > 0.0, length, 1.0)[:, None])

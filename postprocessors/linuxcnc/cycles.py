@@ -46,7 +46,7 @@ class _Hole(Struct):
 
 
 def drill(machine: InterpreterState, block: LinuxcncBlock, motion: int) -> None:
-    """Carry out a cycle."""
+    """Execute a canned cycle: all holes of a block."""
     words = block.words
     if machine.feed_mm == 0.0:
         raise LineFault("a cycle, and no feed yet", mend="write F first")
@@ -118,7 +118,7 @@ def _series_words(machine: InterpreterState) -> dict[str, float]:
 def _word(
     words: dict[str, float], inherited: dict[str, float], letter: str, name: str, key: str = ""
 ) -> float:
-    """Return the number of a word, or of the last block that had it."""
+    """Return the number of a word, or that of the last block of the series that had it."""
     value = words.get(letter, inherited.get(key or letter))
     if value is None:
         raise LineFault(f"a cycle without {name}", "g", f"write {letter.upper()}")
@@ -128,7 +128,7 @@ def _word(
 def _place(
     machine: InterpreterState, words: dict[str, float], names: list[str], start: list[float]
 ) -> list[float]:
-    """Return the place of the (first) hole of an absolute cycle."""
+    """Return the place of the first hole of an absolute cycle."""
     if "@" in words or "^" in words:
         x, y = machine.position[:2]
         radius = words.get("@", math.hypot(y, x))
@@ -138,7 +138,7 @@ def _place(
 
 
 def _polar_step(place: list[float], radius: float, angle: float) -> None:
-    """Return a step in polar coordinates."""
+    """Change `place` by a step in polar coordinates."""
     if place[0] == 0.0 and place[1] == 0.0:
         raise LineFault("a polar step from zero, which has no direction", "@")
     length = math.hypot(place[1], place[0]) + radius
@@ -149,7 +149,8 @@ def _polar_step(place: list[float], radius: float, angle: float) -> None:
 def _bound(
     machine: InterpreterState, times: int, hole: _Hole, motion: int, inherited: dict[str, float]
 ) -> None:
-    """Raise Fault where the holes would be more moves than a program may have."""
+    """Raise LineFault where the holes would be more moves than a program may have, or more strokes
+    than `most_lines`."""
     pecks = 1.0
     if motion in WANTS_PECK:
         pecks = max((hole.r - hole.bottom) / inherited["q"], 1.0)
@@ -265,7 +266,8 @@ def _back_bore(
     is_repeat: bool,
     inherited: dict[str, float],
 ) -> Callable[[_Hole], None]:
-    """G87: beside the hole down through it, over, and up with the spindle turning."""
+    """Return the function that makes a hole of G87: go down through the hole beside its centre,
+    move to the centre, and bore upwards with the spindle turning."""
     series = _series_words(machine) if is_repeat else {}
     for letter in "ijk":
         inherited[letter] = _word(words, series, letter, letter.upper())
@@ -297,7 +299,8 @@ def _back_bore(
 def follow_spindle(
     machine: InterpreterState, block: LinuxcncBlock, end: list[float], motion: int
 ) -> None:
-    """G33, and G33.1 there and back: a move whose feed is K for each turn of the spindle."""
+    """Execute G33, or G33.1 there and back: a move whose feed is K for each turn of the
+    spindle."""
     canon = machine.canon
     _need_spindle(machine, motion)
     feed, canon.feed = canon.feed, block.words["k"] * machine.speed * canon.mm
@@ -311,7 +314,8 @@ def follow_spindle(
 
 
 def thread(machine: InterpreterState, block: LinuxcncBlock, end: list[float]) -> None:
-    """G76: passes along Z, each deeper in X, at the angle Q and with the tapers E of L."""
+    """Execute G76: passes along Z, each deeper in X, at the angle Q, with tapers of length E at
+    the ends that L names."""
     words, canon, mm = block.words, machine.canon, machine.canon.mm
     _need_spindle(machine, 760)
     if machine.compensation.side:

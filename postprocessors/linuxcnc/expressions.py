@@ -46,7 +46,7 @@ class Scanner:
         self._depth = 0
 
     def value(self) -> Value:
-        """Return a number, an expression, a parameter or a function."""
+        """Parse a number, an expression, a parameter or a function."""
         text, begin = self.text, self.at
         sign, after = text[begin : begin + 1], text[begin + 1 : begin + 2]
         if sign == "[":
@@ -67,7 +67,7 @@ class Scanner:
         return self.number()
 
     def number(self) -> float:
-        """Return a plain number."""
+        """Read a plain number."""
         match = NUMBER.match(self.text, self.at)
         assert match is not None  # it matches nothing too
         text = match[0]
@@ -77,7 +77,7 @@ class Scanner:
         return float(text)
 
     def whole_number(self) -> Callable[[Parameters], int] | int:
-        """Read a value that must be a whole number."""
+        """Parse a value that must be an integer."""
         begin = self.at
         value = self.value()
         if isinstance(value, float):
@@ -102,7 +102,8 @@ class Scanner:
         return lambda parameters: finite(function(parameters), begin)
 
     def _ranked(self, left_value: Value, rank: int) -> Value:
-        """Evaluate operators of this precedence and above, up to the closing bracket."""
+        """Parse operators of this precedence and above, up to the closing bracket, with
+        `left_value` on the left of the first."""
         while True:
             name = self._operator_at(self.at)
             if name == "]" or RANKS[name] < rank:
@@ -121,7 +122,7 @@ class Scanner:
         raise LineFault(f"{self.text[begin]!r} is no operator", begin)
 
     def parameter(self) -> Value:
-        """#5, #[…], ##5 or #<name>."""
+        """Parse a parameter: #5, #[…], ##5 or #<name>."""
         begin = self.at
         self.at += 1
         if self.text[self.at : self.at + 1] == "<":
@@ -166,7 +167,7 @@ class Scanner:
         return _apply_function(FUNCTIONS[name], first, begin)
 
     def _exists(self) -> Value:
-        """Parse exists[#<name>]."""
+        """Parse exists[#<name>], which is 1 if the name has a value, else 0."""
         self.at += 1
         if self.text[self.at : self.at + 1] != "#":
             raise LineFault("exists wants a parameter", self.at)
@@ -191,14 +192,14 @@ def evaluate(value: Value, parameters: Parameters) -> float:
 
 
 def finite(value: float, column: int) -> float:
-    """Return the number; Fault for one that is none."""
+    """Return a number as it is; LineFault for inf and NaN."""
     if value - value != 0.0:
         raise LineFault("the result of a calculation is no number", column)
     return value
 
 
 def whole_number(value: float, column: int) -> int:
-    """Return the whole number that is meant; LineFault for a fraction."""
+    """Return the integer within `WHOLE` of a value; LineFault for a fraction."""
     low = math.floor(value)
     if value - low > 1.0 - WHOLE:
         return low + 1
@@ -208,7 +209,7 @@ def whole_number(value: float, column: int) -> int:
 
 
 def check_index(index: int, column: int) -> int:
-    """Return the number of a parameter; Fault where there is none of it."""
+    """Return the index of a numbered parameter; LineFault for one that does not exist."""
     if not 1 <= index < MAX_PARAMETERS:
         raise LineFault(f"there is no parameter #{index} (1 to {MAX_PARAMETERS - 1})", column)
     return index
@@ -218,7 +219,8 @@ Binary = Callable[[float, float, int], float]
 
 
 def _apply_operator(operator: Binary, left_value: Value, right: Value, column: int) -> Value:
-    """Apply an operator at once if both sides are numbers, else when the line is executed."""
+    """Return the result of an operator if both sides are numbers, else a function that computes it
+    when the line is executed."""
     if isinstance(left_value, float):
         if isinstance(right, float):
             return operator(left_value, right, column)
@@ -310,7 +312,7 @@ def _exp(value: float, column: int) -> float:
 
 
 def _round(value: float, column: int) -> float:
-    """To the nearest whole number, halves away from zero."""
+    """Return the nearest integer, halves away from zero."""
     if abs(value) >= MAX_ROUNDED:
         raise LineFault(f"round of {value:g}, which is too large", column)
     return float(math.trunc(value + (-0.5 if value < 0.0 else 0.5)))

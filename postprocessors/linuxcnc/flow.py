@@ -135,8 +135,8 @@ class Flow:
     # Reading
 
     def step(self, within: int = 0) -> ParsedLine | None:
-        """Return the next line of words; None at the % that ends the program, and behind an O word
-        that leaves fewer than `within` calls under way."""
+        """Return the next line of words; None at the % that ends the program, and after an O word
+        that leaves fewer than `within` calls active."""
         while True:
             if self.at >= self.text.count:
                 self._end_of_file()
@@ -255,7 +255,7 @@ class Flow:
 
     def _is_of_flow(self, line: ParsedLine) -> bool:
         """Return True if the O word, M98 or M99 at the start of the line changes the flow. M99
-        of the program itself does not; it ends the program."""
+        outside of a sub does not; it ends the program."""
         assert line.flow is not None
         return not line.text.startswith("m99", line.flow) or self.level > 0
 
@@ -342,7 +342,8 @@ class Flow:
         return known_label
 
     def _unique_label(self, kind: str, label: str, *, after_do: bool = False) -> FlowLabel:
-        """Return the label of a word that may stand in one place only."""
+        """Return the label of a word that may stand in one place only; LineFault where another
+        line has it."""
         known_label = self._labels.get(label)
         if known_label is None:
             return self._save(kind, label)
@@ -470,7 +471,7 @@ class Flow:
         return [evaluate(value, self.given) for value in word.condition]
 
     def _take_result(self, line: ParsedLine, word: _Word) -> None:
-        """The value of `endsub [value]` and `return [value]`."""
+        """Store the value of `endsub [value]` and `return [value]`."""
         if self._defining is not None:
             return
         if word.kind != "M99" and line.text[word.rest : word.rest + 1] == "[":
@@ -567,7 +568,7 @@ class Flow:
 
 
 def _word_of(line: ParsedLine) -> _Word:
-    """Return the O word, M98 or M99 with which a line begins."""
+    """Return the O word, M98 or M99 that begins a line."""
     text, begin = line.text, line.flow
     assert begin is not None
     if text[begin] == "m":
@@ -602,7 +603,7 @@ def _word_of(line: ParsedLine) -> _Word:
 
 
 def _check_rest(line: ParsedLine, word: _Word) -> None:
-    """Raise Fault where more than comments stands behind an O word."""
+    """Raise LineFault where more than comments follows an O word."""
     position = word.rest
     while position < len(line.text) and line.text[position] != ";":
         if line.text[position] != "(":

@@ -81,7 +81,8 @@ class FrameCodes(InterpreterState, ABC):
         return stored | dict.fromkeys(range(5400, 5414), 0.0)
 
     def _stored_place(self, first: int) -> list[float]:
-        """Three lengths of parameters from this one on, in units of the program."""
+        """Return three lengths that are stored as parameters from `first` on, in units of the
+        program."""
         factor = self._user_mm / self.canon.mm
         return [self.given.stored_value(first + k) * factor for k in range(3)]
 
@@ -98,8 +99,7 @@ class FrameCodes(InterpreterState, ABC):
         self._replace()
 
     def _replace(self) -> None:
-        """The canon's coordinates are of the frame as it is now, which the machine learns at
-        rest."""
+        """Come to rest, and set the canon's frame to the one now in force."""
         self.come_to_rest()
         mm = self.canon.mm
         x, y, z = (each * mm for each in self._origin)
@@ -107,7 +107,8 @@ class FrameCodes(InterpreterState, ABC):
         self.canon.set_frame(ProgramFrame((x, y, z), self._rotation, (dx, dy, dz)))
 
     def _on_machine(self) -> list[float]:
-        """Return the position of the tip on the machine, without the tool's length."""
+        """Return the position of the tool tip in machine coordinates; the tool's length does not
+        count."""
         x, y, z = (a + b for a, b in zip(self.position, self._axis_offset, strict=True))
         x, y = rotate(x, y, self._rotation)
         return [a + b for a, b in zip((x, y, z), self._origin, strict=True)]
@@ -135,7 +136,8 @@ class FrameCodes(InterpreterState, ABC):
         return f"G{code / 10:g}"
 
     def _set_offsets(self, code: int, words: dict[str, float]) -> None:
-        """G92: here are these coordinates; G52: zero is moved by these lengths."""
+        """Execute G92, which gives the present position these coordinates, or G52, which moves
+        zero by these lengths."""
         self._not_while_compensating("another offset")
         self.given.set_numbered(5210, 1.0)
         for k, axis in enumerate("xyz"):
@@ -154,7 +156,8 @@ class FrameCodes(InterpreterState, ABC):
         self._replace()
 
     def _end_offsets(self, code: int) -> None:
-        """G92.1 and G92.2 take the offsets away, G92.3 brings those back that are stored."""
+        """Execute G92.1 and G92.2, which remove the offsets, or G92.3, which restores the stored
+        ones."""
         self._not_while_compensating("another offset")
         place = [a + b for a, b in zip(self.position, self._axis_offset, strict=True)]
         if code == 923:
@@ -178,7 +181,8 @@ class FrameCodes(InterpreterState, ABC):
             raise LineFault("G10 L0 while a tool is loaded", "g")
 
     def _g10_frame(self, kind: int, words: dict[str, float]) -> None:
-        """G10 L2: a frame lies there; L20: its coordinates are these where the tool stands."""
+        """Execute G10: L2 sets the zero of a frame, L20 sets it so that the tool has these
+        coordinates."""
         if "i" in words or "j" in words:
             raise LineFault("I and J beside G10 L2", "i" if "i" in words else "j")
         number = int(words.get("p", -1.0) + 1e-4) or self._frame
@@ -244,7 +248,8 @@ class FrameCodes(InterpreterState, ABC):
             self._set_here.add(number)
 
     def _g10_tool(self, kind: int, words: dict[str, float]) -> None:
-        """G10 L1: a tool is so long; L10 and L11: its tip has these coordinates here."""
+        """Execute G10: L1 sets the offsets of a tool, L10 and L11 set them so that its tip has
+        these coordinates."""
         number = int(words["p"] + 0.5)
         tool = self._tool_of(number, "p")
         if not any(letter in words for letter in (*AXES, "r", "q", "i", "j")):
@@ -269,8 +274,8 @@ class FrameCodes(InterpreterState, ABC):
             self._load(number)
 
     def _touch_off(self, kind: int, words: dict[str, float], offset: list[float]) -> list[float]:
-        """Compute the lengths of a tool whose tip has these coordinates here, in the frame in
-        force or (L11) in that of G59.3."""
+        """Return the offsets of a tool whose tip has these coordinates here, in the frame in force
+        or (L11) in that of G59.3."""
         number = 9 if kind == 11 else self._frame
         first = 5201 + 20 * number
         rotation = self.given.stored_value(first + 9)
@@ -289,7 +294,8 @@ class FrameCodes(InterpreterState, ABC):
         return [ox, oy, z - words["z"] if "z" in words else offset[2]]
 
     def _set_length(self, code: int, words: dict[str, float]) -> None:
-        """G43, G43.1, G43.2, G49: the tip moves away from the point that was controlled."""
+        """Execute G43, G43.1, G43.2 or G49: set the offset of the tool tip, and the tip's
+        coordinates by it."""
         self._not_while_compensating("another tool length")
         self.come_to_rest()
         new = [0.0, 0.0, 0.0]

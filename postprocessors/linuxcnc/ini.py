@@ -56,13 +56,12 @@ class _Ini:
         return None if entry is None else entry[0]
 
     def where(self, section: str, key: str) -> str:
-        """Return the place of an entry."""
+        """Return the place of an entry, for messages."""
         entry = self.entries.get((section, key))
         return ("" if entry is None else f"line {entry[1]}, ") + f"[{section}] {key}"
 
     def number(self, section: str, key: str) -> float | None:
-        """Return the number of an entry, behind which may stand a comment; None without the
-        entry."""
+        """Return the number of an entry, which a comment may follow; None without the entry."""
         text = self.text(section, key)
         if text is None:
             return None
@@ -73,8 +72,8 @@ class _Ini:
 
 
 def settings_of(text: str) -> list[ControllerSetting] | None:
-    """Return the values of a machine file that an INI file says, None for a text that is none;
-    MachineError for what is missing or cannot be used."""
+    """Return the values for a machine file that an INI file contains, None for a text that is not
+    an INI file; MachineError for an entry that is missing or cannot be used."""
     ini = _Ini(text)
     if not ini.includes and not any(section in _SECTIONS for section, _ in ini.entries):
         return None
@@ -183,7 +182,8 @@ def _axis(ini: _Ini, letter: str, joint: str, unit: float) -> list[ControllerSet
 
 
 def _limit(ini: _Ini, axis: str, joint: str, key: str) -> tuple[float, str] | None:
-    """Return a limit of the axis, or of its joint where that says none, and the section."""
+    """Return a limit of the axis, or that of its joint where the axis has none, and the section it
+    stands in."""
     for section in (axis, joint):
         value = ini.number(section, key)
         if value is not None:

@@ -41,7 +41,7 @@ class Interpreter(BlockMoves):
         return names_of(self)
 
     def execute(self, block: LinuxcncBlock) -> None:
-        """Carry out a block; Fault where LinuxCNC would refuse it."""
+        """Execute a block; LineFault where LinuxCNC would refuse it."""
         for letter in RELATIVE:
             if letter in block.words:
                 raise LineFault(f"the letter {letter.upper()} is no word here", letter)
@@ -164,7 +164,7 @@ class Interpreter(BlockMoves):
             raise LineFault(f"{name} runs a program of the machine, which only it knows", "m")
 
     def _wait_for_input(self, words: dict[str, float]) -> None:
-        """M66: the input comes at once, and is 0."""
+        """Execute M66: the input is assumed to come at once, and to be 0."""
         digital, analog = words.get("p", -1.0), words.get("e", -1.0)
         kind = round(words.get("l", 0.0))
         if "p" in words and "e" in words:
@@ -227,7 +227,7 @@ class Interpreter(BlockMoves):
     # G words
 
     def _g_words(self, block: LinuxcncBlock, words: dict[str, float]) -> None:
-        """Carry out all G words of a block but the motion."""
+        """Execute all G words of a block except the motion."""
         g = block.g
         one_shot = g.get("one block")
         if one_shot == 40:
@@ -278,8 +278,8 @@ class Interpreter(BlockMoves):
         self._tolerances = self._tolerances[0] * factor, self._tolerances[1] * factor
 
     def _set_path(self, code: int, words: dict[str, float]) -> None:
-        """G61, G61.1, and G64 with P, its tolerance, and Q, that of merging lines (P where it is
-        missing). Below 0 they count as missing."""
+        """Execute G61, G61.1, or G64 with the tolerance P of corners and Q of merging lines (P
+        where Q is missing). Values below 0 count as missing."""
         self._not_while_compensating("another path mode")
         self._control = code
         if code != 640:
@@ -359,7 +359,7 @@ class Interpreter(BlockMoves):
 
 
 def _nose(orientation: int, radius: float) -> tuple[float, float]:
-    """Return the controlled point of a lathe tool, relative to the centre of its nose: X and Z."""
+    """Return the controlled point of a lathe tool, X and Z relative to the centre of its nose."""
     x = -radius if orientation in (1, 2, 6) else radius if orientation in (3, 4, 8) else 0.0
     z = -radius if orientation in (2, 3, 7) else radius if orientation in (1, 4, 5) else 0.0
     return x, z

@@ -87,7 +87,7 @@ _MESSAGES: Final = {
 
 
 def close_up(text: str) -> str:
-    """Return the line as LinuxCNC reads it: without blanks and in small letters, but for
+    """Return the line as LinuxCNC reads it: without blanks and in small letters, except in
     comments."""
     if "(" not in text and ";" not in text:
         return text.translate(_BLANKS).lower()
@@ -115,7 +115,7 @@ def close_up(text: str) -> str:
 
 
 def column_of(text: str, place: int) -> int:
-    """Return the column, from 1, of a place in the closed text of a line."""
+    """Return the column, from 1, of a place in the closed-up text of a line."""
     signs, column, comment = 0, 1, ""
     for column, sign in enumerate(text, 1):
         blank = not comment and sign in " \t\r"
@@ -155,7 +155,7 @@ class ParsedLine:
     of words; `begin`: where it begins behind / and N."""
 
     __slots__ = (
-        *("_block", "_parse_value", "_items", "begin", "comment", "delete", "flow", "text"),
+        *("_block", "_is_compiled", "_items", "begin", "comment", "delete", "flow", "text"),
         "word",
     )
 
@@ -177,7 +177,7 @@ class ParsedLine:
         self.comment: str | None = None
         self._items: list[Item] = []
         self._block: LinuxcncBlock | None = None
-        self._parse_value = False
+        self._is_compiled = False
 
     @property
     def is_block(self) -> bool:
@@ -188,10 +188,11 @@ class ParsedLine:
         return bool(remainder) and remainder[0] != ";"
 
     def block(self, parameters: Parameters) -> LinuxcncBlock:
-        """Return its words; Fault where LinuxCNC would stop while it reads them."""
+        """Return the words of the line with their values; LineFault where LinuxCNC would stop
+        while it reads them."""
         if self._block is not None:
             return self._block
-        if not self._parse_value:
+        if not self._is_compiled:
             self._compile()
             if all(isinstance(item.value, float) and item.letter != "#" for item in self._items):
                 self._block = group_words(self._items, self.comment)
@@ -223,7 +224,7 @@ class ParsedLine:
         return LinuxcncBlock(block.words, block.g, block.m, block.comment, tuple(settings))
 
     def _compile(self) -> None:
-        """Find its words."""
+        """Split the text into words, and compile their values."""
         text, position = self.text, self.begin
         while position < len(text):
             letter = text[position]
@@ -254,11 +255,11 @@ class ParsedLine:
             else:
                 message = _MESSAGES.get(letter, f"the sign {letter!r} belongs to no word")
                 raise LineFault(message, position)
-        self._parse_value = True
+        self._is_compiled = True
 
 
 def _parse_value(text: str, position: int, letter: str) -> tuple[Value, int]:
-    """Parse a value that is no plain number, and return it with its end."""
+    """Parse a value that is not a plain number; return it and its end."""
     sign = text[position : position + 1]
     if not (sign.isalpha() or (sign and sign in "[#+-")):
         raise LineFault(f"no number after {letter.upper()}", position - 1)
@@ -275,7 +276,7 @@ def _parse_value(text: str, position: int, letter: str) -> tuple[Value, int]:
 
 
 def _parse_setting(text: str, position: int) -> tuple[Item, int]:
-    """Parse #index=value or #<name>=value, and return it with its end."""
+    """Parse #index=value or #<name>=value; return it and its end."""
     scanner = Scanner(text, position + 1)
 
     def settable(index: int) -> int:
@@ -303,7 +304,8 @@ def _parse_setting(text: str, position: int) -> tuple[Item, int]:
 
 
 def group_words(items: list[Item], comment: str | None) -> LinuxcncBlock:
-    """Sort words by letter and codes by group; LineFault where LinuxCNC refuses them together."""
+    """Split the words of one block into values by letter and codes by modal group; LineFault for a
+    combination that LinuxCNC rejects."""
     words: dict[str, float] = {}
     g: dict[str, int] = {}
     m: dict[str, int] = {}
@@ -340,7 +342,7 @@ def group_words(items: list[Item], comment: str | None) -> LinuxcncBlock:
 
 
 def g_code(value: float, column: int) -> int:
-    """Return the tenfold code of a G word."""
+    """Return ten times the number of a G word, its code."""
     tenfold = 10.0 * value
     code = int(tenfold // 1)
     excess = tenfold - code

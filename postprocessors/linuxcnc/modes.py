@@ -35,7 +35,8 @@ class ActiveModes(Struct, frozen=True):
 
 
 def obey(machine: InterpreterState, code: int, execute: Execute) -> None:
-    """M70 saves, M71 forgets, M72 brings back, M73 saves for the end of the sub."""
+    """Execute M70 (save the modes), M71 (forget them), M72 (restore them) or M73 (save them until
+    the sub ends)."""
     call = machine.calls[-1]
     if code in (70, 73):
         call.saved = modes_of(machine)
@@ -49,7 +50,7 @@ def obey(machine: InterpreterState, code: int, execute: Execute) -> None:
 
 
 def restore(machine: InterpreterState, saved: ActiveModes, execute: Execute) -> None:
-    """Execute the blocks that bring saved modes back."""
+    """Execute the blocks that restore saved modes."""
     units = saved.g["units"]
     if modes_of(machine).g["units"] != units:
         execute(_block(machine, f"g{units // 10}"))
@@ -77,7 +78,7 @@ def _block(machine: InterpreterState, text: str) -> LinuxcncBlock:
 
 
 def spindle_word(kind: Kind | None) -> int:
-    """Return the M word of a turning, or of a standing, spindle."""
+    """Return the M word for a direction of the spindle, or for a stopped one."""
     return 5 if kind is None else 3 if kind == Kind.SPINDLE_CW else 4
 
 

@@ -52,8 +52,8 @@ class BlockMoves(FrameCodes):
     """The state, its frames, and the moves of blocks."""
 
     def _go_home(self, code: int, words: dict[str, float], g: Mapping[str, int]) -> None:
-        """G28 and G30: by way of the coordinates to the stored place, of the axes that are
-        named."""
+        """Execute G28 or G30: go by way of the block's coordinates to the stored place, in the
+        axes that are named."""
         end = self._ends(words, g)
         self._not_while_compensating("G28 or G30")
         self.canon.rapid(*end)
@@ -112,7 +112,7 @@ class BlockMoves(FrameCodes):
             self._spline_move(motion, block, words)
 
     def _rate(self, block: LinuxcncBlock, length: Callable[[], float] | None = None) -> float:
-        """Return the feed of a move, mm/min; Fault where none is in force."""
+        """Return the feed of a move, mm/min; LineFault where none is in force."""
         mm = self.canon.mm
         if self.feed_mode == 930:
             if "f" not in block.words:
@@ -155,7 +155,8 @@ class BlockMoves(FrameCodes):
         position[:] = end
 
     def _rapid_on_machine(self, end: list[float], words: dict[str, float]) -> None:
-        """G53 G0: to machine zero it is homing, as far as the machine has an event of it."""
+        """Add the rapid of G53 G0. To machine zero it is homing, where there is an event for those
+        axes."""
         named = tuple(axis for axis in "xyz" if axis in words)
         kinds = {("x", "y"): Kind.HOME_XY, ("z",): Kind.HOME_Z}
         if named in kinds and not any(words[axis] for axis in named):
@@ -201,7 +202,8 @@ class BlockMoves(FrameCodes):
         return radius * math.cos(angle), radius * math.sin(angle)
 
     def _ends_on_machine(self, words: dict[str, float]) -> list[float]:
-        """G53: coordinates of the machine, for the point that carries the tool."""
+        """Return the end of a G53 move, whose coordinates are those of the machine for the point
+        that carries the tool."""
         if "@" in words or "^" in words:
             raise LineFault("polar coordinates beside G53", "@")
         place = self._on_machine()
@@ -211,7 +213,7 @@ class BlockMoves(FrameCodes):
         return self._in_frame(place)
 
     def _arc(self, motion: int, block: LinuxcncBlock, words: dict[str, float]) -> None:
-        """G2 and G3, by centre or by radius, flat or helical."""
+        """Add the arc of G2 or G3, given by its centre or radius, flat or helical."""
         if self._arc_refused:
             raise LineFault(
                 "an arc as the first move behind cutter compensation", "g", "write a line"
@@ -283,7 +285,8 @@ class BlockMoves(FrameCodes):
         letters: list[str],
         offsets: dict[str, float],
     ) -> tuple[float, float]:
-        """Return the centre that I, J and K give; Fault where its radii are none of one arc."""
+        """Return the centre that I, J and K give; LineFault where the radii at both ends differ
+        too much."""
         first, second = (offsets.get(letter, 0.0) for letter in letters[:2])
         if self.absolute_centres:
             x, y = first, second
@@ -312,9 +315,9 @@ class BlockMoves(FrameCodes):
     def _centre_of_radius(
         self, begin: list[float], end: list[float], radius: float, ccw: bool
     ) -> tuple[float, float]:
-        """Return the centre of an arc by its radius: beside the middle of its chord, on the
-        left of it for a counter-clockwise arc of at most half a turn; a negative R asks for
-        more than that, whose centre is on the other side."""
+        """Return the centre of an arc given by its radius: on the left of the chord for a
+        counter-clockwise arc of at most half a turn; a negative R asks for the longer arc, whose
+        centre is on the other side."""
         dx, dy = end[0] - begin[0], end[1] - begin[1]
         if dx == 0.0 and dy == 0.0:
             raise LineFault("an arc by its radius that ends where it starts has no centre", "r")
@@ -335,7 +338,7 @@ class BlockMoves(FrameCodes):
     # Splines
 
     def _spline_move(self, motion: int, block: LinuxcncBlock, words: dict[str, float]) -> None:
-        """G5 (cubic) and G5.1 (quadratic)."""
+        """Add the spline of G5 (cubic) or G5.1 (quadratic)."""
         if self._compensates:
             raise LineFault("a spline while the cutter's radius is compensated", "g")
         if self.feed_mode == 930:
@@ -365,7 +368,7 @@ class BlockMoves(FrameCodes):
         self.position[:] = end
 
     def _control_point(self, block: LinuxcncBlock, words: dict[str, float]) -> None:
-        """G5.2: a control point of a NURBS."""
+        """Execute G5.2: store a control point of a NURBS."""
         if self.motion != 52:
             self._spline = []
         if ("x" in words) != ("y" in words):
@@ -390,7 +393,7 @@ class BlockMoves(FrameCodes):
         self.motion = 52
 
     def _end_spline(self) -> None:
-        """G5.3: the NURBS of the control points."""
+        """Execute G5.3: add the NURBS of the stored control points."""
         if self.motion != 52:
             raise LineFault("G5.3 without G5.2 before it", "g")
         points = self._spline

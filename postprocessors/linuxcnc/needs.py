@@ -51,7 +51,7 @@ USES: Final[Mapping[str, tuple[Codes, Codes, Codes, Codes]]] = {
 
 
 def motion_of(state: InterpreterState, block: LinuxcncBlock) -> int | None:
-    """Return the motion that a block asks for (enhance_block)."""
+    """Return the motion code that a block executes (enhance_block); None if it does not move."""
     words, g = block.words, block.g
     polar = "@" in words or "^" in words
     axes = any(letter in words for letter in (*AXES, *RELATIVE))
@@ -85,7 +85,7 @@ def motion_of(state: InterpreterState, block: LinuxcncBlock) -> int | None:
 
 
 def check(state: InterpreterState, block: LinuxcncBlock, motion: int | None) -> None:
-    """Refuse words without what they need beside them (check_g_codes, check_other_codes)."""
+    """Refuse words that lack others which they need (check_g_codes, check_other_codes)."""
     words, g, m = block.words, block.g, block.m
     one_shot = g.get("one block")
     if one_shot is not None:
@@ -152,7 +152,7 @@ def _check_g10(words: dict[str, float]) -> None:
 
 
 def _check_use(letter: str, block: LinuxcncBlock, motion: int | None) -> None:
-    """Raise Fault where nothing in the block uses a letter."""
+    """Raise LineFault where nothing in the block uses a letter."""
     motions, one_shots, m, other_codes = USES[letter]
     is_used = (
         motion in motions

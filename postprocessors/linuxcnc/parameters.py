@@ -62,7 +62,7 @@ class Parameters:
         self._locals: list[dict[str, float]] = [{}]
 
     def show(self, names: Mapping[str, Callable[[], float]]) -> None:
-        """Further names that show a state."""
+        """Add names that show the state of the interpreter."""
         self._more |= names
 
     @cached_property
@@ -85,7 +85,7 @@ class Parameters:
         return 0.0
 
     def stored_value(self, index: int) -> float:
-        """Return the value of a numbered parameter for the interpreter itself."""
+        """Return the value of a numbered parameter, for the interpreter's own use."""
         return self._values.get(index, 0.0)
 
     def value_of_name(self, name: str, column: int) -> float:
@@ -110,22 +110,23 @@ class Parameters:
         return float(name in self._state or name in self._of(name))
 
     def declare(self, name: str, column: int) -> None:
-        """A line that sets a name makes it exist while the line is still read."""
+        """Create a name when a line sets it, so that it exists while the rest of the line is
+        read."""
         if name in self._state:
             raise LineFault(f"#<{name}> cannot be set", column)
         self._of(name).setdefault(name, 0.0)
 
     def set_named(self, name: str, value: float) -> None:
-        """Give a name a value."""
+        """Set the value of a name."""
         self._of(name)[name] = value
 
     def set_numbered(self, index: int, value: float) -> None:
-        """Give a number a value."""
+        """Set the value of a numbered parameter."""
         self._values[index] = value
 
     def enter(self, arguments: Iterable[float] | None) -> dict[int, float | None] | None:
-        """Return a call begins: names of its own, and its arguments in #1 to #30, where it has
-        some (M98 has none). What they were before is given."""
+        """Begin a call: create its local names, and put its arguments into #1 to #30 (M98 has
+        none). Return the values that #1 to #30 had before, None without arguments."""
         self._locals.append({})
         if arguments is None:
             return None
@@ -135,7 +136,7 @@ class Parameters:
         return before
 
     def leave(self, before: dict[int, float | None] | None) -> None:
-        """Restore the local parameters of the caller: a call ends."""
+        """End a call: restore the local parameters of the caller."""
         self._locals.pop()
         for index, value in (before or {}).items():
             if value is None:

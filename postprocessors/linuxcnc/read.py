@@ -108,7 +108,7 @@ class _Reader:
         self._empty, self._cut_off = True, False
 
     def read(self) -> Toolpath:
-        """Return the moves, with the findings."""
+        """Return the moves of the program, with the findings on it."""
         flow = self.flow
         try:
             self._begin()
@@ -132,7 +132,7 @@ class _Reader:
         return self.path.finish(self._findings())
 
     def _begin(self) -> None:
-        """Skip the first line if it is a % alone: a second one ends the program."""
+        """Skip the first line if it is a lone %; a second % then ends the program."""
         for number in range(self.text.count):
             text = self.text.raw(number).strip()
             if text:
@@ -159,7 +159,7 @@ class _Reader:
         machine.effort = 0
 
     def _read_sub(self, number: int) -> Iterator[LinuxcncBlock]:
-        """Yield the blocks of a sub, whose parameters are set."""
+        """Yield the blocks of a sub, with their parameters set."""
         for line in self.flow.lines_of_sub(number):
             block = line.block(self.machine.given)
             self.machine.set_parameters(block)
@@ -174,7 +174,7 @@ class _Reader:
     # By columns
 
     def _read_plain(self) -> bool:
-        """Read plain lines from here on by columns; True if there were any."""
+        """Read the plain lines from here on by columns; return True if there were any."""
         flow = self.flow
         if flow.seeks or flow.text is not self.text or not self.machine.reads_columns:
             return False
@@ -187,8 +187,8 @@ class _Reader:
         return count > 0
 
     def _decode_plain(self, blocks: PlainBlocks) -> int:
-        """Add the rows of plain blocks, up to the first that is no move which LinuxCNC surely
-        executes."""
+        """Add the rows of plain blocks, up to the first that LinuxCNC may not execute as a plain
+        move, and return the number of these blocks."""
         machine, path = self.machine, self.path
         motion = -1 if machine.motion in (None, 800) else int(machine.motion or 0)
         mm = machine.canon.mm
@@ -204,8 +204,8 @@ class _Reader:
     # What is said of the program
 
     def _unread_lines(self) -> list[int]:
-        """Return the lines (from 1) behind the end, which no controller reads; with branches, the
-        end that was met need not be the last."""
+        """Return the lines (from 1) behind the program's end, which the controller never reads;
+        with branches, the end that was reached need not be the last."""
         if self._branches:
             return []
         lines_after = range(self.flow.at, self.text.count)

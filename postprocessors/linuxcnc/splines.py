@@ -63,7 +63,8 @@ def pieces_of(points: Sequence[tuple[float, float, float]], order: int) -> Itera
 
 
 def _places(points: Floats, order: int, parameters: Floats) -> Floats:
-    """Return (N, 2) the points of the spline at these parameters (N,), by Cox and de Boor."""
+    """Return (N, 2) the points of the spline at these parameters (N,), by the Cox–de Boor
+    recursion."""
     last = len(points) - 1
     knots = np.clip(np.arange(last + order + 1) - order + 1, 0, last - order + 2).astype(float)
     basis = np.zeros((len(parameters), last + order))
@@ -86,10 +87,11 @@ def _places(points: Floats, order: int, parameters: Floats) -> Floats:
 def _two_arcs(
     start: Flat, start_direction: Flat, end: Flat, arriving: Flat
 ) -> Iterator[SplinePiece]:
-    """Two arcs that leave and arrive along these directions (unit vectors), and meet as one.
+    """Yield two tangent arcs from `start` to `end` that leave and arrive along these directions
+    (unit vectors), and have a common tangent where they meet.
 
-    The legs of both tangent polygons are of one length b, where the polygon's middle leg is 2b:
-    |v + b (s + e)| = 2b for v from the end to the start, a quadratic equation for b.
+    The legs of both tangent polygons are of one length b, where the polygon's middle leg is 2b: |v
+    + b (s + e)| = 2b for v from the end to the start, a quadratic equation for b.
     """
     vx, vy = start[0] - end[0], start[1] - end[1]
     c = vx * vx + vy * vy
@@ -112,7 +114,7 @@ def _two_arcs(
 
 
 def _arc(start: Flat, end: Flat, direction: Flat) -> SplinePiece:
-    """Return the arc from here to there that leaves along a direction."""
+    """Return the arc from `start` to `end` that leaves along a direction."""
     x, y = end[0] - start[0], end[1] - start[1]
     across = 2.0 * (y * direction[0] - x * direction[1])
     if abs(across) <= STRAIGHT:

@@ -169,8 +169,8 @@ class InterpreterState:
     def continue_from(
         self, motion: int | None, feed: float, position: tuple[float, float, float], *, moves: bool
     ) -> None:
-        """Adopt motion and feed (mm/min) in force, and position (mm), behind blocks of plain moves
-        that were read by columns."""
+        """Adopt motion, feed (mm/min) and position (mm) after plain blocks that were read by
+        columns."""
         mm = self.canon.mm
         self.motion = self.motion if motion is None else motion
         self.feed_mm = feed
@@ -184,11 +184,12 @@ class InterpreterState:
             self.series.height = None
 
     def end_of_file(self) -> None:
-        """The % that ends a program: a move that waits is never made."""
+        """Drop the move that still waits for its end: at the % that ends a program LinuxCNC never
+        makes it."""
         self.canon.queue.clear()
 
     def turn(self, kind: Kind) -> None:
-        """Start or stop the spindle."""
+        """Set the spindle's direction, or stop it."""
         if kind == Kind.SPINDLE_OFF:
             self.spindle = None
             self.canon.event(kind)
@@ -199,18 +200,18 @@ class InterpreterState:
         self.canon.event(kind, self.speed if self._said_speed else None)
 
     def dwell(self, seconds: float) -> None:
-        """Wait."""
+        """Add a dwell."""
         self.canon.event(Kind.DWELL, seconds)
 
     def come_to_rest(self) -> None:
-        """Wait for the last move, where one is under way: what changes now counts behind it."""
+        """Add a stop where a move is under way, so that the change that follows takes effect after
+        it."""
         if self.canon.moves > self._waited:
             self.dwell(0.0)
         self._waited = self.canon.moves
 
     def _tool_of(self, number: int, letter: str) -> ToolTableEntry:
-        """Return a tool of the table; where there is no table, any tool, of which nothing is
-        known."""
+        """Return a tool of the table; without a table, any tool, about which nothing is known."""
         if number == 0:
             return ToolTableEntry()
         tool = self._tools.get(number)
@@ -244,15 +245,15 @@ class InterpreterState:
             raise LineFault(f"{action} while the cutter's radius is compensated")
 
     def go(self, kind: Kind, axes: tuple[int, int, int], place: list[float]) -> None:
-        """A straight move to a place in the order of a plane."""
+        """Add a straight move to a place given in the axis order of a plane."""
         target = [0.0, 0.0, 0.0]
         for axis, value in zip(axes, place, strict=True):
             target[axis] = value
         (self.canon.rapid if kind == Kind.RAPID else self.canon.line)(*target)
 
     def _begin(self) -> list[float]:
-        """Return the start of the programmed move; with compensation, the cutter itself stands
-        beside it."""
+        """Return the programmed position from which the next move begins; with compensation, the
+        cutter itself is beside it."""
         compensation = self._compensation
         if compensation is not None and compensation.active and not compensation.first:
             target = [0.0, 0.0, 0.0]
@@ -262,7 +263,7 @@ class InterpreterState:
         return list(self.position)
 
     def _flat(self, place: list[float] | None = None) -> list[float]:
-        """Return a place, or the position, in the order of the plane."""
+        """Return a place, or the position, in the axis order of the plane."""
         source = self.position if place is None else place
         return [source[axis] for axis in PLANES[self.plane]]
 

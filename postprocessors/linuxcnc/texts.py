@@ -41,7 +41,7 @@ class ProgramText(ProgramLines):
         self._before: Ints | None = None
 
     def raw(self, number: int) -> str:
-        """Return the text of a line, without the blanks at its end."""
+        """Return the text of a line, without blanks at its end."""
         text = self.text(number)
         if len(text) > self._line_chars:
             message = f"the line has more than {self._line_chars} characters"
@@ -49,7 +49,7 @@ class ProgramText(ProgramLines):
         return text.rstrip(" \t\v\f")
 
     def line(self, number: int, *, keep: bool) -> ParsedLine:
-        """Return a line, compiled once where it may be read again (`keep`)."""
+        """Return a line, parsed only once if it may be executed again (`keep`)."""
         line = self._lines.get(number)
         if line is None:
             line = ParsedLine(self.raw(number))
@@ -58,8 +58,7 @@ class ProgramText(ProgramLines):
         return line
 
     def blocks_before(self, number: int) -> int:
-        """Return the number of blocks before this line, counted as in the listing of the
-        program."""
+        """Return the number of blocks before this line, counted as in the program's listing."""
         if self._before is None:
             lines = self.data.decode("latin-1").split("\n")
             flags = np.array([has_words(line) for line in lines], dtype=np.int64)
@@ -76,8 +75,8 @@ class Folder:
         self._found: dict[str, ProgramText | None] = {}
 
     def find(self, label: str) -> ProgramText | None:
-        """Return the file of a sub, None where there is none; Fault for a place that is not
-        opened."""
+        """Return the file of a sub, None where there is none; LineFault for a place outside of the
+        folder, and for too many files."""
         if label in self._found:
             return self._found[label]
         if len(self._found) >= MAX_FILES:
@@ -113,7 +112,7 @@ class Folder:
 
 
 def _check_bytes(data: bytes, name: str) -> None:
-    """Raise ProgramError at the first byte that no program has."""
+    """Raise ProgramError at the first byte that no program contains."""
     odd = _CONTROL.search(data)
     if odd is not None:
         before = data[: odd.start()].split(b"\n")

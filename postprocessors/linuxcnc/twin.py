@@ -105,7 +105,7 @@ class LinuxcncTwin(Twin):
         return output
 
     def next_s(self) -> float | None:
-        """It says nothing by itself."""
+        """Return the time of the next wake-up: it sends nothing but answers."""
         return self.wake_s()
 
     # Lines.
@@ -187,14 +187,15 @@ class LinuxcncTwin(Twin):
         return bool(self._choices.closes(self.slides.commanded_mm - home, PROBE_PART_MM))
 
     def _line(self) -> int:
-        """Return the line that it is at, from 1; behind the end the last that moved."""
+        """Return the number of the line being executed, from 1; after the end, the last that
+        moved."""
         if not len(self._lines):
             return 0
         index = int(np.searchsorted(self._line_ends, self._program_s(), side="right"))
         return int(self._lines[min(index, len(self._lines) - 1)])
 
     def _program_s(self) -> float:
-        """Time since the program began, s, without pauses."""
+        """Return the time since the program began, s, without pauses."""
         if self._status == "RUNNING" and self.slides.ends_s is not None:
             remaining = max(self.slides.ends_s - self.now, 0.0)
             return self._since + self._segment_s - remaining
@@ -236,8 +237,8 @@ class LinuxcncTwin(Twin):
         return is_done
 
     def _override(self, name: str, value: str, highest: float) -> bool:
-        """Take an override, %, as setFeedOverride and setSpindleOverride of emcrsh.cc do; its
-        motion is that of 100 %."""
+        """Store an override, %, as setFeedOverride and setSpindleOverride of emcrsh.cc do. The
+        simulated motion stays that of 100 %."""
         if not 0.0 <= float(value) <= highest:
             self._say(f"error: invalid: {value} (valid: 0-{highest:g})")
             return False
@@ -289,7 +290,8 @@ class LinuxcncTwin(Twin):
         return True
 
     def _mdi(self, value: str) -> bool:
-        """G10 L20 P0, G38.2 and G38.3, a message, or a line in absolute coordinates."""
+        """Execute a line of MDI: G10 L20 P0, G38.2 and G38.3, a message, or a line in absolute
+        coordinates. Return True: it is acknowledged in any case."""
         if self._mode == "MDI" and self._on and self.slides.ends_s is not None:
             self._queue.append(value)
             return True
@@ -320,7 +322,7 @@ class LinuxcncTwin(Twin):
         return True
 
     def _probe(self, match: re.Match[str]) -> None:
-        """Move until the probe touches; the place goes into #5061 to #5063, in the work frame."""
+        """Move until the probe touches; store the place in #5061 to #5063, in the work frame."""
         if self._is_touching():
             self._error = "Probe is already tripped when starting G38.2 or G38.3 move"
             self._queue.clear()
@@ -364,7 +366,7 @@ class LinuxcncTwin(Twin):
         return replace(path, start=start) if keeps_empty or len(path) else path
 
     def _run_program(self, value: str, *, steps: bool = False) -> bool:
-        """From its beginning; a line to run from is not modelled."""
+        """Run the program from its beginning; starting at another line is not modelled."""
         if self._mode != "AUTO" or not self._may_move() or not self._homed or value:
             self._error = "" if self._homed else "Can't run a program when not homed"
             return True
@@ -421,7 +423,7 @@ class LinuxcncTwin(Twin):
     # Motion.
 
     def _begin_segment(self) -> None:
-        """Set out on the program from where it is, to where it waits next."""
+        """Start the motion of the program from where it is to its next halt."""
         assert self._travel is not None
         program = self._travel
         end = next((halt for halt in self._halts if halt > self._since), program.total_s)
@@ -473,8 +475,8 @@ def _place(mm: Floats) -> str:
 
 
 def _jog_travel(start: Floats, target: Floats, speeds: dict[int, float]) -> Travel:
-    """Return the motion of axes that are jogged at once, each at its speed to its own end; those
-    that are there stand."""
+    """Return the motion of axes that are jogged at the same time, each at its own speed to its own
+    end; axes that are there stand still."""
     lengths = np.abs(target - start)
     total_s = max(float(lengths[axis]) / max(speed, 1e-9) for axis, speed in speeds.items())
     count = max(math.ceil(float(lengths.max()) / 0.01), 1)
@@ -490,7 +492,7 @@ def _jog_travel(start: Floats, target: Floats, speeds: dict[int, float]) -> Trav
 def _straight(
     start: Floats, target: Floats, speed: float = HOMING_MM_S, part_mm: float = 0.01
 ) -> Travel:
-    """Return a line, in parts of `part_mm` at most."""
+    """Return the motion along a line, in parts of at most `part_mm`."""
     length = float(np.linalg.norm(target - start))
     count = max(int(np.ceil(length / part_mm)), 1)
     share = np.arange(1, count + 1)[:, None] / count

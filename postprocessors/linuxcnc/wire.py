@@ -101,8 +101,9 @@ class LinuxcncWire(Wire):
     question = b"hello EMC camtool 1.0\r\n"
 
     def with_stops(self, data: bytes, machine: LinuxcncMachine, path: Toolpath) -> bytes:
-        """M0 behind each tool change between cuts, where the length of the tool is in force: on
-        the line of its M6, or of a G43 behind that, before anything moves or turns."""
+        """Return the program with M0 behind each tool change between cuts, when the tool's length
+        is in force: on the line of its M6, or of a later G43, but before anything moves or
+        turns."""
         if not _link(machine).stops_at_tools:
             return data
         changes = set(path.block[changes_between_cuts(path)].tolist())
@@ -127,8 +128,8 @@ class LinuxcncWire(Wire):
     def packets(
         self, data: bytes, machine: LinuxcncMachine, forecast: Forecast
     ) -> Sequence[Packet]:
-        """Return a packet for each line that is a block; nothing of it goes over the wire. One
-        that stops has the comments since the last motion as its note."""
+        """Return one packet for each line that is a block; its text does not go over the wire. A
+        packet that stops the program carries the comments since the last motion as its note."""
         packets: list[Packet] = []
         notes: list[str] = []
         steady = bool((np.diff(forecast.decoded.block) >= 0).all())
@@ -155,7 +156,7 @@ class LinuxcncWire(Wire):
     def conversation(
         self, packets: Sequence[Packet], machine: LinuxcncMachine, manner: Manner
     ) -> LinuxcncConversation:
-        """Open the file, run it, and watch it to its end."""
+        """Return the conversation that opens the file, runs it, and watches it to its end."""
         link = _link(machine)
         if link.folder is not None:
             name = re.split(r"[/\\]", manner.file)[-1]
@@ -178,7 +179,7 @@ class LinuxcncWire(Wire):
         return LinuxcncTerminal(_link(machine))
 
     def travel_mm(self, machine: LinuxcncMachine) -> tuple[Place, Place]:
-        """Unknown: LinuxCNC itself keeps to the limits of its INI file."""
+        """Return infinite travel: LinuxCNC itself checks the limits of its INI file."""
         x = math.inf
         return (-x, -x, -x), (x, x, x)
 
@@ -189,18 +190,20 @@ class LinuxcncWire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> LinuxcncConversation:
-        """`set home -1`; G10 L20 of the frame that is active; `set jog_incr`, axis by axis, or
-        again and again while it is held."""
+        """Return the conversation that homes (`set home -1`), zeroes (G10 L20 of the active frame)
+        or jogs (`set jog_incr`), axis by axis, or repeatedly while a key is held."""
         return LinuxcncConversation((), _link(machine), manner, action, values)
 
     def recognised(self, heard: str) -> str:
-        """Return its answer to the greeting, which enables nothing; "" if it is none."""
+        """Return "LinuxCNC (linuxcncrsh)" for an answer to the greeting, which enables nothing; ""
+        for any other text."""
         return "LinuxCNC (linuxcncrsh)" if heard.upper().startswith("HELLO ") else ""
 
     def probing(
         self, cycle: ProbeCycle, machine: LinuxcncMachine, manner: Manner
     ) -> LinuxcncConversation:
-        """MDI: G38.3 to each place, and G10 L20 where a zero is set."""
+        """Return the conversation that touches by G38.3 at each place and sets a zero by G10 L20,
+        in MDI."""
         return LinuxcncConversation((), _link(machine), manner, "probe", cycle=cycle)
 
 
@@ -251,30 +254,31 @@ class LinuxcncConversation(Conversation):
     # What the user wants; the script looks at it at its next turn.
 
     def begin(self, now: float) -> None:
-        """Greet it."""
+        """Greet the server."""
         self._go(None, now)
 
     def pause(self, now: float) -> None:
-        """Hold the program; PAUSED when the slides stand."""
+        """Pause the program; the state is PAUSED when the slides stand."""
         if self.state is WireState.SENDING:
             self.state, self._pausing = WireState.PAUSING, True
 
     def resume(self, now: float) -> None:
-        """Go on, or with the next line where single blocks are wanted."""
+        """Resume the program; with single blocks, run the next line."""
         if self.state in HALTS or self.state is WireState.PAUSING:
             self._pausing, self._going_on = False, True
             self._passed = self.stop_index if self.state is WireState.WAITING else self._passed
             self.state, self.why = WireState.SENDING, ""
 
     def override(self, name: Override, percent: int, now: float) -> None:
-        """`set feed_override` or `set spindle_override` at the next turn."""
+        """Set a feed or spindle override (`set feed_override`, `set spindle_override`) when the
+        script next may send."""
         if name == "rapid":
             super().override(name, percent, now)
         else:
             self._changes[name] = self.overrides[name] = percent
 
     def stop(self, now: float) -> None:
-        """Abort."""
+        """Abort the program."""
         if self.is_over or self.state is WireState.STOPPING:
             return
         if self._begun:
@@ -301,8 +305,8 @@ class LinuxcncConversation(Conversation):
         return ""
 
     def _abort_at(self, now: float) -> None:
-        """Abort at once, whatever answer is due: all that come before the one to this are passed
-        over. Another client may have taken the say meanwhile."""
+        """Abort at once, whatever answer is due: all answers before the one to the abort are
+        ignored. First ask for the right to command again, which another client may have taken."""
         self._unwrite()
         self.state, self._aborting = WireState.STOPPING, True
         self._script, self._fresh = self._abort(), True
@@ -313,7 +317,7 @@ class LinuxcncConversation(Conversation):
     # The line and the clock.
 
     def receive(self, data: bytes, now: float) -> None:
-        """Handle received lines; echoes are passed over."""
+        """Handle received lines; echoes are ignored."""
         *lines, self._rest = _ENDS.split(self._rest + data)
         for line in lines:
             text = line.decode("latin-1").strip()
@@ -328,7 +332,7 @@ class LinuxcncConversation(Conversation):
             self._go(text, now)
 
     def tick(self, now: float) -> None:
-        """Go on after a wait, or notice a missing answer."""
+        """Continue the script after a wait, or notice a missing answer."""
         if self.is_over or now < self.next_s:
             return
         if not self._asked:
@@ -399,7 +403,8 @@ class LinuxcncConversation(Conversation):
         return x, y, z
 
     def _errors(self) -> Generator[str | float, str, str]:
-        """Read and show the messages of LinuxCNC; return that of a probe, "" if there is none."""
+        """Read and show LinuxCNC's messages; return the one of a probing move, "" if there is
+        none."""
         report = ""
         for name in ("error", "operator_text", "operator_display"):
             text = yield from self._get(name)
@@ -413,7 +418,7 @@ class LinuxcncConversation(Conversation):
     # What is held.
 
     def _session(self, act: Callable[[], Script]) -> Script:
-        """Greet it, check that it is ready, and act."""
+        """Greet the server, check that the machine is ready, and run `act`."""
         answer = yield f"hello {self._link.password} camtool 1.0"
         if not answer.upper().startswith("HELLO ACK"):
             raise _Refused("it does not take the password of its line (link.password)")
@@ -499,7 +504,8 @@ class LinuxcncConversation(Conversation):
             yield self._poll_s
 
     def _obey(self, status: str, is_still: bool) -> Script:
-        """Send the user's pause or resume, and follow the status of the running program."""
+        """Send the user's overrides, pause or resume, and follow the status of the running
+        program."""
         while self._changes:
             name, percent = self._changes.popitem()
             order = f"set {name}_override"
@@ -532,7 +538,7 @@ class LinuxcncConversation(Conversation):
 
     def _count_done(self, text: str, ran: float) -> None:
         """Count the lines before the reported one as done, as far as the simulated time allows
-        it."""
+        that."""
         line = _whole_number(text)
         if self._lines and self._lines[0]:
             index = int(np.searchsorted(self._lines, line))
@@ -541,7 +547,8 @@ class LinuxcncConversation(Conversation):
             self.done = max(self.done, min(index, possible))
 
     def _finish(self, text: str, ran: float) -> None:
-        """End the conversation with an idle machine: at the end of the program, or before it."""
+        """End the conversation of a program that is finished; _Refused if the machine became idle
+        before its end."""
         if self._said:
             raise _Refused(f"it has stopped: {self._said}")
         end, total = self.packets[-1].end_mm, float(self._ends[-1])
@@ -625,8 +632,8 @@ class LinuxcncConversation(Conversation):
         self._end(WireState.FINISHED)
 
     def _hold(self) -> Script:
-        """Jog by short increments until it is stopped. LinuxCNC adds each to where it is going, so
-        that it never has more to do than `HELD_AHEAD_S`, even if nobody speaks to it any more."""
+        """Jog by short increments until the user lets go. LinuxCNC adds each to its target, so the
+        machine stops within `HELD_AHEAD_S` even if the connection is lost."""
         yield from self._set("mode manual")
         yield from self._set("teleop_enable on")
         self._begun, self.state = True, WireState.SENDING
@@ -646,15 +653,15 @@ class LinuxcncConversation(Conversation):
             yield 0.25 * ahead_s
 
     def _still(self) -> Script:
-        """Wait until two reports give the same place."""
+        """Wait until two successive reports give the same place."""
         last = None
         while (place := (yield from self._place())) != last:
             last = place
             yield self._poll_s
 
     def _probe(self) -> Script:
-        """Do one step of the cycle after the other, by MDI; a step that probes is over when the
-        message behind it comes, with the place in the work frame (#5061 to #5063, #5070)."""
+        """Execute the steps of the cycle, one after the other, by MDI. A step that probes is over
+        when its message comes, with the place in the work frame (#5061 to #5063, #5070)."""
         assert self._cycle is not None
         run = CycleRun(self._cycle)
         if _whole_number((yield from self._get("probe_value"))):
@@ -709,7 +716,7 @@ PROBED: Final = "CAMTOOL-PROBE"
 
 
 def _probe_line(step: ProbeStep) -> str:
-    """Return the line of MDI that makes a step of a cycle."""
+    """Return the MDI line that makes a step of a probing cycle."""
     axes = "".join(f" {axis.upper()}{value:.4f}" for axis, value in step.axes.items())
     if step.action == "zero":
         return f"G21 G10 L20 P0{axes}"
@@ -726,7 +733,7 @@ def _whole_number(text: str) -> int:
 
 
 def _without_password(request: str) -> str:
-    """Return a request without its password."""
+    """Return a request with its password removed."""
     return re.sub(r"^(hello|(?:set )?enable) \S+", r"\1 …", request)
 
 
@@ -750,7 +757,8 @@ class LinuxcncTerminal(Terminal):
         self.hello = b"".join(order.encode() + self.end for order in orders)
 
     def halt(self) -> bytes:
-        """Abort; where it is then is asked until it says the same twice."""
+        """Return the bytes of an abort; afterwards the place is asked for until two answers
+        agree."""
         self._idle, self._place = False, ""
         return super().halt()
 
@@ -759,7 +767,7 @@ class LinuxcncTerminal(Terminal):
         return line.lower().split() in (["set", "abort"], ["set", "estop", "on"])
 
     def meaning(self, line: str) -> str:
-        """Explain refusals, and from reports whether the machine stands."""
+        """Return the meaning of a refusal, or from a report whether the machine stands."""
         if line.upper().startswith("PROGRAM_STATUS"):
             self._idle = line.upper().endswith(" IDLE")
         if line.upper().startswith("REL_ACT_POS"):

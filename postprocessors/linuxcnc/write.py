@@ -27,7 +27,8 @@ TOLERANCE: Final = NumberStyle(6, strip=True)
 
 
 def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
-    """Return the program; PostError names the move that cannot be written or done."""
+    """Return the program of a toolpath; PostError names the move that cannot be written or
+    done."""
     dialect, unit = machine.dialect, UNITS[machine.dialect.units]
     # The length in force goes with the tool in the spindle, and with a zero set by that tool.
     no_length = "" if dialect.tool_lengths else " G49"
@@ -54,7 +55,7 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
 
 
 def _path_mode(mode: PathMode, unit: Unit) -> str:
-    """Return the block that asks for it, in a program of that unit."""
+    """Return the block that sets a path mode, in a program of this unit."""
     if mode.corners == "exact-path":
         return "G61"
     if mode.corners == "exact-stop":
