@@ -23,10 +23,11 @@ from camtool.arrays import Bools, Floats, Indices, Ints
 
 
 cpdef near_pairs(Int[:, ::1] cells, double[:, ::1] points, double reach, Int max_pairs):
-    """Return rows (J,), (J,) of all points (E, 2) within `reach` of each other, each pair once.
+    """Return two arrays (J,) of rows: all pairs of points (E, 2) within `reach` of each other,
+    each pair once.
 
-    `cells` (E, 3): group, column and row of the grid cell of each point, `reach` wide, sorted.
-    No point gets more than `max_pairs` pairs with points after it: that bounds time and memory.
+    `cells` (E, 3): group, column and row of the grid cell of each point, `reach` wide, sorted. No
+    point gets more than `max_pairs` pairs with points after it: that bounds time and memory.
     """
     cdef Int total
     cdef Int[::1] first, second, none
@@ -41,10 +42,10 @@ cdef Int _pairs(
     Int[:, ::1] cells, double[:, ::1] points, double reach, Int max_pairs, Int[::1] first,
     Int[::1] second
 ) noexcept:
-    """Counts the pairs, and writes them when there is room for them.
+    """Count the pairs, and write them if `first` and `second` have room for them.
 
-    Beside a point lie its own cell and the one above, which follow it in the sorted list, and
-    three cells of the next column, whose beginning only moves forward.
+    Candidates for a point are in its own cell and the one above, which follow it in the sorted
+    list, and in three cells of the next column, whose first candidate `low` only moves forward.
     """
     cdef Int i, count, low, number, hits, offset, group, column, row, j
     count, low, number = 0, 0, len(points)
@@ -88,7 +89,7 @@ cdef Int top(Int[::1] above, Int item) noexcept:
 
 
 cpdef clusters(Int count, Int[::1] first, Int[::1] second):
-    """Return (count,) the least end of all ends that pairs connect with each end."""
+    """Return (count,) for each end the lowest end that is connected with it by the pairs."""
     cdef Int k, i, a, b
     cdef Int[::1] above
     above = np.arange(count, dtype=np.int64)
@@ -107,10 +108,10 @@ cpdef Int join(
     Int[::1] first_ends, Int[::1] second_ends, Int[::1] mates, Int[::1] above, Int[::1] segments,
     Int[::1] arcs
 ) noexcept:
-    """Joins pairs of free ends in their order into `mates`; how many.
+    """Join pairs of free ends, in their order, by setting `mates`; return how many were joined.
 
-    `above` (paths), `segments` and `arcs` (of each set of joined paths) are updated. A ring
-    around nothing is refused: two lines are one line and its double.
+    `above` (paths), `segments` and `arcs` (of each set of joined paths) are updated. A pair that
+    would close a ring around nothing is refused: two lines are one line and its double.
     """
     cdef Int joined, k, a, b, s, t
     joined = 0
@@ -132,15 +133,16 @@ cpdef Int join(
 
 
 cdef inline bint encloses(Int segments, Int arcs) noexcept:
-    """False for a ring of so few segments that nothing lies inside."""
+    """Return False for a ring of so few segments that nothing lies inside it."""
     return segments > 2 or (segments == 2 and arcs > 0)
 
 
 cpdef walk(Int[::1] mates, uint8_t[::1] is_chosen):
-    """Return the chains of the wanted paths, each begun at its first path, which is not turned.
+    """Return the chains of the chosen paths; each begins at its first path, entered at its first
+    end.
 
-    Returns the ends by which the paths are entered, in the order of travel, where each chain
-    begins in them (C + 1,), and which chains are rings (C,).
+    Three arrays: the ends by which the paths are entered, in the order of travel; where each chain
+    begins among them (C + 1,); and a mask of the chains that are rings (C,).
     """
     cdef Int count, index, size, chains, end, start
     cdef Int[::1] entries, begins
@@ -170,8 +172,8 @@ cpdef walk(Int[::1] mates, uint8_t[::1] is_chosen):
 
 
 cdef Int first_end(Int[::1] mates, Int end) noexcept:
-    """Return the free end at which the chain that enters a path by `end` begins, `end` for a
-    ring."""
+    """Return the free end at which the chain begins that enters a path by `end`; `end` itself for
+    a ring."""
     cdef Int start
     start = end
     while mates[end] >= 0:
@@ -185,12 +187,13 @@ cpdef Int split_loops(
     Int[::1] starts, Int[::1] mates, Int[::1] node, double[:, ::1] points, double reach,
     Int[:, ::1] weights
 ):
-    """Rings that pass a node twice become two rings there; returns how many were split off.
+    """Split each ring that passes a node twice into two rings there; return how many were split
+    off.
 
     Each ring is walked from the end given in `starts`. `node` (ends,) is −1 where only two ends
-    meet; `weights` (paths, 2) are segments and arcs. What has been walked since a node was passed
-    before is a loop: it is closed there, and the rest goes on without it, as long as the ends
-    that then meet lie within `reach`.
+    meet; `weights` (paths, 2) are segments and arcs. The paths walked since the same node was
+    passed before are a loop: it is closed there, and the rest continues without it, as long as the
+    ends that then meet lie within `reach`.
     """
     cdef Int loops, index, start, last, height, end, label, m, k, previous, begin, close, segments
     cdef Int arcs, less, fewer
@@ -237,7 +240,7 @@ cpdef Int split_loops(
 
 
 cdef (Int, Int) _ring_weight(Int start, Int[::1] mates, Int[:, ::1] weights) noexcept:
-    """Return segments and arcs of a whole ring."""
+    """Return the numbers of segments and arcs of a whole ring."""
     cdef Int end, segments, arcs
     segments, arcs = weights[start // 2, 0], weights[start // 2, 1]
     end = mates[start ^ 1]
@@ -249,7 +252,8 @@ cdef (Int, Int) _ring_weight(Int start, Int[::1] mates, Int[:, ::1] weights) noe
 
 
 cdef void _forget(Int[::1] entries, Int low, Int high, Int[::1] node, Int[::1] position) noexcept:
-    """Takes the entries low … high − 1 out of `position` they stand."""
+    """Remove the entries low … high − 1 from `position`, which has the place of each node on the
+    stack."""
     cdef Int m, label
     for m in range(low, high):
         label = node[entries[m]]
@@ -270,7 +274,8 @@ cdef inline double _distance(double[:, ::1] points, Int first, Int second) noexc
 cpdef nearest_others(
     Int[:, ::1] cells, double[:, ::1] points, double size, double min_distance, double reach
 ):
-    """For each point (P, 2) the row of the nearest one beyond `min_distance`, and its distance.
+    """Return for each point (P, 2) the row of the nearest other point beyond `min_distance`, and
+    its distance.
 
     `cells` (P, 2): column and row of the grid cell of each point, `size` wide, sorted. A point
     with none within `reach` gets −1. Equal distances go to the first row.
@@ -306,7 +311,7 @@ cpdef nearest_others(
 
 
 cdef Int _first(Int[:, ::1] cells, Int column, Int row) noexcept:
-    """Return the first sorted cell that is not before (column, row)."""
+    """Return the first of the sorted cells that is not before (column, row)."""
     cdef Int low, high, middle
     low, high = 0, len(cells)
     while low < high:
@@ -329,10 +334,11 @@ cpdef touching(
     double[:, ::1] boxes, Int[::1] equal_keys, Int[::1] unequal_keys, uint8_t[::1] is_queried,
     Int max_pairs
 ):
-    """Return rows (J,), (J,) of boxes (K, 4) low, low, high, high that touch, each pair once.
+    """Return two arrays (J,) of rows: all pairs of boxes (K, 4), xmin, ymin, xmax, ymax, that
+    touch, each pair once.
 
-    `boxes` are sorted by their first column. Both of a pair have the same number in `equal_keys`,
-    different ones in `unequal_keys`, of which at least one `is_queried`. At most `max_pairs`.
+    `boxes` are sorted by their first column. A pair has equal `equal_keys` and different
+    `unequal_keys`, and at least one of the two `is_queried`. At most `max_pairs` pairs.
     """
     cdef Int count
     cdef Int[::1] room, first, second
@@ -348,7 +354,7 @@ cdef Int _touching(
     Int max_pairs,
     Int[::1] first, Int[::1] second
 ) noexcept:
-    """Counts the pairs, and writes them when there is room for them."""
+    """Count the pairs, and write them if `first` and `second` have room for them."""
     cdef Int count, i, j
     count = 0
     for i in range(len(boxes)):
@@ -386,8 +392,9 @@ cdef Int LOW_BITS = 0xFFFFFFFF
 
 
 cpdef latest_near(double[:, ::1] places, Int[::1] begins, double reach):
-    """Return (P,) the latest point before each of the points (P, 2) on its path within `reach`,
-    −1 for none. Path k has the points begins[k]:begins[k + 1], `begins` (M + 1,)."""
+    """Return (P,) for each point (P, 2) the latest point before it on its path that lies within
+    `reach` of it, −1 for none. Path k has the points begins[k]:begins[k + 1], `begins` (M +
+    1,)."""
     cdef Int slots
     cdef int32_t[::1] heads, previous, latest
     slots = 16
@@ -405,8 +412,8 @@ cdef void _latest_near(
     int32_t[::1] previous,
     int32_t[::1] latest
 ) noexcept:
-    """Fills in `latest`; `heads` are the latest points of the chains, `previous` the one before
-    each point."""
+    """Fill in `latest`. `heads` holds the latest point of each hash slot, `previous` the point
+    before each point in its slot."""
     cdef Int path, first, i, j, column, row, best, across, above, own
     cdef double x, y
     for path in range(len(begins) - 1):
@@ -430,10 +437,10 @@ cdef void _latest_near(
 
 
 cdef inline Int _cell(double place, double size) noexcept:
-    """Return the number of the cell of that size in which a coordinate lies."""
+    """Return the number of the grid cell, `size` wide, in which a coordinate lies."""
     return int(math.floor(min(max(place / size, -_FAR), _FAR)))
 
 
 cdef inline Int _slot(Int column, Int row, Int slots) noexcept:
-    """Return the slot of a cell, of a power of two of them."""
+    """Return the hash slot of a cell; `slots`, the number of slots, is a power of two."""
     return ((column & LOW_BITS) * 73_856_093 ^ (row & LOW_BITS) * 19_349_663) & (slots - 1)

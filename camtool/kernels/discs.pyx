@@ -53,14 +53,14 @@ cpdef void largest_discs(
     boundary, Int[::1] row, double[::1] t, Int[:, ::1] guess, double[:, ::1] result,
     Int[::1] partner
 ) noexcept:
-    """Fill `result` (N, 4) with x, y of the middle, radius, and the place (0 … 1) on the element
-    that the disc touches besides, and `partner` (N,) with that element.
+    """Fill `result` (N, 4) with the largest discs: x, y of the centre, radius, and the fraction (0
+    … 1) of the second element at which the disc touches it; and `partner` (N,) with that element.
 
     `boundary` is the table (E, 10) as the columns say; links (E, 3): the element before and
-    behind, and the joint to the one before; boxes (⌈E/BLOCK⌉, 4). The discs touch element `row`
-    (N,) at the part `t` (N,) of its length or of its turn. `guess` (N, 2): elements that may be
-    the partner, looked at first. A disc that touches only its own arc, in whose centre it lies,
-    has itself as partner.
+    behind, and the joint to the one before; boxes (⌈E/BLOCK⌉, 4). Disc i touches the element
+    row[i] at the fraction t[i] of its length, or of its turn. `guess` (N, 2): elements that may be
+    the partner, tried first. A disc that touches only its own arc, in whose centre it lies, has
+    itself as partner.
     """
     cdef (double, double, double, double, double, double) pose
     cdef Int k, own, corner, best
@@ -92,7 +92,7 @@ cpdef void largest_discs(
 
 
 cpdef (double, double, double, double) frame(double[:, ::1] table, Int own, double t) noexcept:
-    """Return the point x, y of an element at the part t of it, and its inner normal there."""
+    """Return the point x, y of an element at the fraction t of it, and the inner normal there."""
     cdef double chord, half
     tx, ty, length = table[own, TX], table[own, TY], table[own, LENGTH]
     turned = table[own, SWEEP] * t
@@ -113,8 +113,8 @@ cpdef (double, double, double, double) frame(double[:, ::1] table, Int own, doub
 cdef (double, double) _from_corner(
     double tx, double ty, double[:, ::1] table, Int own, double t
 ) noexcept:
-    """Return a point of an element as seen from its start (t > 0), or from its end (t < 0, and
-    t_x, t_y the direction back from there): without the rounding of far coordinates."""
+    """Return a point of an element relative to its start (t > 0), or relative to its end (t < 0,
+    and t_x, t_y the direction back from there): without the rounding of far coordinates."""
     cdef double half, chord
     half = 0.5 * table[own, SWEEP] * t
     chord = table[own, LENGTH] * abs(t)
@@ -125,7 +125,7 @@ cdef (double, double) _from_corner(
 
 
 cdef Int _at_convex_corner(Int[:, ::1] links, Int own, double t) noexcept:
-    """Return the other element of the convex corner at which the point lies, −1 elsewhere."""
+    """Return the other element of the convex corner at which the point lies; −1 elsewhere."""
     if t == 0.0 and links[own, 2] == CONVEX:
         return int(links[own, 0])
     if t == 1.0 and links[links[own, 1], 2] == CONVEX:
@@ -137,7 +137,8 @@ cdef (double, Int) _largest(
     double[:, ::1] table, Int[:, ::1] links, double[:, ::1] boxes, Int own, Int guess,
     Int other_guess, (double, double, double, double, double, double) pose, bint at_start
 ) noexcept:
-    """Return the radius and partner of the largest disc at a point with its normal."""
+    """Return the radius of the largest disc at a point with its normal, and the element that
+    limits it."""
     cdef Int neighbour, home, turn, block, best
     cdef double x, y, radius, limit, dx, dy
     x, y = pose[0], pose[1]
@@ -170,8 +171,8 @@ cdef double _limit(
     double[:, ::1] table, Int[:, ::1] links, Int own, Int neighbour,
     (double, double, double, double, double, double) pose, double radius, bint at_start
 ) noexcept:
-    """Return the radius to which another element limits the disc; inf where it does not, or not
-    below `radius`."""
+    """Return the radius to which the element `neighbour` limits the disc; inf where it does not,
+    or not below `radius`."""
     cdef (double, double) turns
     cdef (double, double, double, double) sight
     cdef bint precedes, follows, corner, as_point
@@ -213,7 +214,8 @@ cdef double _limit(
 
 
 cdef double _turn(double[:, ::1] table, Int[:, ::1] links, Int own) noexcept:
-    """By how many radians a smooth joint to the element before turns after all; 0 at others."""
+    """Return the angle, rad, by which a smooth joint to the element before turns in fact; 0 at
+    other joints."""
     cdef Int previous
     if links[own, 2] != SMOOTH:
         return 0.0
@@ -225,8 +227,8 @@ cdef double _turn(double[:, ::1] table, Int[:, ::1] links, Int own) noexcept:
 cdef double _min_distance(
     double[:, ::1] table, Int[:, ::1] links, Int own, Int neighbour
 ) noexcept:
-    """Return the least distance (mm) of a point on the inner side of `neighbour`: above 0 behind a
-    reflex corner."""
+    """Return the distance, mm, from `neighbour` above which a point counts as on its inner side:
+    0, or more if a reflex corner lies between."""
     cdef Int previous, following
     cdef bint is_over
     previous, following = links[own, 0], links[own, 1]
@@ -241,13 +243,14 @@ cdef double _touching(
     (double, double, double, double, double, double) pose, double radius, double min_distance,
     (double, double) turns
 ) noexcept:
-    """Return the radius at which the disc touches the line or arc `own` within it; inf if it is
-    not below `radius` or touches beyond the ends.
+    """Return the radius at which the disc touches the line or arc `own` between its ends; inf if
+    it touches beyond the ends or the radius is not below `radius`.
 
-    `sight`: the tangent at a point of the element, and how the disc's place is seen from there.
-    With `min_distance` below 0 that is a shared corner, and rounding may not hide the element. Nor
-    may it hide one that is touched at its end: beside an arc the disc at the joint touches what follows
-    the arc just there, and without it would seem to have room far beyond the arc's own radius.
+    `sight`: the tangent at a point of the element, and the disc's point of contact relative to
+    that point. With `min_distance` below 0 that is a shared corner, and rounding may not hide the
+    element. Nor may it hide one that is touched at its end: beside an arc the disc at the joint
+    touches what follows the arc just there, and without it would seem to have room far beyond the
+    arc's own radius.
     """
     cdef bint is_past_start, is_before_end
     cdef double g, reach
@@ -274,7 +277,7 @@ cdef double _touching(
 
 
 cdef double _place(double[:, ::1] table, Int element, double cx, double cy) noexcept:
-    """At which part of an element a disc with this middle touches it."""
+    """Return the fraction of an element at which a disc with this centre touches it."""
     wx, wy = cx - table[element, AX], cy - table[element, AY]
     tx, ty, length, sweep = (
         table[element, TX],

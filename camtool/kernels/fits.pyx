@@ -1,7 +1,7 @@
 """Curves and points as arcs: Bézier pieces cut into nodes, biarcs and arcs over them, arcs found
 in chains of chords, and the segments nearest to points.
 
-Compiled, because each of many is measured against many. What each part does is said above it.
+Compiled, because each of many is measured against many. Comments above each part say what it does.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ cdef double GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 cpdef (double, double, double, double) evaluate(
     double[:, :, ::1] pieces, Int k, double u
 ) noexcept:
-    """Position and derivative by u of piece k at u in 0..1: x, y, x', y'.
+    """Return position and derivative by u of piece k at u in 0..1: x, y, x', y'.
 
     Bernstein sums by a Horner scheme for both the piece A and its hodograph A' = p Σ ΔA Bᵖ⁻¹; of
     the quotient (x, y) = A/w the derivative is (A'w − A w')/w².
@@ -134,8 +134,8 @@ cpdef (double, double, double, double) evaluate(
 
 
 cpdef samples_between(double[:, :, ::1] pieces, double[:] t):
-    """Return ((n − 1) · `MEASURE_STEPS` + 1, 2) positions: so many from each of the parameters
-    t (n,) in 0..m on to the next one, and that at the last."""
+    """Return ((n − 1) · `MEASURE_STEPS` + 1, 2) positions: `MEASURE_STEPS` from each of the
+    parameters t (n,) in 0..m on towards the next one, and the one at the last."""
     cdef Int i, j, row, k
     cdef double parameter
     cdef double[:, ::1] samples
@@ -152,7 +152,7 @@ cpdef samples_between(double[:, :, ::1] pieces, double[:] t):
 
 
 cpdef double speed(double[:, :, ::1] pieces, Int k, double u) noexcept:
-    """Return the length of the derivative by u."""
+    """Return the length of the derivative by u at u, mm."""
     _, _, dx, dy = evaluate(pieces, k, u)
     return math.sqrt(dx * dx + dy * dy)
 
@@ -160,8 +160,8 @@ cpdef double speed(double[:, :, ::1] pieces, Int k, double u) noexcept:
 cdef (double, double) aside(
     double[:, :, ::1] pieces, Int k, double u, double side, double min_length
 ) noexcept:
-    """Unit tangent a little before (side −1) or after (+1) u, where the piece is faster than
-    `min_length`."""
+    """Return the unit tangent a little before (side −1) or after (+1) u, where the piece is faster
+    than `min_length`."""
     cdef Int exponent
     if u <= 0.0 or u >= 1.0:
         side = 1.0 if u <= 0.0 else -1.0  # at the ends of a piece look inside
@@ -175,7 +175,7 @@ cdef (double, double) aside(
 
 
 cdef double slowest(double[:, :, ::1] pieces, Int k, double low, double high) noexcept:
-    """Return the u between low and high where the piece moves slowest: golden section."""
+    """Return the u between low and high at which the piece is slowest, by golden section."""
     cdef Int _
     lower, upper = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     lower_speed, upper_speed = speed(pieces, k, lower), speed(pieces, k, upper)
@@ -192,8 +192,8 @@ cdef double slowest(double[:, :, ::1] pieces, Int k, double low, double high) no
 
 
 cdef first_steps(double[:, :, ::1] pieces, Int k, Int each):
-    """Return the u (≥ each + 1,) that piece k is cut at first, tips and cusps among them; its
-    speed."""
+    """Return the u (≥ each + 1,) at which piece k is cut at first, tips and cusps among them; and
+    the piece's highest speed."""
     cdef Int i, count, previous, following, side
     cdef double grid_u, u, tip, fastest
     cdef double[::1] speeds, steps
@@ -227,8 +227,8 @@ cdef bint too_coarse(
     double[:, ::1] rows_behind, Int j,
     double tolerance
 ) noexcept:
-    """Return True if the step between two rows (u, x, y, arrive x, y, leave x, y), row i of
-    those before and row j of those behind, must be halved."""
+    """Return True if the step between two rows (u, x, y, arriving tangent, leaving tangent) must
+    be halved: row i of `rows_before` and row j of `rows_behind`."""
     cdef Int turn
     cdef bint bends
     cdef double reach, distance
@@ -257,7 +257,8 @@ cdef bint too_coarse(
 
 
 cdef piece_rows(double[:, :, ::1] pieces, Int k, Int each, double tolerance, Int max_rows):
-    """Nodes (n, 7) of piece k: u, x, y, tangents before and after; begun with `each` steps.
+    """Return the nodes (n, 7) of piece k: u, x, y, tangents before and after; begun with `each`
+    steps.
 
     Steps are halved from left to right; the stack holds the right ends of those still to do.
     """
@@ -311,10 +312,11 @@ cdef void fill_row(
 
 
 cpdef curve_rows(double[:, :, ::1] pieces, Int steps, double tolerance):
-    """Nodes (n, 7) of all pieces, t in 0..m in place of u, and which of them are corners.
+    """Return the nodes (n, 7) of all pieces, with t in 0..m in place of u, and a mask of the
+    corners.
 
-    Nodes no farther apart than `POSITION_EPS_MM` become one: it arrives as the first and leaves
-    as the last of them.
+    Nodes no farther apart than `POSITION_EPS_MM` become one: it has the arriving tangent of the
+    first and the leaving tangent of the last of them.
     """
     cdef Int each, count, k, i, column, last
     cdef double gap, x, y
@@ -361,15 +363,17 @@ cpdef curve_rows(double[:, :, ::1] pieces, Int steps, double tolerance):
 cpdef inline double distance_to_arc(
     double px, double py, double ax, double ay, double bx, double by, double bulge
 ) noexcept:
-    """Return the distance from p to the arc from a to b, |bulge| ≤ 1, to its nearer end beside the
-    arc.
+    """Return the distance from p to the arc from a to b, |bulge| ≤ 1; to its nearer end if p lies
+    beside the arc.
 
     With w = p − a, u = b − a, n = u turned by +90°, the power of p over the circle and the vector
     from the centre, both times the bulge, need no centre:
+
         b·power = b(w·w − w·u) − (1 − b²)/2 w·n,   q = b(w − u/2) − (1 − b²)/4 n,
         distance to the circle = |b·power| / (|q| + |u|(1 + b²)/4).
-    p lies beside the arc when it is behind the normal at one of its ends, whose tangents are
-    (1 − b²) u ∓ 2b n.
+
+    p lies beside the arc when it is behind the normal at one of its ends, whose tangents are (1 −
+    b²) u ∓ 2b n.
     """
     wx, wy, vx, vy = px - ax, py - ay, px - bx, py - by
     ux, uy = bx - ax, by - ay
@@ -387,7 +391,7 @@ cpdef inline double distance_to_arc(
 
 
 cdef inline double half_angle(double ax, double ay, double bx, double by) noexcept:
-    """tan(α/2) = sin α / (1 + cos α) for the angle α from a to b; NaN when |α| > 90°.
+    """Return tan(α/2) = sin α / (1 + cos α) for the angle α from a to b; NaN when |α| > 90°.
 
     An arc of sweep s leaves the direction of its chord by s/2, so its bulge tan(s/4) is tan(α/2)
     with α between tangent and chord.
@@ -406,12 +410,15 @@ cpdef (double, double, double, double) biarc(
     double start_x, double start_y, double leave_x, double leave_y, double end_x, double end_y,
     double arrive_x, double arrive_y
 ) noexcept:
-    """Joint x, y and both bulges of the biarc with equal handles; all NaN where there is none.
+    """Return the joint x, y and both bulges of the biarc with equal handles; all NaN where there
+    is none.
 
     Handles of length d reach Q0 = start + d·leave and Q1 = end − d·arrive; the arcs meet in the
     middle of Q0Q1 when |Q1 − Q0| = 2d. With v = end − start, s = leave + arrive, c = leave·arrive:
+
         d²(2 − 2c) + 2d v·s − v·v = 0   ⇒   d = v·v / (v·s + √((v·s)² + 2(1 − c) v·v)).
-    None where no d > 0 does it, or where an arc would be more than a half circle.
+
+    There is none where no d > 0 solves this, or where an arc would be more than a half circle.
     """
     vx, vy = end_x - start_x, end_y - start_y
     square = vx * vx + vy * vy
@@ -463,8 +470,8 @@ cpdef step_errors(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int[::1] rows,
     double[:, :, ::1] probes
 ):
-    """For each step from node rows[i] (k,) to the next: the largest distance of its probes
-    (j, k, 2) from the biarc over the step, infinite when there is none."""
+    """Return (k,) for each step from node rows[i] to the next the largest distance of its probes
+    (j, k, 2) from the biarc over the step; inf where there is no biarc."""
     cdef Int i, j, a, b
     cdef double[::1] errors
     errors = np.empty(len(rows))
@@ -482,7 +489,8 @@ cpdef step_errors(
 cpdef double span_error(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high
 ) noexcept:
-    """Return the largest distance of the nodes between from the biarc over nodes low..high."""
+    """Return the largest distance of the nodes between low and high from the biarc over
+    low..high."""
     cdef Int i
     cdef double distance
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
@@ -511,7 +519,7 @@ cdef bint span_holds(
 
 
 cdef double arc_error(double[:, ::1] point, Int low, Int high, double bulge) noexcept:
-    """Return the largest distance of the nodes between from the arc or line over nodes
+    """Return the largest distance of the nodes between low and high from the arc or line over
     low..high."""
     cdef Int i
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
@@ -558,7 +566,7 @@ cdef double single_bulge(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high,
     double target
 ) noexcept:
-    """Return the bulge of the one arc or line that stands for the nodes low..high; NaN for none.
+    """Return the bulge of the single arc or line that replaces the nodes low..high; NaN for none.
 
     With α from the first tangent to the chord and β from the chord to the last one, an arc of
     sweep α + β leaves both tangents by |α − β| / 2.
@@ -587,11 +595,12 @@ cdef (Int, double) longest_single(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int shortest,
     Int farthest, Int guess, double target
 ) noexcept:
-    """End node and bulge of the longest single arc or line from `low` that ends after `shortest`
-    and not after `farthest`; NaN when there is none.
+    """Return the end node and the bulge of the longest single arc or line from `low` that ends
+    after `shortest` and not after `farthest`; NaN when there is none.
 
-    Tangents may suit far off and not before (about an axis of symmetry), so all nodes are tried,
-    from the far end of a window of 2 · `guess` nodes that grows as long as its end is reached.
+    The tangents may fit at a far node but not at a nearer one (about an axis of symmetry), so all
+    nodes are tried, from the far end of a window of 2 · `guess` nodes that grows as long as its
+    end is reached.
     """
     cdef Int too_far, best, high
     too_far, best, bulge = shortest, shortest, math.NAN
@@ -610,7 +619,7 @@ cdef (Int, double) longest_single(
 
 cdef furthest_nodes(double[:, ::1] leave, double[:, ::1] arrive, uint8_t[::1] corner):
     """Return (n,) the last node that a span from each node may reach: the next corner, or where
-    the curve has turned by `SPAN_TURN_RAD`, to either side."""
+    the curve has turned by `SPAN_TURN_RAD`, left and right turns added."""
     cdef Int count, i, last
     cdef Int[::1] furthest
     cdef double[::1] turned
@@ -634,9 +643,9 @@ cdef (Int, Int, double) furthest_state(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int[::1] limit,
     Int[::1] states, Int state, Int guess, double target
 ) noexcept:
-    """Return the furthest node at the price that begins at row `state` of `states` (node −1:
-    none), the row whence it is reached, and the bulge of the single arc or line that does it
-    (NaN: a biarc)."""
+    """Return the furthest node at the price whose candidates begin at row `state` of `states`
+    (node −1: none), the row from which it is reached, and the bulge of the single arc or line that
+    reaches it (NaN: a biarc)."""
     cdef Int row, best, whence, low, begin, high
     cdef bint first
     best, whence, bulge = states[state - CANDIDATES], state - CANDIDATES, math.NAN
@@ -664,15 +673,16 @@ cdef longest_spans(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, uint8_t[::1] corner,
     double target
 ):
-    """Nodes (s + 1,) between the spans of a chain of few arcs; joint and bulges (s, 4) of each.
+    """Return the nodes (s + 1,) between the spans of a chain of few arcs, and (s, 4) the joint and
+    bulges of each span.
 
     `point`, `leave`, `arrive` (n, 2), `corner` (n,). A span of one arc or line has its bulge in
     the third column and NaN elsewhere. No span runs past a corner or turns by more than
     `SPAN_TURN_RAD`.
 
-    Price by price (1, 2, 3 … arcs) the furthest node is found that one arc leads to from a node of
+    Price by price (1, 2, 3 … arcs) the furthest node is found that one arc reaches from a node of
     the price before, or a biarc from two prices before. A few nodes short of it are kept as well:
-    a span that takes a sharp tip in its middle may have to begin there.
+    a span with a sharp tip in its middle may have to begin there.
     """
     cdef Int count, row, state, guess, m, spans, best, previous, low, place, high
     cdef Int[::1] limit, states, whence, ends
@@ -750,9 +760,9 @@ cdef Int lines_for(
 
 
 cdef chain(double[:, ::1] point, Int[::1] ends, double[:, ::1] pairs, double tolerance):
-    """Return rows (n + 1, 3) of all spans and the number of the first row of each (s + 1,).
+    """Return the rows (n + 1, 3) of all spans, and (s + 1,) the number of the first row of each.
 
-    Arcs that leave their chord by `STRAIGHT_SAGITTA_MM` or less, and flat ones, are lines.
+    Arcs whose sagitta is `STRAIGHT_SAGITTA_MM` or less, and flat ones, become lines.
     """
     cdef Int spans, count, s, k, total, i, row_count, j
     cdef Int[::1] owner, parts, first
@@ -802,8 +812,8 @@ cdef chain(double[:, ::1] point, Int[::1] ends, double[:, ::1] pairs, double tol
 
 
 cdef double common_bulge(double[:, ::1] rows, Int first, double end_x, double end_y) noexcept:
-    """Return the bulge of the one arc or line that both segments lie on which begin at `first`
-    and at the row after it and end there, or NaN."""
+    """Return the bulge of the single arc or line on which two consecutive segments lie, which
+    begin at row `first` and the row after it and end at (end_x, end_y); NaN if there is none."""
     cdef Int second
     cdef double bulge, sweep
     second = first + 1
@@ -828,9 +838,10 @@ cdef double common_bulge(double[:, ::1] rows, Int first, double end_x, double en
 
 
 cdef joined(double[:, ::1] rows, double size):
-    """Neighbours on one circle or line become one; also where each old segment is now.
+    """Return the rows with consecutive segments on one circle or line joined, and for each old
+    segment where it is now.
 
-    A segment no longer than `size` is none: its end takes the place of its begin.
+    A segment no longer than `size` is dropped: its end takes the place of its start.
     """
     cdef Int count, i, last
     cdef Int[::1] places
@@ -869,9 +880,9 @@ cdef deviations(
 ):
     """Return distances (n,) of samples (n, 2) of the curve from the segments of their own span.
 
-    There are equally many samples in each step between nodes, and the last one at the end. Of
-    the columns (spans + 1,) span s owns the nodes ends[s]..ends[s + 1] and the old segments
-    first[s]..first[s + 1], which are now at `places`.
+    Each step between nodes has equally many samples, and the last sample is at the end. Span s
+    owns the nodes ends[s]..ends[s + 1] and the old segments first[s]..first[s + 1] (both columns
+    (spans + 1,)), which are now at `places`.
     """
     cdef Int each, s, last, i, low, high, row
     cdef double bulge, nearest, x, y, ax, ay, bx, by
@@ -893,11 +904,11 @@ cdef deviations(
 
 
 cdef (double, double, double) summary(double[:, ::1] samples, double[::1] errors) noexcept:
-    """Return the largest deviation and rms, weighted by length, and length of the curve, mm.
+    """Return the largest deviation, its rms weighted by length, and the length of the curve, mm.
 
-    Between samples i and i + 1 the deviation peaks at or below the meeting of the lines through
-    the two samples before and the two behind: it is concave on each side of a peak, and where the
-    nearest arc changes it has an edge there.
+    Between samples i and i + 1 the deviation peaks at or below the intersection of the lines
+    through the two samples before and the two behind: it is concave on each side of a peak, and
+    where the nearest arc changes it has an edge there.
     """
     cdef Int i
     squares, length = 0.0, 0.0
@@ -1023,8 +1034,8 @@ cpdef (double, double, double) circle_of(double[:, ::1] points, Int low, Int hig
 cdef (Int, double, double, double, double) judge(
     double[:, ::1] points, Int low, Int high, double noise, double tolerance, double[::1] errors
 ) noexcept:
-    """FAIL, STRAIGHT or ARC for the points low..high; of an arc centre, radius, signed sweep.
-    There is room in `errors` (n,) for a number of each point."""
+    """Return FAIL, STRAIGHT or ARC for the points low..high, and of an arc the centre, radius and
+    signed sweep. `errors` (n,) is a scratch buffer, one number for each point."""
     cdef Int k
     cdef double rough, fourth, sweep, largest
     if not lengths_agree(points, low, high):
@@ -1064,7 +1075,8 @@ cdef (Int, double, double, double, double) judge(
 cdef (Int, Int, double, double, double, double) longest_run(
     double[:, ::1] points, Int low, double noise, double tolerance, double[::1] errors
 ) noexcept:
-    """Return the last point of the longest run from `low`, and what it is; `low` for none."""
+    """Return the last point of the longest run from `low`, and its verdict as `judge` returns it;
+    `low` if there is no run."""
     cdef Int best, too_far, size, rest, doubled, high, is_
     cdef double cx, cy, radius, sweep
     best, too_far, size = low, len(points), MIN_POINTS - 1
@@ -1096,7 +1108,7 @@ cpdef find_runs(double[:, ::1] points, double noise, double tolerance):
     """Return (r, 6) runs of chords on one circle: first and last point, centre, radius, signed
     sweep.
 
-    A run that is straight so far is passed; the arc behind it begins within its last chords, and
+    A run that is still straight is skipped; the arc behind it begins within its last chords, and
     is extended backwards as far as it goes.
     """
     cdef Int count, low, run_end, high, is_
@@ -1151,11 +1163,11 @@ cpdef (double, Int, Int) closest(
     const double[:, :] start, const double[:, :] end, double[::1] bulge, double[:, ::1] boxes,
     Int[::1] path
 ):
-    """Return the distance, the row whose start is nearest to another path, and the row it is near
-    to.
+    """Return the smallest distance from a segment's start to another path, the row of that
+    segment, and the row that it is near to.
 
     `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4) and the ascending `path` (K,) of the
-    segments. Rows are −1 when there is one path only.
+    segments. Rows are −1 when there is only one path.
     """
     cdef Int count, row, best_row, best_other, first, last, candidate
     cdef Int[::1] stack
@@ -1182,9 +1194,9 @@ cpdef nearest_rows(
     double[:, ::1] points, const double[:, :] start, const double[:, :] end, double[::1] bulge,
     double[:, ::1] boxes
 ):
-    """Return (P,) rows of the segments nearest to points (P, 2); quick when neighbours in the
-    list are near. `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4), K ≥ 1; where two are as
-    near, the last one keeps its place."""
+    """Return (P,) the rows of the segments nearest to points (P, 2); fast when consecutive points
+    are near each other. `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4), K ≥ 1; of two equally
+    near segments the one of the point before is kept."""
     cdef Int candidate, row, index
     cdef Int[::1] nearest, stack
     cdef double _, x, y, ax, ay, bx, by
@@ -1206,8 +1218,8 @@ cdef (double, Int) _from_point(
     double x, double y, const double[:, :] start, const double[:, :] end, double[::1] bulge,
     double[:, ::1] tree, Int first, Int last, double best, Int[::1] stack
 ) noexcept:
-    """Return the distance to the nearest segment outside first … last that is nearer than the
-    best one so far, and its row; −1 when there is none. `stack` (`DEPTH`,) is room."""
+    """Return the distance to the nearest segment outside of the rows first … last that is nearer
+    than `best`, and its row; −1 when there is none. `stack` (`DEPTH`,) is a scratch buffer."""
     cdef Int leaves, best_row, height, node, row, low, high
     cdef bint own
     leaves = len(tree) // 2

@@ -48,8 +48,8 @@ cdef double STEPS_DO_NOT_COUNT = 1e30
 
 
 cdef Int most_events() noexcept nogil:
-    """Return below how many events the sums of a line fit: less where the compiler has no integers
-    of 128 bits."""
+    """Return an upper bound of the events of a line whose sums do not overflow: it is smaller
+    where the compiler has no integers of 128 bits."""
     return (<Int>1 << 30) if sizeof(Total) > 8 else (<Int>1 << 20)
 
 
@@ -95,7 +95,7 @@ cdef void _floor_sums(
 
 
 cdef Int _floor_sum(Int count, Int slope, Int offset, Int modulus) noexcept nogil:
-    """Return Σ ⌊(slope·j + offset) / modulus⌋ of j = 0 … count − 1, as AtCoder's `floor_sum`."""
+    """Return Σ ⌊(slope·j + offset) / modulus⌋ over j = 0 … count − 1, as AtCoder's `floor_sum`."""
     cdef uint64_t total, n, a, b, m, reach
     total = 0
     n, a, b, m = count, slope, offset, modulus
@@ -145,8 +145,8 @@ cdef Int find_most(
     Int count, long double along, long double across, Int slope, Int offset, Int modulus,
     long double* greatest
 ) noexcept nogil:
-    """Return where along·j + across·⌊(slope·j + offset) / modulus⌋ is greatest for
-    j = 0 … count − 1, and set that value.
+    """Return the j at which along·j + across·⌊(slope·j + offset) / modulus⌋ is greatest among j =
+    0 … count − 1, and set `greatest` to that value.
 
     Both ends are candidates. Between them, if the two terms pull in opposite directions, the
     greatest is at the first j of a level, or just before one: the same problem with levels and
@@ -195,8 +195,8 @@ cdef struct Below:
 
 
 cdef inline Int _floored(double value) noexcept nogil:
-    """Return the whole part of a number, at most MAX_LEVEL away from 0: where a form hardly
-    depends on the steps, levels lie farther away, and one event is undecided at most."""
+    """Return the integer part of a number, limited to ±MAX_LEVEL: where a form hardly depends on
+    the steps, its levels lie farther away than that, and at most one event is undecided."""
     cdef Int integer
     if not -<double>MAX_LEVEL < value < <double>MAX_LEVEL:
         return MAX_LEVEL if value > 0.0 else -MAX_LEVEL
@@ -205,14 +205,14 @@ cdef inline Int _floored(double value) noexcept nogil:
 
 
 cdef inline Int _clamped(double value, Int count) noexcept nogil:
-    """Return the whole part of a number, within 0 … count."""
+    """Return the integer part of a number, limited to 0 … count."""
     if not value > 0.0:
         return 0
     return count if value >= <double>count else <Int>value
 
 
 cdef inline Int _clamped_up(double value, Int count) noexcept nogil:
-    """Return the least whole number that is not below a number, within 0 … count."""
+    """Return the smallest integer not below a number, limited to 0 … count."""
     cdef Int integer
     integer = _clamped(value, count)
     return integer + 1 if <double>integer < value and integer < count else integer
@@ -221,8 +221,8 @@ cdef inline Int _clamped_up(double value, Int count) noexcept nogil:
 cdef inline bint _is_straight(
     Int count, Int size, Int phase, Int events, double along, double across, double level
 ) noexcept nogil:
-    """Return True if the steps do not count: there are none, or all of them together are less
-    than a billionth of a rounding error of the rest."""
+    """Return True if the steps can be ignored: there are none, or all of them together contribute
+    less than a billionth of a rounding error of the rest."""
     return (
         math.fabs(across) * STEPS_DO_NOT_COUNT < max(math.fabs(along), level)
         or across == 0.0
@@ -261,7 +261,8 @@ cdef struct Fixed:
 
 
 cdef Fixed _fixed(double first, double step, Int count) noexcept nogil:
-    """Return first + step·j with as many bits as `count` products fit into 62."""
+    """Return first + step·j in fixed point, with as many fraction bits as keep a product with
+    `count` within 62 bits."""
     cdef Fixed line
     cdef Int bits
     bits = 61
@@ -275,7 +276,7 @@ cdef Fixed _fixed(double first, double step, Int count) noexcept nogil:
 
 
 cdef inline double _share(double value) noexcept nogil:
-    """Return a number between 0 and 1, and 0 for any other."""
+    """Return the number itself if it is between 0 and 1, else 0."""
     return value if 0.0 <= value <= 1.0 else 0.0
 
 
@@ -501,7 +502,7 @@ def sums_along(count: int, size: int, phase: int, events: int) -> tuple[float, .
 def most_along(
     count: int, along: float, across: float, size: int, phase: int, events: int
 ) -> tuple[int, float]:
-    """Return where along·j + across·t_j is greatest, and that value."""
+    """Return the j at which along·j + across·t_j is greatest, and that value."""
     cdef long double greatest
     cdef Int index
     index = find_most(count, along, across, 2 * size, phase, 2 * events, &greatest)

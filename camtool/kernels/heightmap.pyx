@@ -14,12 +14,13 @@ is that from the segment: along a row of cells it is √(c² + (p + q i)²) in e
       cone      u = a |m| / √(rise² − m²), no less than √(flat² − a²), no more than the rim
       ball      u = √((r² − a²) m² / (1 + m²))
       bull      by Newton's steps in a bracket, the last one below NEAR_SHARE of the corner: u errs
-                by about the square of that, the height by the square of the error; where moves are not very gentle, from a table for each move
-                by √(R² − a²), with u linear between its rows: the height errs by below 1e-6 mm
+                by about the square of that, the height by the square of the error; where moves
+                are not very gentle, from a table for each move by √(R² − a²), with u linear
+                between its rows: the height errs by less than 1e-6 mm
 
 A move that begins where the one before ended, with the same tool, cuts nothing new behind its
-start: these cells are left out. The move before leaves out what lies beyond its end, but for these. Loops hold no state but the heights, so equal moves give equal
-bytes on every processor.
+start: these cells are left out. The move before leaves out the cells beyond its end, except these.
+Loops hold no state but the heights, so equal moves give equal bytes on every processor.
 """
 
 from __future__ import annotations
@@ -117,7 +118,7 @@ cdef bint _take(
     Move* move, Cutter* cutter, double[:, ::1] starts, double[:, ::1] ends, Int[::1] tool,
     double[:, ::1] cutters, Int k
 ) noexcept:
-    """Store a move and its cutter; False where there is none or it cuts nothing."""
+    """Store move k and its cutter; return False if there is no such move or it cuts nothing."""
     cdef double dx, dy, dz
     if k >= tool.shape[0] or not _reaches(
         cutter, cutters, tool[k], min(starts[k, 2], ends[k, 2])
@@ -143,8 +144,8 @@ cdef bint _take(
 
 
 cdef bint _reaches(Cutter* cutter, double[:, ::1] cutters, Int tool, double z) noexcept:
-    """Store the cutter, and how far from its axis it cuts below the top with its tip at z; False
-    where it cuts nothing."""
+    """Store the cutter, and the distance from its axis within which it cuts below the top when its
+    tip is at z; return False if it cuts nothing."""
     cdef double below
     cutter.radius, cutter.flat = cutters[tool, RADIUS], cutters[tool, FLAT]
     cutter.corner, cutter.rise = cutters[tool, CORNER], cutters[tool, RISE]
@@ -160,7 +161,8 @@ cdef bint _reaches(Cutter* cutter, double[:, ::1] cutters, Int tool, double z) n
 
 
 cdef double _behind(Cutter* cutter, double slope) noexcept:
-    """Cells whose foot lies before this place on a joined move are cut deepest at its start."""
+    """Return the place along a joined move (mm, below 0: before its start) before which cells are
+    cut deepest at its start; the move before has cut these already."""
     cdef double offset = cutter.radius
     if slope >= 0.0:
         return 0.0
@@ -175,22 +177,22 @@ cdef double _behind(Cutter* cutter, double slope) noexcept:
 
 
 cdef inline Int _index(double place, Int count) noexcept:
-    """Return the number of a cell, no less than 0 and no more than `count`; 0 for NaN."""
+    """Return the number of a cell, limited to 0 … count; 0 for NaN."""
     if not place > 0.0:
         return 0
     return count if place >= count else <Int> place
 
 
 cdef inline Int _from(Row* row, Int nx, double x) noexcept:
-    """Return the first cell whose centre is not left of x."""
+    """Return the first cell whose centre is not to the left of x."""
     return _index(math.ceil((x - row.x0) / row.cell), nx)
 
 
 cdef (double, double) _span(
     double ax, double ay, double run, double ux, double uy, double y, double reach
 ) noexcept:
-    """Return the part of the line at height y that lies within `reach` of a move; inf, −inf if
-    none."""
+    """Return the part of the line at height y that lies within `reach` of a move; (inf, −inf) if
+    there is none."""
     cdef double left, right, half, off, low, high
     left, right = math.INFINITY, -math.INFINITY
     off = y - ay
@@ -216,7 +218,7 @@ cdef (double, double) _span(
 cdef void _cut_level(
     Row* row, Int nx, Cutter* cutter, Move* move, Move* following, double y
 ) noexcept:
-    """Cut a row with a level move; a joined one only before its start."""
+    """Cut a row of cells by a level move; of a joined move, only the cells before its start."""
     cdef double left, right, half, off, x, bx, by, other
     cdef double ax = move.ax, ay = move.ay, z = move.az, run = move.run
     cdef double ux = move.ux, uy = move.uy
@@ -265,8 +267,8 @@ cdef void _lower_end(
     Row* row, Int low, Int high, Cutter* cutter, double z, double bx, double by, Move* following,
     double y
 ) noexcept:
-    """Lower the cells low:high beyond the end (bx, by) of a move, but for those, to within a cell,
-    that the one that follows from there cuts as deep."""
+    """Lower the cells low:high beyond the end (bx, by) of a move, except those, to within a cell,
+    that the following move, which starts there, cuts as deep."""
     cdef double off = (y - following.ay) * following.uy, x
     # A flat tool on a level move leaves out all that lies round its start.
     cdef bint is_left = following.joined and (
@@ -302,7 +304,7 @@ cdef void _lower_flat(Row* row, Int low, Int high, double z) noexcept:
 cdef wide _lower(
     Row* row, Int low, Int high, Cutter* cutter, double z, double c, double p, double q
 ) noexcept:
-    """Lower the cells low:high to z and the profile at the distance √(c² + (p + q i)²)."""
+    """Lower the cells low:high to z plus the profile at the distance √(c² + (p + q i)²)."""
     cdef float* height = row.height
     cdef int* owner = row.owner
     cdef int move = row.move
@@ -342,7 +344,7 @@ cdef wide _lower(
 cdef wide _cut_slope(
     Row* row, Int nx, Cutter* cutter, Move* move, Move* following, double y
 ) noexcept:
-    """Cut a row with a sloping move."""
+    """Cut a row of cells by a sloping move."""
     cdef double left, right, ahead, along, aside, square, rim, u, s, near = -1.0
     cdef double ux = move.ux, uy = move.uy, run = move.run, z = move.az, slope = move.slope
     cdef double radius = cutter.radius, flat = cutter.flat, corner = cutter.corner
@@ -430,7 +432,7 @@ cdef wide _lower_bull(
     Row* row, int low, int high, Cutter* cutter, double z, double run, double ux, double uy,
     double slope, double x0, double off
 ) noexcept:
-    """Lower the cells low:high by a bull nose on a sloping move, several at once."""
+    """Lower the cells low:high by a bull nose on a sloping move, several cells at once."""
     cdef float* height = row.height
     cdef int* owner = row.owner
     cdef double* table = cutter.table
@@ -473,7 +475,8 @@ cdef void _tabulate(Cutter* cutter, double steep) noexcept:
 
 
 cdef inline double _profile(Cutter* cutter, double square) noexcept:
-    """Return the height of the tool over its tip at the distance √square, within its radius."""
+    """Return the height of the tool's surface over its tip at the distance √square from the axis,
+    within its radius."""
     cdef double w = max(math.sqrt(square) - cutter.flat, 0.0)
     if cutter.corner > 0.0:
         w = max(cutter.corner * cutter.corner - w * w, 0.0)
@@ -484,8 +487,9 @@ cdef inline double _profile(Cutter* cutter, double square) noexcept:
 cdef double _bull(
     double corner, double flat, double steep, double square, double rim, double near
 ) noexcept:
-    """Return the u at which a bull nose rises as steeply as the move: w u = steep · d · q, with
-    d² = a² + u², w = d − flat and q² = corner² − w². `near`: where to begin."""
+    """Return the distance u along the move at which a bull nose is as steep as the move: w u =
+    steep · d · q, with d² = a² + u², w = d − flat and q² = corner² − w². `near`: the first
+    guess."""
     cdef double low, high, u, d, w, q, off, rate, estimate
     cdef int k
     low = math.sqrt(max(flat * flat - square, 0.0))
@@ -521,11 +525,11 @@ cpdef void project(
     cosine of its elevation, the picture's u and v, mm, in the middle of pixel (0, 0), and mm from
     pixel to pixel. On the picture u = x fy − y fx and v = z cosine + (x fx + y fy) sine. `cell`
     (H, W) gets the number of the cell, NX · row + column, or −1 beside the map; for a point of a
-    wall, higher than `wall` mm, ~(the number of the cell before it). `level` (H, W) gets the height of the point, mm.
-    Row 0 is the lowest.
+    wall, higher than `wall` mm, ~(the number of the cell before it). `level` (H, W) gets the
+    height of the point, mm. Row 0 is the lowest.
 
-    Each column of pixels is a walk away from the viewer, from cell to cell; what is higher on the
-    picture than all before is seen.
+    Each column of pixels is a walk away from the viewer, from cell to cell; a cell is visible
+    where it is higher on the picture than all before it.
     """
     cdef double x0, y0, size, fx, fy, sine, cosine, u0, v0, pixel, u, t, last, next_x, next_y
     cdef double foot, low, high, before, z
@@ -583,7 +587,7 @@ cpdef void project(
 
 
 cdef inline double _border(double first, double size, Int k, double rate, double start) noexcept:
-    """Return the t at which start + t · way leaves the cell k; inf if it never does."""
+    """Return the t at which start + t · rate leaves the cell k; inf if it never does."""
     if abs(rate) < 1e-12:
         return math.INFINITY
     return (first + (k + 1 if rate > 0.0 else k) * size - start) / rate
@@ -592,7 +596,8 @@ cdef inline double _border(double first, double size, Int k, double rate, double
 cdef (double, double) _within(
     double start, double rate, double low, double high, double first, double last
 ) noexcept:
-    """Return the part of first … last in which start + t · way lies between low and high."""
+    """Return the part of the interval first … last in which start + t · rate lies between low and
+    high."""
     cdef double one, other
     if abs(rate) < 1e-12:
         return (first, last) if low <= start < high else (1.0, 0.0)

@@ -66,7 +66,7 @@ cdef inline void fill_lanes(double* lanes, double value) noexcept nogil:
 
 
 cdef inline double sum_of_lanes(double* lanes) noexcept nogil:
-    """Return the sum of all partial sums, in pairs; they are changed."""
+    """Return the sum of all partial sums, added in pairs; the lanes are overwritten."""
     cdef Int width, lane
     width = LANES // 2
     while width > 0:
@@ -77,7 +77,7 @@ cdef inline double sum_of_lanes(double* lanes) noexcept nogil:
 
 
 cdef inline double largest_of_lanes(double* lanes) noexcept nogil:
-    """Return the largest of all lanes, in pairs; they are changed."""
+    """Return the largest of all lanes, compared in pairs; the lanes are overwritten."""
     cdef Int width, lane
     width = LANES // 2
     while width > 0:
@@ -88,7 +88,7 @@ cdef inline double largest_of_lanes(double* lanes) noexcept nogil:
 
 
 cdef inline double smallest_of_lanes(double* lanes) noexcept nogil:
-    """Return the smallest of all lanes, in pairs; they are changed."""
+    """Return the smallest of all lanes, compared in pairs; the lanes are overwritten."""
     cdef Int width, lane
     width = LANES // 2
     while width > 0:
@@ -179,7 +179,8 @@ cdef wide _to_line(
 cdef wide _count_outside(
     double[:, ::1] arcs, Int row, double[::1] x, double[::1] y, Int* result
 ) noexcept nogil:
-    """Count the points outside of the wedge of an arc."""
+    """Count the points outside of the wedge of an arc, the sector between the radii to its
+    ends."""
     cdef Int k, outside
     cdef bint above_half
     cx, cy, ux, uy = arcs[row, CX], arcs[row, CY], arcs[row, UX], arcs[row, UY]
@@ -201,7 +202,8 @@ cdef inline bint _all_in_wedge(
 
 
 cdef inline double _depth(double from_start, double from_end, bint above_half) noexcept nogil:
-    """Not below 0 in the wedge, from what a point is to the inside of its two edges."""
+    """Return a number that is 0 or more in an arc's wedge, from how far a point lies on the inner
+    side of its two edges."""
     if above_half:
         return larger(from_start, from_end)
     return smaller(from_start, from_end)
@@ -210,12 +212,10 @@ cdef inline double _depth(double from_start, double from_end, bint above_half) n
 cdef inline double _off(double above, double half, double part) noexcept nogil:
     """Return the distance of a point outside a circle with |p|² − R² = `above`, if that is small.
 
-    With `half` = 1 / 2R, h = above / 2R, `part` = 1 / 2R² and q = h / R = above / 2R² that is
-
-        √(R² + 2Rh) − R = h (1 − q/2 + q²/2 − 5q³/8 + 7q⁴/8 − 21q⁵/16 + …);
-
-    within |q| ≤ 2⁻⁹ what is left out is below 2⁻⁵³ R. Roots take longer. With −`half` the sign is
-    the other one, to the last bit.
+    With `half` = 1 / 2R, h = above / 2R, `part` = 1 / 2R² and q = h / R = above / 2R² that is √(R²
+    + 2Rh) − R = h (1 − q/2 + q²/2 − 5q³/8 + 7q⁴/8 − 21q⁵/16 + …); within |q| ≤ 2⁻⁹ the omitted
+    terms are below 2⁻⁵³ R. Square roots take longer. With −`half` the sign is the other one, to
+    the last bit.
     """
     q = above * part
     return above * half * (1.0 + q * (-0.5 + q * (0.5 + q * (-0.625 + q * 0.875))))
@@ -224,9 +224,9 @@ cdef inline double _off(double above, double half, double part) noexcept nogil:
 cdef inline double _outside(
     double px, double py, double radius, double half, double part
 ) noexcept nogil:
-    """Return the distance of a point outside the circle; (px, py) is about the centre, `half` and
-    `part` are those of `_off`. The point alone decides between series and root, so equal points
-    have equal last bits."""
+    """Return the distance of a point outside the circle, negative inside; (px, py) is relative to
+    the centre, `half` and `part` are those of `_off`. The point alone decides between series and
+    root, so equal points have equal last bits."""
     cdef bint is_near
     above = px * px + py * py - radius * radius
     distance = math.sqrt(px * px + py * py) - radius
@@ -276,7 +276,7 @@ cdef wide _to_arc(
 cpdef void set_errors(
     Curves curves, Int row, double[::1] x, double[::1] y, double[::1] errors
 ) noexcept nogil:
-    """Set `errors` (n ≥ 1,) to those of the points x, y (n,) against one move."""
+    """Set `errors` (n ≥ 1,) to the signed distances of the points x, y (n,) from one move."""
     cdef Int at
     at = curves.arc[row]
     if at < 0:
@@ -298,7 +298,7 @@ cdef inline double larger(double one, double other) noexcept nogil:
 
 
 cdef inline Int first_of(double[::1] values, Int low, Int high, double value) noexcept nogil:
-    """Return the first index of `value` in values[low:high], where it is."""
+    """Return the first index of `value` in values[low:high], which must contain it."""
     cdef Int index
     _find_first(values, low, high, value, &index)
     return index
@@ -367,8 +367,8 @@ class Moves(NamedTuple):
 
 
 def room_for(count: int, dtype: type[np.generic] = np.float64) -> npt.NDArray[Any]:
-    """Return (count,) numbers of 8 bytes, not set, that begin where a line of the processor's
-    cache does: of what is read and written 64 bytes at once nothing lies in two of them."""
+    """Return (count,) uninitialised numbers of 8 bytes, aligned to a cache line of the processor:
+    no block of 64 bytes that is read or written at once lies in two lines."""
     buffer = np.empty(count + 8, dtype=dtype)
     begin = -buffer.ctypes.data % 64 // 8
     return buffer[begin : begin + count]
@@ -392,7 +392,7 @@ cdef class Search:
 cdef inline bint is_searched(
     Int k, Int first, Int last, double z_low, double z_high, const double[:, :] heights
 ) noexcept nogil:
-    """Return True if a move is one of first:last, at heights that overlap z_low … z_high."""
+    """Return True if move k is one of first:last and its heights overlap z_low … z_high."""
     if k < first or k >= last:
         return False
     return bool(heights[k, 0] <= z_high and heights[k, 1] >= z_low)
@@ -402,8 +402,8 @@ cdef Int _nearest(
     double x, double y, double within, Int first, Int last, double z_low, double z_high,
     Search search
 ) noexcept nogil:
-    """Return the move nearest to a point, if it is nearer than `within` mm, else −1; of those
-    first:last whose heights overlap z_low … z_high."""
+    """Return the move nearest to a point among those of first:last whose heights overlap z_low …
+    z_high; −1 if none is nearer than `within` mm."""
     cdef Int leaves, height, node, low, place, k, nearest
     cdef double best
     cdef int[::1] order
@@ -446,8 +446,8 @@ cdef inline double _looser(double limit) noexcept nogil:
 cdef wide _set_box(
     double[::1] x, double[::1] y, double[::1] errors, double[::1] box
 ) noexcept nogil:
-    """Set the box about the points x, y (n ≥ 1,) and what is as near to them as their errors. Its
-    middle is that of the way from the first to the last point."""
+    """Set the box that contains all places within the largest of the `errors` of the points x, y
+    (n ≥ 1,). Its centre is in the middle between the first and the last point."""
     cdef Int count, k, j, lane
     cdef double middle_x, middle_y, way_x, way_y, px, py, long, wide, far
     cdef double[LANES] longs, wides, fars
@@ -485,7 +485,7 @@ cdef wide _set_box(
 
 
 cdef inline bint node_near(double[:, ::1] nodes, Int node, double[::1] box) noexcept nogil:
-    """Return True if the box of a node may have a point in the box."""
+    """Return True if the box of a node may have a point in common with `box`."""
     cdef double low_x, low_y, high_x, high_y, aside, reach
     low_x, low_y = nodes[node, 0] - box[MIDDLE_X], nodes[node, 1] - box[MIDDLE_Y]
     high_x, high_y = nodes[node, 2] - box[MIDDLE_X], nodes[node, 3] - box[MIDDLE_Y]
@@ -499,7 +499,7 @@ cdef inline bint node_near(double[:, ::1] nodes, Int node, double[::1] box) noex
 
 
 cdef inline bint move_near(Curves curves, Int k, double[::1] box) noexcept nogil:
-    """Return True if a move may have a point in the box; an arc counts as its full circle."""
+    """Return True if a move may have a point in `box`; an arc counts as its full circle."""
     cdef Int at
     cdef double ax, ay, way_x, way_y, long, wide, px, py, along, aside, near_long, near_wide
     cdef double far_long, far_wide, square, to_x, to_y, further, across, side, reach
@@ -529,8 +529,8 @@ cdef inline bint move_near(Curves curves, Int k, double[::1] box) noexcept nogil
 
 
 cdef bint _is_there(Curves curves, Int[::1] moves, Int count, Int move) noexcept nogil:
-    """Return True if the move is one of the first `count` in the list; turns of a circle are
-    equal."""
+    """Return True if the move is one of the first `count` in the list; all turns of the same
+    circle are equal."""
     cdef Int n
     n = 0
     while n < count and not are_same(curves, moves[n], move):
@@ -554,8 +554,8 @@ cdef inline bint are_same(Curves curves, Int one, Int other) noexcept nogil:
 
 
 cdef double squareness(Curves curves, Int k, double x, double y) noexcept nogil:
-    """Return the distance (mm) of a point from the infinite line; of an arc, from the arc, or
-    beyond its ends from the tangent there."""
+    """Return the distance (mm) of a point from a move's infinite line; from an arc, or beyond its
+    ends from the tangent there."""
     cdef Int at
     cdef double ax, ay, bx, by, cx, cy, px, py, long, across, wide, end_x, end_y, to_a, to_b
     cdef double from_start, from_end
@@ -582,8 +582,8 @@ cdef double squareness(Curves curves, Int k, double x, double y) noexcept nogil:
 cdef void _lowered(
     double[::1] x, double[::1] y, Int move, Search search, double[::1] errors, Int[::1] by
 ) noexcept nogil:
-    """Lower the errors of the points x, y (n,), which are those against the moves `by` (n,), to
-    those against one more; of equally near moves that one counts to which a point is more
+    """Lower the errors of the points x, y (n,) against the moves `by` (n,) to those against one
+    more move where it is nearer. Of equally near moves the one counts to which the point is more
     square."""
     cdef Int k
     cdef double less, square
@@ -605,8 +605,8 @@ cdef Int _list_near(
     double[::1] x, double[::1] y, double[::1] errors, Int own, Int first, Int last, double z_low,
     double z_high, Search search
 ) noexcept nogil:
-    """List the moves that may be nearer to some of the points x, y (n,) than their own, from which
-    they have these errors; it comes first. How many these are, or 0 where they are too many."""
+    """List the moves that may be nearer to some of the points x, y (n,) than `own`, from which
+    they have these errors; `own` comes first. Return their number, 0 where they are too many."""
     cdef Int leaves, height, node, low, place, k, count, limit, some
     cdef int[::1] order
     cdef Int[::1] stack, candidates
@@ -652,11 +652,11 @@ cpdef bint nearest_errors(
     double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,
     Search search, double[::1] out
 ) noexcept nogil:
-    """Return the error of each of the points x, y (1 ≤ n ≤ `BLOCK`,) against the nearest of the
-    moves first:last whose heights overlap z_low … z_high, or of all of these where none does;
-    signed as `set_errors` does, of equally near moves by that to which the point is most
-    square, or by `own`. False, and inf, where there is none. `own` is the move that the points
-    are expected to follow, or −1."""
+    """Set `out` to the error of each of the points x, y (1 ≤ n ≤ `BLOCK`,) against the nearest of
+    the moves first:last whose heights overlap z_low … z_high, or of all of these where none
+    overlaps. The sign is that of `set_errors`; of equally near moves the one counts to which the
+    point is most square, or `own`. Return False, and set inf, where there is no move. `own` is the
+    move that the points are expected to follow, or −1."""
     cdef Int begin, end, height, low, high, middle, k, n, near
     cdef bint is_listed
     cdef double far
@@ -708,8 +708,8 @@ cpdef bint nearest_errors(
 
 
 cdef Int _first_off(double[::1] errors, Int low) noexcept nogil:
-    """Return the first point from `low` on that does not lie on its own move, or the end of
-    all."""
+    """Return the first point from `low` on that does not lie on its own move; the number of points
+    if all do."""
     cdef Int k
     k = low
     while k < len(errors) and abs(errors[k]) <= TIE_MM:
@@ -718,8 +718,8 @@ cdef Int _first_off(double[::1] errors, Int low) noexcept nogil:
 
 
 cdef Int _end_of_off(double[::1] errors, Int low) noexcept nogil:
-    """Return the first index from `low` on, which is off its own move, at which `ON_OWN` points on
-    that move begin, or the number of points."""
+    """Return the first index after `low`, a point off its own move, at which `ON_OWN` consecutive
+    points on that move begin; the number of points if there is none."""
     cdef Int end, k
     end = low + 1
     while end + ON_OWN <= len(errors):
@@ -750,13 +750,13 @@ cpdef enum:
 
 
 def bin_directions() -> Floats:
-    """Return (721, 2) the directions between which the bins lie."""
+    """Return (721, 2) the directions that separate the bins."""
     angle = np.arange(ANGLE_BINS + 1) % ANGLE_BINS * (2.0 * np.pi / ANGLE_BINS)
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def empty_bins(count: int) -> Floats:
-    """Return (count, 720, 9) bins of circles that nothing went round."""
+    """Return (count, 720, 9) the empty bins of circles."""
     bins = np.zeros((count, ANGLE_BINS, BIN_COLUMNS))
     bins[:, :, 3], bins[:, :, 6] = np.inf, -np.inf
     return bins
@@ -781,7 +781,8 @@ cdef wide _count_in_bin(
     double[::1] x, double[::1] y, Int low, double cx, double cy, double[:, ::1] directions,
     Int which, Int* result
 ) noexcept nogil:
-    """Count the consecutive points x, y (n,) from `low` on in the bin `which`: at least one."""
+    """Count the consecutive points x, y (n,) from `low` on that lie in the bin `which`; the first
+    one does."""
     cdef Int j, k, outside
     cdef bint out
     from_x, from_y = directions[which, 0], directions[which, 1]
@@ -860,7 +861,8 @@ cdef void _place(
     double[::1] x, double[::1] y, Int low, double cx, double cy, double square,
     double[:, ::1] bins, Int which, Int column
 ) noexcept nogil:
-    """Keep the first point from `low` on whose distance from the centre has this square."""
+    """Store in a bin the first point from `low` on whose squared distance from the centre is
+    `square`."""
     cdef Int k
     k = low
     while (x[k] - cx) * (x[k] - cx) + (y[k] - cy) * (y[k] - cy) != square:
@@ -876,7 +878,7 @@ cdef void _place(
 
 
 def new_pen(stride: int, room: int) -> Floats:
-    """Return a pen that has written nothing."""
+    """Return a pen that holds nothing yet."""
     pen = np.zeros(PEN)
     pen[STRIDE], pen[ROOM], pen[ROW], pen[PEAK] = stride, room, -1.0, -1.0
     return pen
@@ -907,7 +909,7 @@ cdef void end_run(double[::1] pen, double[:, ::1] trace) noexcept nogil:
 
 
 cdef void end_row(double[::1] pen, double[:, ::1] trace) noexcept nogil:
-    """Write what the pen holds."""
+    """Write the points that the pen still holds."""
     end_run(pen, trace)
     if pen[ROW] >= 0.0 and pen[LAST_IS_WRITTEN] == 0.0:
         _write(pen, pen[LAST_X], pen[LAST_Y], pen[LAST_ERROR], trace)
@@ -918,9 +920,9 @@ cpdef void trace_block(
     Int row, double[::1] x, double[::1] y, double[::1] error, double max_error, double[::1] pen,
     double[:, ::1] trace
 ) noexcept nogil:
-    """Take points x, y (n,) of one row; `error` (n,) of them, the largest of which is `max_error`,
-    where that is above 0; else they have none. What is full of points takes only the ends of
-    rows; a pen whose runs have no samples writes nothing."""
+    """Add points x, y (n,) of one row to the trace. `error` (n,): their errors, the largest of
+    which is `max_error`; 0 if there are none. A full trace takes only the ends of rows; a pen
+    whose runs have no samples writes nothing."""
     cdef Int count, low, high, at, to_stride
     cdef double peak
     count = len(x)
@@ -1067,9 +1069,9 @@ cdef wide _sizes(
     double[::1] errors, double off, double[::1] size, Int[::1] bits, int[::1] places,
     ErrorSums* result
 ) noexcept nogil:
-    """Compute the sizes of errors, all `off` larger than they are alone, and their places in a
-    histogram, where four samples take turns so that none waits for the one before. `bits` are
-    those of `size`."""
+    """Compute the sizes of errors, each increased by `off`, and their places in a histogram, in
+    four alternating parts so that no sample waits for the one before. `bits` are the bits of
+    `size`."""
     cdef Int j, k, lane, leading
     cdef double largest_size, squares, signed
     cdef double[LANES] mosts, sums, signs
@@ -1109,7 +1111,7 @@ cdef void _count(int[::1] places, Int count, Int[:, ::1] histograms, Int which) 
 
 
 cdef void judge_block(Int row, Int count, Judge judge) noexcept nogil:
-    """Judge the first `count` samples of the room, all of one row."""
+    """Judge the first `count` samples in the judge's buffers, all of one row."""
     cdef Int last, own, of_program, k, circle, first, upto, other
     cdef Int[:, ::1] rows
     cdef Int[::1] bits
@@ -1166,8 +1168,8 @@ cdef void judge_block(Int row, Int count, Judge judge) noexcept nogil:
 
 cpdef judge_samples(Int[::1] row, double[:, ::1] commanded, double[:, ::1] slide, task, sums):
     """Judge K samples in order: row (K,), commanded and slide (K, 3) mm, whose Z is not looked at;
-    any number of rows. Returns the first sample that is no place within `FARTHEST_MM`, none of
-    which is judged from its block on, or −1."""
+    any number of rows. Return the first sample that is not within `FARTHEST_MM` (none is judged
+    from its block on), or −1."""
     cdef Int done, count, k, axis
     cdef Judge judge
     cdef bint near

@@ -2,18 +2,18 @@
 
 A line takes a ≤ N steps of its minor axis in N events, s_k = ⌊(2ak + phase) / 2N⌋ after k of them:
 phase N − 1 rounds to the nearest (halves down), phase 0 takes the floor. While no slide starts to
-move, the positions of both slides are linear in k and s_k, and so is their distance from a straight
-move: d_k = A k + B s_k + C. Such a part of a line is a piece; play makes at most three of them.
-Sums, extremes and counts of d over a piece come from `camtool.kernels.floors`.
+move, the positions of both slides are linear in k and s_k, and so is their distance from a
+straight move: d_k = A k + B s_k + C. Such a part of a line is a piece; play makes at most three of
+them. Sums, extremes and counts of d over a piece come from `camtool.kernels.floors`.
 
 Some events are still visited one by one, and replace what the closed form has for them:
 
     caps        where the nearest point of the move is one of its ends, or might be
     crossings   where another move might be nearer
 
-A line is stepped as a whole where that is as quick, and where the closed form does not hold: where Z
-has the most events, where the row is an arc or is compared with one, goes round a full circle, or
-runs along other moves.
+A line is stepped as a whole where that is as quick, and where the closed form does not hold: where
+Z has the most events, where the row is an arc or is compared with one, goes round a full circle,
+or runs along other moves.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ cdef inline double _slide(Drive* drive, Int steps) noexcept nogil:
 
 
 cdef inline void _slides_at(Line* line, Int k, double* x, double* y) noexcept nogil:
-    """Set where the slides are after k events."""
+    """Set x and y to the position of the slides after k events."""
     y[0] = _slide(&line.drives[1], _steps(line, 1, k))
     x[0] = _slide(&line.drives[0], _steps(line, 0, k))
     if line.lean != 0.0:
@@ -198,8 +198,8 @@ cdef inline void _commanded_at(Line* line, Int k, double* x, double* y) noexcept
 
 
 cdef Int _first_moving(Drive* drive) noexcept nogil:
-    """Return the first step from which on the motor takes the slide along; more than there are
-    where it never does; 0 where the slide is where it would be if it had been taken along."""
+    """Return the first step from which on the motor moves the slide: beyond the last step where it
+    never does, 0 where the slide is already in contact."""
     cdef Int first
     cdef double guess
     if drive.size == 0:
@@ -221,7 +221,7 @@ cdef inline bint _takes_along(Drive* drive, Int steps) noexcept nogil:
 
 
 cdef class LineJudge:
-    """Return a judge of lines: the judge of samples, the lines and their slides, and scratch
+    """A judge of lines: the judge of samples, the lines and their slides, and scratch
     buffers: crossings; windows of visited events, and what was found there; pieces to be
     counted."""
 
@@ -248,8 +248,8 @@ cdef class LineJudge:
 
 
 def judge_lines(lines: StepLines, followed: Followed, task: Task, sums: Sums) -> Floats:
-    """Judge lines, whose rows are all of the task's, and end the trace of the last one. Returns
-    their pieces (P, 9), whose errors are in no histogram."""
+    """Judge lines, whose rows all belong to the task, and end the trace of the last one. Return
+    the pieces (P, 9) of the lines; their errors are not in any histogram yet."""
     cdef Int k
     cdef LineJudge all_
     all_ = LineJudge(lines, followed, task, sums)
@@ -333,7 +333,8 @@ cdef void _step(Line* line, LineJudge all_) noexcept nogil:
 
 
 cdef bint _is_judged_at_once(Line* line, LineJudge all_) noexcept nogil:
-    """Judge a line in closed form; False, and nothing is judged, where it has to be stepped."""
+    """Judge a line in closed form; return False, with nothing judged, where it has to be
+    stepped."""
     cdef Int row, own, followed_move, pieces, stride
     cdef Piece[MAX_PIECES] slides
     cdef Piece commanded
@@ -376,7 +377,7 @@ cdef bint _is_judged_at_once(Line* line, LineJudge all_) noexcept nogil:
 
 
 cdef bint _set_straight(Straight* move, Curves curves, Int k) noexcept nogil:
-    """Set a straight move; False for an arc and for a move without length."""
+    """Set a straight move; return False for an arc and for a move without length."""
     if curves.arc[k] >= 0:
         return False
     move.ax, move.ay = curves.start[k, 0], curves.start[k, 1]
@@ -400,7 +401,7 @@ cdef inline double _error(Straight* move, double x, double y) noexcept nogil:
 
 
 cdef void _set_forms(Line* line, Piece* piece, bint* moving) noexcept nogil:
-    """Set the positions of slides of which some move, and the others stand."""
+    """Set the positions of the slides as linear forms; slides that do not move are constant."""
     cdef Int axis
     cdef Drive* drive
     cdef Form[2] forms
@@ -466,7 +467,8 @@ cdef void _set_commanded(Line* line, Piece* piece) noexcept nogil:
 
 
 cdef Form _across_move(Piece* piece, Straight* move) noexcept nogil:
-    """Return the distance to the left of an infinite line."""
+    """Return the signed distance from the infinite line of a move, positive on its left, as a
+    linear form."""
     cdef Form form
     form.along = (move.dx * piece.y.along - move.dy * piece.x.along) / move.length
     form.across = (move.dx * piece.y.across - move.dy * piece.x.across) / move.length
@@ -477,7 +479,7 @@ cdef Form _across_move(Piece* piece, Straight* move) noexcept nogil:
 
 
 cdef Form _along_move(Piece* piece, Straight* move) noexcept nogil:
-    """Return how far along a move positions are, mm from its start."""
+    """Return the position along a move, mm from its start, as a linear form."""
     cdef Form form
     form.along = (move.dx * piece.x.along + move.dy * piece.y.along) / move.length
     form.across = (move.dx * piece.x.across + move.dy * piece.y.across) / move.length
@@ -494,8 +496,8 @@ cdef inline long double _value(Line* line, Form* form, Int k) noexcept nogil:
 cdef void _set_range(
     Line* line, Piece* piece, Form* form, double low, double high, Int* first, Int* end
 ) noexcept nogil:
-    """Set the events of a piece after which a form may be within low … high: s_k differs from
-    a k / N by less than 1."""
+    """Set the range of events of a piece after which a form may lie within low … high: s_k differs
+    from a k / N by less than 1."""
     cdef double slope, reach, one, other, level
     slope = <double>(
         form.along + form.across * <long double>line.size / <long double>line.events
@@ -523,8 +525,8 @@ cdef void _set_range(
 cdef void _set_core(
     Line* line, Piece* piece, Straight* move, Int* first, Int* end
 ) noexcept nogil:
-    """Set the events of a piece after which the nearest point of the infinite line is certainly
-    one of the move; the others are its caps."""
+    """Set the range of events of a piece after which the nearest point of the infinite line
+    certainly lies on the move; the other events are its caps."""
     cdef Form form
     cdef double reach
     form = _along_move(piece, move)
@@ -570,8 +572,8 @@ cdef bint _add_cap(Int low, Int high, LineJudge all_) noexcept nogil:
 cdef bint _visit_wanted(
     Line* line, Straight* nominal, Piece* pieces, Int count, Int row, LineJudge all_
 ) noexcept nogil:
-    """Visit the events of caps and crossings, with their errors against the nearest moves; False
-    where these are too many."""
+    """Visit the events of caps and crossings, with their errors against the nearest moves; return
+    False where these are too many."""
     cdef Int k, first, end, done, top
     cdef double far
     cdef Form form
@@ -604,7 +606,8 @@ cdef bint _visit_wanted(
 
 
 cdef bint _visit_cap(Line* line, Int low, Int high, Int row, LineJudge all_) noexcept nogil:
-    """Visit events, and search the moves nearest to each."""
+    """Visit the events low:high one by one, and search the nearest move for each; return False
+    where they are too many."""
     cdef Int begin, count, k
     cdef double[::1] x, y, errors
     cdef double x_here, y_here
@@ -635,7 +638,8 @@ cdef bint _visit_cap(Line* line, Int low, Int high, Int row, LineJudge all_) noe
 
 
 cdef Int _end_of_group(Int first, LineJudge all_) noexcept nogil:
-    """Return the crossing behind those that overlap one another from `first` on."""
+    """Return the end of the group of crossings that overlap each other, which begins at
+    `first`."""
     cdef Int k, high
     k, high = first + 1, all_.crossing_high[first]
     while k < all_.crossing_count and all_.crossing_low[k] < high:
@@ -647,8 +651,8 @@ cdef Int _end_of_group(Int first, LineJudge all_) noexcept nogil:
 cdef bint _visit_group(
     Line* line, Straight* nominal, Int first, Int end, LineJudge all_
 ) noexcept nogil:
-    """Visit the events of crossings first … end − 1, which overlap, and compare each with their
-    moves."""
+    """Visit the events of the overlapping crossings first … end − 1, and compare each event with
+    their moves."""
     cdef Int low, high, k, event, at
     cdef double x, y
     low, high, at = all_.crossing_low[first], 0, all_.visited_count
@@ -669,8 +673,9 @@ cdef bint _visit_group(
 
 
 cdef void _lower(Straight* nominal, Int crossing, Int shift, LineJudge all_) noexcept nogil:
-    """Lower the errors of a crossing's events, which are visited as number event + `shift`, to those
-    against its move; of equally near moves that one counts to which a point is more square."""
+    """Lower the errors of a crossing's events, where event e is visited as number e + `shift`, to
+    those against its move; of equally near moves the one counts to which a point is more
+    square."""
     cdef Straight other
     cdef Int at, move
     cdef bint is_straight
@@ -690,7 +695,7 @@ cdef void _lower(Straight* nominal, Int crossing, Int shift, LineJudge all_) noe
 
 
 cdef double _error_to(Int move, double x, double y, LineJudge all_) noexcept nogil:
-    """Return the error of a point against a move of the search."""
+    """Return the error of a point against a move of the search, signed as `set_errors` does."""
     all_.judge.search.x[0], all_.judge.search.y[0] = x, y
     set_errors(
         all_.judge.search.curves, move, all_.judge.search.x, all_.judge.search.y,
@@ -702,8 +707,8 @@ cdef double _error_to(Int move, double x, double y, LineJudge all_) noexcept nog
 cdef bint _is_more_square(
     Straight* nominal, Int by, Int move, double x, double y, LineJudge all_
 ) noexcept nogil:
-    """Return True if a point is more square to a move than to `by`, or to the wanted one for
-    −1."""
+    """Return True if a point is more square to `move` than to the move `by`, or than to the wanted
+    move where `by` is −1."""
     cdef double square
     if by < 0:
         square = nominal.dx * (y - nominal.ay) - nominal.dy * (x - nominal.ax)
@@ -717,8 +722,8 @@ cdef bint _list_crossings(
     Line* line, Straight* nominal, Piece* pieces, Int* cores, Int* ends, Int count, double far,
     Int row, LineJudge all_
 ) noexcept nogil:
-    """List the events within `far` of the wanted move for which another one might be nearer, in
-    order; False where these are too many."""
+    """List the events within `far` of the wanted move to which another move might be nearer, in
+    order; return False where these are too many."""
     cdef Int leaves, height, node, low, place, k, first, last, begin, end, followed_move
     cdef double z_low, z_high, wide
     all_.crossing_count = 0
@@ -762,7 +767,7 @@ cdef bint _list_crossings(
 
 
 cdef void _set_box(Straight* nominal, double wide, LineJudge all_) noexcept nogil:
-    """Set the box about a move that is `wide` mm wider on all sides."""
+    """Set the box about a move, `wide` mm larger on all sides."""
     cdef double way_x, way_y, half
     cdef double[::1] box
     box = all_.judge.search.box
@@ -806,9 +811,9 @@ cdef bint _add_crossings(
 cdef Int _set_near(
     Straight* nominal, Int move, double wide, double* bounds, LineJudge all_
 ) noexcept nogil:
-    """Set between which places along the wanted move (mm from its start) its points are within
-    `wide` of another move; returns how many such parts there are: of a line at most one, of an arc,
-    which counts as its full circle, two."""
+    """Set `bounds` to the parts of the wanted move (mm from its start) within `wide` of another
+    move; return their number: at most one for a line, two for an arc, which counts as its full
+    circle."""
     cdef Straight other
     cdef Int at
     cdef double way_x, way_y, px, py, along, across, low, high, outer, inner
@@ -847,7 +852,7 @@ cdef Int _set_near(
 cdef void _clip(
     double value, double slope, double lowest, double greatest, double* low, double* high
 ) noexcept nogil:
-    """Narrow low … high to where least ≤ value + slope·t ≤ most."""
+    """Narrow low … high to the t with lowest ≤ value + slope·t ≤ greatest."""
     cdef double one, other
     if math.fabs(slope) < 1e-15:
         if value < lowest or value > greatest:
@@ -883,9 +888,9 @@ cdef struct Errors:
 cdef Errors _sum_up(
     Line* line, Straight* move, Piece* pieces, Int count, double off, Int which, LineJudge all_
 ) noexcept nogil:
-    """Sum up the errors of all events: those of the pieces in closed form, less what it has for the
-    visited events, and what was found there instead. Sizes are `off` larger than errors. Pieces
-    are kept to be counted, and the histogram is corrected by the visited events."""
+    """Return the sums of the errors of all events: from the pieces in closed form, with the
+    visited events replaced by their real errors. Sizes are `off` larger than errors. The pieces
+    are stored, to be counted later, and the histogram is corrected for the visited events."""
     cdef Errors errors
     cdef SawSums sums
     cdef Form form
@@ -983,9 +988,9 @@ cdef void _raise_peak(
     Line* line, Straight* move, Form* form, Int low, Int high, bint commanded, Found* peak,
     LineJudge all_
 ) noexcept nogil:
-    """Raise `found` to the largest error of those events of a piece that were not visited. Where
-    the closed form has its largest at a visited event, what lies before and behind that window is
-    looked at."""
+    """Raise `peak` to the largest error of those events of a piece that were not visited. Where
+    the closed form is largest at a visited event, the events before and behind that window are
+    searched."""
     cdef Found other_peak
     cdef Int window
     cdef double x, y, size
@@ -1009,7 +1014,8 @@ cdef void _raise_peak(
 
 
 cdef Int _window_of(Int event, LineJudge all_) noexcept nogil:
-    """Return the window of an event, or −1; windows are in order."""
+    """Return the window of visited events that contains an event, −1 for none; windows are in
+    order."""
     cdef Int low, high, middle
     low, high = 0, all_.window_count
     while low < high:
@@ -1026,7 +1032,7 @@ cdef Int _window_of(Int event, LineJudge all_) noexcept nogil:
 cdef void _judge_total(
     Line* line, Straight* nominal, Piece* pieces, Int count, Int row, LineJudge all_
 ) noexcept nogil:
-    """Judge the slides against the wanted moves, and take their path to the trace."""
+    """Judge the slides against the wanted moves, and add their path to the trace."""
     cdef Errors errors
     cdef Found peak, other_peak
     cdef double off, x, y, size
@@ -1077,8 +1083,8 @@ cdef void _judge_inner(
 cdef void _visit_ends(
     Line* line, Straight* move, Int low, Int high, LineJudge all_
 ) noexcept nogil:
-    """Visit the caps of the commanded path. They are few events: it ends within some steps of its
-    own move's ends."""
+    """Visit the caps of the commanded path. They are few events: the path ends within some steps
+    of the ends of its own move."""
     cdef double x, y
     cdef Int event
     if low >= high:
@@ -1096,9 +1102,9 @@ cdef void _visit_ends(
 cdef void _judge_lag(
     Line* line, Piece* pieces, Int count, Int row, LineJudge all_
 ) noexcept nogil:
-    """Judge the slides against the commanded path: the difference is linear in each piece, and its
-    square convex, so that it is greatest at a corner of the hull of the events. Of these the ends
-    and those farthest in the direction in which it grows there are looked at."""
+    """Judge the slides against the commanded path. The difference is linear in each piece, and its
+    square convex, so the greatest is at a corner of the convex hull of the events: the ends are
+    tried, and the events farthest in the direction in which the difference grows there."""
     cdef Piece commanded
     cdef Form x, y
     cdef SawSums sums
@@ -1138,8 +1144,8 @@ cdef double _lag_at(Line* line, Int k) noexcept nogil:
 
 
 cdef Int _climb(Line* line, Piece* piece, Form* x, Form* y, Int at) noexcept nogil:
-    """Return an event at which x² + y² is no less than at `at`, and than at all others in the
-    direction in which it grows there."""
+    """Return an event at which x² + y² is no less than at `at`, and no less than at the events
+    farthest in the direction in which it grows there."""
     cdef long double here_x, here_y, best, square, greatest
     cdef Int begin, new, turn
     if x.along == 0.0 and x.across == 0.0 and y.along == 0.0 and y.across == 0.0:
@@ -1165,8 +1171,8 @@ cdef Int _climb(Line* line, Piece* piece, Form* x, Form* y, Int at) noexcept nog
 
 
 cdef void _judge_still(Line* line, Piece* pieces, Int count, LineJudge all_) noexcept nogil:
-    """Widen the extents, and set where the row ends. Each axis goes one way, so its slide is
-    farthest at an end; only where Y leans towards X is X taken from the pieces."""
+    """Widen the extents, and set where the row ends. Each axis moves in one direction, so its
+    slide is farthest at an end; only where Y leans towards X is X taken from the pieces."""
     cdef Int row, k, at
     cdef double x, y
     cdef double[:, ::1] figures
@@ -1212,7 +1218,8 @@ cdef void _widen(Line* line, Int k, Int row, LineJudge all_) noexcept nogil:
 
 
 cdef Int _begin_trace(Line* line, LineJudge all_) noexcept nogil:
-    """Return how many events the present run of the trace still takes; 0 where none is wanted."""
+    """Return the number of events that the current run of the trace still takes; 0 where no trace
+    is wanted."""
     cdef double[::1] pen
     pen = all_.judge.pen
     if pen[STRIDE] <= 0.0:
@@ -1226,7 +1233,7 @@ cdef Int _begin_trace(Line* line, LineJudge all_) noexcept nogil:
 cdef void _trace_run(
     Line* line, Found* peak, double off, Int low, Int high, LineJudge all_
 ) noexcept nogil:
-    """Take the events low … high − 1, all of one run, to the trace, with the largest error."""
+    """Add the events low … high − 1, all of one run, to the trace, with the largest error."""
     cdef double x, y, size
     cdef double[::1] pen
     pen = all_.judge.pen
@@ -1246,7 +1253,8 @@ cdef void _trace_run(
 
 
 cdef double _error_of(Line* line, Int event, LineJudge all_) noexcept nogil:
-    """Return the size of the total error after an event, without what the drawing adds."""
+    """Return the size of the total error after an event, without the tolerance that the drawing
+    adds."""
     cdef Int window, row
     cdef Straight nominal
     cdef double x, y
@@ -1262,7 +1270,7 @@ cdef double _error_of(Line* line, Int event, LineJudge all_) noexcept nogil:
 
 
 cdef void _trace_air(Line* line, LineJudge all_) noexcept nogil:
-    """Take a line that cuts nothing to the trace: the first event of each run and the last one."""
+    """Add a line that cuts nothing to the trace: the first event of each run and the last one."""
     cdef Found peak
     cdef Int low, high, remaining
     cdef double x, y

@@ -24,7 +24,8 @@ from camtool.arrays import Floats, Ints
 cpdef void legs_fill(
     Int done, Int[:, ::1] begin, Int[:, ::1] travel, double[::1] step_mm, double[:, ::1] out
 ) noexcept:
-    """Positions after the passes of legs, `out` (n, 3) mm, those of the first from `done` on.
+    """Fill `out` (n, 3) mm with the positions after the passes of legs, from pass `done` of the
+    first leg on.
 
     Each leg starts at `begin` (L, 3) steps and goes by `travel` (L, 3) steps, not all of them 0;
     `step_mm` (3,). `out` may end within a leg, not behind the last one.
@@ -63,7 +64,7 @@ cpdef enum:
 
 
 cdef class Ways:
-    """Return the ways of N rows: the `start` (3,) mm of the first and the `end` (N, 3) of each;
+    """The paths of N rows: the `start` (3,) mm of the first and the `end` (N, 3) of each;
     the `arms` (A, 8) of arcs, and which of them each row has, `arm` (N,), −1 for lines."""
 
     def __init__(
@@ -76,7 +77,7 @@ cdef class Ways:
         self.start, self.end, self.arm, self.arms = start, end, arm, arms
 
     cdef void put(self, Int row, double share, double *point) noexcept:
-        """Put the point (3,) mm at a share of the length of a row."""
+        """Write the point (3,) mm at the fraction `share` of the length of a row."""
         cdef Int arm = self.arm[row]
         cdef Int axis
         cdef double angle, radius, begin
@@ -97,7 +98,7 @@ cdef class Ways:
     def fill(
         self, const Int[::1] row, const double[::1] share, double[:, ::1] points
     ) -> None:
-        """Write the points (K, 3) mm at shares (K,) of the lengths of rows (K,)."""
+        """Write the points (K, 3) mm at fractions `share` (K,) of the lengths of rows (K,)."""
         cdef Int k
         for k in range(len(row)):
             self.put(row[k], share[k], &points[k, 0])
@@ -106,8 +107,8 @@ cdef class Ways:
 cpdef void count_steps(
     const double[:, ::1] points, double[::1] step_mm, double guard, Int[:, ::1] counts
 ) noexcept:
-    """Write how many steps each axis has made at each of K points (K, 3) mm since the first one,
-    `counts` (K, 3), where it stands at its nearest step (`camtool.kernels.lattice.to_steps`, with
+    """Write `counts` (K, 3): the steps that each axis has made at each of the points (K, 3) mm
+    since the first one, if it stands at its nearest step (`camtool.kernels.lattice.to_steps`, with
     its `guard`)."""
     cdef Int k, axis, steps, before, total
     cdef double quotient
@@ -143,11 +144,12 @@ cpdef void count_steps(
 cpdef void entry_speeds(
     double[::1] gain, double[::1] limit, Int window, double reached, double[::1] entry
 ) noexcept:
-    """Squares of the speeds at the starts of N blocks, `entry` (N,).
+    """Fill `entry` (N,) with the squares of the speeds at the starts of N blocks.
 
-    `gain` (N,): what the square of a speed can change by within a block, 2 a d; `limit` (N,): its
-    highest value at the start of the block, 0 where the machine stands before it. `reached`: what
-    the blocks before allow at the start of the first, 0 where there are none.
+    `gain` (N,): the greatest change of the square of the speed within a block, 2 a d; `limit`
+    (N,): its highest value at the start of the block, 0 where the machine stands before it.
+    `reached`: the square that the blocks before allow at the start of the first, 0 where there are
+    none.
     """
     cdef Int i, j
     for i in range(len(gain)):

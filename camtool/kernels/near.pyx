@@ -61,9 +61,9 @@ class Moves(NamedTuple):
 
 
 cdef class Near:
-    """Input and buffers of a search: K moves, P `points` (P, 3) mm with their heights, the limit in XY
-    and the window of heights (on a slope, more by the slope), and room for what waits. Of each point:
-    how many moves are within both (`count` (P,)), how far the nearest of these is (`distance`
+    """Input and buffers of a search: K moves, P `points` (P, 3) mm with their heights, the limit in
+    XY and the window of heights (on a slope, more by the slope), and stacks. For each point: the
+    number of moves within both (`count` (P,)), the distance of the nearest of these (`distance`
     (P,) mm) and its row (`move` (P,))."""
 
     cdef const double[:, :] start, end, heights
@@ -95,9 +95,9 @@ cdef class Near:
 def nearest(
     moves: Moves, points: Floats, runs: Ints, limits_mm: tuple[float, float]
 ) -> tuple[Floats, Ints]:
-    """Return (P,) mm and (P,): the distance of each point from the nearest move within the
-    limits, inf for none, and the row of that, −1 for none; arguments as in `Near`. `runs` (R,
-    4): begin and end of some points, begin and end of the moves with which they are compared."""
+    """Return (P,) mm the distance of each point from the nearest move within the limits, inf for
+    none; and (P,) the row of that move, −1 for none; arguments as in `Near`. `runs` (R, 4): begin
+    and end of some points, begin and end of the moves with which they are compared."""
     count = np.zeros(len(points), dtype=np.int64)
     result = np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64), count
     search = Near(moves, points, limits_mm, result)
@@ -111,8 +111,8 @@ def nearest(
 def pairs(
     moves: Moves, points: Floats, limits_mm: tuple[float, float]
 ) -> tuple[Ints, Ints, Floats]:
-    """Return all pairs (point, move) within the limits, in order, and their distances, mm;
-    arguments as in `Near`."""
+    """Return all pairs (point, move) within the limits, in order, as two arrays, and their
+    distances, mm; arguments as in `Near`."""
     count = np.zeros(len(points), dtype=np.int64)
     place = np.empty(len(points), dtype=np.int64)
     search = Near(moves, points, limits_mm, (np.empty(len(points)), place, count))
@@ -126,8 +126,9 @@ def pairs(
 cpdef divide(
     Int low, Int high, Int first, Int last, Near search, Int[::1] moves, double[::1] distance
 ):
-    """Compare the points low:high with the moves first:last; with room in `moves` and `distance`
-    all moves within the limits go there, those of a point from its place in `near.move` on."""
+    """Compare the points low:high with the moves first:last, and store the nearest move of each.
+    If `moves` and `distance` have room, write all moves within the limits there instead, those of
+    a point from index `near.move` on."""
     cdef Int k, height, axis, end, split, part
     cdef double middle
     cdef bint larger
@@ -169,8 +170,8 @@ cpdef divide(
 
 
 cdef (Int, double) _set_box(Int low, Int high, Near search) noexcept:
-    """Set the box of the points low:high; returns its longest side (−1: it is a point) and the
-    middle of that."""
+    """Set the box of the points low:high; return its longest side (−1: it is a point) and the
+    middle of that side."""
     cdef Int side, axis, n
     cdef double longest, middle, smallest, largest, value
     cdef double[:, ::1] points
@@ -193,8 +194,8 @@ cdef (Int, double) _set_box(Int low, Int high, Near search) noexcept:
 
 
 cdef Int _keep_near(Int first, Int last, Near search) noexcept:
-    """Write the candidates first:last that come within the limits of the box behind `last`;
-    returns the end of these."""
+    """Copy those of the candidates first:last that come within the limits of the box to behind
+    `last`; return the end of the copies."""
     cdef Int n, k, arc, end
     cdef double room, window, low_x, low_y, high_x, high_y, x, y, wide, tall, z, to_z, around, ax
     cdef double ay, bx, by, dx, dy, side, near_x, near_y, radius
@@ -246,7 +247,7 @@ cdef Int _keep_near(Int first, Int last, Near search) noexcept:
 
 
 cdef inline double _slope(Near search, Int k) noexcept:
-    """Return the change of height of a move, as a share of its length."""
+    """Return the change of height of a move divided by its length."""
     cdef double rise, length, dx, dy
     cdef Int arc
     rise, arc = abs(search.heights[k, 1] - search.heights[k, 0]), search.arc[k]
@@ -261,8 +262,8 @@ cdef inline double _slope(Near search, Int k) noexcept:
 
 
 cdef Int _divided(Int low, Int high, Int axis, double middle, Near search) noexcept:
-    """Put those of the points low:high that are not above the middle before the others; returns
-    where these begin."""
+    """Reorder the points low:high so that those not above the middle come first; return the index
+    of the first of the others."""
     cdef Int split, n, point
     cdef double[:, ::1] points
     cdef Int[::1] order
@@ -327,7 +328,7 @@ cdef double _share_of_arc(
 
 
 cdef void _compare(Int low, Int high, Int first, Int last, Near search) noexcept:
-    """Of each of the points low:high the nearest of the candidates first:last."""
+    """Store for each of the points low:high the nearest of the candidates first:last."""
     cdef Int i, point, n, count
     cdef double best, distance, x, y, z
     cdef double[:, ::1] points
@@ -357,7 +358,8 @@ cdef void _compare(Int low, Int high, Int first, Int last, Near search) noexcept
 cdef void _list(
     Int low, Int high, Int first, Int last, Near search, Int[::1] moves, double[::1] distance
 ) noexcept:
-    """Return all of the candidates first:last that are within the limits of each of the points."""
+    """Write, for each of the points low:high, all of the candidates first:last that are within the
+    limits, and their distances."""
     cdef Int i, point, n, index
     cdef double gap, x, y, z
     cdef double[:, ::1] points
@@ -376,7 +378,7 @@ cdef void _list(
 
 
 def hilbert_places(const double[:, :] points, Int levels) -> Indices:
-    """Return (K,) uint32: where Hilbert's curve comes to points (K, 2) in the square of size 1,
+    """Return (K,) uint32 the position of points (K, 2) along Hilbert's curve in the unit square,
     whose sides are halved `levels` times.
 
     The quarters of a square come in the order (0, 0), (0, 1), (1, 1), (1, 0). In the first and the

@@ -1,6 +1,6 @@
 """Offsets of paths of lines and arcs: trees of boxes, distances, meetings, slices and loops.
 
-Arrays in, arrays out. What each part does is said above it.
+Arrays in, arrays out. Comments above each part say what it does.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ cpdef enum:
 
 
 cpdef tree_of(double[:, ::1] boxes):
-    """Return (2L, 4) boxes of the nodes over `boxes` (K, 4); the L leaves are the last."""
+    """Return the tree (2L, 4) of boxes over `boxes` (K, 4); the L leaves are the last nodes."""
     cdef Int leaves, node, row, k
     cdef double[:, ::1] tree
     leaves = 1
@@ -53,7 +53,7 @@ cdef void _widen(double[:, ::1] tree, Int node, double[:, ::1] boxes, Int row) n
 
 
 cdef (Int, Int) rows_under(double[:, ::1] tree, Int node, Int count) noexcept nogil:
-    """Return the rows low … high − 1 of `count` in all that a node holds."""
+    """Return the rows low … high − 1, of `count` in all, that a node of the tree contains."""
     cdef Int leaves, span, low
     leaves = len(tree) // 2
     span = LEAF
@@ -65,7 +65,7 @@ cdef (Int, Int) rows_under(double[:, ::1] tree, Int node, Int count) noexcept no
 
 
 cdef inline double apart_square(double[:, ::1] tree, Int node, double x, double y) noexcept nogil:
-    """Square of the distance of a point from the box of a node."""
+    """Return the squared distance of a point from the box of a node."""
     dx = max(tree[node, 0] - x, 0.0, x - tree[node, 2])
     dy = max(tree[node, 1] - y, 0.0, y - tree[node, 3])
     return float(dx * dx + dy * dy)
@@ -74,8 +74,8 @@ cdef inline double apart_square(double[:, ::1] tree, Int node, double x, double 
 cdef inline (Int, Int) next_leaf(
     double[:, ::1] tree, double x, double y, double square, Int[::1] stack, Int height
 ) noexcept:
-    """Return the next leaf of those that wait on a stack of `height` nodes whose box is no farther
-    from a point than the root of `square`, and the new height; leaf −1 if there is none."""
+    """Return the next leaf on a stack of `height` nodes whose box is no farther from a point than
+    the root of `square`, and the new height; leaf −1 if there is none."""
     cdef Int node, leaves = len(tree) // 2
     while height > 0:
         height -= 1
@@ -93,7 +93,7 @@ cdef Int wait_for_children(
     double[:, ::1] tree, Int node, double x, double y, Int[::1] stack, Int height
 ) noexcept nogil:
     """Put the children of a node on a stack of `height` nodes, the one nearer to a point on top;
-    returns the new height."""
+    return the new height."""
     cdef Int left, right
     left, right = 2 * node, 2 * node + 1
     if apart_square(tree, left, x, y) < apart_square(tree, right, x, y):
@@ -143,7 +143,7 @@ cpdef curve_rows(double[:, ::1] start, double[:, ::1] end, double[::1] bulge):
 cdef void set_curve_row(
     double[:, ::1] rows, Int i, double ax, double ay, double bx, double by, double b
 ) noexcept:
-    """Row i of the segment from (ax, ay) to (bx, by) with the bulge b."""
+    """Set row i to the segment from (ax, ay) to (bx, by) with the bulge b."""
     cdef double dx, dy, chord, grown, cosine, sine, turn
     dx, dy = bx - ax, by - ay
     chord = math.hypot(dx, dy)
@@ -161,8 +161,8 @@ cdef void set_curve_row(
 
 
 cpdef curve_boxes(double[:, ::1] curves, double margin):
-    """Return (K, 4) xmin, ymin, xmax, ymax of boxes that hold each curve, and `margin` more all
-    round.
+    """Return the boxes (K, 4), xmin, ymin, xmax, ymax, that contain each curve with a margin on
+    all sides.
 
     An arc lies between its chord and the parallel of it at its height, sin(sweep/4)² · 2/k.
     """
@@ -184,7 +184,7 @@ cpdef curve_boxes(double[:, ::1] curves, double margin):
 
 
 cdef inline double gap_to(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """Return the distance of a point from the whole line or circle of row i."""
+    """Return the distance of a point from the infinite line or full circle of row i."""
     qx, qy = x - curves[i, AX], y - curves[i, AY]
     nx, ny, bend = -curves[i, TY], curves[i, TX], curves[i, BEND]
     power = bend * (qx * qx + qy * qy) - 2.0 * (nx * qx + ny * qy)
@@ -193,7 +193,8 @@ cdef inline double gap_to(double[:, ::1] curves, Int i, double x, double y) noex
 
 
 cdef inline double distance_to(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """Return the distance of a point from row i: from its nearer end beside it (|sweep| ≤ π)."""
+    """Return the distance of a point from row i; from its nearer end where the point lies beside
+    it (|sweep| ≤ π)."""
     cdef bint ahead
     qx, qy = x - curves[i, AX], y - curves[i, AY]
     rx, ry = x - curves[i, BX], y - curves[i, BY]
@@ -261,7 +262,7 @@ cpdef enum:
 
 
 cpdef kite_boxes(double[:, ::1] kites):
-    """Return (J, 4) boxes xmin, ymin, xmax, ymax that hold the kites (J, 10)."""
+    """Return the boxes (J, 4), xmin, ymin, xmax, ymax, that contain the kites (J, 10)."""
     cdef double[:, ::1] boxes
     cdef Int i
     boxes = np.empty((len(kites), 4))
@@ -392,8 +393,8 @@ cpdef nearest_distances(double[:, ::1] points, double[:, ::1] curves, double[:, 
 
 
 cdef bint faces(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """Return True if the nearest place of the whole line or circle of row i lies on the row
-    itself."""
+    """Return True if the point of the infinite line or full circle of row i that is nearest to (x,
+    y) lies on the row itself."""
     return bool(
         (x - curves[i, AX]) * curves[i, TX] + (y - curves[i, AY]) * curves[i, TY] >= 0.0
         and (x - curves[i, BX]) * curves[i, UX] + (y - curves[i, BY]) * curves[i, UY] <= 0.0
@@ -401,8 +402,8 @@ cdef bint faces(double[:, ::1] curves, Int i, double x, double y) noexcept:
 
 
 cdef inline double power_of(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """Power of a point about the whole line or circle of row i, times the curvature: below 0 on
-    the left."""
+    """Return the power of a point over the full circle of row i times its curvature; for a line,
+    twice the distance from it. It is negative on the left."""
     qx, qy = x - curves[i, AX], y - curves[i, AY]
     return float(
         curves[i, BEND] * (qx * qx + qy * qy) - 2.0 * (qy * curves[i, TX] - qx * curves[i, TY])
@@ -410,8 +411,8 @@ cdef inline double power_of(double[:, ::1] curves, Int i, double x, double y) no
 
 
 cdef (double, double, double) away_from(double[:, ::1] curves, Int i, double x, double y) noexcept:
-    """Return the distance of a point from row i, and the direction from the nearest place to
-    the point; 0 where it lies there."""
+    """Return the distance of a point from row i, and the unit direction from the nearest place to
+    the point; 0, 0 where it lies there."""
     cdef double px, py, distance, bend = curves[i, BEND], qx, qy, rx, ry
     qx, qy = x - curves[i, AX], y - curves[i, AY]
     rx, ry = x - curves[i, BX], y - curves[i, BY]
@@ -434,8 +435,9 @@ cdef (double, double, double) away_from(double[:, ::1] curves, Int i, double x, 
 cdef (double, double) least_along(
     double[:, ::1] curves, Int i, double x, double y, double dx, double dy
 ) noexcept:
-    """Return values at the ends of a chord, with the middle (x, y) and half of it (dx, dy), of
-    a linear function that is nowhere on it more than the distance from row i."""
+    """Return the values at both ends of a chord of a linear function that is nowhere on the chord
+    more than the distance from row i. The chord has the middle (x, y) and the half vector (dx,
+    dy)."""
     cdef double distance, nx, ny, low, high, ox, oy, radius, bend = curves[i, BEND], bound
     distance, nx, ny = away_from(curves, i, x, y)
     bound = distance - math.sqrt(dx * dx + dy * dy)
@@ -457,8 +459,8 @@ cdef (double, double) least_along(
 cdef (double, double) most_along(
     double[:, ::1] curves, Int i, double x, double y, double dx, double dy
 ) noexcept:
-    """Return values at the ends of a chord, as in `least_along`, of a linear function that is
-    nowhere on it less than the distance from row i."""
+    """Return the values at both ends of a chord, as in `least_along`, of a linear function that is
+    nowhere on the chord less than the distance from row i."""
     cdef double ox, oy, low, high, slope, distance, radius, bend = curves[i, BEND]
     if bend == 0.0:
         return distance_to(curves, i, x - dx, y - dy), distance_to(curves, i, x + dx, y + dy)
@@ -504,11 +506,14 @@ cdef void nearest_two(
 cpdef chord_distances(
     double[:, ::1] middles, double[:, ::1] halves, double[:, ::1] curves, double[:, ::1] tree
 ):
-    """Return (K, 4) bounds of the distance from the nearest curve along chords, whose middles
-    and half ways from start to end are (K, 2): at both ends the least, at both ends the most.
-    Between the ends the distance lies between the lines through these. Along a chord that may
-    meet a curve the least is what the distance may be on either side of it, counted below 0 on
-    the other one."""
+    """Return (K, 4) bounds of the distance from the nearest curve along chords, whose middles and
+    half vectors from start to end are (K, 2): lower bounds at both ends, then upper bounds at both
+    ends.
+
+    Between the ends the distance lies between the lines through these. Along a chord that may meet
+    a curve, the lower bound is that of the distance on either side of the curve, negative on the
+    other side.
+    """
     cdef double[:, ::1] bounds = np.empty((len(middles), 4))
     cdef Int[::1] stack = np.empty(DEPTH, np.int64), row = np.empty(2, np.int64)
     cdef double[::1] distances = np.empty(2)
@@ -548,8 +553,8 @@ cpdef enum:
 cpdef disc_tangents(
     double[:, ::1] points, double[::1] reach, double[:, ::1] curves, double[:, ::1] tree
 ):
-    """Return (P, 2, 5) upper bounds of the distance from the two curves nearest to each point
-    (P, 2), within `reach` (P,) of it; the distance of a second one that does not exist is inf."""
+    """Return (P, 2, 5) upper bounds of the distance from the two curves nearest to each point (P,
+    2), within `reach` (P,) of it; inf for a second curve that does not exist."""
     cdef double[:, :, ::1] tangents = np.zeros((len(points), 2, TANGENT_COLUMNS))
     cdef Int[::1] stack = np.empty(DEPTH, np.int64), row = np.empty(2, np.int64)
     cdef double[::1] distances = np.empty(2)
@@ -588,12 +593,13 @@ cpdef disc_tangents(
 
 
 cdef double bulge_of(double distance, double reach) noexcept:
-    """By how much the distance from a point, so far away, is more than linear within a disc."""
+    """Return the greatest excess over a linear function of the distance from a point that is
+    `distance` away, within a disc of radius `reach`."""
     return reach * reach / (2.0 * distance) if reach <= 2.0 * distance else 2.0 * reach
 
 
 cdef twice_the_room(Int[:, ::1] pairs):
-    """Return the same pairs (J, 2), and room for as many more."""
+    """Return the pairs (J, 2) in an array with room for twice as many."""
     cdef Int[:, ::1] more
     more = np.empty((2 * len(pairs), 2), np.int64)
     more[: len(pairs)] = pairs
@@ -655,9 +661,9 @@ cdef double _violation(
 ) noexcept:
     """Return how far, mm, a point violates the offset distance beyond the slack `spare`.
 
-    0 if it does not; the search stops at any number above `enough`. It is too near to the source, or
-    too deep in a kite. `rows` are those of the curves that can be nearer than the distance, `count`
-    their number, −1 for all. `stack`, `squares` (`DEPTH`,): scratch buffers.
+    0 if it does not; the search stops at any number above `enough`. It is too near to the source,
+    or too deep in a kite. `rows` are those of the curves that can be nearer than the distance,
+    `count` their number, −1 for all. `stack`, `squares` (`DEPTH`,): scratch buffers.
     """
     cdef Int k
     min_distance = distance - spare
@@ -676,12 +682,12 @@ cdef double _violation(
 
 
 cpdef trimmed_ends(double[:, ::1] elements, surroundings, (double, double) limits):
-    """Return (K, 2) fractions between which each element may be far enough from the source.
+    """Return (K, 2) the fractions between which each element may be far enough from the source.
 
-    The distance from the source, and the depth in a kite, change by no more than the way along an
-    element: where it falls short by s, all is too near for the length s from there. `limits` are
-    the distance, and by how much the ends that stay may be too near. Low is not below high where
-    nothing is left.
+    The distance from the source, and the depth in a kite, change by no more than the length
+    travelled along an element: where the distance is too small by s, it is too small for the
+    length s from there. `limits` are the distance, and by how much the ends that stay may violate
+    it. Low is not below high where nothing is left.
     """
     cdef double[:, ::1] ends, curves, tree, kites, kite_tree
     cdef Int i, count, side, _
@@ -735,10 +741,10 @@ cpdef far_enough(
     double[:, ::1] elements, Int[::1] element, double[:, ::1] span, surroundings,
     (double, double) limits
 ):
-    """Return (S,) true for the slices of which no measured point is too near to the source.
+    """Return a mask (S,), true for slices of which no measured point is too near to the source.
 
     Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]. `limits` are the
-    distance, and by how much a point may be too near.
+    distance, and by how much a point may violate it.
     """
     cdef double[::1] places, squares
     cdef uint8_t[::1] valid
@@ -807,10 +813,11 @@ cpdef pairs_of(
     double[:, ::1] other_tree,
     bint own
 ):
-    """Return (J, 2) rows of `boxes` and of `other_boxes` that touch; a tree stands over each.
+    """Return (J, 2) the pairs of rows of `boxes` and of `other_boxes` that touch; each list has
+    its tree.
 
-    `own` says that both are the same: then each pair comes once, the lesser row first. Nodes of
-    both trees are looked at in pairs, so that what two large boxes tell is told once.
+    `own` says that both lists are the same: then each pair comes once, the lower row first. Nodes
+    of both trees are compared in pairs, so that two large boxes are compared only once.
     """
     cdef Int first, last, other_first, other_last, leaves, other_leaves, count, height, i, a, b
     cdef Int child, low, far_low, j, other_child
@@ -847,7 +854,8 @@ cpdef pairs_of(
 
 
 cpdef meetings_of(double[:, ::1] a, double[:, ::1] b, Int[:, ::1] pairs, double eps):
-    """Return the rows (J, 2) of a and b, and the meetings (J, 4), of the pairs (P, 2) of rows."""
+    """Return the rows (J, 2) of a and b, and the intersections (J, 4), of the pairs (P, 2) of
+    rows."""
     cdef Int room, count, k, more, m, i, j
     cdef Int[:, ::1] rows
     cdef double[:, ::1] points
@@ -898,12 +906,12 @@ cdef bint _is_stored(
     double[:, ::1] a, double[:, ::1] b, Int i, Int j, double x, double y, double eps,
     double[:, ::1] points, Int offset, Int count
 ) noexcept:
-    """Return True if the curves stay within eps of each other from a common point to all of the
-    shorter one, or to a meeting found before: one of `count` in the rows of `points` from `offset`
-    on.
+    """Return True if the curves stay within eps of each other from a common point to the end of
+    the shorter one, or to an intersection found before: one of `count` in the rows of `points`
+    from `offset` on.
 
-    At the angle θ and with curvatures that differ by k they are θ s + k s²/2 apart after s, at
-    most. There rounding alone would place a crossing: where they are tangent at an end, anywhere
+    At the angle θ and with curvatures that differ by k they are at most θ s + k s²/2 apart after
+    s. There rounding alone would place an intersection: where they are tangent at an end, anywhere
     within the root of its own rounding.
     """
     cdef Int k
@@ -944,7 +952,7 @@ cdef Int _store_intersection_if_new(
 
 
 cdef inline double _fraction(double length, double full_length, double eps) noexcept:
-    """Return the fraction of the whole length, exactly 0 or 1 within eps of an end."""
+    """Return the length as a fraction of the full length, exactly 0 or 1 within eps of an end."""
     if length >= full_length - eps:
         return 1.0
     return 0.0 if length <= eps else length / full_length
@@ -960,10 +968,11 @@ cdef inline (double, double) _tangent_after(double[:, ::1] curves, Int i, double
 cdef (double, double, double, double) _common_points(
     double[:, ::1] a, double[:, ::1] b, Int i, Int j
 ) noexcept:
-    """Return the two points that the whole curves share (intersect.py derives them); NaN if none.
-    Row j of b is the rounder one.
+    """Return the two points that the infinite lines or full circles share (intersect.py derives
+    them); NaN if there are none. Row j of b has the larger curvature.
 
-    Where they miss each other, both are the point of the common line nearest to the rounder one.
+    Where they miss each other, both are the point of the common line nearest to the more curved
+    one.
     """
     # All is told from the start of the rounder one.
     k_flat, k_round = a[i, BEND], b[j, BEND]
@@ -1039,7 +1048,7 @@ cpdef merged(double[:, :] points, double[::1] skew, Int[::1] order, double eps):
 
 
 cdef Int _root(Int[::1] group, Int i) noexcept:
-    """Return the least member of the group of i."""
+    """Return the lowest member of the group of i."""
     while group[i] != i:
         group[i] = group[group[i]]
         i = group[i]
@@ -1047,7 +1056,8 @@ cdef Int _root(Int[::1] group, Int i) noexcept:
 
 
 cdef grouped(Int[::1] keys, Int count):
-    """Return rows (R,) by their key below `count`, in their order, and where each key begins."""
+    """Return the rows (R,) sorted by their key, which is below `count`, in their order within a
+    key; and where each key begins."""
     cdef Int[::1] begins, rows
     cdef Int row, key
     begins = np.zeros(count + 1, np.int64)
@@ -1067,8 +1077,8 @@ cdef grouped(Int[::1] keys, Int count):
 
 
 cpdef in_order(Int[::1] keys, double[::1] t, Int count):
-    """Return rows (R,) by their key below `count`, then by t (R,), then as they come (a shell
-    sort)."""
+    """Return the rows (R,) sorted by their key, which is below `count`, then by t (R,), then as
+    they come (a shell sort)."""
     cdef Int key, gap, i, row, j
     cdef Int[::1] rows, begins, some
     rows, begins = grouped(keys, count)
@@ -1093,11 +1103,11 @@ cdef bint _is_after(double[::1] t, Int first, Int second) noexcept:
 cpdef doubles_left(
     double[:, ::1] elements, Int[::1] element, double[::1] middle_t, ends, double eps
 ):
-    """Return (S,) false for repeated slices, and for both of a pair that runs the same way to and
-    fro.
+    """Return a mask (S,), false for repeated slices, and for both of a pair that runs the same way
+    forth and back.
 
-    `ends` holds the nodes (S,) that each slice runs from and to, and how many nodes there are.
-    Slices between the same nodes are the same when their middles are within `eps`.
+    `ends` holds the nodes (S,) that each slice runs from and to, and the number of nodes. Slices
+    between the same nodes are the same when their middles are within `eps`.
     """
     cdef uint8_t[::1] keep
     cdef Int[::1] low_node, from_node, to_node, rows, begins
@@ -1130,8 +1140,8 @@ cpdef doubles_left(
 
 
 cpdef leading_on(Int[::1] from_node, Int[::1] to_node, Int count):
-    """Return (S,) true for the slices that others lead to and lead on from, when all else is
-    gone."""
+    """Return a mask (S,), true for slices that remain after dead ends are removed, again and
+    again: those to whose start another slice leads, and from whose end another one leads on."""
     cdef bint ends_here
     cdef Int first, last, node, height, k, row, end, side
     cdef uint8_t[::1] keep
@@ -1179,11 +1189,12 @@ cdef double U_TURN_EPS_RAD = 1e-3
 
 
 cpdef traced(double[:, ::1] elements, Int[::1] element, double[:, ::1] span, ends):
-    """Return rows (R,) of the slices of all loops, loop by loop, and where each begins (L + 1,).
+    """Return the rows (R,) of the slices of all loops, loop by loop, and where each loop begins (L
+    + 1,).
 
     Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]; `ends` holds the
-    nodes (S,) that each slice runs from and to, and how many nodes there are. No loop passes a
-    node twice. Where several slices leave a node, the leftmost one is taken.
+    nodes (S,) that each slice runs from and to, and the number of nodes. No loop passes a node
+    twice. Where several slices leave a node, the leftmost one is taken.
     """
     cdef uint8_t[::1] unused
     cdef Int[::1] order_seen, from_node, to_node, leaving, first, path, rows, begins, ways
@@ -1233,8 +1244,8 @@ cdef Int _leftmost(
     double[:, ::1] elements, Int[::1] element, double[:, ::1] span, Int last, uint8_t[::1] unused,
     Int[::1] ways
 ) noexcept:
-    """Return the unused one of the slices `ways` that turns left the most when `last` led
-    there; turning right back is left back. −1 when there is none."""
+    """Return the unused one of the slices `ways` that turns farthest to the left after `last`;
+    turning right back counts as the farthest left. −1 when there is none."""
     cdef Int k, best, count, row
     best, max_turn, count = -1, -math.INFINITY, 0
     for k in range(len(ways)):
@@ -1265,13 +1276,13 @@ cdef (double, double) _tangent(double[:, ::1] elements, Int i, double t) noexcep
 
 
 cpdef written(slices, double[:, ::1] nodes, double[::1] sweeps, runs, double eps):
-    """Return vertices (V, 3) of runs of slices that follow each other, and where each begins (L +
-    1,).
+    """Return the vertices (V, 3) of runs of slices that follow each other, and where each run
+    begins (L + 1,).
 
     `slices` are the element, span and both nodes (S,) of each slice, `sweeps` those of the
     elements. `runs` are the rows of all runs, where each begins, and whether it is closed. Slices
-    of one element become one again; segments up to `eps` go. A run of which nothing is left has
-    no vertices.
+    of one element are joined again; segments up to `eps` are dropped. A run of which nothing is
+    left has no vertices.
     """
     cdef double[:, ::1] vertices, span
     cdef Int[::1] offsets, element, from_node, to_node, rows, begins, ways
@@ -1313,7 +1324,8 @@ cdef bint _goes_on(Int[::1] element, double[:, ::1] span, Int last, Int row) noe
 
 
 cdef Int _first(Int[::1] element, double[:, ::1] span, Int[::1] ways) noexcept:
-    """Return the index at which a closed run may begin: not within an element."""
+    """Return the index at which a closed run may begin, so that it does not begin within an
+    element."""
     cdef Int k
     for k in range(len(ways)):
         if not _goes_on(element, span, ways[k - 1 if k > 0 else len(ways) - 1], ways[k]):
@@ -1322,9 +1334,11 @@ cdef Int _first(Int[::1] element, double[:, ::1] span, Int[::1] ways) noexcept:
 
 
 cdef Int _cleaned(double[:, ::1] vertices, bint closed, double eps):
-    """Remove segments up to `eps`, and return the number of vertices that are left, the first ones.
+    """Remove segments up to `eps`, and return the number of vertices that remain, which are the
+    first ones.
 
-    Each shrinks to its middle; the ends of an open path stay. 0 when nothing is left.
+    Each removed segment shrinks to its middle; the ends of an open path stay. 0 when nothing is
+    left.
     """
     cdef Int count, remaining, row, place, height, following, earlier, k
     cdef uint8_t[::1] is_kept
@@ -1394,8 +1408,8 @@ cpdef enum:
 cpdef insides(
     double[:, ::1] points, double[:, ::1] curves, double[::1] bulge, double[:, ::1] tree
 ):
-    """Return (P,) true for the points (P, 2) within a closed path; on the line either may come
-    out.
+    """Return a mask (P,), true for points (P, 2) inside a closed path; on the line either value
+    may result.
 
     `curves` (K, 11) and `tree` as in offset_curves and box_tree, `bulge` (K,).
     """
@@ -1433,8 +1447,8 @@ cdef bint is_inside(
 
 
 cdef inline bint _counts(double[:, ::1] curves, Int i, double bulge, double x, double y) noexcept:
-    """Return True if either a ray to the right crosses the chord or the point lies between
-    chord and arc."""
+    """Return True if a ray from the point to the right crosses the chord, or the point lies
+    between chord and arc, but not both."""
     cdef bint crosses, in_circle, on_left
     ax, ay, bx, by = curves[i, AX], curves[i, AY], curves[i, BX], curves[i, BY]
     dx, dy = bx - ax, by - ay
@@ -1455,7 +1469,7 @@ cpdef holds(double[:, ::1] points, Int[::1] begins, ring, Int[::1] paths, double
     """Return (N,) OUT, HELD or ON_LINE for each of `paths` (N,): path k has the points begins[k] …
     of `points` (P, 2).
 
-    `ring` holds curves, bulge and tree of a closed path; what is within `eps` of its line is
+    `ring` holds curves, bulge and tree of a closed path; a path within `eps` of its line is
     neither outside nor inside.
     """
     cdef Int[::1] positions, stack

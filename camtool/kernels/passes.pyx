@@ -40,8 +40,8 @@ cdef class Tracks:
 
 
 cpdef reaches(double[::1] lengths, Int[::1] first):
-    """Return (K + M,) mm: for each path 0 and the sums of its lengths (K,) so far; path i has the
-    segments first[i] to first[i + 1]."""
+    """Return (K + M,) mm: for each path 0 and the cumulative sums of its lengths (K,); path i has
+    the segments first[i] to first[i + 1]."""
     cdef Int path, k
     cdef double total
     cdef double[::1] totals
@@ -56,7 +56,7 @@ cpdef reaches(double[::1] lengths, Int[::1] first):
 
 
 cdef inline double begin_of(Tracks tracks, Int path, Int u) noexcept:
-    """Return the length at which segment u of a path begins, counted on through the laps."""
+    """Return the length at which segment u of a path begins; u counts on through the laps."""
     cdef Int count, offset
     cdef double lap
     count = tracks.first[path + 1] - tracks.first[path]
@@ -66,24 +66,24 @@ cdef inline double begin_of(Tracks tracks, Int path, Int u) noexcept:
 
 
 cdef inline Int row_of(Tracks tracks, Int path, Int u) noexcept:
-    """Return the row of segment u of a path, counted on through the laps."""
+    """Return the row of segment u of a path; u counts on through the laps."""
     cdef Int count
     count = tracks.first[path + 1] - tracks.first[path]
     return int(tracks.first[path] + u - int(math.floor(float(u) / float(count))) * count)
 
 
 cdef inline double size_of(Tracks tracks, Int path, Int u) noexcept:
-    """Return the length of segment u of a path, counted on through the laps."""
+    """Return the length of segment u of a path; u counts on through the laps."""
     cdef Int offset
     offset = row_of(tracks, path, u) + path
     return float(tracks.reach[offset + 1] - tracks.reach[offset])
 
 
 cdef Int last_before(Tracks tracks, Int path, double length) noexcept:
-    """Return the last segment of a path that begins at a length or before it; the first when none
+    """Return the last segment of a path that begins at or before a length; the first when none
     does.
 
-    `length` lies on the path itself, not further round.
+    `length` lies on the path itself, not in a later lap.
     """
     cdef Int offset, low, high, middle
     offset = tracks.first[path] + path
@@ -113,7 +113,7 @@ cdef (double, double) point(Tracks tracks, Int row, double t) noexcept:
 
 
 cdef (double, double) place(Tracks tracks, Int path, double length) noexcept:
-    """Return the point of a path at a length; ends of open paths reach no further."""
+    """Return the point of a path at a length; beyond the ends of an open path, its end."""
     cdef Int offset, u
     cdef double total, part
     offset = tracks.first[path] + path
@@ -174,7 +174,7 @@ cdef (double, double) start_of(
 
 
 cdef double[:, ::1] grown(double[:, ::1] vertices, Int count, Int needed):
-    """Room for so many vertices, the first `count` of them kept."""
+    """Return `vertices` with room for `needed` of them, the first `count` kept."""
     cdef double[:, ::1] more
     if needed <= len(vertices):
         return vertices
@@ -188,9 +188,10 @@ cdef Int write_piece(
     double[:, ::1] vertices,
     Int index
 ) noexcept:
-    """Write the vertices of a piece of a path behind row `index` of `vertices`, its start, which
-    takes the first bulge; return the row of its last vertex. The z is the length of the piece so
-    far. `first` and `last`: the piece's `span` from the lower length to the higher one."""
+    """Write the vertices of a piece of a path into the rows of `vertices` behind row `index`,
+    which is its start and takes the first bulge; return the row of the last vertex. The z is the
+    length of the piece so far. `first` and `last`: the piece's `span` from the lower length to the
+    higher one."""
     cdef bint is_reversed
     cdef double low, high, travelled, begins, stops, end_part, _, full_bulge, part, bulge, x
     cdef double y, from_x, from_y
@@ -246,7 +247,7 @@ cpdef lifted(Tracks tracks, Int[::1] path, Int[::1] first, double[::1] length, d
     (R + 1,).
 
     Run i follows path[i] (R,) from point to point of its profile, the lengths and heights (P,) of
-    the rows first[i] to first[i + 1]: straight up or down where the length stays, else with z in
+    the rows first[i] to first[i + 1]: vertical where the length does not change, else with z in
     proportion to the length. Its last bulge is 0.
     """
     cdef Int run, of, k, j, index, was, low, high

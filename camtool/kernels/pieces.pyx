@@ -27,12 +27,13 @@ cdef inline int root_of(int[::1] parent, int cell) noexcept nogil:
 
 
 def partings(time: Ints, Int standing, double min_cells):
-    """Return (J, 7) the pieces of `min_cells` or more that come loose of cells that are cut
-    through at a `time` (NY, NX), `standing` for never; what stands at the edge of the raster is
-    held.
+    """Return (J, 7) the pieces of at least `min_cells` cells that come loose when the cells of a
+    raster are cut through at a `time` (NY, NX), `standing` for never; what touches the edge of the
+    raster is held.
 
-    Backwards in time the cells come back, those of one time at once. One that joins two pieces has
-    parted them: the one that is not held, or the smaller, came loose.
+    Backwards in time the cells come back, those of the same time together. A cell that joins two
+    pieces has separated them when it was cut: the one that is not held, or the smaller, came
+    loose.
     """
     cdef Int[::1] flat = np.ascontiguousarray(time, dtype=np.int64).reshape(-1)
     cdef int ny = time.shape[0], nx = time.shape[1]
@@ -104,7 +105,8 @@ def partings(time: Ints, Int standing, double min_cells):
 
 
 def piece_at(standing: Bools, Int row, Int column):
-    """Return (NY, NX) True for the cells of the piece of standing cells in which one lies."""
+    """Return a mask (NY, NX), true for the cells of the piece of standing cells that contains
+    (row, column)."""
     cdef uint8_t[:, ::1] is_standing = np.ascontiguousarray(standing).view(np.uint8)
     cdef Int ny = is_standing.shape[0], nx = is_standing.shape[1], height = 0, x, y, dx, dy
     cdef uint8_t[:, ::1] is_piece = np.zeros((ny, nx), dtype=np.uint8)

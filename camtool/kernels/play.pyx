@@ -42,7 +42,8 @@ cdef inline uint64_t _mixed(uint64_t word) noexcept:
 
 
 cdef double deviate(Int seed, Int stream, Int number) noexcept:
-    """Return the `number`-th of a stream ≥ 0, from 0 on."""
+    """Return random number `number` (from 0) of stream `stream` (from 0): nearly normal with
+    standard deviation 1, by the sum of twelve uniform numbers."""
     cdef Int k, part
     cdef uint64_t key, total, word
     key = _mixed(seed + (stream + 1) * GAMMA)
@@ -83,7 +84,8 @@ cdef double deviate(Int seed, Int stream, Int number) noexcept:
 
 
 def play_limits(play_mm: float, convention: str, direction: int) -> tuple[float, float]:
-    """Return (low, high) in mm for "preloaded" in `direction` ±1 or "centred"."""
+    """Return the limits (low, high) of the play, mm, for "preloaded" in `direction` ±1 or
+    "centred"."""
     if convention == "centred":
         return -0.5 * play_mm, 0.5 * play_mm
     return (0.0, play_mm) if direction > 0 else (-play_mm, 0.0)
@@ -111,8 +113,8 @@ cdef inline (double, double, bint) turned(
 
 
 cdef inline double taken_along(double slide, double motor, double low, double high) noexcept:
-    """Return the play operator: the slide after the motor went to `motor` mm without turning
-    round."""
+    """Return the position of the slide after the motor has gone to `motor` mm in one direction
+    (the play operator)."""
     return min(max(slide, motor + low), motor + high)
 
 
@@ -120,10 +122,11 @@ cpdef void play_fill(
     const double[:, ::1] positions, Int[::1] offsets, double[:, ::1] axes, double[:, ::1] states,
     double[:, ::1] out, Int[:, ::1] turns
 ) noexcept:
-    """Slides in mm, `out` (n, 3), for commanded `positions` (n, 3); reversals of each run.
+    """Fill `out` (n, 3) with the positions of the slides, mm, for commanded `positions` (n, 3),
+    and count the reversals of each run.
 
-    `axes` (3, 5): scale, low and high in mm, compensation, and how far back is a reversal.
-    `states` (3, 6), each of `play_start`, are changed in place, so that the next call goes on.
+    `axes` (3, 5): scale, low and high in mm, compensation, and how far back counts as a reversal.
+    `states` (3, 6), each of `play_start`, are changed in place, so that the next call continues.
     Run r is offsets[r]:offsets[r+1]; `turns` (R, 3) are its reversals.
     """
     cdef Int axis, run, count, k
@@ -153,11 +156,11 @@ cpdef void play_varied_fill(
     double[:, ::1] plays, double[::1] shares, double[::1] scatter, Int seed, double[:, ::1] out,
     Int[:, ::1] turns
 ) noexcept:
-    """As `play_fill`, with a play for each sample and axes that scatter.
+    """Fill `out` as `play_fill` does, with a play for each sample and axes that scatter.
 
-    `plays` (n, 3) mm take the place of low and high in `axes`, which are shares (2,) of them. At
-    each reversal both flanks of an axis go to a new random place, `scatter` (3,) mm is its
-    standard deviation; the first ones are at 0.
+    `plays` (n, 3) mm replace low and high in `axes`, which have `shares` (2,) of them. At each
+    reversal both flanks of an axis move to a new random place, with the standard deviation
+    `scatter` (3,) mm; the first ones are at 0.
     """
     cdef Int axis, run, number, before, k
     cdef bint reversed_
@@ -199,7 +202,7 @@ cpdef void play_varied_fill(
 
 
 cpdef Int way_of(Int before, Int[::1] positions) noexcept:
-    """Return the direction of the positions (n,) that follow `before`."""
+    """Return RISING, FALLING, STILL or TURNING for the positions (n,) that follow `before`."""
     cdef Int smallest, largest, k, change
     smallest = largest = positions[0] - before
     for k in range(1, len(positions)):
@@ -214,7 +217,8 @@ cpdef Int way_of(Int before, Int[::1] positions) noexcept:
 cpdef Int play_block(
     Int trend, double[::1] positions, double[::1] axis, double[::1] state, double[::1] out
 ) noexcept:
-    """Compute slides, `out` (n,) mm, for positions (n,) that run `trend`; return the reversals.
+    """Compute the slide `out` (n,) mm for positions (n,) that run in the direction `trend`; return
+    the number of reversals.
 
     `axis` (5,) and `state` (4,) as in `play_fill`; steps are wider than axis[4].
     """

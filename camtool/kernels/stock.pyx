@@ -72,8 +72,8 @@ cdef inline double profile(const double* tool, double distance, double grow) noe
 cdef inline double downhill(
     const double* tool, double aside, double steep, double limit, double grow
 ) noexcept nogil:
-    """Distance downhill, from the place on a sloping line that is nearest to a point `aside` of it
-    to the one where the tool is lowest over the point; `limit` at most."""
+    """Return the distance downhill from the place on a sloping line nearest to a point `aside` mm
+    beside it to the place where the tool is lowest over the point; at most `limit`."""
     cdef double flat = tool[FLAT] + grow, corner = tool[CORNER]
     cdef double low, high, middle, distance, out
     cdef int k
@@ -105,8 +105,8 @@ cdef inline double downhill(
 cdef inline double height_of(
     const double* move, const double* tool, double x, double y, double grow
 ) noexcept nogil:
-    """Least height to which a move cuts a point, with the profile begun `grow` farther out; inf
-    where the tool does not get."""
+    """Return the least height to which a move cuts a point, with the profile begun `grow` farther
+    out; inf where the tool does not reach."""
     cdef double wide = tool[RADIUS] + grow
     cdef double px = x - move[AX], py = y - move[AY]
     cdef double along, aside, s, distance, reach, low, high
@@ -137,9 +137,9 @@ cdef inline double height_of(
 cdef inline double tangent_of(
     const double* move, const double* tool, double x, double y, double* slope
 ) noexcept nogil:
-    """Return the height to which a move cuts a point, and the slope in x and y of a plane
-    through it below which the height of the move nowhere lies; inf where there is none or it is
-    not known: beyond the tool, and where the edge of the tool cuts deepest."""
+    """Return the height to which a move cuts a point, and set the slope in x and y of a plane
+    through it below which the move's height nowhere lies; inf where there is none or it is not
+    known: beyond the tool, and where the tool's edge cuts deepest."""
     cdef double px = x - move[AX], py = y - move[AY], wide = tool[RADIUS]
     cdef double along, aside, s, distance, reach, dx, dy, out, steep
     slope[0], slope[1] = 0.0, 0.0
@@ -184,7 +184,7 @@ cdef inline double tangent_of(
 
 
 cdef class StockTree:
-    """Return the moves (M, 7) in the order of a curve through the plane, the tool (M,) and the
+    """The moves (M, 7) in the order of a curve through the plane, the tool (M,) and the
     number in the order of cutting (M,) of each; tools (T, 4); the nodes (N, 7) of all levels,
     the root's last, where level l begins at levels[l]. `top`: the height of what is not cut."""
 
@@ -205,9 +205,9 @@ cdef class StockTree:
         self.height = len(levels) - 1
 
     def heights(self, points: Floats, before: Ints | None = None, double grow=0.0):
-        """Return (J,) heights of the stock over points (J, 2), and (J,) the move in the order
-        of cutting that is lowest there, −1 for none; after the first `before` (J,) moves only.
-        Profiles begin `grow` farther out, or nearer where it is below 0."""
+        """Return (J,) the heights of the stock over points (J, 2), and (J,) the move that is
+        lowest there, in the order of cutting, −1 for none; after the first `before` (J,) moves
+        only. Profiles begin `grow` farther out, or nearer where it is below 0."""
         cdef double[:, ::1] at = np.ascontiguousarray(points, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
         cdef double[::1] lowest_z = np.empty(count)
@@ -228,8 +228,8 @@ cdef class StockTree:
         return np.asarray(lowest_z), np.asarray(which)
 
     def min_heights(self, squares: Floats, double grow=0.0):
-        """Return (K,) the least height over the disc round each square: middle and half a side
-        (K, 3)."""
+        """Return (K,) the least height over the disc round each square, given by its middle and
+        half a side (K, 3)."""
         cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
         cdef Py_ssize_t k, count = at.shape[0]
         cdef double[::1] lowest_z = np.empty(count)
@@ -250,10 +250,9 @@ cdef class StockTree:
         double grow=0.0,
         before: Ints | None = None,
     ):
-        """Return (K,) an upper bound of the heights over each square: middle and half a side
-        (K, 3); after the first `before` (K,) moves only. With `tilt` (K, 2) it is one of the
-        heights over the plane through 0 at the middle that rises so much for each mm of x and
-        y."""
+        """Return (K,) an upper bound of the heights over each square, given by its middle and half
+        a side (K, 3); after the first `before` (K,) moves only. With `tilt` (K, 2) heights are
+        measured from the plane that is 0 at the middle and rises by `tilt` per mm of x and y."""
         ways = squares[:, 2, None, None] * CORNERS
         values = np.zeros(ways.shape[:2])
         if tilt is not None:
@@ -300,8 +299,9 @@ cdef class StockTree:
         return np.asarray(bounds)
 
     def quarter_means(self, squares: Floats, double bottom=-math.INFINITY):
-        """Return (4 K,), (4 K,) bounds of the mean height over the quarters of each square, in
-        the order of `QUARTERS`: middle and half a side (K, 3); the stock ends at a bottom."""
+        """Return (4 K,) lower and (4 K,) upper bounds of the mean height over the quarters of each
+        square, in the order of `QUARTERS`; squares are middle and half a side (K, 3); the stock
+        ends at `bottom`."""
         cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
         cdef double[:, ::1] signs = QUARTERS
         cdef Py_ssize_t k, q, count = at.shape[0]
@@ -368,10 +368,10 @@ cdef class StockTree:
         self, const double* square, double bottom, Int[::1] near, Int count, double[::1] heights,
         double* low, double* high
     ) noexcept nogil:
-        """Bounds of the mean height over a square that so many moves may cut; `heights`: scratch
-        buffer. From below: the least of the tangent planes of all moves that may be lowest there
-        is concave, so its mean is at least that of the four corners. From above: the mean of the
-        corners of the best move."""
+        """Set bounds of the mean height over a square that `count` moves may cut; `heights` is a
+        scratch buffer. From below: the least of the tangent planes of all moves that may be lowest
+        there is concave, so its mean is at least that of the four corners. From above: the mean of
+        the corners of the best move."""
         cdef double x = square[0], y = square[1], half = square[2]
         cdef double room = half * math.sqrt(2.0), best = self.top, z, average, lowest = self.top
         cdef double[2] slope
@@ -446,9 +446,9 @@ cdef class StockTree:
         high[0] = max(high[0], low[0])
 
     cdef double reach_past(self, Int move, double x, double y, double* direction) noexcept nogil:
-        """Return how far the tool of a move gets beyond a point, along `direction` from
-        the nearest place of its axis to the point, below 0 where it ends before it; inf where the
-        point lies on the axis."""
+        """Return how far the tool of a move reaches beyond a point, along `direction`, which is
+        set to that from the nearest place of its axis to the point; below 0 where the tool ends
+        before the point, inf where the point lies on the axis."""
         cdef double* columns = &self.moves[move, 0]
         cdef double px = x - columns[AX], py = y - columns[AY], s, distance
         s = min(max(px * columns[UX] + py * columns[UY], 0.0), columns[LONG])
@@ -462,7 +462,7 @@ cdef class StockTree:
     cdef double support(
         self, Int move, double x, double y, const double* direction, double room
     ) noexcept nogil:
-        """Return the upper bound of how far the tool of a move gets along a direction from a
+        """Return an upper bound of how far the tool of a move reaches along a direction from a
         point, within a disc of radius `room` round it. The tool lies on one side of its
         tangent."""
         cdef double[2] own
@@ -481,8 +481,8 @@ cdef class StockTree:
     cdef double covered(
         self, Int move, const double* square, const double* direction, double far, double bottom
     ) noexcept nogil:
-        """Return the upper bound of the mean height over a square, of which a move covers a
-        part: all that lies before the chord of its edge."""
+        """Return an upper bound of the mean height over a square of which a move covers a part:
+        all that lies before the chord of its edge."""
         cdef double* columns = &self.moves[move, 0]
         cdef double* tool = &self.tools[self.tool[move], 0]
         cdef double half = square[2], radius = tool[RADIUS], room = 2.0 * half * half
@@ -505,8 +505,8 @@ cdef class StockTree:
     cdef inline double nearer(
         self, const double* node, double x, double y, double room, double grow
     ) noexcept nogil:
-        """Lower bound of what the moves of a node leave within `room` of a point; inf where none
-        of them gets."""
+        """Return a lower bound of the heights that the moves of a node leave within `room` of a
+        point; inf where none of them reaches."""
         cdef double dx = max(max(node[LOW_X] - x, x - node[HIGH_X]), 0.0)
         cdef double dy = max(max(node[LOW_Y] - y, y - node[HIGH_Y]), 0.0)
         cdef double wide = node[WIDEST] + grow + room
@@ -528,8 +528,8 @@ cdef class StockTree:
         Int* which,
         Int guess,
     ) noexcept nogil:
-        """Least height over a point, below `top`, and the row of the move there. `guess`: a move
-        that may be low there."""
+        """Return the least height over a point, below `top`, and set the row of the move there.
+        `guess`: a move that may be low there."""
         cdef Int stack[FAN * DEPTH]
         cdef int levels[FAN * DEPTH]
         cdef int count = 0, level
@@ -569,7 +569,7 @@ cdef class StockTree:
         return best
 
     cdef inline Int members(self, int level) noexcept nogil:
-        """Number of children that the nodes of a level have together."""
+        """Return the number of children that the nodes of a level have together."""
         if level == 0:
             return self.moves.shape[0]
         return self.levels[level] - self.levels[level - 1]
@@ -583,9 +583,9 @@ cdef class StockTree:
         double enough,
         Int* guess,
     ) noexcept nogil:
-        """Return the upper bound of the heights and a linear function over a polygon: by the
-        moves that are lowest at its corners and in its middle, by the means of two of these,
-        and by any move that covers all of it."""
+        """Return an upper bound of the heights plus a linear function over a polygon: by the moves
+        that are lowest at its corners and in its middle, by the means of two of these, and by any
+        move that covers all of it."""
         cdef Int stack[FAN * DEPTH]
         cdef int levels[FAN * DEPTH]
         cdef double now[MAX_CORNERS]
@@ -654,8 +654,8 @@ cdef class StockTree:
     cdef inline double corners(
         self, Int move, int count, double[3][MAX_CORNERS] polygon, double grow, double* heights
     ) noexcept nogil:
-        """Return heights of a move plus the given values at the corners of a polygon, and the
-        greatest."""
+        """Set the heights of a move plus the given values at the corners of a polygon, and return
+        the greatest."""
         cdef double* tool = &self.tools[self.tool[move], 0]
         cdef double* columns = &self.moves[move, 0]
         cdef double highest = -math.INFINITY
@@ -679,7 +679,7 @@ cdef inline void corners_of(const double* square, double[3][MAX_CORNERS] at) noe
 
 
 cdef inline double mean_above(const double* corner, double bottom) noexcept nogil:
-    """Mean of four heights, none of them below a bottom."""
+    """Return the mean of four heights, each raised to at least a bottom."""
     cdef double mean = 0.0
     cdef int k
     for k in range(4):
@@ -723,7 +723,8 @@ cdef int clipped(
 
 
 cdef double fan_integral(int count, double[3][MAX_CORNERS] at) noexcept nogil:
-    """Integral over a convex polygon of a function that is linear in each triangle of a fan."""
+    """Return the integral over a convex polygon of a function that is linear in each triangle of a
+    fan."""
     cdef double integral = 0.0, area
     cdef int k
     for k in range(2, count):
@@ -738,8 +739,8 @@ cdef double fan_integral(int count, double[3][MAX_CORNERS] at) noexcept nogil:
 cdef double half_plane_mean(
     double half, const double* direction, double far, const double* value, double top
 ) noexcept nogil:
-    """Mean over a square of a concave function with these values at the corners, at least, where
-    it is `top` beyond a line across a direction."""
+    """Return the mean over a square of the least concave function that has these values at the
+    corners and is `top` beyond the line at the distance `far` along a direction."""
     cdef double[3][MAX_CORNERS] at
     cdef double[4] below
     cdef int count, k
@@ -752,8 +753,8 @@ cdef double half_plane_mean(
 cdef inline double mean_bound(
     int count, const double* one, const double* other, double best
 ) noexcept nogil:
-    """Least over all means of two moves of the greatest value at the corners, or `best` where
-    that is less: at an end or where the lines of two corners cross."""
+    """Return the least, over all weighted means of two moves, of the greatest value at the
+    corners, or `best` where that is less: at an end or where the lines of two corners cross."""
     cdef double share, rise, highest, value
     cdef int k, j, c
     for k in range(count):
@@ -774,7 +775,7 @@ cdef inline double mean_bound(
 
 def heights_of_moves(moves: Floats, tools: Floats, points: Floats, grow: Floats):
     """Return (K,) the least height to which each move (K, 7), its tool (K, 4) begun `grow` (K,)
-    farther out, cuts its point (K, 2); inf where it does not get."""
+    farther out, cuts its point (K, 2); inf where it does not reach."""
     cdef double[:, ::1] columns = np.ascontiguousarray(moves, dtype=np.float64)
     cdef double[:, ::1] tool = np.ascontiguousarray(tools, dtype=np.float64)
     cdef double[:, ::1] at = np.ascontiguousarray(points, dtype=np.float64)
@@ -788,12 +789,12 @@ def heights_of_moves(moves: Floats, tools: Floats, points: Floats, grow: Floats)
 
 
 def thinned(points: Floats, row: Ints, start: Floats, double tolerance):
-    """Return (J,) the samples that stay of points (K, 3) of the rows (K,): the last one of each
-    row, and so many between that every sample lies within `tolerance` of the straight move between
-    those that stay before and behind it. `start` (3,): the place before the first sample.
+    """Return (J,) the samples to keep of points (K, 3) of the rows (K,): the last one of each row,
+    and so many between that every sample lies within `tolerance` of the straight move between
+    those kept before and behind it. `start` (3,): the place before the first sample.
 
-    From each kept sample the move is drawn twice as far again and again, as long as all samples
-    between lie beside it; then the last doubling is halved down.
+    From each kept sample the move is extended to twice the length again and again, as long as all
+    samples between lie beside it; then the last doubling is bisected.
     """
     cdef double[:, ::1] at = np.ascontiguousarray(np.concatenate([start[None], points]))
     cdef Int[::1] of = np.ascontiguousarray(row, dtype=np.int64)
@@ -829,7 +830,7 @@ def thinned(points: Floats, row: Ints, start: Floats, double tolerance):
 cdef inline bint lies_beside(
     double[:, ::1] at, Py_ssize_t begin, Py_ssize_t end, double tolerance
 ) noexcept nogil:
-    """Return True if all points between two lie within a distance of the line from one to the
+    """Return True if all points between two lie within `tolerance` of the line from one to the
     other."""
     cdef double[3] direction
     cdef double[3] off

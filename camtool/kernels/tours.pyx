@@ -1,7 +1,6 @@
 """The order in which items are cut: a tour through them, made shorter step by step.
 
-Compiled, because thousands of steps are tried. What
-each part does is said above it.
+Compiled, because thousands of steps are tried. Comments above each part say what it does.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ from camtool.arrays import Floats, Ints
 
 
 class Tour(NamedTuple):
-    """Input of the search: `ends` (S + 2, 4), entry and exit of each row, then those of from and to;
-    `turned` (S + 2,), the row with both exchanged, or itself when there is none; item i owns the
+    """Input of the search: `ends` (S + 2, 4), entry and exit of each row, then those of from and
+    to; `turned` (S + 2,), the row with both exchanged, or itself when there is none; item i owns the
     rows from first[i] to first[i + 1]; `near`, `after`, `earlier`: of each item its neighbours,
     what comes after it and what before it, with the firsts of each; `free` the row of `to` when
     the tool may stay anywhere, else −1; `one_way` whether some row cannot be turned.
@@ -76,7 +75,7 @@ cdef class Route:
 
 
 cdef class Step:
-    """Return a change of the tour that shortens it by `gain`.
+    """A change of the tour that shortens it by `gain`.
 
     second_high < 0: the positions low … high are reversed. Otherwise they change places with those
     behind them up to `second_high`; `flip` says which of the two is reversed as well (1: the first,
@@ -94,13 +93,13 @@ cdef class Step:
     cdef void set(
         self, double gain, Int low, Int high, Int second_high, Int flip, Int who, Int new_row
     ) noexcept:
-        """Make it another one."""
+        """Set all values of the step."""
         self.gain, self.low, self.high, self.second_high = gain, low, high, second_high
         self.flip, self.who, self.new_row = flip, who, new_row
 
 
 cdef inline double gap(Route tour, Int from_row, Int to_row) noexcept:
-    """From the exit of a row to the entry of another one."""
+    """Return the distance, mm, from the exit of a row to the entry of another one."""
     if to_row == tour.free:
         return 0.0
     x = tour.ends[to_row, 0] - tour.ends[from_row, 2]
@@ -149,7 +148,7 @@ cpdef double turning(Route tour, Int low, Int high) noexcept:
 
 
 cpdef bint may_swap(Route tour, Int low, Int high, Int second_high) noexcept:
-    """Return True if nothing in low … high must come before anything in high + 1 … other."""
+    """Return True if nothing in low … high must come before anything in high + 1 … second_high."""
     cdef Int position, item, k
     if len(tour.after) == 0:
         return True
@@ -203,7 +202,7 @@ cpdef double gain_of_swap(Route tour, Int low, Int high, Int second_high, Int fl
 
 
 cdef Int take(Route tour, Step step, Int[:, ::1] log, Int logged) noexcept:
-    """Change the tour, write down how to undo it, and return how much is written."""
+    """Change the tour by a step, log how to undo it, and return the new length of the log."""
     cdef Int low, high, second_high, middle
     low, high, second_high = step.low, step.high, step.second_high
     if second_high >= 0:
@@ -229,7 +228,7 @@ cdef Int _reversed(Route tour, Int low, Int high, Int[:, ::1] log, Int logged) n
 
 
 cdef void undo(Route tour, Int[:, ::1] log, Int logged) noexcept:
-    """Take back what is written down, the last first."""
+    """Undo the logged steps, the last first."""
     cdef Int k
     for k in range(logged - 1, -1, -1):
         if log[k, 0] < 0:
@@ -269,8 +268,8 @@ class Tree(NamedTuple):
 
 
 cpdef tree_of(double[:, :] points):
-    """Return the tree of these points, N ≥ 1, finite, all switched on. A node is halved across
-    the longer side of its box."""
+    """Return the tree of these points, N ≥ 1, finite, all switched on. A node is halved across the
+    longer side of its box."""
     cdef Int count, levels, leaves, nodes, node, low, middle, high, k
     cdef Int[::1] begin, size, rows, leaf
     cdef double[:, ::1] box
@@ -305,7 +304,7 @@ cpdef tree_of(double[:, :] points):
 cdef void _bound(
     double[:, :] points, Int[::1] rows, Int low, Int high, double[:, ::1] box, Int node
 ) noexcept:
-    """Return the box of the rows low … high − 1 becomes that of a node."""
+    """Set the box of a node to that of the rows low … high − 1."""
     cdef Int k
     cdef double x, y
     box[node, 0] = box[node, 1] = math.INFINITY
@@ -319,8 +318,8 @@ cdef void _bound(
 cdef void _halve(
     double[:, :] points, Int[::1] rows, Int low, Int middle, Int high, Int axis
 ) noexcept:
-    """Put the rows low … high into such an order that none before `middle` lies farther along the
-    axis than one from there on (Hoare's FIND, 1961)."""
+    """Reorder the rows low … high so that none before `middle` lies farther along the axis than
+    one from there on (Hoare's FIND, 1961)."""
     cdef double pivot
     cdef Int left, right, row
     while low < high:
@@ -342,7 +341,7 @@ cdef void _halve(
 
 
 cdef class Branches:
-    """Return a tree as the loops read it, and room for the nodes that wait."""
+    """A tree as the loops read it, and a stack for the nodes that wait."""
 
     cdef double[:, ::1] points, box
     cdef Int[::1] rows, begin, size, live, leaf, waiting
@@ -359,7 +358,7 @@ cdef class Branches:
 
 
 cpdef void switch(Branches tree, Int row, Int change) noexcept:
-    """Switch a point off (−1) or on (+1); it must be the other way before."""
+    """Switch a point off (−1) or on (+1); it must be in the other state before."""
     cdef Int node
     node = tree.leaf[row]
     while True:
@@ -370,7 +369,7 @@ cpdef void switch(Branches tree, Int row, Int change) noexcept:
 
 
 cdef inline double _box_distance_square(Branches tree, Int node, double x, double y) noexcept:
-    """Squared distance from a point to a node's box."""
+    """Return the squared distance from a point to a node's box."""
     dx = max(tree.box[node, 0] - x, x - tree.box[node, 2], 0.0)
     dy = max(tree.box[node, 1] - y, y - tree.box[node, 3], 0.0)
     return float(dx * dx + dy * dy)
@@ -379,7 +378,8 @@ cdef inline double _box_distance_square(Branches tree, Int node, double x, doubl
 cdef Int _halves_wait(
     Branches tree, Int node, double x, double y, Int[::1] waiting, Int top
 ) noexcept:
-    """Let the halves of a node wait, the nearer one on top; how many wait then."""
+    """Put the halves of a node on the stack `waiting`, the nearer one on top; return its new
+    height."""
     cdef bint left_first
     distance = _box_distance_square(tree, 2 * node + 1, x, y)
     left_first = distance <= _box_distance_square(tree, 2 * node + 2, x, y)
@@ -389,7 +389,8 @@ cdef Int _halves_wait(
 
 
 cpdef Int nearest_row(Branches tree, Int[::1] is_open, double x, double y) noexcept:
-    """Return the nearest point that is switched on, `is_open` (N,) 1 or 0; −1 when none is."""
+    """Return the nearest point that is switched on (`is_open` (N,): 1, else 0); −1 when none
+    is."""
     cdef Int top, leaves, node, k, row, nearest
     cdef Int[::1] waiting
     cdef double best, square, dx, dy
@@ -418,9 +419,8 @@ cpdef Int nearest_owners(
     Branches tree, Int[::1] owner, Int row, Int max_count, Int quarter, Int[::1] nearest,
     double[::1] squares
 ) noexcept:
-    """Return the owners nearest to a point, but its own: up to `max_count`, each once, nearest
-    first; they are written into `nearest`, their squared distances into `squares`. Returns how
-    many.
+    """Write the owners nearest to a point, except its own, into `nearest`, each once, nearest
+    first, and their squared distances into `squares`; return their number, at most `max_count`.
 
     `quarter` 0 … 3: only those above and to the right of the point, and so on CCW.
     """
@@ -459,7 +459,8 @@ cpdef Int nearest_owners(
 
 
 cdef inline bint _looks_to(Int quarter, double dx, double dy) noexcept:
-    """Return True if a direction lies in a quarter of the plane; each has one of its two edges."""
+    """Return True if a direction lies in a quarter of the plane; one of its two edges belongs to
+    each."""
     if quarter == 0:
         return dx > 0.0 and dy >= 0.0
     if quarter == 1:
@@ -474,7 +475,8 @@ cdef inline bint _looks_to(Int quarter, double dx, double dy) noexcept:
 cdef void _enter(
     Int[::1] nearest, double[::1] squares, Int max_count, Int owner, double distance
 ) noexcept:
-    """Put an owner into the sorted list of `max_count`, or move it up when it is there already."""
+    """Put an owner into the sorted list of `max_count`, or move it up when it is in the list
+    already."""
     cdef Int index, k
     index = max_count - 1
     if not _is_before(distance, owner, nearest, squares, index):
@@ -521,11 +523,12 @@ cpdef nearest_first(
     tree, double[:, ::1] ends, Int[::1] first, Int[::1] after_first, Int[::1] after,
     Int[::1] waits, double[::1] start
 ):
-    """Return rows (M,) in order: from `start` (2,) always to the nearest row that may be taken.
+    """Return the rows (M,) in greedy order: from `start` (2,) always on to the nearest row that
+    may be taken.
 
     `tree` is that of the entries, and is used up. `ends` (S, 4): entry x, y and exit x, y; item i
     owns the rows from first[i] to first[i + 1]; after[after_first[i] : after_first[i + 1]] may
-    come after item i only, and `waits` (M,) counts for each item what must come before it.
+    come after item i only, and `waits` (M,) counts for each item those that must come before it.
     Shorter than M when items wait for each other.
     """
     cdef Branches branches
@@ -563,10 +566,11 @@ cpdef nearest_first(
 
 
 cpdef neighbours(tree, Int[::1] owner, Int count):
-    """Neighbours of item i: near[near_first[i] : near_first[i + 1]], by a tree of N places.
+    """Return the neighbours of all items and where each item's begin: those of item i are
+    near[near_first[i] : near_first[i + 1]], by a tree of N places.
 
-    `owner` (N,) ascends. Each place brings its nearest items, the first one those in each quarter
-    too; what several bring comes once.
+    `owner` (N,) ascends. Each place contributes its nearest items, the first place also those in
+    each quarter; an item that several contribute comes once.
     """
     cdef Branches branches
     cdef Int total, i, places, max_nearest, place, k, quarter, wanted_count, hits, m, item
@@ -612,8 +616,8 @@ cpdef neighbours(tree, Int[::1] owner, Int count):
 cpdef best_rows(
     double[:, ::1] ends, Int[::1] first, Int[::1] order, double[::1] start, double[::1] goal
 ):
-    """Return rows (M,) for items (M,) in this order, from `start` (2,) to `goal` (2,), NaN for no
-    goal.
+    """Return the best rows (M,) for items (M,) in this order, from `start` (2,) to `goal` (2,),
+    NaN for no goal.
 
     `ends` (S, 4): entry x, y and exit x, y; item i owns the rows from first[i] to first[i + 1].
     """
@@ -678,10 +682,10 @@ cpdef enum:
 cdef (double, Int) shorten(
     Route tour, Int[::1] queue, Int[::1] waits, Int count, Int[:, ::1] log, Int logged, Step step
 ) noexcept:
-    """Take steps until no item waits: how much shorter the tour is, and how much is logged.
+    """Take steps until no item waits; return the length saved, mm, and the length of the log.
 
-    `queue` (M,) holds the `count` items that wait, `waits` (M,) 1 for each of them. With
-    `logged` < 0 nothing need be undone. `step` is room for one.
+    `queue` (M,) holds the `count` items that wait, `waits` (M,) 1 for each of them. With `logged`
+    < 0 nothing need be undone. `step` is a scratch object.
     """
     cdef Int head, size, item
     cdef double gained
@@ -706,7 +710,8 @@ cdef (double, Int) shorten(
 cdef Int _wait(
     Route tour, Int[::1] queue, Int[::1] waits, Int head, Int count, Int position
 ) noexcept:
-    """Let the item at a position wait, unless it does; how many wait then."""
+    """Put the item at a position into the queue, unless it is there; return the number of waiting
+    items."""
     cdef Int item
     if position < 1 or position > len(queue):
         return count
@@ -721,7 +726,8 @@ cdef Int _wait(
 cdef Int _touched_wait(
     Route tour, Step step, Int[::1] queue, Int[::1] waits, Int head, Int count
 ) noexcept:
-    """Let the items wait that lie beside a gap which a step has changed; how many wait then."""
+    """Put the items beside the gaps that a step has changed into the queue; return the number of
+    waiting items."""
     cdef Int last, middle, position, k
     last = step.high if step.second_high < 0 else step.second_high
     middle = step.low if step.second_high < 0 else step.low + step.second_high - step.high
@@ -738,8 +744,8 @@ cdef Int _touched_wait(
 
 
 cdef void best_step(Route tour, Int item, Step best) noexcept:
-    """Make `best` the step that gains most of those that concern this item; without one its gain
-    is the least that counts."""
+    """Set `best` to the step that saves most among those that concern this item; if there is none,
+    its gain is the least that counts."""
     cdef Int turned, k, position, last, row, left, right, neighbour, spot, neighbour_row
     cdef bint alone
     cdef double reach, lifted
@@ -774,7 +780,8 @@ cdef void best_step(Route tour, Int item, Step best) noexcept:
 
 
 cdef void _other_row(Route tour, Int item, Step best) noexcept:
-    """Return the best row of an item where it is."""
+    """Set `best` to the choice of another row of an item at its position, where that saves
+    more."""
     cdef Int candidate, position, row, left, right
     position, row = tour.place[item], tour.row[item]
     left, right = row_at(tour, position - 1), row_at(tour, position + 1)
@@ -797,8 +804,8 @@ cdef void _reversal(Route tour, Int low, Int high, Step best) noexcept:
 
 
 cdef void _part(Route tour, Int position, Int direction, Int spot, bint turn, Step best) noexcept:
-    """Return parts of two and more items that begin (way 1) or end (way −1) at a position,
-    moved between the positions `spot` and `spot` + 1."""
+    """Try to move parts of two and more items that begin (`direction` 1) or end (−1) at a position
+    to between the positions `spot` and `spot` + 1; keep the best step."""
     cdef Int length, low, high
     for length in range(2, MAX_MOVED + 1):
         low = position if direction > 0 else position - length + 1
@@ -824,8 +831,8 @@ cdef void _swap(Route tour, Int low, Int high, Int second_high, Int flip, Step b
 
 
 cdef void _single(Route tour, Int item, Int spot, double lifted, Step best) noexcept:
-    """Search for the item that is best moved between the positions `spot` and `spot` + 1, and for
-    its best row there."""
+    """Try to move an item to between the positions `spot` and `spot` + 1, with its best row there;
+    keep the best step."""
     cdef Int position, k, left, right, row, first, count, candidate, low, high, end
     cdef double gain, candidate_gain, opened_gap
     position = tour.place[item]
@@ -855,8 +862,8 @@ def settled(tour: Tour) -> float:
 
 
 cpdef double kicked(tour, Int kicks, Int seed):
-    """Shorten the tour until no step gains any more, then by so many kicks; return the length (mm)
-    saved."""
+    """Shorten the tour until no step saves anything, then by `kicks` random changes each followed
+    by more steps; return the length saved, mm."""
     cdef Int items, waiting, may_undo, kick, logged, low, high, second_high
     cdef Int[:, ::1] log
     cdef Int[::1] queue, waits

@@ -23,7 +23,7 @@ cpdef enum:
 
 
 cdef Int _put_number(Int value, Int[::1] style, unsigned char[::1] out, Int at) noexcept:
-    """Write a number to `out` from `at` on; where it ends."""
+    """Write a number to `out` from `at` on; return where it ends."""
     cdef Int size, decimals, digits, rest, end, k, place
     size, decimals = abs(value), int(style[DECIMALS])
     if value < 0 or style[PLUS] != 0:
@@ -57,11 +57,11 @@ cpdef void put_words(
     Int[:, ::1] values, unsigned char[:, ::1] written, unsigned char[::1] fixed,
     Int[::1] fixed_ends, Int[:, ::1] styles, bint blanks, unsigned char[::1] out, Int[::1] ends
 ) noexcept:
-    """Write M rows of up to K words to `out`, which has room; `ends` (M,) is filled.
+    """Write M rows of up to K words to `out`, which must have room; fill `ends` (M,).
 
-    values (M, K) whole units; written (M, K): 1 for words that a row has; `fixed`: what stands
-    before the numbers, and last what ends a row that has words, cut at fixed_ends (K + 1,); styles
-    (K, 5); `blanks`: whether words are parted by one.
+    values (M, K) whole units; written (M, K): 1 for words that a row has; `fixed`: the text before
+    each number, and last the end of a row that has words, cut at fixed_ends (K + 1,); styles (K,
+    5); `blanks`: true if words are separated by a blank.
     """
     cdef Int columns, at, row, begin, column, k
     columns, at = len(styles), 0
@@ -118,7 +118,8 @@ cdef inline Int _column_of(Int sign) noexcept:
 cdef Int _number(
     const unsigned char[::1] data, Int at, Int end, double[::1] numbers, Int column
 ) noexcept:
-    """Read the number at `at`; where it ends, or −1 when there is none that is plain."""
+    """Read the number at `at` into `numbers`; return where it ends, −1 when there is none that is
+    plain."""
     cdef bint negative, point
     cdef Int mantissa, digits, exact, sign
     cdef double scale, value
@@ -174,7 +175,8 @@ cdef bint _is_comment(const unsigned char[::1] data, Int at, Int end) noexcept:
 cdef Int _plain_line(
     const unsigned char[::1] data, Int at, Int end, bint free, double[::1] numbers, Int[::1] facts
 ) noexcept:
-    """Read a line; how many words it has, or −1 when it is not plain."""
+    """Read a line into `numbers` and `facts`; return its number of words, −1 when it is not
+    plain."""
     cdef Int words, form, mask, one_blank, blanks, sign, first, column
     cdef bint numbered, plain_digits
     cdef double code
@@ -224,13 +226,13 @@ cpdef (Int, Int, Int) plain_lines(
     const unsigned char[::1] data, Int at, Int line, Int most_chars, bint free,
     double[:, ::1] numbers, Int[:, ::1] facts
 ) noexcept:
-    """Read lines from `at` on, which is the begin of the line of this number, up to the first that
-    is not plain: how many have words, and where and in which line it stopped.
+    """Read lines from `at` on, which is the beginning of line `line`, up to the first that is not
+    plain. Return the number of lines with words, and the offset and the line at which it stopped.
 
-    `most_chars`: of a line. `free`: lines are as RS274/NGC has them, where small letters count as
-    capitals, blocks may be numbered, and comments that stand alone are passed over; otherwise they
-    hold words in capitals and nothing else. numbers (R, 7) and facts (R, 5) are filled, no more
-    rows than these.
+    `most_chars`: the longest line. `free`: lines are as in RS274/NGC, where small letters count as
+    capitals, blocks may be numbered, and comments that stand alone are skipped; otherwise they
+    hold words in capitals and nothing else. At most as many rows of numbers (R, 7) and facts (R,
+    5) are filled as these have.
     """
     cdef Int rows, size, end, first, words
     rows, size = 0, len(data)

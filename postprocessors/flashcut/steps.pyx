@@ -13,10 +13,10 @@ late at each step and the shorter one never: it fires every P·n/m ms and makes 
 steps. Steps of both axes at the same time are one sample; so is the one that ends the move.
 
 Exact, because times are integers (in the second reading those of a move are taken m times), and
-only the time of the next firing and its difference to the other one are carried along: below 2⁶² for all half periods and
-displacements below 2³¹. Lengths become steps as everywhere, by floor(length / step + a half and
-a guard); no position is summed up. Compiled, because a displacement may depend on what the one
-before it reached, and a part has millions of steps.
+only the time of the next firing and its difference to the other one are carried along: below 2⁶²
+for all half periods and displacements below 2³¹. Lengths become steps as everywhere, by
+floor(length / step + a half and a guard); no position is summed up. Compiled, because a
+displacement may depend on where the one before it ended, and a part has millions of steps.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ cdef class Timers:
 
 
 cdef Int _displacement(Int axis, double target, bint sensed, Timers timers) noexcept:
-    """Return steps of an axis to its target, which then is where the program is."""
+    """Return the steps of an axis to its target, which becomes the program's position."""
     cdef Int steps
     cdef double position
     position = timers.programmed[axis]
@@ -147,7 +147,8 @@ cdef void _begin(Int move, Timers timers) noexcept:
 
 
 cdef Int _run(Timers timers, Int row, Int move, Int first) noexcept:
-    """Let the timers run until the move ends or the samples are full; the samples then filled."""
+    """Let the timers run until the move ends or the samples are full; return the number of samples
+    filled."""
     cdef Int axis, steps_left, gap, longer, shorter, sense, short_sense, every, short_every, count
     cdef Int short_count, k, next_ms, unit
     cdef Int[::1] steps, under_way, rows, moves, since
@@ -192,7 +193,7 @@ cdef Int _run(Timers timers, Int row, Int move, Int first) noexcept:
 cpdef (Int, Int) timers_fill(moves, Int first, rules, counters, issued):
     """Run moves from `first` on until all are done or the samples of `issued` are full.
 
-    Returns the move to go on with and the samples filled.
+    Return the move to continue with and the number of samples filled.
     """
     cdef Int k, move, done, row, before
     cdef Timers timers

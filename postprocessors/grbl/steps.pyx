@@ -33,10 +33,10 @@ def steps_taken(travel: Ints, events: Ints) -> Ints:
 cpdef void step_lines_fill(
     blocks, (Int, Int) first, double[::1] step_mm, double[:, ::1] out
 ) noexcept:
-    """Positions in mm, `out` (K, 3), after K step events.
+    """Fill `out` (K, 3) mm with the positions after K step events.
 
-    `blocks`: where each starts (B, 3) and its way (B, 3), steps, none without steps; `first`: the
-    block of the first event, and how many of its events came before.
+    `blocks`: the start (B, 3) and the travel (B, 3) of each, steps, none without steps; `first`:
+    the block of the first event, and how many of its events came before.
     """
     cdef Int k, block, event, event_count, count, axis, size, sign, taken_steps, counter, position, m
     cdef Int[:, ::1] start, travel
@@ -92,7 +92,7 @@ cdef float HALF = 0.5, TWO = 2.0, ZERO = 0.0
 
 
 cdef class Segments:
-    """Return the segments of B blocks, from the first on. Columns (B,), 32-bit: length mm,
+    """The segments of B blocks, from the first on. Columns (B,), 32-bit: length mm,
     acceleration mm/min², squares of the speeds at start and end (mm/min)², highest speed
     mm/min; and the steps of the longest axis."""
 
@@ -110,8 +110,8 @@ cdef class Segments:
         self.block, self.is_loaded = 0, False
 
     def fill(self, Int[::1] block, Int[::1] eighths, Int[::1] tick, Int[::1] cycles) -> int:
-        """Fill the next segments: their blocks, lengths in eighths of a step, eighths of a tick,
-        and cycles of a tick, all (S,). Return how many there are; fewer than S only at the end."""
+        """Fill in the next segments (S,): their blocks, lengths in eighths of a step, eighths of a
+        tick, and cycles of a tick. Return their number, less than S only at the end."""
         cdef Int k, steps, level, count
         cdef float dt, inv_rate, distance, remaining, last
         k = 0
@@ -145,7 +145,7 @@ cdef class Segments:
         return k
 
     cdef void _load(self) noexcept:
-        """Load the next block, and find its ramps."""
+        """Load the next block, and compute its ramps."""
         cdef float inv_2_accel, entry, exit, nominal, meeting
         cdef Int b
         b = self.block
@@ -179,7 +179,7 @@ cdef class Segments:
                 self.maximum = <float>math.sqrt(TWO * self.acceleration[b] * meeting + exit)
 
     cdef float _advance(self) noexcept:
-        """Go on by a segment; return its minutes."""
+        """Advance by one segment; return its duration, min."""
         cdef float longest, dt, time, ahead, change, end_mm, mm, acceleration
         acceleration = self.acceleration[self.block]
         longest, dt, time, mm = SEGMENT_MIN, ZERO, SEGMENT_MIN, self.mm

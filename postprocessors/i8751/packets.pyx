@@ -21,7 +21,8 @@ cdef Int _motor(
     const unsigned char[::1] data, Int at, Int number, (Int, Int) pulses, Int[::1] record,
     Int column
 ) noexcept:
-    """Read a motor; where its bytes end, −1 when it is none or turns for 0 pulses."""
+    """Read the bytes of a motor; return where they end, −1 when they are none or it turns for 0
+    pulses."""
     cdef Int high_steps, lost, sense, count
     high_steps, lost = pulses
     if at < 0 or at + 2 > len(data) or data[at] != number:
@@ -42,7 +43,7 @@ cdef Int _motor(
 cdef Int _wait(
     const unsigned char[::1] data, Int at, Int mark, Int[::1] record, Int column
 ) noexcept:
-    """Read a wait; where its bytes end, −1 when it is none."""
+    """Read the bytes of a wait; return where they end, −1 when they are none."""
     if at < 0 or at + 2 > len(data) or data[at] != mark:
         return -1
     record[column] = data[at + 1]
@@ -53,8 +54,9 @@ cpdef (Int, Int, Int) records_in_a_row(
     const unsigned char[::1] data, (Int, Int) place, (Int, Int, Int, Int, bint) rules,
     Int[:, ::1] records
 ) noexcept:
-    """Read records into (R, 5), no more than these, up to the first that is none, or to a packet's
-    end that no packet follows: how many, where it stopped, and how many of the packet were read.
+    """Read records into `records` (R, 5), at most R, up to the first that is none, or to the end
+    of a packet that no packet follows. Return how many were read, where it stopped, and how many
+    records of the last packet were read.
 
     `place`: the byte to begin at and how many records of its packet were read before; `rules`: the
     most records of a packet, the pulses that a high byte counts, those that are lost at each

@@ -63,11 +63,11 @@ cpdef void merge_lines(
     double[:, ::1] points, uint8_t[::1] breaks, double[:] tolerance, Int[::1] chain,
     double[:, ::1] moved
 ) noexcept:
-    """Return the chain of each of N moves, `chain` (N,), numbered from 0, and where the moves then
-    end, `moved` (N, 3): on the chain's line, never back.
+    """Fill `chain` (N,) with the chain of each of N moves, numbered from 0, and `moved` (N, 3)
+    with the new ends of the moves: on the chain's line, never going back.
 
-    `points` (N+1, 3): the start and all ends; `breaks` (N,): moves that do not join the one before;
-    `tolerance` (N,): within which a move joins.
+    `points` (N+1, 3): the start and all ends; `breaks` (N,): moves that do not join the one
+    before; `tolerance` (N,): within which a move joins.
     """
     cdef Int k, base, number, axis, j
     cdef double reached, travel
@@ -106,7 +106,7 @@ cpdef enum:
 
 
 cdef class Blends:
-    """Return the corners (M + 1, 17) at the starts of M moves and behind the last; of each move
+    """The corners (M + 1, 17) at the starts of M moves and behind the last; of each move
     the `length` (M,) mm, the unit tangent at its start (M, 3) and the first row (M,) of it. Of
     each row of `ways` its move (N,), and how far into that it begins and how long it is (N,),
     mm."""
@@ -128,7 +128,7 @@ cdef class Blends:
         self.move, self.into, self.row_length = rows
 
     cdef void _turned(self, Int corner, double share, double *point) noexcept:
-        """Put a point (3,) mm at a share of the way of an arc blend."""
+        """Write the point (3,) mm at the fraction `share` of an arc blend."""
         cdef Int axis
         cdef double turn = share * self.corners[corner, ANGLE]
         cdef double one = sin(self.corners[corner, ANGLE] - turn) / self.corners[corner, SINE]
@@ -139,7 +139,7 @@ cdef class Blends:
             point[axis] += other * self.corners[corner, LAST + axis]
 
     cdef void _unblended(self, Int move, double along, double *point) noexcept:
-        """Put the point (3,) mm at this arc length along a move, corners not blended."""
+        """Write the point (3,) mm at the arc length `along` of a move, corners not blended."""
         cdef Int row = self.first[move]
         cdef Int axis
         cdef double begin
@@ -151,9 +151,9 @@ cdef class Blends:
             point[axis] = begin + along * self.tangent[move, axis]
 
     cdef void _overlapped(self, Int corner, double x, double *point) noexcept:
-        """Put a point (3,) mm where two moves overlap, at the part x of the time: while the first
-        slows down evenly over its last `BEFORE` mm, the second speeds up in the first part `RAMP`
-        of that time, and goes on, over its first `BEHIND` mm."""
+        """Write the point (3,) mm where two moves overlap, at the fraction x of the time: while
+        the first slows down evenly over its last `BEFORE` mm, the second speeds up in the first
+        part `RAMP` of that time, and then continues, over its first `BEHIND` mm."""
         cdef double other[3]
         cdef double corner_point[3]
         cdef Int axis
@@ -173,8 +173,8 @@ cdef class Blends:
     cpdef void put(
         self, const Int[::1] row, const double[::1] share, double[:, ::1] points
     ) noexcept:
-        """Put points (K, 3) mm at shares (K,) of the lengths of rows (K,) on the blends beside
-        them."""
+        """Write the points (K, 3) mm at fractions `share` (K,) of the lengths of rows (K,), on the
+        blends beside them."""
         cdef Int k, move
         cdef double along, rest, turn
         cdef double[:, ::1] corners = self.corners

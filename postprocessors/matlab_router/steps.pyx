@@ -1,7 +1,7 @@
 """The loops of the Matlab router's slaves: speed loops with integers, motors, and their master.
 
 Compiled, because every tick depends on the one before.
-What each part does is said above it.
+Comments above each part say what it does.
 """
 
 from __future__ import annotations
@@ -94,14 +94,14 @@ class Account(NamedTuple):
 
 
 cdef Int _int32(Int value) noexcept:
-    """As it stands in a signed int of 32 bits."""
+    """Return the value as a signed int of 32 bits holds it, wrapped on overflow."""
     return ((value + SIGN_OF_INT32) & BITS_OF_INT32) - SIGN_OF_INT32
 
 
 cdef void listed_loop(
     double* motor, Int* slave, double* axis, Int* table
 ) noexcept:
-    """The interrupt of the listing: L5496-5584."""
+    """Run the interrupt of the listing once: L5496-5584."""
     cdef Int phase, shown, change, drive, to_go, fast, speed, ref, kid, kpd
     phase = int(axis[PHASE])
     shown = (slave[COUNT] + phase) & (TURN - 1)
@@ -125,8 +125,9 @@ cdef void listed_loop(
 
 
 cdef void text_loop(double* motor, Int* slave, double* axis, Int top) noexcept:
-    """Equations 4.15-4.18 and 4.27: the reference by the way that is left, and the loop in its
-    velocity form. Nothing drives an axis that has arrived."""
+    """Run one pass of the loop that the text describes, equations 4.15-4.18 and 4.27: the
+    reference by the remaining distance, and the loop in its velocity form. An axis that has
+    arrived has no drive."""
     speed = float(slave[COUNT] - slave[SHOWN])
     slave[SHOWN] = slave[COUNT]
     if slave[STAGE] == FOLLOWING:
@@ -140,7 +141,8 @@ cdef void text_loop(double* motor, Int* slave, double* axis, Int top) noexcept:
 
 
 cdef Int _seen_way(Int* slave, double* axis, Int up) noexcept:
-    """Posi of the main loop, when the counter's direction is `up`."""
+    """Return Posi of the main loop, the position that it computes from the counter, when the
+    counter's direction is `up`."""
     cdef Int phase, shown
     phase = int(axis[PHASE])
     shown = (slave[COUNT] + phase) & (TURN - 1)
@@ -148,10 +150,10 @@ cdef Int _seen_way(Int* slave, double* axis, Int up) noexcept:
 
 
 cdef Int to_go_of(Int* slave, double* axis, Int sense) noexcept:
-    """Return counts in the direction `sense` until the loop that the slave is in ends.
+    """Return the counts in the direction `sense` until the loop that the slave is in ends.
 
-    Posi does not fall: within the turn number k it is c + 1023 k, c = 0 … 1023. It first reaches
-    T in the turn k' = ⌈T / 1023⌉ − 1, or in the present one, at c' = max(T − 1023 k', 0).
+    Posi does not fall: within the turn number k it is c + 1023 k, c = 0 … 1023. It first reaches T
+    in the turn k' = ⌈T / 1023⌉ − 1, or in the present one, at c' = max(T − 1023 k', 0).
     """
     cdef Int stage, goal, up, wraps, seen, turn, to_go
     cdef bint ahead
@@ -178,7 +180,7 @@ cdef Int to_go_of(Int* slave, double* axis, Int sense) noexcept:
 
 
 cdef void next_stage(double* motor, Int* slave, double moment) noexcept:
-    """Begin the next stage of a motor, when the count that its slave waited for has come."""
+    """Begin the next stage of a motor, when its slave has reached the count that it waited for."""
     if slave[STAGE] == CRUISING and slave[LEFT] > 1:
         slave[LEFT] -= 1
         slave[WRAPS] = 0
@@ -190,8 +192,8 @@ cdef void next_stage(double* motor, Int* slave, double moment) noexcept:
 
 
 cdef void start_line(double* motor, Int* slave, bint text) noexcept:
-    """The master's word to go. The text's distances add up, so that what an axis went too far is
-    taken back by its next line; the listing's begin where the axis is."""
+    """Start a line at the master's signal. The text's distances add up, so that an overshoot is
+    taken back by the axis' next line; the listing's distances begin where the axis is."""
     cdef Int amount
     slave[WRAPS], slave[REF] = 0, slave[NEXT_REF]
     amount = slave[LEFT]
@@ -248,7 +250,8 @@ cdef double REST_COUNTS = 1e-6
 
 
 cdef double _moment(double travel, double speed, double aim, double tau, double upper) noexcept:
-    """When a motor at `speed` that tends to `aim` has gone `travel`; it has by `upper`."""
+    """Return the time in ticks after which a motor at `speed` that tends to `aim` has gone
+    `travel`, at most `upper`; by bisection with Newton steps."""
     cdef Int _
     cdef double low, high, moment, better
     low, high, moment = 0.0, upper, 0.5 * upper
@@ -270,7 +273,7 @@ cdef double _moment(double travel, double speed, double aim, double tau, double 
 
 
 cdef inline Int _floor(double value) noexcept:
-    """Return the greatest whole number below or at a value that an Int holds."""
+    """Return the greatest integer not above a value, which must fit into an Int."""
     cdef Int integer = <Int>value
     return integer - (value < <double>integer)
 
@@ -279,9 +282,9 @@ cdef (double, bint) _glide(
     double* motor, Int* slave, double* axis, double aim, Int sense, double ticks,
     Int to_go, double whole_fade
 ) noexcept:
-    """Move one way (`sense`) for so many ticks at most, and so many counts until the loop ends,
-    without a turn; returns the ticks it took and whether the loop ends there. `whole_fade` is
-    1 − q of a whole tick."""
+    """Move in one direction (`sense`) for at most `ticks`, and at most the counts `to_go` until
+    the loop ends; return the ticks it took and True if the loop ends there. `whole_fade` is 1 − q
+    of a whole tick."""
     cdef Int count, new, phase
     cdef bint reached
     cdef double end, fade
@@ -310,7 +313,8 @@ cdef (double, bint) _glide(
 cdef double _home(
     double* motor, Int* slave, double* axis, double at, Int tick
 ) noexcept:
-    """Run home evenly from `at` in a tick, and stand there; returns the time within the tick."""
+    """Run home at constant speed from `at` in a tick, and stop there; return the time within the
+    tick."""
     cdef Int phase, k
     needed = max(motor[PLACE], 0.0) / axis[HOME_SPEED]
     if needed > 1.0 - at:
@@ -339,9 +343,9 @@ cdef Int UNKNOWN_SENSE = 2
 cdef bint _passes_chunk(
     double* motor, Int* slave, double* axis, Int sense, double aim, Ahead* ahead, double whole_fade
 ) noexcept:
-    """Glide for a whole tick in which at most a chunk of a line ends that is not its last: the
-    main loop counts it, and nothing else changes, so the motion need not be parted there. False,
-    and nothing done, where something else may come within the tick."""
+    """Glide for a whole tick in which at most one chunk of a line ends, and not the last: the main
+    loop counts it, and nothing else changes, so the motion need not be divided there. Return
+    False, with nothing done, where something else may happen within the tick."""
     cdef Int begin, end, phase, up, wraps, to_go, passed
     cdef double place, speed
     place, speed, begin = motor[PLACE], motor[SPEED], slave[COUNT]
@@ -447,7 +451,7 @@ cdef class Slaves:
 
 
 cdef void _open(Slaves all_, Int line) noexcept:
-    """Return the slaves wait for the word to run a line."""
+    """Prepare the slaves to run a line: they wait for the master's signal."""
     cdef Int index
     cdef int[:, ::1] lines
     cdef Int[:, ::1] slaves
@@ -463,7 +467,7 @@ cdef void _open(Slaves all_, Int line) noexcept:
 
 
 cdef void _close(Slaves all_, Int line, Int tick) noexcept:
-    """Account for a line that all slaves have answered, and set when the next one begins."""
+    """Account for a line that all slaves have completed, and set when the next one begins."""
     cdef int[:, ::1] lines
     cdef double[:, ::1] motors
     cdef double[::1] begin
@@ -481,7 +485,8 @@ cdef void _close(Slaves all_, Int line, Int tick) noexcept:
 
 
 cdef Int _row(Slaves all_, Int line, Int tick) noexcept:
-    """Whose sample the places at a tick are: the start of a row is none of it."""
+    """Return the row to which the sample at a tick belongs; the start of a row belongs to the row
+    before. Note the moment at which a second row begins."""
     cdef Int first, second, axis, ahead
     cdef int* order
     cdef double* begin
@@ -508,7 +513,7 @@ cdef bint _all_still(Int[:, ::1] slaves) noexcept:
 
 
 cdef void _given_up(double[:, ::1] motors, Int[:, ::1] slaves, Int tick) noexcept:
-    """Somebody switches off what has not arrived."""
+    """Stop all axes that have not arrived, as a user would switch them off."""
     cdef Int index
     for index in range(3):
         if slaves[index, STAGE] != STILL:
@@ -518,8 +523,8 @@ cdef void _given_up(double[:, ::1] motors, Int[:, ::1] slaves, Int tick) noexcep
 
 
 cdef inline bint _goes_on(Int* moves, Int* ways) noexcept:
-    """Return True if no axis turns; `ways` (3,) then has the sense of each, 0 of one that has
-    not moved. Else these are the senses of the `moves` (3,)."""
+    """Return True if no axis reverses; `ways` (3,) then has the direction of each axis, 0 for one
+    that has not moved. Otherwise set `ways` to the directions of `moves` (3,)."""
     cdef Int axis
     cdef bint turns = False
     for axis in range(3):
@@ -532,7 +537,7 @@ cdef inline bint _goes_on(Int* moves, Int* ways) noexcept:
 
 cdef inline bint _is_at_rest(double* motor, Int* slave, double* axis, Int tick) noexcept:
     """Return True if neither the loop nor the motor changes anything in this tick: the axis stands
-    without drive, waits for no word that comes within the tick, and has been seen to stand."""
+    without drive, waits for no signal that comes within the tick, and has been seen to stand."""
     cdef Int phase
     if motor[SPEED] != 0.0 or motor[DRIVE] != 0.0 or slave[REF] != 0:
         return False
@@ -543,7 +548,8 @@ cdef inline bint _is_at_rest(double* motor, Int* slave, double* axis, Int tick) 
 
 
 cdef Int _homes_on(double* motor, Int* slave, double* axis, Int longest) noexcept:
-    """Run home for as many ticks as nothing else happens; return them."""
+    """Run home for as many ticks, up to `longest`, as nothing else happens; return their
+    number."""
     cdef Int ticks = 0
     cdef double place = motor[PLACE]
     cdef double rate = axis[HOME_SPEED]
@@ -558,8 +564,9 @@ cdef Int _homes_on(double* motor, Int* slave, double* axis, Int longest) noexcep
 cdef Int _cruises_on(
     double* motor, Int* slave, double* axis, Int longest, Ahead* ahead, double fade
 ) noexcept:
-    """Run the listing's loop and the motor for as many whole ticks as the motor goes on one way and
-    no chunk ends; return them. The same steps as `listed_loop` and `_glide`, in registers."""
+    """Run the listing's loop and the motor for as many whole ticks, up to `longest`, as the motor
+    does not reverse and no chunk ends; return their number. The same steps as `listed_loop` and
+    `_glide`, in registers."""
     cdef Int ticks, sense, phase, shown, change, drive, count, begin, new, remaining
     cdef Int measured, total, ref, kid, kpd, wraps
     cdef bint is_up
@@ -604,8 +611,8 @@ cdef Int _cruises_on(
 cdef Int _goes_alone(
     Slaves all_, Int line, Int tick, Int* moves, Ahead* ahead, double* whole_fade
 ) noexcept:
-    """Run one axis for as many ticks as nothing changes but its speed, where the others stand;
-    return them, and the counts that it goes in `moves` (3,)."""
+    """Run one axis for as many ticks as only its speed changes while the others stand; return
+    their number, and set `moves` (3,) to the counts that it goes."""
     cdef Int axis, mover, ticks, longest
     mover = -1
     for axis in range(3):
@@ -638,11 +645,12 @@ cdef Int _goes_alone(
 
 
 cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1] row):
-    """Return counts of the axes at each tick into `out` (n, 3), the rows that they belong to into
-    `row` (n,), until these are full or all lines have run and their last pause is over.
+    """Fill `out` (n, 3) with the counts of the axes at each tick and `row` (n,) with the rows that
+    these belong to, until both are full or all lines have run and the last pause is over.
 
-    Of thin rows a sample takes the place of the one before, unless an axis turned there. `state`
-    goes on from call to call; `account` grows. Returns samples filled, and whether that was all.
+    In thin rows a sample replaces the one before, unless an axis reversed there. `state` continues
+    from call to call; `account` grows. Return the number of samples filled, and True if that was
+    all.
     """
     cdef Int top, count, filled, tick, ticks, line, index, of
     cdef Int[3] moves

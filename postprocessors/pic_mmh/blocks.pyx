@@ -27,8 +27,8 @@ cdef inline bint _is_blank(Int sign) noexcept:
 
 
 cdef inline Int _digits(const unsigned char[::1] data, Int at, Int count, Int number) noexcept:
-    """Return the number with so many digits more, −1 where they are none; they lie within the
-    data."""
+    """Return a number with `count` more digits from `at` appended, −1 where they are no digits;
+    they lie within the data."""
     cdef Int k
     for k in range(at, at + count):
         if not _ZERO <= data[k] < _ZERO + 10:
@@ -40,7 +40,7 @@ cdef inline Int _digits(const unsigned char[::1] data, Int at, Int count, Int nu
 cdef Int _coordinate(
     const unsigned char[::1] data, Int at, Int letter, bint annex, Int[::1] block, Int column
 ) noexcept:
-    """Read a word; where it ends, or −1 when it is none of this letter in this form."""
+    """Read a word; return where it ends, −1 when it is no word of this letter in this form."""
     cdef Int longest, number
     cdef bint signed, negative
     longest = 2 + WHOLE_DIGITS + 1 + DECIMALS
@@ -66,7 +66,7 @@ cdef Int _coordinate(
 
 
 cdef Int _move(const unsigned char[::1] data, Int at, bint annex, Int[::1] block) noexcept:
-    """Read a move; where its last word ends, or −1 when it is none or its feed is 0."""
+    """Read a move; return where its last word ends, −1 when it is none or its feed is 0."""
     cdef Int size, code
     cdef bint deep
     size = len(data)
@@ -97,8 +97,9 @@ cdef Int _move(const unsigned char[::1] data, Int at, bint annex, Int[::1] block
 cpdef (Int, Int) moves_in_a_row(
     const unsigned char[::1] data, Int at, bint annex, Int[:, ::1] blocks
 ) noexcept:
-    """Read blocks from `at` on into blocks (R, 9), no more than these, up to the first that is no
-    move of this form with a feed above 0, where it needs one: how many, and where it stopped."""
+    """Read blocks from `at` on into `blocks` (R, 9), at most R, up to the first that is no move of
+    this form, with a feed above 0 where it needs one. Return how many were read, and where it
+    stopped."""
     cdef Int rows, size, first, last, end
     rows, size = 0, len(data)
     while rows < len(blocks):

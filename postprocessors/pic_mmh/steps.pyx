@@ -1,7 +1,8 @@
 """The loops of the PIC18F8720's interpolators: lines and arcs step by step, where arcs stop, and
 whole programs that are judged as they run.
 
-Positions are whole steps. Compiled, because one part takes tens of millions of them. What each part does is said above it.
+Positions are whole steps. Compiled, because one part takes tens of millions of them. Comments
+above each part say what it does.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ from camtool.kernels.judging import Sums, Task, room_for
 
 
 cpdef inline (Int, Int) heading(Int x, Int y, bint clockwise) noexcept:
-    """Direction (±1, ±1) of the motion at (x, y) ≠ (0, 0) on an arc about (0, 0).
+    """Return the direction (±1, ±1) of the motion at (x, y) ≠ (0, 0) on an arc about (0, 0).
 
     Clockwise the velocity is along (y, −x). On an axis one of the two vanishes: there the
-    coordinate that is not 0 shrinks, so its direction is against its sign, and the quadrant is
-    the one that the motion enters.
+    coordinate that is not 0 shrinks, so its direction is against its sign, and the quadrant is the
+    one that the motion enters.
     """
     cdef Int turn, sx, sy, along_x, along_y
     turn = 1 if clockwise else -1
@@ -40,7 +41,7 @@ cpdef inline (Int, Int) heading(Int x, Int y, bint clockwise) noexcept:
 
 
 cpdef Int rounded_radius(Int x, Int y) noexcept:
-    """√(x² + y²) to the nearest step."""
+    """Return √(x² + y²) rounded to the nearest step."""
     return int(math.sqrt(float(x * x + y * y)) + 0.5)
 
 
@@ -79,14 +80,14 @@ cpdef Int expected_quadrants(Int x, Int y, bint clockwise, Int end_x, Int end_y)
 
 
 def approach_start(x: int, y: int, end_x: int, end_y: int, low: int) -> Ints:
-    """Return the tracker (6,): x, y, quadrants entered, samples seen, nearest sample, its squared
-    distance (−1 while there is none); sample 0 is the start itself."""
+    """Return a new tracker (6,): x, y, quadrants entered, samples seen, nearest sample, its
+    squared distance (−1 while there is none); sample 0 is the start itself."""
     square = (x - end_x) ** 2 + (y - end_y) ** 2
     return np.array([x, y, 0, 0, 0, square if low <= 0 else -1], dtype=np.int64)
 
 
 def approach_scan(points: Ints, end: Ints, tracker: Ints, low: int, high: int) -> None:
-    """Take the samples `points` (n, 2), which follow those seen before, into account.
+    """Update the tracker by the samples `points` (n, 2), which follow those seen before.
 
     `end` (2,). The first of equally near samples counts.
     """
@@ -98,7 +99,7 @@ cdef void scan(
     Int[::1] path_x, Int[::1] path_y, Int count, Int end_x, Int end_y, Int[::1] tracker, Int low,
     Int high
 ) noexcept:
-    """As `approach_scan`, for `count` samples.
+    """Update the tracker as `approach_scan` does, by `count` samples.
 
     No coordinate changes by more than one from sample to sample: of `STRIDE` of them none is 0, or
     nearer than the nearest, when the one before is far enough away.
@@ -226,7 +227,7 @@ def direct_search_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints
 
 cdef Int _run_length(Int m, Int n, Int sense, Int error, Int room) noexcept:
     """Return the number of positions, up to `room`, for which the closed form holds from M, N on
-    while M runs `sense`."""
+    while M runs in the direction `sense`."""
     cdef Int invariant, diagonal
     invariant = m * m + n * n - error
     if error < -abs(n) or error >= abs(n) or invariant >= MAX_SQUARE or 2 * m * m > invariant:
@@ -240,8 +241,8 @@ cdef Int _run_length(Int m, Int n, Int sense, Int error, Int room) noexcept:
 cdef wide _run(
     Int m, Int n, Int sense, Int error, Int[::1] out_m, Int[::1] out_n, Int low, Int high
 ) noexcept:
-    """Return the positions that follow M, N while M runs `sense`, by the closed form, into the
-    rows low … high − 1."""
+    """Write the positions that follow M, N while M runs in the direction `sense`, by the closed
+    form, into the rows low … high − 1."""
     cdef Int first, k, size
     cdef double position, invariant
     invariant = float(m * m + n * n - error)
@@ -258,8 +259,8 @@ cdef wide _run(
 def direct_search_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, bool]:
     """Run on from `state` into `out` (n, 2) until the end is met or `out` is full.
 
-    Returns the number of rows filled and whether the last of them is the end; `state` then
-    stands where the rows end, so that the next call goes on.
+    Return the number of rows filled and whether the last of them is the end; `state` is then that
+    of the last row, so that the next call continues.
     """
     path = np.empty((2, len(out)), dtype=np.int64)
     filled, met = direct_search_run(state, end_x, end_y, path[0], path[1])
@@ -270,7 +271,7 @@ def direct_search_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[
 cdef (Int, bint) direct_search_run(
     Int[::1] state, Int end_x, Int end_y, Int[::1] out_x, Int[::1] out_y
 ) noexcept:
-    """As `direct_search_fill`, into one array for each axis."""
+    """Run on as `direct_search_fill` does, into one array for each axis."""
     cdef Int x, y, error, sx, sy, room, filled, run, _, m, n, sense, run_end, delta_x, delta_y, at
     cdef bint met, by_x
     x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
@@ -310,8 +311,8 @@ cdef (Int, bint) direct_search_run(
 
 
 cpdef void skip(Int[::1] state, Int count) noexcept:
-    """Run on by so many iterations: as `direct_search_fill`, but no position on the way is made
-    where the closed form gives the last one."""
+    """Advance by `count` iterations as `direct_search_fill` does, but without computing positions
+    on the way where the closed form gives the last one."""
     cdef Int x, y, error, sx, sy, m, n, sense, run, size, _, invariant, delta_x, delta_y
     cdef bint by_x
     x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
@@ -342,11 +343,11 @@ cpdef void skip(Int[::1] state, Int count) noexcept:
 
 cpdef Int first_at(Int[::1] state, Int end_x, Int end_y, Int limit) noexcept:
     """Return the first iteration, 1 … limit, from `state` on at which the position equals the end,
-    or −1; `state` runs on to there.
+    or −1; `state` is advanced to there.
 
-    This is the controller's stop test, done after each iteration: an end at the start is met
-    after a whole turn. No coordinate changes by more than one an iteration, so the end is not
-    nearer than the larger of its two distances.
+    This is the controller's stop test, done after each iteration: an end at the start is met after
+    a whole turn. No coordinate changes by more than one per iteration, so the end cannot be met in
+    fewer iterations than the larger of its two distances.
     """
     cdef Int done, distance, run
     done = 0
@@ -362,11 +363,11 @@ cpdef Int first_at(Int[::1] state, Int end_x, Int end_y, Int limit) noexcept:
 
 cpdef (Int, Int) nearest_to(Int[::1] state, Int end_x, Int end_y, Int low, Int high) noexcept:
     """Return the iteration in low … high (both included) nearest to the end, the first one on
-    ties, and its squared distance in steps²; (−1, −1) when the range is empty. `state` runs on to
-    `high`.
+    ties, and its squared distance in steps²; (−1, −1) when the range is empty. `state` is advanced
+    to `high`.
 
-    As in `first_at`; what is to be no farther than d has come nearer by apart − d. Long strides
-    show first how near it comes at least.
+    As in `first_at`, a position that is to be no farther than d cannot come before `apart` − d
+    iterations. Long strides first bound how near it comes.
     """
     cdef Int done, best, min_square, off_x, off_y, square, run, x, y, error, sx, sy
     if high < low:
@@ -423,8 +424,8 @@ def stairs_start(x: int, y: int, clockwise: bool, error: int = 0) -> Ints:
 def stairs_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, bool]:
     """Run on from `state` into `out` (n, 2) until the end is met or `out` is full.
 
-    Returns the number of rows filled and whether the last of them is the end; `state` then
-    stands where the rows end, so that the next call goes on.
+    Return the number of rows filled and whether the last of them is the end; `state` is then that
+    of the last row, so that the next call continues.
     """
     path = np.empty((2, len(out)), dtype=np.int64)
     filled, met = _stairs(state, end_x, end_y, path[0], path[1])
@@ -435,7 +436,7 @@ def stairs_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, bo
 cdef (Int, bint) _stairs(
     Int[::1] state, Int end_x, Int end_y, Int[::1] out_x, Int[::1] out_y
 ) noexcept:
-    """As `stairs_fill`, into one array for each axis."""
+    """Run on as `stairs_fill` does, into one array for each axis."""
     cdef Int x, y, error, sx, sy, filled
     cdef bint met, x_grows
     x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
@@ -493,8 +494,8 @@ def dda_line_fill(
 ) -> tuple[int, int, bool]:
     """Run a line of a ≥ 0, b ≥ 0 steps on into `out` (n, 2), one row per pass with a pulse.
 
-    `registers` (2,) and `counters` (2,) begin at 0 and are changed in place. Returns rows filled,
-    passes run, and whether the line is finished.
+    `registers` (2,) and `counters` (2,) begin at 0 and are changed in place. Return the number of
+    rows filled, the passes run, and whether the line is finished.
     """
     path = np.empty((2, len(out)), dtype=np.int64)
     filled, passes, met = _dda_line(a, b, registers, counters, path[0], path[1])
@@ -505,7 +506,7 @@ def dda_line_fill(
 cdef (Int, Int, bint) _dda_line(
     Int a, Int b, double[::1] registers, Int[::1] counters, Int[::1] out_x, Int[::1] out_y
 ) noexcept:
-    """As `dda_line_fill`, into one array for each axis."""
+    """Run on as `dda_line_fill` does, into one array for each axis."""
     cdef Int x, y, filled, passes
     cdef bint pulse
     cdef double limit
@@ -559,8 +560,8 @@ cdef inline (Int, Int, Int, Int) _arc_pass(
 def dda_arc_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, int, bool]:
     """Run on from `state` into `out` (n, 2), one row per pass with a pulse.
 
-    Stops when the end is met or `out` is full. Returns rows filled, passes run, and whether the
-    last row is the end.
+    Stop when the end is met or `out` is full. Return the number of rows filled, the passes run,
+    and whether the last row is the end.
     """
     path = np.empty((2, len(out)), dtype=np.int64)
     filled, passes, met = _dda_arc(state, end_x, end_y, path[0], path[1])
@@ -571,7 +572,7 @@ def dda_arc_fill(state: Ints, end_x: int, end_y: int, out: Ints) -> tuple[int, i
 cdef (Int, Int, bint) _dda_arc(
     Int[::1] state, Int end_x, Int end_y, Int[::1] out_x, Int[::1] out_y
 ) noexcept:
-    """As `dda_arc_fill`, into one array for each axis."""
+    """Run on as `dda_arc_fill` does, into one array for each axis."""
     cdef Int x, y, sx, sy, radius, in_grow, in_shrink, filled, passes, grow, shrink, new_grow
     cdef Int new_shrink
     cdef bint x_grows, met
@@ -628,7 +629,7 @@ cpdef enum:
 
 
 cdef void start_leg(Int[::1] leg, Int method, bint rounded, Int[::1] state) noexcept:
-    """Set the state (8,) to the start of a leg; that of a line is where its counters are."""
+    """Set the state (8,) to the start of a leg; the state of a line holds its counters."""
     cdef Int k, radius, x, y, sx, sy
     cdef bint clockwise
     for k in range(len(state)):
@@ -650,7 +651,8 @@ cdef void start_leg(Int[::1] leg, Int method, bint rounded, Int[::1] state) noex
 cdef (Int, Int, bint) fill_leg(
     Int[::1] leg, Int method, Int[::1] state, double[::1] registers, Int[::1] out_x, Int[::1] out_y
 ) noexcept:
-    """Positions filled, passes run, whether the last one is the end."""
+    """Run a leg on into `out_x`, `out_y`; return the positions filled, the passes run, and whether
+    the last position is the end."""
     cdef Int filled
     cdef bint met
     if leg[KIND] != ARC:
@@ -665,7 +667,7 @@ cdef (Int, Int, bint) fill_leg(
 
 
 cdef void turn_round(Int[::1] leg, Int[::1] path_x, Int[::1] path_y, Int count) noexcept:
-    """Give the positions of a line their signs; a line of Z leaves X and Y where they are."""
+    """Give the positions of a line their signs; a line along Z leaves X and Y unchanged."""
     cdef Int k, sign_x, sign_y
     sign_x, sign_y = leg[SIGN_X], leg[SIGN_Y]
     if leg[KIND] == DEPTH:
@@ -712,8 +714,8 @@ cpdef enum:
 cdef Int _passes(
     Int[::1] path_x, Int[::1] path_y, Int count, Int[::1] leg, Int[::1] tracker, Int expected
 ) noexcept:
-    """At which of so many positions an arc stops in its final quadrant, or −1; `tracker` as in
-    `approach_start`."""
+    """Return the index of the position, of `count`, at which an arc stops in its final quadrant,
+    −1 for none; `tracker` as in `approach_start`."""
     cdef Int x, y, entered, end_x, end_y, to_x, to_y, index, k
     cdef bint reached, short
     x, y, entered = tracker[0], tracker[1], tracker[2]
@@ -744,8 +746,9 @@ cdef void _stop(
     Int[::1] leg, Int method, bint rounded, Int reading, Int[::1] path_x, Int[::1] path_y,
     double[::1] registers, Int[::1] state, Int[::1] tracker, Int[::1] out
 ) noexcept:
-    """Fill `out` (4,) for one arc that does not start at its centre. There is room for positions,
-    registers (2,) and state (8,) of an interpolator, and a tracker (6,) of `approach_start`."""
+    """Fill `out` (4,) with the stop of one arc that does not start at its centre. Scratch buffers:
+    positions, registers (2,) and state (8,) of an interpolator, and a tracker (6,) of
+    `approach_start`."""
     cdef Int expected, size, end_x, end_y, low, high, seen, at, filled, _, best, off_x, off_y
     cdef Int nearest
     cdef Int[::1] part_x, part_y
@@ -791,8 +794,8 @@ cdef void _stop(
 cdef void _stop_by_closed_form(
     Int[::1] leg, bint rounded, Int reading, Int[::1] state, Int[::1] out
 ) noexcept:
-    """As `_stop`, for direct search: no coordinate changes by more than one an iteration, so what
-    can happen no sooner than in n iterations is looked for behind the next n."""
+    """Fill `out` as `_stop` does, for direct search: no coordinate changes by more than one per
+    iteration, so an event that is at least n iterations away is searched only from then on."""
     cdef Int expected, end_x, end_y, low, high, first, last, done, at, to_x, to_y, entered, x, y
     cdef Int short, run, _
     end_x, end_y = leg[END_X], leg[END_Y]
@@ -833,7 +836,8 @@ cdef void _stop_by_closed_form(
 
 
 cdef Int _enter(Int[::1] state, Int count) noexcept:
-    """Run on until so many quadrants are entered, by direct search; the iterations to there."""
+    """Run on by direct search until `count` more quadrants are entered; return the number of
+    iterations."""
     cdef Int done, x, y, run
     done = 0
     while count > 0:
@@ -847,7 +851,7 @@ cdef Int _enter(Int[::1] state, Int count) noexcept:
 
 
 cpdef void arc_stops(Int[:, ::1] legs, (Int, bint, Int) how, Int[:, ::1] out):
-    """Fill `out` (L, 4) for each arc of legs (L, 14) by itself; 0 in other rows.
+    """Fill `out` (L, 4) with the stop of each arc of legs (L, 14) by itself; 0 in other rows.
 
     `how`: the method of arcs, whether their error starts as that against the rounded radius, and
     the reading. An arc that misses its end by `EQUAL` has the stop of `NEAREST`, and MET = 0.
@@ -870,12 +874,13 @@ cpdef void run_on(
     Int[::1] moves, Int[::1] start, Int[:, ::1] ends, Int[:, ::1] centres, (Int, bint, Int) how,
     Int[::1] samples
 ):
-    """Return the rows of a program, each from where the one before has really stopped.
+    """Follow the rows of a program, each from where the one before really stopped, and change
+    `ends` and `samples` accordingly.
 
     `moves` (N,): 0 where X and Y stay, 1 for a line, 2 and 3 for an arc counter-clockwise and
-    clockwise; `start` (2,), `ends` (N, 2), `centres` (N, 2) steps. Ends of arcs become their
-    stops, and rows that were to stay where they were stay there; `samples` (N,) becomes that of
-    each arc, −1 where a row is none.
+    clockwise; `start` (2,), `ends` (N, 2), `centres` (N, 2) steps. The end of an arc becomes its
+    stop, and a line to the programmed position before it stays at that stop; `samples` (N,)
+    becomes the samples of each arc, −1 for other rows.
     """
     cdef Int row, method, reading, x, y, said_x, said_y, end_x, end_y
     cdef Int[::1] path_x, path_y, tracker, leg, out, state
@@ -969,7 +974,8 @@ cdef (Int, bint) _run_ahead(
     Int[::1] leg, Int method, Int entered, Int low, Int high, Room room
 ) noexcept:
     """Return the number of positions from the present state to the end, and True; or to its
-    nearest approach in the quadrants low … high, and False. `entered` quadrants lie behind."""
+    nearest approach in the quadrants low … high, and False. `entered` quadrants have been entered
+    before."""
     cdef Int size, end_x, end_y, filled, _, off_x, off_y
     cdef Int[::1] tracker, state, path_x, path_y
     cdef bint met
@@ -996,11 +1002,12 @@ cdef (Int, Int) _ways(
     Int[::1] leg, Int method, Int[::1] before, Int[::1] after, Int at_x, Int at_y, Int[::1] path_x,
     Int[::1] path_y
 ) noexcept:
-    """Return the directions of X and Y on the positions (n,) that follow at_x, at_y; the states `before` and
-    `after` them.
+    """Return the directions of X and Y on the positions (n,) that follow at_x, at_y. `before` and
+    `after`: the states before and after these.
 
-    A line runs one way. So does a path of direct search between its quadrants, and what makes
-    signs come back is a whole turn: more than a block, when the circle is larger than that.
+    A line runs in one direction. So does a path of direct search between its quadrants; only a
+    whole turn brings the same signs back, and that is more than a block when the circle is larger
+    than one.
     """
     cdef Int last, sign_x, sign_y
     cdef bint is_exact
@@ -1026,7 +1033,7 @@ cdef (Int, bint) _passed(
     Int[::1] leg, Int x, Int y, Int[::1] path_x, Int[::1] path_y, Int way_x, Int way_y
 ) noexcept:
     """Return the number of quadrants that the positions (n,) after (x, y) enter, and True if they
-    may be near the end. A coordinate that runs one way becomes 0 once at most."""
+    may be near the end. A coordinate that runs in one direction becomes 0 at most once."""
     cdef Int k, entered, last, to_x, to_y
     cdef bint near
     entered, near = 0, False
@@ -1065,7 +1072,7 @@ cdef wide _move_slide(
 
 
 cdef void _deepen(Int[::1] leg, double[::1] state, Int[::1] counts) noexcept:
-    """Count a leg of Z, whose `state` (6,) need not say where the slide is."""
+    """Count a leg of Z; its `state` (6,) need not hold the position of the slide."""
     counts[STEPS + 2] = leg[A]
     if state[1] != leg[CW]:
         state[1] = leg[CW]
@@ -1075,10 +1082,10 @@ cdef void _deepen(Int[::1] leg, double[::1] state, Int[::1] counts) noexcept:
 cpdef void judge_legs(
     Int[:, ::1] legs, (Int, bint) how, double step_mm, mechanics, Int[:, ::1] counts, task, sums
 ):
-    """Run and judge legs (L, 14) in order; `counts` (L, 9) is filled.
+    """Run and judge legs (L, 14) in order; fill `counts` (L, 9).
 
     `how`: the method of arcs, and whether their error starts as that against the rounded radius;
-    `mechanics`: axes (3, 5) and states (3, 6) of `camtool.kernels.play`, which go on.
+    `mechanics`: axes (3, 5) and states (3, 6) of `camtool.kernels.play`; the states continue.
     """
     cdef Int number, method
     cdef Int[::1] leg, count
@@ -1100,7 +1107,7 @@ cdef void _judge_leg(
     Int[::1] leg, Int method, double step_mm, double[:, ::1] axes, double[:, ::1] states,
     Int[::1] count, Judge judge, Room room
 ) noexcept:
-    """Run and judge a leg from the state in `room` on."""
+    """Run and judge a leg, beginning with the state in `room`."""
     cdef Int x, y, end_x, end_y, at_x, at_y, low, high, expected, entered, remaining, size, filled
     cdef Int passes, way_x, way_y, more
     cdef Int[::1] path_x, path_y, state, other
@@ -1229,13 +1236,15 @@ cdef class LandingSearch:
 cpdef land(
     Int[:, ::1] arcs, double[::1] sweeps, double units_per_step, Int most_units, double sagitta
 ):
-    """Return (N, 3) landings of arcs (N, 7) with wanted sweeps (N,) > 0 rad: where to end each.
+    """Return the landings (N, 3) of arcs (N, 7) with wanted sweeps (N,) > 0 rad: where the block
+    of each arc is to end.
 
-    At its end if all paths meet it; otherwise in this order: the last step from which the closing
-    line goes on without turning an axis round (each such reversal costs the machine a whole
-    compensation) and does not leave the arc by more than `sagitta` steps; the step nearest to the
-    end within that reach; the last step that can be written at all. None when lines do as well:
-    the whole arc lies within that reach, or no step of its paths can be written.
+    An arc lands at its end if all paths meet it; otherwise, in this order: at the last step from
+    which the closing line continues without a reversal of an axis (each reversal costs the machine
+    a whole compensation) and does not leave the arc by more than `sagitta` steps; at the step
+    nearest to the end within that reach; at the last step that can be written at all. There is
+    none when lines do as well: the whole arc lies within that reach, or no step of its paths can
+    be written.
     """
     cdef Int k, room
     cdef LandingSearch search
@@ -1253,12 +1262,13 @@ cpdef land(
 
 
 cdef inline double _radius(Int x, Int y) noexcept:
-    """Steps; the root of a whole number, and so nearest to the truth."""
+    """Return √(x² + y²), steps, with a single rounding since the root is of an integer."""
     return math.sqrt(float(x * x + y * y))
 
 
 cdef Int _reach(double radius, double sagitta) noexcept:
-    """Iterations before the end within which one line may replace the rest of the arc.
+    """Return the number of iterations before the end within which one line may replace the rest of
+    the arc.
 
     A chord c leaves its arc by the sagitta s ≈ c²/(8R), so c = √(8 R s); a path piece of n
     iterations is at most √2·n long.
@@ -1267,7 +1277,7 @@ cdef Int _reach(double radius, double sagitta) noexcept:
 
 
 cdef void _begin(Int[::1] arc, Int error, Int[::1] state) noexcept:
-    """Set the state to the start of the arc, with this D."""
+    """Set the state to the start of the arc, with D = `error`."""
     cdef Int x, y, sx, sy
     x, y = arc[START_X], arc[START_Y]
     sx, sy = heading(x, y, arc[CLOCKWISE] != 0)
@@ -1275,9 +1285,9 @@ cdef void _begin(Int[::1] arc, Int error, Int[::1] state) noexcept:
 
 
 cdef Int _hits(Int[::1] arc, Int x, Int y, Int low, Int high, Int[::1] state) noexcept:
-    """Return the iteration in low … high at which the controller, D = 0 at the start, would
-    stop if the block's end were (x, y); −1 when it would not, or not about there with the other
-    start of D, which is that against the rounded radius."""
+    """Return the iteration in low … high at which the controller, with D = 0 at the start, would
+    stop if the block's end were (x, y). −1 when it would not, or would not stop about there with
+    the other start of D, which is that against the rounded radius."""
     cdef Int met, other, radius, error
     _begin(arc, 0, state)
     met = first_at(state, x, y, high)
@@ -1294,7 +1304,7 @@ cdef Int _hits(Int[::1] arc, Int x, Int y, Int low, Int high, Int[::1] state) no
 
 
 cdef bint _represents(Int steps, LandingSearch search) noexcept:
-    """Return True if a whole number of units means this step."""
+    """Return True if there is a whole number of units that means this step."""
     cdef Int size, units
     size = abs(steps)
     units = int(size * search.units_per_step + 0.5)
@@ -1302,8 +1312,8 @@ cdef bint _represents(Int steps, LandingSearch search) noexcept:
 
 
 cdef bint _lands(Int[::1] arc, Int row, Int first, LandingSearch search) noexcept:
-    """Return True if position `row` of the path, which began behind iteration `first`, can be
-    written and the controller stops there and not earlier, whatever D was."""
+    """Return True if position `row` of the path, which began after iteration `first`, can be
+    written and the controller stops there and not earlier, whichever start of D it has."""
     cdef Int x, y, iteration
     x, y = search.path_x[row], search.path_y[row]
     if not _represents(x + arc[CENTRE_X], search) or not _represents(y + arc[CENTRE_Y], search):
@@ -1313,7 +1323,8 @@ cdef bint _lands(Int[::1] arc, Int row, Int first, LandingSearch search) noexcep
 
 
 cdef void _fill_path(Int[::1] arc, Int first, Int count, LandingSearch search) noexcept:
-    """Compute the positions after the iterations first + 1 … first + count, D = 0 at the start."""
+    """Compute the positions after the iterations first + 1 … first + count, with D = 0 at the
+    start."""
     cdef Int[::1] path_x, path_y
     _begin(arc, 0, search.state)
     skip(search.state, first)
@@ -1324,7 +1335,7 @@ cdef void _fill_path(Int[::1] arc, Int first, Int count, LandingSearch search) n
 cdef void _mark_onward(Int[::1] arc, Int count, LandingSearch search) noexcept:
     """Mark the positions from which the line to the arc's end reverses no axis.
 
-    The direction of an axis is that of its last step on the path. Before its first one it is that
+    The direction of an axis is that of its last step on the path. Before its first step it is that
     of the motion, which at (x, y) is along (y, −x) clockwise; 0 (exactly there) allows both.
     """
     cdef Int k, turn, along_x, along_y, on_x, on_y
@@ -1342,7 +1353,7 @@ cdef void _mark_onward(Int[::1] arc, Int count, LandingSearch search) noexcept:
 
 
 cdef void _store_landing(Int row, Int first, LandingSearch search, Int[::1] out) noexcept:
-    """Store the landing at this position."""
+    """Store the position `row` as the landing."""
     out[LANDING_X], out[LANDING_Y] = search.path_x[row], search.path_y[row]
     out[ITERATION] = first + row + 1
 
@@ -1350,7 +1361,8 @@ cdef void _store_landing(Int row, Int first, LandingSearch search, Int[::1] out)
 cdef void _land(
     Int[::1] arc, double sweep_rad, double sagitta, LandingSearch search, Int[::1] out
 ) noexcept:
-    """Fill `out` (3,) for one arc (7,), as `land` says; left alone when there is no landing."""
+    """Fill `out` (3,) with the landing of one arc (7,), as `land` describes; leave it unchanged
+    when there is none."""
     cdef double radius, latest
     cdef Int end_x, end_y, low, high, met, near, _, first, count, row, min_square, off_x, off_y, square
     cdef Int upto, room
