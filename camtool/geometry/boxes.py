@@ -43,13 +43,14 @@ MAX_COMPARISONS = 4_000_000_000
 
 
 class BoxIndex:
-    """A packed tree over boxes (K, 4) xmin, ymin, xmax, ymax: which of them touch others?
+    """A search tree over boxes (K, 4), xmin, ymin, xmax, ymax, that finds those which touch other
+    boxes.
 
     `FAN` boxes that lie near each other are a block, `FAN` blocks one of the next level, up to a
     single one; each level is four arrays, without pointers. A search goes down level by level, for
-    many boxes at once, into the blocks that they touch. Few boxes stay in the order in which they
-    are given, in which those of a path are neighbours; many are put into that of Hilbert's curve,
-    since paths that surround each other are not. The order decides on time alone.
+    many boxes at once, into the blocks that they touch. Few boxes stay in the given order, in
+    which those of a path are neighbours; many are sorted along Hilbert's curve, since paths that
+    surround each other are not neighbours. The order affects the time alone, not the result.
     """
 
     def __init__(self, boxes: Floats) -> None:

@@ -306,8 +306,11 @@ def joints(ends: Ends, reach: float) -> Joints:
 
 
 class _Joining(Struct, eq=False):
-    """The joints so far: `mates`, `node` and `branches` as of `Joints`; of each set of joined
-    paths the first one (`above`), its `segments` and its `arcs`."""
+    """The joints made so far: `mates`, `node` and `branches` as in `Joints`.
+
+    Joined paths form a set: `above` leads from each path to the first of its set, which has the
+    number of `segments` and `arcs` of all.
+    """
 
     ends: Ends
     mates: Ints

@@ -36,7 +36,7 @@ class Curve(Protocol):
 
     @property
     def breaks(self) -> Floats:
-        """(k,) parameters, k ≥ 2."""
+        """Parameters (k,), k ≥ 2, of the ends and of possible corners."""
         ...
 
     def point(self, t: Floats) -> Floats:
@@ -86,7 +86,7 @@ class BezierCurve(Struct, frozen=True, eq=False):
 
     @property
     def breaks(self) -> Floats:
-        """(2,): 0 and 1."""
+        """Parameters (2,): 0 and 1."""
         return np.array([0.0, 1.0])
 
     def point(self, t: Floats) -> Floats:
@@ -119,7 +119,7 @@ class EllipseCurve(Struct, frozen=True, eq=False):
 
     @property
     def breaks(self) -> Floats:
-        """(2,): 0 and the size of the sweep."""
+        """Parameters (2,): 0 and the size of the sweep."""
         return np.array([0.0, abs(self.end - self.start)])
 
     def point(self, t: Floats) -> Floats:
@@ -197,7 +197,7 @@ class SplineCurve(Struct, frozen=True, eq=False):
 
     @property
     def breaks(self) -> Floats:
-        """(k,) the distinct knots of the domain."""
+        """Distinct knots (k,) of the domain."""
         return distinct(self.knots[self.degree : len(self.control) + 1])
 
     def point(self, t: Floats) -> Floats:

@@ -46,7 +46,8 @@ PATHS_AT_A_TIME = 256
 
 
 class Nearest(Struct, frozen=True, eq=False):
-    """For P points: `distance` (P,) mm to the nearest segment and its row, `segment` (P,)."""
+    """The nearest segment to each of P points: the distance (P,) mm, and the row `segment`
+    (P,)."""
 
     distance: Floats
     segment: Ints
@@ -149,7 +150,8 @@ def each_approach(
 
 
 class _PathRows(Struct, frozen=True, eq=False):
-    """Paths and their `segments` with boxes (K, 4), path after path from `first` (M+1,) on."""
+    """Paths with their segments, and the boxes (K, 4) of these; the segments of path i are
+    first[i] to first[i + 1]."""
 
     paths: Polylines
     segments: Segments
@@ -225,8 +227,8 @@ def near_paths(lines: Polylines, targets: Polylines, reach_mm: float) -> Iterato
 
 
 class _PathBoxes(Struct, frozen=True, eq=False):
-    """Boxes (M, 4) of paths and (K, 4) of their segments, path after path from `first` (M+1,)
-    on."""
+    """Boxes (M, 4) of paths and (K, 4) of their segments; those of path i are first[i] to first[i
+    + 1]."""
 
     paths: Floats
     segments: Floats

@@ -127,8 +127,8 @@ class Healing(Struct, frozen=True):
 
 
 class FitError(Struct, frozen=True):
-    """Distance between what was drawn and the paths that stand for it, mm: largest, and rms over
-    what is not drawn so itself; zeros when all is."""
+    """Distance between what was drawn and the paths that stand for it, mm: the largest, and the
+    rms over segments that differ; zeros if all paths are as drawn."""
 
     max_mm: float = 0.0
     rms_mm: float = 0.0

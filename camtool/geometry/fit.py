@@ -251,7 +251,7 @@ def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
 
 
 class _NodeColumns(Struct, eq=False):
-    """Nodes while they grow."""
+    """The columns of nodes, as in `Nodes`, while nodes are still inserted."""
 
     t: Floats
     point: Floats

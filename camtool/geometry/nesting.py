@@ -47,7 +47,7 @@ class Nesting(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def levels(self) -> Levels:
-        """The levels where every closed path is a holder."""
+        """The levels if every closed path counts as a holder."""
         return self.levels_by(self.lines.closed)
 
     def levels_by(self, holders: Bools) -> Levels:

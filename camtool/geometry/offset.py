@@ -314,7 +314,7 @@ def _turns_about(points: Floats, lines: Polylines) -> Ints:
 
 
 class Stages(Struct, frozen=True, eq=False):
-    """The stages of an offset to the left: to print, to draw, to test."""
+    """The results of all stages of an offset to the left, for printing, drawing and tests."""
 
     raw: RawOffset
     trimmed: RawOffset
@@ -613,12 +613,13 @@ class Slices(Struct, frozen=True, eq=False):
 
     @property
     def span(self) -> Floats:
-        """(S, 2) t0 and t1."""
+        """Fractions (S, 2): t0 and t1 of each slice."""
         return np.column_stack([self.t0, self.t1])
 
     @property
     def ends(self) -> tuple[Ints, Ints, int]:
-        """from_node and to_node (S,), and how many nodes there are."""
+        """Nodes (S,) at which slices begin, nodes (S,) at which they end, and the number of
+        nodes."""
         return self.from_node, self.to_node, len(self.nodes)
 
 

@@ -163,7 +163,7 @@ def _is_full_circle(rows: Floats) -> bool:
 
 
 class MergedPaths(Struct, frozen=True, eq=False):
-    """The paths after merging, and how many segments went."""
+    """The paths after merging, and the number of segments that were merged into others."""
 
     lines: Polylines
     count: int

@@ -75,7 +75,8 @@ def unit_or_mm(options: ReadOptions, why: str) -> Units:
 
 
 class Found(Struct, frozen=True, eq=False):
-    """What a reader found, for `assemble`: pieces and marks in mm, and the unit that they had."""
+    """The content that a reader found in a file, in mm, from which `assemble` makes a Drawing:
+    pieces, marks, callouts, and the unit that the file had."""
 
     pieces: list[Piece]
     units: Units

@@ -43,9 +43,9 @@ IS_DRAWN_TWICE = "is drawn twice"
 
 
 class Cleaned(Struct, frozen=True, eq=False):
-    """Paths, the piece that each came from (M,), and what was left out.
+    """Paths, the piece that each came from (M,), and counts of what was left out.
 
-    `duplicates` pieces of `duplicates_mm` were drawn twice.
+    `duplicates` pieces, with a length of `duplicates_mm`, were drawn twice.
     """
 
     lines: Polylines
@@ -225,7 +225,8 @@ TINY_SHARE = 0.5
 
 
 class Healed(Struct, frozen=True, eq=False):
-    """Contours, the pieces that each is made of, the gaps, and what was mended."""
+    """Contours; `members`, the pieces that each is made of; the gaps; and counts of the
+    repairs."""
 
     lines: Polylines
     members: tuple[tuple[int, ...], ...]
@@ -346,7 +347,8 @@ def distance_from_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
 
 
 class _Joined(Struct, frozen=True, eq=False):
-    """K segments between the rows `begin` and `end` (K,) of `vertices` (N, 3)."""
+    """K segments, each between the vertices of the rows `begin` and `end` (K,) of `vertices` (N,
+    3)."""
 
     vertices: Floats
     begin: Indices

@@ -50,12 +50,12 @@ class Piece(Struct, frozen=True, eq=False):
 
     @property
     def where(self) -> str:
-        """For messages: layer and source."""
+        """The place of the piece for messages: layer and source."""
         return f"layer {self.layer}, {self.source}"
 
     @property
     def kind(self) -> str:
-        """The first word of the source."""
+        """The kind of the entity: the first word of the source."""
         return self.source.partition(" ")[0]
 
 
@@ -73,7 +73,7 @@ NAMED = 12
 
 
 class NoMatchError(DrawingError):
-    """A pattern that chooses nothing of a drawing."""
+    """A pattern that matches nothing in the drawing."""
 
     def __init__(self, what: str, pattern: str, file: str, names: Sequence[str]) -> None:
         listed = ", ".join(sorted(names)[:NAMED]) + (" …" if len(names) > NAMED else "")

@@ -68,7 +68,8 @@ _CHOICES_KEPT = 64
 
 
 class Letter(Struct, frozen=True, eq=False):
-    """`points` (n, 2) of all parts; each contour is the count of points (2 to 4) of its parts."""
+    """The shape of a letter: the control points (n, 2) of all its parts; for each contour the
+    number of points (2 to 4) of each part; and its advance."""
 
     points: Floats
     contours: tuple[tuple[int, ...], ...]
@@ -85,10 +86,12 @@ class Letter(Struct, frozen=True, eq=False):
 
 
 class Font(Struct, frozen=True, eq=False):
-    """`letter` gives None for what the font lacks: a blank as wide as `blank` stands there.
+    """A font, in heights of a capital.
 
-    `em`, the size that a font is asked for by, is in heights of a capital, like all of it; the
-    baseline is the foot of an "x", which lies `foot` above the one that the font counts from."""
+    `letter` returns None for a character that it lacks: a blank of the width `blank` takes its
+    place. `em` is the size by which the font is asked for. The baseline is the foot of an "x",
+    which lies `foot` above the font's own.
+    """
 
     name: str
     outlines: bool
@@ -339,7 +342,7 @@ def character_of_number(digits: str) -> str:
 
 
 class Rule(IntFlag):
-    """Lines along a text."""
+    """The lines along a text: underline, strike-through, overline."""
 
     NONE = 0
     UNDER = 1

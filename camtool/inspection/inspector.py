@@ -75,9 +75,11 @@ MAX_EDGES_AT_ONCE = 1_000_000
 
 
 class Inspected(Struct, frozen=True, eq=False):
-    """A dimension in the work frame, the cut of each of its features, and the number of its copy
-    (None for a single part). A depth or thickness has a `floor` instead, and the thickness of the
-    stock, mm (0 for a depth)."""
+    """A dimension in the work frame, with the cut of each of its features, and the number of its
+    copy (None for a single part).
+
+    A depth or thickness has a `floor` instead, and the thickness of the stock, mm (0 for a depth).
+    """
 
     bound: BoundDimension
     cuts: tuple[Cut, ...]
@@ -132,8 +134,10 @@ class _FarCut(Struct, frozen=True, eq=False):
 
 
 class _OtherSetups:
-    """The other set-ups of a part, each posted when a dimension first needs it; `cuts` are the
-    cuts that were found there, by their `id` in the frame of the dimensions."""
+    """The other set-ups of a part, each posted when a dimension first needs it.
+
+    `cuts` are the cuts found there, by the `id` of the same cut in the frame of the dimensions.
+    """
 
     def __init__(self, run: Run) -> None:
         self._run = run
@@ -175,8 +179,11 @@ class _OtherSetups:
 
     @property
     def flip_errors_mm(self) -> list[float | None]:
-        """Greatest distances, mm, by which the set-ups that are turned over may lie beside the
-        first face: of all that cut a feature, this one too; None for one that is not known."""
+        """The largest distances, mm, by which set-ups that are turned over may lie beside the
+        first face; None for one that is not known.
+
+        They are those of all set-ups that cut a feature, this one included.
+        """
         assert self._run.job is not None
         if not self.setups or self._run.job.setup_of is None:
             return []
@@ -185,9 +192,12 @@ class _OtherSetups:
 
 
 class Inspector:
-    """Measure the dimensions of the part that the program of a run makes. `dimensions` can be
-    measured; `findings` say why the others cannot. A feature that another set-up of the part cuts
-    is measured as that set-up cuts it."""
+    """The dimensions of the part that the program of a run makes, ready to be measured on variants
+    of the machine.
+
+    `dimensions` can be measured; `findings` say why the others cannot. A feature that another
+    set-up of the part cuts is measured as that set-up cuts it.
+    """
 
     def __init__(self, run: Run, dimensions: Iterable[Dimension]) -> None:
         """Take a run with a drawing, a job and a verification. Raises OptionError if its job
@@ -365,7 +375,8 @@ class Inspector:
 
     @property
     def edges(self) -> Floats:
-        """Derivatives (3 D, E, 2 or 3) of the values by the position of each machined edge."""
+        """Derivatives (3 D, E, 2 or 3) of the values with respect to the position of each machined
+        edge."""
         return edges_of([(3, _edges_of(each.bound)) for each in self.dimensions])
 
     @property
@@ -375,8 +386,8 @@ class Inspector:
 
     @property
     def flip_errors_mm(self) -> list[float | None]:
-        """Greatest distances, mm, by which the set-ups of features may lie beside each other: one
-        for each that is turned over, where a dimension has features of two; None if not known."""
+        """The largest distances, mm, by which set-ups may lie beside each other: one for each
+        turned-over set-up that cuts a feature; None if not known."""
         return self._others.flip_errors_mm
 
     @property
@@ -545,7 +556,8 @@ def _inspected_depth(run: Run, dimension: Dimension, floor: Floor | None) -> Ins
 
 
 class ToolAt:
-    """Cutting width of the tool of each wanted row at the surface."""
+    """The radius at the surface of the tool of each wanted row, and the height down to which it is
+    as wide."""
 
     def __init__(self, wanted_moves: Toolpath, job: Job, diameter_mm: float | None) -> None:
         """Take the tools of the operations that the wanted moves name; if they name none, one tool

@@ -58,8 +58,8 @@ _EXAMPLES = "write them like H7, ±0.05, +0.1/-0.2 or 19.9 … 20.1"
 class LimitsText(Struct, frozen=True):
     """Limits parsed from text, before the nominal size is known.
 
-    One of them, or a class and its deviations: `iso` ("H7", or ""), `deviations_mm` or `sizes_mm`
-    (lower, upper). `unit` in which their numbers are ("" where they name none).
+    One of these is set, or a class and its deviations: `iso` ("H7", or ""), `deviations_mm`,
+    `sizes_mm` (lower, upper). `unit`: that of their numbers ("" if the text names none).
     """
 
     iso: str = ""

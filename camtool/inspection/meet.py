@@ -135,7 +135,8 @@ class MeetingCase(Struct, frozen=True, eq=False):
 
 
 class JobChanges(Struct, frozen=True):
-    """Changes of a job: of keys, of allowances, and of its machine as `--set` takes them."""
+    """A proposal: changes of keys of a job, of allowances, and of settings of its machine in the
+    form of `--set`."""
 
     changes: tuple[Change, ...] = ()
     left: tuple[Left, ...] = ()
@@ -153,9 +154,12 @@ class JobChanges(Struct, frozen=True):
 
 
 class MeetingTrial(Struct, frozen=True, eq=False):
-    """The result of a proposal. `verdicts` of the dimensions, with the `paths` of the drawing that
-    form each; `missing`: number of dimensions that could not be inspected; `time_s` of the
-    program; `left`: the allowances that should improve it, computed from its edges."""
+    """The result of a proposal.
+
+    `verdicts` of the dimensions, with the `paths` of the drawing that form each; `missing`: number
+    of dimensions that could not be inspected; `time_s` of the program; `left`: the allowances that
+    should improve it, computed from its edges.
+    """
 
     proposal: JobChanges
     verdicts: tuple[InspectedReport, ...]
@@ -166,7 +170,7 @@ class MeetingTrial(Struct, frozen=True, eq=False):
 
     @property
     def short(self) -> list[int]:
-        """Dimensions that are not within their limits."""
+        """Indices of the dimensions that are not within their limits."""
         return [k for k, each in enumerate(self.verdicts) if each.verdict != "in"]
 
     @property
@@ -221,11 +225,14 @@ class Need(Struct, frozen=True):
 
 
 class Certificate(Struct, frozen=True):
-    """The reason why no proposal holds: the dimension that is farthest from it, the uncertain
-    inputs that are unknown and unbounded, and each number of the machine that alone, if it were
-    better, would make all dimensions hold. `exact`: True if all would hold with every one of these
-    numbers at its best. `together`: names of its contours that other contours share, so that one
-    allowance applies to all of them."""
+    """The reason why no proposal holds.
+
+    `binding` is the dimension that is farthest from holding, `unknown` are its uncertain inputs
+    that are unknown and unbounded, and `needs` the numbers of the machine that would each, if it
+    alone were better, make all dimensions hold. `exact`: True if all would hold with every one of
+    these numbers at its best. `together`: names of its contours that other contours share, so that
+    one allowance applies to all of them.
+    """
 
     binding: InspectedReport | None
     unknown: tuple[str, ...] = ()
@@ -235,10 +242,13 @@ class Certificate(Struct, frozen=True):
 
 
 class Meeting(Struct, frozen=True, eq=False):
-    """The result of `meet`: the job as it was, the best proposal and its `run`, posted (`brief` as
-    `post_drawing` has it) and inspected, the number of programs tried besides the job as it was,
-    and `all`, True if every necessary one was tried. `text`: the job file of the proposal.
-    `certificate`: the reason why it does not hold, else None."""
+    """The result of `meet`.
+
+    `before` is the original job, `after` the best proposal with its `run`, posted (`brief` as
+    `post_drawing` has it) and inspected; `trials` counts the programs tried besides the original
+    one, and `all` is True if every necessary one was tried. `text`: the job file of the proposal.
+    `certificate`: the reason why it does not hold, else None.
+    """
 
     before: MeetingTrial
     after: MeetingTrial
@@ -425,10 +435,13 @@ def _rows(job: Job) -> Iterator[tuple[int, int, Operation]]:
 
 
 class JobContours(Struct, frozen=True, eq=False):
-    """The contours of a job by the names of their entities. `cut`: names that the operation in
-    each row of the file takes; `walls`: those with allowances; `depth`: number of contours around
-    each; `head`: walls with the same head move alike, since an operation cannot be divided;
-    `most_mm`: largest change of the allowance of a wall; `of_path`: name of each drawn path."""
+    """The contours of a job, by the names of their entities.
+
+    `cut`: names that the operation in each row of the file cuts; `walls`: those of operations with
+    an allowance; `depth`: number of contours around each; `head`: walls with the same head move
+    alike, since an operation cannot be divided; `most_mm`: largest change of the allowance of a
+    wall; `of_path`: name of each drawn path.
+    """
 
     cut: dict[int, tuple[str, ...]]
     walls: dict[int, tuple[str, ...]]
@@ -616,7 +629,8 @@ def paths_of(each: Inspected) -> tuple[int, ...]:
 
 
 class Bench(Struct, eq=False, dict=True):
-    """Post and inspect the jobs of proposals; equal programs are judged once."""
+    """The test bench for proposals: it posts, simulates and inspects their jobs; equal programs
+    are judged once."""
 
     case: MeetingCase
     progress: Progress
@@ -626,17 +640,20 @@ class Bench(Struct, eq=False, dict=True):
 
     @cached_property
     def job(self) -> Job:
-        """Job as it is."""
+        """The original job."""
         return self.case.job_of(self.case.tables)
 
     @cached_property
     def contours(self) -> JobContours:
-        """Contours of the job as it is."""
+        """The contours of the original job."""
         return JobContours.of(self.case, self.job)
 
     def first(self) -> MeetingTrial:
-        """Try the job as it is. Raises the errors of posting it, and OptionError for a program
-        with errors or if no dimension with limits can be inspected."""
+        """Try the original job.
+
+        Raises the errors of posting it, and OptionError for a program with errors or if no
+        dimension with limits can be inspected.
+        """
         run = self._posted(JobChanges(), self.case.target)
         if run.report is None or run.failed:
             errors = (each for each in run.findings if each.severity is Severity.ERROR)
@@ -821,7 +838,7 @@ def _digest(run: Run, machine: Machine) -> bytes:
 
 
 class _Number(Struct, frozen=True):
-    """A number of a machine: its key, its name and its best value."""
+    """A number of a machine that could be better: its key, its present and its best value."""
 
     key: str
     now: float

@@ -219,7 +219,7 @@ def _with_unique_names(dimensions: Sequence[Dimension]) -> Iterator[Dimension]:
 
 
 class _Row(msgspec.Struct, forbid_unknown_fields=True, rename={"start": "from"}):
-    """One [[dimension]]."""
+    """The keys of one [[dimension]] of a tolerance file."""
 
     kind: Literal[
         "diameter",
@@ -244,7 +244,7 @@ class _Row(msgspec.Struct, forbid_unknown_fields=True, rename={"start": "from"})
 
 
 class _File(msgspec.Struct, forbid_unknown_fields=True):
-    """The whole file."""
+    """The keys of a tolerance file."""
 
     general: str = ""
     dimension: list[dict[str, Any]] = []

@@ -109,11 +109,13 @@ CERTAIN = 1e-12
 
 @dataclass(frozen=True)
 class MachineVariant:
-    """A machine that differs from the one in the file, with a tool that is wider by `wider_mm`
-    than in the job, cuts deeper by `deeper_mm`, and has a stock that is thicker by `thicker_mm`;
-    features of other set-ups lie `beside_mm` (x, y) of their places.
+    """A machine that differs from the original, in its own values or in those of a cut.
+
+    Its tool is wider by `wider_mm` than in the job, cuts deeper by `deeper_mm`, and its stock is
+    thicker by `thicker_mm`; features of other set-ups lie `beside_mm` (x, y) of their places.
     Variants of these alone share the machine object of the original, so that its motion is not
-    simulated again."""
+    simulated again.
+    """
 
     machine: Machine
     wider_mm: float = 0.0
@@ -169,14 +171,14 @@ class Direction(Struct, frozen=True):
 
 
 class Input(Struct, frozen=True):
-    """An uncertain input: `name` as in `[uncertainty]` ("x.backlash_mm", "process_mm"), its
-    `value` on the machine, its `standard` uncertainty in the same unit (None: unknown), and a
-    `probe`, a step that reveals the values that depend on it.
+    """An uncertain input of a prediction.
 
-    It moves the machine along `along`, (direction, factor), or the machined edges: then `edges`
-    are its shares in X, Y and Z. Where it is not known, `missing` are the keys that would say it,
-    and `most` bounds by how much its value can be off, as `within` says in words (infinite and
-    "": nothing bounds it).
+    `name` as in `[uncertainty]` ("x.backlash_mm", "process_mm"), `value` on the machine,
+    `standard` uncertainty in the same unit (None: unknown), and a `probe`, a step that reveals the
+    values that depend on it. It moves the machine along `along`, (direction, factor), or the
+    machined edges: then `edges` are its shares in X, Y and Z. If it is not known, `missing` are
+    the keys that would tell it, and `most` is an upper bound of its error, explained by the words
+    `within` (infinite and "": nothing bounds it).
     """
 
     name: str
@@ -512,11 +514,11 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
 
     `values` (K,) mm: as simulated on the machine itself; `shifts` (K,) mm: by how much their
     expectations differ from that, where they bend. `sensitivities` (K, P): of edges the root of
-    the sum of their squares; 0 for what is known exactly. `covariance` (K, K) mm²; `variances`
-    (K, P) mm² its diagonal by input, and `alone` (K, P) mm² that of each input if only it were
-    uncertain. `probed` (K, P) mm: by how much a step changes the value, where an input is not
-    known, else 0. `runs`: variants that were simulated. `drawn` (N, K) mm: the values of machines
-    drawn at random, without what shifts single edges, of which `scatter` (K,) mm is the standard
+    the sum of their squares; 0 for what is known exactly. `covariance` (K, K) mm²; `variances` (K,
+    P) mm² its diagonal by input, and `alone` (K, P) mm² that of each input if only it were
+    uncertain. `probed` (K, P) mm: the change of a value by the probe of an unknown input, else 0.
+    `runs`: number of variants that were simulated. `drawn` (N, K) mm: the values of machines drawn
+    at random, without what shifts single edges, of which `scatter` (K,) mm is the standard
     deviation; `linear` (K,): True where a value is linear in all inputs.
     """
 

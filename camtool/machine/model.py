@@ -277,8 +277,11 @@ class PlayMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MechanicsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """`squareness_rad`: how much the angle between +X and +Y is less than a right one.
-    `seed`: which draws the random repeatability of the axes makes."""
+    """Properties of the mechanics as a whole.
+
+    `squareness_rad`: by how much the angle between +X and +Y is less than a right angle. `seed`:
+    of the random numbers for the repeatability of the axes.
+    """
 
     squareness_rad: Annotated[float, Meta(ge=-MAX_SQUARENESS_RAD, le=MAX_SQUARENESS_RAD)] = 0.0
     seed: Annotated[int, Meta(ge=0, le=(1 << 32) - 1)] = 0
@@ -477,7 +480,7 @@ class Machine(
 
     @property
     def short_digest(self) -> str:
-        """So much of the digest stands in programs: eight hexadecimal digits."""
+        """The first eight hexadecimal digits of the digest, which stand in programs."""
         return self.digest[:8]
 
     @property

@@ -38,7 +38,8 @@ MOVES_AT_ONCE = 1 << 14
 
 
 class Chain(Struct, frozen=True, eq=False):
-    """n moves end to end: points (n+1, 2) mm; centre (n, 2) mm; sweep (n,) rad, 0 for lines."""
+    """A chain of n moves end to end: points (n+1, 2) mm; centre (n, 2) mm; sweep (n,) rad, 0 for
+    lines."""
 
     points: Floats
     centre: Floats

@@ -50,8 +50,8 @@ class Group(Struct, frozen=True):
 
 
 class SweptCut(Struct, frozen=True, eq=False):
-    """The cut of a tool of a constant width along `chains`; where the width is None these are the
-    outlines of the cut."""
+    """The area that a tool of constant width cuts along `chains`; if the width is None, `chains`
+    are the outlines of that area."""
 
     width_mm: float | None
     chains: tuple[Chain, ...]
@@ -67,11 +67,14 @@ class Places(Struct, frozen=True, eq=False):
 
 
 class Content(Struct, frozen=True, eq=False, dict=True):
-    """`outlines` are the paths of the drawing, in `groups` by its layers; `moves` those of the
+    """The content of a picture of a scene.
+
+    `outlines` are the paths of the drawing, in `groups` by its layers; `moves` those of the
     toolpath, empty without one; `places` belong to the drawing; `trace` is the predicted path
     where it is shown, and `engaged` the moves by engagement. `window` (2, 2) mm is the part of the
     plane that is shown, `crop_mm` the part that was asked for; `shown` are the names of layers,
-    None: the usual ones; `times` is the factor of the errors that are drawn."""
+    None: the usual ones; `times` is the factor by which errors are exaggerated.
+    """
 
     scene: Scene
     groups: tuple[Group, ...]
@@ -108,7 +111,7 @@ class Content(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def starts(self) -> Floats:
-        """(S, 2) mm: starts of contours without a plunge."""
+        """Places (S, 2) mm where contours begin without a plunge."""
         starts, plunges = self.moves.starts, self.moves.plunges
         if not len(plunges):
             return starts
@@ -117,7 +120,8 @@ class Content(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def order(self) -> tuple[list[str], list[Place]]:
-        """The numbers of contours, from 1, and where these begin; of many contours only some."""
+        """The numbers of contours, from 1, as texts, and the places where these begin; if there
+        are many, only some."""
         starts: list[Place] = self.moves.starts.tolist()
         step = 1 if len(starts) <= MAX_NUMBERED else round(round_step(len(starts) / MAX_NUMBERED))
         numbers = [k for k in range(len(starts)) if k == 0 or (k + 1) % step == 0]
@@ -125,7 +129,7 @@ class Content(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def swept(self) -> tuple[SweptCut, ...]:
-        """The cuts, each as wide as its tool cuts at the surface, where that is known."""
+        """The cuts, each as wide as its tool cuts at the surface, if that is known."""
         scene, toolpath = self.scene, self.scene.toolpath
         swept: list[SweptCut] = []
         if scene.tool_mm:
@@ -146,12 +150,12 @@ class Content(Struct, frozen=True, eq=False, dict=True):
 
     @property
     def stock(self) -> tuple[Chain, ...]:
-        """The outline of the stock, where it is known."""
+        """The outline of the stock, if it is known."""
         return self._box(self.scene.stock_mm)
 
     @property
     def passed_over(self) -> tuple[Chain, ...]:
-        """The box that tools and holders pass over, where it is known."""
+        """The box that tools and holders pass over, if it is known."""
         return self._box(self.scene.swept_mm)
 
     @staticmethod
@@ -173,12 +177,12 @@ class Content(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def reversals(self) -> Floats:
-        """(R, 2) mm: where X or Y reverses."""
+        """Places (R, 2) mm where X or Y reverses."""
         return NOWHERE if self.scene.toolpath is None else reversals_of(self.scene.toolpath)
 
     @cached_property
     def worst(self) -> Floats:
-        """(W, 2) mm: where the worst places are drawn."""
+        """Places (W, 2) mm at which the marks of the largest errors are drawn."""
         places = np.array(self.scene.worst, dtype=np.float64).reshape(-1, 2)
         if self.scene.wanted is None or self.times == 1.0:
             return places

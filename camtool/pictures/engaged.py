@@ -22,7 +22,8 @@ TOP_DEG = 180.0
 
 
 class EngagementTrace(Struct, frozen=True, eq=False):
-    """Moves of the slides at a feed: `begin` and `end` (M, 2) mm, and the step (M,) of each."""
+    """Moves of the slides at a feed: `begin` and `end` (M, 2) mm, and the step (M,) of the colour
+    map of each."""
 
     begin: Floats
     end: Floats

@@ -71,7 +71,7 @@ CROSSING_MARK: Look = {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1
 
 
 class LegendEntry(Struct, frozen=True):
-    """A line of the legend: its text, and its swatch as SVG from x 0 to `SWATCH`, centred on
+    """An entry of the legend: its text, and its swatch as SVG from x 0 to `SWATCH`, centred on
     height 0 ("" for none)."""
 
     swatch: str

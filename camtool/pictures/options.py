@@ -27,15 +27,18 @@ MIN_TIMES, MAX_TIMES = 1.0, 1e6
 
 @dataclass(frozen=True, repr=False, eq=False)
 class PictureOptions(FrozenRecord):
-    """`view`: one of VIEWS, the plane picture of moves or a picture of the stock. `size_px` is
-    the width, None: as usual. `crop_mm` (x, y, width, height): only this part of the plane,
-    with more beside or above it where it is very long or very high. `dark`: on a dark ground.
-    `exaggerate`: the factor by which the distance of the predicted path from the wanted one is
-    drawn larger. `polar`: the plot of the radial errors of this circle, from 1, in place of
-    the picture. `layers`: the names of the layers to show, None: the usual ones.
+    """Options of a picture.
 
-    OptionError for a size or a part that makes no picture, a factor out of range, and a part,
-    a factor or layers with `polar` or a view of the stock."""
+    `view`: one of VIEWS, the plane picture of moves or a picture of the stock. `size_px` is the
+    width, None: as usual. `crop_mm` (x, y, width, height): only this part of the plane, with more
+    beside or above it where it is very long or very high. `dark`: on a dark ground. `exaggerate`:
+    the factor by which the distance of the predicted path from the wanted one is drawn larger.
+    `polar`: the plot of the radial errors of this circle, from 1, in place of the picture.
+    `layers`: the names of the layers to show, None: the usual ones.
+
+    OptionError for a size or a part that makes no picture, a factor out of range, and a part, a
+    factor or layers with `polar` or a view of the stock.
+    """
 
     size_px: int | None = None
     crop_mm: tuple[float, float, float, float] | None = None

@@ -42,8 +42,9 @@ WANTED_PEN, RUN_PEN = 8.0, 2.0
 
 
 class Overlay(Struct, frozen=True, eq=False):
-    """`window` (2, 2) mm [[xmin, xmax], [ymin, ymax]]; `wanted` the path without any error;
-    `runs` (name, lines of points (n, 2) mm) of the variants, in the order of the legend."""
+    """The content of an overlay: `window` (2, 2) mm [[xmin, xmax], [ymin, ymax]]; `wanted`, the
+    path without any error; `runs` (name, lines of points (n, 2) mm) of the variants, in the order
+    of the legend."""
 
     title: str
     window: Floats

@@ -58,8 +58,11 @@ FITS = 3
 
 
 class PageLayout(Struct, frozen=True, eq=False):
-    """`head` is the SVG of title and notes, `rows` the legend; the first row is centred on
-    `legend_y`, the scale bar on `bar_y`; `width` and `height` are those of the page."""
+    """The layout of a page.
+
+    `head` is the SVG of title and notes, `rows` the legend; the first row is centred on
+    `legend_y`, the scale bar on `bar_y`; `width` and `height` are those of the page.
+    """
 
     head: str
     view: View
@@ -175,8 +178,8 @@ CLEAR_OF_TOP = 2.3
 
 
 class MapScale(Struct, frozen=True):
-    """The end of the colour map, which begins at 0, and its name; `step` is the distance of its
-    numbers, None: round ones, and the end."""
+    """The scale of a colour map: its upper end `top` (it begins at 0) and its name; `step` is the
+    distance of its numbers, None for round numbers and the end."""
 
     top: float
     title: str = "error (µm)"

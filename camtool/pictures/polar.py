@@ -151,8 +151,8 @@ PENS = ((FEED, SPREAD), (BACK, BACK_SPREAD))
 
 
 class Dial(Struct, frozen=True):
-    """Middle of the plot, its radius, that of the programmed circle, units per µm, µm from ring
-    to ring."""
+    """The geometry of a polar plot: its middle, its radius, the radius of the programmed circle,
+    units of the page per µm, and µm from ring to ring."""
 
     middle: tuple[float, float]
     outer: float

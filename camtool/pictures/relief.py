@@ -55,9 +55,12 @@ GLOSS = 0.05
 
 
 class Camera(Struct, frozen=True):
-    """A view along the horizontal direction `direction` (x, y) of length 1, from above the table
-    by the angle with this `sine`; the lamp stands in the direction `lamp` (to the right, away from
-    the viewer), `rise` times as high as it is far away."""
+    """A camera that looks along the horizontal `direction` (x, y) of length 1, from above the
+    table by the angle with this `sine`.
+
+    The lamp stands in the direction `lamp` (to the right, away from the viewer), and `rise` times
+    as high as it is far away.
+    """
 
     direction: tuple[float, float]
     sine: float
@@ -95,10 +98,13 @@ seen at one scale; "front" and "side" are those of a drawing, level with the tab
 
 
 class Stage(Struct, frozen=True, eq=False):
-    """The lit scene: heights (NY, NX) mm of the stock and of the board around it, `margin` cells
-    wide; the heights of the board (`bottom_mm`) and of the deepest floor (`deep_mm`). `marks`
-    (NY, NX): how the marks of the tool catch the light, −1 … 1. `tint` (NY, NX, 3): the light of
-    the colours of floors, in place of those of the material."""
+    """The scene to be lit: heights (NY, NX) mm of the stock, and of a board around it that is
+    `margin` cells wide.
+
+    `bottom_mm` and `deep_mm`: heights of the board and of the deepest floor. `marks` (NY, NX): how
+    much the marks of the tool catch the light, −1 … 1. `tint` (NY, NX, 3): the light of the
+    colours of floors, in place of those of the material.
+    """
 
     heights: Heights
     corner_mm: tuple[float, float]
@@ -219,9 +225,13 @@ def picture_of(
 
 
 class _LitStage(Struct, frozen=True, eq=False):
-    """A stage and what the lamp does to its cells (NY, NX): how far they face it as floors and as
-    walls, the height below which it does not shine, the share of the sky that is open, and how far
-    the board shows this (0 at its edges). `open_board`: the light of the board in the open."""
+    """A stage with the light on its cells (NY, NX).
+
+    `flat`, `steep`: how directly they face the lamp as floors and as walls; `shade`: the height
+    below which it does not shine; `open_sky`: the share of the sky that they see; `fade`: how much
+    of all this the board shows, 0 at its edges. `open_board`: the light of the board far from the
+    stock.
+    """
 
     stage: Stage
     flat: Heights

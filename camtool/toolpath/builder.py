@@ -130,7 +130,7 @@ class ToolpathBuilder:
 
     @property
     def runs(self) -> Ints:
-        """(N,) index of the run of each row."""
+        """Index (N,) of the run of each row."""
         self._gather()
         return np.asarray(self._columns["run"].to_array(), dtype=np.int64)
 

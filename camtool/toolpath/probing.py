@@ -54,8 +54,8 @@ class ProbeStep(Struct, frozen=True):
 
 
 class ProbeAnswer(Struct, frozen=True):
-    """The place, mm in the work frame, at which the probe touched, or else where the tool stands
-    behind a step."""
+    """The answer of the machine to a step: the place, mm in the work frame, at which the probe
+    touched, or at which the tool now stands."""
 
     place: Place
     has_touched: bool = False
@@ -146,10 +146,13 @@ Measured = Generator[ProbeStep, ProbeAnswer, dict[str, float]]
 
 
 class Touch(Struct, frozen=True):
-    """How places are touched: up to `reach_mm` away at `fast` mm/min, then `back_mm` back and
-    again at `slow`. Between the places the tool moves at `travel` and stops where it touches.
-    `radius_mm`: radius of the tool or of the tip of the probe. `sets_zero`: what is measured
-    gets the coordinates `values`, 0 where there are none."""
+    """The way in which places are touched: up to `reach_mm` away at `fast` mm/min, then `back_mm`
+    back and again at `slow`.
+
+    Between the places the tool moves at `travel` and stops if it touches anything. `radius_mm`:
+    radius of the tool or of the tip of the probe. `sets_zero`: what is measured gets the
+    coordinates `values`, 0 if there are none.
+    """
 
     reach_mm: float = 10.0
     fast: float = 100.0
@@ -434,7 +437,8 @@ def grid_over(toolpath: Toolpath, step_mm: float) -> tuple[Floats, Floats]:
 
 
 class Box(Struct, frozen=True):
-    """A clamp, or another place where no tool may be: `x_mm`, `y_mm` from and to, `top_mm`."""
+    """A clamp, or another place where no tool may be: its extents `x_mm` and `y_mm` (from, to) and
+    the height of its top."""
 
     name: str
     x_mm: tuple[float, float]

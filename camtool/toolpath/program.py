@@ -15,7 +15,8 @@ from camtool.machine.model import Machine
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """`data` for the machine `target`, to be stored with `extension` (".pic").
+    """A program for one machine: its bytes `data`, the name of the machine's target, and the file
+    `extension` (".pic").
 
     `row_of_block` (B,) gives for each block the row of the toolpath that it came from, −1 for
     blocks of the dialect's own (header, footer).

@@ -34,8 +34,11 @@ MIN_NODES = 2
 
 
 class Surface(Struct, frozen=True, eq=False):
-    """Heights `z` (NY, NX) mm at the nodes `x` (NX,), `y` (NY,) mm, which ascend; ValueError when
-    the shapes disagree or a height is not finite."""
+    """A measured surface: heights `z` (NY, NX) mm at the nodes `x` (NX,), `y` (NY,) mm, which
+    ascend.
+
+    ValueError when the shapes disagree or a height is not finite.
+    """
 
     x: Floats
     y: Floats
@@ -334,8 +337,9 @@ VERTICAL_MM = 1e-6
 
 
 class _Cuts:
-    """The cuts of a toolpath, and how far each has come in its run, which is the cutting between
-    two rapids: `begin`, `end` (C,) from run + 0 to run + 1, by the length in the plane."""
+    """The cuts of a toolpath with their places along their run, the cutting between two rapids:
+    `begin` and `end` (C,) are the number of the run plus the share, 0 to 1, of its length in the
+    plane."""
 
     def __init__(self, toolpath: Toolpath) -> None:
         toolpath = toolpath.first(toolpath.executed_rows)

@@ -21,8 +21,8 @@ ROWS_AT_ONCE = 1 << 14
 
 
 class WordColumn(Struct, frozen=True, eq=False):
-    """One word in M blocks: the text before its number, the number in whole units of its last
-    decimal (M,), and the mask of blocks that have it (M,).
+    """One word of M blocks: the text before its number, the number as `units` (M,) of its last
+    decimal, and the mask `written` (M,) of blocks that have it.
 
     `kept`: decimals that are written even if they are 0 (None: all); `digits`: least number of
     digits before the point; `plus`: write a sign before numbers that are not negative;
@@ -40,7 +40,7 @@ class WordColumn(Struct, frozen=True, eq=False):
 
     @property
     def style(self) -> tuple[int, int, int, int, int]:
-        """The columns of a style, as `camtool.kernels.words` takes them."""
+        """The five numbers of a style, in the form of `camtool.kernels.words`."""
         decimals_kept = self.decimals if self.kept is None else self.kept
         return self.digits, self.decimals, decimals_kept, int(self.plus), int(self.bare_point)
 

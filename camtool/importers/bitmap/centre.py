@@ -73,7 +73,7 @@ def thin(dark: Bools) -> Bools:
 
 
 def _edge(pixels: Ints, pixels_set: Bools, neighbours: Ints) -> Ints:
-    """Return those of the `pixels` that have at least one light neighbour."""
+    """Return those `pixels` that have at least one light neighbour."""
     inner = np.ones(len(pixels), dtype=np.bool_)
     for step in neighbours:
         inner &= pixels_set[pixels + step]
@@ -97,8 +97,11 @@ def _removable(neighbours: Bools, turn: int) -> Bools:
 
 
 class _Graph:
-    """The pixels of thin lines and their links: to neighbours in rows and columns, and to diagonal
-    ones where no such neighbour leads there."""
+    """The pixels of thin lines, each linked to its neighbours.
+
+    A pixel is linked to neighbours in its row and column, and to diagonal ones that no such
+    neighbour connects to it.
+    """
 
     def __init__(self, thin: Bools, dark: Bools) -> None:
         self.dark = np.pad(dark, 1)

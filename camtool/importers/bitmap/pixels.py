@@ -45,8 +45,8 @@ _BROKEN: tuple[type[Exception], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class PixelPicture:
-    """The darkness of its pixels, and how many of them the file says are an inch, None where it
-    says nothing; `kind`: PNG or JPEG."""
+    """A decoded picture: the darkness `ink` (H, W) of its pixels, 0 white to 1 black, and the
+    pixels per inch that the file states, or None; `kind`: PNG or JPEG."""
 
     ink: Ink
     dpi: tuple[float, float] | None

@@ -99,8 +99,11 @@ class _Shape(Struct, frozen=True, eq=False):
 
 
 class PixelStrokes(Struct, frozen=True, eq=False):
-    """`vertices` (n, 3) x, y, bulge; of an open path the last one is its end. `off` (n, 2): the
-    largest and the rms distance of the points from the segment that leaves each vertex."""
+    """Lines and arcs that stand for points.
+
+    `vertices` (n, 3) x, y, bulge; of an open path the last one is its end. `off` (n, 2): the
+    largest and the rms distance of the points from the segment that leaves each vertex.
+    """
 
     vertices: Floats
     off: Floats
@@ -360,7 +363,7 @@ def _meeting_point(one: _Shape, other: _Shape, place: Floats, limit: float) -> F
 
 
 class _Run(Struct, frozen=True, eq=False):
-    """Points that one line or arc stands for."""
+    """Successive points, `part` (n, 2), and the one line or arc that stands for them."""
 
     part: Floats
     shape: _Shape

@@ -38,15 +38,18 @@ _HATCHES = frozenset(("HATCH", "MPOLYGON"))
 
 
 class BulkLines(Struct, frozen=True, eq=False):
-    """LINEs by columns: `ends` (K, 2, 3) in the units of the file."""
+    """LINEs as columns: their handles (K,) and `ends` (K, 2, 3), in the units of the file."""
 
     handles: list[str]
     ends: Floats
 
 
 class Bulk(Struct, frozen=True, eq=False):
-    """`others` (N,): the tags that are left to ezdxf; the LINEs that follow the one of a handle;
-    the vertices (K, 5) of the LWPOLYLINE of a handle."""
+    """What was read in bulk, and the mask `others` (N,) of the tags that are left to ezdxf.
+
+    `lines`: the LINEs that follow a LINE, by the handle of that one; `vertices` (K, 5) of an
+    LWPOLYLINE, by its handle.
+    """
 
     others: Bools
     lines: Mapping[str, BulkLines] = field(default_factory=dict)

@@ -54,8 +54,8 @@ _NO_ASCII = re.compile(r"[^\x00-\x7f]")
 
 
 class Loaded(Struct, frozen=True):
-    """An `ezdxf` document, the header as the file itself says it, all that was mended, and the
-    LINEs that follow some LINE of the document, by its handle."""
+    """An `ezdxf` document; the header variables that the file itself sets; the repairs; and the
+    LINEs that were read in bulk, by the handle of the LINE of the document that they follow."""
 
     document: Any
     header: dict[str, Any] = field(default_factory=dict)
@@ -97,7 +97,7 @@ def load(data: bytes, file: str, *, plain: bool = False) -> Loaded:
 
 
 class _Kept(logging.Handler):
-    """Keeps the messages of warnings and errors."""
+    """A log handler that keeps warnings and errors in a list."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)

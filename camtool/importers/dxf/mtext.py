@@ -122,7 +122,8 @@ def _columns(entity: Any) -> Columns:
 
 
 class _Reader:
-    """Tokens to paragraphs; `fonts` collects what was used."""
+    """The reader that makes paragraphs of the tokens of an MTEXT; `fonts` lists those that were
+    used."""
 
     def __init__(self, look: TextLook, font: tuple[WantedFont, str]) -> None:
         self._look = look
@@ -240,9 +241,10 @@ class Glue(Enum):
 
 
 class MTextCell(Struct, frozen=True, eq=False):
-    """A word; a stack of two (`bar` "^" no bar, "/" a bar, "#" a slanted one); or glue.
+    """A word, a stack of two texts, or the space between two words (glue), in one look.
 
-    `lift` is 0 on the baseline of the line, 1 in its middle, 2 at its top.
+    A stack has a `bar`: "^" no bar, "/" a bar, "#" a slanted one. `lift` is 0 on the baseline of
+    the line, 1 in its middle, 2 at its top.
     """
 
     look: TextLook
@@ -254,7 +256,7 @@ class MTextCell(Struct, frozen=True, eq=False):
 
     @property
     def width(self) -> float:
-        """From its left end to its right end."""
+        """Width, from the left to the right end."""
         widths = self.look.width(self.text), self.look.width(self.lower)
         return sum(widths) if self.bar == "#" else max(widths)
 
@@ -266,8 +268,11 @@ class MTextCell(Struct, frozen=True, eq=False):
 
 
 class Paragraph(Struct, frozen=True, eq=False):
-    """`share` 0 left, 0.5 centred, 1 right; indents of the first line, the others, the right edge;
-    `stops` of tabs (x, share); `blank` is the height of an empty line."""
+    """A paragraph of an MTEXT.
+
+    `share`: 0 left, 0.5 centred, 1 right; `indents` of the first line, the others, and the right
+    edge; `stops` of tabs as (x, share); `blank` is the height of an empty line.
+    """
 
     cells: tuple[MTextCell, ...]
     share: float
@@ -280,8 +285,11 @@ class Paragraph(Struct, frozen=True, eq=False):
 
 
 class MTextLine(Struct, frozen=True, eq=False):
-    """Cells with the x of their left ends; the last one ends at `right`, `margin` stays free after
-    it; `stretch` marks a line that is widened to its column."""
+    """A line of text: its cells, each with the x of its left end.
+
+    The last cell ends at `right`, `margin` stays free after it; `stretch` marks a line that is
+    widened to its column.
+    """
 
     cells: tuple[tuple[float, MTextCell], ...]
     height: float
@@ -293,7 +301,8 @@ class MTextLine(Struct, frozen=True, eq=False):
 
 
 class Columns(Struct, frozen=True, eq=False):
-    """`width` 0 does not wrap; `heights` of all columns but the last, which takes the rest."""
+    """The columns of a text: their `width` (0: lines do not wrap), the `gutter` between them, and
+    the `heights` of all but the last, which takes the rest."""
 
     width: float
     gutter: float = 0.0
@@ -301,7 +310,8 @@ class Columns(Struct, frozen=True, eq=False):
 
 
 class Pitch(Struct, frozen=True, eq=False):
-    """`exact` is the height that all lines count for, 0 for each its own."""
+    """The spacing of lines: a `factor`, and the height `exact` that every line counts for, or 0 if
+    each has its own."""
 
     factor: float
     exact: float = 0.0
@@ -314,7 +324,7 @@ class Pitch(Struct, frozen=True, eq=False):
 
 
 class Placed(Struct, frozen=True, eq=False):
-    """A line in its column; the first line's top lies at y = 0."""
+    """A line in its column, and the y of its baseline; the top of the first line lies at y = 0."""
 
     column: int
     baseline: float

@@ -82,8 +82,8 @@ class _Attributes(SimpleNamespace):
 
 
 class _Entity(SimpleNamespace):
-    """An entity or a layer of a `kind`, with its attributes `dxf` and the numbers that it has many
-    of."""
+    """An entity or a layer of a `kind`, with its attributes `dxf` and lists of numbers such as
+    vertices, under ezdxf's names."""
 
     def dxftype(self) -> str:
         """Return the kind of the entity, such as "LINE"."""

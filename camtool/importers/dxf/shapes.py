@@ -38,9 +38,11 @@ than this along X and Y, otherwise to the world's Z axis."""
 
 
 class Plane(Struct, frozen=True, eq=False, dict=True):
-    """(x, y) ↦ origin + x·u + y·v, all (2,) in mm; `scale` is 0 unless circles stay circles.
+    """A plane of the drawing as it is seen from above: (x, y) ↦ origin + x·u + y·v, all (2,) in
+    mm.
 
-    `rise` (2,): how the origin moves for each unit of elevation.
+    `scale` is that of circles, 0 if they become ellipses; `sign` is −1 if the map mirrors. `rise`
+    (2,): how the origin moves for each unit of elevation.
     """
 
     u: Floats
@@ -79,7 +81,7 @@ class Plane(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def turn(self) -> float:
-        """The direction of u, rad."""
+        """Direction of u, rad."""
         return math.atan2(float(self.u[1]), float(self.u[0]))
 
     def at(self, elevation: float) -> Plane:
@@ -95,7 +97,8 @@ class Plane(Struct, frozen=True, eq=False, dict=True):
 
 
 class WorldMap(Struct, frozen=True, eq=False):
-    """World to mm: p ↦ p @ linear + offset, with linear (3, 3) and offset (3,)."""
+    """The map from the world of an entity to mm: p ↦ p @ linear + offset, with linear (3, 3) and
+    offset (3,)."""
 
     linear: Floats
     offset: Floats
@@ -143,7 +146,8 @@ class WorldMap(Struct, frozen=True, eq=False):
 
 
 class DxfShape(Struct, frozen=True, eq=False):
-    """`vertices` (n, 3) mm and `off_mm` of a `Piece`; `lacks` names what was not applied."""
+    """A path: `vertices` (n, 3) mm and `off_mm` as in `Piece`; `lacks` names a property that was
+    not applied, such as a width."""
 
     vertices: Floats
     closed: bool

@@ -61,9 +61,9 @@ Codes = npt.NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Tags(ABC):
-    """The tags of a file, comments (999) included: `codes` (N,) and as many values.
+    """The tags of a file, comments (999) included: group codes `codes` (N,), and a value for each.
 
-    `notes`: what is damaged without harm to the rest, one phrase each.
+    `notes`: phrases about damage that does not affect the rest.
     """
 
     codes: Codes
@@ -109,7 +109,7 @@ class Tags(ABC):
 
     @cached_property
     def marks(self) -> Ints:
-        """(M,) the tags that begin something: their code is 0."""
+        """Rows (M,) of the tags at which an entity or section begins: their code is 0."""
         return np.flatnonzero(self.codes == 0)
 
     @cached_property
@@ -148,8 +148,11 @@ class BinaryTags(Tags):
 
 @dataclass(frozen=True, eq=False)
 class TextTags(Tags):
-    """The tags of ASCII DXF: line 2k of `data` is the code of tag k, line 2k + 1 its value; line j
-    begins at the byte `at[j]`. `escaped`: signs may be written as \\U+00D6 or \\M+1…"""
+    r"""The tags of ASCII DXF: line 2k of `data` is the code of tag k, line 2k + 1 its value; line
+    j begins at the byte `at[j]`.
+
+    `escaped`: characters may be written as \U+00D6 or \M+1…
+    """
 
     data: bytes = b""
     at: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros(1, dtype=np.int32))
@@ -201,7 +204,8 @@ _MARK = np.zeros(1, dtype=np.int32)
 
 
 class Section(Struct, frozen=True):
-    """Tags `begin` (its 0 SECTION) to `end` (its 0 ENDSEC; None when that is missing)."""
+    """A section of the file: its tags from `begin`, its 0 SECTION, to `end`, its 0 ENDSEC (None
+    when that is missing)."""
 
     name: str
     begin: int
@@ -209,7 +213,8 @@ class Section(Struct, frozen=True):
 
 
 class DxfSections(Struct, frozen=True):
-    """The sections, the index of the end mark (None when it is missing), and what is wrong."""
+    """The sections of a file, the row of the end mark `eof` (None when it is missing), and the
+    faults in their order."""
 
     sections: tuple[Section, ...]
     eof: int | None

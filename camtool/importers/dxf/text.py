@@ -46,17 +46,18 @@ _STACKED_LETTERS = 4
 
 
 class TextContour(Struct, frozen=True, eq=False):
-    """Parts (k, 3) of control points, k = 2 (line), 3 (quadratic) or 4 (cubic), end to end."""
+    """A contour of a letter: parts (k, 3) of control points, k = 2 (line), 3 (quadratic) or 4
+    (cubic), end to end."""
 
     parts: list[Floats]
     closed: bool
 
 
 class TextShape(Struct, frozen=True, eq=False):
-    """The curves of a text, in world coordinates.
+    """The curves of a text, in world coordinates, and the font that they are drawn with.
 
-    `font` is what it is drawn with; `substituted` names the wanted font when that is another one
-    ("" otherwise); `missing` holds each character that the font lacks, as often as it occurs.
+    `substituted` names the wanted font if it is another one, else ""; `missing` holds each
+    character that the font lacks, as often as it occurs.
     """
 
     contours: list[TextContour]
@@ -87,7 +88,7 @@ def text_strokes(entity: Any, mode: str) -> TextShape:
 
 
 class _Place(Struct, frozen=True, eq=False):
-    """(x, y) ↦ origin + x·u + y·v, all (3,)."""
+    """The plane of a text in the world: (x, y) ↦ origin + x·u + y·v, all (3,)."""
 
     origin: Floats
     u: Floats

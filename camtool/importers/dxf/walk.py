@@ -52,9 +52,12 @@ CALLOUTS = frozenset(("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION"))
 
 
 class DxfScope(Struct, frozen=True, eq=False):
-    """The context of entities in a space or inside an INSERT: the map to mm, the `look` of the
-    INSERT, and the `blocks` around. `within` is added to the source of each path; `source`, that
-    of a dimension and the like, replaces the sources of its parts."""
+    """The context of entities in a space or inside an INSERT.
+
+    `frame` maps to mm, `look` is that of the INSERT, `blocks` are the names of those around.
+    `within` is added to the source of each path; `source`, that of a dimension and the like,
+    replaces the sources of its parts.
+    """
 
     frame: WorldMap
     look: DxfLook | None = None
@@ -64,7 +67,8 @@ class DxfScope(Struct, frozen=True, eq=False):
 
 
 class DxfWalk:
-    """Visits entities and collects what they give."""
+    """The walk through a space: reads its entities, and collects pieces, marks, callouts, and
+    counts of what was left out."""
 
     def __init__(self, loaded: Loaded, file: str, options: ReadOptions) -> None:
         self.loaded, self.file, self.options = loaded, file, options
@@ -571,7 +575,8 @@ class DxfLook(Struct, frozen=True):
 
 
 class DxfLooks(Struct):
-    """The looks of all entities of a document, by what these say of themselves."""
+    """The looks of the entities of a document, resolved from their attributes and the table of
+    layers."""
 
     layers: dict[str, DxfLook]
     _known: dict[tuple[Any, ...], DxfLook] = msgspec.field(default_factory=dict)

@@ -61,7 +61,7 @@ def parse_matlab(text: str, file: str) -> PointTable:
 
 
 class _Job:
-    """The drawing that the arrays describe together."""
+    """The job of the router that the arrays describe together, checked against each other."""
 
     def __init__(self, file: str, values: dict[str, MatlabArray]) -> None:
         self.file = file
@@ -254,7 +254,7 @@ def parse_assignments(text: str, file: str, names: tuple[str, ...]) -> dict[str,
 
 
 class _Parser:
-    """`name = number` and `name = [ rows ]`, one after the other."""
+    """The parser of statements `name = number` and `name = [ rows ]`."""
 
     def __init__(self, file: str, text: str, names: tuple[str, ...]) -> None:
         self.file = file

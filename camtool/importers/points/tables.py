@@ -24,8 +24,8 @@ COLUMNS = (2, 3)
 class Stroke(Struct, frozen=True, eq=False):
     """A polyline: `points` (n, 2) or (n, 3) of x, y, bulge in the file's unit.
 
-    `source` says where it stands in the file; `closed` is None when the file does not say: then
-    a stroke is closed that ends where it began.
+    `source` says where it stands in the file. `closed` is None when the file does not say: then
+    the stroke is closed if it ends where it began.
     """
 
     points: Floats
@@ -35,9 +35,10 @@ class Stroke(Struct, frozen=True, eq=False):
 
 
 class PointTable(Struct, frozen=True, eq=False):
-    """All strokes of a file, its unit (None when the file names none), and where that comes from.
+    """All strokes of a file, its unit (None when the file names none), and the reason `why` for
+    that unit.
 
-    `mm_per_unit` is needed for a unit that is none of `camtool.units` alone.
+    `mm_per_unit` is given only for a unit that `camtool.units` does not have.
     """
 
     strokes: list[Stroke]
@@ -94,9 +95,12 @@ def parse_lines(text: str, file: str) -> PointTable:
 
 
 class _Lines(Struct):
-    """The format of a table as far as its lines have shown it: the separator `parted` ("" for
-    blanks), `columns`, and the first lines with a decimal comma, a decimal point, and a proof of
-    the comma's meaning."""
+    """The reader of a table, and the format that its lines have shown so far.
+
+    `parted` is the separator ("" for blanks), `comma_line` and `point_line` the first lines with a
+    decimal comma and a decimal point, `proven`: a line has proved that its commas are decimal
+    ones.
+    """
 
     file: str
     parted: str | None = None
@@ -357,7 +361,8 @@ def _refuse_constant(name: str) -> NoReturn:
 
 
 class _Walker:
-    """Checks every field on the way down; `file` is for the messages."""
+    """The reader of a JSON document: it checks every field, and names the bad one; `file` is for
+    the messages."""
 
     def __init__(self, file: str) -> None:
         self.file = file

@@ -24,7 +24,8 @@ _NO_NAME = re.compile(
 
 
 class Body(Struct, frozen=True, eq=False):
-    """A solid, or a shell, face, wire or edge that belongs to none: a `TopoDS_Shape`."""
+    """A part to be outlined, a `TopoDS_Shape`, with its layer and colour: a solid, or a shell,
+    face, wire or edge that belongs to none."""
 
     shape: Any
     layer: str

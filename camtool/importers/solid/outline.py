@@ -27,7 +27,10 @@ SECTION_MARGIN = 0.1
 
 
 class SolidOutline(Struct, frozen=True, eq=False):
-    """The wires of one face; `kind` is "face", "section", "wire" or "edge"."""
+    """The outline of a face: its wires as paths; or loose edges.
+
+    `kind` is "face", "section", "wire" or "edge".
+    """
 
     kind: str
     layer: str
@@ -36,9 +39,11 @@ class SolidOutline(Struct, frozen=True, eq=False):
 
 
 class Outlines(Struct, frozen=True, eq=False):
-    """All that is drawn; `levels` are the heights at which solids were taken, `span` is the
-    height of the whole model from its lowest to its highest point; of the `missed` bodies nothing
-    is drawn, for these reasons."""
+    """The outlines of a model.
+
+    `levels` are the heights of the faces or sections of its solids, `span` the lowest and highest
+    z of the whole model, and `missed` counts the bodies of which nothing is drawn, by the reason.
+    """
 
     outlines: list[SolidOutline] = field(default_factory=list)
     levels: list[float] = field(default_factory=list)
@@ -228,7 +233,8 @@ files of other programs within 1e-5 and more."""
 
 
 class EdgePath(Struct, frozen=True, eq=False):
-    """Vertices (n, 3) x, y, bulge and `off` (n, 2) of a `Piece`, in the model's unit."""
+    """An edge or a wire as a path: vertices (n, 3) x, y, bulge and errors `off` (n, 2) as those of
+    a `Piece`, in the model's unit."""
 
     vertices: Floats
     closed: bool

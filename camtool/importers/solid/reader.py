@@ -254,7 +254,8 @@ _SPELLINGS = {"inches": "inch", "in": "inch", "feet": "foot", "ft": "foot"}
 
 
 class FileUnit(Struct, frozen=True):
-    """`mm` per unit of the file, which its reader has applied already; None: unknown."""
+    """The unit of a file: `mm` for each of its units, which its reader has applied already (None:
+    unknown), and the reason `why`."""
 
     why: str
     mm: float | None = 1.0

@@ -54,7 +54,11 @@ class _Compound(Struct, frozen=True):
 
 
 class _Rule(Struct, frozen=True):
-    """Steps from the element outwards; `child[i]`: step i + 1 is the parent of step i."""
+    """A rule for one selector: its compounds as steps from the element outwards, and its
+    declarations.
+
+    `child[i]` is true if step i + 1 must be the parent of step i, false for any ancestor.
+    """
 
     steps: tuple[_Compound, ...]
     child: tuple[bool, ...]
@@ -63,7 +67,8 @@ class _Rule(Struct, frozen=True):
 
     @property
     def weight(self) -> tuple[int, int, int, int]:
-        """Ids, classes, types, and then the later rule."""
+        """Sort key of the cascade: counts of ids, classes and types, and then the order, so that
+        the later rule wins."""
         return (
             sum(len(step.ids) for step in self.steps),
             sum(len(step.classes) + len(step.tests) for step in self.steps),
@@ -73,7 +78,7 @@ class _Rule(Struct, frozen=True):
 
     @property
     def cost(self) -> int:
-        """Estimate the work of a match."""
+        """Estimated work of a match."""
         return 1 if len(self.steps) == 1 else _CHAIN_COST
 
     def matches(self, node: Node) -> bool:
@@ -93,7 +98,8 @@ class _Rule(Struct, frozen=True):
 
 
 class CssRules(Struct):
-    """All rules of a document, found by what their element must be; `left_out` counts others."""
+    """The rules of all sheets, indexed by an id, class or tag that their element must have;
+    `left_out` counts rules that are not understood."""
 
     left_out: int = 0
     _by_id: dict[str, list[_Rule]] = field(default_factory=lambda: defaultdict(list))

@@ -32,8 +32,8 @@ from camtool.records import replace
 
 
 class SvgPage(Struct, frozen=True):
-    """`to_mm`: user units of the root to mm; `viewport` (width, height) in user units where
-    known; the unit, and the findings about it."""
+    """The page of a drawing: `to_mm` maps user units of the root to mm; `viewport` is its width
+    and height in user units, if known; and the unit, with findings about it."""
 
     to_mm: Affine
     viewport: tuple[float, float] | None
@@ -42,7 +42,8 @@ class SvgPage(Struct, frozen=True):
 
 
 class _Side(Struct, frozen=True):
-    """Width or height as written: in mm where it is a size, and its unit ("" without one)."""
+    """A width or height as written: `text`, its size in mm if it has one, and its unit ("" without
+    one)."""
 
     text: str
     size_mm: float | None

@@ -107,7 +107,8 @@ _COUNTED = (*SHAPES, "text", "flowRoot", "image", "use")
 
 
 class SvgWalk:
-    """Visits the tree and collects pieces and counts."""
+    """The walk through the tree: it collects pieces, and counts of what was left out or not
+    applied."""
 
     def __init__(self, root: Node, page: SvgPage, options: ReadOptions) -> None:
         self.options = options
@@ -418,7 +419,8 @@ def _cost(subpaths: list[Subpath]) -> int:
 
 
 class Notes(Struct):
-    """Counts by kind and reason; of faults the first of each kind is kept."""
+    """Counts of elements by kind and reason; of faults the text of the first of each kind is
+    kept."""
 
     used: Counter[str] = field(default_factory=Counter)
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
@@ -475,7 +477,7 @@ Fitted = tuple[Floats, Floats | None]
 
 
 class CurveFitter:
-    """Maps subpaths into mm; fits curves within one tolerance.
+    """Converts subpaths from user units to vertices in mm, with curves fitted within one tolerance.
 
     With `box_only` a Bézier curve whose control points lie within the box of all that came before
     is its chord: it lies in their convex hull, and so leaves the box as it is. Of 900 such curves

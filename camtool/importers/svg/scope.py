@@ -88,8 +88,11 @@ FRAME_SHARE = 1e-6
 
 
 class ClipFrame(Struct, frozen=True):
-    """`to_mm` from the units inside; `viewport` what % are of inside; `box` in the units outside,
-    whose map to mm is `outer`."""
+    """The frame of an inner svg or a symbol.
+
+    `to_mm` maps from the units inside, `viewport` is the size there to which percentages refer;
+    `box` is the frame in the units outside, which `outer` maps to mm.
+    """
 
     to_mm: Affine
     viewport: tuple[float, float]

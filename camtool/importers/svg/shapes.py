@@ -54,7 +54,8 @@ Segment = SvgLines | Bezier | Arc
 
 
 class Subpath(Struct, frozen=True, eq=False):
-    """A start (2,) and what follows it; `closed` paths have a straight line back, if any."""
+    """A subpath: its start (2,) and the segments that follow; if `closed`, a straight line leads
+    back, unless it ends at its start."""
 
     start: Floats
     segments: tuple[Segment, ...]
@@ -198,10 +199,10 @@ def _odd(text: str) -> str:
 
 
 class _Pen(Struct):
-    """Draws: the point where it stands, the open subpath, and what is done.
+    """The pen that draws path data: its place, the open subpath, and the finished subpaths.
 
-    The open subpath is its segments, and after them the corners of straight lines that are not
-    yet among them.
+    The open subpath is its segments, and after them the corners of straight lines that are not yet
+    among them.
     """
 
     place: complex = 0j
@@ -342,8 +343,11 @@ FONT_UNITS = {"em": 1.0, "ex": 0.5}
 
 
 class Lengths(Struct, frozen=True):
-    """Turns lengths into user units: `viewport` (width, height) is what % are of, where known;
-    a user unit is a px; em and ex are of `font_px`, ex half of it."""
+    """Converts lengths to user units.
+
+    A user unit is a px; percentages are of the `viewport` (width, height), if it is known; em is
+    `font_px`, ex half of it.
+    """
 
     options: ReadOptions
     viewport: tuple[float, float] | None

@@ -59,16 +59,18 @@ _BETWEEN = re.compile(r"[\s,]+")
 
 @dataclass(frozen=True, eq=False)
 class TextRun:
-    """Letters of one style and what they draw."""
+    """Letters of one style, as subpaths."""
 
     subpaths: list[Subpath]
     style: SvgStyle
 
 
 class Text(Struct, frozen=True, eq=False):
-    """The runs of a text and the count of its letters; `unseen`: why some of them are not drawn;
-    `lacks`: what fonts lack; `plainer`: weights that fonts are not
-    asked for."""
+    """A text drawn: its runs, and the number of its letters.
+
+    `unseen`: reasons why some of them are not drawn; `lacks`: what fonts lack; `plainer`: font
+    weights that were replaced by regular or bold.
+    """
 
     runs: list[TextRun]
     letters: int
@@ -115,8 +117,8 @@ def _keeps_blanks(node: Node | None) -> bool:
 
 
 class _Flow(Struct, eq=False):
-    """Letters in order, blanks collapsed, each with its style; `at` has the places that elements
-    give to letters by their number."""
+    """The letters of a text in order, blanks collapsed, and the style of each; `at` holds the x,
+    y, dx and dy that elements give to a letter, by its index."""
 
     style_of: Callable[[Node, SvgStyle], SvgStyle]
     lengths_of: Callable[[SvgStyle], Lengths]
@@ -217,7 +219,7 @@ def _check(letter: str) -> None:
 
 
 class _Words(Struct, frozen=True, eq=False):
-    """Letters of one look from x on, the baseline at y (down)."""
+    """Letters of one look in a row, from x to `end`, with the baseline at y (down)."""
 
     letters: str
     style: SvgStyle
@@ -229,7 +231,8 @@ class _Words(Struct, frozen=True, eq=False):
 
 
 class _Writer(Struct, eq=False):
-    """Fonts by mode; what they lacked, by font and by the font wanted."""
+    """The choice of fonts for a mode of text; `missing` collects the characters that a font lacks,
+    by the font used and the one wanted."""
 
     mode: str
     missing: dict[tuple[str, str], set[str]] = field(default_factory=dict)

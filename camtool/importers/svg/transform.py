@@ -29,7 +29,7 @@ _SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
 
 
 class Affine(Struct, frozen=True):
-    """A map of the plane; `outer @ inner` does `inner` first."""
+    """An affine map of the plane; `outer @ inner` applies `inner` first."""
 
     a: float = 1.0
     b: float = 0.0
@@ -109,7 +109,7 @@ def parse_numbers(text: str, name: str) -> list[float]:
 
 
 class SvgBox(Struct, frozen=True):
-    """A rectangle: its corner of least x and y, and its size."""
+    """A rectangle: its corner with the least x and y, and its size."""
 
     x: float
     y: float

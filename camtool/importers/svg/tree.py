@@ -146,7 +146,8 @@ def _parser(builder: _Builder, data: bytes) -> Any:
 
 
 class _Builder(ContentHandler):
-    """Collects nodes; `root_name` is the name of the root, whatever it is."""
+    """The handler of parser events that builds the tree of nodes; `root_name` is the name of the
+    root element, also of one that is no SVG."""
 
     def __init__(self) -> None:
         super().__init__()
