@@ -1,8 +1,8 @@
 """Search for pairs of boxes near each other, before anything is computed exactly.
 
-`BoxIndex` is asked which of its boxes touch others; `box_pairs` and `near_points` stand upon it.
-`touching_boxes` gives the pairs within one set, no more than a bound. `IndexedCurves` are segments
-as compiled loops take them, with the tree of boxes that those loops go down themselves.
+`BoxIndex` finds which of its boxes touch others; `box_pairs` and `near_points` use it.
+`touching_boxes` gives the pairs within one set, up to a bound. `IndexedCurves` are segments in the
+form of the compiled loops, with the tree of boxes that those loops search themselves.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ IN_ORDER = 2048
 """An index of no more boxes than this keeps their order: sorting takes longer than it saves."""
 
 MIN_LIMIT_MM, LIMIT_GROWTH = 1e-6, 4.0
-"""A search for the nearest move begins within a small limit, at least the first, and grows it by
-the second while none is found."""
+"""A search for the nearest move begins within a small limit, at least the first, and multiplies it
+by the second while none is found."""
 
 NOWHERE = (np.inf, np.inf, -np.inf, -np.inf)
 """A box that touches none."""
@@ -245,7 +245,7 @@ def nearest_pairs(
     reach = times * distance + slack_mm
     places = np.column_stack([points, np.zeros(len(points))])
     pairs = [np.empty((2, 0), dtype=np.int64)]
-    # One search has one reach: points of about the same one are searched for together.
+    # One search has one reach, so that points with similar ones are searched for together.
     octave = np.frexp(reach)[1]
     for each in distinct(octave):
         rows = np.flatnonzero(octave == each)

@@ -189,10 +189,11 @@ CLASS_RATIO = 2.0
 SAME_TURN_RAD = 1e-6
 
 MAX_PAIRS = 4_000_000
-"""More pairs of ends than this are not examined together: nearer ones are joined first."""
+"""At most this many pairs of ends are examined together; if there are more, the nearer ones are
+joined first."""
 
 MAX_NEIGHBOURS = 64
-"""Number of other ends that are examined for each end where very many ends meet at one point."""
+"""At a point where very many ends meet, each is compared with at most this many others."""
 
 
 class Ends(Struct, frozen=True, eq=False):
@@ -286,7 +287,7 @@ def joints(ends: Ends, reach: float) -> Joints:
     is_alone = np.ones(len(joining.mates), dtype=np.bool_)
     exact = one, other = _near_pairs(ends, every, POSITION_EPS_MM)
     is_alone[one], is_alone[other] = False, False
-    # Of very many ends at one point not all pairs are examined at once.
+    # Where very many ends meet at one point, their pairs are examined in several rounds.
     while joining.join_clusters(one, other) and len(one) >= MAX_NEIGHBOURS:
         free_ends = free_ends[joining.mates[free_ends] < 0]
         one, other = _near_pairs(ends, free_ends, POSITION_EPS_MM)
@@ -375,7 +376,7 @@ class _Joining(Struct, eq=False):
         has_free[label[is_free]] = True
         meeting = np.flatnonzero((size[label] > 2) & has_free[label])
         for number in distinct(self.node[meeting]).tolist():
-            self.branches.pop(number, None)  # it is part of a larger one
+            self.branches.pop(number, None)  # this branch is part of a larger one
         label += len(label)
         self.node[meeting] = label[meeting]
         self.branches.update(_first_ends(self.ends, meeting, label))
@@ -416,7 +417,7 @@ _MIX = np.int64(0x9E3779B1)
 def _near_pairs(ends: Ends, free_ends: Ints, reach: float) -> tuple[Ints, Ints]:
     """Return the pairs of free ends of one group within `reach`, the lesser end first."""
     points = ends.points[free_ends]
-    # Wider than the reach by a hair, so that rounding cannot put near points two cells apart.
+    # Slightly wider than the reach, so that rounding cannot put near points two cells apart.
     cells = np.column_stack([ends.group[free_ends // 2], np.floor(points / (reach * _WIDER))])
     cells = cells.astype(np.int64)
     order = np.lexsort((cells[:, 2], cells[:, 1], cells[:, 0]))
@@ -568,7 +569,7 @@ def join_chains(lines: Polylines, chains: Chains) -> list[JoinedChains]:
         is_path, part = _try_chains(lines, remaining)
         if len(part.chains):
             results.append(part)
-        # A ring may still be an open chain; an open chain only its pieces.
+        # A ring is tried again as an open chain; an open chain gives its single paths.
         retried = remaining.select(~is_path, np.zeros(len(remaining), dtype=np.bool_))
         open_ones = ~remaining.rings[~is_path]
         pieces = retried.select(open_ones, retried.rings)

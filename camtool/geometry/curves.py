@@ -23,7 +23,7 @@ MAX_PIECE_RAD = 0.5 * math.pi
 """A piece of an ellipse covers at most this: beyond, its weights spread its points unevenly."""
 
 JUMP_SHARE = 1e-9
-"""Pieces of a spline that lie apart by more than this share of its size are no curve."""
+"""A spline whose pieces lie apart by more than this share of its size has a gap and is refused."""
 
 
 class Curve(Protocol):

@@ -34,10 +34,10 @@ from camtool.kernels.offsets import curves_within, nearest_distances
 POINTS_AT_A_TIME = 1 << 14
 
 NEAREST_SPARE_MM = 1e-9
-"""Segments that are farther than the nearest one by no more than this are measured again ..."""
+"""Segments that are at most this much farther than the nearest one are measured exactly, ..."""
 
 NEAREST_SPARE = 1e-9
-"""... and by no more than this part of the distance."""
+"""... and so are those farther by at most this share of the distance."""
 
 FEW_PAIRS = 256
 """Up to this many distances are computed one by one: building an index would take longer."""
@@ -85,7 +85,7 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
     distance = np.empty(len(points))
     segment = np.empty(len(points), dtype=np.int64)
     for begin in range(0, len(points), POINTS_AT_A_TIME):
-        # A copy: the loops take no array that nobody may write to.
+        # A copy: the compiled loops accept writable arrays only.
         batch = np.array(points[begin : begin + POINTS_AT_A_TIME])
         reach = nearest_distances(batch, curves.rows, curves.tree)
         reach += NEAREST_SPARE_MM + NEAREST_SPARE * reach

@@ -185,7 +185,7 @@ class Drawing:
     def __post_init__(self) -> None:
         count = len(self.paths)
         if not len(self.off_mm):
-            # One number, seen as many.
+            # One number, broadcast to the shape.
             exact = np.broadcast_to(0.0, (len(self.paths.vertices), 2))
             object.__setattr__(self, "off_mm", exact)
         if self.off_mm.shape != (len(self.paths.vertices), 2):

@@ -247,7 +247,7 @@ def narrowest_wall(lines: Polylines) -> Feature | None:
         return None
 
     boxes = segment_boxes(segments)
-    # The tree wants paths numbered in the order in which they stand here.
+    # The compiled tree needs paths numbered in the order in which they occur here.
     number = np.cumsum(np.diff(segments.path, prepend=segments.path[:1]) != 0)
     best, row, other = closest(
         np.ascontiguousarray(segments.start), np.ascontiguousarray(segments.end),

@@ -39,10 +39,10 @@ from camtool.kernels.fits import (
 )
 
 Judged = tuple[float, float, float]
-"""Of a chain its largest and its rms deviation from the curve, and the length of that, mm."""
+"""Largest and rms deviation of a chain from the curve, and the length of the curve, mm."""
 
 MAX_SIZE_MM = 1e100
-"""The products of larger numbers would not be finite."""
+"""Products of larger numbers would overflow."""
 
 SEARCH_SHARE = 0.97
 """The share of the tolerance that the search may use up: errors peak between nodes."""
@@ -208,7 +208,8 @@ def _checked_fit(vertices: Floats, deviations: Judged, ends: Floats) -> Fit:
 # turns when it is as short as one position (`POSITION_EPS_MM`) is a corner or a cusp.
 
 _ASIDE = tuple(10.0**k for k in range(ASIDE_FROM, ASIDE_TO))
-"""Distances aside, as shares of the distance to the next break, at which a tangent is sought."""
+"""Where a derivative vanishes, the tangent is taken beside that place, at these shares of the
+distance to the next break."""
 
 
 class Nodes(Struct, frozen=True, eq=False):
@@ -242,7 +243,8 @@ def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
     nodes = _NodeColumns(t, _finite(curve.point(t)), *directions.both_sides(t))
     is_break = np.arange(len(t)) % each == 0
     for side, column in ((-1.0, nodes.arrive), (1.0, nodes.leave)):
-        # A derivative at a corner is the one of either side.
+        # At a corner the derivative may be that of either side, so that both are taken from beside
+        # it.
         one_sided, derivative = directions.one_sided(breaks, side), column[is_break]
         differs = turns(one_sided, derivative) > CORNER_ANGLE_RAD
         column[is_break] = np.where(differs[:, None], one_sided, derivative)

@@ -6,11 +6,11 @@ region the whole axis is passed, each of its branches from both sides. So nothin
 approximated or pruned: the axis is traced by the boundary itself.
 
     boundary ──samples──▶ discs ──where the partner changes: bisection──▶ intervals
-             ──halved until chords are within the tolerance──▶ Trace
+             ──halved until chords are within the tolerance──▶ MedialTrace
 
-An *interval* is what one element sees of one partner. A sample that one element has of another
-shows that other a place where the first must be seen; so intervals that fall between the first
-samples are found from their other side.
+An *interval* is the part of an element whose discs touch one and the same partner. Each disc is
+seen from both of the elements that it touches; so an interval of one that falls between its
+samples is found from the samples of the other.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ STILL_MM = 1e-6
 searched: at the common centre of several arcs any of them may seem to be the partner."""
 
 MAX_ROUNDS = 200
-"""Samples are halved, and searched from the other side, no more often than this."""
+"""Samples are halved, and completed from the other side, in at most this many rounds."""
 
 
 class MedialTrace(Struct, frozen=True, eq=False):

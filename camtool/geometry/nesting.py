@@ -2,7 +2,7 @@
 
 A point is inside a closed path when it is inside the polygon of its chords, or when it lies
 between a chord and its arc, but not both (XOR, arc by arc). A point exactly on a chord is taken
-as a hair up and to the right of it, the same way in both questions, so that no point counts twice.
+as slightly above and to the right of it, in both tests alike, so that no point counts twice.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, rev
 from camtool.kernels.offsets import HELD, ON_LINE, holds, insides
 
 HOLDERS_AT_A_TIME = 256
-"""Closed paths whose boxes are compared with all others together: it bounds the memory."""
+"""Number of closed paths whose boxes are compared with all others in one batch: it bounds the
+memory."""
 
 
 class Levels(Struct, frozen=True, eq=False):
@@ -101,7 +102,7 @@ class _Pairs(Struct, frozen=True, eq=False):
             smaller = candidates[rank[candidates] > rank[j]]
             if len(smaller) == 0:
                 continue
-            # Most drawings of very many paths hold none within another.
+            # Made only when needed: most drawings of very many paths have none within another.
             places = places or _Places.of(lines)
             for contained, on_line in zip(
                 places.contained_paths(smaller, j), (False, True), strict=True

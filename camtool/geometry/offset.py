@@ -323,7 +323,8 @@ class Stages(Struct, frozen=True, eq=False):
     final_slices: Slices
     loops: list[Ints]
     meeting_paths: Ints
-    """(J, 2) the paths at each common point of two, other than between neighbours."""
+    """Pairs of paths (J, 2) at each common point of two segments, other than between
+    neighbours."""
 
 
 def shape_stages(lines: Polylines, offset: Offset) -> Stages:
@@ -332,7 +333,7 @@ def shape_stages(lines: Polylines, offset: Offset) -> Stages:
     source = source_arrays(Segments.of(lines), raw.kites)
     trimmed = trim_raw(raw, source, offset)
     elements, cutting_elements = trimmed.elements, None
-    # Only where paths meet can what is on their right end what is on their left.
+    # Only where paths meet can elements on their right bound those on their left.
     pairs = _touching_paths(lines)
     if len(pairs):
         right = raw_offset(reverse_lines(lines), replace(offset, limit=math.inf))

@@ -1,12 +1,12 @@
-"""Loose lines and arcs that lie on other ones, wholly or in part, are taken off.
+"""Remove from loose lines and arcs what lies on other ones.
 
-A *loose* path is an open one of a single line, or of arcs on a single circle. What of it lies on
-another path of its group goes; the rest stays, in one piece or more. Longer paths go first, so
-that a short line on a long one goes and the long one stays.
+A *loose* path is an open one of a single line, or of arcs on a single circle. The part of it that
+lies on another path of its group is removed; the rest stays, in one piece or more. Where two loose
+paths overlap, the longer one stays whole.
 
 Everything else stays whole: closed paths, because two contours that share an edge are two parts
 that both need cutting, and open paths of several segments, because they were drawn as one stroke.
-What lies on itself stays too.
+A path that overlaps itself stays too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import Polylines, Segments
 
 SAME_LINE_MM = 1e-4
-"""Lines and arcs nearer to each other than this lie on each other, at most the tolerance."""
+"""Lines and arcs lie on each other if they are nearer than this; the tolerance, if less, replaces
+it."""
 
 
 class Unlapped(Struct, frozen=True, eq=False):
@@ -127,7 +128,8 @@ def _remaining_spans(items: Intervals, laps: Covers, tolerance: float) -> dict[i
     """Return the spans, mm along it, that remain of each loose interval after removing what other
     intervals cover; only of those that lose something."""
     rank = _ranks(items, distinct(np.concatenate([laps.a, laps.b])))
-    # A loose interval yields to what is not loose, and to loose ones that rank before it.
+    # A loose interval gives way to intervals that are not loose, and to loose ones of a higher
+    # rank.
     yields = ~items.loose[laps.b] | (rank[laps.b] < rank[laps.a])
     order = np.argsort(rank[laps.a], kind="stable")
     order = order[yields[order]]

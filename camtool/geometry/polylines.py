@@ -223,7 +223,7 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
         following = rows + 1
         last = following == offsets[path + 1]
         following[last] = offsets[path[last]]
-        # Rows are taken several times as fast as they are indexed.
+        # np.take is several times as fast as indexing.
         start, end = (
             vertices.take(outgoing, axis=0)[:, :2].copy() for outgoing in (rows, following)
         )
@@ -327,7 +327,7 @@ def _refuse(is_bad: Bools, message: str, offsets: Ints) -> None:
     raise GeometryError(message, where=f"path {path}, vertex {row - int(offsets[path])}")
 
 
-# Reversing, rotating and beginning elsewhere: the results are always new polylines.
+# Reversing, rotating, another start: the results are always new polylines.
 
 
 def reverse(p: Polyline) -> Polyline:
@@ -389,8 +389,8 @@ def begin_lines_at(lines: Polylines, begins: Ints) -> Polylines:
     return Polylines._trusted(lines.vertices[low + place], lines.offsets, lines.closed)
 
 
-# Points that are one: taken out of paths, whatever made them coincide (a drawing that repeats
-# them, a scale that brings them together).
+# Repeated points are removed from paths, whatever made them coincide (a drawing that repeats them,
+# a scale that brings them together).
 #
 # Tolerance: POSITION_EPS_MM, below which two points are one. A point stays where it is, so no path
 # moves by more than that.

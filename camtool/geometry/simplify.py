@@ -28,19 +28,20 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 from camtool.kernels.fits import MIN_POINTS, find_runs, furthest_off
 
 NOISE_MM = 1e-7
-"""Points of exact drawings lie on their circle within this."""
+"""Points of drawings without rounding lie on their circle within this."""
 
 DECIMALS = range(1, 7)
 
 GRID_SHARE = 1e-3
-"""A number is rounded when it is off its decimals by no more than this share of the last one."""
+"""A number has so many decimals if it differs from the rounded one by at most this share of the
+last decimal."""
 
 ROUNDING = 0.75
-"""Rounding moves a point by no more than this share of the last decimal (½·√2, and a little)."""
+"""Rounding moves a point by at most this share of the last decimal (½·√2, with a margin)."""
 
 
 HALF_SLACK = 1e-3
-"""An arc of more than a half circle by no more than this share is tried as a half circle first."""
+"""An arc of more than a half circle by at most this share is first tried as a half circle."""
 
 
 def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
@@ -209,7 +210,7 @@ def _merge_vertices(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints
         arrives = bulges[i - 1] != 0.0 and (i > 0 or path.closed)
         leaves = bulges[j] != 0.0
         is_last = not path.closed and j == count - 1
-        # An end of an open path stays where it is, as an arc does.
+        # The ends of open paths stay where they are, and so do the ends of arcs.
         stays = arrives and (leaves or is_last)
         if not (stays or (i == 0 and leaves and not path.closed)):
             keep[i + 1 : j + 1] = False
@@ -227,7 +228,7 @@ def _path_of(path: Polyline, place: Ints, bend: Ints) -> Polyline | None:
     vertices[:, 2] = path.vertices[bend, 2]
     if path.closed and len(vertices) < 3 and not vertices[:, 2].any():
         return None
-    vertices.flags.writeable = False  # it need not be copied
+    vertices.flags.writeable = False  # read-only, so that it is not copied
     step = np.roll(vertices[:, :2], -1, axis=0) - vertices[:, :2]
     shortest = np.hypot(*(step if path.closed else step[:-1]).T).min()
     return Polyline(vertices, path.closed) if shortest > POSITION_EPS_MM else None

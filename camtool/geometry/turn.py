@@ -68,4 +68,4 @@ class Turn(Struct, frozen=True):
 
 
 UNTURNED = Turn()
-"""A part that lies as it is drawn."""
+"""The map of a part that lies as drawn."""

@@ -150,7 +150,7 @@ def assemble(
         made_for=options.scale,
         callouts=tuple(callouts),
     )
-    # What is drawn twice has a finding of its own.
+    # The finding DRAWN_TWICE reports these.
     other_skips = [item for item in clean.skipped if item.reason != IS_DRAWN_TWICE]
     all_findings = [*findings, *skip_findings(skipped, [*unwanted, *other_skips, *repeated])]
     return replace(drawing, findings=(*all_findings, *_drawing_findings(drawing, options)))
@@ -268,8 +268,8 @@ MAX_SIZE_MM = 2000.0
 """A drawing whose longer side is above this was probably read in the wrong unit."""
 
 MAX_GAP_FINDINGS = 20
-"""At most this many gaps get a finding of their own, largest first; one finding counts the
-others."""
+"""At most this many gaps get a finding of their own, the most conspicuous first; one finding
+counts the others."""
 
 MAX_PLACES = 20
 

@@ -27,7 +27,8 @@ BINARY_DXF = b"AutoCAD Binary DXF\r\n\x1a\x00"
 HEAD_BYTES = 4096
 
 MAX_ENTRIES = 100
-"""A ZIP archive is a board's if one of its first entries is."""
+"""A ZIP archive is taken for a board if one of its first entries, so many, is a file of a
+board."""
 
 XML_HEAD_BYTES = 1 << 20
 """The first element of an XML file is searched for in this many bytes, after comments and a
@@ -74,7 +75,7 @@ _OTHERS = {
     ),
     rb"[^\n]{72}S {0,6}\d{1,7}\s": ("is IGES", "export STEP from the program that made it"),
 }
-"""First bytes of what people hand over by mistake, and what to do about it."""
+"""First bytes of files that are often given by mistake, and what to do about them."""
 
 _ZIPPED = {
     b"word/": ("is a document", _EXPORT),

@@ -193,7 +193,7 @@ def segment_numbers(vertices: Floats, begin: Ints | Indices, end: Ints | Indices
     numbers = np.empty(len(begin), dtype=np.uint64)
     for first in range(0, len(begin), SEGMENTS_AT_ONCE):
         batch = slice(first, first + SEGMENTS_AT_ONCE)
-        # Adding 0 makes −0 and 0 one.
+        # Adding 0 turns −0 into 0, so that both give the same number.
         grid, next_grid = (
             (np.round(vertices[rows[batch]] / POSITION_EPS_MM) + 0.0).astype(np.int64)
             for rows in (begin, end)
@@ -217,8 +217,9 @@ def _mix_bits(words: _Words) -> _Words:
     return word ^ (word >> np.uint64(31))
 
 
-# Healing: overlaps taken off, ends joined, arcs recognised (if asked for), specks merged. Each
-# stage is a function of camtool.geometry; here they are put in order and counted.
+# Healing: remove overlaps, join ends, recognise arcs (if the options ask for it), merge tiny
+# segments. Each stage is a function of camtool.geometry; this section calls them in order and
+# counts the repairs.
 
 TINY_SHARE = 0.5
 """Segments up to this share of the tolerance are merged into their neighbours."""
@@ -339,7 +340,7 @@ def distance_from_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
         max_distances = np.maximum.reduceat(drawn_off[drawn.begin[order]], first, axis=0)
         distances[rows[stays]] = max_distances[np.searchsorted(numbers, made_as[stays])]
     if is_gone.any() or not stays.all():
-        del drawn_as, made_as  # the index takes their room
+        del drawn_as, made_as  # frees memory for the index
         _add_distances(
             drawn, drawn_off, result, np.flatnonzero(is_gone), np.flatnonzero(~stays), distances
         )
@@ -408,11 +409,11 @@ def _add_distances(
     drawn one equals. Distances are measured from drawn to result and from result to drawn, and the
     reader's own error is added.
     """
-    # What was drawn, to what is there now: the nearest of it, and what is about as near.
+    # From drawn segments to the result: to the nearest segment, and to others nearly as near.
     for rows, distances, point, row in _near_segments(drawn, is_gone, result, 2.0):
         total = distances[point, None] + drawn_off[drawn.begin[rows[point]]]
         np.maximum.at(off_mm, result.begin[row], total)
-    # What is there now, to what was drawn.
+    # From the result to what was drawn.
     for rows, distances, point, row in _near_segments(result, new, drawn, 1.0):
         total = distances[point, None] + drawn_off[drawn.begin[row]]
         np.maximum.at(off_mm, result.begin[rows[point]], total)
@@ -435,6 +436,6 @@ def _near_segments(
         row = np.repeat(np.arange(len(batch)), len(PLACES))
         points = point_at(segments.of(batch), row, np.tile(PLACES, len(batch)))
         distances, point, other = nearest_pairs(points, moves, times, POSITION_EPS_MM)
-        # Two positions nearer than that are one.
+        # Positions within POSITION_EPS_MM of each other are one.
         distances = np.where(distances > POSITION_EPS_MM, distances, 0.0)
         yield batch[row], distances, point, other

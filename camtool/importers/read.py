@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
 
 MAX_FILE_BYTES = 500_000_000
-"""A larger file is refused before it is read: its drawing would not fit into memory."""
+"""Larger files are refused before they are read: their drawing would not fit into memory."""
 
 STDIN = "<stdin>"
 

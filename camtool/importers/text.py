@@ -24,11 +24,11 @@ from camtool.geometry import hershey
 from camtool.importers.pieces import Unusable
 
 SUBSTITUTES = ("Liberation Sans", "Arimo", "Arial", "Helvetica", "DejaVu Sans", "Noto Sans")
-"""Families that stand in for a font that is not installed, the first that is: most drawings name
-Arial, whose widths the first four share."""
+"""Families that replace a font that is not installed, the first one that is installed: most
+drawings name Arial, whose widths the first four share."""
 
 STROKE_EM = 2048.0 / 1466.0
-"""Size of the stroke font in heights of its capitals, that of Arial: such a font has none."""
+"""Size of the stroke font in heights of its capitals, which it lacks itself: that of Arial."""
 
 _OUTLINES = (".ttf", ".otf", ".ttc")
 _SHAPES = (".shx", ".shp", ".lff")
@@ -297,7 +297,7 @@ MTEXT."""
 MAX_CHARACTERS_NAMED = 20
 
 MAX_NUMBER = 1e60
-"""Sizes and places beyond it are refused: products of a few of them would not be finite."""
+"""Larger sizes and coordinates are refused: products of a few of them would overflow."""
 
 MAX_OBLIQUE_DEG = 85.0
 

@@ -1,10 +1,11 @@
 """Depths of floors: how deep the slides cut the bottom of a pocket, of a groove or of a hole.
 
-A floor is named by a place on it. What belongs to it follows from the wanted solid
+A floor is named by a place on it. Its extent follows from the wanted solid
 (`camtool.stock.wanted`), so from drawing and job and not from the moves: the contour around the
-place with its islands, or the line beside it, without what another operation cuts deeper, and
-without the tabs. Beside walls a band is left out that is wider than the slides are off in the
-plane: there the stock stands to its full height, and widths are other dimensions.
+place with its islands, or the line beside it, without areas that another operation cuts deeper,
+and without the tabs. A band beside walls is left out, which is wider than the error of the slides
+in the plane: within that error the stock may stand to its full height, and that is a matter of
+other dimensions, the widths.
 
 The least and the greatest depth are bounds, proved by branch and bound to `TOLERANCE_MM`, of the
 moves of the predicted slides and of all that may lie beside them. Of a groove or hole whose bottom
@@ -44,23 +45,23 @@ from camtool.toolpath.moves import STOCK_TOP_MM
 SAME_DEPTH_MM = 1e-6
 
 MARGIN_MM = 0.05
-"""Width of the band beside walls in which no depth is measured, besides what the slides are off in
-the plane."""
+"""Width of the band beside walls in which no depth is measured, in addition to the error of the
+slides in the plane."""
 
 TOLERANCE_MM = 1e-4
-"""Least and greatest depth are proved to this, ..."""
+"""The least and the greatest depth are bounded to within this, ..."""
 
 MAX_SQUARES = 300_000
-"""... or as far as so many squares show; the bounds are then wider."""
+"""... or as well as this many squares allow; the bounds are then wider."""
 
 POINTS_APART_MM = 0.1
-"""Pointed grooves are looked at no farther apart than this along their line."""
+"""Largest distance of the points along its line at which a pointed groove is measured."""
 
 LATTICE = 40
-"""Points along each side of the box of a region, of which one becomes its place."""
+"""Number of points along each side of the box of a region, among which its place is chosen."""
 
 Z_WEIGHT = 100.0
-"""Slides lie so many times nearer to their moves in Z than in the plane."""
+"""The Z of slide moves is exact to this many times less than their place in the plane."""
 
 
 class Floor(Struct, frozen=True, eq=False):

@@ -22,11 +22,14 @@ widths are distances. "depth" is that of a floor below the top of the stock, "th
 the stock which is left under it."""
 
 DEPTHS: Final = ("depth", "thickness")
-"""Kinds along Z, of the floor at a place. The drawing has no size of them: what the job
-asks for is nominal unless the file says it."""
+"""Kinds of dimensions along Z, of the floor at a place.
+
+The drawing gives no size for them: the nominal size is what the job asks for, unless the file
+states one.
+"""
 
 ZONES: Final = ("position", "straightness", "roundness", "profile")
-"""Kinds that are the widths of zones of ISO 1101: nothing nominal, and no lower limit."""
+"""Kinds that are widths of zones of ISO 1101: they have no nominal size and no lower limit."""
 
 Place = tuple[float, float]
 

@@ -25,19 +25,19 @@ from camtool.planning.place import AffineMap
 from camtool.records import replace
 
 BIND_MM = 0.01
-"""A place lies on a feature that is no farther away than this: programs round the places that
-dimensions measure to a hundredth."""
+"""A place belongs to a feature that is at most this far away: programs round the places of
+dimensions to a hundredth."""
 
 SAME_CIRCLE_MM = 1e-4
-"""Arcs of one path whose centres and radii differ by no more are one circle."""
+"""Arcs of one path whose centres and radii differ by at most this are one circle."""
 
 SQUARE_RAD = 2e-3
-"""Tolerance of perpendicular and of parallel: 0.1°."""
+"""Tolerance of right angles and of parallel directions: 0.1°."""
 
 SAME_DIRECTION_RAD = 1e-6
 
 FULL_TURN_RAD = 1e-6
-"""Arcs whose sweeps lack at most this angle of a full turn form a closed circle."""
+"""Arcs form a closed circle if their sweeps lack at most this of a full turn."""
 
 
 class CircleFeature(Struct, frozen=True, eq=False):
@@ -382,7 +382,7 @@ def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> li
         if each.distance_mm(place) > BIND_MM:
             continue
         cosine = float(spoke @ direction) / each.radius_mm
-        # A place that is BIND_MM off has turned by up to BIND_MM / radius.
+        # A place that is off by BIND_MM changes the angle by up to BIND_MM / radius.
         if abs(cosine) >= math.cos(min(SQUARE_RAD + BIND_MM / each.radius_mm, 0.5)):
             outermost.append(DistanceEnd(each, "outermost", 1 if cosine > 0.0 else -1))
     return outermost

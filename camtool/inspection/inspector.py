@@ -64,14 +64,15 @@ from camtool.verification.cuts import CutMoves, row_lengths, sample_cuts
 from camtool.verification.slides import SlideTrace
 
 CHORD_MM = 1e-4
-"""Arcs of the slides' path are chords within this, as far as `MAX_POINTS` allows."""
+"""Arcs of the slides' path are approximated by chords within this, as far as `MAX_POINTS`
+allows."""
 
 MAX_POINTS = 400_000
 """Approximate upper bound of the points of a path for inspection: 13 MB."""
 
 
 MAX_EDGES_AT_ONCE = 1_000_000
-"""Edges of drawn parts that are measured together: 8 MB in each array."""
+"""Number of edges of randomly drawn parts that are measured in one batch: 8 MB in each array."""
 
 
 class Inspected(Struct, frozen=True, eq=False):
@@ -479,7 +480,7 @@ def _inspected(
                     cuts_by_feature[key] = cut_of(feature, moves)
                 cuts.append(cuts_by_feature[key])
             if any(cuts):
-                # A dimension of other set-ups alone is inspected there.
+                # A dimension whose features are all cut by other set-ups is inspected there.
                 cuts = [
                     cut or others.cut_of(drawn, feature, copy)
                     for cut, drawn, feature in zip(
@@ -565,11 +566,11 @@ class ToolAt:
         rows = np.arange(len(wanted_moves))
         starts, ends = wanted_moves.starts_of(rows)[:, 2], wanted_moves.end[:, 2]
         self.z = np.maximum(starts, ends)
-        """(N,) mm: the height to which each row cuts at least as wide as at the surface; infinite
-        where the tool tapers all the way."""
+        """Height (N,) mm down to which each row cuts as wide as at the surface; infinite if the
+        tool tapers over all its depth."""
         lowest = np.minimum(starts, ends)
         self.radius = np.full(len(wanted_moves), 0.5 * (diameter_mm or 0.0))
-        """(N,) mm: the radius at the surface."""
+        """Radius (N,) mm at the surface."""
         operations = wanted_moves.operations
         if operations is None:
             return

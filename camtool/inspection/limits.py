@@ -6,7 +6,7 @@
     H7 (+0.012/0)                  a class and its deviations, which must agree
     ISO 2768-m                     the general tolerance of a whole drawing
 
-    words ──read_words──▶ Words ──limits(nominal size)──▶ Limits
+    words ──read_words──▶ LimitsText ──limits(nominal size)──▶ Limits
 
 Every error is an OptionError in one line with its mend; the caller adds file and place.
 """
@@ -26,8 +26,8 @@ from camtool.records import replace
 from camtool.units import MM_PER_UNIT, UM_PER_MM
 
 SIZE_DIGITS = 3
-"""Nominal sizes are rounded to so many decimals of a millimetre before a table is asked: a circle
-drawn as 6.0000001 mm is one of 6 mm, the last size of its band."""
+"""Nominal sizes are rounded to so many decimals of a millimetre before a table is searched: a
+circle drawn as 6.0000001 mm has 6 mm, the last size of its band."""
 
 SAME_LIMIT_MM = 1e-6
 """Limits given both as a class and as numbers must agree within this."""
@@ -279,8 +279,8 @@ def _not_in_table(name: str, size_mm: float) -> OptionError:
 
 _CLASSES = "fmcv"
 MIN_GENERAL_MM = 0.5
-"""Smaller nominal sizes have no general tolerance: their limits stand beside them (ISO 2768-1,
-tables 1 and 2, note)."""
+"""Smaller nominal sizes have no general tolerance: their limits must be stated (ISO 2768-1, tables
+1 and 2, note)."""
 
 _TABLE_1: tuple[tuple[float, tuple[float | None, ...]], ...] = (
     (3.0, (0.05, 0.1, 0.2, None)),

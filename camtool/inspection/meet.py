@@ -84,7 +84,7 @@ MAX_CHANGES = 3
 DEFAULT_TRIALS = 100
 
 FEED_SHARES = (0.5, 0.25)
-"""Feeds that are tried, as shares of the operation's own."""
+"""Slower feeds to try, as shares of the operation's own."""
 
 MAX_LEFT_SHARE = 0.25
 """Largest change of an allowance, as a share of the radius of the tool."""
@@ -97,27 +97,28 @@ PER_MM = 1e-3
 """ε: cost of a millimetre of allowance, in standard uncertainties."""
 
 STEP_MM = 1e-6
-"""The step, mm, whose differences are the slopes of sizes."""
+"""Step, mm, for the slopes of sizes by differences."""
 
 ROUNDS = 8
-"""Most allowances at which tangents are computed."""
+"""At most this many allowances are tried to find tangents of sizes."""
 
 SETTLED = 1e-6
-"""Rounds end when sizes differ from their tangents by no more, mm."""
+"""The search ends when sizes differ from their tangents by at most this, mm."""
 
 NO_STANDARD_MM = 1e-3
-"""The standard uncertainty that stands for one that is not known, mm: sizes are centred then."""
+"""Replaces an unknown standard uncertainty, mm: sizes are then centred within their limits."""
 
 BISECTIONS = 6
-"""Bisections of the required value of a number of the machine."""
+"""Number of bisections for the needed value of a number of the machine."""
 
 NEEDED_DIGITS = 3
 
 REFINED = 2
-"""Times that allowances are corrected by the sizes that they gave."""
+"""Number of times that allowances are corrected by the sizes that they gave."""
 
 MAX_INPUTS_ASKED = 2
-"""Number of uncertainties, the largest first, whose required value is computed."""
+"""At most this many uncertainties, the largest first, are examined for the value that would be
+needed."""
 
 
 # The question (`MeetingCase`), proposals, trials, and the answer (`Meeting`).
@@ -320,7 +321,7 @@ def _check_readable(case: MeetingCase) -> None:
 
 
 Tried = Callable[[JobChanges], "MeetingTrial | None"]
-"""Tries a proposal; None for one that cannot be cut."""
+"""Function that tries a proposal; it returns None for one that cannot be cut."""
 
 
 def find_cheapest(
@@ -582,7 +583,8 @@ def _best_left(
     infinite for none.
     """
     count, dims = len(max_allowances), len(limits)
-    # x = t_1 … t_D, then what is left and what is taken, both 0 or more, of each contour.
+    # Unknowns x: t_1 … t_D, then for each contour the allowance as two parts, positive and
+    # negative, both 0 or more.
     goal = np.concatenate([-np.ones(dims), np.full(2 * count, PER_MM)])
     unit = np.eye(dims)
     conditions = [
@@ -596,8 +598,8 @@ def _best_left(
     allowances = np.zeros(count)
     for _ in range(ROUNDS):
         base = sizes(allowances)
-        # To both sides: where a zone is as wide to either side of what is off, what it grows by in
-        # one direction and what it grows by in another are no slope.
+        # Slopes are taken to both sides: where a zone is centred, its width grows with a change in
+        # either direction, and a single slope would be wrong for one of them.
         steps = STEP_MM * np.eye(count)
         slopes = np.stack(
             [0.5 * (sizes(allowances + dx) - sizes(allowances - dx)) / STEP_MM for dx in steps],
@@ -798,7 +800,7 @@ class Bench(Struct, eq=False, dict=True):
 
         if not holds(number.best):
             return None
-        holding, failing = 1.0, 0.0  # parts of the way from what it is to its best
+        holding, failing = 1.0, 0.0  # shares of the way from its present to its best value
         for _ in range(BISECTIONS):
             middle = 0.5 * (holding + failing)
             holding, failing = (middle, failing) if holds(number.at(middle)) else (holding, middle)
@@ -834,7 +836,7 @@ def _digest(run: Run, machine: Machine) -> bytes:
     return digest.digest()
 
 
-# Numbers of a machine that may be what it takes.
+# Numbers of a machine that may have to be better.
 
 
 class _Number(Struct, frozen=True):
@@ -895,7 +897,7 @@ def _standards(machine: Machine, binding: InspectedReport) -> Iterator[_Number]:
 
 
 REPEATABILITY = "repeatability_mm"
-"""The input whose standard uncertainty is a number of the axis itself."""
+"""Ending of the key of the input whose standard uncertainty stands in the table of its axis."""
 
 
 def _value_at(record: object, key: str) -> object:
@@ -914,7 +916,7 @@ def _rounded(value: float, best: float) -> float:
     return best + math.copysign(math.floor(difference / unit) * unit, value - best)
 
 
-# In words.
+# The result as text, as JSON, and as a job file.
 
 MAX_NAMED = 4
 
@@ -1074,7 +1076,7 @@ def _verdict_data(each: InspectedReport | None) -> dict[str, Any] | None:
 
 
 ALL_HOLD, NOT_ALL_HOLD = "Every dimension of ", "NOT ALL dimensions of "
-"""The first comment of a job file that is proposed begins with one of these."""
+"""The comment at the top of a proposed job file begins with one of these."""
 
 
 def is_proposal(data: bytes) -> bool:

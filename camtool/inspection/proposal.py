@@ -35,7 +35,7 @@ from camtool.tables import toml_string
 MAX_DIMENSIONS = 200
 
 DIGITS = 4
-"""Decimals of a millimetre of places and sizes."""
+"""Decimals of a millimetre in places and sizes."""
 
 _HEADER = """\
 # The dimensions of a drawing and their limits (docs/tolerances.md). Lengths take units ("6mm",

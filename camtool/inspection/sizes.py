@@ -20,7 +20,7 @@ sizes are taken at all depths at which moves lie, and the extreme ones are those
 
 Sizes of it are those of ISO 14405-1 (two-point sizes, the least-squares size) and zones of ISO
 1101 (minimum zones, as linear programmes in the deviations, which are small beside the feature).
-Not looked at: the lay of the surface, taper of the tool, burrs.
+Not modelled: surface texture, taper of the tool, burrs.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ LEVEL_SHARE = 0.5
 of a ramp) is not measured by itself."""
 
 MAX_LEVELS = 200
-"""Depths at which a feature is measured; of more (a helix of many arcs) so many, evenly spaced."""
+"""Largest number of depths at which a feature is measured; a cut with more (a helix of many arcs)
+is measured at so many, evenly spaced."""
 
 SAME_LEVEL_MM = 1e-6
 
@@ -68,8 +69,8 @@ ON_PATH_SHARE = 0.25
 feature is then its path, not its edge."""
 
 BESIDE_MM = 0.5
-"""Moves are looked for up to this beyond the radius of the tool from a feature: slides may be
-that far from what was planned."""
+"""Moves are searched up to this beyond the tool's radius from a feature: slides may be that far
+from the planned path."""
 
 
 class SweptSegments(Struct, frozen=True, eq=False, dict=True):
@@ -157,7 +158,7 @@ def stations_of(feature: Feature, side: int) -> Stations:
 
 
 SURFACE = np.array([math.inf])
-"""The depth at which all moves count."""
+"""The single level at which all moves count."""
 
 
 def envelope(
@@ -291,7 +292,7 @@ def _reach(radius: Floats, least_v: Floats, bound_mm: float) -> Floats:
     return np.where(below < radius, np.sqrt(np.maximum(radius**2 - below**2, 0.0)), 0.0)
 
 
-# Which moves cut a feature.
+# Assignment of moves to features.
 
 
 def cut_of(feature: Feature, wanted_moves: SweptSegments) -> Cut | None:
@@ -572,7 +573,7 @@ def _lengths(vectors: Floats) -> Floats:
 
 
 CENTRE_ROUNDS = 50
-"""Most iterations for a centre; three or four are usual."""
+"""Largest number of iterations for a centre; three or four are usual."""
 
 CENTRE_MM = 1e-9
 
@@ -664,10 +665,10 @@ def _widths(table: Floats, offsets: Floats) -> Floats:
 
 
 MAX_EXCHANGES = 500
-"""Most exchanges of a linear programme; about ten are usual."""
+"""Largest number of exchanges in a linear programme; about ten are usual."""
 
 VIOLATION_EPS_MM = 1e-12
-"""A condition violated by at most this holds."""
+"""A condition that is violated by at most this counts as satisfied."""
 
 
 def minimise(goal: Floats, rows: Floats, bounds: Floats) -> Floats:

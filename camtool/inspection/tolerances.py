@@ -54,8 +54,10 @@ from camtool.tables import convert, read_table
 from camtool.units import MM_PER_UNIT, parse_angle, parse_length
 
 DIFFERS_MM = 0.02
-"""A nominal size that is farther from what is drawn is an error. Inches with three decimals are
-rounded by up to 0.0127 mm."""
+"""A nominal size that differs more from the drawn size is an error.
+
+Inches with three decimals are rounded by up to 0.0127 mm.
+"""
 
 MAX_SIZE_MM = 1e6
 
@@ -107,7 +109,7 @@ def dimensions_of(
             findings.append(_duplicate_finding(measured, by_measure[measure], file))
             continue
         drawn_mm = bound.drawn_mm if isinstance(bound, BoundDimension) else math.inf
-        # Programs round the places of a dimension: what is drawn counts.
+        # Programs round the places of a dimension: the size of the drawn feature counts.
         if abs(drawn_mm - callout.measured_mm) <= DIFFERS_MM:
             measured = replace(measured, nominal_mm=round(drawn_mm, 9))
         callout_dimensions = _callout_dimensions(

@@ -3,7 +3,7 @@
     machine ─inputs_of─▶ Inputs ─propagate─▶ Budget      finite differences of simulations
                               └─monte_carlo─▶ Draws      a simulation for each draw
 
-Whoever asks gives `machined`, a function that simulates a program on a `MachineVariant` (a
+The caller passes `machined`, a function that simulates a program on a `MachineVariant` (a
 machine, and by how much its tool is wider) and returns where the T machined edges of its part lie,
 mm; and `measure`, which takes K sizes from such edges, mm. All inputs act on a machine along few
 *directions*, in which the simulation is repeated:
@@ -76,7 +76,8 @@ if TYPE_CHECKING:
     from camtool.arrays import Bools, Floats
 
 PROBE_MM = 0.01
-"""Steps of the inputs whose standard uncertainty is unknown."""
+"""Steps of inputs whose standard uncertainty is unknown, which show the values that depend on
+them."""
 
 PROBE_SCALE = 1e-3
 
@@ -89,19 +90,20 @@ ROOM_K = 15.0
 Sizes hold at 20 °C (ISO 1)."""
 
 EXPANSIONS_OF_MACHINES = (0.0, 3e-5)
-"""1/K by which the screws, belts and scales grow by which machines place their slides: from Invar
-(1e-6) over steel (11e-6) to aluminium (24e-6) and zinc (30e-6)."""
+"""Range of expansion, 1/K, of the screws, belts and scales by which machines place their slides:
+from Invar (1e-6) over steel (11e-6) to aluminium (24e-6) and zinc (30e-6)."""
 
 EXPANSIONS_OF_PARTS = (0.0, 2e-4)
-"""1/K by which parts grow: glass, wood and metals, and plastics up to polyethylene of high density
-(1.06e-4 to 1.98e-4; Callister, Materials Science and Engineering, table B.6). Softer ones grow by
-more: they must be said."""
+"""Range of expansion, 1/K, of parts: glass, wood and metals, and plastics up to polyethylene of
+high density (1.06e-4 to 1.98e-4; Callister, Materials Science and Engineering, table B.6). Softer
+materials expand more: their number must be given."""
 
 MAX_SIGMAS = 3.0
-"""A temperature whose standard uncertainty is known is off by no more of them."""
+"""A temperature with a known standard uncertainty is assumed to be off by at most this many of
+them."""
 
 NEGLIGIBLE_MM = 1e-5
-"""A value depends on an input where such a step changes it by more than this, mm."""
+"""A value depends on an input if the input's step changes it by more than this, mm."""
 
 CERTAIN = 1e-12
 """Standard deviations below this are taken as 0."""
@@ -139,20 +141,21 @@ SEED = 20
 """The draws are the same for every part, so that a budget is deterministic."""
 
 QUANTILES = 64
-"""Values of one input, equally likely, that say what it contributes alone."""
+"""Number of equally likely values of one input, from which its own contribution is computed."""
 
 LINEAR_MM = 1e-7
-"""A size whose draws all lie within this of a linear function of the inputs is linear, mm."""
+"""A size counts as linear if all its draws lie within this of a linear function of the inputs,
+mm."""
 
 Machined = Callable[[MachineVariant], "Floats"]
-"""Simulates a variant and returns where the edges of its part lie: (T,) mm."""
+"""Function that simulates a variant and returns the positions (T,) mm of the edges of its part."""
 
 Measure = Callable[["Floats", "Floats"], "Floats"]
-"""Measures the K sizes of N parts, (N, K) mm, from the edges of M simulated ones (M, T) mm and the
-weights (N, M) with which each part mixes these."""
+"""Function that measures the K sizes of N parts, (N, K) mm, from the edges of M simulated ones (M,
+T) mm and the weights (N, M) with which each part mixes these."""
 
 Values = Callable[[MachineVariant], "Floats"]
-"""Simulates a variant and measures K sizes of its part: (K,) mm."""
+"""Function that simulates a variant and measures K sizes of its part: (K,) mm."""
 
 Moved = Callable[[MachineVariant, float], MachineVariant]
 
@@ -654,7 +657,7 @@ def propagate(
     measured = measure(nodes, _weights_of(offsets, inputs.directions, places, rows, len(nodes)))
     drawn, single = measured[:DRAWS], measured[DRAWS:].reshape(len(inputs.each), QUANTILES, -1)
     shifts = drawn.mean(axis=0) - centre
-    # A linear value has the very draws of its sensitivities.
+    # The draws of a linear value follow from its sensitivities exactly.
     straight = draws @ sensitivities.T
     linear = np.abs(drawn - centre - straight).max(axis=0, initial=0.0) <= LINEAR_MM
     shifts[linear] = 0.0
@@ -663,7 +666,7 @@ def propagate(
     single_variance = single.var(axis=1).T
     single_variance[single_variance < CERTAIN**2] = 0.0
     single_variance[linear] = (sensitivities[linear] * inputs.standards) ** 2
-    # What a value owes to each input in proportion; the rest is what bends.
+    # The part of a value that is proportional to each input; the rest comes from bends.
     variances = sensitivities * (residual.T @ draws / DRAWS)
     remainder = np.diag(joint) - variances.sum(axis=1)
     bent = np.maximum(single_variance - (sensitivities * inputs.standards) ** 2, 0.0)
@@ -837,13 +840,14 @@ def normals_below(z: Floats) -> Floats:
 
 
 FAR = 9.0
-"""Beyond so many standard deviations a normal variable has a probability below 2e-19."""
+"""Beyond this many standard deviations a normal variable has a probability below 2e-19."""
 
 NODES = 24
 """Nodes of Gauss and Legendre's rule on each piece of an integral."""
 
 STEEPNESS = (-FAR, -3.0, 0.0, 3.0, FAR)
-"""Where an integral is divided about the steep place of its integrand, in widths of that."""
+"""An integral is divided at these distances from the steep place of its integrand, in widths of
+that place."""
 
 
 def both_below(a: float, b: float, correlation: float) -> float:
@@ -893,7 +897,8 @@ def probability(low: float, high: float, covariance: Floats, limits: tuple[float
     below = _sigmas(upper - high, s_high)
     if s_low < CERTAIN or s_high < CERTAIN:
         return normal_below(above) * normal_below(below)
-    # Not below the limit is: −low is at most −lower. So the correlation turns over.
+    # "Not below the lower limit" means: −low is at most −lower. So the correlation changes its
+    # sign.
     return both_below(above, below, -float(covariance[0, 1]) / (s_low * s_high))
 
 

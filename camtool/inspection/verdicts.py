@@ -51,7 +51,8 @@ SURE = 0.95
 """The probability of a verdict (ISO 14253-1: 95 % unless agreed otherwise)."""
 
 GUARD = 1.6449
-"""A size that is within one limit by this many standard uncertainties is so with 95 %."""
+"""A size within one limit by this many standard uncertainties is within it with a probability of
+95 %."""
 
 Required = Literal["in", "not-out"]
 """Values of `--require`: the verdict that every dimension with limits must have."""
@@ -124,8 +125,8 @@ NOT_INSPECTED = (
     InspectionCode.DIMENSION_NOT_CUT,
     InspectionCode.CALLOUT_TEXT,
 )
-"""Errors where something is required of every dimension with limits: nobody knows whether these
-hold."""
+"""Findings that become errors where a verdict is required of every dimension with limits: nothing
+is known of these."""
 
 
 def _as_error(finding: Finding) -> Finding:
@@ -177,7 +178,7 @@ def _verdict(each: Inspected, size: MachinedSize, budget: Budget, first: int) ->
         chance, verdict = _decided(budget, first, (lower, upper))
     measure = ""
     if verdict == "undecided":
-        # Where what is known alone leaves it open, whatever is largest counts.
+        # If the known inputs alone leave the verdict open, the largest contribution of all counts.
         open_by = [one for one in contributions if one.um is None] if chance is None else ()
         largest = max(open_by or contributions, key=_likely_um).input
         keys = {one.name: one.missing[0] for one in unknown}

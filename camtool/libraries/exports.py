@@ -25,10 +25,10 @@ MIN_CHORDS = 2
 """An arc becomes this many chords or more, so that two arcs still enclose an area."""
 
 ROUND_SHARE = 1e-9
-"""A closed path is one circle when its centres and radii differ by no more than this share."""
+"""A closed path is one circle if its centres and radii differ by at most this share."""
 
 _NO_LAYER = re.compile(r'[<>/\\":;?*|=`,\x00-\x1f]')
-"""What the name of a layer in a DXF must not hold."""
+"""Characters that must not occur in the name of a layer of a DXF."""
 
 
 def layers_in(drawing: Drawing) -> list[str]:
@@ -117,7 +117,7 @@ def svgpathtools_of(drawing: Drawing) -> dict[str, list[Any]]:
         )
         bulges = np.where(rises_of(segments) < POSITION_EPS_MM, 0.0, segments.bulge).tolist()
         rows = zip(starts, ends, bulges, segments.radius.tolist(), strict=True)
-        # Y is turned over: an arc that turns counter-clockwise has the sweep flag 0.
+        # Y points down there, so that an arc that turns counter-clockwise has the sweep flag 0.
         paths[layer].append(
             Path(
                 *(
@@ -214,7 +214,7 @@ def _lines_of(toolpath: Toolpath, is_chosen: Bools, tolerance_mm: float) -> Any:
     is_chosen = is_chosen & ((toolpath.end != toolpath.starts).any(axis=1) | toolpath.is_arc)
     rows = np.flatnonzero(is_chosen)
     points, row = move_points(toolpath, rows, tolerance_mm)
-    # Events and moves that go nowhere do not break a line; other moves do.
+    # Events and moves without a length do not break a line; other moves do.
     order = np.cumsum(toolpath.is_motion & ~is_chosen & (toolpath.end != toolpath.starts).any(1))
     stretches = np.split(points, np.flatnonzero(np.diff(order[row])) + 1)
     return shapely.MultiLineString([_without_repeats(line) for line in stretches if len(line)])

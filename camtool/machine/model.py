@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
 
 Grade = Literal["step-true", "timed", "path only"]
-"""What the model of a controller knows: each step, times and corners, or the path alone."""
+"""How exactly the model of a controller knows it: each step; times and corners; or the path
+alone."""
 
 
 class TargetNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -55,7 +56,7 @@ class TargetNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 FEED_TOLERANCE = 1e-9
-"""A feed may exceed its limit by this part of it, by rounding alone."""
+"""A feed may exceed its limit by this share, from rounding alone."""
 
 AS_CODED = 0.0
 """The value of `Axis.real_step_mm` before it is set to the coded step; no file can contain it."""
@@ -227,7 +228,8 @@ class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 # The mechanics beyond its single axes.
 
 MAX_SQUARENESS_RAD = 0.1
-"""No machine is out of square by more (5.7°): a larger number is in the wrong unit."""
+"""Larger deviations from a right angle (5.7°) are refused: no machine has them, so that the number
+is in a wrong unit."""
 
 
 class PlayCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -314,13 +316,13 @@ SEMIDEFINITE = 1e-3
 decimals may make one of 0 a little less than 0."""
 
 Coefficient = Annotated[float, Meta(ge=-1.0, le=1.0)]
-"""Of a correlation."""
+"""Coefficient of a correlation."""
 
 Relative = Annotated[float, Meta(ge=0.0, le=0.1)]
-"""Standard uncertainty as a part of the value."""
+"""Standard uncertainty as a share of the value."""
 
 Expansion = Annotated[float, Meta(ge=-1e-5, le=1e-3)]
-"""1/K by which a length grows: some ceramics shrink, plastics grow by 1e-4."""
+"""Expansion of a length, 1/K: some ceramics shrink, plastics grow by 1e-4."""
 
 
 class AxisUncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -56,7 +56,7 @@ from camtool.pictures.view import (
 from camtool.records import replace
 
 WIDE = 0.5
-"""A window lower than this share of its width is wide."""
+"""A window is wide if its height is less than this share of its width."""
 
 NUMBERS_FOOT = 32.0
 """Height below a plot for its numbers."""
@@ -203,8 +203,8 @@ def _polars(scenes: Sequence[Scene], number: int, options: PictureOptions) -> st
 # Panels in rows and columns of a page: where each lies, and the ids of its parts.
 
 GROWN = 1.25
-"""Factor of the units of a page with panels side by side: letters become smaller, as each panel
-is."""
+"""Factor of the page's width if panels stand side by side: each panel is smaller, and so are its
+letters."""
 
 TITLE_LINES = 2
 

@@ -20,21 +20,21 @@ from camtool.pictures.svg import MM_DECIMALS, PathData
 from camtool.toolpath.moves import Kind, Toolpath, rows_of
 
 MAX_TAPERS = 30_000
-"""The outlines of more moves than this would make too large a picture: some 5 MB."""
+"""Outlines of at most this many moves are drawn: more would make a picture of some 5 MB."""
 
 TAPER_ARC_RAD = 0.2
 """Arcs along which a tool may become wider are taken as chords of this turn: of a circle of 1 mm
 they are 5 µm off."""
 
 MIN_TAPER_MM = 1e-6
-"""A tool that cuts less than this at the surface is a point there."""
+"""A tool that cuts less than this wide at the surface counts as a point."""
 
 MAX_ARC_RAD = 0.75 * math.pi
 """A longer arc is written as several: a half circle whose end lies δ beside its circle of radius
 r, as rounded numbers do, would have its centre √(2 r δ) off."""
 
 MOVES_AT_ONCE = 1 << 14
-"""So many moves of a chain are looked at, or written, together."""
+"""Number of moves of a chain that are examined, or written, in one batch."""
 
 
 class Chain(Struct, frozen=True, eq=False):
@@ -131,7 +131,7 @@ def _follows(cuts: Bools, is_counted: Bools) -> Bools:
     `cuts`."""
     rows = np.flatnonzero(is_counted)
     marks = np.zeros(len(cuts), dtype=np.int8)
-    # What a row that is counted says holds from the next one on.
+    # A counted row determines the rows after it, up to the next counted one.
     changes = np.flatnonzero(np.diff(cuts[rows], prepend=False))
     marks[rows[changes]] = np.where(cuts[rows[changes]], 1, -1)
     follows = np.zeros(len(cuts), dtype=np.bool_)
@@ -242,7 +242,7 @@ def path_data(chains: Iterable[Chain]) -> str:
     data = PathData(MM_DECIMALS)
     for chain in chains:
         data.move(*chain.points[0].tolist())
-        # What closes a path draws its last line.
+        # Closing the path draws its last line.
         drawn = len(chain.sweep) - int(chain.closed and chain.sweep[-1] == 0.0)
         for low, part in chain.parts():
             points, sweeps = part.points.tolist(), part.sweep.tolist()
@@ -334,7 +334,7 @@ def _halved(chains: Sequence[Chain]) -> Segments:
 QUARTER_RAD = 0.5 * np.pi
 
 MIN_PIECE_RAD = 1e-9
-"""Of an arc that begins or ends at a multiple of 90°, a shorter piece is not counted."""
+"""Shorter pieces of an arc are not counted: it begins or ends at a multiple of 90°."""
 
 
 class _Pieces(Struct, frozen=True, eq=False):

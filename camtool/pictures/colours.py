@@ -122,7 +122,7 @@ def channels(colour: str) -> tuple[int, int, int]:
 
 
 UNKNOWN, AIR, CUT_ENTRY = -3, -2, -1
-"""Steps of moves whose engagement is not judged, that cut nothing, and that are entries."""
+"""Steps of moves whose engagement is unknown, of moves that cut nothing, and of entries."""
 
 ENGAGED_NAMES = {AIR: "cuts nothing", UNKNOWN: "engagement not known", CUT_ENTRY: "entry"}
 
@@ -132,5 +132,5 @@ ENGAGED_STYLES = {
     CUT_ENTRY: (ENTRY, 1.0),
     **{step: (colour, 1.0) for step, colour in enumerate(bin_colours())},
 }
-"""Colour and share of the pen of moves by the step of their engagement, the lowest first: the most
-engaged lie on top."""
+"""Colour and share of the pen for each step of engagement, the lowest first: the most engaged
+moves are drawn on top."""

@@ -35,7 +35,7 @@ Place = tuple[float, float]
 """x, y in mm."""
 
 MAX_NUMBERED = 100
-"""Of more contours than this only every 2nd, 5th, 10th … is numbered."""
+"""If there are more contours than this, only every 2nd, 5th, 10th … is numbered."""
 
 NOWHERE: Floats = np.empty((0, 2))
 NO_MOVES = MoveChains((), (), (), NOWHERE, NOWHERE, np.zeros(2))

@@ -45,7 +45,7 @@ from camtool.pictures.view import View, page_width
 from camtool.records import replace
 
 PNG_DPI = 96
-"""resvg's own default of 0 makes lengths in mm vanish."""
+"""Resolution for lengths in mm: with resvg's own default of 0 they would vanish."""
 
 
 def draw(scene: Scene, options: PictureOptions = AS_USUAL) -> str:

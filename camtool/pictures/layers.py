@@ -371,7 +371,7 @@ def _feeds_legend(content: Content, view: View) -> Iterator[LegendEntry]:
         yield LegendEntry(line_swatch(PLUNGE, 2.8), "slope")
 
 
-# What is predicted.
+# Predictions.
 
 
 def _path(content: Content, plot: Plot) -> str:
@@ -427,7 +427,7 @@ def _sizes(content: Content) -> list[Part]:
         ends = [end for each in every if each.verdict == verdict for end in each.places_mm]
         look: Look = {"r": 3.4, "fill": colour, "stroke": PAPER, "stroke-width": 1.0}
         parts.append(DotGroup(f"ends-{verdict}", "", ends, look))
-    # Where there is no room for all, those that matter most have it.
+    # If there is no room for all, those that matter most come first.
     order = {"out": 0, "undecided": 1}
     every = tuple(sorted(every, key=lambda each: order.get(each.verdict, 2)))
     middles = [_middle(*each.places_mm) for each in every]

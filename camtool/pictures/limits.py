@@ -1,8 +1,9 @@
 """The plot of inspected dimensions: each within its limits, which all are drawn equally wide.
 
-A row per dimension with limits: the zone between them, a thick line from the least to the largest
-predicted size, a thin one as far as these are uncertain (expanded by two), and a dot at the best
-fit, in the colour of the verdict. What lies farther out than the zone is wide ends at the edge.
+Each dimension with limits has a row: the zone between the limits, a thick line from the least to
+the largest predicted size, a thin one that adds their expanded uncertainty (2 u), and a dot at the
+best fit, in the colour of the verdict. Whatever lies beyond a limit by more than the width of the
+zone ends at the edge.
 """
 
 from __future__ import annotations
@@ -22,15 +23,15 @@ from camtool.units import UM_PER_MM
 from camtool.verification.report import COVERAGE, InspectedReport
 
 MAX_ROWS = 60
-"""Most dimensions in one plot: first those that are out, then the undecided; the report's table
-has all of them."""
+"""At most this many dimensions are plotted, those out of limits first, then the undecided ones;
+the report's table has all."""
 
 ROW, CAP = 27.0, 12.0
 NAMES, SIZES = 0.24, 0.33
 """The parts of the width for names and for sizes in numbers."""
 
 ZONE = 1.0 / 3.0
-"""The part of the axis that is within limits: as much lies to either side."""
+"""The share of the axis that is within limits: half of the rest lies to either side."""
 
 _ORDER = {"out": 0, "undecided": 1, "in": 2}
 

@@ -14,15 +14,15 @@ MIN_PX, MAX_PX = 16, 20_000
 SVG_WIDTH_PX, PNG_WIDTH_PX = 1000, 1200
 
 POINTS_OF_A_PAGE = 400_000
-"""Most points of the slides' path that the viewer gets: enough for the ends of 200,000 moves and
-the largest error within each."""
+"""At most this many points of the slides' path go to the viewer: enough for the ends of 200,000
+moves and the largest error within each."""
 
 VIEWS = ("plan", "iso", "bottom", "front", "side", "top", "leftover", "gouge")
 """Views: the moves from above; the stock after the program, aslant, from the front, from the right
 and from above; and, by colour, where it is higher or lower than wanted."""
 
 MIN_TIMES, MAX_TIMES = 1.0, 1e6
-"""Least and greatest factor of errors that are drawn larger."""
+"""Least and greatest factor by which errors may be exaggerated."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)

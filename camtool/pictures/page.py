@@ -49,7 +49,7 @@ HEAD_GAP = 50.0
 """Room between the head and the plot, for the names above it."""
 
 LEGEND_DROP = 70.0
-"""From the plot's foot to the middle of the legend's first row."""
+"""Distance from the lower edge of the plot to the middle of the legend's first row."""
 
 FOOT = 32.0
 BAR_ROOM = 36.0
@@ -174,7 +174,7 @@ MAX_ENTRY_WIDTH = 330.0
 BAR_WIDTH, BAR_GAP = 18.0, 26.0
 MIN_BAR_SPACING = 85.0
 CLEAR_OF_TOP = 2.3
-"""Round numbers are left out nearer than this many heights of a letter to the largest error."""
+"""A round number nearer to the largest error than this many heights of a letter is left out."""
 
 
 class MapScale(Struct, frozen=True):

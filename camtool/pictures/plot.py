@@ -22,7 +22,7 @@ from camtool.pictures.trace import ErrorTrace, trace_layer
 from camtool.pictures.view import View
 
 MAX_BODIES = 500
-"""Drawings of more closed paths have no light fill."""
+"""A drawing with more closed paths than this has no light fill."""
 
 INK_SHARE = 0.12
 """Lines become thinner once they would cover more than this share of the plot."""
@@ -32,7 +32,7 @@ THINNEST = 0.5
 ARROW_LENGTH, ARROW_WIDTH = 18.0, 6.5
 ARROW_EVERY = 900.0
 ARROWS_APART = 60.0
-"""An arrow nearer than this to another one is left out: passes at several depths lie over each
+"""Arrows nearer than this to another one are left out: passes at several depths lie over each
 other."""
 
 MIN_LENGTH_WITH_ARROW = 90.0
@@ -45,7 +45,7 @@ CAP = 12.0
 """Height of the letters of labels on the page."""
 
 HALO = 5.0
-"""Width of the rim in the ground's colour round the letters."""
+"""Width of the rim, in the colour of the ground, around the letters."""
 
 AWAY = 9.0
 CLEAR = 3.0

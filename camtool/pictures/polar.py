@@ -134,15 +134,16 @@ BASE_SHARE = 0.62
 MIN_RINGS = 3
 
 MIN_RANGE_UM = 1e-3
-"""The magnification grows no further for errors smaller than this."""
+"""Errors smaller than this are not magnified further."""
 
 LABELS_DEG = (22.5, 67.5, 112.5, 157.5, 202.5, 247.5, 292.5, 337.5)
-"""The rings are numbered along that of these directions where the numbers hide least."""
+"""Directions in which the rings may be numbered: the one where the numbers hide the fewest errors
+is used."""
 
 MIN_LABELS = 2
 
 FIRST_LABEL = 40.0
-"""Rings of a smaller radius have no number: it would lie on the middle."""
+"""Rings with a smaller radius have no number, as it would cover the middle."""
 
 AXES = ("X+", "Y+", "X−", "Y−")
 

@@ -25,7 +25,7 @@ from camtool.stock.moves import StockMoves
 Heights = npt.NDArray[np.float32]
 
 SAMPLES = 2
-"""Pixels are computed so many times finer, in each direction, than they are written."""
+"""Each pixel is the mean of so many samples in each direction."""
 
 ROWS_AT_ONCE = 64
 
@@ -42,16 +42,17 @@ PENUMBRA = 0.012
 """Width of the edge of a shadow, as a share of the map."""
 
 NEARBY = ((0.012, 0.30), (0.035, 0.28), (0.1, 0.25))
-"""Distances within which neighbours take light, as shares of the map, and how much of it."""
+"""Distances, as shares of the map, within which neighbours shade a cell, and how much."""
 
 WALL_CELLS = 4.0
-"""A step from cell to cell higher than so many of them is a wall; a lower one is a slope."""
+"""A step between neighbouring cells that is higher than this many cells is a wall; a lower one is
+a slope."""
 
 WALL_REACHES = (3, 2)
 """Cells over which heights are averaged for the direction of a wall."""
 
 GLOSS = 0.05
-"""Change of brightness of the marks of a tool, by the direction in which it cut."""
+"""Largest change of brightness by the direction of the tool's marks."""
 
 
 class Camera(Struct, frozen=True):
@@ -281,7 +282,7 @@ def _colours(
     if stage.tint is not None:
         tint = stage.tint.reshape(-1, 3)[number]
         material = np.where(wall[..., None], material, tint)
-    # The board gives back what the lamp gives it in the open.
+    # The colour of the board is meant for the light in the open, so that it is divided by that.
     faded = lit.open_board + (light - lit.open_board) * lit.fade.ravel()[number]
     light = np.where(board, faded, light)
     paper = ground.astype(np.float32) / np.float32(lit.open_board)

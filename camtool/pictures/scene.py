@@ -357,7 +357,8 @@ def _before(
 
 
 FLIP_SHARE = 0.04
-"""Lines about which a part is turned over end so far beyond the stock, a share of its size."""
+"""Lines about which a part is turned over reach this far beyond the stock, as a share of its
+size."""
 
 
 def _flips(job: Job) -> tuple[tuple[tuple[float, float], tuple[float, float]], ...]:
@@ -379,11 +380,11 @@ def _flips(job: Job) -> tuple[tuple[tuple[float, float], tuple[float, float]], .
 
 
 BESIDE_SHARE, BELOW_SHARE = 0.06, 0.25
-"""A stock that is not known reaches so far beyond the cuts (a share of their longer side), and so
-far below them (a share of their depth)."""
+"""A stock of unknown size reaches this far beyond the cuts (share of their longer side), and this
+far below them (share of their depth)."""
 
 MIN_BESIDE_MM = 0.01
-"""A stock that is not known reaches at least so far beyond the cuts."""
+"""A stock of unknown size reaches at least this far beyond the cuts."""
 
 
 def _as_planned(path: Toolpath, job: Job | None) -> StockMoves:

@@ -48,13 +48,13 @@ SHAPES = (0.3, 0.6)
 """Least and greatest height of the plot, as a share of its width."""
 
 MAX_FACTOR = 1000.0
-"""Heights are drawn no larger than this."""
+"""Heights are magnified at most this much."""
 
 LEFT_ROOM = 84.0
 """Room for the numbers of the heights."""
 
 GAP_UNITS = 70.0
-"""Least distance of two numbers on the page."""
+"""Least distance of two numbers, units of the page."""
 
 WANTED_DASHES = "9 6"
 

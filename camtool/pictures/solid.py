@@ -80,7 +80,7 @@ from camtool.stock.before import WHOLE
 from camtool.stock.heightmap import Box, HeightMap, cell_for, height_map
 
 MAP_CELLS = 3_000_000
-"""Cells of a height map, at most: 12 MB, and as much for the moves that cut them."""
+"""Largest number of cells of a height map: 12 MB, and as much for the moves that cut them."""
 
 MAX_RASTER_PX = 2400
 """Wider pictures show larger pixels: the map has no finer cells."""
@@ -104,8 +104,8 @@ WALL_CELLS = 1.0
 """Width of the band beside walls in which heights are not compared, in cells."""
 
 BESIDE_CELLS = 1
-"""Heights within so many cells are taken together where two stocks are compared: a wall that is
-moved by less than a cell is no difference of heights."""
+"""Two stocks are compared by the extreme heights within so many cells: a wall that has moved by
+less than a cell is no difference of heights."""
 
 MIN_SHOWN_MM = 2e-3
 
@@ -115,7 +115,7 @@ BAR_STEPS = 200
 GREY = "#b9bec4"
 FROM_ABOVE = ("top", "leftover", "gouge")
 LEVEL = ("front", "side")
-"""Views along the table, in which the block hides what is cut: its outline is dashed."""
+"""Views along the table, in which the block hides the cuts: their outline is dashed."""
 
 DASHES = "7 4"
 BAR_NAMES = {"leftover": "left (mm)", "gouge": "too deep (mm)"}
@@ -174,7 +174,7 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
     """Compute the height map of the part of the stock in a window, as fine as the pixels of the
     picture."""
     side = max(window[2] - window[0], window[3] - window[1])
-    # From above, what lies beside the window throws shadows into it.
+    # Seen from above, the stock beside the window throws shadows into it.
     margin = 0.1 * side if options.view in FROM_ABOVE else 0.0
     low, high = np.array(window[:2]) - margin, np.array(window[2:]) + margin
     box = (*np.maximum(low, pair.box_mm[:2]).tolist(), *np.minimum(high, pair.box_mm[2:]).tolist())
@@ -199,7 +199,7 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
     lowest, highest = _wanted_heights(pair, map_found, box, options)
     heights = material.heights.clip(-pair.thickness_mm)
     deviations = heights - highest if options.view == "leftover" else lowest - heights
-    # What was gone before is neither left nor cut.
+    # Material that was gone before counts neither as left nor as cut.
     deviations = np.where(material.heights == map_found.heights, deviations, 0.0)
     return Solid(pair, material, box[2:], cut_mm, deviations.astype(np.float64))
 

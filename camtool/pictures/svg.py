@@ -15,13 +15,16 @@ LENGTH_DECIMALS = 2
 """Decimals of lengths on the page (units of the viewBox, 1000 across)."""
 
 MM_DECIMALS = 9
-"""Decimals of coordinates in mm: half circles stay round when their centre is found again."""
+"""Decimals of coordinates in mm: enough for renderers to find the centre of a half circle from its
+ends."""
 
 _NO_XML = "\N{REPLACEMENT CHARACTER}"
 
 _NOT_XML = "[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
-"""What XML 1.0 (fifth edition, §2.2) does not allow; compiled at first use, because the help loads
-this file too, and compiling it takes 4 ms."""
+"""Characters that XML 1.0 (fifth edition, §2.2) does not allow.
+
+Compiled at first use, because the help loads this file too, and compiling takes 4 ms.
+"""
 
 Attributes = Mapping[str, str | float]
 Look = dict[str, str | float]
@@ -56,7 +59,7 @@ def escape(text: str) -> str:
     """Return the text escaped for use between tags and inside a double-quoted attribute."""
     escaped = clean(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     escaped = escaped.replace('"', "&quot;")
-    # A reader would turn bare white space of an attribute into blanks.
+    # XML readers turn other white space in attributes into blanks.
     return escaped.replace("\n", "&#10;").replace("\r", "&#13;").replace("\t", "&#9;")
 
 

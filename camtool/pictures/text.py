@@ -16,7 +16,7 @@ from camtool.pictures.colours import INK
 from camtool.pictures.svg import Look, PathData, element, one_line, title
 
 _UNIT = re.compile(r" (?!\(?(?:µm|mm|h)\b)")
-"""Blanks where a line may break: not those between a number and its unit."""
+"""Pattern of blanks at which a line may break: not those between a number and its unit."""
 
 
 class TextStyle(Struct, frozen=True):

@@ -22,7 +22,7 @@ from camtool.pictures.view import View
 from camtool.units import UM_PER_MM
 
 MIN_TOP_UM = 1e-3
-"""The colour map ends here where all errors are smaller."""
+"""The colour map ends here if all errors are smaller."""
 
 FINEST_SHARE = 1e-5
 """Coordinates of the path are rounded to this share of the window: 1/25 of a pixel of 4000."""
@@ -142,11 +142,12 @@ def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
     return element("g", {"id": "slide-path", **round_pen(view, pen)}, *paths)
 
 
-# The predicted path with its deviation from the wanted one N times as large.
+# The predicted path with its deviation from the wanted one exaggerated N times.
 #
-# Of a point p of the slides and the point q of the wanted path that is nearest to it,
-# q + N (p − q) is drawn.  A factor of 1 changes nothing; where the nearest point jumps, the drawn
-# path jumps too.
+# For a point p of the slides, and the point q of the wanted path that is nearest to it, q + N (p −
+# q) is drawn.
+#
+# A factor of 1 changes nothing; where the nearest point jumps, the drawn path jumps too.
 
 
 def exaggerated(points: Floats, wanted_path: Segments, times: float) -> Floats:
@@ -164,7 +165,7 @@ def nearest_points(points: Floats, wanted_path: Segments) -> Floats:
     from camtool.kernels.fits import nearest_rows
 
     boxes = segment_boxes(wanted_path)
-    bulge = np.array(wanted_path.bulge)  # of lines alone one number, seen as many, or as one
+    bulge = np.array(wanted_path.bulge)  # may be one number broadcast to all rows
     row = nearest_rows(points, wanted_path.start, wanted_path.end, bulge, boxes)
     begin, end, sweep = wanted_path.start[row], wanted_path.end[row], wanted_path.sweep[row]
     chord = end - begin

@@ -11,19 +11,24 @@ from msgspec import Struct
 from camtool.arrays import Floats
 
 PAGE = 1000.0
-"""Width of a picture of ordinary size in its own units, in which lines and letters are given."""
+"""Width of an ordinary picture in units of the page, in which widths of lines and heights of
+letters are given."""
 
 ORDINARY_PX = (1000, 1200)
-"""Pictures between these widths have a page of `PAGE` units. Smaller ones have fewer units and
-larger ones more, by the root of the size: letters grow with the picture, but less than it does."""
+"""Pictures between these widths have a page of `PAGE` units.
+
+The page of a smaller or larger picture is scaled by the square root of its size: letters grow with
+the picture, but less than it does.
+"""
 
 MIN_PAGE = 560.0
-"""No page has fewer units: head, legend and numbers need them."""
+"""Least width of a page in units: head, legend and numbers need it."""
 
 MARGIN = 36.0
 
 LOOK_AROUND = 2.0
-"""Part zero and rapids are in the window unless they make it more than this many times larger."""
+"""Part zero and rapids are shown too, unless the window becomes more than this many times
+larger."""
 
 PADDING = 0.06
 """Room around the part, as a share of its larger side."""

@@ -19,11 +19,11 @@ Coordinate = float | None
 ROWS_AT_ONCE = 1 << 14
 
 FEW_ROWS = 16
-"""Columns of up to this many rows become rows of Python objects too: to add a column takes as long
-as some ten rows."""
+"""Up to this many rows are added as Python objects: to add them as arrays would take as long as
+some ten rows."""
 
 GROWTH = 8
-"""A full column grows by 1/GROWTH of its rows."""
+"""A full column is enlarged by 1/GROWTH of its rows."""
 
 
 class ToolpathBuilder:

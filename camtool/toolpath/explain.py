@@ -14,10 +14,11 @@ from camtool.toolpath.moves import Kind, Move, PathMode, Toolpath
 from camtool.toolpath.program import Listing
 
 MAX_MOVES = 4
-"""Moves of one block that are told one by one: a cycle has a few, a spline may have thousands."""
+"""At most this many moves of one block are explained one by one: a cycle has a few, a spline may
+have thousands."""
 
 _NO_WORDS = re.compile(r"\([^)]*\)|;.*|<[^>]*>|\s")
-"""Comments, names of subroutines and parameters, blanks."""
+"""Pattern of comments, names of subroutines and parameters, and blanks."""
 
 _WORD = re.compile(r"([A-Z])0*(\d+(?:\.\d+)?)")
 

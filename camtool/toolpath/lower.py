@@ -39,7 +39,8 @@ STEP_EPS = 1e-9
 """A slope may exceed a whole number of steps by this fraction of a step, by rounding alone."""
 
 MAX_PARTS = 10_000_000
-"""Most rows of a lowered toolpath; one that needs more has too fine a tolerance and is refused."""
+"""Largest number of rows of a lowered toolpath; one that needs more has too fine a tolerance and
+is refused."""
 
 
 class LoweredToolpath(Struct, frozen=True, eq=False):

@@ -41,7 +41,7 @@ STOCK_TOP_MM = 0.0
 """Z of the stock top: part zero lies on it."""
 
 LEVEL_MM = 1e-6
-"""Moves that are less than this below the stock top are on it."""
+"""Moves less than this below the stock top count as on it."""
 
 ROWS_AT_ONCE = 1 << 15
 """Rows computed at a time, for columns that follow from each row and its start alone."""
@@ -80,7 +80,7 @@ EVENTS_AT_REST = (
     Kind.COOLANT_OFF,
     Kind.END,
 )
-"""Before these a controller of G-code comes to rest."""
+"""Events before which a controller of G-code stops the slides."""
 
 Corners = Literal["blend", "exact-path", "exact-stop"]
 

@@ -24,10 +24,10 @@ from camtool.toolpath.moves import Toolpath, toolpath_extents
 from camtool.toolpath.surface import MIN_NODES, Surface, filled
 
 MAX_POINTS = 10_000
-"""A grid of more points is refused: at 5 s each they take 14 hours."""
+"""Grids of more points are refused: at 5 s each they would take 14 hours."""
 
 MAX_SPREAD_MM = 0.2
-"""Largest difference of the fast and the slow touch of a place."""
+"""Largest difference between the fast and the slow touch of a place."""
 
 NEAR_MM = 0.05
 """Largest distance of a reported touch from the way that the tool was sent."""
@@ -62,10 +62,10 @@ class ProbeAnswer(Struct, frozen=True):
 
 
 ProbeScript = Generator[ProbeStep, ProbeAnswer, None]
-"""A cycle under way."""
+"""A cycle that has begun."""
 
 ProbeCycle = Callable[[Place], ProbeScript]
-"""A cycle; it is told where the tool stands at its beginning."""
+"""Function that begins a cycle, given the place of the tool."""
 
 TouchNote = Callable[[ProbeStep, ProbeAnswer], None]
 """Function that is told of each touch, and of each zero that is set."""
@@ -142,7 +142,7 @@ class CycleRun:
 
 
 Measured = Generator[ProbeStep, ProbeAnswer, dict[str, float]]
-"""A cycle that returns what it has measured."""
+"""A cycle that returns what it has measured, mm."""
 
 
 class Touch(Struct, frozen=True):

@@ -19,13 +19,14 @@ from camtool.toolpath.lower import MAX_PARTS
 from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, read_only
 
 FORMAT = "camtool surface 1"
-"""First line of a file of a surface."""
+"""First line of a surface file."""
 
 OUTSIDE_MM = 1e-6
 """Places within this distance of the grid count as on it."""
 
 MAX_FILL_ROUNDS = 10_000
-"""Rounds of the mean of neighbours that fill nodes which were not probed."""
+"""Largest number of rounds in which nodes that were not probed get the mean of their
+neighbours."""
 
 FILL_MM = 1e-7
 """The rounds end when no node changes by more than this."""
@@ -330,10 +331,10 @@ def _bends(
 # A toolpath against the surface that it follows; shares no code with `follow`.
 
 CHECKED_SHARES = 16
-"""Places of each cut that are compared with the surface."""
+"""Number of places of each cut that are compared with the surface."""
 
 VERTICAL_MM = 1e-6
-"""A cut shorter than this in the plane goes up or down."""
+"""A cut shorter than this in the plane is vertical."""
 
 
 class _Cuts:
@@ -352,7 +353,7 @@ class _Cuts:
         turning = self._arc_of[self.rows]
         radius = 0.5 * (arcs.radius + arcs.end_radius)
         lengths[turning >= 0] = (radius * np.abs(arcs.sweep))[turning[turning >= 0]]
-        # A rapid that moves nothing separates no runs: writers leave it out.
+        # A rapid without a length separates no runs: writers leave it out.
         is_move = (toolpath.starts != toolpath.end).any(axis=1)
         breaks = np.cumsum((toolpath.kind == Kind.RAPID) & is_move)[self.rows]
         _, self.run = np.unique(breaks, return_inverse=True)
@@ -403,7 +404,7 @@ def surface_error(flat: Toolpath, written: Toolpath, surface: Surface) -> tuple[
         errors = np.abs(points[:, 2] - wanted_z - surface.heights(points[:, :2]))
         if len(errors) and float(errors.max()) > worst:
             worst, place = float(errors.max()), int(warped.rows[cuts[int(errors.argmax())]])
-    # Drilled holes: the lowest place of each run, which its way in the plane says nothing of.
+    # Drilled holes have no length in the plane: the lowest place of each run is compared.
     lowest = [np.full(plain.runs, np.inf), np.full(warped.runs, np.inf)]
     for cuts_of, low in zip((plain, warped), lowest, strict=True):
         ends = cuts_of.toolpath.end[cuts_of.rows]

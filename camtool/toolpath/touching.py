@@ -12,10 +12,11 @@ from camtool.arrays import Floats
 from camtool.toolpath.moves import Toolpath, feeds_below_top, toolpath_extents
 
 CLEARANCE_MM = 2.0
-"""The top is whole so far around the place: as much as a tip or a plate to touch needs."""
+"""The top must be uncut this far around the place: as much as the tip of a tool or a plate
+needs."""
 
 GRID = 9
-"""So many places along each side are tried."""
+"""Number of places that are tried along each side."""
 
 
 def untouched_place(toolpath: Toolpath, row: int, mm: float = 1.0) -> tuple[float, float] | None:
@@ -38,7 +39,7 @@ def untouched_place(toolpath: Toolpath, row: int, mm: float = 1.0) -> tuple[floa
         length = np.maximum((along * along).sum(axis=1), np.finfo(float).tiny)
         part = np.clip(((place - begin) * along).sum(axis=1) / length, 0.0, 1.0)
         distances = np.hypot(*(begin + part[:, None] * along - place).T)
-        # Of an arc the whole circle counts.
+        # An arc blocks the places of its whole circle.
         round_away = np.abs(np.hypot(*(place - centre).T) - radius)
         if (np.where(is_arc, round_away, distances) >= reach).all():
             return float(place[0]), float(place[1])

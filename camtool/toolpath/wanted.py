@@ -55,8 +55,7 @@ TOOL_SHAPES = {
     "threading": "threading insert",
     "blade": "parting blade",
 }
-"""Names of the shapes of tools in jobs and of those of lathes, for people; an unlisted shape is
-its own name."""
+"""Readable names of the shapes of tools, also for lathes; an unlisted shape is its own name."""
 
 
 class ToolNote(Struct, frozen=True):

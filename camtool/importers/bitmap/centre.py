@@ -27,22 +27,22 @@ STRAIGHT_ON_RAD = math.radians(60.0)
 """A path goes on through a junction into the branch that bends least, if by less than this."""
 
 HOOK_SHARE = 0.6
-"""A line that has come to the middle of a stroke is less than this part of its way from the
-stroke's edges; on its way out of a corner it is more."""
+"""A thinned line is in the middle of its stroke when half the width there is less than this share
+of the distance from its end; on its way out of a corner of the stroke it is more."""
 
 MIDDLE_SHARE = 0.93
-"""The part of a line before the place where it has this share of the half width leads into a
-corner."""
+"""The hook into a corner ends where half the width first reaches this share of its value in the
+middle."""
 
 ROUGH_PX = 1.0
-"""Half widths that are counted in pixels are uncertain by this much."""
+"""Half widths are uncertain by this much, since they are counted in pixels."""
 
 LOOK_BACK = 1.5
 """The direction of a branch is measured from its junction to a point this many half widths
 away."""
 
 MIN_LOOK_PX = 4
-"""That distance is at least this many pixels."""
+"""The direction of a branch is measured over at least this many pixels."""
 
 MAX_ROUNDS = 8
 """Spurs are removed in at most this many rounds, since removing some lengthens others."""

@@ -35,8 +35,8 @@ _LINES: dict[int, tuple[tuple[int, int], ...]] = {
     13: ((RIGHT, TOP),),
     14: ((TOP, LEFT),),
 }
-"""From which side to which side of a square of four pixels the line runs, by which of these are
-dark: 1 upper left, 2 upper right, 4 lower right, 8 lower left."""
+"""Sides at which a line enters and leaves a square of four pixels, by the sum over its dark ones:
+1 upper left, 2 upper right, 4 lower right, 8 lower left."""
 
 _SADDLES = {
     (5, True): ((RIGHT, TOP), (LEFT, BOTTOM)),
@@ -44,7 +44,8 @@ _SADDLES = {
     (10, True): ((TOP, LEFT), (BOTTOM, RIGHT)),
     (10, False): ((TOP, RIGHT), (BOTTOM, LEFT)),
 }
-"""The same of two dark pixels that meet at a corner, by whether it is dark in their middle."""
+"""Lines in a square of two dark pixels that meet at a corner, by the case as above and whether its
+middle is dark."""
 
 
 def crossings(ink: Ink, level: float) -> int:

@@ -20,8 +20,7 @@ import numpy.typing as npt
 from camtool.errors import DrawingError
 
 MAX_PIXELS = 24_000_000
-"""A larger picture is refused: its pixels, their contours and these in work take some 40 bytes
-each."""
+"""Larger pictures are refused: each pixel takes some 40 bytes of memory, contours included."""
 
 SQUARE_SHARE = 0.01
 """Pixels whose sides differ by more than this share are not square."""

@@ -25,14 +25,14 @@ from camtool.importers.pieces import Piece
 from camtool.units import MM_PER_UNIT
 
 MAX_POINTS = 200_000
-"""Lines of more points than this, one at each edge of a pixel, are no drawing but noise."""
+"""Contours with more points in all (one between each two neighbouring pixels) are noise, not a
+drawing."""
 
 CENTRE_PX = 0.5
-"""Pixels that thinning leaves may lie this much farther from a centre line than those of an edge
-from their contour."""
+"""Centre lines may be off their pixels by this much more than contours off theirs."""
 
 MIN_DARKNESS_RANGE = 0.05
-"""A picture whose pixels differ by less in darkness is of one tone."""
+"""A picture whose pixels differ by less in darkness has a single tone."""
 
 BINS = 256
 

@@ -27,14 +27,15 @@ from camtool.importers.bitmap.outline import enclosed_area
 from camtool.kernels.fits import furthest_off
 
 SEARCH_SHARE = 0.9
-"""Runs are searched within this part of the limit: moving their ends takes a part of the rest."""
+"""Runs are searched within this share of the limit, since moving their ends uses up some of the
+rest."""
 
 FLAT_SHARE = 0.35
 """An arc that leaves its chord by less than this part of the limit is a line."""
 
 AS_GOOD = 1.25
-"""A line is taken in place of an arc where its mean deviation is at most so many times that of the
-arc, plus `AS_GOOD_PX`."""
+"""A line is preferred to an arc if its rms distance is at most this many times that of the arc,
+plus `AS_GOOD_PX`."""
 
 AS_GOOD_PX = 0.02
 """See `AS_GOOD`."""
@@ -42,16 +43,16 @@ AS_GOOD_PX = 0.02
 MAX_SWEEP_RAD = 1.5 * math.pi
 
 BACK_PX = 1.5
-"""Along a line or an arc, points may go back by no more than this."""
+"""Points may run backwards along their line or arc by at most this, pixels."""
 
 AREA_SHARE = 0.1
-"""A contour encloses what its points enclose, but for this part."""
+"""The area of a contour may differ by at most this share from that which its points enclose."""
 
 HALVINGS = 5
 """The limit is halved at most this many times for a contour whose area differs by more."""
 
 MOVES_BACK, MOVES_ON = 6, 2
-"""Points before and behind the end of a greedy run that are tried as its end."""
+"""How many points before and after the end of a greedy run are tried as its end."""
 
 MEETINGS = 24
 """Rounds in which a point is projected onto both neighbours in turn; it converges to the point
@@ -66,7 +67,7 @@ CORNER_POINTS = 4
 MIN_SEGMENT_PX = 0.05
 
 MIN_RUN_POINTS = 3
-"""Points of a run that is more than a chord."""
+"""Runs have at least this many points where there are so many."""
 
 
 class _Shape(Struct, frozen=True, eq=False):

@@ -69,7 +69,7 @@ _SIDES = {"Top": "-TOP", "Bot": "-BOTTOM", "Inr": "-INNER"}
 
 
 _HARMLESS = "zero-size aperture|[Dd]eprecated"
-"""Remarks of gerbonara on what is drawn all the same."""
+"""Warnings of gerbonara about files that it draws correctly all the same."""
 
 MAX_REMARK = 120
 

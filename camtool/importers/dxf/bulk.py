@@ -74,7 +74,7 @@ class Bulk(Struct, frozen=True, eq=False):
             lines = _lines(tags, marks, np.asarray(kinds == "LINE", dtype=np.bool_), is_other)
             polylines = np.flatnonzero(kinds == "LWPOLYLINE")
             vertices = _vertices(tags, marks[polylines], marks[polylines + 1], is_other)
-        except ValueError:  # a number that is none: ezdxf says where
+        except ValueError:  # not a number: ezdxf reports where
             return cls.none(tags)
         bulk = cls(is_other, lines, vertices)
         return bulk if bulk._is_plain(tags, frame) else cls.none(tags)
@@ -150,7 +150,7 @@ def _say_the_same(tags: Tags, rows: Ints, size: int) -> Bools:
     for k in range(size):
         candidates = np.flatnonzero(is_same & ~np.isin(table[:, k], _OWN))
         tag_rows, before = rows[candidates] + k, rows[candidates] + k - size
-        # Most of them stand before one and after another: each is looked up once.
+        # Most entities are compared with both neighbours: each value is looked up once.
         is_wanted = np.zeros(len(tags.codes), dtype=np.bool_)
         is_wanted[tag_rows] = is_wanted[before] = True
         place = np.cumsum(is_wanted) - 1

@@ -211,7 +211,7 @@ def _text(entity: Any, style: Mapping[str, Any]) -> str:
         raise Unusable("shows no text")
     from camtool.importers.dxf.mtext import plain_text
 
-    # What follows [] is of the alternative units.
+    # Text after [] is for alternative units.
     shown, _, _ = post.partition("[]")
     replacement = shown if "<>" in shown else f"<>{shown}"
     text = (raw or "<>").replace("<>", replacement).replace("[]", "")

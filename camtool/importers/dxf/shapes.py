@@ -1,8 +1,8 @@
 """DXF entities to paths in mm: lines and circles exact, all other curves fitted.
 
 DXF keeps flat entities in a coordinate system of their own (OCS: the arbitrary axis algorithm of
-the DXF reference), and blocks are placed by any affine map. `Frame` is that map, from the world of
-an entity to mm; `Plane` is what it makes of the plane that the entity lies in, seen from above.
+the DXF reference), and blocks are placed by any affine map. `WorldMap` is that map, from the world
+of an entity to mm; `Plane` is the image of the plane that the entity lies in, seen from above.
 """
 
 from __future__ import annotations
@@ -29,12 +29,13 @@ FLAT_TILT = 1e-4
 would change (by half the square of it, 5 nm on a metre)."""
 
 ROUND_SHARE = 1e-9
-"""Half axes that differ by less, or stand less askew, make a circle."""
+"""Half axes whose lengths differ by less than this share, and whose angle differs as little from
+90°, make a circle."""
 
 _UPWARDS = (0.0, 0.0, 1.0)
 _MAX_SHARE_OF_Y = 1.0 / 64.0
-"""The X axis of a plane is at a right angle to the world's Y axis where its unit normal has less
-than this along X and Y, otherwise to the world's Z axis."""
+"""Arbitrary axis algorithm: if the unit normal of a plane has less than this along X and along Y,
+its X axis is at a right angle to the world's Y axis, otherwise to the world's Z axis."""
 
 
 class Plane(Struct, frozen=True, eq=False, dict=True):
@@ -232,8 +233,10 @@ WIDTH = "the width of a line (its middle is the path)"
 _FRAME_VERTEX = 16  # flag of a vertex that only steers a splined POLYLINE
 
 Reader = Callable[[Any, WorldMap, float], Sequence[DxfShape]]
-"""From entity, frame and tolerance (mm). Raises Unusable, and DrawingError (without file and
-place) for numbers that are none."""
+"""Function that makes shapes of an entity, given the map and the tolerance (mm).
+
+Raises Unusable, and DrawingError (without file and place) for numbers that are not finite.
+"""
 
 
 def line(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
@@ -530,7 +533,7 @@ def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
             shapes.extend(_edge(edge, plane, tolerance_mm) for edge in path.edges)
         else:
             rows = numbers(path.vertices).reshape(-1, 3)
-            # Whether the file says so or not: the outline of an area is closed.
+            # The outline of an area is closed, also if the file does not say so.
             shapes.append(polyline_with_bulges(rows, True, plane, tolerance_mm))
     return shapes
 

@@ -37,7 +37,7 @@ SECTIONS = frozenset(
 """Sections that the DXF reference names."""
 
 AT_ONCE = 65536
-"""Number of values that become Python objects together."""
+"""Number of values that are converted to Python objects in one batch."""
 
 _LAYER, _VARIABLE, _POINT, _COUNT = 8, 9, 10, 90
 _UTF16_MARKS, _UTF8_MARK = (b"\xff\xfe", b"\xfe\xff"), b"\xef\xbb\xbf"
@@ -270,7 +270,7 @@ def ascii_tags(data: bytes, file: str) -> Tags:
     if end is not None:
         tags = replace(tags, codes=codes[: end + 1])
     _check_codes(tags, file)
-    # What Python takes for a number and nobody else does.
+    # Python's float() accepts "1_0" and digits of other scripts, which are no numbers in DXF.
     check_numbers(tags, file, tags.values_with(letters == ord("_")))
     if not data.isascii():
         check_numbers(tags, file, tags.values_with(letters >= _NOT_ASCII))

@@ -48,7 +48,7 @@ _NOWHERE = Piece(np.zeros((0, 3)), False, "", "", "")
 _NO_LINES = BulkLines([], np.zeros((0, 2, 3)))
 
 CALLOUTS = frozenset(("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION"))
-"""Kinds of entities that measure something."""
+"""Kinds of entities that are read as dimensions (callouts)."""
 
 
 class DxfScope(Struct, frozen=True, eq=False):
@@ -354,7 +354,8 @@ def _source(entity: Any, scope: DxfScope | None) -> str:
     return f"{entity.dxftype()} {entity.dxf.handle}{scope.within if scope is not None else ''}"
 
 
-# What becomes of each kind of entity: its reader, the parts it is made of, or why it is not used.
+# The treatment of each kind of entity: its reader, the parts that it is drawn with, or the reason
+# why it is not used.
 
 READERS: dict[str, Reader] = {
     "3DFACE": face,
@@ -374,7 +375,7 @@ READERS: dict[str, Reader] = {
 """Kinds that have a shape of their own."""
 
 TEXTS = frozenset(("TEXT", "MTEXT", "ATTRIB", "ATTDEF"))
-"""Kinds that are read as the caller wants text."""
+"""Kinds of text; the option `text` says how they are read."""
 
 DIMENSIONS = frozenset(
     (
@@ -387,10 +388,10 @@ DIMENSIONS = frozenset(
         "ACAD_TABLE",
     )
 )
-"""Kinds that annotate; read when the caller wants dimensions."""
+"""Kinds of annotations; read if the option `dimensions` is set."""
 
 COMPOUNDS = frozenset(("MLINE", "ACAD_PROXY_ENTITY"))
-"""Kinds that are read by the parts they are drawn with."""
+"""Kinds that are read as the parts with which they are drawn."""
 
 DIMENSION_SKIPPED = "is an annotation: read its lines with --dimensions"
 
@@ -431,7 +432,7 @@ def parts_of(entity: Any) -> list[Any]:
                 parts.append(part)
             if len(parts) > MAX_PARTS:
                 break
-    # ezdxf draws these from data that nothing has checked.
+    # ezdxf draws these from unchecked data, and may raise anything.
     except Exception as error:
         raise Unusable("cannot be drawn: its data is damaged") from error
     if len(parts) > MAX_PARTS:
@@ -466,10 +467,10 @@ def text_shapes(
     return shapes, text.lacks
 
 
-# Where the blocks of a DXF drawing stand, and how many entities that makes.
+# The places of blocks, and the number of entities that they amount to.
 #
-# The count comes first, from the sizes of the blocks alone: nested arrays can say more entities in
-# a kilobyte than anybody could draw.
+# They are counted first, from the sizes of the blocks alone: nested arrays can describe more
+# entities in a kilobyte than fit into memory.
 
 MAX_INSERTED = 100_000
 
@@ -488,7 +489,7 @@ class BlockSizes:
             return 1
         name = block_key(insert.dxf.name)
         if name not in self._sizes:
-            self._sizes[name] = 0  # what a block that holds itself finds on its way round
+            self._sizes[name] = 0  # for a block that contains itself
             block = self._blocks.get(insert.dxf.name)
             self._sizes[name] = sum(
                 self.inserted(entity) if entity.dxftype() == "INSERT" else 1
@@ -551,7 +552,7 @@ def _array(insert: Any) -> tuple[int, int]:
 # INSERT, as in CAD.
 
 FOREGROUND = "#000000"
-"""White on black screens, black on paper: black here."""
+"""Colour 7 is white on a black screen and black on paper: black here."""
 
 CONTINUOUS = "Continuous"
 

@@ -32,7 +32,7 @@ MM_PER_UNIT = 0.1
 """The router counts in tenths of a millimetre (thesis L3202)."""
 
 AGREES_UNITS = 1e-6
-"""Two numbers of the file that should be equal may differ by this much (in its own unit)."""
+"""Numbers of the file that should be equal may differ by this much, in its own unit."""
 
 _PAIRS = ("xy", "lxy", "velxy")
 _VECTORS = ("x_points", "y_points", "lx", "ly", "velx", "vely")
@@ -203,7 +203,7 @@ def _are_same(one: Floats, other: Floats) -> bool:
 # with % or #, blocks of comments, continuation with `...`, and commands that change no number.
 
 _HARMLESS = ("clc", "clear", "close", "format", "global", "more")
-"""Commands that change no number: they are passed over to the end of their line."""
+"""Commands that change no number: they are skipped to the end of their line."""
 
 _TOKEN = re.compile(
     r"""(?P<skip>\.\.\.[^\n]*\n|[%\#][^\n]*|[ \t\r]+)

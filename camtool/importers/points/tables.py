@@ -486,7 +486,7 @@ def parse_npz(data: bytes, file: str) -> PointTable:
                     )
                 points = _array(content, file, layer)
                 strokes.append(Stroke(points, f"of array {layer}", layer=layer))
-    # zipfile says so: a bad archive, a password, an unknown packing, a broken stream of bytes.
+    # zipfile raises these for a bad archive, a password, an unknown compression, damaged data.
     except (zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError, OSError) as error:
         raise _broken(file, error) from error
     except (zlib.error, ValueError, OverflowError) as error:
@@ -555,12 +555,12 @@ def _header(
     try:
         version = np.lib.format.read_magic(stream)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of what a damaged header would mean elsewhere
+            warnings.simplefilter("ignore")  # about numbers in a damaged header
             if version == (1, 0):
                 shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
             else:
                 shape, fortran, dtype = np.lib.format.read_array_header_2_0(stream)
-    # What a damaged header does to NumPy's reader is not documented.
+    # NumPy does not document what its reader raises for a damaged header.
     except Exception as error:
         raise DrawingError(
             "has a damaged header", file=file, where=where, mend="save it again"

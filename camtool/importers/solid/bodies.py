@@ -147,7 +147,7 @@ def _listed(explorer: Any) -> Iterator[Any]:
 _AGAIN = "export it again as STEP (AP214 or AP242)"
 
 MAX_DEPTH = 100
-"""Assemblies are nested no deeper than this; a deeper one contains itself."""
+"""Largest depth of nested assemblies; a deeper one contains itself."""
 
 
 def load_step(path: str) -> list[Body]:
@@ -282,7 +282,7 @@ def _name(label: Any) -> str:
 # the part, writing files) is left out. All this happens in a process of its own.
 
 RESULTS = ("part", "sketch", "result")
-"""Names under which a script may leave its model; the first one that there is counts."""
+"""Names of the variable in which a script may leave its model; the first that is set counts."""
 
 _MEND = "correct the script"
 
@@ -291,19 +291,19 @@ def run_script(data: bytes, file: str) -> list[Body]:
     """Run a build123d script and return the bodies that it leaves; DrawingError, with its line,
     when it fails."""
     names: dict[str, Any] = {"__name__": "camtool_script", "__file__": file}
-    if Path(file).is_file():  # what lies beside a script it finds, as ever
+    if Path(file).is_file():  # a script can import modules beside it
         sys.path.insert(0, str(Path(file).resolve().parent))
     sys.argv[:] = [file]
     try:
         exec(compile(data, file, "exec"), names)
     except SystemExit as error:
-        # A script that ends itself without complaint has done its work.
+        # A script that calls sys.exit() without an error has finished.
         if error.code not in (None, 0):
             raise _script_error(f"ended itself: {error.code}", error, file) from error
     except SyntaxError as error:
         where = f"line {error.lineno}" if error.lineno else None
         raise DrawingError(f"is no Python: {error.msg}", where=where, mend=_MEND) from error
-    # Whatever the script raises is a fault of the script.
+    # Any exception is a fault of the script.
     except Exception as error:
         if is_missing(error):
             raise

@@ -221,7 +221,8 @@ def _box(shape: Any) -> tuple[float, ...]:
 #     all others                       fitted by asking OpenCASCADE for points and tangents
 
 LEVEL_RAD = 1e-6
-"""A face or a circle whose axis leaves the vertical by no more is level: 1 nm over 1 mm."""
+"""A face or a circle is level if its axis deviates from the vertical by no more: 1 nm over 1
+mm."""
 
 FULL_TURN_RAD = 1e-9
 """An arc within this of a full turn is a full circle."""
@@ -256,7 +257,7 @@ def edge_path(edge: Any, tolerance: float) -> EdgePath:
     else:
         error_mm = np.zeros((len(exact), 2))
     if edge.Orientation() == TopAbs_REVERSED:
-        exact = reversed_vertices(exact)  # and all of one edge is equally far off
+        exact = reversed_vertices(exact)  # the whole edge has the same error
     return EdgePath(exact, False, error_mm)
 
 

@@ -138,7 +138,7 @@ def _section_finding(answer: dict[str, Any], scale: float, height: float | None)
     return [sentence(measured=high, heights=heights, bottom=bottom, top=top)]
 
 
-# `worker` in a process of its own: started, and what it found taken over.
+# Start `worker` in a process of its own, and read its answer.
 
 FILE_SECONDS = 60.0
 """Time limit for a STEP or BREP file, to which SECONDS_PER_MB is added for its size: damaged ones
@@ -150,7 +150,7 @@ SECONDS_PER_MB = 5.0
 CHATTER_BYTES = 1 << 16
 """Number of bytes of OpenCASCADE's output that are searched for complaints."""
 
-# -P: nothing that lies in the working directory is taken for a module.
+# -P: no module is imported from the working directory.
 START = (
     "import json, sys; request = json.load(open(sys.argv[1], encoding='utf-8'));"
     "sys.path[:] = request['path'];"
@@ -234,7 +234,7 @@ def _complaint(output: str) -> str:
     return ""
 
 
-# The unit of length of a solid model, and what `--units` makes of it.
+# The unit of length of a solid model, and how `--units` replaces it.
 
 _CONTEXT = re.compile(rb"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([#\d,\s]*)\)")
 _ENTITY = re.compile(rb"#(\d+)\s*=\s*(\([^;]*LENGTH_UNIT[^;]*);")

@@ -62,7 +62,7 @@ def parse_colour(text: str) -> str:
     >>> parse_colour("hsl(120, 100%, 25%)"), parse_colour("url(#fade) teal")
     ('#008000', '#008080')
     """
-    # Behind a gradient, or before an ICC profile, stands the colour for readers without them.
+    # The colour after a gradient, or before an ICC profile, is for readers that know neither.
     text = _LINK.sub("", text.strip().lower(), count=1).partition("icc-color(")[0].strip()
     if text in NAMES:
         return NAMES[text]

@@ -26,7 +26,7 @@ MAX_COMPOUNDS = 8
 """A selector of more steps than this is not applied."""
 
 Declarations = dict[str, tuple[str, bool]]
-"""Property to its value and whether it is !important."""
+"""For each property its value, and True if it is !important."""
 
 _CHAIN_COST = 100
 _ATTRIBUTE = r"""\[\s*([\w-]+)\s*(?:([~|^$*]?=)\s*("[^"]*"|'[^']*'|[\w-]+)\s*)?\]"""
@@ -91,7 +91,7 @@ class _Rule(Struct, frozen=True):
             if child:
                 parents = [place.parent for place in places if place.parent is not None]
             else:
-                # What lies around the inmost place lies around all others, or is one.
+                # The ancestors of the innermost place include those of all others.
                 parents = _ancestors(places[0])
             places = [place for place in parents if step.matches(place)]
         return bool(places)

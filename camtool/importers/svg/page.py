@@ -51,7 +51,7 @@ class _Side(Struct, frozen=True):
 
 
 Writer = tuple[str, float]
-"""A program whose px have another size, and how many of them are an inch."""
+"""The program that wrote a file, and its number of px per inch."""
 
 
 def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> SvgPage:

@@ -101,7 +101,7 @@ _SILENT = (
     "symbol", "clipPath", "mask", "pattern", "hatch", "marker", "linearGradient",
     "radialGradient", "meshgradient", "filter", "style", "script", "title", "desc", "metadata",
 )  # fmt: skip
-"""Elements that draw nothing where they stand: they count where they are used."""
+"""Elements that draw nothing where they stand, but may be drawn elsewhere by reference."""
 
 _COUNTED = (*SHAPES, "text", "flowRoot", "image", "use")
 
@@ -273,7 +273,7 @@ class SvgWalk:
 
     def _text(self, node: Node, scope: SvgScope) -> None:
         """Add the letters of a text to the pieces, all or none."""
-        from camtool.importers.svg.text import text_of  # fonts: only where there is text
+        from camtool.importers.svg.text import text_of  # imports fonts: needed for texts only
 
         def lengths_of(style: SvgStyle) -> Lengths:
             return self._lengths(scope, style)
@@ -473,7 +473,7 @@ MAX_CURVE_MM = 1e6
 
 
 Fitted = tuple[Floats, Floats | None]
-"""Vertices (n, 3), and `off_mm` (n, 2) of a `Piece` made of them."""
+"""Vertices (n, 3), and the errors `off_mm` (n, 2) of a `Piece` with these vertices."""
 
 
 class CurveFitter:
@@ -502,7 +502,8 @@ class CurveFitter:
         rows, errors = [_straight(to_mm, subpath.start[None, :])], [np.zeros((1, 2))]
         for segment in subpath.segments:
             piece, error = self._segment(rows[-1][-1, :2], segment, to_mm)
-            # The segment's first vertex is the last one so far; what leaves it goes there.
+            # The segment begins at the last vertex so far, which therefore takes the segment's
+            # bulge.
             rows[-1][-1, 2] = piece[0, 2]
             rows.append(piece[1:])
             if error is None:

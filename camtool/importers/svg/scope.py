@@ -24,7 +24,7 @@ from camtool.importers.svg.transform import (
 from camtool.importers.svg.tree import Node
 
 DEFAULT_LAYER = "0"
-"""The layer of what stands in no layer and in no named group."""
+"""The layer of elements outside of all layers and named groups."""
 
 
 class SvgScope(NamedTuple):
@@ -84,7 +84,7 @@ def layer_in(node: Node, scope: SvgScope) -> str:
 # Source: Scalable Vector Graphics 1.1, 5.1 (svg), 5.5 (symbol), 7.9 (new viewports); SVG 2, 5.5.
 
 FRAME_SHARE = 1e-6
-"""A piece that leaves a frame by no more of its size lies inside: rounding."""
+"""A piece that leaves a frame by no more than this share of the frame's size counts as inside."""
 
 
 class ClipFrame(Struct, frozen=True):

@@ -388,7 +388,7 @@ class Lengths(Struct, frozen=True):
                 f"{name} is in %, but the page has no size", mend="give the svg a viewBox"
             )
         width, height = self.viewport
-        # The standard's length for what is neither along x nor along y.
+        # The standard's reference length for lengths along neither axis.
         diagonal = math.hypot(width, height) / math.sqrt(2.0)
         return {"x": width, "y": height}.get(axis, diagonal)
 

@@ -49,7 +49,7 @@ PLAIN_TEXT: dict[str, tuple[str, ...]] = {
     "font-size-adjust": ("none",),
     "text-transform": ("none",),
 }
-"""Properties of text that are not applied, with the values that ask for nothing."""
+"""Properties of text that are not applied, with the values that change nothing."""
 
 _NOT_INHERITED = ("display", "transform", "transform-origin", "transform-box", "overflow",
                   "limits")  # fmt: skip

@@ -19,7 +19,7 @@ from camtool.arrays import Floats
 from camtool.errors import DrawingError
 
 MAX_NUMBER = 1e12
-"""Numbers beyond this belong to no drawing; their products could overflow."""
+"""Larger numbers are refused: their products could overflow."""
 
 NUMBER = re.compile(r"(?>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)", re.ASCII)
 
@@ -170,7 +170,8 @@ _VERTICAL = ("top", "bottom")
 _QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 
 Length = Callable[[str, str], float]
-"""A length text and the axis ("x" or "y") that % are along, to user units; DrawingError."""
+"""Function that converts a length text to user units; the axis ("x" or "y") says what percentages
+are of. DrawingError."""
 
 
 def parse_transform(text: str) -> Affine:

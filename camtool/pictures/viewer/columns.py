@@ -48,7 +48,7 @@ MAX_NUMBER_BYTES = 7
 """Of an integer below 2**48: a unit of 0.1 µm is then enough for 28,000 km."""
 
 GOAL_COUNTS = 32_000
-"""Wanted heights are whole shares of the thickness, one of so many."""
+"""Wanted heights are multiples of the thickness divided by this."""
 
 SLIDE_UNIT_MM = 1e-4
 """Places of the slides are multiples of this."""
@@ -163,8 +163,8 @@ def slide_columns(pair: StockPair | None, rows: int, cell_mm: float) -> Columns:
 
 
 MAX_ENGAGED = 20_000
-"""Of programs with more moves of tips than this the engagement is not shown: it would take longer
-than all else."""
+"""The engagement is not shown for programs with more moves of tips: it would take longer than
+everything else."""
 
 ENTRY_DEG = -1.0
 
@@ -315,7 +315,7 @@ def _wide(scene: Scene, toolpath: Toolpath) -> npt.NDArray[np.generic]:
     for (begin, tool), end in zip(turns, ends, strict=True):
         rows = begin + np.flatnonzero(toolpath.is_feed[begin:end])
         depths: Floats = -np.column_stack([toolpath.starts_of(rows)[:, 2], toolpath.end[rows, 2]])
-        # What lies above the stock cuts nothing.
+        # Ends of a feed above the stock cut nothing.
         for row, ends_mm in zip(rows.tolist(), depths.tolist(), strict=True):
             if max(ends_mm) > 0.0:
                 wide[row] = [tool.radius_at(max(each, 0.0)) for each in ends_mm]
@@ -370,8 +370,8 @@ def _arc_columns(
 # and draws p + (N − 1)(p − q) for a deviation N times as large (see `camtool.pictures.trace`).
 
 MAX_COUNTS = 4_000
-"""Deviations are whole numbers of counts, this many for the largest: drawn a thousand times as
-large, it is true to a quarter of itself."""
+"""Number of counts of the largest deviation: at a magnification of a thousand, it is exact to a
+quarter of its true size."""
 
 
 class Traced(Struct, frozen=True, eq=False):

@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Tool
 
 SCRIPTS = ("data.js", "paint.js", "stage.js", "solid.js", "depth.js", "panel.js", "main.js")
-"""The files of the script in their order; the last one starts it."""
+"""The files of the script in order; the last one starts it."""
 
 SCRIPTED = frozenset(
     ("drawing", "swept", "travel", "rapids", "feeds", "plunges", "starts", "order", "arrows")
@@ -166,7 +166,7 @@ def _head(content: Content, run: Playback | None, traced: Traced) -> dict[str, o
 MAX_HEIGHTS = 1 << 19
 
 MIN_STEP_MM = 0.005
-"""They are no nearer to each other."""
+"""Least distance of the heights of a grid."""
 
 
 def _cutting(scene: Scene, pair: StockPair | None, stock: StockBox | None) -> dict[str, object]:
@@ -333,7 +333,7 @@ def _file(name: str) -> str:
 MAX_PLOTS = 16
 
 BINS_SHOWN = 120
-"""Errors are joined until a plot has no more than this, one every 3°."""
+"""Errors of neighbouring bins are joined until a plot has at most this many, one every 3°."""
 
 WIDTH = 520.0
 """Width of a plot in its own units; letters are about 14 high."""
@@ -349,7 +349,8 @@ NAMES = {
     PLOT: "paper",
     QUIET: "quiet",
 }
-"""The page's name of each colour of a plot, so that it is light or dark as the page is."""
+"""For each colour of a plot the page's variable, so that plots are light or dark as the page
+is."""
 
 _PAINT = re.compile('(fill|stroke)="(#[0-9a-f]{6})"')
 _SHAPE = re.compile(' d="[^"]*"')
