@@ -477,11 +477,11 @@ Fitted = tuple[Floats, Floats | None]
 
 
 class CurveFitter:
-    """Converts subpaths from user units to vertices in mm, with curves fitted within one tolerance.
+    """Converts subpaths from user units to vertices in mm, curves fitted within one tolerance.
 
-    With `box_only` a Bézier curve whose control points lie within the box of all that came before
-    is its chord: it lies in their convex hull, and so leaves the box as it is. Of 900 such curves
-    24 are fitted.
+    With `box_only`, a Bézier curve whose control points lie within the box of the curves before it
+    is replaced by its chord: it lies in the convex hull of its control points, and so does not
+    enlarge the box. Of 900 such curves 24 are fitted.
     """
 
     def __init__(self, tolerance_mm: float, *, box_only: bool = False) -> None:
@@ -535,8 +535,11 @@ class CurveFitter:
         return _with_ends(vertices, ends), errors
 
     def _is_in_box(self, control: Floats) -> bool:
-        """True if control points (n, 2) lie within the box so far, which the ends of their curve
-        enlarge; what is but a point may be left out, and so enlarges nothing."""
+        """Return True if the control points (n, 2) lie within the box so far; if not, enlarge the
+        box by the ends of their curve.
+
+        A curve that is shorter than a position may be left out, and so does not enlarge it.
+        """
         low, high = control.min(axis=0), control.max(axis=0)
         is_within = bool((low >= self._low).all() and (high <= self._high).all())
         if not is_within and (high - low).max() > POSITION_EPS_MM:
@@ -559,7 +562,8 @@ class CurveFitter:
 
 
 def _chord(control: Floats) -> Floats:
-    """(2, 3) from the first to the last of control points (n, 2)."""
+    """Return the vertices (2, 3) of the line from the first to the last of control points (n,
+    2)."""
     vertices = np.zeros((2, 3))
     vertices[:, :2] = control[[0, -1]]
     return vertices
