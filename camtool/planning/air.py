@@ -33,8 +33,9 @@ BESIDE_TIMES = 20.0
 
 
 def left_beside_mm(setting: Setting) -> float:
-    """Distance left beside the edge, mm: the allowance, and of a carving its slopes. The wall of a
-    V bit of half the angle α is z tan α from the edge where it is z deep."""
+    """Return the distance that an operation leaves uncut beside the edge, mm: its allowance, and
+    on the floor of a carving also the carved slope. The wall of a V bit of half angle α is z tan α
+    from the edge at the depth z."""
     operation, carved = setting.operation, setting.operation.rest_of
     if carved is None or carved.contract.rest != "floor" or carved.tool.tip_angle_rad is None:
         return operation.allowance_mm
@@ -43,8 +44,8 @@ def left_beside_mm(setting: Setting) -> float:
 
 
 def reached(region: Polylines, operation: Operation, left_mm: float) -> Polylines:
-    """Return what of a region the tool of an operation that clears it surely reaches; adaptive
-    ones leave necks that are hardly wider than it."""
+    """Return the part of a region that the operation's tool surely reaches, with `left_mm` left at
+    its walls. Adaptive clearing leaves necks that are little wider than the tool."""
     wide_mm = (1.0 + REST_OVERLAP) * operation.tool.radius_mm
     if operation.engagement_rad is not None:
         wide_mm = operation.tool.radius_mm + neck_mm(operation.tool.radius_mm)
@@ -52,7 +53,8 @@ def reached(region: Polylines, operation: Operation, left_mm: float) -> Polyline
 
 
 def air_after(step: Step) -> Iterator[Air]:
-    """Yield what an operation leaves as air: pockets, bores and holes, and the faced top."""
+    """Yield what an operation turns into air: the regions of pockets, bores and holes, and the
+    faced top."""
     operation, contract, tool = step.operation, step.operation.contract, step.operation.tool
     deep_mm = step.setting.levels_mm[-1]
     if not step.runs:
@@ -83,8 +85,8 @@ def air_after(step: Step) -> Iterator[Air]:
 
 
 def air_at(airs: Iterable[Air], region: Polylines, setting: Setting, level_mm: float) -> Polylines:
-    """Return what is air at a level in a region of tool centres and beside it: of others, and
-    beside the stock. The regions may overlap."""
+    """Return the air at a level in and beside a region of tool centres: what earlier operations
+    have cleared that deep, and what lies beside the stock. The regions may overlap."""
     radius = setting.operation.tool.radius_mm
     low, high = _extents(region)
     near = [
@@ -97,7 +99,8 @@ def air_at(airs: Iterable[Air], region: Polylines, setting: Setting, level_mm: f
 
 
 def _beside(stock: Stock | None, low: Floats, high: Floats, radius: float) -> list[Polylines]:
-    """Return the air beside a stock of known size that a region reaches beyond."""
+    """Return the air beside a stock of known size, if a region (box `low` to `high`) reaches
+    beyond the stock."""
     if stock is None or stock.box_mm is None:
         return []
     box = np.array(stock.box_mm).reshape(2, 2)
@@ -114,7 +117,7 @@ def _extents(region: Polylines) -> tuple[Floats, Floats]:
 
 
 def _meets(region: Polylines, low: Floats, high: Floats) -> bool:
-    """Return True if a region's box reaches into another."""
+    """Return True if the region's bounding box overlaps the box from `low` to `high`."""
     own_low, own_high = _extents(region)
     return bool((own_low < high).all() and (own_high > low).all())
 

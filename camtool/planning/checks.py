@@ -103,10 +103,11 @@ Box = tuple[float, float, float, float]
 def checked(
     toolpath: Toolpath, job: Job, machine: Machine, steps: Sequence[Step] = ()
 ) -> tuple[Finding, ...]:
-    """Find what no program may do, and what looks like a mistake; () when all is well.
+    """Return the findings about what no program may do and about probable mistakes; () if all is
+    well.
 
     Errors: an axis beyond its travel, a cut deeper than the stock, a feed that the machine cannot
-    make (on slopes: along Z), an operation whose tool the program cannot ask for; of the `steps`
+    make (on slopes: along Z), an operation whose tool the program cannot ask for; of the `steps`,
     what is drawn beside the stock, leads and clamps beside it. A warning: something is cut wholly
     beside the stock.
     """
@@ -132,7 +133,8 @@ def checked(
 
 
 def _long(toolpath: Toolpath) -> Iterator[Finding]:
-    """Yield warnings for sizes and numbers of moves that only a job that allows them may have."""
+    """Yield warnings for sizes and numbers of moves that are possible only because the job allows
+    them (`allow`)."""
     reach = toolpath_extents(toolpath)[:2]
     size = float(max(np.ptp(reach, axis=1).max(), np.abs(reach).max())) if len(toolpath) else 0.0
     if size > MAX_SIZE_MM:
@@ -142,7 +144,8 @@ def _long(toolpath: Toolpath) -> Iterator[Finding]:
 
 
 def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
-    """Yield axes on which the toolpath, part zero included, spans more than they can travel."""
+    """Yield a finding for each axis on which the toolpath (part zero included) spans more than the
+    axis can travel."""
     for name, axis, (low, high) in zip(
         AXES, machine.axes, toolpath_extents(toolpath).tolist(), strict=True
     ):
@@ -159,8 +162,8 @@ def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
 
 
 def _into_travel(toolpath: Toolpath, machine: Machine, name: str) -> str:
-    """Say how to bring a toolpath into the travel of an axis: what helps here, or a larger
-    machine."""
+    """Return text on how to bring a toolpath into the travel of an axis: the change that helps
+    here, or a larger machine."""
     axis = AXES.index(name)
     needed = math.ceil(np.ptp(toolpath_extents(toolpath)[axis]))
     yours = own_numbers(machine, [f"axes.{name.lower()}.travel_mm={needed}"])
@@ -177,7 +180,8 @@ def _into_travel(toolpath: Toolpath, machine: Machine, name: str) -> str:
 
 
 def _too_deep(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
-    """Cuts through the stock, and deeper than may be."""
+    """Yield a finding for cuts below the stock: a remark or warning within the depth that is
+    allowed there, an error beyond it."""
     stock = job.stock
     cuts = feeds_below_top(toolpath)
     if stock is None or not cuts.any():
@@ -225,11 +229,12 @@ def _beside_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
 
 
 def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
-    """Return findings for drawn contours of an operation that lie beside the stock.
+    """Return findings for drawn contours of an operation that lie partly or wholly beside the
+    stock.
 
     An error: a part and an engraving that are not whole then, and what lies wholly beside it. A
-    pocket that is open at the edge, a notch, and a line that runs out of the stock may be meant:
-    a warning. The tool itself may run beside the stock.
+    pocket that is open at the edge, a notch, and a line that runs out of the stock may be meant: a
+    warning. The tool itself may run beside the stock.
     """
     is_repeat = step.operation.stage == "finish" or step.operation.rest_of is not None
     if stock is None or stock.box_mm is None or is_repeat or not step.runs:
@@ -279,8 +284,8 @@ def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
 
 
 def _clamps_off_stock(job: Job) -> Iterator[Finding]:
-    """Yield an error for each box to be kept free that does not reach the stock, as a clamp does
-    that holds it; not for boxes without end, which keep an area free."""
+    """Yield an error for each keep-out box that does not reach the stock, which a clamp must.
+    Boxes without an end are not checked: they keep an area free."""
     stock = job.stock
     if stock is None or stock.box_mm is None:
         return
@@ -329,8 +334,8 @@ def _leads_off_stock(step: Step, stock: Stock | None) -> list[Finding]:
 
 
 def _is_beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:
-    """Return (N,) true where the tool, of `radius` (N,) mm, stays beside the stock's box: by
-    the boxes of the moves, of arcs by those of their circles."""
+    """Return the mask (N,) of rows in which the tool, of `radius` (N,) mm, stays beside the
+    stock's box. Bounding boxes are compared, for arcs those of their whole circles."""
     begin, end = toolpath.starts[:, :2], toolpath.end[:, :2]
     low, high = np.minimum(begin, end), np.maximum(begin, end)
     arm = np.hypot(*(begin - toolpath.centre).T)[:, None]
@@ -342,7 +347,8 @@ def _is_beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:
 
 
 def _tools_not_said(job: Job) -> Iterator[Finding]:
-    """Operations whose tool is another than the one before, with no number to ask for it."""
+    """Yield a finding for each operation whose tool differs from the one before, if the program
+    cannot ask for it because it has no number, or the same number."""
     for before, operation in pairwise(job.operations):
         one, other = before.tool, operation.tool
         if _shape(one) == _shape(other) or other.number not in (None, one.number):
@@ -355,7 +361,8 @@ def _tools_not_said(job: Job) -> Iterator[Finding]:
 
 
 def _change_not_stated(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
-    """Yield the first change of tools on a machine that does not state where they are changed."""
+    """Yield a finding for the first tool change on a machine whose file does not state where tools
+    are changed."""
     changes = changes_between_cuts(toolpath)
     keys = [key for key in ("change_mm", "change_z_mm") if getattr(machine.defaults, key) is None]
     if not keys or not len(changes) or machine.spindle.turns == "work":
@@ -377,8 +384,8 @@ def _shape(tool: Tool) -> tuple[object, ...]:
 
 
 def _radii(toolpath: Toolpath, job: Job) -> Floats:
-    """Return the radius (N,) mm of the tool of each row; the most of all where it is not known
-    which one is in."""
+    """Return the radius (N,) mm of the tool of each row; the largest of all tools where the tool
+    of a row is not known."""
     tools = [operation.tool for operation in job.operations]
     radii = np.full(len(toolpath), max(tool.radius_mm for tool in tools))
     numbered = {tool.number: tool for tool in tools if tool.number is not None}
@@ -391,7 +398,8 @@ def _radii(toolpath: Toolpath, job: Job) -> Floats:
 
 
 def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
-    """Yield the fastest move along X and Y, and along Z, where the machine is not so fast.
+    """Yield findings for the move that exceeds the highest rate of X and Y most, and for the move
+    that exceeds that of Z most.
 
     Of a feed the part |dz| / length goes along Z, and the rest of the triangle across.
     """
@@ -417,7 +425,7 @@ def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Findin
 
 
 def _lengths(toolpath: Toolpath) -> tuple[Floats, Floats]:
-    """Return (N,), (N,) mm: how far each row goes in XY, along its arc, and in Z."""
+    """Return (N,), (N,) mm: the length of each row in XY (along its arc), and in Z."""
     step = toolpath.end - toolpath.starts if len(toolpath) else np.zeros((0, 3))
     spoke = toolpath.starts[:, :2] - toolpath.centre
     arc = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps())
@@ -426,7 +434,7 @@ def _lengths(toolpath: Toolpath) -> tuple[Floats, Floats]:
 
 
 def _place(toolpath: Toolpath, row: int) -> str:
-    """`move 12 (CIRCLE 2F)`: a row and where it came from."""
+    """Return the name of a row and its source, such as `move 12 (CIRCLE 2F)`."""
     source = toolpath.text(row)
     return f"move {row} ({source})" if source else f"move {row}"
 
@@ -468,7 +476,7 @@ def doubtful_settings(
 
 
 def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
-    """Yield what is doubtful about an operation, each with the flag that changes it."""
+    """Yield text on each doubtful setting of an operation, with the flag that changes it."""
     operation, feeds, tool = step.operation, step.setting.feeds, step.operation.tool
     wide = operation.away_mm > 0.0
     on_line = operation.contract.runs_beside and operation.side != "on" and not wide
@@ -489,7 +497,7 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
 
 
 def _plunges(step: Step) -> bool:
-    """Return True if a mill goes straight down into the stock; a bore does where its hole is
+    """Return True if a mill goes straight down into the stock; a bore does so where its hole is
     narrow."""
     operation = step.operation
     if operation.stage == "finish":
@@ -502,7 +510,7 @@ def _plunges(step: Step) -> bool:
 
 
 def _comes_down_beside(step: Step) -> bool:
-    """Return True if the tool comes down beside the stock at every run."""
+    """Return True if the tool comes down beside the stock at the begin of every run."""
     stock = step.setting.stock
     if stock is None or stock.box_mm is None:
         return False
@@ -513,8 +521,8 @@ def _comes_down_beside(step: Step) -> bool:
 
 
 def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[str]:
-    """Yield a doubt if an operation cuts parts out of the stock without tabs, which come loose
-    under the tool; where a finishing pass follows, it cuts at loose parts."""
+    """Yield a doubt if an operation cuts parts free without tabs, so that they come loose under
+    the tool, also before a finishing pass."""
     operation, closed = step.operation, step.chosen.lines.closed
     if stock is None or operation.stage == "finish" or operation.tabs is not None:
         return
@@ -526,7 +534,8 @@ def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[s
 
 
 def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
-    """Yield what the tool of an operation is not made for, as far as its file says it."""
+    """Yield text on each respect in which an operation demands more of its tool than the tool is
+    made for, as far as its file says."""
     operation, tool, setting = step.operation, step.operation.tool, step.setting
     contract, pecks = operation.contract, operation.contract.descent == "pecks"
     depth = -setting.levels_mm[-1]
@@ -557,8 +566,8 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
 
 
 def peak_mm(tool: Tool, step_over: float) -> float:
-    """Return the height of the highest peaks on a floor, mm: at square corners of rings, which
-    are farther apart there."""
+    """Return the height, mm, of the highest peaks that a tool leaves on a floor: at square corners
+    of rings, where the rings are farther apart."""
     return ridge_mm(tool, min(CORNER_GAP * step_over, 1.0))
 
 
@@ -574,7 +583,7 @@ def ridge_mm(tool: Tool, step_over: float) -> float:
 
 
 def _is_beyond(value: float, limits: tuple[float, float] | None) -> bool:
-    """Return True if a number is out of its limits, by more than rounding."""
+    """Return True if a number is outside its limits by more than rounding."""
     if limits is None:
         return False
     min_value, max_value = limits

@@ -75,8 +75,8 @@ POLE_SHARE = 0.01
 
 
 class Cell(Struct, eq=False):
-    """A connected tool centre region, the regions that it falls into when shrunk by a step, the
-    tips between the two, and how many times it can be shrunk (`height`)."""
+    """A connected tool centre region; the regions into which it splits when shrunk by a step
+    (`inner`); the tips between it and these; and how many times it can be shrunk (`height`)."""
 
     region: ConnectedRegion
     inner: list[Cell] = field(default_factory=list)
@@ -85,9 +85,9 @@ class Cell(Struct, eq=False):
 
 
 class Steps(Struct, frozen=True):
-    """Distance of the rings and radius of the tool, mm; whether rings run as they are oriented
-    (the region on their left) or reversed; whether the first one begins as near as possible to
-    the pole of its region, where a helix goes down."""
+    """The distance of the rings and the radius of the tool, mm. `forward`: rings run as they are
+    oriented (the region on their left), not reversed. `from_pole`: the first ring begins as near
+    as possible to the pole of its region, where a helix goes down."""
 
     step_mm: float
     radius_mm: float
@@ -119,8 +119,8 @@ def ring_cells(region: Polylines, steps: Steps) -> Cell:
 
 
 def _next_ring(region: Polylines, steps: Steps) -> tuple[Polylines, list[Polyline]]:
-    """Return the region shrunk by a step, and the tips; by a shorter step where that saves the
-    tips."""
+    """Return the region shrunk by a step, and the tips. A shorter step is taken if no tips are
+    needed then."""
     shrunk = offset_shape(region, steps.step_mm)
     if steps.step_mm <= steps.radius_mm + POSITION_EPS_MM:
         return shrunk, []
@@ -136,7 +136,7 @@ def _next_ring(region: Polylines, steps: Steps) -> tuple[Polylines, list[Polylin
 
 
 def _tips(core: Polylines, shrunk: Polylines, steps: Steps) -> list[Polyline]:
-    """Return the parts of the boundary of `core`, the region shrunk by the tool's radius, that the
+    """Return the parts of the boundary of `core` (the region shrunk by the tool's radius) that the
     tool does not cover from within the next ring."""
     if len(core) == 0 or len(shrunk) == 0:
         return list(core)
@@ -144,10 +144,11 @@ def _tips(core: Polylines, shrunk: Polylines, steps: Steps) -> list[Polyline]:
 
 
 def ring_paths(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
-    """Return (n, 3) x, y, bulge: an open path over all rings, and the cell that it begins in. A
-    region is cut after all that came of it.
+    """Return open paths (n, 3) x, y, bulge over all rings, from the inside out, and the cell in
+    which the first begins.
 
-    Several paths only where rounding hides the link from one ring to the next (`LinkedPath`).
+    There is more than one path only where rounding hides the link from one ring to the next
+    (`LinkedPath`).
     """
     linked = LinkedPath()
     first = None
@@ -161,9 +162,11 @@ def ring_paths(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
 
 
 def _inside_out(root: Cell, linked: LinkedPath) -> Iterator[tuple[Cell, Cell]]:
-    """Yield all cells, each after its inner ones, with the cell in which the tool can come to it.
+    """Yield all cells, each after its inner ones, together with the outer cell through which the
+    tool can reach it.
 
-    The highest first; later the one nearest to the end of the path so far, which grows meanwhile.
+    The first is the one with the greatest height; later the cell nearest to the end of the path so
+    far (`linked`, which the caller extends meanwhile).
     """
     stack = [(root, list(root.inner))]
     outer_cell: Cell | None = None
@@ -180,7 +183,8 @@ def _inside_out(root: Cell, linked: LinkedPath) -> Iterator[tuple[Cell, Cell]]:
 
 
 def _pick(cells: list[Cell], tool_place: Floats | None) -> int:
-    """Return the cell nearest to a place; the highest when the tool is nowhere yet."""
+    """Return the index of the cell nearest to the tool; of the cell with the greatest height if
+    the tool has no place yet."""
     if tool_place is None:
         return max(range(len(cells)), key=lambda row: (cells[row].height, -row))
     distances = [
@@ -190,8 +194,8 @@ def _pick(cells: list[Cell], tool_place: Floats | None) -> int:
 
 
 class Scan(Struct, frozen=True):
-    """Distance of the strokes and radius of the tool, mm, and the angle of the strokes; whether
-    the rings run as they are oriented (the region on their left) or reversed."""
+    """The distance of the strokes and the radius of the tool, mm, and the angle of the strokes.
+    `forward`: rings run as they are oriented (the region on their left), not reversed."""
 
     step_mm: float
     radius_mm: float
@@ -200,8 +204,8 @@ class Scan(Struct, frozen=True):
 
 
 class Strokes(Struct, frozen=True, eq=False):
-    """J pieces of the lines: `row` (J,) of its line, `ends` (J, 2, 2) mm, `span` (J, 2) from and
-    to where along its line, mm; all in one connected region."""
+    """J pieces of parallel lines within one connected region: `row` (J,), the number of the line;
+    `ends` (J, 2, 2), mm; `span` (J, 2), the begin and end along the line, mm."""
 
     row: Ints
     ends: Floats
@@ -212,16 +216,17 @@ class Strokes(Struct, frozen=True, eq=False):
 
 
 def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
-    """Return (n, 3) x, y, bulge: an open path over all strokes and rings of one connected region.
+    """Return open paths (n, 3) x, y, bulge over all strokes and rings of one connected region.
 
     The region is shrunk by a margin m and cut by parallel lines, h apart. Their pieces within it
     are the strokes; then the boundary of the whole region is followed, which takes the margin off
-    the walls. Nothing is left over when  h/2 + m ≤ r,  the tool's radius: the line nearest to a
+    the walls. Nothing is left over when h/2 + m ≤ r, the tool's radius: the line nearest to a
     place of the shrunk region is no farther than h/2, and if the straight line to it leaves the
     shrunk region, that is within h/2, and so the wall's ring within h/2 + m. Every other place is
     within m of that ring.
 
-    Several paths only where rounding hides the link from one stroke to the next (`LinkedPath`).
+    There is more than one path only where rounding hides the link from one stroke to the next
+    (`LinkedPath`).
     """
     connected, linked = ConnectedRegion(region), LinkedPath()
     margin = min(scan.radius_mm - 0.5 * scan.step_mm, MAX_MARGIN_SHARE * scan.radius_mm)
@@ -241,7 +246,8 @@ def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
 
 
 def strokes_of(region: Polylines, scan: Scan) -> Strokes:
-    """Return the pieces of equally spaced lines, no farther apart than the step, in a region."""
+    """Return the pieces within a region of equally spaced parallel lines, no farther apart than
+    the step."""
     level_region = Polylines.of([rotate(path, -scan.angle_rad) for path in region])
     (left_x, right), (low, high) = extents(level_region).tolist()
     count = max(1, math.ceil((high - low) / scan.step_mm))
@@ -257,10 +263,10 @@ def strokes_of(region: Polylines, scan: Scan) -> Strokes:
 
 
 def _order(strokes: Strokes) -> list[tuple[int, bool]]:
-    """Return every stroke once, each with whether it is cut from its end.
+    """Return the order of all strokes, as (index, True if cut from its end).
 
-    From a stroke on to one beside it, as long as there is one; else to the nearest end of any
-    that has at most one neighbour left, so that no row of strokes is interrupted.
+    After a stroke comes one beside it, as long as there is one; else the nearest end of any stroke
+    with at most one neighbour left, so that no row of strokes is interrupted.
     """
     neighbours = _neighbours(strokes)
     remaining = set(range(len(strokes)))
@@ -286,8 +292,8 @@ def _order(strokes: Strokes) -> list[tuple[int, bool]]:
 def _next(
     last: int, onward: int, strokes: Strokes, neighbours: list[list[int]], remaining: set[int]
 ) -> list[int]:
-    """Return the strokes that may follow the last one, which went on to the next line or the
-    one before (`onward` 1 or −1)."""
+    """Return the indices of the strokes that may follow the last one; `onward` (1 or −1): the
+    direction in which the lines were cut so far, which is kept if possible."""
     candidates = [index for index in neighbours[last] if index in remaining]
     onward_ones = [
         index for index in candidates if strokes.row[index] - strokes.row[last] == onward
@@ -301,7 +307,7 @@ def _next(
 
 
 def _neighbours(strokes: Strokes) -> list[list[int]]:
-    """For each stroke those of the lines before and behind it that run beside a part of it."""
+    """Return, for each stroke, the strokes on the adjacent lines that run beside a part of it."""
     neighbours: list[list[int]] = [[] for _ in range(len(strokes))]
     first = np.searchsorted(strokes.row, np.arange(strokes.row.max(initial=-1) + 3))
     for index, row in enumerate(strokes.row.tolist()):
@@ -314,12 +320,12 @@ def _neighbours(strokes: Strokes) -> list[list[int]]:
 
 
 def slot_paths(region: Polylines, tool_radius_mm: float) -> list[Floats]:
-    """Return (n, 3) x, y, bulge: open paths along the centre lines of slots as wide as the tool,
-    where the tool centre region is a line and has no area.
+    """Return open paths (n, 3) x, y, bulge along the centre lines of slots as wide as the tool,
+    where the tool centre region is a line without area.
 
-    With a tool thinner by a hair the tool centre region is a band as thin as that hair. What of it
-    lies beyond the region of the true tool is a slot. Of the hairs that show all of the slots the
-    thinnest is taken, so that the band is as near to the centre line of the slot as possible.
+    For a slightly thinner tool the tool centre region is a band as thin as the difference
+    ("hair"). The part of it beyond the region of the true tool is a slot. Of the hairs that show
+    all slots the thinnest is taken, so that the band is as near to the centre line as possible.
     """
     diameter = 2.0 * tool_radius_mm
     widest = _bands(region, tool_radius_mm, SLOT_TOLERANCE * diameter)
@@ -338,8 +344,8 @@ def slot_paths(region: Polylines, tool_radius_mm: float) -> list[Floats]:
 
 
 def _bands(region: Polylines, radius: float, hair_mm: float) -> list[Polyline]:
-    """Return the edges of the bands that a tool thinner by a hair shows beyond the true tool's
-    region."""
+    """Return the edges of the bands: the boundary of the tool centre region of a tool thinner by
+    `hair_mm`, outside the true tool's region."""
     thinner = offset_shape(region, radius - hair_mm)
     true = offset_shape(region, radius)
     if len(true):
@@ -350,7 +356,8 @@ def _bands(region: Polylines, radius: float, hair_mm: float) -> list[Polyline]:
 
 
 def _covered(path: Polyline, other_paths: list[Polyline], near_mm: float) -> bool:
-    """Return True if all of a path runs beside others: it is the other edge of a band."""
+    """Return True if the whole path runs beside others, within `near_mm`: it is the other edge of
+    a band."""
     if not other_paths:
         return False
     points = sample(path, length(path) / BAND_PLACES)
@@ -360,8 +367,8 @@ def _covered(path: Polyline, other_paths: list[Polyline], near_mm: float) -> boo
 
 
 def _along_band(band: Polyline, near_mm: float) -> Polyline:
-    """Return an open path along a band: one side of it where the other one is beside it; else
-    round."""
+    """Return an open path along a band. If its two edges lie beside each other only one is
+    followed; otherwise the path goes all round."""
     if not band.closed:
         return band
     along = MeasuredPath.of(band)
@@ -376,14 +383,14 @@ def _along_band(band: Polyline, near_mm: float) -> Polyline:
 
 
 def _without_specks(vertices: Floats, speck_mm: float) -> Floats:
-    """Return an open path (n, 3) without segments as short as a band is wide: they lead across
-    it."""
+    """Return an open path (n, 3) without segments as short as a band is wide, since these lead
+    across it."""
     step = np.hypot(*np.diff(vertices[:, :2], axis=0).T)
     return np.asarray(vertices[np.concatenate([step > speck_mm, [True]])])
 
 
 class LinkedPath:
-    """Collects strokes (k, 3) of x, y, bulge; each is linked to the one before it, at depth."""
+    """Collects strokes (k, 3) x, y, bulge, and links each to the one before it at depth."""
 
     def __init__(self) -> None:
         self.begin: Floats | None = None
@@ -397,15 +404,16 @@ class LinkedPath:
         return self._parts[-1][-1, :2] if self._parts else None
 
     def cut(self, stroke: Floats, region: ConnectedRegion) -> None:
-        """A stroke, after a link that stays in a region which holds both places.
+        """Add a stroke, after a link within `region`, which must hold both its ends.
 
-        Where rounding hides the link (`route`) the tool comes up: another path begins.
+        If rounding hides the link (`route`), the tool comes up and another path begins.
         """
         tool_place = self.end_place
         self.join(None if tool_place is None else route(tool_place, stroke[0, :2], region), stroke)
 
     def join(self, link: Floats | None, stroke: Floats) -> None:
-        """A stroke after its link; None where there is none."""
+        """Add a stroke after its link. Without a link (None) the path so far is finished and
+        another begins."""
         if link is not None:
             self._parts.append(link)
         elif self._parts:
@@ -420,9 +428,9 @@ class LinkedPath:
         outer_region: ConnectedRegion,
         is_forward: bool,
     ) -> None:
-        """All these paths of a region, each time the nearest: closed ones once round from their
-        nearest place, as they are oriented or (not `is_forward`) reversed; open ones from either
-        end.
+        """Add all paths of a region, each time the nearest one. Closed paths are cut once round
+        from their nearest place, as they are oriented or (not `is_forward`) reversed; open ones
+        from either end.
 
         The first is reached through `outer_region`, which contains the region.
         """
@@ -441,19 +449,20 @@ class LinkedPath:
             outer_region = region
 
     def _near(self, path: Polyline) -> Floats:
-        """Place of the tool, or where it would go down, or else the start of a path."""
+        """Return the place from which the next path is reached: the tool's place, or where it
+        would go down, or else the start of `path`."""
         if self.end_place is not None:
             return self.end_place
         return path.start if self.begin is None else self.begin
 
     def paths(self) -> list[Floats]:
-        """Return (n, 3) open paths; several only where the tool has to come up."""
+        """Return the finished open paths (n, 3); several only where the tool has to come up."""
         return [*self._done, _chained(self._parts)] if self._parts else self._done
 
 
 def _from_nearest(along: MeasuredPath, place: Floats) -> tuple[float, float]:
-    """Return the distance of a place from where a path may begin, and the length along it to
-    there."""
+    """Return the distance from a place to the nearest point at which a path may begin (any point
+    of a closed one, an end of an open one), and the length along the path to that point."""
     if along.path.closed:
         return closest(along, place)
     to_start, to_end = np.hypot(*(along.path.vertices[[0, -1], :2] - place).T).tolist()
@@ -461,7 +470,7 @@ def _from_nearest(along: MeasuredPath, place: Floats) -> tuple[float, float]:
 
 
 def _chained(parts: list[Floats]) -> Floats:
-    """Open paths, each of which begins where the one before it ends, as one."""
+    """Return consecutive open paths, each beginning where the one before ends, joined into one."""
     return tidy(join_paths(parts))
 
 
@@ -481,7 +490,7 @@ class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
         return [MeasuredPath.of(path) for path in self.boundary]
 
     def holds(self, points: Floats) -> Bools:
-        """Return (P,) true for points (P, 2) in the region or on its boundary."""
+        """Return the mask (P,) of points (P, 2) within the region or on its boundary."""
         is_inside = inside(points, self.segments)
         not_inside = np.flatnonzero(~is_inside)
         if len(not_inside):
@@ -491,8 +500,8 @@ class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
         return is_inside
 
     def place(self, point: Floats) -> tuple[int, float]:
-        """Return the path nearest to a point (2,), and the length along it to its nearest
-        place."""
+        """Return the index of the boundary path nearest to a point (2,), and the length along it
+        to the nearest place."""
         row = int(points_to_segments(point[None, :], self.segments)[0].argmin())
         path = int(self.segments.path[row])
         first = int(np.searchsorted(self.segments.path, path))
@@ -500,15 +509,15 @@ class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
 
 
 def closest(along: MeasuredPath, point: Floats) -> tuple[float, float]:
-    """Return the distance of a point (2,) from a path, and the length along it to the nearest
-    place."""
+    """Return the distance of a point (2,) from a path, and the length along the path to its
+    nearest place."""
     distances = points_to_segments(point[None, :], along.segments)[0]
     row = int(distances.argmin())
     return float(distances[row]), float(along.reach[row]) + _length_to(point, along.segments, row)
 
 
 def _length_to(point: Floats, segments: Segments, row: int) -> float:
-    """Return the length along a segment to its place nearest to a point (2,), mm."""
+    """Return the length from the start of a segment to its place nearest to a point (2,), mm."""
     one = segments[np.array([row])]
     if one.is_arc[0]:
         # Measured from the midpoint of the arc, no angle is near to half a turn.
@@ -526,22 +535,22 @@ def _length_to(point: Floats, segments: Segments, row: int) -> float:
 
 
 def route(start: Floats, end: Floats, region: ConnectedRegion) -> Floats | None:
-    """Return (k, 3) x, y, bulge from one place (2,) of a connected region to another, staying
-    in it, as `routes` has it."""
+    """Return a link (k, 3) x, y, bulge between two places (2,) of a connected region that stays in
+    it, as `routes` does."""
     return routes(start[None, :], end[None, :], region)[0]
 
 
 def routes(starts: Floats, ends: Floats, region: ConnectedRegion) -> list[Floats | None]:
-    """Return (k, 3) x, y, bulge each: from places (J, 2) of a connected region to others (J, 2),
-    staying in it.
+    """Return links (k, 3) x, y, bulge from places (J, 2) of a connected region to others (J, 2),
+    which stay in it.
 
     A straight line leaves a region through one of its paths and comes back through the same one:
     each path has the region on its left and one connected piece of what is not the region on its
     right. So the link goes straight, and where the line is outside it follows that path, in the
     shorter direction.
 
-    None where rounding hides where the straight line goes out or in, or the two places are not in
-    one connected region.
+    None for a link whose line leaves or enters at a place that rounding hides, or whose two places
+    are not in one connected region.
     """
     links: list[Floats | None] = []
     for low in range(0, len(starts), LINKS_AT_ONCE):
@@ -555,7 +564,9 @@ def routes(starts: Floats, ends: Floats, region: ConnectedRegion) -> list[Floats
 def _linked(
     start: Floats, end: Floats, outside: list[tuple[float, float]], region: ConnectedRegion
 ) -> Floats | None:
-    """Return one link, of whose straight line these parts are outside of the region."""
+    """Return one link. `outside`: the parts (from, to) of the straight line that are outside the
+    region, in which the boundary is followed. None if a part begins and ends on different boundary
+    paths."""
     if np.hypot(*(end - start)) <= POSITION_EPS_MM:
         return np.array([[*start, 0.0]])
     rows = [np.array([[*start, 0.0]])]
@@ -572,8 +583,8 @@ def _linked(
 def _outside(
     starts: Floats, ends: Floats, region: ConnectedRegion
 ) -> list[list[tuple[float, float]]]:
-    """Of each straight line between places (J, 2) and (J, 2) the parts (from, to) that are outside
-    of the region, in order."""
+    """Return, for each straight line between places (J, 2) and (J, 2), the parts (from, to) of it
+    that are outside the region, in order."""
     outside: list[list[tuple[float, float]]] = [[] for _ in range(len(starts))]
     room = nearest(starts, region.segments).distance
     long_rows = np.flatnonzero(np.hypot(*(ends - starts).T) > room + ON_LINE_MM)
@@ -600,7 +611,7 @@ def _outside(
 
 
 def _along(along: MeasuredPath, begin: float, end: float) -> Floats:
-    """Return the piece of a closed path between two lengths, in the shorter direction."""
+    """Return the piece of a closed path between two lengths in the shorter direction."""
     forth = (end - begin) % along.total_mm
     length_back = along.total_mm - forth
     return (
@@ -611,8 +622,8 @@ def _along(along: MeasuredPath, begin: float, end: float) -> Floats:
 
 
 def tidy(vertices: Floats) -> Floats:
-    """Return vertices (k, 3) of an open path without steps up to POSITION_EPS_MM; both ends
-    stay."""
+    """Return the vertices (k, 3) of an open path without steps of up to POSITION_EPS_MM; both ends
+    stay in place."""
     step = np.hypot(*np.diff(vertices[:, :2], axis=0).T)
     keep: Ints = np.flatnonzero(np.concatenate([step > POSITION_EPS_MM, [True]]))
     vertices_kept = vertices[keep].copy()
@@ -622,7 +633,7 @@ def tidy(vertices: Floats) -> Floats:
 
 def parts_of(lines: Polylines) -> list[Polylines]:
     """Return the connected parts of a region whose paths are oriented already: each outer path
-    (CCW) with the holes (CW) in it, the smallest outer one around each."""
+    (CCW) with the holes (CW) directly inside it."""
     if len(lines) == 0:
         return []
     areas = signed_areas(lines)
@@ -643,7 +654,7 @@ def parts_of(lines: Polylines) -> list[Polylines]:
 
 
 def pole(region: Polylines) -> Floats:
-    """Return (2,) a place of a connected region about as far from its boundary as any."""
+    """Return the point (2,) of a connected region that is about farthest from its boundary."""
     import shapely
 
     outer = int(signed_areas(region).argmax())
@@ -659,8 +670,8 @@ def pole(region: Polylines) -> Floats:
 
 
 def outside_parts(lines: Polylines, region: Polylines) -> list[Polyline]:
-    """Return what of the paths lies outside of a region (even-odd): open pieces, or whole
-    paths."""
+    """Return the parts of paths that lie outside a region (even-odd): open pieces, or
+    whole paths."""
     border = Segments.of(region)
     outside_pieces: list[Polyline] = []
     for path in lines:
@@ -672,7 +683,7 @@ def outside_parts(lines: Polylines, region: Polylines) -> list[Polyline]:
 
 
 def _marks(along: MeasuredPath, border: Segments) -> Floats:
-    """Return the lengths along a path, ascending, where it meets the border, and both its ends."""
+    """Return the lengths, ascending, at which a path meets the border, and both its ends."""
     common = crossings(along.segments, border)
     lengths = segment_lengths(along.segments)
     meeting_lengths = along.reach[common.row_a] + common.ta * lengths[common.row_a]
@@ -684,7 +695,7 @@ def _marks(along: MeasuredPath, border: Segments) -> Floats:
 
 
 def _runs(along: MeasuredPath, marks: Floats, is_wanted: Bools) -> list[Polyline]:
-    """Return the pieces between marks that are wanted, neighbours as one."""
+    """Return the wanted pieces between consecutive marks along a path, adjacent pieces joined."""
     if is_wanted.all():
         return [along.path]
     begin, end = marks[:-1], marks[1:]
@@ -703,9 +714,10 @@ def _runs(along: MeasuredPath, marks: Floats, is_wanted: Bools) -> list[Polyline
 
 
 def scanned(line: Segments, region: Segments) -> tuple[Ints, Floats, Floats]:
-    """Find what of K straight lines is in a region: rows (J,), and from and to which part of each.
+    """Return the parts of K straight lines that are within a region: rows (J,), and the begin and
+    end (J,), (J,) of each part as shares of its line.
 
-    Ascending by row and by part; pieces up to POSITION_EPS_MM are left out.
+    Ascending by row and begin; pieces up to POSITION_EPS_MM are left out.
     """
     common = crossings(line, region)
     rows = np.concatenate([np.arange(len(line)), np.arange(len(line)), common.row_a])

@@ -47,7 +47,7 @@ Point = tuple[float, float, float]
 
 
 def compensate(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
-    """`toolpath` bent against the scale, squareness and backlash of the machine, so that its
+    """Return `toolpath` changed so that the machine's scale, squareness and backlash make its
     slides come out where `toolpath` says. Sources of the rows are kept; blocks are not.
 
     What remains: at a reversal that the controller compensates by too much, half of the excess
@@ -63,8 +63,8 @@ def compensate(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
 
 
 def motor_path(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
-    """Scale and squareness undone: the path of the motors for slides on `toolpath`; itself where
-    both are as they should.
+    """Return the path of the motors for which the slides follow `toolpath`, as far as scale and
+    squareness are concerned; `toolpath` itself if both are exact.
 
     A slide is where its motor is times s = `real_step_mm` / `coded_step_mm` of the axis, about
     part zero, and Y leans by q (`camtool.simulation.mechanics`):
@@ -141,7 +141,8 @@ class _ToolpathMapper:
 
 
 def _add_vertices(builder: ToolpathBuilder, vertices: Floats, end: Point, feed: float) -> None:
-    """The lines and arcs between vertices (n, 3) x, y, bulge, the last of which is `end`."""
+    """Add the lines and arcs between vertices (n, 3) x, y, bulge to the builder; the last one ends
+    at `end`."""
     for (x0, y0, bulge), (x1, y1, _) in zip(
         vertices[:-1].tolist(), [*vertices[1:-1].tolist(), list(end)], strict=True
     ):
@@ -162,7 +163,7 @@ def _feed(move: Move) -> float:
 
 
 def _add_event(builder: ToolpathBuilder, move: Move, toolpath: Toolpath) -> None:
-    """Add the same event; a message keeps its words."""
+    """Add the event of `move` to the builder; a message keeps its text."""
     if move.kind == Kind.MESSAGE and move.value is not None:
         builder.message(toolpath.texts[int(move.value)])
     else:
@@ -184,15 +185,16 @@ class _Drive(Struct):
         return value - self.residual.error_mm(sense)
 
     def sense_of(self, begin: float, end: float) -> int:
-        """Return the direction of a move; the last one where it does not move."""
+        """Return the direction ±1 of a move of this axis; the direction of its last move if it
+        does not move."""
         step = end - begin
         if abs(step) < STILL_STEPS * self.axis.coded_step_mm:
             return self.sense
         return 1 if step > 0.0 else -1
 
     def move_freely(self, begin: float, end: float) -> None:
-        """Move in the air to `end`, in the direction that takes the axis to the position for
-        it."""
+        """Move in the air so that the slide comes to `end`, in whichever direction of motion is
+        consistent with the position for it."""
         for sense in (self.sense_of(begin, end), -self.sense_of(begin, end)):
             target = self.position_for(end, sense)
             if (target - self.position) * sense > 0.0 or (
@@ -203,8 +205,8 @@ class _Drive(Struct):
 
 
 def _take_up_backlash(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
-    """Return the positions that a controller must be given for slides on `toolpath` (in motor mm);
-    the same toolpath where there is neither backlash nor compensation."""
+    """Return the positions that the controller must be given for slides on `toolpath` (in motor
+    mm); the same toolpath if there is neither backlash nor compensation."""
     regions = _Regions(machine)
     if not regions.has_backlash:
         return CompensatedToolpath(toolpath, np.arange(len(toolpath)))
@@ -273,7 +275,7 @@ class _BacklashCompensator:
         )
 
     def _enter(self, point: Point) -> None:
-        """Use the backlash of the region around a point from here on."""
+        """Use the backlash of the region around this point from here on."""
         for drive, axis_residual in zip(self._drives, self._regions.residuals(point), strict=True):
             drive.residual = axis_residual
 
@@ -282,12 +284,13 @@ class _BacklashCompensator:
         return x, y, z
 
     def _line(self, move: Move) -> None:
-        """Add a line to where the drives now stand, if that is elsewhere."""
+        """Add a line to the place where the drives now stand, unless the tool is there."""
         if math.dist(self._b.position, self._place()) > AHEAD_MM:
             self._b.line(*self._place(), feed=_feed(move))
 
     def _cut(self, segment: MonotoneSegment, move: Move) -> None:
-        """Add a segment at a feed: take up the backlash, overshoot, hold, and follow."""
+        """Add a segment at a feed: take up the backlash, overshoot and hold where necessary, and
+        follow the segment."""
         self._overshoot(segment, move)
         for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             drive.sense = drive.sense_of(begin, end)
@@ -302,8 +305,8 @@ class _BacklashCompensator:
             low = high
 
     def _overshoot(self, segment: MonotoneSegment, move: Move) -> None:
-        """Go out and make one step back, before a reversal that the controller compensates too
-        much."""
+        """Add an overshoot and one step back, if this segment begins with a reversal that the
+        controller compensates by too much."""
         reversing = []
         for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             sense = drive.sense_of(begin, end)
@@ -322,8 +325,8 @@ class _BacklashCompensator:
             self._line(move)
 
     def _follow_share(self, index: int, segment: MonotoneSegment) -> float:
-        """Return the share of the segment from which on an axis follows it: 0 unless it stands
-        ahead."""
+        """Return the share of the segment from which on an axis follows it; 0 unless the axis
+        stands ahead of it."""
         drive = self._drives[index]
         begin, end = segment.begin[index], segment.end[index]
         distance = (drive.position - drive.position_for(begin, drive.sense)) * drive.sense
@@ -334,7 +337,7 @@ class _BacklashCompensator:
         return segment.share_at(index, drive.position + drive.residual.error_mm(drive.sense))
 
     def _follow(self, part: MonotoneSegment, follows: list[bool], move: Move) -> None:
-        """Add a part of a segment on which each axis either follows or holds."""
+        """Add a part of a segment during which each axis either follows or holds still."""
         offsets = []
         for drive, begin, end, moves in zip(
             self._drives, part.begin, part.end, follows, strict=True
@@ -361,7 +364,7 @@ class _BacklashCompensator:
 
 
 def _step_mm(axis: Axis) -> float:
-    """Return the smallest distance, mm, of whole steps that a program can express."""
+    """Return the smallest distance of whole steps that a program can express, mm."""
     steps = to_steps(axis.resolution_mm or 0.0, axis.coded_step_mm)
     return max(1.0, float(steps)) * axis.coded_step_mm
 
@@ -393,7 +396,7 @@ class _Regions:
         return any(one.matters for one in (*self._plain, *cells))
 
     def residuals(self, point: Sequence[float]) -> tuple[Residual, ...]:
-        """Return the residuals (X, Y, Z) where the tool is at `point` mm."""
+        """Return the residuals (X, Y, Z) for the region that holds `point`, mm."""
         residuals = []
         for axis, cells in enumerate(self._cells):
             if cells is None:
@@ -426,7 +429,7 @@ class _Regions:
 
 
 def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
-    """Compute the residual of an axis with this backlash (None: its own); compensation is in whole
+    """Return the residual of an axis with this backlash (None: its own); compensation is in whole
     steps."""
     play = axis.backlash_mm if play_mm is None else play_mm
     added_mm = axis.compensation_mm
@@ -452,7 +455,7 @@ class MonotoneSegment(Struct, frozen=True):
     sweep_rad: float = 0.0
 
     def at(self, share: float) -> Point:
-        """Return the point at this share (0 … 1) of the length; exact at the ends."""
+        """Return the point at this share (0 to 1) of the length; exact at the ends."""
         if share <= 0.0:
             return self.begin
         if share >= 1.0:
@@ -470,8 +473,8 @@ class MonotoneSegment(Struct, frozen=True):
         return cx + radius * math.cos(angle), cy + radius * math.sin(angle), line[2]
 
     def share_at(self, axis: int, value: float) -> float:
-        """Return the share of the length at which an axis that moves has this value; 0 or 1 beyond
-        it.
+        """Return the share of the length at which an axis that moves has this value; 0 or 1 if the
+        value is beyond an end.
 
         On an arc the angle θ with c + r cos θ (sin θ for Y) = value; of its two solutions the one
         within the sweep.

@@ -51,8 +51,9 @@ Heights = tuple[float | None, list[Tab]]
 
 
 class CutContours(Struct, frozen=True, eq=False):
-    """The runs that cut M contours, one contour after the other, and how many of each, `counts`
-    (M); what did not go as the operation asks, and the bridges that their tabs leave."""
+    """The runs that cut M contours, one contour after the other; the number of runs of each,
+    `counts` (M,); findings where entry or leads differ from what was asked; and the bridges that
+    the tabs leave."""
 
     runs: Runs
     counts: tuple[int, ...]
@@ -61,8 +62,8 @@ class CutContours(Struct, frozen=True, eq=False):
 
 
 class _Pass(Struct, frozen=True, eq=False):
-    """A run before it is made: along the path, with the heights of these parts of it, each of
-    which ends where the next one begins, and with these leads."""
+    """A run before it is made: the path, the profiles of height for its consecutive parts, and its
+    leads."""
 
     along: MeasuredPath
     parts: list[ZProfile]
@@ -72,8 +73,8 @@ class _Pass(Struct, frozen=True, eq=False):
 def runs_of(
     contours: Sequence[Contour], order: Ints, paths: Polylines, keep_out: KeepOut
 ) -> CutContours:
-    """Return the runs that cut the contours of one operation, those of the indices `order` (M,) in
-    that order.
+    """Return the runs that cut the contours of one operation, in the order of the indices `order`
+    (M,).
 
     `paths` (M) are those of the contours, from the chosen starts in the chosen directions. On its
     leads the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
@@ -95,7 +96,7 @@ def runs_of(
 
 
 def _cut_lot(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) -> CutContours:
-    """Return the runs that cut these contours, in their order."""
+    """Return the runs that cut a part of the contours, in their order."""
     passes: list[_Pass] = []
     counts: list[int] = []
     findings: list[Finding] = []
@@ -118,8 +119,8 @@ def _cut_lot(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) -
 
 
 def _lift_passes(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> Runs:
-    """Return the runs of these names, lifted together where their paths lie in the same
-    columns."""
+    """Return the passes with their heights as runs with these names; passes whose paths share
+    columns are lifted together."""
     owner = [k for k, each in enumerate(passes) for _ in each.parts]
     parts = [part for each in passes for part in each.parts]
     columns: dict[int, list[int]] = {}
@@ -148,7 +149,8 @@ def _lift_passes(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) ->
 def _closed_passes(
     contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
 ) -> tuple[list[_Pass], Leads]:
-    """Return the passes round a closed contour, and its leads."""
+    """Return the passes round a closed contour, and its leads; `heights`: the angle of its ramp
+    (None: plunge) and its tabs."""
     angle, tabs = heights
     levels, overlap = contour.setting.levels_mm, contour.setting.operation.overlap_mm
     total = along.total_mm
@@ -170,7 +172,7 @@ def _closed_passes(
 
 
 def _split_profile(points: ZProfile, stops: list[float]) -> list[ZProfile]:
-    """Split the profile at these lengths."""
+    """Return the parts of the profile between these lengths."""
     parts: list[ZProfile] = []
     begin = 0
     for stop in stops:
@@ -181,8 +183,8 @@ def _split_profile(points: ZProfile, stops: list[float]) -> list[ZProfile]:
 
 
 def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
-    """Return the run (n, 4) along parts (n, 4) of a contour: the lead-in before the first of them,
-    the lead-out behind the last, and out and back between two."""
+    """Return the run (n, 4) along parts (n, 4) of a contour, with the lead-in before the first
+    part, the lead-out after the last, and the lead-out forth and back between two parts."""
     if len(leads.way_in) == len(leads.way_out) == 0:
         return parts[0]
     rows = [np.insert(leads.way_in[:-1], 2, parts[0][0, 2], axis=1)]
@@ -199,8 +201,7 @@ def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
 def _open_passes(
     contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
 ) -> tuple[list[_Pass], Leads]:
-    """Return the passes along an open contour, whose leads are parts of its path, and these
-    leads."""
+    """Return the passes along an open contour, and its leads, which are parts of its path."""
     angle, tabs = heights
     levels = contour.setting.levels_mm
     leads = leads_of(contour, along, (0.0, along.total_mm), keep_out)
@@ -222,8 +223,8 @@ def _open_passes(
 
 
 def _ramp_angle(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Finding]]:
-    """Return the angle of the ramp, None for a plunge; and a finding when a plunge stands for a
-    ramp."""
+    """Return the angle of the ramp, rad, None for a plunge; and a finding if a plunge replaces the
+    ramp that was asked for."""
     operation = contour.setting.operation
     angle = operation.entry.angle_rad
     if operation.entry.kind == "plunge":
@@ -243,10 +244,12 @@ def _ramp_angle(contour: Contour, along: MeasuredPath) -> tuple[float | None, li
 def with_starts(
     path: Polyline, rule: str | tuple[float, float], away_mm: float
 ) -> tuple[Polyline, Ints]:
-    """Return the path, perhaps with one more vertex, and the vertices at which it may begin.
+    """Return the path, with one more vertex if needed, and the indices of the vertices at which it
+    may begin.
 
-    `rule` is one of STARTS, or a place (x, y) mm: then the nearest one of the path. None are
-    given (any will do) for "nearest", for open paths, and when nothing is as the rule says.
+    `rule` is one of STARTS, or a place (x, y) mm, which selects the nearest point of the path. The
+    indices are empty (any start will do) for "nearest", for open paths, and if the path has no
+    place of that kind.
 
     - "longest-line": the middle of the longest line; without lines, of the longest arc.
     - "corner": where the path turns, and where it begins to round a corner of the part, in an arc
@@ -268,7 +271,8 @@ def with_starts(
 
 
 def _midpoint(along: MeasuredPath) -> float:
-    """Return the length along the path of the midpoint of its longest line, or else arc."""
+    """Return the length along the path to the midpoint of its longest line, or of its longest arc
+    if it has no lines."""
     size = np.diff(along.reach)
     lines = np.where(along.segments.is_arc, 0.0, size)
     row = int((lines if lines.any() else size).argmax())

@@ -60,8 +60,8 @@ alone."""
 
 
 def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> DrawnEdges:
-    """Return what is drawn for each row of a toolpath, whose rows are of the runs (N,) of these
-    steps, counted through all of them; the drawing in the work frame."""
+    """Return, for each row of a toolpath, what was drawn there. The rows belong to the runs (N,)
+    of the steps, counted through all steps; `placed`: the drawing in the work frame."""
     # One number, seen as many, until there is another.
     off_mm = np.broadcast_to(0.0, (len(toolpath), 2))
     edge = np.broadcast_to(np.int64(NO_EDGE), len(toolpath))
@@ -96,8 +96,8 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
 def _path_offsets(
     toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing
 ) -> Iterator[tuple[Ints, Floats]]:
-    """Yield some of the rows (R,) at a time, and (R, 2) how far what was drawn lies from the lines
-    that they were planned along, mm; rows that are left out lie on them."""
+    """Yield (rows (R,), (R, 2) mm: how far the drawing lies from the lines that the rows were
+    planned along) in batches. Rows that are left out have no such distance."""
     path_error = step.operation.contract.path_error_mm
     lines, drawn_off = step.chosen.lines, placed.off_mm
     if placed.datum_off_mm:
@@ -121,7 +121,7 @@ def _path_offsets(
 
 
 def _vertex_rows(lines: Polylines, selection: Ints) -> Ints:
-    """Return the vertices of the chosen paths, in their order."""
+    """Return the vertex rows of the chosen paths, in their order."""
     counts = np.diff(lines.offsets)[selection]
     begin = lines.offsets[:-1][selection]
     steps = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -129,7 +129,7 @@ def _vertex_rows(lines: Polylines, selection: Ints) -> Ints:
 
 
 def _points(toolpath: Toolpath, rows: Ints) -> Floats:
-    """Return (R · P, 2) mm: the places on each row, one row after the other."""
+    """Return (R · P, 2) mm: P sample points on each row, row by row."""
     share = np.array(PLACES)
     begin, end = toolpath.starts_of(rows)[:, None, :2], toolpath.end[rows, None, :2]
     points = begin + share[:, None] * (end - begin)
@@ -155,8 +155,8 @@ class _Edges(Struct, frozen=True, eq=False):
 
 
 def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
-    """Return the edges that a step cuts; `later` is the step after this one. What is finished
-    behind it is made by that."""
+    """Return the edges that a step cuts; `later`: the step after it. A roughing stage cuts none,
+    since the finishing stage after it makes the edge."""
     no_rows = np.empty(0, dtype=np.bool_)
     operation = step.operation
     is_finished = operation.stage == "rough" and later and later.operation.stage == "finish"
@@ -178,8 +178,8 @@ def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
 
 
 def _beside_or_on(step: Step, contours: Sequence[Contour], drawn: Floats) -> _Edges:
-    """Return the edges of contours beside their lines, or on them; `drawn` (M, 2, 2): the boxes
-    of what is drawn."""
+    """Return the edges of contours beside or on their lines; `drawn` (M, 2, 2): the boxes of the
+    drawn paths."""
     used_contours = distinct(step.owner).tolist()
     centres = path_extents(Polylines.of(contours[k].path for k in used_contours))
     source = np.array([contours[k].source for k in used_contours])
@@ -195,13 +195,14 @@ def _beside_or_on(step: Step, contours: Sequence[Contour], drawn: Floats) -> _Ed
 
 
 def _cut_radius(setting: Setting) -> float:
-    """Return the radius of what the tool cuts at the surface in its deepest pass, mm."""
+    """Return the radius of the tool's cut at the surface in its deepest pass, mm."""
     return setting.operation.tool.radius_at(-setting.levels_mm[-1])
 
 
 def _boxes(contour: Contour, drawn: Floats, centre: Floats) -> tuple[Floats, Floats]:
-    """Nominal and planned box of the edge that a contour beside its line cuts, as if the line were
-    its own: those of its line and of the tool's centre."""
+    """Return the nominal and the planned box (2, 2), mm, of the edge that a contour beside its
+    line cuts, as if the line were its only edge. `drawn`, `centre`: the boxes of the line and of
+    the tool's centre."""
     operation = contour.setting.operation
     radius, allowance = operation.tool.radius_mm, operation.allowance_mm
     reach = _cut_radius(contour.setting)
@@ -224,7 +225,7 @@ def _boxes(contour: Contour, drawn: Floats, centre: Floats) -> tuple[Floats, Flo
 
 def _wall_box(contour: Contour, drawn: Floats) -> Floats:
     """Return (2, 2) mm: the box of the wall that the tool leaves on the side of a contour where
-    material stays; the middle of what is drawn where nothing is left of it."""
+    material stays; the middle of the drawn box if nothing is left."""
     from camtool.geometry.offset import offset_shape
 
     path = contour.path if contour.material_left else reverse(contour.path)
@@ -235,12 +236,12 @@ def _wall_box(contour: Contour, drawn: Floats) -> Floats:
 
 
 def _cleared_boxes(runs: Runs, tool: Tool) -> Floats:
-    """Return (R, 2, 2) mm: the box of what the tool removes at the surface in each run, exact with
+    """Return (R, 2, 2) mm: the box of what the tool removes at the surface in each run, exact on
     arcs.
 
     It is that of the discs as wide as the tool is at the surface. Along a move their radius
     changes evenly, by d over an arc of radius R and sweep s: seen in the direction a, their edge
-    is farthest where the centre stands at the angle  a + arcsin(d / (R s))  of the arc.
+    is farthest where the centre stands at the angle a + arcsin(d / (R s)) of the arc.
     """
     vertices, first = runs.vertices, runs.first[:-1]
     heights, height_index = np.unique(np.minimum(vertices[:, 2], 0.0), return_inverse=True)
@@ -273,7 +274,8 @@ def _cleared_boxes(runs: Runs, tool: Tool) -> Floats:
 
 
 def kept_of(steps: Sequence[Step]) -> tuple[ProtectedRegion, ...]:
-    """Return all runs of a plan, with what they must leave of the material, as the drawing has it.
+    """Return all runs of a plan, together with the region of material that they must leave, as
+    drawn.
 
     A profile leaves the part, a pocket and a carving what is outside of their region; engraving,
     drilling and chamfers leave nothing in particular. Where reliefs go into the corners of the
@@ -313,9 +315,9 @@ def _protected_regions(step: Step) -> Iterator[ProtectedRegion]:
 
 
 def _regions(operation: Operation, nesting: Nesting, rim: Bools) -> Iterator[Bools]:
-    """Yield masks of the closed contours that make one region. Where the job names the side, a
-    contour in another one is cut on that side too, whatever the outer one keeps: those of each
-    depth are a region of their own."""
+    """Yield masks of the closed contours that bound one region together. If the job names the
+    side, each nesting depth is a region of its own: a contour within another one is then cut on
+    that side too, whatever the outer one keeps."""
     if operation.side == "auto":
         yield from regions_of(nesting, rim)
         return
@@ -325,7 +327,8 @@ def _regions(operation: Operation, nesting: Nesting, rim: Bools) -> Iterator[Boo
 
 
 def _runs_of(step: Step, sources: Ints, *, others: bool = False) -> tuple[Floats, ...]:
-    """Return the runs of a step that are of these contours of the drawing, or of all others."""
+    """Return the runs (n, 4) of a step that belong to these contours of the drawing, or (`others`)
+    to all other contours."""
     source = np.array([item.source for item in step.items], dtype=np.int64)
     of_these = np.isin(source[step.owner], sources) != others
     return tuple(step.runs[row].vertices for row in np.flatnonzero(of_these).tolist())

@@ -66,9 +66,9 @@ round which it does not get."""
 
 
 def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]:
-    """Return those of the findings that this stage of an operation has to say. A profile that
-    is roughed runs farther from its own wall than it is finished, and so nearer to its
-    neighbours."""
+    """Return the findings that this stage of an operation should report. Roughing runs farther
+    from its own wall, and so nearer to its neighbours, so that it reports gouges of these and
+    leaves findings about the wall to the finishing stage."""
     if not operation.stage:
         return list(findings)
     if operation.stage == "rough":
@@ -82,7 +82,7 @@ def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]
 def along_walls(
     paths: Polylines, setting: Setting, names: Sequence[str], sources: Sequence[int]
 ) -> list[Contour]:
-    """Return contours on the boundary of tool centre regions, which are on the left of their
+    """Return contours along the boundaries of tool centre regions, which lie on the left of their
     paths."""
     conventional = setting.operation.direction == "conventional"
     lines = reverse_lines(paths) if conventional else paths
@@ -95,8 +95,8 @@ def along_walls(
 def in_passes(
     contours: list[Contour], setting: Setting, rough: Step
 ) -> tuple[list[Contour], list[Finding]]:
-    """Return the contours of a finishing pass; at the levels of the roughing where that has
-    left more than the tool takes at once."""
+    """Return the contours of a finishing pass. They are cut in passes instead of at once if
+    roughing has left more than the tool can take at full depth."""
     operation = setting.operation
     if not contours:
         return contours, []
@@ -120,8 +120,8 @@ def in_passes(
 
 
 def _tabs_lost(contours: Sequence[Contour], rough: Step) -> Iterator[Finding]:
-    """Yield a finding for each part that fewer tabs hold than are asked for: the tool that roughs
-    makes them, and does not get all round it."""
+    """Yield a finding for each part that is held by fewer tabs than asked for, because the
+    roughing tool, which makes them, does not get all round it."""
     tabs = rough.operation.tabs
     if tabs is None or tabs.at_mm is not None:
         return
@@ -140,8 +140,8 @@ def _tabs_lost(contours: Sequence[Contour], rough: Step) -> Iterator[Finding]:
 
 
 def _engaged(contours: list[Contour], operation: Operation, rough: Step) -> tuple[float, str]:
-    """Return the most that is left beside the wall, mm, and where; infinite where nothing was
-    roughed."""
+    """Return the greatest thickness that is left beside the wall, mm, and the place; infinite if
+    nothing was roughed."""
     if not len(rough.runs):
         return math.inf, at_place(contours[0].name, contours[0].path.start.tolist())
     cleared = _paths(rough)
@@ -161,7 +161,7 @@ def _engaged(contours: list[Contour], operation: Operation, rough: Step) -> tupl
 
 
 def _paths(step: Step) -> Segments:
-    """Return segments along which the tool of a step ran, seen from above."""
+    """Return the segments, seen from above, along which the tool of a step ran."""
     vertices, first = step.runs.vertices, step.runs.first
     start, end = vertices[:-1], vertices[1:]
     goes = np.hypot(*(end - start)[:, :2].T) > 0.0

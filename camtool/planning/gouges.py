@@ -58,7 +58,7 @@ SAMPLES_ROUND = 500
 
 
 def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:
-    """Return findings on the sides of an operation: gouges, and sides that follow from uncut
+    """Return the findings about the sides of an operation: gouges, and sides that depend on uncut
     contours."""
     if operation.contract.clears:
         cleared = list(_cleared_away(chosen, sides, operation))
@@ -81,8 +81,9 @@ def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation
 def branch_findings(
     branches: Sequence[Branch], chosen: Chosen, sides: Sides, operation: Operation
 ) -> list[Finding]:
-    """Return errors where an operation needs to know what contours enclose that pass `branches`
-    of the placed drawing at which that is a choice: its own, and those that decide its sides."""
+    """Return errors where an operation needs to know what its contours enclose, and one of them
+    (or one that decides its sides) passes a branch, at which that is ambiguous. `branches`: those
+    of the placed drawing."""
     is_beside = runs_beside(operation)
     if not (is_beside or operation.contract.cuts == "within"):
         return []
@@ -104,7 +105,7 @@ def branch_findings(
 
 
 def _centre_paths(work: Work) -> Iterator[tuple[Item, Polyline]]:
-    """Yield the items of a work that run beside a wall, with each of their paths."""
+    """Yield each item that runs beside a wall with each path of its tool centre."""
     for item in work.items:
         if isinstance(item, Fixed):
             yield from ((item, path) for path in item.centre_lines or ())
@@ -113,8 +114,8 @@ def _centre_paths(work: Work) -> Iterator[tuple[Item, Polyline]]:
 
 
 def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> Iterator[Finding]:
-    """Yield a finding where the tool, beside one contour, comes over another one, or into the
-    allowance that its operation leaves on that."""
+    """Yield a finding where the tool, running beside one contour, cuts into the wall of another
+    contour, or into the allowance that is left on it."""
     radius, allowance = operation.wall_radius_mm, operation.allowance_mm
     if operation.stage == "rough":
         allowance = 0.0  # what roughing takes of it is not missed
@@ -133,8 +134,8 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     count, reported_pairs = 0, set[tuple[int, int]]()
 
     def is_measured(one: int, wall_row: int) -> bool:
-        """Return True if the distance of a path from a wall may be a finding: not of its own
-        contour, and where there are many, only an error."""
+        """Return True if the distance between a path and a wall must be computed: the wall is not
+        the path's own contour. After MAX_COUNTED findings only possible errors are computed."""
         other = int(wall_rows[wall_row])
         is_error = sided[other] and (operation.side == "auto" or other not in own_rows)
         return beside_items[one][0].source != other and bool(is_error or count < MAX_COUNTED)
@@ -192,8 +193,8 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
 
 
 def _taken_back(sides: Sides, other: int, path: Polyline) -> float:
-    """Distance by which the wall of a contour is taken back, mm, seen from where another path
-    begins."""
+    """Return by how much (mm) the wall of contour `other` is taken back by operations that cut
+    beyond its line, on the side on which `path` begins."""
     taken_outside, taken_inside = sides.beyond_mm[other].tolist()
     if not (taken_outside or taken_inside):
         return 0.0
@@ -203,9 +204,8 @@ def _taken_back(sides: Sides, other: int, path: Polyline) -> float:
 
 
 def _beside_pocket(sides: Sides, pocket: Operation) -> Iterator[Finding]:
-    """Yield a finding where what is cut beyond the lines of a pocket, or a bore, comes over a
-    contour beside it that a profile follows. Where it only opens towards the contour around it,
-    nothing is lost."""
+    """Yield a finding where a pocket or bore that cuts beyond its lines cuts into a contour beside
+    it that a profile follows. If it only opens towards the contour around it, nothing is lost."""
     cut = sides.cut_by(pocket) & sides.lines.closed
     rows, wall_rows = np.flatnonzero(cut), np.flatnonzero(sides.sided() & ~cut)
     lines, walls = (sides.lines.select(each.tolist()) for each in (rows, wall_rows))
@@ -235,13 +235,14 @@ def _beside_pocket(sides: Sides, pocket: Operation) -> Iterator[Finding]:
 
 
 def _witnesses(path: Polyline) -> Floats:
-    """Return (P, 2) the vertices of a path and the midpoints of its segments."""
+    """Return (P, 2) the vertices of a path and the midpoints of its segments, as test points for
+    its position."""
     return np.concatenate([path.vertices[:, :2], midpoints(Segments.of(path))])
 
 
 def _parts(path: Polyline, wall: Polyline) -> tuple[Bools, Floats]:
-    """Return (P,), (P,) of the witnesses of a path: whether each is within a closed one, and
-    how far from its line, mm."""
+    """Return for the witnesses of a path the mask (P,) of those inside the closed path `wall`, and
+    their distances (P,) from it, mm."""
     return _side_and_distance(_witnesses(path), wall)
 
 
@@ -251,13 +252,13 @@ def _side_and_distance(points: Floats, wall: Polyline) -> tuple[Bools, Floats]:
 
 
 def _lies_in(path: Polyline, wall: Polyline) -> bool:
-    """Return True if a path lies within a closed one."""
+    """Return True if `path` lies within the closed path `wall`."""
     is_inside, distances = _parts(path, wall)
     return bool((is_inside | (distances <= GOUGE_TOLERANCE_MM)).all())
 
 
 def _cross(one: Polyline, other: Polyline) -> bool:
-    """Return True if two closed paths cross, and not only touch."""
+    """Return True if two closed paths cross, rather than only touch."""
     for path, wall in ((one, other), (other, one)):
         is_inside, distances = _parts(path, wall)
         clear = distances > GOUGE_TOLERANCE_MM
@@ -267,8 +268,8 @@ def _cross(one: Polyline, other: Polyline) -> bool:
 
 
 def _overshoot(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
-    """Return the greatest distance of the tool's centre across a closed line, mm; the side on
-    which most of the drawn contour lies is this side of it."""
+    """Return how far the tool's centre goes across a closed line at most, mm; the side on which
+    most of the drawn contour lies is this side of the line."""
     length = float(path_lengths(Polylines.of([path]))[0])
     is_inside, distances = _side_and_distance(sample(path, length / SAMPLES_ROUND), wall)
     home, clear = _parts(drawn, wall)
@@ -277,8 +278,8 @@ def _overshoot(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
 
 
 def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[Finding]:
-    """Yield parts that another operation keeps, in what a pocket (or a bore) clears as deep as
-    that, or deeper."""
+    """Yield a finding for parts that another operation keeps but that lie in what a pocket (or
+    bore) clears at least as deep."""
     is_kept = sides.kept_from(pocket)
     is_kept[chosen.source] = False
     rows = np.flatnonzero(is_kept)
@@ -299,9 +300,9 @@ def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[F
 
 
 def by_uncut(sides: Sides, operation: Operation, rows: Ints) -> Iterator[Finding]:
-    """Yield findings of what follows from uncut closed contours, for those of the operation
-    (`rows`): some have their side because of them, others in spite of those on the layers of
-    frames."""
+    """Yield findings for closed contours of the operation (`rows`) whose side depends on uncut
+    contours: those that would be on the other side without them, and those that would be if
+    contours on layers of frames counted."""
     seen_sides = sides.seen_by(operation)
     for sentence, is_turned, surrounding in (
         (SIDE_BY_UNCUT, seen_sides.by_uncut, sides.uncut),

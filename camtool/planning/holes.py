@@ -60,8 +60,8 @@ class Hole(Struct, frozen=True):
 def refuse_endless_pecks(
     depth_mm: float, peck_mm: float, holes: Sequence[Hole], operation: Operation
 ) -> None:
-    """Raise OptionError for pecks so small that the holes take too many moves; a bore has its
-    pecks from the step down."""
+    """Raise OptionError for pecks so small that the holes take too many moves; the pecks of a bore
+    follow from its step down."""
     key = "peck" if operation.contract.descent == "pecks" else "step_down"
     refuse_endless(
         MOVES_OF_PECK * depth_mm / peck_mm * len(holes),
@@ -73,8 +73,8 @@ def refuse_endless_pecks(
 
 
 def circle_of(path: Polyline) -> tuple[tuple[float, float], float] | None:
-    """Return the centre (x, y) mm and diameter mm of a closed path that is a full circle, else
-    None."""
+    """Return the centre (x, y) and the diameter, mm, of a closed path that is a full circle; None
+    for another path."""
     if not path.closed:
         return None
     (xmin, xmax), (ymin, ymax) = _box(path)
@@ -89,7 +89,7 @@ def circle_of(path: Polyline) -> tuple[tuple[float, float], float] | None:
 
 
 def _turns_once(sweep: Floats) -> bool:
-    """Return True if arcs that all turn in one direction make one full turn, and not two."""
+    """Return True if arcs of these sweeps make exactly one full turn, all in one direction."""
     one_way = bool((sweep > 0.0).all() or (sweep < 0.0).all())
     return one_way and round(abs(float(sweep.sum())) / (2.0 * math.pi)) == 1
 
@@ -100,8 +100,8 @@ def _box(path: Polyline) -> list[list[float]]:
 
 
 def each_once(holes: list[Hole], drill_mm: float) -> list[Hole]:
-    """Return the holes in their order without those at a place that another one has; circles go
-    before marks, and of circles that whose diameter is nearest to the drill's."""
+    """Return the holes in their order, with one for each place: circles before marks, and of
+    several circles the one whose diameter is nearest to the drill's."""
 
     def misfit(index: int) -> tuple[float, int]:
         diameter = holes[index].diameter_mm
@@ -119,8 +119,8 @@ def each_once(holes: list[Hole], drill_mm: float) -> list[Hole]:
 
 
 def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
-    """Depths below the stock top at which the drill turns back, equal steps, the last the full
-    depth; ValueError for a depth that is not above 0."""
+    """Return the depths, mm below the stock top, at which the drill turns back: equal steps of at
+    most `peck_mm`, the last at the full depth. ValueError for a depth that is not above 0."""
     if not depth_mm > 0.0:
         raise ValueError(f"a hole {depth_mm} mm deep")
     peck_size = depth_mm if peck_mm is None else peck_mm
@@ -131,9 +131,8 @@ def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
 def pecks(
     at_mm: tuple[float, float], depths: Sequence[float], setting: Setting
 ) -> tuple[Floats, list[float]]:
-    """Return the vertices (n, 4) of a tool that goes down at a place, and the feeds between
-    them: it cuts a peck, comes out as a rapid, goes back as a rapid to just above it, and so
-    on."""
+    """Return the vertices (n, 4) of drilling at a place, and the feeds between them: a peck at the
+    plunge feed, out as a rapid, back as a rapid to just above it, and so on."""
     top = min(PECK_TOP_MM, setting.safe_z_mm)
     above = min(PECK_CLEARANCE_MM, 0.5 * depths[0])
     heights, feeds = [-depths[0]], list[float]()
@@ -144,7 +143,7 @@ def pecks(
 
 
 def circles_of(chosen: Chosen) -> tuple[list[Hole], list[str]]:
-    """Return the full circles of the paths, and the names of the other paths."""
+    """Return the full circles among the paths, and the names of all other paths."""
     holes, other_names = [], []
     for path, source, name in zip(chosen.lines, chosen.source, chosen.names, strict=True):
         circle = circle_of(path)
@@ -156,7 +155,8 @@ def circles_of(chosen: Chosen) -> tuple[list[Hole], list[str]]:
 
 
 def largest_hole_mm(operation: Operation) -> float:
-    """Diameter up to which an operation drills circles, mm; inf for a drill of no width."""
+    """Return the largest diameter of circles that an operation drills, mm; inf for a drill without
+    width."""
     if operation.max_hole_mm is not None:
         return operation.max_hole_mm
     return operation.tool.diameter_mm or math.inf
@@ -165,8 +165,8 @@ def largest_hole_mm(operation: Operation) -> float:
 def drilled_holes(
     chosen: Chosen, operation: Operation
 ) -> tuple[list[Hole], list[Hole], list[str]]:
-    """Return the holes that an operation drills, each place once; the circles that are too large
-    for it; and the names of the paths that are no circles."""
+    """Return the holes that an operation drills, one for each place; the circles that are too
+    large for it; and the names of paths that are no circles."""
     circles, other_names = circles_of(chosen)
     limit = largest_hole_mm(operation) + HOLE_SIZE_MM
     small_circles = [hole for hole in circles if (hole.diameter_mm or 0.0) <= limit]
@@ -179,6 +179,6 @@ def drilled_holes(
 
 
 def named(names: list[str]) -> str:
-    """Return the first few names, and how many more there are."""
+    """Return the first few names as text, and the number of the others."""
     extra = len(names) - NAMES_SHOWN
     return ", ".join(names[:NAMES_SHOWN]) + (f" and {extra} more" if extra > 0 else "")

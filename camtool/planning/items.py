@@ -89,7 +89,7 @@ class Runs(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, runs: Iterable[CutRun]) -> Runs:
-        """Return columns from single runs."""
+        """Return single runs as columns."""
         each = list(runs)
         feeds = [np.append(run.feed_mm_min, RAPID) for run in each]
         return cls(
@@ -103,7 +103,7 @@ class Runs(Struct, frozen=True, eq=False):
 
     @classmethod
     def joined(cls, parts: Sequence[Runs]) -> Runs:
-        """Return the runs of all parts, one part after the other."""
+        """Return the runs of all parts in one record, one part after the other."""
         if len(parts) == 1:
             return parts[0]
         before = np.cumsum([0, *(len(part.vertices) for part in parts)], dtype=np.int64)
@@ -188,8 +188,8 @@ def contours_of(items: Items) -> list[Contour]:
 def contours_along(
     lines: Polylines, setting: Setting, names: Iterable[str], sources: Iterable[int]
 ) -> list[Contour]:
-    """Return a contour on each of the lines, with these names and sources (of all M); the material
-    stays on both sides, and open ones may be cut from either end."""
+    """Return a contour on each of M lines, with these names and sources (M). Material stays on
+    both sides, and open ones may be cut from either end."""
     return [
         Contour(path, setting, name, source, reversible=not path.closed)
         for path, name, source in zip(lines, names, sources, strict=True)
@@ -204,8 +204,8 @@ class Work(Struct, frozen=True, eq=False):
 
 
 class Air(Struct, frozen=True, eq=False):
-    """A `region` (on the left of its closed paths, work frame) in which nothing of the stock is
-    left down to `z_mm`."""
+    """A `region` (on the left of its closed paths, work frame) in which no stock is left above
+    `z_mm`."""
 
     region: Polylines
     z_mm: float

@@ -151,7 +151,8 @@ program of some 25 MB."""
 
 
 def above_zero(name: str, value: float | None, unit: str) -> None:
-    """Refuse a number that is given (not None) and not above 0, or not plausible."""
+    """Raise OptionError for a number that is given (not None) but not above 0, or implausibly
+    small or large."""
     if value is None:
         return
     if not (math.isfinite(value) and value > 0.0):
@@ -168,13 +169,13 @@ def above_zero(name: str, value: float | None, unit: str) -> None:
 
 
 def all_above_zero(name: str, values: Sequence[float], unit: str = "") -> None:
-    """Refuse numbers of which one is not above 0, or not plausible."""
+    """Raise OptionError if any of the numbers is not above 0 or is implausible."""
     for value in values:
         above_zero(name, value, unit)
 
 
 def at_least_zero(name: str, value: float, unit: str, max_value: float | None = None) -> None:
-    """Refuse a number below 0, or not plausible."""
+    """Raise OptionError for a number below 0 or implausibly large."""
     if not (math.isfinite(value) and value >= 0.0):
         raise OptionError(
             f"{_quantity(name, value, unit)} is not 0 or more",
@@ -184,7 +185,7 @@ def at_least_zero(name: str, value: float, unit: str, max_value: float | None = 
 
 
 def finite(name: str, value: float, unit: str, max_value: float | None = None) -> None:
-    """Refuse what is no number, or not plausible."""
+    """Raise OptionError for a value that is not finite or implausibly large."""
     if not math.isfinite(value):
         raise OptionError(f"{_quantity(name, value, unit)} is no number", mend=f"give a {name}")
     _at_most(name, abs(value), unit, max_value)
@@ -202,8 +203,8 @@ drawings larger than any machine; parts, copies and cuts that lie beside the sto
 def refuse_endless(
     moves: float, where: str, request: str, mend: str, *, is_long: bool = False
 ) -> None:
-    """Raise OptionError when more than MAX_MOVES moves (MAX_LONG_MOVES if `is_long`) are
-    estimated to result from a `request` such as "10000 passes"."""
+    """Raise OptionError if a `request` such as "10000 passes" would result in more than MAX_MOVES
+    moves, by estimate (MAX_LONG_MOVES if `is_long`)."""
     max_moves = MAX_LONG_MOVES if is_long else MAX_MOVES
     if moves > max_moves:
         meant = f", or --allow long if it is meant (up to {MAX_LONG_MOVES:,})"
@@ -227,13 +228,14 @@ def _quantity(name: str, value: float, unit: str) -> str:
 
 
 def one_of(name: str, value: str, words: Sequence[str]) -> None:
-    """Refuse a word that is not known."""
+    """Raise OptionError for a value that is not one of the words."""
     if value not in words:
         raise OptionError(f"unknown {name} {value!r}", mend=f"use one of {', '.join(words)}")
 
 
 def refuse_range(key: str, limits: tuple[float, float] | None, named: str = "") -> None:
-    """Refuse a least and a most that are no range; `named`: whose key it is."""
+    """Raise OptionError for limits (least, most) that are negative or out of order; `named`: text
+    that names the owner of the key."""
     if limits is not None and not 0.0 <= limits[0] <= limits[1]:
         raise OptionError(
             f"{limits[0]:g} to {limits[1]:g} is no range",
@@ -253,7 +255,7 @@ def _refuse_fit(fit_mm: tuple[float, float]) -> None:
 
 
 def _refuse_beyond(key: str, lengths: tuple[float, float], min_mm: float, max_mm: float) -> None:
-    """Refuse lengths outside of these limits."""
+    """Raise OptionError for a length outside these limits."""
     for length in lengths:
         if not min_mm <= length <= max_mm:
             raise OptionError(
@@ -353,9 +355,9 @@ class Tool(FrozenRecord):
         return {"ball": self.radius_mm, "bull": self.corner_radius_mm}.get(self.kind, 0.0)
 
     def radius_at(self, above_tip_mm: float) -> float:
-        """Radius so far above its tip, mm: half of what it cuts at the surface with its
-        tip so deep. A drill counts as wide as it is; one of whom only the cone is known grows
-        without end."""
+        """Return the radius at a height above the tip, mm, which is half the width of the cut at
+        the surface when the tip is that deep. A drill counts with its full radius; a tool of which
+        only the cone is known widens without limit."""
         if self.kind == "v" and self.tip_angle_rad is not None:
             wide = 0.5 * self.tip_diameter_mm + above_tip_mm * math.tan(0.5 * self.tip_angle_rad)
             return min(wide, self.radius_mm or math.inf)
@@ -365,13 +367,13 @@ class Tool(FrozenRecord):
         return self.radius_mm - nose + math.sqrt(nose * nose - below * below)
 
     def feed_per_tooth_mm(self, feed_mm_min: float, rpm: float | None) -> float | None:
-        """Feed for each cutting edge in a turn, mm; None where its flutes
-        or the speed are not known."""
+        """Return the feed for each cutting edge per turn, mm; None if the number of flutes or the
+        speed is not known."""
         return feed_mm_min / (rpm * self.flutes) if rpm and self.flutes else None
 
     def edge_speed_m_min(self, rpm: float | None) -> float | None:
-        """Return the speed of its edge where it is widest, m/min; None without a speed, and for
-        a point."""
+        """Return the cutting speed at the widest place of the tool, m/min; None without a speed,
+        and for a tool without width."""
         return math.pi * self.diameter_mm * rpm / 1000.0 if rpm and self.diameter_mm else None
 
     @property
@@ -569,7 +571,7 @@ class Operation(FrozenRecord):
         self._refuse_contradictions()
 
     def _refuse_contradictions(self) -> None:
-        """Settings that are fine one by one and cannot be together."""
+        """Raise OptionError for settings that are valid one by one but contradict each other."""
         named = f"operation {self.name!r}, " if self.name else ""
         for word, other_words in _APART:
             clashing = [
@@ -613,7 +615,8 @@ class Operation(FrozenRecord):
             )
 
     def _refuse_finish(self, named: str) -> None:
-        """A finishing pass without a wall, or with a tool that is not for it."""
+        """Raise OptionError for a finishing pass without a wall, or with a tool that does not suit
+        it."""
         if self.finish_mm is None:
             return
         if self.contract.runs_beside and self.side == "on":
@@ -639,10 +642,11 @@ class Operation(FrozenRecord):
             )
 
     def after(self, others: Sequence[Operation]) -> Operation:
-        """Return the operation with what it clears the rest of, found by its name among others,
-        those before it and then those behind it; itself where it names none.
+        """Return the operation linked to the one that it clears the rest of (`rest`), which is
+        found by its name among `others`, earlier ones first; unchanged if it names none.
 
-        It takes the paths of that one, and is as deep. OptionError for what leaves no rest.
+        It takes over the paths and the depth of that one. OptionError for an operation that leaves
+        no rest.
         """
         if not self.rest:
             return self
@@ -673,7 +677,7 @@ class Operation(FrozenRecord):
         return replace(self, rest_of=other, depth_mm=depth, **other_selection)
 
     def _refuse_rest(self, other: Operation, where: str) -> None:
-        """An operation that leaves this one nothing, or what it cannot clear."""
+        """Raise OptionError if `other` leaves nothing that this operation can clear."""
 
         def refuse(message: str, mend: str) -> OptionError:
             return OptionError(message, where=where, mend=mend)
@@ -711,11 +715,12 @@ class Operation(FrozenRecord):
             )
 
     def stages(self) -> tuple[Operation, ...]:
-        """Return the operation, or the two that its finishing pass makes of it: one that leaves
-        this on the wall, and one along the wall, which comes in and leaves on quarter arcs as
-        large as what was left: from where the tool of the first ran. A trochoidal slot has the
-        latter always, for its cusps. OptionError for a feed or a tool of a pass that there is
-        not, and for a tool that cannot cut as far beyond the line."""
+        """Return the operation alone, or if it has a finishing pass two stages: roughing, which
+        leaves `finish_mm` on the wall, and the pass along the wall, which enters and leaves on
+        quarter arcs as large as that thickness, from where the roughing tool ran. A trochoidal
+        slot always has a finishing stage, for its cusps. OptionError for a feed or a tool of a
+        finishing pass that does not exist, and for a tool that cannot cut as far beyond the line
+        as asked."""
         self._refuse_beyond()
         left_mm = self.finish_mm
         if left_mm is None and self.makes_slots and self.side != "on" and not self.stage:
@@ -770,7 +775,8 @@ class Operation(FrozenRecord):
         return rough, finish
 
     def _refuse_beyond(self) -> None:
-        """A cut beyond the line for which the tool's centre would have to cross it."""
+        """Raise OptionError for a cut so far beyond the line that the tool's centre would have to
+        cross it."""
         if self.allowance_mm >= 0.0:
             return
         place = f"operation {self.name or self.kind!r}, key allowance"
@@ -792,9 +798,10 @@ class Operation(FrozenRecord):
             )
 
     def through(self, stock: Stock | None) -> Operation:
-        """Return the operation with the depth that its breakthrough makes in this stock; itself
-        without one. A pointed drill, or a round nose, goes through with its whole diameter.
-        OptionError for a stock that is not known, or that lies on too thin a board."""
+        """Return the operation with its breakthrough converted to a depth for this stock;
+        unchanged without one. The depth lets a pointed drill or a round nose go through with its
+        whole diameter. OptionError if the stock is not known, or the board under it is too thin.
+        """
         extra = self.breakthrough_mm
         if extra is None:
             return self
@@ -818,9 +825,11 @@ class Operation(FrozenRecord):
         return replace(self, depth_mm=stock.thickness_mm + extra + point, breakthrough_mm=None)
 
     def settled(self, stock: Stock | None) -> Operation:
-        """Return the operation as its kind completes it, with the depth of its breakthrough.
+        """Return the operation as its kind completes it, with its breakthrough converted to a
+        depth.
 
-        OptionError for what cannot be, with this stock (None: not known)."""
+        OptionError for an operation that is impossible in this stock (None: not known).
+        """
         settle = self.contract.settle
         settled: Operation = function_of(settle)(self, stock) if settle else self
         return settled.through(stock)
@@ -831,7 +840,7 @@ class Operation(FrozenRecord):
         return kind_named(self.kind)
 
     def own_value(self, name: str) -> Any:
-        """Return the value of a key that its kind alone has, or its default."""
+        """Return the value of a key that only its kind has, or the default of that key."""
         key = self.contract.own[name]
         return dict(self.own).get(key.field, key.default)
 
@@ -880,8 +889,8 @@ class Operation(FrozenRecord):
         return bool(self.select or self.entities or self.size_mm or self.area_mm2)
 
     def takes(self, layer: str, colour: str) -> bool:
-        """Return True if paths of this layer and colour are cut, as far as it does not select
-        them by what they are."""
+        """Return True if paths of this layer and colour may be cut; other criteria, such as
+        `select`, are not checked."""
         return (
             self.contract.takes_drawn
             and (not self.layers or matches(self.layers, layer))
@@ -890,14 +899,15 @@ class Operation(FrozenRecord):
 
 
 def _selection_of(operation: Operation) -> dict[str, Any]:
-    """By what an operation takes paths."""
+    """Return the fields by which an operation selects paths."""
     keys = ("layers", "colours", "select", "size_mm", "area_mm2", "entities")
     return {key: getattr(operation, key) for key in keys}
 
 
 def rested(operations: Sequence[Operation]) -> list[Operation]:
-    """Return the operations with what they clear the rest of. That of a pocket comes after it;
-    a carved floor may be cleared before or after its walls."""
+    """Return the operations, those that clear a rest linked to the operation that leaves it. The
+    rest of a pocket must come after it; a carved floor may be cleared before or after its walls.
+    """
     settled = []
     for row, each in enumerate(operations):
         later = [other for other in operations[row + 1 :] if other.contract.rest == "floor"]
@@ -933,7 +943,8 @@ class Placement(FrozenRecord):
         self._refuse_contradictions()
 
     def _refuse_contradictions(self) -> None:
-        """Settings that are fine one by one and cannot be together, and lengths that are none."""
+        """Raise OptionError for settings that are valid one by one but contradict each other, and
+        for impossible lengths."""
         if self.fit_mm is not None:
             _refuse_fit(self.fit_mm)
             if self.scale != 1.0:
@@ -1028,7 +1039,7 @@ class KeepOutBox(FrozenRecord):
                 )
 
     def moved(self, by_mm: tuple[float, float]) -> KeepOutBox:
-        """Return the box moved in the plane."""
+        """Return the box moved in X and Y."""
         (x, y), (left_x, right), (low, high) = by_mm, self.x_mm, self.y_mm
         return replace(self, x_mm=(left_x + x, right + x), y_mm=(low + y, high + y))
 
@@ -1073,7 +1084,7 @@ class JobSetup(FrozenRecord):
 
 
 def _refuse_pins(setup: JobSetup, turn: Turn, where: str) -> None:
-    """Refuse pins that meet none again when the part is turned over."""
+    """Raise OptionError for pins that do not meet again when the part is turned over."""
     for x, y in setup.pins_mm:
         place = turn.point((x, y))
         if not any(math.dist(place, pin) <= PIN_SLACK_MM for pin in setup.pins_mm):
@@ -1129,7 +1140,8 @@ class Job(FrozenRecord):
         self._refuse_setups()
 
     def _refuse_setups(self) -> None:
-        """Refuse set-ups of one name or of unknown operations, and operations of no set-up."""
+        """Raise OptionError for set-ups with equal names or unknown operations, and for operations
+        that are in no set-up."""
         names = [each.name for each in self.setups]
         operation_names = [each.name for each in self.operations if each.stage != "finish"]
         for row, setup in enumerate(self.setups):
@@ -1161,8 +1173,8 @@ class Job(FrozenRecord):
                 )
 
     def setup(self, name: str) -> Job:
-        """Return the job of one set-up: its operations, the drawing turned over as it says, and
-        the stock as it lies then. OptionError for a name that no set-up has."""
+        """Return the job of one set-up: its operations, with drawing and stock turned over as it
+        says. OptionError for an unknown name."""
         chosen_setup = next((each for each in self.setups if each.name == name), None)
         if chosen_setup is None:
             names = [each.name for each in self.setups]
@@ -1190,8 +1202,8 @@ class Job(FrozenRecord):
         )
 
     def flip_line_mm(self, setup: JobSetup) -> float | None:
-        """Return where the line lies about which a set-up is turned over, mm; None if it is not
-        turned over, or nobody knows."""
+        """Return the position of the line about which a set-up is turned over, mm; None if it is
+        not turned over, or the position is not known."""
         box = None if self.stock is None else self.stock.box_mm
         across = 0 if setup.flip == "y" else 1
         if setup.line_mm is not None or setup.flip is None or box is None:
@@ -1199,8 +1211,9 @@ class Job(FrozenRecord):
         return 0.5 * (box[across] + box[across + 2])
 
     def _turn(self, setup: JobSetup, where: str) -> tuple[Turn, tuple[float, float]]:
-        """Return the map into the frame of a set-up, and where its zero lies in the frame that has
-        the zero of the others; OptionError where nobody knows, and for pins that do not meet."""
+        """Return the map into the frame of a set-up, and its zero (x, y), mm, in the frame turned
+        over but not shifted. OptionError if line or zero are not known, and for pins that do not
+        meet."""
         turn, line = Turn(), self.flip_line_mm(setup)
         if setup.flip is not None:
             if line is None:
@@ -1245,10 +1258,9 @@ class Job(FrozenRecord):
 
 
 def job_of(**settings: Any) -> Job:
-    """Return the job of one operation: fields of Operation, Job and Placement by name, those of
-    its Tool with `tool_` before them (`tool_diameter_mm=0.2`). TypeError for a name none of
-    them has.
-    """
+    """Return a job of one operation, from fields of Operation, Job and Placement by name, and
+    those of its Tool with the prefix `tool_` (`tool_diameter_mm=0.2`). TypeError for a name that
+    none of them has."""
     tool = {
         key.removeprefix("tool_"): settings.pop(key)
         for key in list(settings)
@@ -1264,8 +1276,8 @@ def job_of(**settings: Any) -> Job:
 
 
 def operation_of(**settings: Any) -> Operation:
-    """Return the operation of these fields; those that its kind alone has (without a kind: any
-    kind) go into `own_fields`. TypeError for a name that it does not have."""
+    """Return an operation with these fields; those that only its kind has (without a kind: any
+    kind) go into `own`. TypeError for an unknown name."""
     named = [kind_named(settings["kind"])] if "kind" in settings else installed_kinds().values()
     own_names = {key.field for kind in named for key in kind.own.values()} - _names(Operation)
     own_fields = tuple(sorted((name, settings.pop(name)) for name in own_names & settings.keys()))

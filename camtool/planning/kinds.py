@@ -159,7 +159,7 @@ class _Broken(Struct, frozen=True):
 
 @cache
 def _load_kinds() -> tuple[dict[str, OperationKind], dict[str, _Broken]]:
-    """Return the kinds that can be loaded, in order, and the others."""
+    """Return the kinds that can be loaded, in the order of lists, and the broken ones."""
     kinds: list[OperationKind] = []
     broken: dict[str, _Broken] = {}
     for point in _entry_points():
@@ -172,8 +172,8 @@ def _load_kinds() -> tuple[dict[str, OperationKind], dict[str, _Broken]]:
 
 
 def _entry_points() -> list[EntryPoint]:
-    """Return the entry points of all kinds; also of our own that the installation does not know
-    yet, in a checkout that was updated and not installed again."""
+    """Return the entry points of all kinds. Camtool's own kinds are included even if the installed
+    metadata lacks them, as in a checkout that was updated but not installed again."""
     points = entry_points(GROUP)
     known_names = {point.name for point in points}
     our_modules = iter_modules(import_module(GROUP).__path__)
@@ -183,7 +183,8 @@ def _entry_points() -> list[EntryPoint]:
 
 
 def _load(point: EntryPoint) -> OperationKind:
-    """Return the kind that an entry point names; TypeError or ValueError for another object."""
+    """Return the kind that an entry point names; TypeError or ValueError if that is another
+    object."""
     kind = point.load()
     if not isinstance(kind, OperationKind):
         raise TypeError(f"{point.attr} is no camtool.planning.kinds.OperationKind")
@@ -193,12 +194,12 @@ def _load(point: EntryPoint) -> OperationKind:
 
 
 def installed_kinds() -> Mapping[str, OperationKind]:
-    """Return the kinds of operation that are installed, by name, in the order of lists."""
+    """Return the installed kinds of operation by name, in the order of lists."""
     return _load_kinds()[0]
 
 
 def broken_kinds() -> Collection[str]:
-    """Return the names of kinds that are installed and cannot be loaded."""
+    """Return the names of installed kinds that cannot be loaded."""
     return _load_kinds()[1].keys()
 
 
@@ -221,8 +222,8 @@ def kind_named(name: str) -> OperationKind:
 
 
 def function_of(path: str) -> Callable[..., Any]:
-    """Return the function that a kind names; an unexpected exception in one of a third party is
-    an error that names its plug-in."""
+    """Return the function at this path, which a kind names; an unexpected exception in a third
+    party's function becomes an error that names the plug-in."""
     module, _, name = path.partition(":")
     function: Callable[..., Any] = getattr(import_module(module), name)
     if module.startswith(OWN_PACKAGE):

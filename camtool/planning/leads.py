@@ -77,10 +77,10 @@ class Border(Struct, frozen=True, eq=False):
         )
 
     def near(self, place: Floats, size_mm: float) -> Segments:
-        """Return the segments that a lead of this size from a place (2,) of the contour must stay
-        away from.
+        """Return the segments from which a lead of this size at a place (2,) of the contour must
+        keep away.
 
-        What an engraved contour itself cuts there is not kept from its leads.
+        An engraved contour's own cut there does not count.
         """
         reach = 2.0 * size_mm + self.reach_mm + max(self.allowance_mm, 0.0)
         near_lines = segments_near(self.keep_out.lines, place, reach)
@@ -90,7 +90,7 @@ class Border(Struct, frozen=True, eq=False):
         return near_lines
 
     def allows(self, lead: Segments, near_segments: Segments) -> bool:
-        """Return True if the tool cuts no wanted material along this one line or arc."""
+        """Return True if the tool cuts no wanted material along this single line or arc."""
         distance, _ = paired_distances(
             lead[np.zeros(len(near_segments), dtype=np.int64)], near_segments
         )
@@ -101,7 +101,7 @@ class Border(Struct, frozen=True, eq=False):
         return is_far and (self.free_left is None or self._is_beside(lead))
 
     def _is_beside(self, lead: Segments) -> bool:
-        """Return True if no piece of the lead lies on the side of the contour that is not free."""
+        """Return True if the whole lead lies on the free side of the contour."""
         common = crossings(lead, Segments.of(self.line))
         parts = distinct(np.concatenate([[0.0, 1.0], common.ta]))
         rows = np.zeros(len(parts) - 1, dtype=np.int64)
@@ -127,8 +127,7 @@ NO_LEADS = Leads(np.empty((0, 3)), np.empty((0, 3)), ())
 def leads_of(
     contour: Contour, along: MeasuredPath, ends: tuple[float, float], keep_out: KeepOut
 ) -> Leads:
-    """Return the leads of a contour that is cut as `along` from one length to another, its
-    `ends`."""
+    """Return the leads of a contour that is cut along `along` between two lengths, its `ends`."""
     operation = contour.setting.operation
     if operation.lead_in.kind == operation.lead_out.kind == "none":
         return NO_LEADS
@@ -156,10 +155,10 @@ def leads_of(
 
 
 def _lead_bulge(sign: float, material_left: bool | None) -> float:
-    """Return the bulge of a lead that goes away from the contour: a quarter arc to the free side.
+    """Return the bulge of a lead seen from the contour outwards: a quarter arc to the free side.
 
-    Seen away from the contour, what is free on the right of the travel is on the right of a
-    lead-out too, and on the left of a lead-in, which is seen backwards.
+    What is free on the right of the travel is on the right of a lead-out, and on the left of a
+    lead-in, which is seen backwards.
     """
     if material_left is None:
         return 0.0
@@ -169,8 +168,8 @@ def _lead_bulge(sign: float, material_left: bool | None) -> float:
 def _longest_lead(
     lead: Lead, place_and_heading: tuple[Floats, Floats], bulge: float, border: Border
 ) -> tuple[Floats, float]:
-    """Return the longest permitted lead as it leaves its place at the contour; and its size,
-    mm."""
+    """Return the longest permitted lead, as it leaves its place at the contour, and its
+    size, mm."""
     place, heading = place_and_heading
     near_segments = border.near(place, lead.length_mm)
     size = lead.length_mm
@@ -187,7 +186,7 @@ def _longest_lead(
 
 
 def runs_back(path: Polyline, other: Polyline) -> bool:
-    """Return True if `other`, a part of the path or all of it, is travelled in the other
+    """Return True if `other`, which is the path or a part of it, runs in the opposite
     direction."""
     other_along = MeasuredPath.of(other)
     middle = 0.5 * other_along.reach[1:2]
@@ -200,7 +199,8 @@ def runs_back(path: Polyline, other: Polyline) -> bool:
 
 
 def segments_near(lines: Polylines, place: Floats, reach_mm: float) -> Segments:
-    """Return the segments of paths that may come so near to a place (2,), and few others.
+    """Return the segments of paths that may come within `reach_mm` of a place (2,), and few
+    others.
 
     No point of an arc of a half circle at most is farther from its start than π/2 of its chord.
     """

@@ -32,7 +32,7 @@ Approach = Callable[[CutRun], tuple[float, float] | None]
 
 
 def _rounded(places: Floats) -> Floats:
-    """Places rounded to ROUNDED_DECIMALS, −0 as 0.
+    """Return places rounded to ROUNDED_DECIMALS, with 0 for −0.
 
     The ends of a straight wall differ by some 1e-15 of their size, as offsets, tabs and ramps come
     to them. Where a dialect's last decimal is a tie (a cutter of 1/8 inch has a radius of 1.5875)
@@ -46,12 +46,13 @@ def link(
     machine: Machine,
     approaches: Callable[[], Approach] | None = None,
 ) -> ToolpathBuilder:
-    """Return all moves of a program: the tool starts at part zero on the stock and ends above it,
-    where the machine parks.
+    """Return the builder with all moves of a program: the tool starts at part zero on the stock
+    and ends above it, where the machine parks.
 
-    `worked`: operations, each with its runs in order of cutting. Rows know their run, counted
-    through all of them. `approaches` makes what gives the place from which a run is approached, a
-    new one after each tool change. All places are rounded to ROUNDED_DECIMALS.
+    `worked`: (setting, runs in order of cutting) of each operation. Rows know their run, counted
+    through all of them. `approaches` makes the function that returns the place from which a run is
+    approached; a new one is made after each tool change. All places are rounded to
+    ROUNDED_DECIMALS.
     """
     safe_z_mm = worked[0][0].safe_z_mm
     feed_z_mm = machine.defaults.feed_z_mm
@@ -103,8 +104,8 @@ def link(
 
 
 def _add_section(builder: ToolpathBuilder, runs: Runs, before: int) -> None:
-    """Add the moves of runs on a lathe, of which there were so many before: across to each, and
-    along it, without any height."""
+    """Add the moves of runs on a lathe, which has no height: across to each run and along it.
+    `before`: the number of runs added before."""
     for index, run in enumerate(runs, before):
         cut = cuts(run.vertices, run.feed_mm_min, np.array([0, len(run.vertices)]))
         is_arc = np.isfinite(cut.centre[:, 0]) & np.isfinite(cut.feed)
@@ -126,8 +127,9 @@ def _add_section(builder: ToolpathBuilder, runs: Runs, before: int) -> None:
 
 
 def _go_to_tool_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: float) -> None:
-    """Move to where the machine changes tools, up first; where it states none, up as far as a hand
-    needs and to where it parks. `lowest_mm`: the lowest Z of the program."""
+    """Move to the place where the machine changes tools, up first. If the machine states none,
+    move up as far as a hand needs, and to where it parks. `lowest_mm`: the lowest Z of the
+    program."""
     x, y, z = builder.position
     height, place = machine.defaults.change_z_mm, machine.defaults.change_mm
     if height is None:
@@ -143,7 +145,7 @@ def _go_to_tool_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: fl
 
 
 def tool_note(operation: Operation) -> ToolNote:
-    """Return the tool of an operation as a program names it."""
+    """Return the tool of an operation as it is named in programs."""
     tool = operation.tool
     return ToolNote(
         tool.number,
@@ -181,8 +183,8 @@ def _operation_note(setting: Setting) -> OperationNote:
 def _set_spindle(
     builder: ToolpathBuilder, speed: float | None, wanted_rpm: float | None, spindle: Spindle
 ) -> float | None:
-    """Bring the spindle from one speed to another, None being off; return the new speed. Nothing
-    is done where the program does not switch it."""
+    """Switch the spindle from one speed to another (None: off) and return the new speed. Nothing
+    is added if the program does not switch this spindle."""
     if wanted_rpm == speed or spindle.switched != "program":
         return speed
     if wanted_rpm is None:
@@ -195,7 +197,7 @@ def _set_spindle(
 
 
 def _set_coolant(builder: ToolpathBuilder, coolant_now: str, wanted_coolant: str) -> str:
-    """Change from one way of cooling to another; return the new one."""
+    """Switch from one kind of coolant to another and return the new one."""
     if coolant_now != wanted_coolant and (
         wanted_coolant == "off"
         or (coolant_now not in ("off", wanted_coolant) and wanted_coolant != "both")
@@ -221,8 +223,8 @@ class _Lot(Struct, frozen=True, eq=False):
 
 
 def _lots(runs: Runs) -> Iterator[_Lot]:
-    """Yield the runs in lots of about VERTICES_AT_ONCE vertices. A run is split only where a line
-    leaves a vertex: there no arc goes on."""
+    """Yield the runs in lots of about VERTICES_AT_ONCE vertices. A run is split only before a
+    line, so that no arc is split."""
     first, count = runs.first, len(runs.vertices)
     may_part = runs.vertices[:, 3] == 0.0
     may_part[first[1:] - 1] = False
@@ -254,8 +256,9 @@ def _add_cuts(
     heights: tuple[float, float | None],
     approach: Approach | None,
 ) -> None:
-    """Add the moves of runs, of which there were so many before: each from safe z, the first of
-    the `heights`, and back to it; down as a rapid to the second one, if there is one.
+    """Add the moves of the runs of a lot; `before`: the number of runs added before. Each run
+    begins and ends at safe z, the first of `heights`; it goes down as a rapid to the second of
+    these (None: not), and from there at the plunge feed.
 
     (the approach) · across · (as a rapid) · down · the cuts · (the dwell) · up
     """

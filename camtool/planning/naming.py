@@ -14,26 +14,26 @@ MAX_LISTED = 12
 
 
 def at_place(name: str, point: Sequence[float]) -> str:
-    """Return a path's name and a place (x, y) mm of it."""
+    """Return text that names a path and a place (x, y) mm of it."""
     return f"{name} at X {point[0]:.4f} Y {point[1]:.4f}"
 
 
 def tool_name(tool: Tool) -> str:
-    """Return the tool's diameter, and its name if it has one."""
+    """Return text with the tool's diameter, and its name if it has one."""
     name = f" ({tool.name})" if tool.name else ""
     return f"a tool of {tool.diameter_mm:g} mm{name}"
 
 
 def width_name(operation: Operation) -> str:
-    """Return the name of an operation's tool by its width beside the line that it follows."""
+    """Return text that names an operation's tool by its width beside the line that it follows."""
     if operation.contract.breaks_edges:
         return f"a V bit, {2.0 * operation.wall_radius_mm:.3g} mm wide where its bevel ends,"
     return tool_name(operation.tool)
 
 
 def tool_words(tool: Tool, shape: str = "") -> str:
-    """Describe all that is known of a tool's shape: `end mill 3.175 mm, 2 flutes, cuts 12 mm`;
-    `shape`: its name in TOOL_SHAPES where that is not the tool's own kind."""
+    """Return text on all that is known of a tool's shape, such as `end mill 3.175 mm, 2 flutes,
+    cuts 12 mm`. `shape`: its name in TOOL_SHAPES, if that is not the tool's own kind."""
     words = [f"{TOOL_SHAPES[shape or tool.kind]} {tool.diameter_mm:g} mm"]
     if not tool.diameter_mm:
         words = [TOOL_SHAPES[tool.kind] if tool.kind != "flat" else "point"]
@@ -53,7 +53,8 @@ def tool_words(tool: Tool, shape: str = "") -> str:
 
 
 def key_of(operation: Operation, key: str) -> str:
-    """Name the place of a setting of an operation: in its job, or in the preset of its tool."""
+    """Return text that names a setting of an operation: its key in the job, or in the preset of
+    its tool."""
     preset_words = (
         f" of the tool's preset for {operation.material!r}" if key in operation.preset else ""
     )
@@ -61,12 +62,12 @@ def key_of(operation: Operation, key: str) -> str:
 
 
 def operation_name(operation: Operation) -> str:
-    """Return an operation's name, or its kind when it has none."""
+    """Return an operation's name, or its kind if it has none."""
     return f"operation {operation.name or operation.kind!r}"
 
 
 def range_words(limits: tuple[float, float] | None) -> str:
-    """Describe a range: `0.02 to 0.06`, `at most 0.06` or `at least 0.02`."""
+    """Return a range as text: `0.02 to 0.06`, `at most 0.06` or `at least 0.02`."""
     min_value, max_value = limits or (0.0, math.inf)
     if math.isinf(max_value):
         return f"at least {min_value:g}"
@@ -74,8 +75,8 @@ def range_words(limits: tuple[float, float] | None) -> str:
 
 
 def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
-    """Describe how to give the numbers of the user's own machine, which may differ from the
-    target's."""
+    """Return text on how to give these numbers of the user's own machine, which may differ from
+    the target's."""
     keys = " ".join(f"--set {each}" for each in settings)
     name, dialect = machine.target.name, machine.target.dialect
     its_file = (
@@ -100,13 +101,13 @@ def shortened_list(findings: Sequence[Finding], sentence: Sentence) -> list[Find
 
 
 def setup_name(job: Job) -> str:
-    """Return the name of the set-up that a job is of a part, "" for others."""
+    """Return the name of the set-up that this job is, "" for a job that is no set-up."""
     return "" if job.setup_of is None else job.setup_of[1].name
 
 
 def setup_heading(job: Job) -> tuple[str, ...]:
-    """Return in words what set-up of a part this is, which face is up, and how the part is turned
-    to it from the face that is drawn; () for a job that is no set-up."""
+    """Return lines of text: which set-up of a part this is, which face is up, and how the part is
+    turned to it from the face that is drawn; () for a job that is no set-up."""
     if job.setup_of is None:
         return ()
     setup = job.setup_of[1]
@@ -122,8 +123,8 @@ def setup_heading(job: Job) -> tuple[str, ...]:
 
 
 def setup_words(job: Job) -> str:
-    """Return the heading of a set-up with its pins, and how far its face may lie beside the other;
-    "" for a job that is no set-up."""
+    """Return the heading of a set-up with its pins and the error between the faces as text; "" for
+    a job that is no set-up."""
     if job.setup_of is None:
         return ""
     setup, words = job.setup_of[1], list(setup_heading(job))
@@ -137,22 +138,22 @@ def setup_words(job: Job) -> str:
 
 
 def flip_error_words(*setups: JobSetup) -> str:
-    """Return in words how far what is cut in these set-ups may lie beside each other."""
+    """Return text on how far the cuts of these set-ups may lie beside each other."""
     errors = [setup.flip_error_mm for setup in setups if setup.flip is not None]
     lengths = [error for error in errors if error is not None]
     return f"up to {max(lengths):g} mm" if lengths and lengths == errors else "an unknown length"
 
 
 def pins_of(job: Job) -> tuple[tuple[float, float], ...]:
-    """Return the places of all alignment pins of a part in the frame of one of its set-ups, or of
-    the face that is drawn."""
+    """Return the places (x, y), mm, of all alignment pins of a part, in the frame of the job's
+    set-up or of the face that is drawn."""
     places = dict.fromkeys(pin for setup in job.whole.setups for pin in setup.pins_mm)
     return tuple(map(job.placement.turn.point, places))
 
 
 def flip_lines_of(job: Job) -> tuple[tuple[str, float], ...]:
-    """Return the lines about which the part is turned over to a set-up, or from it to others,
-    each along "x" or "y", with its place in the frame of the set-up, mm."""
+    """Return (axis "x" or "y", position in mm) of the lines about which the part is turned over,
+    to this set-up or from it to others, in its frame."""
     if job.setup_of is None:
         return ()
     whole_job, own = job.setup_of

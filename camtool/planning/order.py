@@ -84,10 +84,11 @@ class Choices(Struct, frozen=True, eq=False):
 
 
 def choices_of(items: Items) -> Choices:
-    """Return the variants in which the items may be cut, by where the tool goes down and comes up.
+    """Return the variants in which the items may be cut, with the places where the tool goes down
+    and comes up.
 
     A closed contour may begin at its `starts` or at any joint, and ends there; its direction
-    changes nothing. An open one runs as drawn, or from its end too when reversible.
+    changes nothing. An open one runs as drawn, and if reversible also from its end.
     """
     columns = [_fixed_ends(items), *_contour_ends(items)]
     owner, ends = (np.concatenate(each) for each in zip(*columns, strict=True))
@@ -96,8 +97,8 @@ def choices_of(items: Items) -> Choices:
 
 
 def chosen_paths(contours: Sequence[Contour], choices: Choices, rows: Ints) -> Polylines:
-    """Return a path for each of these rows (R,) of `choices`: the contour to which the row
-    belongs, with the start and the direction that the row gives."""
+    """Return the path of the contour for each of these rows (R,) of `choices`, from the start and
+    in the direction of the row."""
     owners = choices.owner[rows]
     rank = rows - choices.first[owners]
     # The places in each closed path where it may begin, the first, the second, and so on.
@@ -111,7 +112,7 @@ def chosen_paths(contours: Sequence[Contour], choices: Choices, rows: Ints) -> P
 
 
 def drawn_order(choices: Choices) -> Ints:
-    """Return rows (M,): all items in the order in which they come, each in its first variant."""
+    """Return rows (M,): all items in their own order, each in its first variant."""
     return choices.first[:-1]
 
 
@@ -121,7 +122,7 @@ def best_order(
     from_point: Point = (0.0, 0.0),
     to_point: Point | None = (0.0, 0.0),
 ) -> Ints:
-    """Return the rows (M,), one of each item, in the order of cutting.
+    """Return rows (M,), one for each item, in the order of cutting.
 
     `before` (P, 2): the first item of a pair is cut before the second. The tool comes from
     `from_point` and goes to `to_point` at last (None: it stays where it is). OptionError when
@@ -154,7 +155,7 @@ def best_order(
 
 
 def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Floats) -> Tour:
-    """Return the tour of these rows, with the tables that the search uses."""
+    """Return the tour of these rows with the tables that the compiled search needs."""
     count, variants = len(choices), len(choices.owner)
     reversed_rows = _reversed_rows(choices)
     stays = bool(np.isnan(goal).any())
@@ -188,8 +189,8 @@ def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Flo
 
 
 def _reversed_rows(choices: Choices) -> Ints:
-    """Return, for each row (S,), the row of its item with entry and exit exchanged; itself when
-    there is none."""
+    """Return, for each row (S,), the row of the same item with entry and exit exchanged; the row
+    itself if there is none."""
     reversed_rows = np.arange(len(choices.owner))
     rows = np.flatnonzero((choices.entry != choices.exit).any(axis=1))
     owners = choices.owner[rows]
@@ -200,8 +201,8 @@ def _reversed_rows(choices: Choices) -> Ints:
 
 
 def _reversed_rows_among(choices: Choices, rows: Ints) -> Ints:
-    """Return, for each of these rows (R,), the row of its item with entry and exit exchanged; the
-    rows are all of their items that end elsewhere than they begin."""
+    """Return the same for these rows (R,), which must be all rows of their items whose exit is not
+    their entry."""
     if len(rows) == 0:
         return rows
     owner, entry, leave = choices.owner[rows, None], choices.entry[rows], choices.exit[rows]
@@ -212,8 +213,8 @@ def _reversed_rows_among(choices: Choices, rows: Ints) -> Ints:
 
 
 def _places(choices: Choices) -> tuple[Floats, Ints]:
-    """Return places (N, 2) that stand for the items when neighbours are sought, and their owners
-    (N,)."""
+    """Return places (N, 2) that represent the items in the search for neighbours, and the item
+    (N,) of each."""
     first, variants = choices.first, np.diff(choices.first)
     step = -(-variants // MAX_PLACES_EACH)
     rank = np.arange(len(choices.owner)) - first[choices.owner]
@@ -226,8 +227,8 @@ def _places(choices: Choices) -> tuple[Floats, Ints]:
 
 
 def travel_mm(choices: Choices, rows: Ints, from_point: Point, to_point: Point | None) -> float:
-    """Return the length of the tool's travel between items cut in this order, and from and to the
-    points, mm."""
+    """Return the length of the tool's travel between items cut in this order, mm, including the
+    ways from `from_point` and to `to_point`."""
     leave = np.concatenate([np.array([from_point]), choices.exit[rows]])
     arrive = choices.entry[rows]
     if to_point is None:
@@ -239,7 +240,8 @@ def travel_mm(choices: Choices, rows: Ints, from_point: Point, to_point: Point |
 
 
 def _followers(before: Ints, count: int) -> tuple[Ints, Ints]:
-    """Return the items that must follow each item i: after[first[i] : first[i + 1]], each once."""
+    """Return first (count + 1,) and after: the items that must follow item i are after[first[i] :
+    first[i + 1]], each once."""
     pairs = distinct_rows(np.asarray(before, dtype=np.int64).reshape(-1, 2))
     if len(pairs) and not (pairs.min() >= 0 and pairs.max() < count):
         raise ValueError(f"a pair names an item that is none of {count}")
@@ -260,14 +262,14 @@ tool goes down and where it comes up."""
 
 
 def _fixed_ends(items: Items) -> Ends:
-    """Return the only variant of each item that is cut as it is."""
+    """Return entry and exit of the Fixed items, which have a single variant each."""
     fixed = [(k, item.runs) for k, item in _fixed_items(items)]
     ends = [[runs[0].vertices[0, :2], runs[-1].vertices[-1, :2]] for _, runs in fixed]
     return np.array([k for k, _ in fixed], dtype=np.int64), np.array(ends).reshape(-1, 4)
 
 
 def _fixed_items(items: Items) -> Iterator[tuple[int, Fixed]]:
-    """Yield the items that are cut as they are, with their indices."""
+    """Yield index and item of each Fixed item."""
     return ((k, item) for k, item in enumerate(items) if isinstance(item, Fixed))
 
 
@@ -283,7 +285,7 @@ def _lines_of(contours: Sequence[Contour]) -> Polylines:
 
 
 def _contour_ends(items: Items) -> Iterator[Ends]:
-    """Yield the variants of contours: of closed ones, of open ones as they run, and of those
+    """Yield the variants of contours: closed ones, open ones as they run, and reversible ones
     turned."""
     contours, owner = contours_of(items), _contour_rows(items)
     lines = _lines_of(contours)
@@ -305,8 +307,8 @@ def _contour_ends(items: Items) -> Iterator[Ends]:
 
 
 def _start_mask(contours: Sequence[Contour], lines: Polylines) -> Bools:
-    """Return the mask (N,) of the vertices of `lines`, the paths of the contours, at which these
-    may begin."""
+    """Return the mask (N,) of the vertices of `lines`, the paths of the contours, at which a
+    contour may begin."""
     is_joint, offsets = joints(lines), lines.offsets
     for k, contour in enumerate(contours):
         if len(contour.starts):
@@ -317,10 +319,10 @@ def _start_mask(contours: Sequence[Contour], lines: Polylines) -> Bools:
 
 
 def must_precede(items: Items) -> Ints:
-    """Return pairs (P, 2) of items, the first to be cut before the second, ascending.
+    """Return pairs (P, 2) of items, ascending; the first must be cut before the second.
 
-    An item goes before the smallest closed Contour, or slot, that holds it, or any of its runs;
-    nothing else does. Contours that cross hold each other not.
+    An item goes before the smallest closed Contour, or slot, that holds it or any of its runs;
+    there are no other conditions. Contours that cross do not hold each other.
     """
     shapes, shape, item = _shapes(items)
     parent = Nesting(shapes).levels.parent
@@ -339,10 +341,10 @@ def must_precede(items: Items) -> Ints:
 
 
 def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
-    """Return paths that show where items lie, and pairs (J,), (J,) of a path and an item that it
+    """Return paths that show where items lie, and pairs (J,), (J,) of a path and the item that it
     belongs to.
 
-    Only a Contour's path, or that round a slot, is closed and holds any.
+    Only the path of a Contour, or the one round a slot, is closed and can hold items.
     """
     contours, owner = contours_of(items), _contour_rows(items)
     lines, shape = _lines_of(contours), np.arange(len(contours))
@@ -363,7 +365,7 @@ def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
 
 
 def _places_of(item: Fixed) -> Iterator[Polyline]:
-    """Yield paths that show where an item lies that is cut as it is."""
+    """Yield paths that show where a Fixed item lies: its outline, or its runs seen from above."""
     if item.outline is not None:
         yield Polyline(item.outline.vertices, closed=item.centre_lines is not None)
         return

@@ -114,22 +114,22 @@ class MeasuredPath:
         return point_at(self.segments, row, part)
 
     def directions(self, lengths: Floats) -> Floats:
-        """Return the unit tangents (J, 2) at these lengths (J,) mm; at a vertex, of what follows
-        it."""
+        """Return the unit tangents (J, 2) at these lengths (J,), mm; at a vertex, the tangent of
+        the segment after it."""
         row, part = self._locate(lengths, POSITION_EPS_MM)
         return Frames.of(self.segments[row]).tangent_at(part)
 
     def arrivals(self, lengths: Floats) -> Floats:
-        """Return the unit tangents (J, 2) at these lengths (J,) mm; at a vertex, of what leads to
-        it."""
+        """Return the unit tangents (J, 2) at these lengths (J,), mm; at a vertex, the tangent of
+        the segment before it."""
         row, part = self._locate(lengths, -POSITION_EPS_MM)
         return Frames.of(self.segments[row]).tangent_at(part)
 
     def nearest_to(self, point: tuple[float, float]) -> float:
-        """Return the length at which the path is nearest to a point (x, y) mm.
+        """Return the length along the path to its point nearest to (x, y), mm.
 
         Measured from the start of an arc of the curvature k, with the point at x along the tangent
-        and y along the left normal, the foot of the point is  atan2(k x, 1 − k y) / k  along.
+        and y along the left normal, the foot of the point is atan2(k x, 1 − k y) / k along.
         """
         place = np.array([point])
         nearest_place = nearest(place, self.segments)
@@ -145,19 +145,19 @@ class MeasuredPath:
         return float(tries[np.hypot(gaps[:, 0], gaps[:, 1]).argmin()])
 
     def piece(self, begin: float, end: float) -> Floats:
-        """Return vertices (k, 3) x, y, bulge from one length to another, backwards when `end` is
-        the lower one.
+        """Return the vertices (k, 3) x, y, bulge of the path from one length to another, backwards
+        if `end` is less than `begin`.
 
-        Vertices nearer than POSITION_EPS_MM to an end are that end. The last bulge is 0.
+        Vertices nearer than POSITION_EPS_MM to an end are merged with it. The last bulge is 0.
         """
         vertices = piece(self.paths.tracks, self.index, begin, end)
         return np.ascontiguousarray(vertices[:, [0, 1, 3]])
 
     def _locate(self, lengths: Floats, ahead_mm: float) -> tuple[Ints, Floats]:
-        """Return the segment that is so far ahead of each length, and the part of it at the
-        length.
+        """Return, for each length (J,), the segment at `ahead_mm` beyond it, and the share of that
+        segment at the length itself.
 
-        Ends of open paths reach no further.
+        Lengths beyond the ends of an open path count as its ends.
         """
         inside = lengths
         if self.closed:
@@ -169,8 +169,8 @@ class MeasuredPath:
 
 
 def reverse_vertices(vertices: Floats) -> Floats:
-    """Return vertices (k, n) of an open path, the bulge in the last column, travelled in the other
-    direction."""
+    """Return the vertices (k, n) of an open path in the opposite direction; the bulge is the last
+    column."""
     vertices_back = vertices[::-1].copy()
     vertices_back[:-1, -1] = 0.0 - vertices[-2::-1, -1]
     vertices_back[-1:, -1] = 0.0
@@ -188,15 +188,15 @@ def midpoints(segments: Segments) -> Floats:
 
 
 def true_ranges(values: Bools) -> tuple[Ints, Ints]:
-    """Return the ranges of true values: first indices (J,), and the indices (J,) behind the last
-    ones."""
+    """Return the ranges of consecutive True values: their first indices (J,), and the indices (J,)
+    after their last ones."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], values.astype(np.int64), [0]])))
     return edges[::2], edges[1::2]
 
 
 def flat_path(vertices: Floats) -> Polyline | None:
-    """Return a run (n, 4) of x, y, z, bulge seen from above, without the moves that lead nowhere
-    there; None when it stays at one place."""
+    """Return a run (n, 4) x, y, z, bulge seen from above, without moves that are vertical; None if
+    it stays at one place."""
     vertices_kept: list[Floats] = []
     for vertex in vertices[:, [0, 1, 3]]:
         if vertices_kept and np.hypot(*(vertex[:2] - vertices_kept[-1][:2])) <= POSITION_EPS_MM:
@@ -218,9 +218,11 @@ class Cuts(Struct, frozen=True, eq=False):
 
 
 def joints(lines: Polylines) -> Bools:
-    """Return the mask (N,) of the vertices of closed paths where one move ends and another begins.
+    """Return the mask (N,) of the vertices of closed paths where one move ends and another begins
+    (not those within an arc).
 
-    For a circle every vertex is as good, and all are true; so are those of open paths.
+    On a circle every vertex is as good as another, and all are True; so are all vertices of open
+    paths.
     """
     is_joint = np.ones(len(lines.vertices), dtype=np.bool_)
     rows = np.flatnonzero(np.repeat(lines.closed, np.diff(lines.offsets)))
@@ -236,7 +238,7 @@ def joints(lines: Polylines) -> Bools:
 
 
 def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
-    """Return the lines and arcs of R runs, arcs of one circle that follow each other as one.
+    """Return the lines and arcs of R runs; consecutive arcs of one circle are joined.
 
     Run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices` (N, 4), x, y, z, bulge, and
     of `feed_mm_min` (N,), that of the move which leaves the vertex. A circle becomes a single arc
@@ -268,8 +270,9 @@ def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
 
 
 def _begins_move(segments: Segments, goes_on: Bools) -> Bools:
-    """Return the mask (n,) of the segments with which a move begins, `goes_on` (n−1,) where one
-    may go on in the next: an arc sweeps no more than one may, or a whole circle."""
+    """Return the mask (n,) of the segments with which a move begins; `goes_on` (n − 1,): the next
+    segment may continue the move. An arc is divided where it would sweep more than a move may,
+    unless it is a whole circle."""
     begins = np.ones(len(segments), dtype=np.bool_)
     begin, swept, last = 0, 0.0, -1
     for row in (np.flatnonzero(goes_on) + 1).tolist():
@@ -285,8 +288,8 @@ def _begins_move(segments: Segments, goes_on: Bools) -> Bools:
 
 
 def _is_single_arc(segments: Segments, begin: int, last: int, swept: float) -> bool:
-    """Return True if the rows from `begin` to `last` sweep no more than an arc may, or a whole
-    circle."""
+    """Return True if the rows from `begin` to `last` together sweep no more than one arc may, or a
+    whole circle."""
     if abs(swept) <= MAX_PART_SWEEP_RAD:
         return True
     gap = segments.end[last] - segments.start[begin]
@@ -294,8 +297,8 @@ def _is_single_arc(segments: Segments, begin: int, last: int, swept: float) -> b
 
 
 def _continues(segments: Segments, rise: Floats, feed: Floats) -> Bools:
-    """Return the mask (n−1,) of the segments that go on in the next: one run, circle, slope and
-    feed."""
+    """Return the mask (n − 1,) of segments that the next one continues: same run, circle, slope
+    and feed."""
     continues = _same_arc(segments[:-1], segments[1:]) & (feed[:-1] == feed[1:])
     continues &= np.diff(segments.path) == 0
     pairs = np.flatnonzero(continues)
@@ -306,13 +309,13 @@ def _continues(segments: Segments, rise: Floats, feed: Floats) -> Bools:
 
 
 def _slopes(segments: Segments, rise: Floats, rows: Ints) -> Floats:
-    """Return the slopes (J,) of these rows, mm per mm, all of them arcs."""
+    """Return the slopes (J,) of these rows, which must be arcs, mm per mm."""
     arcs = segments[rows]
     return np.asarray(rise[rows] / (arcs.radius * np.abs(arcs.sweep)))
 
 
 def _same_arc(one: Segments, other: Segments) -> Bools:
-    """Return the mask (K,) of the rows of which both are arcs of one circle in the same
+    """Return the mask (K,) of rows in which both segments are arcs of the same circle and
     direction."""
     is_same = one.is_arc & (np.sign(one.bulge) == np.sign(other.bulge))
     rows = np.flatnonzero(is_same)

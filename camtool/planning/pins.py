@@ -36,8 +36,9 @@ Pin = tuple[float, float]
 def proposed_pins(
     stock_mm: Box, part_mm: Box, flip: tuple[str, float], diameter_mm: float, cut_mm: float
 ) -> tuple[Pin, Pin] | None:
-    """Return places of two pins in the stock, for a part that is cut out with a tool `cut_mm`
-    wide, and turned over about a line along "x" or "y", so far from zero; None without room."""
+    """Return places for two pins in the stock, None if there is no room. The part is cut out with
+    a tool `cut_mm` wide; `flip`: the axis "x" or "y" of the line about which it is turned over,
+    and the position of that line, mm."""
     across = 0 if flip[0] == "y" else 1
     along, room = 1 - across, ROOM_SHARE * diameter_mm
     ends = [
@@ -54,8 +55,8 @@ def proposed_pins(
 
 
 def with_pins(chosen: Chosen, placed: Drawing, job: Job, operation: Operation) -> Chosen:
-    """Return what an operation takes, with the pins of the job for one that drills these;
-    OptionError where there are none, with a proposal."""
+    """Return what an operation takes; for one that drills pins, with the pins of the job.
+    OptionError, with a proposal, if the job has none."""
     if operation.contract.takes != "pins":
         return chosen
     pins = pins_of(job)
@@ -72,7 +73,7 @@ def with_pins(chosen: Chosen, placed: Drawing, job: Job, operation: Operation) -
 
 
 def pin_findings(placed: Drawing, job: Job) -> list[Finding]:
-    """Return a remark that proposes pins, where a set-up turns the part over without any."""
+    """Return a remark that proposes pins, if a set-up turns the part over without any."""
     if job.setup_of is None or job.setup_of[1].flip is None or pins_of(job):
         return []
     places = _proposed_for(placed, job)
@@ -80,13 +81,13 @@ def pin_findings(placed: Drawing, job: Job) -> list[Finding]:
 
 
 def pins_text(pins: Sequence[Pin]) -> str:
-    """Return pins as a job file says them."""
+    """Return pins as the text of a key in a job file."""
     return f"pins = [{', '.join(f'[{x:g}, {y:g}]' for x, y in pins)}]"
 
 
 def _proposed_for(placed: Drawing, job: Job) -> list[Pin]:
-    """Return pins for a part in the frame of the face that is drawn, [] where there is no room, or
-    nobody knows."""
+    """Return proposed pins for a part, in the frame of the face that is drawn; [] if there is no
+    room or sizes are not known."""
     stock = None if job.stock is None else job.stock.box_mm
     lines = flip_lines_of(job)
     drawn = [each for each in (placed.paths, placed.unchosen.paths) if len(each)]
@@ -99,6 +100,6 @@ def _proposed_for(placed: Drawing, job: Job) -> list[Pin]:
 
 
 def _pin_mm(job: Job) -> float:
-    """Return the diameter of pins: that of the widest drill of the job."""
+    """Return the diameter for proposed pins: that of the widest drill of the job."""
     drills = [each.tool for each in job.whole.operations if each.tool.kind == "drill"]
     return max((tool.diameter_mm for tool in drills), default=0.0) or PIN_MM

@@ -63,25 +63,25 @@ class AffineMap(Struct, frozen=True, eq=False):
         return x, y
 
     def vertices(self, vertices: Floats) -> Floats:
-        """Return the images of vertices (N, 3) of x, y, bulge: the bulge changes its sign with the
-        handedness."""
+        """Return the images of vertices (N, 3) x, y, bulge; a mirroring map changes the sign of
+        the bulge."""
         flipped = np.linalg.det(self.matrix) < 0.0
         bulge = 0.0 - vertices[:, 2] if flipped else vertices[:, 2]
         return np.column_stack([self.points(vertices[:, :2]), bulge])
 
     def moved(self, shift: Floats) -> AffineMap:
-        """Return the map followed by a shift (2,) mm."""
+        """Return this map followed by a shift (2,), mm."""
         return replace(self, shift=self.shift + shift)
 
     def turned(self, turn: Turn) -> AffineMap:
-        """Return the map followed by turning the part over."""
+        """Return this map followed by turning the part over."""
         matrix = np.diag(turn.signs) @ self.matrix
         return AffineMap(matrix, self.shift * turn.signs + turn.shift_mm, self.scale)
 
 
 def place(drawing: Drawing, job: Job) -> Drawing:
-    """Return the drawing in the work frame, as the job's placement says; itself when nothing
-    changes.
+    """Return the drawing in the work frame, as the job's placement says; the same object if
+    nothing changes.
 
     Copies come one after the other, row by row: all paths and marks of the first, then of the
     second, whose sources name the copy ("CIRCLE 2F copy 2"). Fit, lower left and centre take the
@@ -96,7 +96,7 @@ def place(drawing: Drawing, job: Job) -> Drawing:
 
 
 def _place(drawing: Drawing, job: Job) -> Drawing:
-    """Return the drawing where the job's placement says, of whatever size."""
+    """Return the drawing in the work frame, without a check of its size."""
     placement = job.placement
     _refuse_too_many(drawing, placement)
     maps = placements(drawing, job)
@@ -117,7 +117,7 @@ def placements(drawing: Drawing, job: Job) -> list[AffineMap]:
 
 
 def part_scale(drawing: Drawing, job: Job) -> float:
-    """Return the size of the part over the size of the drawing, as the job's placement says.
+    """Return the factor from the drawing's size to the part's, from the job's scale or fit.
 
     Raises OptionError for an impossible fit.
     """
@@ -125,8 +125,8 @@ def part_scale(drawing: Drawing, job: Job) -> float:
 
 
 def collapse_findings(drawing: Drawing, placed_drawing: Drawing, job: Job) -> list[Finding]:
-    """Return a finding for paths that the scale made too small for a shape: points that became
-    one, and paths that became a point and are left out (a warning: something drawn is not cut)."""
+    """Return findings about what the scale made too small: points that were merged, and paths that
+    shrank to a point and are left out (a warning, since something drawn is not cut)."""
     columns, rows = job.placement.copies
     paths = columns * rows * len(drawing.paths) - len(placed_drawing.paths)
     points = columns * rows * len(drawing.paths.vertices) - len(placed_drawing.paths.vertices)
@@ -145,7 +145,7 @@ def collapse_findings(drawing: Drawing, placed_drawing: Drawing, job: Job) -> li
 
 
 def _first_map(drawing: Drawing, job: Job) -> AffineMap:
-    """Return the mirror, rotation and scale about the drawing's zero."""
+    """Return the map that mirrors, rotates and scales about the drawing's zero."""
     placement, turn_map = job.placement, _mirror_and_rotation(job.placement)
     scale = placement.scale
     if placement.fit_mm is not None:
@@ -154,7 +154,7 @@ def _first_map(drawing: Drawing, job: Job) -> AffineMap:
 
 
 def _mirror_and_rotation(placement: Placement) -> AffineMap:
-    """Return the mirror and rotation about the drawing's zero."""
+    """Return the map that mirrors and rotates about the drawing's zero."""
     cosine, sine = _cosine_and_sine(placement.rotate_rad)
     flip = np.diag([-1.0 if placement.mirror == axis else 1.0 for axis in ("x", "y")])
     return AffineMap(np.array([[cosine, -sine], [sine, cosine]]) @ flip, np.zeros(2), 1.0)
@@ -165,9 +165,8 @@ def _mirror_and_rotation(placement: Placement) -> AffineMap:
 
 
 def datum_off(drawing: Drawing, job: Job, placed_map: AffineMap) -> float:
-    """Return an upper bound of the distance, mm in the work frame, of the drawing that is
-    `placed_map` from where the box of what was drawn would have put it; 0 where no box is asked
-    for."""
+    """Return an upper bound, mm in the work frame, of how far the drawing placed by `placed_map`
+    is from where the box of the exact curves would have put it. 0 if the placement uses no box."""
     placement = job.placement
     by_box = placement.origin in ("lower-left", "centre")
     if not (by_box or placement.fit_mm) or not drawing.off_mm.any():
@@ -195,8 +194,8 @@ def datum_off(drawing: Drawing, job: Job, placed_map: AffineMap) -> float:
 
 
 def _box_slack(drawing: Drawing, job: Job, frame_map: AffineMap) -> Floats:
-    """Return an upper bound (2, 2), mm, of the distance of each side of `_box` from that of what
-    was drawn."""
+    """Return upper bounds (2, 2), mm, of the distance of each side of `_box` from the same side of
+    the box of the exact curves."""
     paths, marks = rows_taken(drawing, job)
     lines, off_mm = drawing.paths.select(paths), drawing.off_mm[:, 0]
     if len(paths) < len(drawing.paths):
@@ -219,8 +218,8 @@ def _box_slack(drawing: Drawing, job: Job, frame_map: AffineMap) -> Floats:
 
 
 def _cosine_and_sine(angle_rad: float) -> tuple[float, float]:
-    """Return the cosine and sine of an angle; exactly 0 and ±1 for quarter turns, so that squares
-    stay square."""
+    """Return cosine and sine of an angle; exactly 0 and ±1 for quarter turns, so that squares stay
+    square."""
     quarters = angle_rad / (0.5 * math.pi)
     if quarters == round(quarters):
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarters) % 4]
@@ -228,8 +227,8 @@ def _cosine_and_sine(angle_rad: float) -> tuple[float, float]:
 
 
 def _fitting_scale(fit_mm: tuple[float, float], box: Floats | None, file: str) -> float:
-    """Return the largest scale at which the box (2, 2) is no larger than `fit_mm`, where 0 means
-    any size."""
+    """Return the largest scale at which the box (2, 2) fits into `fit_mm` (width, height), in
+    which 0 means any size."""
     if box is None:
         raise OptionError(
             "the operations choose nothing of this drawing, so there is nothing to fit",
@@ -255,7 +254,7 @@ def _fitting_scale(fit_mm: tuple[float, float], box: Floats | None, file: str) -
 
 
 def _origin(drawing: Drawing, job: Job, first: AffineMap, shifts: Floats) -> Floats:
-    """Return the place (2,), before it is moved, that becomes part zero."""
+    """Return the point (2,), before the drawing is moved, that becomes part zero."""
     origin = job.placement.origin
     if not isinstance(origin, str):
         return np.array(origin)
@@ -268,8 +267,8 @@ def _origin(drawing: Drawing, job: Job, first: AffineMap, shifts: Floats) -> Flo
 
 
 def _box(drawing: Drawing, job: Job, frame_map: AffineMap) -> Floats | None:
-    """Return the box (2, 2) of all that the operations take, mapped by `frame_map`; None when they
-    take nothing."""
+    """Return the bounding box (2, 2) of all that the operations take, mapped by `frame_map`; None
+    if they take nothing."""
     paths, marks = rows_taken(drawing, job)
     boxes = []
     if paths:
@@ -284,8 +283,8 @@ def _box(drawing: Drawing, job: Job, frame_map: AffineMap) -> Floats | None:
 
 
 def rows_taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
-    """Return the indices of the paths that any operation takes, and of the marks that any one
-    drills."""
+    """Return the indices of the paths that any operation takes, and of the marks that any
+    operation drills."""
     job = job.whole  # all set-ups of a part have one place
     drills = [operation for operation in job.operations if operation.contract.takes == "holes"]
     takes = _cached(job.takes)
@@ -298,7 +297,8 @@ def rows_taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
 
 
 def _cached(takes: Callable[[str, str], bool]) -> Callable[[str, str], bool]:
-    """Return a function with the same answers that matches each layer and colour only once."""
+    """Return a cached version of `takes`, which matches each pair of layer and colour only
+    once."""
     answers: dict[tuple[str, str], bool] = {}
 
     def answer(layer: str, colour: str) -> bool:
@@ -330,8 +330,8 @@ def _refuse_too_many(drawing: Drawing, placement: Placement) -> None:
 
 
 def _refuse_too_large(placed_drawing: Drawing, job: Job) -> None:
-    """Refuse a drawing that is larger in the work frame than any machine, or far from part
-    zero."""
+    """Raise OptionError for a drawing that, in the work frame, is larger than any machine or far
+    from part zero."""
     places = placed_drawing.paths.vertices[:, :2]
     if len(places) == 0:
         return
@@ -358,13 +358,14 @@ def _refuse_too_large(placed_drawing: Drawing, job: Job) -> None:
 
 
 def _or_allow(length_mm: float, most_mm: float) -> str:
-    """Return the words for what a job may allow; "" where it is more than that."""
+    """Return the advice to allow such a length in the job; "" if it exceeds even what can be
+    allowed."""
     allowed = length_mm <= ALLOWED_TIMES * most_mm
     return "; or --allow long if it is meant" if allowed else ""
 
 
 def _enlarging_key(placement: Placement) -> str:
-    """Return the key that makes a drawing large; "" when none does."""
+    """Return the name of the key that makes the drawing large, "" if none does."""
     if placement.scale > 1.0:
         return "scale"
     if placement.fit_mm is not None:
@@ -377,8 +378,8 @@ def _is_identity(frame_map: AffineMap) -> bool:
 
 
 def _map_drawing(drawing: Drawing, maps: list[AffineMap]) -> Drawing:
-    """Return the drawing with all that has a place repeated for each map; paths that the scale
-    makes a point are left out."""
+    """Return the drawing with everything that has a place repeated under each map; paths that
+    shrink to a point are left out."""
     paths, rows, kept_vertices = _map_lines(drawing.paths, maps)
     off_mm = np.tile(maps[0].scale * drawing.off_mm, (len(maps), 1))
     copy, path = np.divmod(rows, max(1, len(drawing.paths)))
@@ -407,11 +408,11 @@ def _map_drawing(drawing: Drawing, maps: list[AffineMap]) -> Drawing:
 
 
 def _map_lines(lines: Polylines, maps: list[AffineMap]) -> tuple[Polylines, Ints, Ints]:
-    """Return the paths under each map, one map after the other, the indices (copy · paths + path)
-    of those that remain, and the mask of the vertices that do: points that the scale brings
+    """Return the paths under each map, one map after the other; the indices (copy · paths + path)
+    of those that remain; and the mask of the vertices that remain. Points that the scale brings
     together are merged, and a path of one point is dropped.
 
-    OptionError when numbers are lost, or no path is left of any.
+    OptionError if coordinates overflow, or if no path is left.
     """
     count = len(maps) * len(lines)
     counts = np.tile(np.diff(lines.offsets), len(maps))
@@ -443,7 +444,7 @@ def _map_lines(lines: Polylines, maps: list[AffineMap]) -> tuple[Polylines, Ints
 
 
 def _map_unchosen(unchosen: Unchosen, maps: list[AffineMap]) -> Unchosen:
-    """Return the contours that were not chosen under each map, except those that shrink to
+    """Return the contours that were not chosen, under each map, without those that shrink to
     points."""
     try:
         paths, rows, _ = _map_lines(unchosen.paths, maps)
@@ -472,8 +473,8 @@ def _map_gaps(gaps: tuple[Gap, ...], maps: list[AffineMap]) -> tuple[Gap, ...]:
 
 
 def _map_healing(drawing: Drawing, maps: list[AffineMap], rows: Ints) -> Healing:
-    """Return the places of branches and crossings of the paths `rows` that are left; the counts of
-    what was corrected on reading stay as they were."""
+    """Return the branches and crossings of the remaining paths `rows` under the maps; counts of
+    what was corrected on reading are unchanged."""
     healing, paths = drawing.healing, len(drawing.paths)
     new_index = {row: index for index, row in enumerate(rows.tolist())}
     return replace(

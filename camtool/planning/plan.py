@@ -78,8 +78,8 @@ MAX_OVERLAPS = 20
 
 
 class Plan(Struct, frozen=True, eq=False):
-    """Every stage of a plan: the job, the drawing in the work frame, the operations, the
-    toolpath."""
+    """The results of all stages of planning: the job, the drawing in the work frame, the steps,
+    and the toolpath."""
 
     job: Job
     placed: Drawing
@@ -88,9 +88,9 @@ class Plan(Struct, frozen=True, eq=False):
 
 
 def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
-    """Return the toolpath that cuts the drawing, work frame, with the findings of planning.
+    """Return the toolpath that cuts the drawing, in the work frame, with the findings of planning.
 
-    OptionError for what the job asks and the drawing or the machine cannot give.
+    OptionError if the drawing or the machine does not allow what the job asks.
     """
     return planned(drawing, job, machine).toolpath
 
@@ -130,8 +130,8 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
 
 
 def _with_all_setups(job: Job) -> Job:
-    """Return the job with the operations of the part's other set-ups behind its own: edges that
-    are cut in these are edges too."""
+    """Return the job with the operations of the part's other set-ups after its own: edges that are
+    cut in these are edges too."""
     other_operations = [each for each in job.whole.operations if each not in job.operations]
     return (
         replace(job, operations=(*job.operations, *other_operations)) if other_operations else job
@@ -141,8 +141,7 @@ def _with_all_setups(job: Job) -> Job:
 def _linked(
     plan: Plan, drawing: Drawing, full_job: Job, machine: Machine, *, undivided: bool
 ) -> Plan:
-    """Return the plan with the toolpath of its steps; its job may be a part of the `full_job`
-    one."""
+    """Return the plan with the toolpath of its steps; its own job may be a part of `full_job`."""
     job, placed_drawing, steps = plan.job, plan.placed, plan.steps
     worked = [(step.setting, step.runs) for step in steps]
     approaches = None
@@ -171,14 +170,14 @@ def _linked(
 
 
 def _tabs(steps: Sequence[Step]) -> tuple[tuple[float, float], ...]:
-    """Return the places of all tabs, each once."""
+    """Return the places of all tabs, without repeats."""
     places = [tuple(bridge.centre.tolist()) for step in steps for bridge in step.bridges]
     return tuple(dict.fromkeys((float(x), float(y)) for x, y in places))
 
 
 def turns_of_tools(plan: Plan) -> list[list[int]]:
-    """Return the steps of the plan, by their index, parted where another tool has its turn;
-    what cuts nothing has no turn of its own."""
+    """Return the indices of the plan's steps in groups, one for each stretch between tool changes.
+    Steps that cut nothing belong to the group before them."""
     turns: list[list[int]] = [[]]
     tool: Tool | None = None
     for index, step in enumerate(plan.steps):
@@ -202,8 +201,9 @@ def parted(
     *,
     undivided: bool = False,
 ) -> tuple[Plan, ...]:
-    """Return a plan for each of the `turns`, in the frame of the whole one, with its cuts: what
-    its steps leave standing for each other, and on which side they cut, they know from it."""
+    """Return a plan for each group of steps in `turns`, in the frame of the whole plan and with
+    the cuts of that; what steps leave for each other, and the sides on which they cut, are
+    therefore the same."""
     parts = []
     for turn in turns:
         steps = tuple(plan.steps[index] for index in turn)
@@ -214,7 +214,7 @@ def parted(
 
 
 def _coarse(drawing: Drawing, placed_drawing: Drawing) -> Iterator[Finding]:
-    """FIT_COARSE for curves that were fitted for a smaller part than the job makes of them."""
+    """Yield FIT_COARSE if curves were fitted for a smaller scale than that of the job."""
     if not drawing.fit.max_mm or not placed_drawing.fit.max_mm:
         return
     scale = placed_drawing.fit.max_mm / drawing.fit.max_mm
@@ -237,9 +237,9 @@ def _step(
     sides: Sides,
     before: Sequence[Step],
 ) -> Step:
-    """Plan one operation from what it takes to its runs, for a tool that comes from the first
-    point of its `ends` and goes to the second (None: stays). `before`: the steps so far, the last
-    of which has cleared the way where it is a finishing pass."""
+    """Plan one operation, from what it takes to its runs. `ends`: the point from which the tool
+    comes, and the one to which it goes (None: it stays). `before`: the steps so far; for a
+    finishing stage the last of these is its roughing."""
     chosen = choose(placed_drawing, setting.operation, sides)
     chosen = with_pins(chosen, placed_drawing, job, setting.operation)
     if setting.operation.engagement_rad is not None:
@@ -297,7 +297,7 @@ def _step(
 def _text_as_edge(
     placed_drawing: Drawing, chosen: Chosen, operation: Operation, findings: Sequence[Finding]
 ) -> Iterator[Finding]:
-    """Yield outlines of text that are cut as edges, where the tool has no room beside some of
+    """Yield a finding if outlines of text are cut as edges and the tool has no room beside some of
     them."""
     if not runs_beside(operation):
         return
@@ -315,7 +315,7 @@ def _text_as_edge(
 
 
 def _is_divided(job: Job, operation: Operation) -> bool:
-    """Return True if contours of the operation are cut as runs, against reversals."""
+    """Return True if contours of the operation are divided into runs to avoid reversals."""
     if job.minimise != "reversals":
         return False
     from camtool.planning.reversing import may_divide
@@ -324,7 +324,8 @@ def _is_divided(job: Job, operation: Operation) -> bool:
 
 
 def _sparing(steps: list[Step]) -> list[Step]:
-    """Return the steps, their runs raised over the bridges that any of them leaves."""
+    """Return the steps with their runs raised over the bridges of all tabs, whichever step leaves
+    them."""
     bridges = [bridge for step in steps for bridge in step.bridges]
     if not bridges:
         return steps
@@ -337,7 +338,7 @@ def _sparing(steps: list[Step]) -> list[Step]:
 
 
 def _rested(steps: list[Step]) -> list[Step]:
-    """Return the steps; what one of them leaves for another to clear is said by that one alone."""
+    """Return the steps without findings about material that another step clears."""
     rest_names = [step.operation.rest for step in steps if step.operation.rest_of is not None]
     codes = (PlanningCode.UNREACHED, PlanningCode.DEPTH_LIMITED)
     return [
@@ -349,7 +350,7 @@ def _rested(steps: list[Step]) -> list[Step]:
 
 
 def _refuse_endless(items: Items, setting: Setting) -> None:
-    """Raise OptionError for passes, or an overlap, that go round what is drawn too often."""
+    """Raise OptionError for passes or an overlap that would follow the contours too many times."""
     operation, passes = setting.operation, len(setting.levels_mm)
     paths = [contour.path for contour in contours_of(items)]
     if passes > 1:
@@ -374,8 +375,8 @@ def _refuse_endless(items: Items, setting: Setting) -> None:
 
 
 def _walls(placed_drawing: Drawing, sides: Sides, operation: Operation) -> KeepOut:
-    """Return the closed lines that leads of a contour must keep away from: those of the
-    operation itself, and those that any operation makes walls of."""
+    """Return the closed lines that leads must keep away from: those of the operation itself, and
+    those along which any operation makes walls."""
     count = len(placed_drawing.paths)
     makers = [each.contract.leaves_walls for each in sides.operations]
     is_own, walls = sides.taken_by(operation)[:count], sides.cuts[makers, :count].any(axis=0)
@@ -384,7 +385,7 @@ def _walls(placed_drawing: Drawing, sides: Sides, operation: Operation) -> KeepO
 
 
 def _with_starts(contours: list[Contour]) -> list[Contour]:
-    """Contours, the closed ones with the places where their operation lets them begin."""
+    """Return the contours, closed ones with the starts that their operation's rule allows."""
     if contours[0].setting.operation.start == "nearest":
         return contours
     contours_made = []
@@ -396,8 +397,8 @@ def _with_starts(contours: list[Contour]) -> list[Contour]:
 
 
 def _begun_between_tabs(contours: list[Contour]) -> list[Contour]:
-    """Return the contours, those with tabs by hand beginning farthest from these, if nothing
-    says where: no tab can stand where a contour begins."""
+    """Return the contours; those with tabs placed by hand begin as far from these as possible,
+    unless a rule says where, since no tab can stand where a contour begins."""
     contours_made = []
     for contour in contours:
         tabs = contour.setting.operation.tabs
@@ -411,7 +412,8 @@ def _begun_between_tabs(contours: list[Contour]) -> list[Contour]:
 
 
 def _end(runs: Runs, tool_place: Point) -> Point:
-    """Return the place (x, y) mm at which the tool comes up after the runs."""
+    """Return the place (x, y), mm, where the tool comes up after the runs; `tool_place` if there
+    are none."""
     if not len(runs):
         return tool_place
     x, y = runs.vertices[-1, :2].tolist()
@@ -419,7 +421,8 @@ def _end(runs: Runs, tool_place: Point) -> Point:
 
 
 def _left_over(placed_drawing: Drawing, job: Job, cuts: bool) -> list[Finding]:
-    """Return findings of what is drawn and not cut: points that are not drilled, or all of it."""
+    """Return findings about what is drawn and not cut: points that are not drilled, or the whole
+    drawing."""
     findings: list[Finding] = []
     drills = [operation for operation in job.operations if operation.contract.takes == "holes"]
     uncut_marks = [

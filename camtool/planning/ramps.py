@@ -46,8 +46,8 @@ MAX_LAPS = 200.0
 
 
 def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> ZProfile:
-    """Return the profile round a closed path at each level, straight down from one to the next at
-    the start."""
+    """Return the profile for a closed path: once round at each level, straight down to the next
+    one at the start."""
     points: ZProfile = []
     for turn, z in enumerate(levels_mm):
         points += [(turn * total_mm, z), ((turn + 1) * total_mm, z)]
@@ -58,15 +58,15 @@ def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> ZPro
 def separate_laps(
     total_mm: float, levels_mm: Sequence[float], overlap_mm: float
 ) -> list[ZProfile]:
-    """Return one profile round a closed path for each level."""
+    """Return one profile for each level, once round a closed path."""
     return [[(0.0, z), (total_mm + overlap_mm, z)] for z in levels_mm]
 
 
 def spiral(
     total_mm: float, levels_mm: Sequence[float], overlap_mm: float, angle_rad: float
 ) -> ZProfile:
-    """Return the profile round a closed path, sloping from the stock top to each level, and one
-    flat lap at the last."""
+    """Return the profile for a closed path that slopes from the stock top to each level in turn,
+    with one flat lap at the last."""
     points: ZProfile = [(0.0, 0.0)]
     begin = above = 0.0
     for z in levels_mm:
@@ -82,8 +82,8 @@ def spiral(
 def spiral_with_stops(
     total_mm: float, levels_mm: Sequence[float], overlap_mm: float, angle_rad: float
 ) -> tuple[ZProfile, list[float]]:
-    """Return the profile of a spiral, and for each level but the last a length at which the tool
-    has reached it, always at the place where the last lap ends.
+    """Return the profile of a spiral, and for each level except the last a length at which the
+    tool has reached it; all these lie at the place where the last lap ends.
 
     All ramps are as long as that of the largest step, so that all end at one place.
     """
@@ -103,10 +103,11 @@ def spiral_with_stops(
 def to_and_fro(
     total_mm: float, levels_mm: Sequence[float], above_mm: float, angle_rad: float | None
 ) -> ZProfile:
-    """Return the profile along an open path at each level, from the end where the level before
-    ended.
+    """Return the profile for an open path: along it at each level, from the end where the level
+    before ended.
 
-    Down from `above_mm` and between the levels straight (None), or sloping by the angle.
+    Down from `above_mm` and between the levels straight (`angle_rad` None), or sloping by the
+    angle.
     """
     points: ZProfile = []
     for turn, z in enumerate(levels_mm):
@@ -121,7 +122,8 @@ def to_and_fro(
 
 
 def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> ZProfile:
-    """Return the profile down at the start of an open path, to and fro as often as needed."""
+    """Return the profile of a descent at the start of an open path, to and fro as often as
+    needed."""
     ramp = (above_mm - z_mm) / math.tan(angle_rad)
     legs = 2 * math.ceil(ramp / (2.0 * total_mm))
     drop = (above_mm - z_mm) / legs
@@ -131,8 +133,8 @@ def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> 
 def lift_paths(
     paths: MeasuredPaths, index: Sequence[int], profiles: Sequence[ZProfile]
 ) -> list[Floats]:
-    """Return vertices (n, 4) for each run: x, y, z, bulge of the paths of these indices (R,) with
-    these profiles (R,)."""
+    """Return the vertices (n, 4) x, y, z, bulge of each run: path index[r] (R,) with the heights
+    of profiles[r] (R,)."""
     first = np.concatenate([[0], np.cumsum([len(points) for points in profiles])])
     points = np.array([point for points in profiles for point in points]).reshape(-1, 2)
     length, z = np.ascontiguousarray(points.T)
@@ -142,8 +144,8 @@ def lift_paths(
 
 
 def helix(centre: Floats, radius: float, towards: Floats, length: float) -> Floats:
-    """Return (k, 3) arcs CCW about a centre of this length in all, seen from above; the last ends
-    nearest to a place."""
+    """Return CCW arcs (k, 3) about a centre with this total length in the plane; the last ends at
+    the point of the circle nearest to `towards`."""
     arm = towards - centre
     end = math.atan2(arm[1], arm[0])
     sweep = length / radius
@@ -156,10 +158,10 @@ def helix(centre: Floats, radius: float, towards: Floats, length: float) -> Floa
 
 
 def feeds_along(vertices: Floats, feeds: Feeds) -> Floats:
-    """Return the feeds (n−1,) mm/min for the moves between vertices (n, 4).
+    """Return the feeds (n − 1,), mm/min, of the moves between vertices (n, 4).
 
-    Straight up and down at the plunge feed; all others at the feed of the cut, but no faster than
-    that the vertical part of the feed is the plunge feed.
+    Vertical moves have the plunge feed; all others the feed of the cut, reduced where necessary so
+    that its vertical part does not exceed the plunge feed.
     """
     across = _lengths(vertices[:, [0, 1, 3]])
     rise = np.abs(np.diff(vertices[:, 2]))
@@ -170,5 +172,5 @@ def feeds_along(vertices: Floats, feeds: Feeds) -> Floats:
 
 
 def _lengths(vertices: Floats) -> Floats:
-    """Return the lengths (k−1,) of the lines and arcs between vertices (k, 3), seen from above."""
+    """Return the lengths (k − 1,) in the plane of the lines and arcs between vertices (k, 3)."""
     return segment_lengths(Segments.between(vertices[:-1, :2], vertices[1:, :2], vertices[:-1, 2]))

@@ -74,12 +74,13 @@ class Unreached(Struct, frozen=True, eq=False):
 
 
 def opened(region: Polylines, tool_radius_mm: float) -> Polylines:
-    """Return what a disc covers that stays in a region (on the left of its closed paths)."""
+    """Return the region (on the left of its closed paths) opened by a disc of the tool's radius:
+    what the disc covers while it stays in the region."""
     return offset_shape(offset_shape(region, tool_radius_mm), -tool_radius_mm)
 
 
 def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
-    """Return the pieces of a region that a disc within it does not cover, the largest first.
+    """Return the pieces of a region that a disc within it cannot cover, the largest first.
 
     The region is on the left of its closed paths, which may also be the holes of an endless one.
     Pieces smaller than MIN_FOOT_SHARE of the disc's area are left out. GeometryError for open
@@ -102,8 +103,8 @@ def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
 
 
 def _far_places(pieces: Sequence[Polylines], reached: Polylines) -> list[tuple[float, float]]:
-    """Return the vertex of each piece farthest from what is reached; its centre when nothing
-    is."""
+    """Return for each piece the vertex farthest from the `reached` region; the centre of the piece
+    if nothing is reached."""
     if len(reached) == 0 or not pieces:
         centres = [extents(piece).mean(axis=1).tolist() for piece in pieces]
         return [(x, y) for x, y in centres]
@@ -122,7 +123,8 @@ def _far_places(pieces: Sequence[Polylines], reached: Polylines) -> list[tuple[f
 def _difference(
     region: Polylines, reached: Polylines, least_mm2: float, parting_mm: float
 ) -> Polylines:
-    """Return the closed paths around what is in the region and not in `reached`, a part of it.
+    """Return the closed paths around the part of the region that is not in `reached`, which must
+    lie in the region.
 
     Pieces that are surely smaller than `least_mm2` may be left out.
     """
@@ -136,13 +138,13 @@ def _difference(
 
 
 def _separate_sections(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polyline]:
-    """Return the sections of closed paths that do not run together with others: closed where
-    whole.
+    """Return the sections of closed paths that do not coincide with `other`; a path that nowhere
+    coincides is returned closed.
 
-    They begin and end at vertices, their own and those of the others that are on a path: where
-    the one parts from the other, so does the other from the one. One that leads h away, and is l
-    long, goes round no more than 2 l h: if that is less than `least_mm2` it is left out, and so
-    are the many at the blunt corners of a fine polygon.
+    Sections begin and end at vertices of either side, since where one path parts from the other,
+    the other parts from it. A section of length l that leads at most h away encloses no more than
+    2 l h: if that is less than `least_mm2` it is left out, as are the many at the blunt corners of
+    a fine polygon.
     """
     segments = Segments.of(lines)
     row, low, high = _split(segments, other.vertices[:, :2])
@@ -164,16 +166,16 @@ def _separate_sections(lines: Polylines, other: Polylines, least_mm2: float) -> 
 
 
 class _Parts(Struct, frozen=True, eq=False):
-    """The parts of a closed path in order: how long and how far from others each is (K,), mm, and
-    which of them are wanted."""
+    """The parts of a closed path in order: the length of each (K,), its distance from the other
+    paths (K,), mm, and the mask of those that are wanted."""
 
     length: Floats
     distances: Floats
     is_wanted: Bools
 
     def sections(self, path: Polyline, least_mm2: float) -> list[Polyline]:
-        """Return the runs of wanted parts, but those that surely go round less than
-        `least_mm2`."""
+        """Return the runs of wanted parts as open paths, without those that surely enclose less
+        than `least_mm2`."""
         if self.is_wanted.all():
             return [path]
         turn = int(np.argmin(self.is_wanted))
@@ -194,8 +196,8 @@ class _Parts(Struct, frozen=True, eq=False):
 
 
 def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
-    """Return rows and the parts from .. to (in fractions) into which the points on them divide
-    them."""
+    """Return (row, begin, end) of the parts into which the points divide the segments that they
+    lie on; begin and end are shares of the segment."""
     curves, points = IndexedCurves.of(segments), np.ascontiguousarray(points)
     distances = nearest_distances(points, curves.rows, curves.tree)
     is_on = (distances <= TOGETHER_MM) & ~_at_any(points, segments.start)
@@ -216,19 +218,20 @@ def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
 
 
 def _distances(points: Floats, segments: Segments) -> Floats:
-    """Return (P,) distance of each point (P, 2) from the nearest segment."""
+    """Return the distance (P,) of each point (P, 2) from the nearest segment."""
     curves = IndexedCurves.of(segments)
     return nearest_distances(np.ascontiguousarray(points), curves.rows, curves.tree)
 
 
 def _at_any(points: Floats, other_points: Floats) -> Bools:
-    """Return (P,) which of the points (P, 2) are at one of the others (N, 2)."""
+    """Return the mask (P,) of points (P, 2) that coincide with one of the others (N, 2)."""
     node, _ = merge_points(np.concatenate([points, other_points]), TOGETHER_MM)
     return np.isin(node[: len(points)], node[len(points) :])
 
 
 def _closed(sections: list[Polyline], parting_mm: float) -> list[Polyline]:
-    """Open sections joined to closed paths; those that lead nowhere are left out."""
+    """Return the closed paths that open sections form when joined; sections that lead nowhere are
+    left out. Ends up to `parting_mm` apart may be joined."""
     if not sections:
         return []
     ends = np.array([[path.start, path.end] for path in sections]).reshape(-1, 2)
@@ -261,14 +264,15 @@ def _closed(sections: list[Polyline], parting_mm: float) -> list[Polyline]:
 
 
 def _turn(arriving: Frames, leaving_frames: Frames) -> float:
-    """Return the angle from the end of one section to the start of another, left positive."""
+    """Return the angle by which the path turns from the end of one section to the start of
+    another, left positive."""
     x, y = arriving.tangent_at(np.ones(len(arriving.length)))[-1]
     u, v = leaving_frames.tangent[0]
     return float(np.arctan2(x * v - y * u, x * u + y * v))
 
 
 def _joined(sections: list[Polyline]) -> list[Polyline]:
-    """Return sections that follow each other as one closed path; none when it is but a speck."""
+    """Return consecutive sections as one closed path in a list; [] if it is only a speck."""
     vertices = np.concatenate([path.vertices for path in sections])
     step = np.roll(vertices[:, :2], -1, axis=0) - vertices[:, :2]
     vertices = vertices[np.hypot(*step.T) > SAME_PLACE_MM]
@@ -280,8 +284,8 @@ def _joined(sections: list[Polyline]) -> list[Polyline]:
 def unreached_findings(
     region: Polylines, setting: Setting, *, hair_mm: float = 0.0
 ) -> list[Finding]:
-    """Return findings of what a tool within the region (on the left of its closed paths) cannot
-    touch.
+    """Return findings about what the tool, staying within the region (on the left of its closed
+    paths), cannot touch.
 
     Corners are not reported where the operation makes reliefs, nor for chamfers, whose bevels are
     round there. Slots narrower than the tool by `hair_mm` count as reached.
@@ -298,8 +302,8 @@ def unreached_findings(
 
 
 def scallop_findings(region: Polylines, setting: Setting) -> Iterator[Finding]:
-    """Yield how much adaptive clearing leaves in the corners of a region that is on the left of
-    its closed paths."""
+    """Yield a finding on how much adaptive clearing leaves in the corners of a region (on the left
+    of its closed paths)."""
     radius_mm = setting.operation.wall_radius_mm
     disc_mm = SCALLOP_DISC_SHARE * radius_mm
     centres = offset_shape(region, radius_mm)
@@ -320,9 +324,9 @@ def scallop_findings(region: Polylines, setting: Setting) -> Iterator[Finding]:
 
 
 def cut_away_findings(kept_region: Polylines, operation: Operation) -> list[Finding]:
-    """Return findings where an operation that cuts beyond its lines cuts away what is to stay (on
-    the left of its closed paths) from both sides: what a disc of that radius does not cover, but
-    for corners."""
+    """Return findings where an operation that cuts beyond its lines removes, from both sides,
+    material that must stay (`kept_region`, on the left of its closed paths): the parts that a disc
+    of that radius does not cover, except corners."""
     beyond_mm = operation.beyond_mm
     if not beyond_mm:
         return []

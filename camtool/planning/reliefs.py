@@ -40,7 +40,7 @@ RELIEF_SLACK_MM = 1e-4
 
 
 class RelievedPath(Struct, frozen=True, eq=False):
-    """The path with its reliefs; `left` (K, 2) mm, the corners that got none because the tool
+    """The path with its reliefs; `left` (K, 2) mm: the corners without a relief, because the tool
     would have cut into other wanted lines."""
 
     path: Polyline
@@ -50,11 +50,12 @@ class RelievedPath(Struct, frozen=True, eq=False):
 def add_reliefs(
     path: Polyline, original: Polyline, near_mm: float, kind: str, keep_out: Polylines
 ) -> RelievedPath:
-    """Return a path of the tool centre with reliefs at the sharp inner corners of the `original`.
+    """Return a path of the tool centre with reliefs at the sharp inner corners of the contour
+    `original`.
 
-    `kind` is "dogbone" or "overcut". Reliefs come nowhere nearer than `near_mm` to the lines of
-    `keep_out`, and to the walls of the original beyond the corner: the tool's radius, or less by
-    what is cut beyond the lines.
+    `kind` is "dogbone" or "overcut". Reliefs keep at least `near_mm` from the lines of `keep_out`,
+    and from the walls of the original beyond the corner: the tool's radius, reduced by what is cut
+    beyond the lines.
     """
     if near_mm == 0.0:
         return RelievedPath(path, np.empty((0, 2)))
@@ -77,9 +78,9 @@ def add_reliefs(
 
 
 def _missed_corners(along: MeasuredPath, walls: MeasuredPath, near_mm: float) -> dict[int, int]:
-    """Return the corners (vertices of the walls) that the tool misses, with the vertex of its path
-    at which it stands then: the nearest of those that are equally far from both walls of the
-    corner."""
+    """Return the corners (vertices of the walls) that the tool does not reach, each with the
+    vertex of the tool's path from which it is missed: the nearest vertex equally far from both
+    walls of the corner."""
     nearest_vertex: dict[int, tuple[float, int]] = {}
     for vertex in np.flatnonzero(np.abs(along.turns) > RELIEF_TURN_RAD).tolist():
         v = along.path.vertices[vertex, :2]
@@ -99,7 +100,7 @@ def _missed_corners(along: MeasuredPath, walls: MeasuredPath, near_mm: float) ->
 def _relief_move(
     along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int, kind: str
 ) -> Floats:
-    """Return the move (2, 2) from V to where the tool's edge touches the corner."""
+    """Return the move (2, 2) from V to the place where the tool's edge touches the corner."""
     v, c = along.path.vertices[vertex, :2], walls.segments.start[corner]
     distance_min = float(points_to_segments(v[None], walls.segments).min())
     arm = c - v
@@ -117,9 +118,10 @@ def _relief_move(
 
 
 def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int) -> Floats:
-    """Return the direction (2,) in which the tool goes on beyond V along the longer wall.
+    """Return the direction (2,) beyond V along the longer wall.
 
-    Of two as long it is the one nearer to the X axis, so that symmetric parts stay symmetric.
+    Of two equally long walls it is the one nearer to the X axis, so that symmetric parts stay
+    symmetric.
     """
     length_here = along.reach[vertex : vertex + 1]
     before = along.at(length_here - 0.5 * np.diff(along.reach)[vertex - 1])
@@ -135,7 +137,7 @@ def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner:
 
 
 def _is_clear(move: Floats, corner: Floats, other_walls: Segments, near_mm: float) -> bool:
-    """Return True if a tool that makes this move cuts into no wanted line but those at the
+    """Return True if a tool that makes this move cuts into no wanted line except those at the
     corner."""
     low, high = move.min(axis=0) - near_mm, move.max(axis=0) + near_mm
     boxes = segment_boxes(other_walls)

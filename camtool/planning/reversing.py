@@ -60,7 +60,8 @@ controllers that follow paths."""
 
 
 class _Sums(Struct):
-    """Sums over all contours: runs, reversals while cutting, the greatest predicted error."""
+    """Sums over all contours: the runs, the reversals while cutting, and the greatest predicted
+    error."""
 
     runs: int = 0
     reversals: int = 0
@@ -74,8 +75,8 @@ class _Sums(Struct):
 
 
 class _Counts(Struct):
-    """Figures before and after the division; `whole`: reasons why contours stayed in one piece,
-    with the names of these contours."""
+    """The figures before and after the division; `whole`: the reasons why contours were not
+    divided, with the names of these contours."""
 
     before: _Sums = field(default_factory=_Sums)
     after: _Sums = field(default_factory=_Sums)
@@ -83,12 +84,14 @@ class _Counts(Struct):
 
 
 def fewer_reversals(items: Items, machine: Machine) -> tuple[Items, tuple[Finding, ...]]:
-    """Replace contours by runs that reverse no axis while cutting, in the order of the contours;
-    return all items, and findings that compare. Items of `Fixed` runs stay.
+    """Replace contours by runs in which no axis reverses while cutting, in the order of the
+    contours; return all items, and findings that compare the figures before and after. `Fixed`
+    items stay.
 
     An axis without backlash and compensation may reverse anywhere. The runs of a contour together
     are the contour: they meet exactly, keep its name, source and setting, and know the whole path
-    as their `outline`. `PLAY_NOT_KNOWN` when neither axis has any: nothing is changed then.
+    as their `outline`. If neither axis has backlash or compensation nothing is changed, and the
+    finding is `PLAY_NOT_KNOWN`.
     """
     residual = residuals(machine)
     if not any(each.matters for each in residual):
@@ -147,19 +150,20 @@ def _reversals(
 
 
 def _keeps_direction(contour: Contour) -> bool:
-    """Return True if the job fixes the side on which the teeth cut, and the contour has one."""
+    """Return True if the contour must keep its direction, since the job sets climb or conventional
+    and the contour has a wall."""
     operation = contour.setting.operation
     wide = operation.tool.diameter_mm > 0.0 and contour.material_left is not None
     return operation.direction != "drawn" and wide
 
 
 def may_divide(operation: Operation) -> bool:
-    """Return True if contours of this operation may be cut as several runs."""
+    """Return True if contours of this operation may be divided into several runs."""
     return not _stays_whole(operation)
 
 
 def _stays_whole(operation: Operation) -> str:
-    """Return the reason why contours of this operation are not divided; "" when they may be."""
+    """Return the reason why contours of this operation are not divided, "" if they may be."""
     if operation.tabs is not None:
         return "tabs are counted along whole contours"
     if operation.lead_in.kind != "none" or operation.lead_out.kind != "none":
@@ -172,8 +176,7 @@ def _stays_whole(operation: Operation) -> str:
 
 
 def _run_of_contour(contour: Contour, path: Polyline, backward: bool) -> Contour:
-    """Return a run of a contour; one that is the whole of an open contour keeps no other
-    outline."""
+    """Return a run of a contour; a run that is the whole of an open contour gets no `outline`."""
     material_left = contour.material_left
     return replace(
         contour,
@@ -188,8 +191,9 @@ def _run_of_contour(contour: Contour, path: Polyline, backward: bool) -> Contour
 def _begun_at_reversals(
     contour: Contour, parts: Parts, reversals: tuple[AxisReversals, AxisReversals]
 ) -> tuple[Contour, int]:
-    """Return the closed contour with only those starts at which the most reversals happen in the
-    air, and the number of these: two at most, one of X and one of Y."""
+    """Return the closed contour with only those starts at which the most reversals fall into the
+    air (before and after the cut), and the number of these reversals: at most one of X and one of
+    Y."""
     count = len(parts)
     if len(contour.starts):
         places = np.flatnonzero(parts.begin == 0.0)[contour.starts]
@@ -226,9 +230,10 @@ def _findings(counts: _Counts) -> Iterator[Finding]:
 
 
 class RunPiece(Struct, frozen=True):
-    """From place `first` to place `last` of the parts (beyond their number on a closed path), cut
-    from its end to its start when `backward`; its greatest predicted error, mm; how far off it is
-    for the axes driven in their worse direction, mm; its parts' errors times lengths, mm²."""
+    """A piece from place `first` to place `last` of the parts (beyond their number on a closed
+    path), cut from its end to its start if `backward`. Its greatest predicted error, mm; its error
+    for the axes driven in their worse direction, mm; and the sum of its parts' errors times their
+    lengths, mm²."""
 
     first: int
     last: int
@@ -272,14 +277,16 @@ class Division(Struct, frozen=True, eq=False):
         *,
         either_direction: bool,
     ) -> Division:
-        """With the predicted errors of all parts."""
+        """Return the division of a path with these parts and reversals, with the predicted errors
+        of all parts computed."""
         lengths = segment_lengths(parts.segments)
         return cls(
             parts, reversals, residual, part_errors(parts, residual), lengths, either_direction
         )
 
     def pieces(self) -> list[RunPiece]:
-        """Return the runs of the path in its order; together they are the path."""
+        """Return the runs into which the path is divided, in its order; together they are the
+        path."""
         if not self.parts.path.closed:
             return _cheapest(self, 0)[1]
         reversals = [(t.first, t.last) for t in self.reversals if len(t)]
@@ -291,8 +298,8 @@ class Division(Struct, frozen=True, eq=False):
         return min((_cheapest(self, begin) for begin in begins), key=lambda each: each[0])[1]
 
     def variants(self, first: int, last: int) -> list[RunPiece]:
-        """Return the piece between two places between which no axis reverses, in each direction in
-        which it may be cut."""
+        """Return the piece between two places in each direction in which it may be cut; no axis
+        may reverse between them."""
         directions = (1, -1) if self.either_direction else (1,)
         return [self._piece(first, last, direction) for direction in directions]
 
@@ -311,10 +318,10 @@ class Division(Struct, frozen=True, eq=False):
 
 
 def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
-    """Return (A, 2, 2) mm: how far each part comes from the path when X is driven towards −, +
-    and Y towards −, +: the points of the part, moved by the residual errors, to the part and to
-    the ones before and after it. (The path may pass nearer elsewhere, where it is as fine as
-    the errors.)"""
+    """Return (A, 2, 2) mm: the predicted distance of each part's cut from the path, with X driven
+    towards −, + (second index) and Y towards −, + (third index). Points of the part, moved by the
+    residual errors, are compared with the part and its two neighbours; elsewhere the path may pass
+    nearer, where it is as fine as the errors."""
     count, segments = len(parts), parts.segments
     rows = np.repeat(np.arange(count), SAMPLES)
     points = point_at(segments, rows, np.tile(np.linspace(0.0, 1.0, SAMPLES), count))
@@ -333,7 +340,7 @@ def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
 
 
 def drawn_error_mm(division: Division) -> float:
-    """Return the greatest predicted error when the path is cut as it is drawn, in one go."""
+    """Return the greatest predicted error, mm, if the path is cut as drawn, in one go."""
     columns = []
     for axis, reversals in enumerate(division.reversals):
         sense, better = reversals.sense, division.residual[axis].better
@@ -350,8 +357,8 @@ Cost = tuple[int, float, float]
 
 
 def _cheapest(division: Division, begin: int) -> tuple[tuple[int, Cost], list[RunPiece]]:
-    """Return the best division of the path from place `begin` once around, or to the end, with its
-    greatest error in ALIKE_MM and its cost."""
+    """Return the best division of the path from place `begin` once round (or to the end): its
+    greatest error in units of ALIKE_MM together with its cost, and its pieces."""
     places = _division_places(division, begin, begin + len(division.parts))
     pieces = list(_possible_pieces(division, places))
     greatest = [0.0] + [np.inf] * (len(places) - 1)
@@ -377,8 +384,8 @@ def _trace_back(arrivals: Sequence[tuple[int, RunPiece] | None]) -> list[RunPiec
 
 
 def _possible_pieces(division: Division, places: list[int]) -> Iterator[tuple[int, int, RunPiece]]:
-    """Yield pieces from place i to place j of `places` in all directions, in the order of i: each
-    ends before, or on, the first reversal that lies ahead as a whole."""
+    """Yield (i, j, piece) for pieces from places[i] to places[j] in all permitted directions, in
+    the order of i. Each ends no later than the first reversal that begins after its start."""
     reach = _reaches(division, np.array(places, dtype=np.int64))
     for i, first in enumerate(places):
         for j in range(i + 1, len(places)):
@@ -389,8 +396,8 @@ def _possible_pieces(division: Division, places: list[int]) -> Iterator[tuple[in
 
 
 def _reaches(division: Division, places: Ints) -> Floats:
-    """Return the farthest place (P,) that a piece from each of the places may reach without a
-    reversal."""
+    """Return (P,) the farthest place that a piece from each of the places can reach without a
+    reversal; inf if there is none ahead."""
     count = len(division.parts)
     laps = np.arange(3 if division.parts.path.closed else 1) * count
     first = np.concatenate([(t.first + laps[:, None]).ravel() for t in division.reversals])
@@ -402,8 +409,8 @@ def _reaches(division: Division, places: Ints) -> Floats:
 
 
 def _division_places(division: Division, begin: int, end: int) -> list[int]:
-    """Return the places between two places, these too, at which a path may be divided: the ends of
-    all spans, and where an axis of an open path begins or ends to move."""
+    """Return the places from `begin` to `end` at which a path may be divided: these two, the ends
+    of all spans of reversals, and where an axis of an open path begins or ends to move."""
     count, places = len(division.parts), {begin, end}
     for reversals in division.reversals:
         places.update(reversals.first.tolist(), reversals.last.tolist(), reversals.moves or ())
@@ -435,9 +442,10 @@ class Parts(Struct, frozen=True, eq=False, dict=True):
         return Segments.between(self.places[:-1], self.places[1:], bulge)
 
     def subpath(self, first: int, last: int) -> Polyline:
-        """Return the open path from place `first` to place `last`; beyond A a closed path goes on.
+        """Return the open path from place `first` to place `last`; on a closed path, places beyond
+        A go on round.
 
-        Parts of one segment are one segment again.
+        Parts of one segment are joined again.
         """
         index = np.arange(first, last) % len(self)
         row, count = self.row[index], len(index)
@@ -451,7 +459,7 @@ class Parts(Struct, frozen=True, eq=False, dict=True):
         return Polyline(np.column_stack([places, bulge]))
 
     def with_vertices(self, places: Ints) -> tuple[Polyline, Ints]:
-        """Return the closed path with vertices at these places, and the indices of these
+        """Return the closed path with vertices added at these places, and the indices of these
         vertices."""
         keep = np.union1d(np.flatnonzero(self.begin == 0.0), places)
         last = np.append(keep[1:], len(self)) - 1
@@ -461,17 +469,18 @@ class Parts(Struct, frozen=True, eq=False, dict=True):
 
 
 def _bulges(path: Polyline, row: Ints, share: Floats) -> Floats:
-    """Return the bulges of these shares of segments; a whole one keeps its own to the last bit."""
+    """Return the bulges of shares of segments (shares (K, 2) of rows (K,)); a whole segment keeps
+    its bulge to the last bit."""
     bulge = path.vertices[row, 2]
     return np.asarray(np.where(share == 1.0, bulge, np.tan(np.arctan(bulge) * share)))
 
 
 def parts_of(path: Polyline) -> Parts:
-    """Split the arcs of a path where their tangents lie along an axis.
+    """Return the path as parts, with its arcs split where their tangents lie along an axis.
 
-    The tangent of an arc turns from  chord direction − sweep/2  to  chord direction + sweep/2;
-    it lies along an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at
-    most. No part is shorter than `POSITION_EPS_MM`.
+    The tangent of an arc turns from chord direction − sweep/2 to chord direction + sweep/2; it
+    lies along an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at most.
+    No part is shorter than `POSITION_EPS_MM`.
     """
     segments = Segments.of(path)
     quarter = 0.5 * np.pi
@@ -518,20 +527,20 @@ class AxisReversals(Struct, frozen=True, eq=False):
         return len(self.first)
 
     def count_within(self, count: int) -> int:
-        """Count the reversals between the first of `count` parts' places and the last: those at
-        the start of a closed path do not count."""
+        """Return the number of reversals within the first `count` parts; those at the start of a
+        closed path do not count."""
         return int(((self.first > 0) & (self.last < count)).sum())
 
 
 def no_reversals(count: int) -> AxisReversals:
-    """Return the reversals of an axis that never moves, or does not matter, along `count`
-    parts."""
+    """Return an AxisReversals without reversals along `count` parts, for an axis that never moves
+    or does not matter."""
     no_parts = np.empty(0, dtype=np.int64)
     return AxisReversals(np.zeros(count, dtype=np.int64), no_parts, no_parts)
 
 
 def reversals_along(values: Floats, closed: bool, least_mm: float) -> AxisReversals:
-    """Find the reversals of at least `least_mm` in `values` (A+1,), the positions of one axis in
+    """Return the reversals of at least `least_mm` in `values` (A + 1,), the positions of one axis,
     mm."""
     count = len(values) - 1
     # A closed path is begun at its highest value, which is a reversal if there are any.
@@ -558,8 +567,8 @@ def reversals_along(values: Floats, closed: bool, least_mm: float) -> AxisRevers
 
 
 def _extremes(values: list[float], least_mm: float) -> list[int]:
-    """Return the places where the motion begins, reverses, and is furthest at last; [] when it
-    is shorter than `least_mm` throughout."""
+    """Return the places where the motion begins, reverses, and ends at its extreme; [] if it is
+    shorter than `least_mm` throughout."""
     low = high = furthest = sense = 0
     extremes: list[int] = []
     for place, value in enumerate(values):
@@ -578,8 +587,8 @@ def _extremes(values: list[float], least_mm: float) -> list[int]:
 
 
 def _flat(values: list[float], extreme: int, closed: bool, least_mm: float) -> tuple[int, int]:
-    """Return the places before and after `extreme` up to which the values stay within
-    `least_mm`; those of a closed path go on before 0 and beyond its end."""
+    """Return the places before and after `extreme` up to which the values stay within `least_mm`
+    of it; on a closed path they may lie before 0 or beyond its end."""
     count = len(values) - 1
     low = high = extreme
     while (closed or low > 0) and abs(values[(low - 1) % count] - values[extreme]) < least_mm:
@@ -616,8 +625,8 @@ class Approaches:
         ]
 
     def __call__(self, run: CutRun) -> tuple[float, float] | None:
-        """Return the place (x, y) mm to which the tool goes first, at safe z; None: straight to
-        the first point of the run, as always where neither axis has backlash or compensation.
+        """Return the place (x, y), mm, to which the tool goes first at safe z. None: straight to
+        the first point of the run, as always if neither axis has backlash or compensation.
 
         The place lies beside the run, nearer than the backlash and `APPROACH_MARGIN_MM` on each
         axis. Nothing keeps it within the travel: a nearer one would not do, and the toolpath that
@@ -643,8 +652,9 @@ class _Drive:
         self._sense = 0
 
     def approach_from(self, values: list[float]) -> float:
-        """Return the position, mm, from which the axis comes to a run that takes it to these
-        values: their first one when any will do. Afterwards the axis has made the run."""
+        """Return the position, mm, from which the axis must come to a run that takes it through
+        these values; the first value if any position will do. The state of the drive is then that
+        after the run."""
         start, sense = values[0], self._first_sense(values)
         engaged_from = self._since if sense == self._sense else self._at
         engaged = (start - self._at) * sense >= 0.0 and (
@@ -658,8 +668,8 @@ class _Drive:
         return come
 
     def _first_sense(self, values: list[float]) -> int:
-        """Return the direction in which a run first drives the axis; the better one when it does
-        not."""
+        """Return the direction ±1 in which a run first drives the axis; the one with the smaller
+        error if the run does not drive it."""
         if len(values) == 1:
             return self._residual.better
         sense = reversals_along(np.array(values), False, self._least_mm).sense
@@ -674,13 +684,13 @@ class _Drive:
 
 
 def approach_mm(axis: Axis) -> float:
-    """Return the distance that an axis must be driven in one direction until its slide follows for
-    certain: the backlash that the controller's compensation leaves, and the margin."""
+    """Return the distance, mm, over which an axis must be driven in one direction until its slide
+    surely follows: the backlash that compensation leaves, and a margin."""
     return max(axis.backlash_mm - axis.compensation_mm, 0.0) + APPROACH_MARGIN_MM
 
 
 def least_reversal_mm(axis: Axis) -> float:
-    """Return the least distance that counts as a reversal of an axis."""
+    """Return the least distance, mm, that counts as a reversal of an axis."""
     return REVERSAL_STEPS * axis.coded_step_mm
 
 
@@ -714,12 +724,12 @@ class Residual(Struct, frozen=True):
 
 
 def backlashes_mm(axis: Axis, cells: PlayCells | None) -> tuple[float, ...]:
-    """Return the backlash of an axis in every region of the table, mm."""
+    """Return the backlash of an axis in each region of the table, mm."""
     return (axis.backlash_mm,) if cells is None else tuple(chain.from_iterable(cells.play_mm))
 
 
 def axes_with_largest_backlash(machine: Machine) -> tuple[Axis, Axis]:
-    """Return X and Y with the largest backlash of all regions."""
+    """Return X and Y, each with the largest backlash of all regions."""
     x, y, _ = (
         replace(axis, backlash_mm=max(backlashes_mm(axis, cells)))
         for axis, cells in zip(machine.axes, machine.play_map.used, strict=True)
@@ -728,9 +738,9 @@ def axes_with_largest_backlash(machine: Machine) -> tuple[Axis, Axis]:
 
 
 def residuals(machine: Machine) -> tuple[Residual, Residual]:
-    """Return the residuals of X and Y, each in the region where compensation leaves most over:
-    where a contour is divided then depends on its shape alone, not on its place, and no other
-    region leaves more over than is reported."""
+    """Return the residuals of X and Y, each from the region where compensation leaves most. The
+    division of a contour then depends only on its shape, not on its place, and no region leaves
+    more than is reported."""
     x, y, _ = (
         max(
             (
@@ -745,7 +755,7 @@ def residuals(machine: Machine) -> tuple[Residual, Residual]:
 
 
 def residual(axis: Axis, controller: SlideStart) -> Residual:
-    """Compute the residual of one axis of a machine with this controller."""
+    """Return the residual of one axis of a machine with this controller."""
     first = 1 if controller.start_direction == "+" else -1
     low, high = play_limits(axis.backlash_mm, controller.start_play, first)
     errors = {1: low, -1: high}

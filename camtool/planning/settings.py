@@ -34,7 +34,7 @@ class Cone(Struct, frozen=True):
 
     @classmethod
     def of(cls, operation: Operation) -> Cone:
-        """Return the V bit of an operation; OptionError when its tool is none."""
+        """Return the cone of an operation's V bit; OptionError if its tool is none."""
         tool = operation.tool
         if tool.kind != "v" or tool.tip_angle_rad is None:
             raise OptionError(
@@ -46,17 +46,17 @@ class Cone(Struct, frozen=True):
         return cls(math.tan(0.5 * tool.tip_angle_rad), 0.5 * tool.tip_diameter_mm, widest)
 
     def radius_at(self, depth_mm: float) -> float:
-        """Return the radius of what is cut at the surface with the tip so deep."""
+        """Return the radius of the cut at the surface, mm, with the tip at this depth."""
         return min(self.tip_mm + depth_mm * self.slope, self.widest_mm)
 
     def depth_of(self, rho: Floats) -> Floats:
-        """Return depths of the tip, mm, at which it cuts these radii at the surface."""
+        """Return the depths of the tip, mm, at which it cuts these radii at the surface."""
         return np.maximum(rho - self.tip_mm, 0.0) / self.slope
 
 
 def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
-    """Return the operation with the machine's numbers where it gives none; OptionError when too
-    fast, and for impossible passes."""
+    """Return the operation with the machine's numbers where it gives none; OptionError for speeds
+    and feeds that are too high, and for impossible passes."""
     turns_work = operation.contract.turns_work
     depth = 0.0 if turns_work else depth_of(operation, machine)
     _check_coolant(operation, machine)
@@ -82,9 +82,8 @@ def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
 
 
 def speed_of(operation: Operation, machine: Machine) -> float | None:
-    """Return the operation's speed of the spindle, or the machine's, in rev/min; None where
-    neither says any, and for 0, which is off. OptionError for a speed that the spindle does not
-    have."""
+    """Return the spindle speed of the operation, or the machine's default, rev/min; None if
+    neither has one, and for 0 (off). OptionError for a speed that the spindle does not have."""
     spindle, rpm = machine.spindle, operation.spindle_rpm
     if rpm is None:
         return spindle.default_rpm
@@ -109,8 +108,8 @@ def speed_of(operation: Operation, machine: Machine) -> float | None:
 
 
 def _check_spindle(operation: Operation, machine: Machine) -> None:
-    """Raise OptionError for turning on a mill, for milling on a lathe, and for feeds that
-    should follow a spindle whose turns nobody counts."""
+    """Raise OptionError for turning on a mill, for milling on a lathe, and for feeds that must
+    follow the spindle if its turns are not counted."""
     turns_work, kind = machine.spindle.turns == "work", operation.contract
     if kind.turns_work != turns_work:
         turned, other = ("work", "tool") if turns_work else ("tool", "work")
@@ -131,7 +130,7 @@ def _check_spindle(operation: Operation, machine: Machine) -> None:
 
 
 def _check_coolant(operation: Operation, machine: Machine) -> None:
-    """Raise OptionError for coolant that the machine has not."""
+    """Raise OptionError for coolant that the machine does not have."""
     kinds_needed = ("mist", "flood") if operation.coolant == "both" else (operation.coolant,)
     for each in kinds_needed:
         if each != "off" and each not in machine.coolant.kinds:
@@ -148,8 +147,8 @@ def safe_z_of(job: Job, machine: Machine) -> float:
 
 
 def depth_of(operation: Operation, machine: Machine) -> float:
-    """Return the operation's depth of cut below the stock top, or the machine's, mm; of a
-    carved floor no more than the bit is deep where it is widest."""
+    """Return the depth of cut of the operation below the stock top, or the machine's default, mm.
+    A carved floor is no deeper than the bit is where it is widest."""
     carved = operation.rest_of
     if carved is not None and carved.contract.rest == "floor":
         cone = Cone.of(carved)
@@ -159,11 +158,12 @@ def depth_of(operation: Operation, machine: Machine) -> float:
 
 
 def feeds_of(operation: Operation, machine: Machine) -> Feeds:
-    """Return the operation's feeds, or the machine's, none above the rates of the axes.
+    """Return the feeds of the operation, or the machine's defaults, limited to the rates of the
+    axes.
 
     A plunge feed that is not given is the machine's share of the feed of the cut (without one,
-    that feed), or the highest that Z can.
-    OptionError for feeds above what the machine takes at all, naming the highest.
+    that feed), or the highest that Z can. OptionError for feeds above what the machine takes at
+    all, naming the highest.
     """
     given_feed = operation.plunge_feed_mm_min
     cut = operation.feed_mm_min
@@ -193,8 +193,8 @@ def feeds_of(operation: Operation, machine: Machine) -> Feeds:
 
 
 def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
-    """Yield feeds of the job, or of the machine, that the rates of its axes do not allow, each
-    once."""
+    """Yield a finding for each feed of the job or the machine that is lowered to the rates of its
+    axes, without repeats."""
     axes = machine.axes
     reported: set[tuple[str, float]] = set()
     for operation in job.operations:
@@ -221,7 +221,7 @@ def lowered_feeds(job: Job, machine: Machine) -> Iterator[Finding]:
 
 
 def _programmable(highest_mm_min: float, machine: Machine) -> float:
-    """Return the highest programmable feed that is not above this one."""
+    """Return the highest feed not above this one that a program can express."""
     unit = machine.feed.unit_mm_min
     units = math.floor(highest_mm_min / unit * (1.0 + FEED_TOLERANCE))
     return units * unit or highest_mm_min
@@ -273,11 +273,12 @@ def levels(
 def carved_levels(
     depth_mm: float, step_down_mm: float | None, last_pass_mm: float | None
 ) -> tuple[float, ...]:
-    """Return the z of all passes of a V bit, which goes inwards from the wall as it goes down.
+    """Return the z of all passes of a V bit, mm, which moves inwards from the wall as it goes
+    down.
 
     A pass whose tip is d deeper than the one before runs d·tan α farther in (α the half angle of
-    the bit). Under its tip the earlier one has cut d less deep than its own depth, so that the
-    tip takes 2 d: passes after the first are no deeper than half the step down.
+    the bit). Under its tip the earlier one has cut d less deep than its own depth, so that the tip
+    takes 2 d: passes after the first are no deeper than half the step down.
 
     >>> carved_levels(0.9, 0.3, None)
     (-0.3, -0.45, -0.6, -0.75, -0.9)

@@ -53,10 +53,10 @@ CONTINUOUS = ("", "continuous", "bylayer", "byblock")
 class Seen(Struct, frozen=True, eq=False):
     """The sides of all contours (of `Sides.lines`) as one operation sees them.
 
-    `rim` (M,): what is within it is part, and stays. `holder` (M,): the smallest contour that
-    holds it, −1 if none. `by_uncut` (M,): it would be the other side without the contours that
-    are not cut; `by_frames` (M,): with those that count as frames. `bounds` (M,): which contours
-    bound material.
+    `rim` (M,): the contour is the edge of a part, so that its inside stays. `holder` (M,): the
+    smallest contour around it, −1 if none. `by_uncut` (M,): it would be the other side without the
+    contours that are not cut; `by_frames` (M,): with those that count as frames. `bounds` (M,):
+    the contour bounds material.
     """
 
     rim: Bools
@@ -145,15 +145,15 @@ class Sides(Struct, eq=False, dict=True):
         return np.asarray(idle & ~_is_repeated(self.lines, self.worked, idle))
 
     def taken_by(self, operation: Operation) -> Bools:
-        """Return (M,) the contours that one of the operations takes."""
+        """Return the mask (M,) of contours that one of the operations takes."""
         return np.asarray(self.takes[self.operations.index(operation)])
 
     def cut_by(self, operation: Operation) -> Bools:
-        """Return (M,) of these those that it cuts."""
+        """Return the mask (M,) of contours that one of the operations takes and cuts."""
         return np.asarray(self.cuts[self.operations.index(operation)])
 
     def seen_by(self, operation: Operation) -> Seen:
-        """Return the sides for a profile of this operation."""
+        """Return the sides of all contours for a profile of this operation."""
         depth = self._depth(operation)
         cut = self._taken(
             each.contract.runs_beside or (each.contract.clears and self._depth(each) >= depth)
@@ -170,12 +170,13 @@ class Sides(Struct, eq=False, dict=True):
         return self._known[key]
 
     def sided(self) -> Bools:
-        """Return (M,) the contours that a profile follows on one side, so that the other side
-        stays."""
+        """Return the mask (M,) of contours that a profile follows on one side, so that the other
+        side stays."""
         return self._taken(map(runs_beside, self.operations))
 
     def kept_from(self, pocket: Operation) -> Bools:
-        """Return (M,) the contours whose inside must stay, by profiles no deeper than a pocket."""
+        """Return the mask (M,) of contours whose inside must stay when `pocket` is cut: those that
+        profiles at most as deep as the pocket cut out."""
         is_kept = np.zeros(len(self.lines), dtype=np.bool_)
         for number, each in enumerate(self.operations):
             if runs_beside(each) and self._depth(each) <= self._depth(pocket):
@@ -183,7 +184,7 @@ class Sides(Struct, eq=False, dict=True):
         return is_kept
 
     def holds(self, profile: Operation) -> Bools:
-        """Return (M,) the contours within which all stays, where this profile runs beside them."""
+        """Return the mask (M,) of contours whose inside stays if this profile runs beside them."""
         if profile.side == "auto":
             return self.seen_by(profile).rim
         return np.full(len(self.lines), profile.side == "outside")
@@ -203,14 +204,16 @@ class Sides(Struct, eq=False, dict=True):
         return np.asarray(self.nesting.levels_by(bounds).depth % 2 == 0)
 
     def _taken(self, is_chosen: Iterable[bool]) -> Bools:
-        """Return (M,) the closed contours that any of these operations takes."""
+        """Return the mask (M,) of closed contours that any operation in the mask
+        `is_chosen` cuts."""
         return np.asarray(self.lines.closed & self.cuts[list(is_chosen)].any(axis=0))
 
     def _depth(self, operation: Operation) -> float:
         return self.default_depth_mm if operation.depth_mm is None else operation.depth_mm
 
     def why(self, operation: Operation, row: int) -> str:
-        """Return why, in a few words, an operation has its tool on this side of a contour."""
+        """Return the reason, in a few words, why an operation's tool runs on this side of a
+        contour."""
         if not self.lines.closed[row]:
             return "it is open"
         if operation.side != "auto":
@@ -228,15 +231,15 @@ class Sides(Struct, eq=False, dict=True):
 
 
 class Traits:
-    """Traits of M paths, each found out when an operation asks for it. `edges` (M,): those by
-    which outer and inner ones are told."""
+    """Traits of M paths, each computed when an operation first asks for it. `edges` (M,): the
+    paths by whose nesting outer and inner ones are told."""
 
     def __init__(self, nesting: Nesting, sources: tuple[str, ...], edges: Bools) -> None:
         self._nesting, self._sources, self._edges = nesting, sources, edges
         self._lines = nesting.lines
 
     def selected(self, operation: Operation, rows: Bools) -> Bools:
-        """Return (M,) those of the rows that the operation selects."""
+        """Return the mask (M,) of the paths in the mask `rows` that the operation selects."""
         rows = rows.copy()
         for word in operation.select:
             rows &= self._are(word, rows)
@@ -253,7 +256,8 @@ class Traits:
         return rows
 
     def _are(self, word: str, rows: Bools) -> Bools:
-        """Return (M,) of which of the rows a word is true."""
+        """Return the mask (M,) of paths of which a word of `select` is true; only those in the
+        mask `rows` are of interest."""
         closed = self._lines.closed
         if word in ("circle", "not circle"):
             is_circle = circles(self._lines, rows)
@@ -274,7 +278,7 @@ class Traits:
 
 
 def circles(lines: Polylines, rows: Bools) -> Bools:
-    """Return (M,) which of the rows (M,) of some paths are full circles."""
+    """Return the mask (M,) of paths in the mask `rows` (M,) that are full circles."""
     is_circle = np.zeros(len(rows), dtype=np.bool_)
     for row in np.flatnonzero(rows & lines.closed).tolist():
         is_circle[row] = circle_of(lines[row]) is not None
@@ -282,20 +286,21 @@ def circles(lines: Polylines, rows: Bools) -> Bools:
 
 
 def _is_within(sizes: Floats, limits: tuple[float, float]) -> Bools:
-    """Return (M,) which sizes are in a range, its ends included; NaN is in none."""
+    """Return the mask (M,) of sizes within a range, its ends included; NaN is in none."""
     low, high = limits
     return np.asarray((sizes >= low * (1.0 - SIZE_SHARE)) & (sizes <= high * (1.0 + SIZE_SHARE)))
 
 
 def is_named(operation: Operation, source: str) -> bool:
-    """Return True if an operation takes the entity of this name, such as "CIRCLE 2F": by the
-    whole name, or by what stands behind the kind (the handle, or the id)."""
+    """Return True if an operation takes the entity of this name, such as "CIRCLE 2F": by the whole
+    name, or by the part after the kind (the handle, or the id)."""
     names = [source, source.partition(" ")[2]]
     return not operation.entities or any(matches(operation.entities, name) for name in names)
 
 
 def takes_mark(operation: Operation, mark: Mark) -> bool:
-    """Return True if an operation takes a single point: it has no size, and is a point only."""
+    """Return True if an operation takes a single point. A point has no size, and the only word of
+    `select` that is true of it is "point"."""
     if operation.size_mm is not None or operation.area_mm2 is not None:
         return False
     if operation.select and operation.select != ("point",):
@@ -304,7 +309,7 @@ def takes_mark(operation: Operation, mark: Mark) -> bool:
 
 
 def _selection(operation: Operation) -> str:
-    """Describe in words what an operation selects."""
+    """Return text on what an operation selects."""
     words = list(dict.fromkeys(operation.select))
     for key, limits, unit in (
         ("size", operation.size_mm, "mm"),
@@ -318,15 +323,15 @@ def _selection(operation: Operation) -> str:
 
 
 def runs_beside(operation: Operation) -> bool:
-    """Return True if an operation runs beside its closed contours, not on them."""
+    """Return True if an operation runs beside its closed contours rather than on them."""
     if not operation.contract.runs_beside or operation.side == "on":
         return False
     return operation.away_mm > 0.0
 
 
 def _is_repeated(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
-    """Return (M,) those of the uncut closed contours (`idle`) that run along one that is cut,
-    or along one before them."""
+    """Return the mask (M,) of uncut closed contours (`idle`) that coincide with one that is cut,
+    or with an earlier uncut one."""
     is_repeat = np.zeros(len(lines), dtype=np.bool_)
     other_rows = np.flatnonzero((cut & lines.closed) | idle)
     idle_rows = np.flatnonzero(idle)
@@ -350,9 +355,9 @@ def _runs_along(path: Polyline, other: Polyline) -> bool:
 
 
 def regions_of(nesting: Nesting, rim: Bools) -> Iterator[Bools]:
-    """Yield masks of closed contours that bound one region together: those on whose waste side the
-    nesting agrees with `rim` (whether each is the edge of a part), those on which it says the
-    contrary because of contours that were not chosen, and what is left by depth and side."""
+    """Yield masks of closed contours that bound one region together: first those whose side by
+    nesting agrees with `rim` (True for the edge of a part), then those for which it is reversed
+    because of contours that were not chosen, and then the others by nesting depth and side."""
     is_open = np.ones(len(rim), dtype=np.bool_)
     for even in (True, False):
         region = is_open.copy()
@@ -374,10 +379,11 @@ def regions_of(nesting: Nesting, rim: Bools) -> Iterator[Bools]:
 
 
 def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
-    """Choose what the operation takes of a drawing in the work frame, with the sides of that
+    """Return what an operation takes of a drawing in the work frame, with the sides of that
     drawing.
 
-    OptionError, naming what there is, when the drawing has something, but nothing of that.
+    OptionError, which lists what there is, if the drawing is not empty but the operation takes
+    nothing of it.
     """
     index = np.flatnonzero(sides.taken_by(operation)).tolist()
     marks = [mark for mark in drawing.marks if takes_mark(operation, mark)]
@@ -396,8 +402,8 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
 
 
 def _rim(operation: Operation, sides: Sides, index: list[int]) -> Bools:
-    """Return (M,) which of the chosen paths are rims of parts, for a profile that asks for it;
-    of nets, which are rims of copper: an area of its own, whatever outline lies around it."""
+    """Return the mask (M,) of the chosen paths that are edges of parts, for a profile, which needs
+    it. For nets the edges of copper: an area of its own, whatever outline lies around it."""
     if operation.contract.frees_nets:
         levels = sides.nesting.among(np.array(index, dtype=np.int64)).levels
         return np.asarray(levels.depth % 2 == 0)

@@ -48,18 +48,18 @@ def engagement(value: object) -> float:
 
 
 class SlotWidth(NamedTuple):
-    """A width in mm, or as a part of the tool's diameter."""
+    """The width of a slot, in mm or as a multiple of the tool's diameter."""
 
     amount: float
     is_part: bool
 
     def mm(self, diameter_mm: float) -> float:
-        """Return the width for a tool, mm."""
+        """Return the width for a tool of this diameter, mm."""
         return self.amount * diameter_mm if self.is_part else self.amount
 
 
 def width(value: object) -> SlotWidth:
-    """Read a width: a length, or such as "150%" of the diameter."""
+    """Read a width of slots: a length, or a percentage of the tool's diameter such as "150%"."""
     if isinstance(value, str) and value.strip().endswith("%"):
         return SlotWidth(fraction(value), True)
     return SlotWidth(length(value), False)

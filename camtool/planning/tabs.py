@@ -111,23 +111,22 @@ class Tab(Struct, frozen=True):
         return Tab(self.begin + by_mm, self.end + by_mm, self.top_mm, self.fall)
 
     def holds(self, length: float) -> bool:
-        """Return True if a tool that stands at this length stands on the tab; not at a straight
-        edge."""
+        """Return True if a tool at this length stands on the tab; False at its vertical edges."""
         return not math.isinf(self.fall) or self.begin < length < self.end
 
     def height(self, length: float) -> float:
-        """Return the lowest z that the tab allows at this length."""
+        """Return the lowest z that the tab allows at this length, mm; −inf beside it."""
         distance = max(self.begin - length, length - self.end, 0.0)
         return self.top_mm - (self.fall * distance if distance else 0.0)
 
 
 def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
-    """Return the contours of an operation, with no tabs on those that are to have none; and a
+    """Return the contours of an operation, without tabs on those that should have none, and a
     finding that counts these.
 
-    Tabs hold parts: where an operation cuts parts free, its holes and open paths get no tabs, nor
-    do contours that are too short. Where it cuts none free, everything has tabs as asked. Where
-    nothing is long enough, `tabs_of` raises the error.
+    Tabs hold parts: if an operation cuts parts free, its holes and open paths get no tabs, nor do
+    contours that are too short. If it cuts none free, everything has tabs as asked. If nothing is
+    long enough, `tabs_of` raises the error.
     """
     if not contours or not contours[0].setting.operation.tabs:
         return contours, []
@@ -159,8 +158,8 @@ def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
 
 
 def _with_tabs_by_hand(contours: list[Contour]) -> list[Contour]:
-    """Return the contours, each with the places of the tabs that are nearest to it; OptionError
-    for a place that is near to none."""
+    """Return the contours, each with those of the hand-placed tabs that are nearest to it;
+    OptionError for a place that is not near any contour."""
     setting = contours[0].setting
     operation = setting.operation
     tabs = operation.tabs
@@ -192,7 +191,7 @@ def _with_tabs_by_hand(contours: list[Contour]) -> list[Contour]:
 def middle_of_longest_gap(
     path: Polyline, places: Sequence[tuple[float, float]]
 ) -> tuple[float, float]:
-    """Return the place (x, y) mm of a closed path in the middle of its longest piece between these
+    """Return the point (x, y), mm, of a closed path midway in the longest piece between these
     places."""
     along = MeasuredPath.of(path)
     lengths = np.sort([along.nearest_to(place) for place in places])
@@ -203,7 +202,7 @@ def middle_of_longest_gap(
 
 
 def is_hole(contour: Contour) -> bool:
-    """Return True if the material that stays lies around a closed contour, and not within it."""
+    """Return True if the material that stays lies around a closed contour, not within it."""
     if contour.material_left is None:
         return False
     ccw = bool(signed_areas(Polylines.of([contour.path]))[0] > 0.0)
@@ -220,10 +219,10 @@ def _is_long_enough(contour: Contour) -> bool:
 
 
 def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Finding]]:
-    """Return the tabs of a contour whose path, from its start, is `along`; and findings for those
+    """Return the tabs of a contour, whose path from its start is `along`, and findings for those
     that do not fit.
 
-    OptionError for tabs that are higher than the cut is deep or longer than the path together.
+    OptionError for tabs that are higher than the cut is deep or together longer than the path.
     """
     operation = contour.setting.operation
     tabs = operation.tabs
@@ -260,8 +259,8 @@ def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Find
 
 
 def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
-    """Return a tab of the operation, from the length 0, and the length of the slope to each side
-    of it."""
+    """Return a tab of the operation that begins at the length 0, and the length of the slope on
+    each side of it."""
     tabs = operation.tabs
     assert tabs is not None
     end, top = tabs.width_mm + operation.tool.diameter_mm, bottom_mm + tabs.height_mm
@@ -275,8 +274,8 @@ def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
 
 
 def raise_profile(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfile:
-    """Return the profile, kept above the tabs; `total_mm`: the length of a closed path, round
-    which they come again, None for an open one."""
+    """Return the profile raised over the tabs. `total_mm`: the length of a closed path, on which
+    the tabs come again in each lap; None for an open one."""
     if not tabs:
         return points
     result: ZProfile = []
@@ -310,7 +309,7 @@ def raise_profile(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> 
 
 
 def _tabs_between(tabs: list[Tab], total_mm: float | None, low: float, high: float) -> list[Tab]:
-    """Return the tabs between two lengths, repeated for each lap of a closed path."""
+    """Return the tabs between two lengths along a path, repeated for each lap of a closed one."""
     if total_mm is None:
         return tabs
     laps = range(math.floor(low / total_mm), math.floor(high / total_mm) + 1)
@@ -318,8 +317,8 @@ def _tabs_between(tabs: list[Tab], total_mm: float | None, low: float, high: flo
 
 
 def _breaks(tab: Tab, begin: float, z_begin: float, slope: float) -> list[float]:
-    """Return the lengths at which a line of z, sloping from a place, and the height of a tab may
-    part."""
+    """Return the lengths at which the larger of two heights may change: a straight line of z that
+    starts at (`begin`, `z_begin`) with this slope, and the tab."""
     places = [tab.begin, tab.end]
     if slope != 0.0:
         places.append(begin + (tab.top_mm - z_begin) / slope)
@@ -334,8 +333,8 @@ def _breaks(tab: Tab, begin: float, z_begin: float, slope: float) -> list[float]
 
 
 def _checked_tab_count(total_mm: float, operation: Operation, length_mm: float) -> int:
-    """Return the number of tabs of this length; OptionError when together they are longer than the
-    path."""
+    """Return the number of tabs on a path; OptionError if, each with this length, they are
+    together longer than the path."""
     count = _tab_count(total_mm, operation)
     if count * length_mm > total_mm * (1.0 + COUNT_SLACK):
         raise OptionError(
@@ -348,7 +347,7 @@ def _checked_tab_count(total_mm: float, operation: Operation, length_mm: float) 
 
 
 def _tab_count(total_mm: float, operation: Operation) -> int:
-    """Return the number of tabs that the operation asks of a path of this length."""
+    """Return the number of tabs that the operation asks for on a path of this length."""
     tabs = operation.tabs
     assert tabs is not None
     if tabs.spacing_mm is not None:
@@ -365,8 +364,8 @@ def _tab_count(total_mm: float, operation: Operation) -> int:
 
 
 class _Corners(Struct, frozen=True, eq=False):
-    """The corners of a path, (C, 2) mm each, from and to: `vertices` where it turns at all, those
-    where it turns `sharply`, and `arcs` on which it goes round corners of the drawing, of which
+    """The corners of a path as intervals (C, 2) of length, mm: `vertices` where it turns at all,
+    those where it turns `sharply`, and `arcs` on which it rounds corners of the drawing, of which
     the `sharp_arcs` turn sharply."""
 
     vertices: Floats
@@ -388,10 +387,10 @@ class _Fitting(Struct, frozen=True, eq=False):
     def nearest(
         self, centre: float, share: tuple[float, float], other_tabs: Sequence[Tab]
     ) -> Tab | None:
-        """Return the tab that is nearest to a length: on what is hardly bent before what is,
-        within its share before elsewhere; and only where there is no such place where the bridge
-        alone lies off the corners, and the tool is up on the arcs round them. None where it fits
-        nowhere."""
+        """Return the possible tab nearest to a length. Places are tried in this order: straight
+        ones, then those without a corner, at last those where only the bridge is off the corners;
+        each first within the tab's own share of the path, then anywhere. None if it fits nowhere.
+        """
         own_places = self._places(centre, share)
         anywhere = self._places(centre, (0.0, self.along.total_mm))
         for clear in (self._is_straight, self._is_off_corners, self._is_bridge_off_corners):
@@ -403,8 +402,8 @@ class _Fitting(Struct, frozen=True, eq=False):
         return None
 
     def _places(self, centre: float, span: tuple[float, float]) -> Floats:
-        """Return lengths of a span, the nearest to a place first; those beyond the seam of a
-        closed path are further round."""
+        """Return lengths to try within an interval, the nearest to `centre` first; on a closed
+        path distances count across the seam."""
         low, high = span
         count = math.ceil(PLACES_PER_TAB * (high - low) / self.model.end)
         count = min(max(count, 2 * PLACES_PER_SIDE), MAX_PLACES_ROUND)
@@ -420,20 +419,20 @@ class _Fitting(Struct, frozen=True, eq=False):
         return np.asarray(places[np.lexsort([offsets < 0.0, distances])])
 
     def _is_straight(self, places: Floats) -> Bools:
-        """Return the mask (P,) of the lengths at which a tab, its slopes included, lies across
-        no corner and no bend."""
+        """Return the mask (P,) of lengths at which a tab with its slopes lies across no corner and
+        no bend."""
         low, high = places - self._reach, places + self._reach
         bend = np.abs(self._heading(high) - self._heading(low))
         return np.asarray(self._is_off_corners(places) & (bend <= GENTLE_RAD))
 
     def _is_off_corners(self, places: Floats) -> Bools:
-        """Return the mask (P,) of the lengths at which a tab lies across no corner."""
+        """Return the mask (P,) of lengths at which a tab with its slopes lies across no corner."""
         corners = np.concatenate([self.corners.vertices, self.corners.arcs])
         return self._is_clear(places, self._reach, corners)
 
     def _is_bridge_off_corners(self, places: Floats) -> Bools:
-        """Return the mask (P,) of the lengths at which a tab lies across no sharp corner, and
-        its bridge not round one. Circles that are drawn as polygons have no sharp ones."""
+        """Return the mask (P,) of lengths at which a tab lies across no sharp corner, and its
+        bridge across no corner. Circles that are drawn as polygons have no sharp ones."""
         clear = self._is_clear(places, self._reach, self.corners.sharply)
         arcs = self.corners.sharp_arcs
         return np.asarray(clear & self._is_clear(places, self.half_width_mm, arcs))
@@ -449,7 +448,7 @@ class _Fitting(Struct, frozen=True, eq=False):
         return np.asarray(~touches.any(axis=1))
 
     def _heading(self, lengths: Floats) -> Floats:
-        """Return the direction of the path (P,) at these lengths, rad, counted through all its
+        """Return the direction (P,) of the path at these lengths, rad, without jumps of full
         turns."""
         reach, segments = self.along.reach, self.along.segments
         heading = np.cumsum(segments.sweep + self.along.turns) - segments.sweep
@@ -458,7 +457,7 @@ class _Fitting(Struct, frozen=True, eq=False):
         return np.asarray(heading[row] + segments.sweep[row] * np.clip(part, 0.0, 1.0))
 
     def _tab_at(self, centre: float, other_tabs: Sequence[Tab]) -> Tab | None:
-        """Return the tab at a length, None where it has no room there beside others."""
+        """Return the tab at a length, None if it has no room there beside others."""
         foot, total = self.foot_mm, self.along.total_mm
         half = _half_length(self.along, centre, self.model.end, min(centre, total - centre) - foot)
         if half is None:
@@ -471,12 +470,13 @@ class _Fitting(Struct, frozen=True, eq=False):
 
 
 def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
-    """Find the corners and tight arcs along a path, from which tabs keep clear."""
+    """Return the corners and tight arcs of a path, which tabs must avoid."""
     reach, total = along.reach, along.total_mm
     bend = np.abs(along.turns)
 
     def places_turning(min_turn: float) -> Floats:
-        """Return (K, 2) the lengths, twice, at which the path turns by more than this, rad."""
+        """Return (K, 2) the lengths (each twice, as an interval) at which the path turns by more
+        than this angle, rad."""
         lengths = reach[: len(bend)][bend > min_turn]
         if along.path.closed and len(lengths) and lengths[0] == 0.0:
             lengths = np.append(lengths, total)
@@ -495,8 +495,8 @@ def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
 
 
 def _half_length(along: MeasuredPath, centre: float, chord: float, room: float) -> float | None:
-    """Return half the length about a place whose ends are so far apart; None beyond the room there
-    is."""
+    """Return half the length of the piece about a place whose ends are `chord` apart in a straight
+    line; None if that exceeds `room`."""
 
     def lacks(halves: Floats) -> Floats:
         ends = along.at(centre + halves) - along.at(centre - halves)
@@ -518,8 +518,8 @@ def _half_length(along: MeasuredPath, centre: float, chord: float, room: float) 
 
 
 def _is_bridge_clear(along: MeasuredPath, tab: Tab) -> bool:
-    """Return True if no other part of the path comes nearer to the centre of the bridge than
-    its ends."""
+    """Return True if no other part of the path comes nearer to the centre of the bridge than the
+    ends of the tab do."""
     ends = along.at(np.array([tab.begin, tab.end]))
     other_spans = [(0.0, tab.begin), (tab.end, along.total_mm)]
     if along.path.closed:
@@ -538,7 +538,7 @@ def _left_out_finding(contour: Contour, along: MeasuredPath, length: float) -> F
 
 
 def bridges_of(along: MeasuredPath, tabs: Sequence[Tab], tool: Tool, name: str) -> list[Bridge]:
-    """Return the bridges of the tabs of a contour; none for a tool that cuts no width."""
+    """Return the bridges that the tabs of a contour leave; none for a tool without width."""
     bridges = []
     for tab in tabs if tool.radius_mm > 0.0 else ():
         a, b, centre = along.at(np.array([tab.begin, tab.end, 0.5 * (tab.begin + tab.end)]))
@@ -551,8 +551,8 @@ def bridges_of(along: MeasuredPath, tabs: Sequence[Tab], tool: Tool, name: str) 
 
 
 class RaisedRuns(Struct, frozen=True, eq=False):
-    """The runs of an operation, raised where they would have cut bridges, and the
-    findings of that."""
+    """The runs of an operation, raised where they would have cut bridges, with findings about
+    that."""
 
     runs: Runs
     findings: tuple[Finding, ...]
@@ -561,7 +561,7 @@ class RaisedRuns(Struct, frozen=True, eq=False):
 def raised_over_bridges(
     runs: Runs, operation: Operation, feeds: Feeds, bridges: Sequence[Bridge]
 ) -> RaisedRuns:
-    """Return the runs of an operation, kept above all bridges: no cut goes through them.
+    """Return the runs of an operation, raised so that no cut goes through any bridge.
 
     A tab is made by the contour that it belongs to. The tool comes by again: round a neighbour
     that is nearer than two slots are wide, on the other side of a narrow contour, on a lead, or in
@@ -615,7 +615,8 @@ class _RaisedBridges:
 def _raise_run(
     run: CutRun, near_bridges: Sequence[Bridge], tool: Tool, feeds: Feeds, raised: _RaisedBridges
 ) -> CutRun:
-    """Return the run kept above the bridges near to it; itself when it is so already."""
+    """Return the run raised over the bridges near it; the same object if nothing changes. `raised`
+    is added to in place."""
     vertices = run.vertices
     moves = np.hypot(*np.diff(vertices[:, :2], axis=0).T) > POSITION_EPS_MM
     is_drilled = not moves.any()
@@ -656,8 +657,8 @@ def _note_drilled(run: CutRun, bridge: Bridge, tool: Tool, raised: _RaisedBridge
 
 
 def _tabs_over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab]:
-    """Yield the pieces of a path, with the lowest z (n,) of each of its segments, where the tool
-    would cut into a bridge."""
+    """Yield the pieces of a path, as tabs, in which the tool would cut into a bridge; `low` (n,):
+    the lowest z of each segment."""
     is_low = low < bridge.top_mm - POSITION_EPS_MM
     if not is_low.any():
         return
@@ -691,7 +692,8 @@ def _tabs_over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> 
 
 
 def _zone(bridge: Bridge, reach_mm: float) -> Polyline:
-    """Return the zone in which the centre of a tool of this radius would cut into a bridge."""
+    """Return the boundary of the zone within `reach_mm` of a bridge, in which the centre of a tool
+    of this radius would cut into it."""
     normal = np.array([-bridge.ahead[1], bridge.ahead[0]])
     w, s, r = bridge.half_width_mm, bridge.half_span_mm, reach_mm
     corners = [
@@ -709,8 +711,8 @@ def _box(bridge: Bridge, reach: float) -> tuple[float, float, float, float]:
 
 
 def _extent(run: CutRun) -> tuple[Floats, Floats]:
-    """Return a box around a run; an arc of a half circle stays within its chord's length of its
-    ends."""
+    """Return the bounding box (low, high) of a run, a little large at arcs: an arc of up to a half
+    circle stays within its chord's length of its ends."""
     chords = np.hypot(*np.diff(run.vertices[:, :2], axis=0).T)
     bent = run.vertices[:-1, 3] != 0.0
     wide = float(chords[bent].max(initial=0.0))

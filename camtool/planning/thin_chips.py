@@ -37,23 +37,24 @@ FINE_RAD = math.radians(3.0)
 
 
 def feed_levels(feed_mm_min: float, max_feed_mm_min: float) -> Floats:
-    """Return the levels of the feed, ascending, from that at the limit to the greatest."""
+    """Return the levels of the feed, mm/min, ascending from the feed at the limit of engagement to
+    the greatest."""
     ratio = max(max_feed_mm_min / feed_mm_min, 1.0)
     count = math.ceil(math.log(ratio) / math.log(LEVEL_RATIO))
     return np.asarray(feed_mm_min * ratio ** (np.arange(count + 1) / max(count, 1)))
 
 
 def level_of(engaged_rad: Floats, limit_rad: float, levels: Floats) -> Ints:
-    """Return the highest levels (K,) of the feed at which chips are no thicker, at engagements
-    (K,), than they are at the limit with the lowest level."""
+    """Return the highest levels (K,) of the feed with which chips at these engagements (K,) are no
+    thicker than at the limit with the lowest level."""
     sine = np.sin(np.clip(engaged_rad, 1e-9, 0.5 * math.pi))
     allowed = levels[0] * math.sin(limit_rad) / sine
     return np.asarray((np.searchsorted(levels, allowed, side="right") - 1).clip(min=0))
 
 
 def without_peaks(level: Ints, lengths_mm: Floats, least_mm: float) -> Ints:
-    """Return levels (K,) in a row, lowered where one would be kept or exceeded for less than a
-    length."""
+    """Return consecutive levels (K,), lowered where a level is kept or exceeded over less than
+    `least_mm` of the path."""
     level = level.copy()
     for k in range(int(level.max(initial=0)), 0, -1):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], (level >= k).astype(int), [0]])))
@@ -74,9 +75,9 @@ class FeedStretches(Struct, frozen=True, eq=False):
 def thin_chip_feeds(
     paths: Sequence[tuple[Floats, Ints]], tool_mm: float, limit_rad: float, levels: Floats
 ) -> list[FeedStretches]:
-    """Return the feeds along paths that are cut in this order. Each of them is given as chords:
-    moves (K, 9) as `camtool.kernels.engagement` wants them, and of which line or arc of the path
-    (K,) each is a part.
+    """Return the feeds along paths that are cut in this order. A path is given as chords: moves
+    (K, 9) as `camtool.kernels.engagement` reads them, and the line or arc (K,) of the path that
+    each is a part of.
 
     What was air before is taken for stock, so that the feed is lower there than it might be.
     """

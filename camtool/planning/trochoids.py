@@ -54,20 +54,20 @@ SWEPT_SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3)
 
 
 def trochoid_step(radius_mm: float, tool_mm: float, limit: float) -> float:
-    """Return the distance of the circles' middles, mm."""
+    """Return the distance between the centres of successive circles, mm, that keeps the limit of
+    engagement."""
     step = front_step(PLANNED_SHARE * limit, radius_mm, tool_mm)
     return min(step, MAX_STEP_SHARE * radius_mm)
 
 
 def cusp_mm(radius_mm: float, tool_mm: float, limit: float) -> float:
-    """Return a bound of how far cusps reach into the band of the circles: twice their height along
-    a straight line, since lines may be curved."""
+    """Return an upper bound of how far cusps reach into the band of the circles, mm: twice their
+    height along a straight line, since lines may be curved."""
     return trochoid_step(radius_mm, tool_mm, limit) ** 2 / (4.0 * radius_mm)
 
 
 def band_of(lines: Polylines, half_mm: float) -> Polylines:
-    """Return the region of all within a distance of lines; GeometryError where that cannot be
-    told."""
+    """Return the region within a distance of lines; GeometryError if it cannot be determined."""
     for share in SWEPT_SHARES:
         outline = swept_outline(lines, (1.0 - share) * half_mm)
         if outline is not None:
@@ -76,9 +76,9 @@ def band_of(lines: Polylines, half_mm: float) -> Polylines:
 
 
 def middles(line: Polyline, radius_mm: float, step_mm: float) -> Floats:
-    """Return (N, 2) the middles of circles along a line: at its corners, and in steps between
-    these; shorter ones where it turns on arcs smaller than the circles, since cusps are higher
-    there."""
+    """Return (N, 2) the centres of circles along a line: at its corners, and at steps between
+    these; the steps are shorter where the line turns on arcs smaller than the circles, since cusps
+    are higher there."""
     along = MeasuredPath.of(line)
     corners = along.reach[np.flatnonzero(np.abs(along.turns) > CORNER_TURN_RAD)]
     marks = np.unique(np.concatenate([[0.0, along.total_mm], corners]))
@@ -97,7 +97,8 @@ def middles(line: Polyline, radius_mm: float, step_mm: float) -> Floats:
 def trochoid_legs(
     line: Polyline, radius_mm: float, helix_mm: float, tool_mm: float, limit: float
 ) -> tuple[Floats, list[Leg]]:
-    """Return where a helix goes down (2,), and the legs of circles along a line behind it."""
+    """Return the place (2,) where a helix goes down, and the legs of the circles along a line from
+    there."""
     places = middles(line, radius_mm, trochoid_step(radius_mm, tool_mm, limit))
     legs = [Leg(spiral(places[0], helix_mm, radius_mm, tool_mm, limit))]
     for before, place in pairwise(places):
@@ -114,8 +115,8 @@ def trochoid_legs(
 
 
 def _round(leg: Leg, centre: Floats, end: Floats) -> list[Leg]:
-    """Return the arc CCW about a centre from where a leg ends to a place of that circle; none
-    where it is there already."""
+    """Return the CCW arc about a centre from the end of a leg to the point `end` of the circle, in
+    a list; [] if the leg ends there already."""
     begin = leg.vertices[-1, :2]
     sweep = _angle(end - centre) - _angle(begin - centre)
     rows = arc_rows(begin, centre, sweep % math.tau, 1)
@@ -123,8 +124,8 @@ def _round(leg: Leg, centre: Floats, end: Floats) -> list[Leg]:
 
 
 def _back(leg: Leg, centre: Floats, cut: Floats, radius_mm: float) -> list[Leg]:
-    """Return the way through a disc from where a leg ends to the next cut, which leaves the disc;
-    tangent, unless it is so short that the tool has to stay on the circle."""
+    """Return the way within the cleared disc from the end of a leg to the next cut: a tangent
+    link, or an arc of the circle if the way is too short for that."""
     start, end = ends_of(leg.vertices)[1], ends_of(cut)[0]
     sweep = _angle(cut[0, :2] - centre) - _angle(leg.vertices[-1, :2] - centre)
     if sweep % math.tau >= MIN_BACK_RAD:
@@ -146,8 +147,8 @@ def trochoid_stays(
     tool_mm: float,
     limit: float,
 ) -> list[AdaptiveStays]:
-    """Return the stays that clear a connected tool centre region: in circles along those of the
-    lines that lie in it, and by fronts what is left; none where it has no room."""
+    """Return the stays that clear a connected tool centre region: circles along those of the lines
+    that lie in it, and fronts for what they leave. [] if the region has no room."""
     starts = lines.vertices[lines.offsets[:-1], :2]
     rows: list[int] = []
     if len(lines):
