@@ -317,8 +317,8 @@ def _refuse_spacing(block: WordBlock) -> None:
     block.fail("words are not parted by exactly one space", mend="write G00 X1.0 Y1.0")
 
 
-# What the machine's timers make of a program's lines and feeds: some rows at a time, since the
-# columns of what becomes of each would need more room than the program.
+# How the machine's timers execute a program's lines and feeds: computed for some rows at a time,
+# since the columns for all rows would need more memory than the program.
 
 ROWS_AT_ONCE: Final = 1 << 14
 

@@ -287,7 +287,7 @@ def _chords(arc: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> lis
         if (point != position).any():
             pieces.append(ReplacementRow(Kind.LINE, _pair(point), share=share))
             position = point
-    # Moves nothing when the last chord was too small, but for the rest of a helix's rise.
+    # This line has no length if the last chord was too small, except the rest of a helix's rise.
     return [*pieces, ReplacementRow(Kind.LINE, _pair(stop))]
 
 

@@ -60,7 +60,7 @@ _NO_BLANKS: Final = str.maketrans("", "", " \t")
 _NO_WORDS: Final = re.compile(r"\([^()]*\)|;.*|[ \t%]")
 _BLOCK_NUMBER: Final = re.compile(r"[Nn]\d+(?:\.\d*)?")
 
-# What a sign means that begins no word: (message, mend).
+# For signs that begin no word: (message, remedy).
 _SIGNS: Final = {
     ",": ("a decimal comma", "write a decimal point"),
     "#": ("a parameter", "only plain numbers can be read"),

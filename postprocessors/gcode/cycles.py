@@ -77,7 +77,7 @@ def threads_of(toolpath: Toolpath, unit_mm: float, style: NumberStyle) -> list[C
     threads = []
     for note, low, high in zip(operations.notes, operations.begin.tolist(), ends, strict=True):
         cuts = low + np.flatnonzero(toolpath.kind[low:high] == Kind.LINE)
-        if note.pitch_mm is None or len(cuts) < 3:  # of one pass G76 does not say the depth
+        if note.pitch_mm is None or len(cuts) < 3:  # G76 cannot give the depth of a single pass
             continue
         first, last = int(cuts[0]) - 2, int(cuts[-1]) + 2
         if last >= high or last - first != 4 * len(cuts):

@@ -153,7 +153,7 @@ def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
     changed_rows = halved.row[rows[has_no_centre | has_moved]]
     kind = path.kind.copy()
     kind[rows[flat]] = Kind.LINE
-    # By row of `path`, so that they survive the rows that lines add.
+    # Indexed by row of `path`: replacing arcs by lines adds rows.
     offset = np.zeros((len(path), 2), dtype=np.int64)
     has_arc = ~flat & has_centre
     offset[rows[has_arc]] = centre[has_arc] - begin[rows[has_arc], :2]
@@ -198,7 +198,7 @@ def _halve_circles(toolpath: Toolpath, rules: ArcRules) -> LoweredToolpath:
     is_full &= np.abs(toolpath.sweeps()) > math.pi
     if rules.full_circles == "whole" or not is_full.any():
         return LoweredToolpath(toolpath, np.arange(len(toolpath)))
-    # Other arcs pass for lines meanwhile, so that these alone are cut.
+    # Other arcs are marked as lines meanwhile, so that only these are cut.
     kinds = np.where(toolpath.is_arc & ~is_full, int(Kind.LINE), toolpath.kind)
     halves = arcs_within(replace(toolpath, kind=kinds), math.pi)
     kind = toolpath.kind[halves.row]

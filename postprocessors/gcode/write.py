@@ -292,7 +292,7 @@ class BlockOrder:
             index = self._before[1:] - 1 + np.searchsorted(indices, every, side="right")
             columns = [numbers.column(index, self._is_motion), *columns]
             labels = [numbers.label(k, blanks=blanks) for k in number.tolist()]
-        # In front of a row: the other blocks, each behind its comments; then those of a motion.
+        # In front of a row: other blocks, each after its comments; then comments of the motion.
         other, moves = np.searchsorted(number, commented), ~np.isin(commented, number)
         motion = (commented - other)[moves]
         place, rank = np.empty(len(commented), dtype=np.int64), 2 * other
@@ -463,7 +463,7 @@ def sent_rows(
     elsewhere = is_changed | (kind == CYCLE)
     home_xy, home_z = elsewhere | (kind == Kind.HOME_XY), elsewhere | (kind == Kind.HOME_Z)
     flat = written[:, :2].any(axis=1) | is_arc
-    # A rapid to where X and Y should be already is not left out before they were ever written.
+    # A rapid to the present X and Y is kept if X and Y have never been written before.
     is_still = (kind == Kind.RAPID) & ~written.any(axis=1)
     is_still &= _not_yet_written(flat, home_xy) & ~_not_yet_written(written[:, 2], home_z)
     is_still &= _not_yet_written(flat | is_still, home_xy)

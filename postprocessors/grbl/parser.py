@@ -528,7 +528,7 @@ class GrblParser:
         if block.groups - {"distance", "units", "one block"} or block.once not in ("", "G53"):
             raise error(16, block.at.get("G"))
         self.notes.jogs.append(self.index)
-        if block.uses == NONE:  # its coordinates are those with which it begins a block: 0
+        if block.uses == NONE:  # a block begins with coordinates 0
             target = list(self._zero)
         elif feed == 0.0:
             raise error(22, None)

@@ -401,7 +401,7 @@ class _Parser(GrblParser):
         return self._memory.frames[block.modes.frame]
 
     def _target(self, block: GrblBlock, words: dict[int, float], unused: set[str]) -> list[float]:
-        super()._target(block, words, unused)  # for what it refuses
+        super()._target(block, words, unused)  # for its checks only
         target = list(self.position)
         if block.once in ("G10", "G92") or block.uses == LENGTH:
             return target
@@ -613,7 +613,7 @@ class GrblTwin(Twin):
 
     @property
     def state(self) -> str:
-        """As the status report says it; Start while it begins anew and reports nothing."""
+        """State as in the status report; "Start" while it restarts and reports nothing."""
         if self._starting:
             return "Start"
         if self._state == "Hold":
@@ -739,7 +739,7 @@ class GrblTwin(Twin):
         self._phases: list[Phase] = []
         self._begun_s, self._done_mm, self._speed, self._events = 0.0, 0.0, 0.0, 0
         self._running = self._holding = self._stopping = self._ended = self._dwells = False
-        self._stale = False  # the plan of the block that runs is not that of the ring
+        self._stale = False  # True: the running block's plan differs from the ring's
         self._turn_at_s = None
         self._touches: list[float] = []
         self._probing = None
@@ -1600,7 +1600,7 @@ class GrblTwin(Twin):
         grbl would divide, are ignored."""
         settings, stood = self._memory.settings, self._steps
         is_inverted = [int(settings[3]) >> axis & 1 for axis in range(3)]
-        self._signs = 1 - 2 * np.array(is_inverted, dtype=np.int64)  # as it was wired for $3=0
+        self._signs = 1 - 2 * np.array(is_inverted, dtype=np.int64)  # wired so that $3=0 is right
         self._set_steps(stood)
         axes: dict[str, Any] = {}
         for k, name in enumerate("xyz"):

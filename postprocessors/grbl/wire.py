@@ -326,50 +326,51 @@ class GrblConversation(Conversation):
         self._commands = deque(each + b"\n" for each in (*unlocking, *queries, *homing, *commands))
         self._listing: list[str] = []
         self._rest = b""
-        self._out_lines: deque[_Line] = deque()  # written, not answered
-        self._unconfirmed = 0  # bytes of lines since the last query that was answered
-        self._since_probe = 0  # bytes of lines behind the last query
-        self._confirmed = 0  # packets before the last query that was answered
-        self._probed = 0  # packets before the last query that was sent
+        self._out_lines: deque[_Line] = deque()  # sent, not answered yet
+        self._unconfirmed = 0  # bytes sent since the last answered query
+        self._since_probe = 0  # bytes sent since the last query
+        self._confirmed = 0  # packets before the last answered query
+        self._probed = 0  # packets before the last query sent
         self._phase = "greeting"
-        self._offset: Place | None = None  # its work zero, once it has said so
+        self._offset: Place | None = None  # work zero, once grbl has reported it
         self._frame: Place | None = None  # the work zero with which the program begins
         self._standing = None if manner.home else manner.standing
-        self._restarted = False  # whether it has begun anew with the port
-        self._stood = False  # whether it was seen to stand before it was reset
-        self._idle = 0  # idle reports in a row
+        self._restarted = False  # True if opening the port has reset grbl
+        self._stood = False  # True if it stood still before the reset
+        self._idle = 0  # consecutive Idle reports
         self._idle_since = 0.0  # the first of them
-        self._holds = 0  # reports in a row that it is held, while it should work
-        self._due = self._stale = 0  # reports that are due; those of them that are of before a ~
-        self._resumes = False  # whether it is to go on as soon as it stands
+        self._holds = 0  # consecutive Hold reports while it should run
+        self._due = self._stale = 0  # reports due, and those from before a ~
+        self._resumes = False  # True: resume as soon as it stands
         self._polled = self._answered = 0.0
-        self._waiting = False  # a report is asked for that has not come
-        self._resets = 0  # banners that are due
-        self._begun = 0.0  # since then
-        self._known = False  # whether it has said anything that a grbl says
-        self._fresh = False  # whether it has begun anew since it was asked to
-        self._heard = b""  # what came before that
-        self._locked = False  # whether its settings are asked for to say how to unlock it
-        self._messages: list[str] = []  # what it said of being locked
-        self._closed = ""  # switches, as it reports them
-        self._startup: list[str] = []  # its startup lines
-        self._beyond = ""  # why the program would leave its travel, if it is built as usual
+        self._waiting = False  # a requested report has not come yet
+        self._resets = 0  # banners expected after resets
+        self._begun = 0.0  # time of that request
+        self._known = False  # True once it has sent anything that grbl sends
+        self._fresh = False  # True if it has restarted since the reset was sent
+        self._heard = b""  # bytes received before that
+        self._locked = False  # True while settings are read to advise on the lock
+        self._messages: list[str] = []  # its messages about the lock
+        self._closed = ""  # closed switches, as reported
+        self._startup: list[str] = []  # startup lines
+        self._beyond = ""  # why the program would leave the travel, on a usual machine
         self._modes_asked = False
         self._failing = self._alarm = ""
         self._halted = 0.0
         self._reset_sent = self._slows = False
-        self._reported = self._stands_at = ""  # places as the last reports have them
+        self._reported = self._stands_at = ""  # places in the last reports
         self._asked_again = 0
-        self._acted = False  # whether anything but questions was sent
+        self._acted = False  # True if anything but queries was sent
         self._feed = 0.0
-        self._aims: dict[Override, int] = {}  # overrides that are wanted, %
-        self._steered = 0  # reports since the last byte on the way there
-        self._moves = 0  # reports in a row that it moves, while it should stop
+        self._aims: dict[Override, int] = {}  # wanted overrides, %
+        self._steered = 0  # reports since the last override byte
+        self._moves = 0  # consecutive reports of motion while it should stop
         self._jogs = any(each.startswith(b"$J=") for each in commands)
 
     @property
     def at_mm(self) -> Place | None:
-        """By its machine position, so that frames that the program sets do not matter."""
+        """Place of the tool by grbl's machine position, so that frames that the program sets do
+        not matter."""
         if self._frame is None or self.machine_mm is None:
             return None
         return _difference(self.machine_mm, self._frame)
@@ -381,7 +382,7 @@ class GrblConversation(Conversation):
             self._stood and self.is_over and not self._alarm
         )
 
-    # What the user wants.
+    # Requests of the user.
 
     def begin(self, now: float) -> None:
         """Ask for the state. A controller that the port resets reports it by itself."""
@@ -476,7 +477,7 @@ class GrblConversation(Conversation):
                     WireState.FAILED, f"{reason}; it did not confirm the stop: switch it off"
                 )
                 return
-            # One that homes since before the port was opened hears nothing else, and says nothing.
+            # While homing, begun before the port was opened, it reads nothing and sends nothing.
             homes = self._phase == "greeting" and self._answered <= self._halted
             if not self._reset_sent and elapsed >= (
                 SILENCE_FACTOR * self.manner.late_s if homes else patience
@@ -673,7 +674,7 @@ class GrblConversation(Conversation):
             self.state, self.why = (
                 WireState.SENDING,
                 "",
-            )  # somebody has let it go on at the machine
+            )  # somebody has resumed it at the machine
             self._go_on(now)
         elif self._idle >= 2 and self.state is WireState.SENDING:
             self._at_rest(now)
@@ -749,8 +750,8 @@ class GrblConversation(Conversation):
             elif self._fresh and (self._offset or self._standing is None):
                 self._ready(now)
         elif state == "Hold:0" and self.manner.standing is not None:
-            # The sender of this program is gone, such as one that was killed at a stop (M0): what
-            # it has left in the buffer is dropped, and the place is kept.
+            # Another sender has gone, for example one that was killed at a stop (M0): drop what it
+            # has left in the buffer, and keep the place.
             if self._resets == 0:
                 self._resets, self._begun = 1, now
                 self._write(RESET)
@@ -779,11 +780,11 @@ class GrblConversation(Conversation):
         elif self._phase != "greeting":
             self._end(WireState.FAILED, "the controller was reset while it worked")
         elif self.state is WireState.STOPPING:
-            self._reset(now)  # a hold that comes behind its banner would last
+            self._reset(now)  # a hold received after its banner would stay in force
         elif self._resets:
             self._fresh, self._offset = True, None
             self._poll(now)
-        else:  # it has begun by itself: the next report says how it stands
+        else:  # it has restarted by itself: the next report says its state
             self._restarted = True
 
     def _ready(self, now: float) -> None:
@@ -971,7 +972,7 @@ class GrblConversation(Conversation):
             self._end(WireState.FINISHED)
         elif self.single and self.sent == self.done:
             self.state, self.why = WireState.PAUSED, SINGLE
-        else:  # it was to do single blocks, and need not any more
+        else:  # single blocks were wanted, and are not any more
             self._go_on(now)
 
     def _dwell_s(self) -> float:
@@ -1060,11 +1061,11 @@ class GrblProbing(GrblConversation):
     def __init__(self, cycle: ProbeCycle, machine: GrblMachine, manner: Manner) -> None:
         super().__init__((), machine, manner)
         self._run = CycleRun(cycle)
-        self._report: tuple[Place, bool] | None = None  # of the line under way
+        self._report: tuple[Place, bool] | None = None  # the probe report of the current line
 
     def _ready(self, now: float) -> None:
         if self._offset is None or self.machine_mm is None:
-            return  # the next report says both
+            return  # the next report will contain both
         if "P" in self._closed:
             self._end(WireState.FAILED, f"the probe touches already: {TOUCHES_MEND}")
             return
@@ -1145,13 +1146,13 @@ class GrblSettings(GrblConversation, SettingsConversation):
         lines = [each.encode("ascii") for each in self._changes]
         super().__init__((), machine, manner, (b"$$", *lines, b"$$"))
         self.written: list[str] = []
-        self._awaited: _Line | None = None  # the line whose answer is due, and since when
+        self._awaited: _Line | None = None  # the line whose answer is due
         self._awaited_since = 0.0
         self._is_listed = False
 
     @property
     def _unlocks(self) -> bool:
-        return True  # it stays locked, which changes nothing
+        return True  # settings can be read and written while it is locked
 
     def tick(self, now: float) -> None:
         """Notice a line whose answer is overdue, although reports come."""
@@ -1230,7 +1231,7 @@ class GrblHand(GrblConversation, Hand):
     def __init__(self, machine: GrblMachine, manner: Manner) -> None:
         super().__init__((), machine, manner)
         self._held: Mapping[str, float] = {}
-        self._room_mm = math.inf  # of a held jog, until it would leave the travel
+        self._room_mm = math.inf  # length that a held jog may still go within the travel
         self._homes_now = False
         self._released = False
         self._queued_s = 0.0  # the time up to which the pieces of a held jog last

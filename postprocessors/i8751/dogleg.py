@@ -90,7 +90,7 @@ class StepLine(Struct, frozen=True):
         if self.reach == FREE:
             return _runs(diagonals, singles, diagonals * singles, max_steps)
         runs = _runs(diagonals, singles, self.reach, max_steps)
-        # Whole steps waste up to a run's step, b or d, of each reach.
+        # Rounding to whole steps loses up to one step, b or d, of each reach.
         waste = (diagonals + singles) // 2
         reach = diagonals * singles // (2 * len(runs) - 1) + waste
         if reach >= self.reach:

@@ -185,7 +185,7 @@ def _lower(
     """Return the toolpath as lines of XY or of Z only, and the row of the given toolpath that each
     came from; count what was changed."""
     two_lines = helices_to_steps(toolpath, step_mm)
-    # A rapid in two parts is as good as one; a cut in steps is another cut.
+    # Splitting a rapid in two does no harm; a slope cut in steps differs from the wanted cut.
     cut = (np.bincount(two_lines.row, minlength=len(toolpath)) > 1) & toolpath.is_feed
     counts.slopes, counts.slope_step_mm = int(cut.sum()), step_mm
     counts.slopes_place = toolpath.place(int(cut.argmax())) if counts.slopes else ""
@@ -262,7 +262,7 @@ def _with_x_steps(steps: Ints) -> Ints:
         if not (x or y):
             next_offset = 1 - x_offset
         else:
-            # A record that would stand still by going back leaves it to a later one.
+            # If going back would leave a record without a step, a later one goes back.
             next_offset = x_offset if (x, y, z) == (x_offset, 0, 0) and x_offset else 0
         result[record, 0] += next_offset - x_offset
         x_offset = next_offset

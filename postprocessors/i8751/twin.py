@@ -116,7 +116,7 @@ class I8751Twin(Twin):
         if self._executing is not None and not self.is_moving:
             self._next_record()
 
-    # The dialogue. What it does not wait for is neither stored nor answered; ours.
+    # The dialogue. Bytes that it does not wait for are neither stored nor answered (our choice).
 
     def _program(self) -> Generator[None, int, None]:
         """Receive one program after the other, byte by byte, as a coroutine."""
@@ -180,7 +180,8 @@ class I8751Twin(Twin):
 
     @property
     def _dwell_replies(self) -> tuple[bytes, bytes]:
-        """To the mark of a wait, which stands where a motor's number could, and to its seconds."""
+        """Replies to the mark of a wait, which stands where a motor's number could, and to its
+        seconds."""
         if self._choices.dwell_reply == "none":
             return b"", b""
         mark = STORED if self._choices.dwell_reply == "M" else self._choices.motor_reply.encode()

@@ -252,14 +252,14 @@ class I8751Conversation(PacketByPacket):
         stream = b"".join(packet.data for packet in packets)
         self._replies = [part.replies for part in _parts(stream, machine)]
         self._known = machine.dialect.motor_reply + "M"
-        self._at = 0  # the byte of the packet that is out
+        self._at = 0  # index of the byte that was sent last
         self._said = ""
         self._tries = 0
         self._written = 0.0
 
     @property
     def is_still(self) -> bool:
-        """True as for other packets, unless it may still seek its origin."""
+        """True as for other conversations, unless the machine may still seek its origin."""
         return super().is_still and not (self._seeks_origin and self.done == 0)
 
     @property

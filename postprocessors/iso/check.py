@@ -396,7 +396,7 @@ class _Check:
                     f"write {own[wrong[0]]}{{{wrong[0]}}}",
                 )
 
-    # What is alike, and what must not appear
+    # Events with equal blocks, and signs that must not appear
 
     def _check_apart(self) -> None:
         """Refuse two events with the same blocks: the reader could not tell them apart."""

@@ -353,7 +353,7 @@ class _Reader:
             for word in passed:
                 if not is_fixed:
                     self._passed[word.code] = self._passed.get(word.code, 0) + 1
-            # What belongs to a word that nobody knows is not known either.
+            # Words that belong to an unknown word have no known meaning either.
             words = [each for each in words if each.letter in "GM" and each not in passed]
         _Execution(self, block, words).run()
         return 1

@@ -184,7 +184,7 @@ def _see_words(
         decimals = max(max(behind), 1)
         inches = _has(lines, "G", 20.0)
         keeps_zeros = sum(count == decimals for count in behind) >= ENOUGH * len(behind)
-        if not keeps_zeros:  # then the last decimals may be zeros that are not there
+        if not keeps_zeros:  # then trailing zeros may have been dropped
             decimals = max(decimals, 4 if inches else 3)
         key = "dialect.words.inch_decimals" if inches else "dialect.words.decimals"
         sample.say(key, min(decimals, 6), f"of {len(pointed)} lengths")

@@ -47,7 +47,7 @@ class Canon(PartMoves):
 
     @property
     def moves(self) -> int:
-        """Rows so far that are no events."""
+        """Number of rows so far that are moves, not events."""
         return len(self.path) - self._events
 
     def event(self, kind: Kind, value: float | None = None) -> None:

@@ -88,7 +88,7 @@ class Compensation:
         """End the queued moves where the cutter's centre is, since the machine stops here."""
         self._end_at(centre[0], centre[1])
 
-    # Moves; each gives where the cutter's centre comes to stand
+    # Moves; each returns where the cutter's centre ends
 
     def line(self, kind: Kind, target: list[float], centre: list[float]) -> list[float]:
         """Queue a straight move to a programmed point, from `centre`, where the cutter's centre

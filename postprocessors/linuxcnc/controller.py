@@ -431,7 +431,7 @@ class _Profile(Struct, frozen=True, eq=False):
         reach, length = np.append(corners.reach, 0.0), moves.length[move]
         first, last = np.append(corners.reach_on, 0.0)[move], reach[move + 1]
         move_s = self.own_s + self.begin_s + self.end_s
-        moment_s = move_s[move] * along / length  # evenly, where blends leave nothing of the move
+        moment_s = move_s[move] * along / length  # in proportion, if blends use up the whole move
         planned = np.flatnonzero(self.block[move] >= 0)
         one, block = move[planned], self.block[move[planned]]
         way_mm = np.maximum(along - first, 0.0)[planned]
@@ -662,7 +662,7 @@ def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
     length of each row with the end that `merge_rows` gives it."""
     length, begins = np.zeros(len(path)), [np.zeros(1, dtype=np.int32)]
     low, end = 0, 2 * len(path)
-    at_once = max(ROWS_AT_ONCE, MAX_CHAIN_POINTS + 2)  # more than one line has
+    at_once = max(ROWS_AT_ONCE, MAX_CHAIN_POINTS + 2)  # more rows than one merged line can have
     while low < end:
         base = low // 2
         part = path.part(base, min(base + at_once, len(path)))
@@ -672,7 +672,7 @@ def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
         place[1:] += np.diff(origin) == 0
         part, origin, place = part.part(low % 2, len(part)), origin[low % 2 :], place[low % 2 :]
         part, chain = merge_rows(part, modes.merging_mm(part.mode))
-        # The last line may go on.
+        # The last line may continue in the next part.
         rows = len(part) if ends_here else int(np.searchsorted(chain, chain[-1]))
         own_length = move_lengths(part)[:rows]
         lasting = np.bincount(chain[:rows], own_length) > 0.0
@@ -978,10 +978,10 @@ class Bends(Struct, frozen=True, eq=False):
 def corners_of(moves: PlannerMoves, tangents: Tangents, rules: CornerRules) -> PlannerCorners:
     """Return the speed, overlap or blend at the start of each move."""
     bends = Bends(
-        tangents.at_ends(np.roll(moves.row, 1)),  # nothing comes of that before the first
+        tangents.at_ends(np.roll(moves.row, 1)),  # the first has no effect
         tangents.at_starts(moves.row),
     )
-    used_mm = np.zeros(len(moves.length))  # of each move, by the blend at its start
+    used_mm = np.zeros(len(moves.length))  # length of each move used by the blend at its start
     lines = ~moves.is_arc & (moves.same_kind | ~moves.cuts)
     joinable = lines
     for _ in range(MAX_ROUNDS):
@@ -1147,7 +1147,7 @@ def _overlap(
     lengths = moves.length[rows - 1], moves.length[rows]
     overall = LAST_PART * moves.acceleration[rows]
     overlaps = _overlaps(moves, tangents, rows, (one, other), lengths, overall, rules.modes)
-    # While the first comes to rest, the second begins as from rest, whatever its share was.
+    # While the first comes to rest, the second starts from rest, whatever its speed at the corner.
     seconds = overlaps.first / one
     reached = np.minimum(moves.speed[rows], seconds * other)
     corners.overlap[rows], corners.ramp[rows] = seconds, reached / other / seconds

@@ -159,7 +159,7 @@ def _bound(
         subject = "its pecks" if by_pecks else "the repeats of this cycle"
         mend = "write a larger Q" if by_pecks else bounds.SPLIT_PROGRAM
         raise LineFault(too_many(subject), "q" if by_pecks else "l", mend)
-    strokes = int(times * pecks)  # each takes as long as a line
+    strokes = int(times * pecks)  # each takes as long to simulate as a line
     if strokes > machine.most_lines:
         raise LineFault(
             f"a cycle of more than {machine.most_lines} strokes",

@@ -69,7 +69,7 @@ class Scanner:
     def number(self) -> float:
         """Read a plain number."""
         match = NUMBER.match(self.text, self.at)
-        assert match is not None  # it matches nothing too
+        assert match is not None  # the pattern also matches an empty text
         text = match[0]
         if _PLAIN.fullmatch(text) is None:
             raise LineFault(f"{text!r} is no number" if text else "no number", self.at)

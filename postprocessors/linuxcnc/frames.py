@@ -208,7 +208,7 @@ class FrameCodes(InterpreterState, ABC):
             if axis in words:
                 self.notes.axes.setdefault(axis.upper(), self.block_index)
         if number == self._frame:
-            # LinuxCNC turns the position without its G92 offset here, as this does.
+            # As in LinuxCNC, the position is rotated here without its G92 offset.
             x, y = rotate(self.position[0], self.position[1], self._rotation)
             self.position[:] = [
                 x + self._origin[0],

@@ -316,7 +316,7 @@ def group_words(items: list[Item], comment: str | None) -> LinuxcncBlock:
             group = G_GROUPS[code]
             before = g.get(group)
             if before is not None and code == 800:
-                continue  # G80 beside another motion word counts for nothing
+                continue  # G80 beside another motion word is ignored
             if before not in (None, 800):
                 raise LineFault(f"two G words of one group ({group})", item.at)
             g[group] = code

@@ -279,7 +279,7 @@ def _lengths(mounted: list[Mounted], path: Toolpath) -> Iterator[Finding]:
     ]
     if len({each.tool for each in cutting}) < 2:
         return
-    # What is off by the same length for all tools is part of where the zero was set.
+    # An error that is equal for all tools was compensated when the zero was set.
     errors = [each.own_mm - each.length_mm for each in cutting if each.own_mm is not None]
     spread = max(errors) - min(errors) if errors else 0.0
     if spread > LENGTHS_EQUAL_MM:

@@ -68,24 +68,24 @@ class LinuxcncTwin(Twin):
         self._link = machine.link
         self._estop, self._on = choices.power == "estop", choices.power != "estop"
         self._homed = choices.power == "ready"
-        self._zero: Floats = np.zeros(3)  # of the work frame, on the machine
+        self._zero: Floats = np.zeros(3)  # zero of the work frame on the machine
         self._mode, self._status = "MANUAL", "IDLE"
         self._file, self._program = "", b""
         self._error = ""
-        self._steps = False  # whether the program stops behind each line
-        self._travel: Travel | None = None  # of the whole program
-        self._done = 0  # so many of its outputs have been made
-        self._since = 0.0  # and so much of its time is over
-        self._line_ends: Floats = np.empty(0)  # when each line is over, s of the program
+        self._steps = False  # True if the program stops after each line
+        self._travel: Travel | None = None  # motion of the whole program
+        self._done = 0  # number of its outputs made so far
+        self._since = 0.0  # time of it that has passed, s
+        self._line_ends: Floats = np.empty(0)  # end of each line, s from the start of the program
         self._lines: Ints = np.empty(0, dtype=np.int64)
-        self._halts: list[float] = []  # where it waits, s of the program
+        self._halts: list[float] = []  # times at which it waits, s from the start of the program
         self._segment_s = 0.0
         self._homing = False
         self._overrides = {"feed": 100, "spindle": 100}
-        self._jogs: dict[int, float] = {}  # axes that are being jogged, and their speeds, mm/s
-        self._target: Floats = np.zeros(3)  # of the jogs
+        self._jogs: dict[int, float] = {}  # jogged axes and their speeds, mm/s
+        self._target: Floats = np.zeros(3)  # ends of the jogs
         self._choices = choices
-        self._queue: list[str] = []  # lines of MDI that wait for the one that moves
+        self._queue: list[str] = []  # MDI lines that wait for the current one
         self._display = ""
         self._parameters = dict.fromkeys(range(5061, 5071), 0.0)
         self.read_file: Callable[[str], bytes] = lambda name: Path(name).read_bytes()

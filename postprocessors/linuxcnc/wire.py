@@ -138,7 +138,7 @@ class LinuxcncWire(Wire):
             if has_words(line) and len(packets) < len(forecast):
                 block = len(packets)
                 seconds = float(forecast.seconds[block])
-                # Where lines are executed again, none is done for certain before the end.
+                # If lines are executed repeatedly, none is certainly done before the end.
                 counts = (number if steady else 0,)
                 waits = bool(_WAITS.search(_COMMENT.sub("", line)))
                 note = "; ".join(filter(None, notes)) if waits else ""
@@ -236,13 +236,13 @@ class LinuxcncConversation(Conversation):
         }
         self._script, self._fresh = self._session(acts[action]), True
         self._rest, self._asked, self._now = b"", "", 0.0
-        self._zero_mm: Place | None = None  # part zero of its frame, from machine zero
+        self._zero_mm: Place | None = None  # zero of the work frame from machine zero
         self._skips = ""
         """Answers that begin otherwise are passed over."""
         self._begun = self._aborting = self._pausing = self._going_on = False
         self._changes: dict[Override, int] = {}
         """Overrides that it is to be told, %."""
-        self._passed = -1  # the last stop behind which it has gone on
+        self._passed = -1  # last stop that it has passed
         self._taken: dict[Override, int] = {}
         """Overrides that it has taken, %."""
         self._why_aborted = ""
@@ -251,7 +251,7 @@ class LinuxcncConversation(Conversation):
         self._ends = np.cumsum([packet.seconds for packet in packets])
         self._lines = [packet.counts[0] for packet in packets]
 
-    # What the user wants; the script looks at it at its next turn.
+    # Requests of the user; the script carries them out when it next may send.
 
     def begin(self, now: float) -> None:
         """Greet the server."""
@@ -349,7 +349,7 @@ class LinuxcncConversation(Conversation):
         """Run the script to its next wait."""
         self._now = now
         try:
-            # A script that begins has asked nothing yet, whatever was answered to another.
+            # A new script has asked nothing yet: an answer now belongs to the script before.
             was_fresh, self._fresh = self._fresh, False
             step = self._script.send(cast(str, None if was_fresh else answer))
         except StopIteration:
@@ -534,7 +534,7 @@ class LinuxcncConversation(Conversation):
             self.state, self.why = (
                 WireState.SENDING,
                 "",
-            )  # somebody has let it go on at the machine
+            )  # somebody has resumed it at the machine
 
     def _count_done(self, text: str, ran: float) -> None:
         """Count the lines before the reported one as done, as far as the simulated time allows

@@ -30,7 +30,7 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
     """Return the program of a toolpath; PostError names the move that cannot be written or
     done."""
     dialect, unit = machine.dialect, UNITS[machine.dialect.units]
-    # The length in force goes with the tool in the spindle, and with a zero set by that tool.
+    # The length in force belongs to the tool in the spindle, as does a zero set with that tool.
     no_length = "" if dialect.tool_lengths else " G49"
     is_lathe = machine.spindle.turns == "work"
     plane = "G18 G8" if is_lathe else "G17"

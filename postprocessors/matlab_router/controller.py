@@ -153,7 +153,7 @@ class _Run:
         self.standing_s = np.cumsum(self._lines.extra_s)
         """(R,) s that rows up to each take besides its ticks."""
         self._mechanics = Mechanics(machine, path.start, options.effects)
-        # Slides with the same backlash everywhere go the same way, whatever was between two turns.
+        # With even backlash the slide does not depend on what lies between two reversals.
         thin = (path.kind[: self._rows] == Kind.RAPID) & (
             not options.rapids and self._mechanics.even
         )
@@ -198,7 +198,7 @@ class _Run:
             lines: list[int] = []
             parts: list[tuple[Floats, ...]] = []
             while len(rows) < TICKS_AT_ONCE and not is_done:
-                # Motors coast after their order; that is part of it, up to the next one.
+                # Motors coast after their line; that belongs to it, up to the next one.
                 line = int(self._state.clock[1])
                 since = tick + 1.0 - float(self._state.begin[0])
                 if line == len(orders) or since <= 0.0:
@@ -545,7 +545,7 @@ def _link(header: Bools, first: Ints, rows: int, router: MatlabRouterController)
     return extra
 
 
-# The machine's record as the arrays that the kernel runs on.
+# The machine's numbers as arrays for the kernel.
 
 TICK_S = 0.005
 """The slaves' timer: (65536 − 53036) · 2 / 5 MHz (L2757)."""

@@ -68,7 +68,7 @@ class MatlabRouterTwin(Twin):
         choices: MatlabRouterTwinSettings,
     ) -> None:
         super().__init__(Slides(machine))
-        # What the numbers take on their way they have taken already when a job begins.
+        # When a job begins here, the time of transmitting its numbers has passed already.
         at_once = replace(machine.controller, header_pause_s=0.0, number_pause_s=0.0)
         self._machine = replace(machine, controller=at_once)
         self._choices, self._dialect = choices, dialect_of(machine)

@@ -170,7 +170,7 @@ class MatlabRouterConversation(PacketByPacket):
         self._pauses = router.header_pause_s, router.number_pause_s
         self._margin_s = self._link.margin_s * manner.late_s / LATE_S
         self._left: list[bytes] = []
-        self._count = 0  # how many numbers of the job are out
+        self._count = 0  # numbers of the job sent so far
         self._echo = b""
         """Rest of the expected echo of the last number."""
         self._echoes = False

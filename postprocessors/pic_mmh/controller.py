@@ -88,8 +88,8 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
         return super().timed(toolpath, machine, options_by_pass(machine, options))
 
     def clock(self, toolpath: Toolpath, machine: _Machine) -> SampleClock:
-        """Return the clock of the samples: outputs one period apart, and behind them the steps
-        that compensate backlash, by region too."""
+        """Return the clock of the samples: outputs one period apart, with the steps that
+        compensate backlash, by region too."""
         added = None
         if machine.controller.compensates_by_region:
             added = np.zeros((len(toolpath), 3), dtype=np.int64)

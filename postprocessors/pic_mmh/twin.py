@@ -76,10 +76,10 @@ class PicMmhTwin(Twin):
         self._given, self._machine, self._choices = machine, machine, choices
         self._model = PicMmhModel()
         self._vector = bytearray()
-        self._said: Floats = np.zeros(3)  # the last end that a block gave, mm from part zero
-        self._zero: Floats = np.zeros(3)  # part zero, mm from where it was at first
+        self._said: Floats = np.zeros(3)  # last programmed end, mm from part zero
+        self._zero: Floats = np.zeros(3)  # part zero, mm from its first place
         self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-        self._joystick: tuple[Ints, float] | None = None  # what runs on until it is stopped
+        self._joystick: tuple[Ints, float] | None = None  # motion that runs until it is stopped
         self._joystick_hz = JOYSTICK_HZ
 
     def _wake(self) -> None:
@@ -138,7 +138,7 @@ class PicMmhTwin(Twin):
             end[unsaid] = self._said[unsaid]
             last_end, self._said = self._said, end.copy()
             if kind <= Kind.LINE and (end[:2] == last_end[:2]).all():
-                end[:2] = start[:2]  # what is to stay where it is stays where an arc has left it
+                end[:2] = start[:2]  # no line: stay where an arc has stopped
         else:
             at_home = [kind == Kind.HOME_XY] * 2 + [kind == Kind.HOME_Z]
             home = np.array(self._machine.controller.machine_zero_mm)

@@ -266,10 +266,10 @@ class PicMmhConversation(PacketByPacket):
             )
         self._play_s = _reverses_s(machine)
         self._reverses_s = max(self._play_s)
-        self._unsure_s = 0.0  # how long the packet may make up for the play of earlier motion
+        self._unsure_s = 0.0  # time the packet may need to take up play
         self._echo = b""
         self._count = 0
-        self._over = 0.0  # when the time of the block is over
+        self._over = 0.0  # end of the simulated time of the block
         self._halting = False
         self._step_mm = [axis.coded_step_mm for axis in machine.axes]
         self._play_steps = [
@@ -278,13 +278,13 @@ class PicMmhConversation(PacketByPacket):
             else 0
             for axis in machine.axes
         ]
-        self._base_mm: Place | None = None  # where the counts began
+        self._base_mm: Place | None = None  # place from which steps are counted
         self._counts = [0, 0, 0]
-        self._senses = [0, 0, 0]  # of the last step of each axis
-        self._silent_steps = [0, 0, 0]  # reports of compensation that are still to come
-        self._halt_byte = b""  # a byte that may be the first of A;, or a step
-        self._ends = 0  # how many ; are to come back until A; has
-        self._told = 0.0  # when A; was written last
+        self._senses = [0, 0, 0]  # direction of the last step of each axis
+        self._silent_steps = [0, 0, 0]  # reports of compensation still to come
+        self._halt_byte = b""  # a byte that may begin A; or report a step
+        self._ends = 0  # number of ; to come back, the one of A; included
+        self._told = 0.0  # time at which A; was last sent
         self._count_from(manner.at_mm)
 
     def _count_from(self, place_mm: Place | None) -> None:
@@ -333,7 +333,7 @@ class PicMmhConversation(PacketByPacket):
     def _moves(self, now: float) -> None:
         """Record that the block has been accepted and is executed from now on."""
         packet = self.packets[self.sent - 1]
-        # In which sense an axis moved before the program, nobody knows.
+        # The direction of an axis before the program is not known.
         unmoved = zip(self._play_s, self._senses, strict=True)
         self._unsure_s = sum(seconds for seconds, sense in unmoved if not sense)
         self._over = now + packet.seconds
@@ -504,10 +504,10 @@ class PicMmhTerminal(Terminal):
         assert isinstance(link, PicMmhLink)
         self._link, self.answers = link, link.echo == "echo"
         self._reverses_s, self._hz = max(_reverses_s(machine)), _by_hand_hz(machine)
-        self._left = 0  # steps of PX that are still to be reported
-        self._ends = 0  # how many ; are to come back until A; has
-        self._steps: list[tuple[str, int]] = []  # kinds of outputs and how many of each
-        self._echo = b""  # what is to come back: letters are bytes of steps too
+        self._left = 0  # steps of PX still to be reported
+        self._ends = 0  # number of ; to come back, the one of A; included
+        self._steps: list[tuple[str, int]] = []  # kinds of outputs, each with its number
+        self._echo = b""  # expected echo: its letters could also report steps
 
     def encode(self, line: str) -> bytes:
         """Return the bytes of a typed line with its end."""
@@ -519,7 +519,7 @@ class PicMmhTerminal(Terminal):
         match, reports = _STEPS.fullmatch(data), self._link.step_byte != "none"
         self._left = int(match[1]) if match and reports else 0
         self.due = int(self._left > 0)
-        # In front of steps in the other sense there are those of compensation.
+        # Steps of compensation come before steps in the other direction.
         self.rests_s = self._reverses_s if data[:1] in (b"G", b"H", b"P") else 0.0
         if match and reports:
             self.rests_s = 0.0

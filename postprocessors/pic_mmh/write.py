@@ -77,10 +77,10 @@ class _Writer:
         self._wanted = toolpath
         self._changes = WriterChanges()
         check_motion(toolpath, machine)
-        # Refuses by the numbers of the rows that were given, before these are lowered.
+        # Refuse by the numbers of the given rows, before they are lowered.
         numbers = numbers_of(toolpath, machine, dialect)
         self._feed_finding, grid = numbers.feed_finding, numbers.grids[0]
-        del numbers  # as large as the toolpath
+        del numbers  # free it: it is as large as the toolpath
         lowered_path = self._lower(grid)
         self._toolpath, self._row = lowered_path.toolpath, lowered_path.row
         self._numbers = numbers_of(lowered_path.toolpath, machine, dialect)
@@ -115,7 +115,7 @@ class _Writer:
 
     @property
     def _grid(self) -> UnitGrid:
-        """X and Y are alike wherever arcs and their lines are concerned."""
+        """Grid of X and Y, which are alike where there are arcs or lines that replace arcs."""
         return self._numbers.grids[0]
 
     def blocks(self) -> tuple[bytes, Ints]:

@@ -89,7 +89,7 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
         start = pieces.in_steps(toolpath.start) * step_mm
         end = toolpath.by_parts(lambda part: pieces.in_steps(part.end) * step_mm)
         rounded = replace(toolpath, start=start, end=read_only(end))
-        # Arcs of less than a step: their ends may have become one point, and they a circle.
+        # Rounding may have made the ends of an arc below a step equal, and it a full circle.
         arcs = np.flatnonzero(toolpath.is_arc)
         closed = (rounded.end[arcs] == rounded.starts_of(arcs))[:, :2].all(axis=1)
         vanished = arcs[closed & (np.abs(toolpath.sweeps_of(arcs)) < np.pi)]

@@ -224,7 +224,7 @@ class ValcncConversation(PacketByPacket):
         self._margin_s = link.margin_s * manner.late_s / LATE_S
         self._said = b""
         self._awaits = self._answered = False
-        self._over = 0.0  # when the time of the block is over
+        self._over = 0.0  # end of the simulated time of the block
         self.place_mm = manner.at_mm
         if not self._answer:
             self.stands = (
@@ -237,7 +237,7 @@ class ValcncConversation(PacketByPacket):
 
     def _send(self, packet: Packet, now: float) -> None:
         self._write(packet.data)
-        self._awaits = bool(self._answer) and packet.block >= 0  # what C is answered is not known
+        self._awaits = bool(self._answer) and packet.block >= 0  # the answer to C is not known
         self._answered = False
         self._over = now + len(packet.data) * BITS / (ValcncWire.baud or 1) + packet.seconds
         if not self._awaits:
