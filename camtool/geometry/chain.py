@@ -95,15 +95,15 @@ def chain(
 
     chosen_joints = joints(paths.ends, max(gap_mm, POSITION_EPS_MM))
     is_single = lines.closed | (chosen_joints.mates.reshape(-1, 2) < 0).all(axis=1)
-    lots = join_chains(lines, Chains(*walk(chosen_joints.mates, ~is_single)))
-    result, members = _sorted_chains(lines, np.flatnonzero(is_single), lots)
+    batches = join_chains(lines, Chains(*walk(chosen_joints.mates, ~is_single)))
+    result, members = _sorted_chains(lines, np.flatnonzero(is_single), batches)
     first = np.array([member_paths[0] for member_paths in members], dtype=np.int64)
     result_ends = Ends.of(result, paths.ends.group[first], paths.ends.style[first])
     names = [paths.layers[index] for index in first.tolist()]
     return Chained(
         lines=result,
         members=members,
-        closed_gaps=tuple(_closed_gaps(lots, paths.layers)),
+        closed_gaps=tuple(_closed_gaps(batches, paths.layers)),
         open_gaps=tuple(open_gaps(result_ends, path_lengths(result), names, gap_mm)),
         branches=chosen_joints.named(paths.ends, paths.layers, members, result.closed),
     )
@@ -124,31 +124,31 @@ def _single_members(paths: Ints) -> tuple[tuple[int, ...], ...]:
 
 
 def _sorted_chains(
-    lines: Polylines, single: Ints, lots: Sequence[JoinedChains]
+    lines: Polylines, single: Ints, batches: Sequence[JoinedChains]
 ) -> tuple[Polylines, tuple[tuple[int, ...], ...]]:
     """Return the single paths and all chains in the order of their first members, and the members
     of each."""
-    if not lots:
+    if not batches:
         return lines, _single_members(single)
     members = list(_single_members(single))
     first_members = [single]
-    for joined_lot in lots:
-        paths = joined_lot.chains.entries // 2
-        begins = joined_lot.chains.begins.tolist()
+    for joined_batch in batches:
+        paths = joined_batch.chains.entries // 2
+        begins = joined_batch.chains.begins.tolist()
         flat = paths.tolist()
         members.extend(tuple(flat[a:b]) for a, b in pairwise(begins))
-        first_members.append(np.minimum.reduceat(paths, joined_lot.chains.begins[:-1]))
+        first_members.append(np.minimum.reduceat(paths, joined_batch.chains.begins[:-1]))
     order = np.argsort(np.concatenate(first_members), kind="stable")
     every_path = Polylines.joined(
-        [lines.select(single), *(joined_lot.lines for joined_lot in lots)]
+        [lines.select(single), *(joined_batch.lines for joined_batch in batches)]
     )
     return every_path.select(order), tuple(members[index] for index in order.tolist())
 
 
-def _closed_gaps(lots: Sequence[JoinedChains], layers: Sequence[str]) -> list[Gap]:
+def _closed_gaps(batches: Sequence[JoinedChains], layers: Sequence[str]) -> list[Gap]:
     """Return the gaps that were bridged, in the order of the first members of their chains."""
     numbered_gaps: list[tuple[int, Gap]] = []
-    for batch in lots:
+    for batch in batches:
         paths = batch.chains.entries // 2
         first_members = (
             np.minimum.reduceat(paths, batch.chains.begins[:-1]) if len(batch.chains) else paths

@@ -210,7 +210,7 @@ class Drawing:
             return FitError()
         rows = segment_rows(self.paths)
         largest, rms = self.off_mm[rows].T
-        length = np.concatenate([segment_lengths(lot) for lot in Segments.lots(self.paths)])
+        length = np.concatenate([segment_lengths(batch) for batch in Segments.batches(self.paths)])
         length[largest == 0.0] = 0.0
         total_length = float(length.sum())
         if not total_length:

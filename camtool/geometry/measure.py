@@ -25,7 +25,7 @@ SHALLOW_BULGE = 1e-3
 def path_lengths(lines: Polylines) -> Floats:
     """Return the length (M,) of each path, mm."""
     lengths = np.zeros(len(lines))
-    for segments in Segments.lots(lines):
+    for segments in Segments.batches(lines):
         np.add.at(lengths, segments.path, segment_lengths(segments))
     return lengths
 
@@ -49,7 +49,7 @@ def signed_areas(lines: Polylines) -> Floats:
     rows = np.flatnonzero(lines.closed)
     areas, lines = np.zeros(len(lines)), lines.select(rows.tolist())
     inside = np.zeros(len(lines))
-    for segments in Segments.lots(lines):
+    for segments in Segments.batches(lines):
         # Areas are taken about the first point of each path, so that far drawings lose no digits.
         anchors = lines.vertices[lines.offsets[segments.path], :2]
         start, end = segments.start - anchors, segments.end - anchors
@@ -120,7 +120,7 @@ def path_extents(lines: Polylines) -> Floats:
     arcs."""
     low = np.full((len(lines), 2), np.inf)
     high = np.full((len(lines), 2), -np.inf)
-    for segments in Segments.lots(lines):
+    for segments in Segments.batches(lines):
         boxes = segment_boxes(segments)
         np.minimum.at(low, segments.path, boxes[:, :2])
         np.maximum.at(high, segments.path, boxes[:, 2:])

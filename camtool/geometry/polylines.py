@@ -208,7 +208,7 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
         return cls.leaving(lines, segment_rows(lines))
 
     @classmethod
-    def lots(cls, lines: Polylines) -> Iterator[Segments]:
+    def batches(cls, lines: Polylines) -> Iterator[Segments]:
         """Yield all segments of the paths, in order, in batches of at most SEGMENTS_AT_ONCE."""
         rows = segment_rows(lines)
         for first in range(0, len(rows), SEGMENTS_AT_ONCE):
@@ -303,7 +303,7 @@ def _check_vertices(vertices: Floats, offsets: Ints, closed: Bools | list[bool])
         array[:, 2] = bulge
     array.flags.writeable = False
     lines = Polylines._trusted(array, offsets, is_closed)
-    is_short = np.concatenate([np.empty(0, np.bool_), *map(_is_short, Segments.lots(lines))])
+    is_short = np.concatenate([np.empty(0, np.bool_), *map(_is_short, Segments.batches(lines))])
     if is_short.any():
         repeated = np.zeros(len(array), dtype=np.bool_)
         repeated[segment_rows(lines)] = is_short

@@ -177,7 +177,7 @@ def without_tiny(lines: Polylines, limit_mm: float) -> MergedPaths:
     A path of which too little would remain stays as it is.
     """
     has_short = np.zeros(len(lines), dtype=np.bool_)
-    for segments in Segments.lots(lines):
+    for segments in Segments.batches(lines):
         has_short[segments.path[segment_lengths(segments) <= limit_mm]] = True
     if not has_short.any():
         return MergedPaths(lines, 0)

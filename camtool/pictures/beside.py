@@ -123,7 +123,9 @@ def _views(contents: Sequence[Content], options: PictureOptions) -> tuple[PanelG
     bar = 0.0
     for _ in range(2):
         grid = grid_of(heads, columns, page, bar)
-        views = [fitted(window, top + HEAD_GAP, grid.width, shapes)[0] for top in grid.downs]
+        views = [
+            fitted(window, top + HEAD_GAP, grid.width, shapes)[0] for top in grid.head_bottoms
+        ]
         grid = grid.with_bodies(HEAD_GAP + views[0].box.height + NUMBERS_FOOT)
         if scale is not None:
             bar = colour_bar_width(scale, grid.around([view.box for view in views]).height)
@@ -193,7 +195,7 @@ def _polars(scenes: Sequence[Scene], number: int, options: PictureOptions) -> st
     grid = grid_of(heads, columns, page).with_bodies(2.0 * (dial.outer + ROOM))
     panels = [
         [head, *plot(shown, dial.centred_below(top, width))]
-        for shown, head, top in zip(errors, grid.heads, grid.downs, strict=True)
+        for shown, head, top in zip(errors, grid.heads, grid.head_bottoms, strict=True)
     ]
     entries = list(dict.fromkeys(entry for circles in plots for entry in polar.entries(circles)))
     below, foot = legend_below(entries, grid.rows[-1], page)
@@ -217,22 +219,22 @@ Head = tuple[str, Sequence[str]]
 class PanelGrid(Struct, frozen=True):
     """A grid of panels of `width`, margins included, in `columns` on a page of width `page`.
 
-    `heads` are the SVG of titles and notes, `downs` the page heights at which the heads of each
-    panel's row end, `rows` the page heights at which the rows begin.
+    `heads` are the SVG of titles and notes, `head_bottoms` the heights in each panel at which the
+    heads of its row end, `rows` the page heights at which the rows begin.
     """
 
     columns: int
     page: float
     width: float
     heads: tuple[str, ...]
-    downs: tuple[float, ...]
+    head_bottoms: tuple[float, ...]
     rows: tuple[float, ...] = ()
 
     def with_bodies(self, height: float) -> PanelGrid:
         """Return the grid with the heights of its rows, given the height of a panel below its
         head."""
         rows = [0.0]
-        for top in self.downs[:: self.columns]:
+        for top in self.head_bottoms[:: self.columns]:
             rows.append(rows[-1] + top + height)
         return replace(self, rows=tuple(rows))
 
@@ -292,6 +294,6 @@ def grid_of(heads: Sequence[Head], columns: int, page: float, bar: float = 0.0) 
     stays free for the colour bar."""
     width = panel_width(columns, page - bar)
     drawn = [title_and_notes(title, notes, width, lines=TITLE_LINES) for title, notes in heads]
-    downs = [bottom for _, bottom in drawn]
-    lowest = [max(downs[k - k % columns :][:columns]) for k in range(len(downs))]
+    head_bottoms = [bottom for _, bottom in drawn]
+    lowest = [max(head_bottoms[k - k % columns :][:columns]) for k in range(len(head_bottoms))]
     return PanelGrid(columns, page, width, tuple(head for head, _ in drawn), tuple(lowest))

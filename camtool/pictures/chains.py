@@ -282,26 +282,26 @@ def chains_box(chains: Sequence[Chain]) -> Floats | None:
     if not chains:
         return None
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for lot in _lots(chains):
-        boxes = segment_boxes(_halved(lot))
+    for batch in _batches(chains):
+        boxes = segment_boxes(_halved(batch))
         low = np.minimum(low, boxes[:, :2].min(axis=0))
         high = np.maximum(high, boxes[:, 2:].max(axis=0))
     return np.column_stack([low, high])
 
 
-def _lots(chains: Iterable[Chain]) -> Iterator[list[Chain]]:
+def _batches(chains: Iterable[Chain]) -> Iterator[list[Chain]]:
     """Yield all moves of the chains as lists of open chains, about MOVES_AT_ONCE moves in each."""
-    lot: list[Chain] = []
+    batch: list[Chain] = []
     count = 0
     for chain in chains:
         for _, part in chain.parts():
-            lot.append(part)
+            batch.append(part)
             count += len(part.sweep)
             if count >= MOVES_AT_ONCE:
-                yield lot
-                lot, count = [], 0
-    if lot:
-        yield lot
+                yield batch
+                batch, count = [], 0
+    if batch:
+        yield batch
 
 
 def _halved(chains: Sequence[Chain]) -> Segments:

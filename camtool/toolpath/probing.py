@@ -232,14 +232,15 @@ def _zero(
 
 
 def plate(start: Place, how: Touch, thickness_mm: float) -> Measured:
-    """Touch a plate of this thickness that lies on the part: its lower side becomes Z0."""
+    """Touch a plate of this thickness that lies on the part. If zero is set, the lower side of the
+    plate becomes Z0."""
     top = yield from touch(start, "z", -1, how)
     yield from _zero(start, {"z": top - thickness_mm}, how)
     return {"top_z_mm": top, "z_mm": top - thickness_mm}
 
 
 def edge(start: Place, axis: Axis, sense: int, how: Touch) -> Measured:
-    """Touch a side of a part from beside it: the side becomes 0 of that axis."""
+    """Touch a side of a part from beside it. If zero is set, the side becomes 0 of that axis."""
     place = yield from _side(start, axis, sense, how)
     yield from _zero(start, {axis: place}, how)
     return {f"{axis}_mm": place}
@@ -261,7 +262,8 @@ def corner(
     *,
     is_inside: bool = False,
 ) -> Measured:
-    """Touch the two sides of a corner, in the direction `senses` of X and of Y.
+    """Touch the two sides of a corner, in the direction `senses` of X and of Y. If zero is set,
+    the corner becomes X0 Y0.
 
     Outside, the tool stands diagonally beyond the corner, and goes `along_mm` along each side
     before it touches it; inside (a pocket, a fence) both sides are touched from where it stands.
@@ -283,8 +285,8 @@ def corner(
 
 
 def bore(start: Place, how: Touch) -> Measured:
-    """Touch a bore at four places from within, X again through the centre: its centre becomes X0
-    Y0, and the tool stands there."""
+    """Touch a bore at four places from within, X again through the centre, and go to its centre.
+    If zero is set, that becomes X0 Y0."""
     x, y, z = start
     x, _ = yield from _middle((x, y, z), "x", how)
     yield from _guard({"x": x}, how)
@@ -317,7 +319,8 @@ def _middle(
 
 
 def boss(start: Place, how: Touch, size_mm: float, clear_mm: float, depth_mm: float) -> Measured:
-    """Touch a boss about `size_mm` wide at four places from outside: its centre becomes X0 Y0.
+    """Touch a boss about `size_mm` wide at four places from outside. If zero is set, its centre
+    becomes X0 Y0.
 
     The tool stands free above its centre. It goes out beyond each side by `clear_mm`, and down by
     `depth_mm`; X is touched again through the centre, and the tool ends above it.

@@ -99,7 +99,7 @@ class Tags(ABC):
 
     def pairs(self, rows: Ints) -> Iterator[tuple[int, Any]]:
         """Yield the group code and the value of each of these tags."""
-        for part in lots(rows):
+        for part in batches(rows):
             yield from zip(self.codes[part].tolist(), self.values(part), strict=True)
 
     def where(self, row: int) -> str:
@@ -118,7 +118,7 @@ class Tags(ABC):
         return list(self.values(self.marks))
 
 
-def lots(rows: Ints) -> Iterator[Ints]:
+def batches(rows: Ints) -> Iterator[Ints]:
     """Return an iterator over the rows in batches of AT_ONCE."""
     return (rows[first : first + AT_ONCE] for first in range(0, len(rows), AT_ONCE))
 
@@ -164,13 +164,13 @@ class TextTags(Tags):
     def raw(self, rows: Ints) -> Iterator[bytes]:
         """Yield the bytes of the lines that hold the values of these tags."""
         data = self.data
-        for part in lots(rows):
+        for part in batches(rows):
             ends = zip(self.at[2 * part + 1].tolist(), self.at[2 * part + 2].tolist(), strict=True)
             yield from [data[begin : end - 1] for begin, end in ends]
 
     def values(self, rows: Ints) -> Iterator[str]:
         """Yield the values of these tags as text."""
-        for part in lots(rows):
+        for part in batches(rows):
             texts = [
                 line.decode(self.encoding, "surrogateescape").rstrip("\r")
                 for line in self.raw(part)
