@@ -113,7 +113,7 @@ __all__ = [
 # Drawings, jobs and programs from files.
 
 BYTES = "<bytes>"
-"""The name in messages of a program that was given as bytes."""
+"""The name in messages for a program that was given as bytes."""
 
 
 def _patterns(patterns: str | Sequence[str]) -> tuple[str, ...]:

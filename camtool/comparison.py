@@ -49,10 +49,10 @@ EFFECTS = ("play", "compensation", "scale", "squareness", "repeatability")
 """The parts of the mechanics that can be left out."""
 
 AXES_OF = {"backlash": "backlash_mm", "compensation": "compensation_mm", "step": "real_step_mm"}
-"""Short names of a key for both X and Y."""
+"""Short names of keys, each for the key of both X and Y."""
 
 Load = Callable[[Sequence[str]], "LoadedTarget"]
-"""Loads the target with more settings, such as "axes.x.backlash_mm=0.2"."""
+"""The function that loads the target with more settings, such as "axes.x.backlash_mm=0.2"."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,7 +183,7 @@ _TEXTS: Final = _Texts()
 
 
 MAX_ALIKE = 3
-"""At most this many findings of one code and severity are listed one by one in texts."""
+"""Largest number of findings of one code and severity that are listed one by one in texts."""
 
 
 class AnyFinding(Protocol):

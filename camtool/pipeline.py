@@ -102,10 +102,10 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 WALL_COVERAGES = 2.0
-"""The stock is judged so many tolerances of coverage beside its walls."""
+"""The stock is not judged within this many tolerances of coverage beside its walls."""
 
 PLANNING = "planning"
-"""The name of the stage that makes moves of a job."""
+"""The name of the stage that plans the moves of a job."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -20,7 +20,7 @@ MAX_LINE_CHARS = 2000
 
 _LONG = re.compile(rf"\S{{{MAX_WORD_CHARS + 1},}}")
 _BYTES_FROM = 0xDC00
-"""The surrogate by which Python stands for byte 0 of a file name in another encoding."""
+"""The surrogate by which Python represents byte 0 of a file name in another encoding."""
 
 _INVISIBLE = re.compile(
     "[\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"

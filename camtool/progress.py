@@ -5,7 +5,8 @@ from __future__ import annotations
 from contextvars import ContextVar
 
 STEPS = 100
-"""Steps in which the share of a long part of a stage is told, rounded down: only all is 100 %."""
+"""Steps in which the share of a long part of a stage is reported, rounded down, so that 100 %
+means complete."""
 
 
 class Progress:
@@ -37,7 +38,7 @@ class Progress:
 
 
 _CURRENT: ContextVar[Progress | None] = ContextVar("progress", default=None)
-"""The progress of which a stage began last in this thread."""
+"""The progress on which a stage was begun last in this thread."""
 
 
 def tell_share(part: str, share: float | None) -> None:

@@ -42,7 +42,7 @@ from camtool.units import UM_PER_MM
 # until the others are determined. The null space of A shows which they are.
 
 ROUNDS = 50
-"""Rounds of Gauss-Newton at most; about five are usual."""
+"""Largest number of Gauss-Newton rounds; about five are usual."""
 
 SETTLED = 1e-13
 """The solution is found when no parameter changes by more than this (of 1, of a mm, of a
@@ -53,13 +53,13 @@ SINGULAR = 1e-9
 direction."""
 
 INVOLVED = 1e-6
-"""A parameter is part of such a direction when its share is above this."""
+"""A parameter belongs to an undetermined direction when its share in it is above this."""
 
 OUTLIER_SIGMAS = 3.0
 
 OUTLIER_FREEDOM = 4
-"""That standard deviation is estimated from the other readings if they exceed the parameters by so
-many; otherwise it is the uncertainty of the instrument."""
+"""The standard deviation of a residual is estimated from the other readings if these exceed the
+parameters by at least this many; otherwise it is the uncertainty of the instrument."""
 
 
 class FixedParameter(Struct, frozen=True):

@@ -57,7 +57,7 @@ SAME = 1e-9
 """Numbers of units that differ by less than this from a whole number are that number."""
 
 MAX_REGIONS = 9
-"""Most columns and rows of regions."""
+"""Largest number of columns, and of rows, of regions."""
 
 
 class CouponCell(Struct, frozen=True):

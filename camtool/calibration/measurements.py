@@ -74,7 +74,7 @@ class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     kind: ClassVar[str]
     readings: ClassVar[tuple[str, ...]]
-    """The keys of what is measured on it."""
+    """The keys of the measured values of the coupon."""
 
     source: str = ""
     region: str = ""

@@ -1,4 +1,4 @@
 """Commands: parse, call, print."""
 
 COMPLETE = "_CAMTOOL_COMPLETE"
-"""The environment's variable in which a shell says what it asks."""
+"""The environment variable in which a shell asks for completions."""

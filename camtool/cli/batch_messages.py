@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 LISTED = 50
-"""The most rows of the table that are shown; the JSON summary has all."""
+"""Largest number of rows of the table; the JSON summary has all."""
 
 CODES = 3
-"""The most codes of findings that the last line counts."""
+"""Largest number of codes of findings that the last line counts."""
 
 COLOUR = {
     OutcomeState.FAILED: "red",
@@ -141,7 +141,7 @@ class BarDisplay:
 
 
 _PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "emoji": False}
-"""Text that comes from files is no markup."""
+"""Options of rich that print text from files as it is, not as markup."""
 
 
 def outcome_lines(outcome: Outcome, verbosity: Verbosity) -> list[str]:

@@ -30,14 +30,15 @@ if TYPE_CHECKING:
     from camtool.verification.report import Gates
 
 REMARKS = 20
-"""The most findings of a drawing that its worker returns; there may be a hundred thousand."""
+"""Largest number of findings of a drawing that its worker returns; there may be a hundred
+thousand."""
 
 SMALL_JOB = b"""<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm" viewBox="0 0 2 2">
 <circle cx="1" cy="1" r="0.2"/></svg>"""
-"""A drawing of one contour: nothing is to be put into an order."""
+"""A drawing of a single contour, with which a worker loads its modules."""
 
 SVG = ".svg"
-"""The kind of picture that may have the name of a drawing."""
+"""The extension of pictures that a drawing may have too."""
 
 
 @dataclass(frozen=True)

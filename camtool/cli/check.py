@@ -106,7 +106,7 @@ class _Check:
 SHOWN = 10
 
 NAME_WIDTH = 10
-"""Columns before the values."""
+"""Width, in columns, of the names."""
 
 MARKS = dict.fromkeys(("not used", "gap", "branch", "crossing", "open"), "warning")
 """Facts of a drawing that are marked as needing attention."""

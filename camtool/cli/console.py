@@ -27,22 +27,23 @@ TICK_S = 0.05
 """Time to listen to the controller before the keyboard is read, s."""
 
 QUIET_S = 0.3
-"""An answer is over when nothing has come for so long, s."""
+"""An answer is complete when nothing has come for this time, s."""
 
 SILENT_S = 1.5
-"""A line to which nothing is answered for so long has no answer, s."""
+"""A line that gets no answer within this time gets none at all, s."""
 
 KNOCK_S = 0.5
 """Time between two questions to a controller that may be starting, s."""
 
 CONFIRMS_S = 3.0
-"""A machine that was told to stop and says nothing for so long does not say that it stands, s."""
+"""A machine that was told to stop is no longer expected to confirm it after this time of silence,
+s."""
 
 SLOWS_S = 30.0
-"""Longest time for which a machine that reports its state slows down, s."""
+"""Longest time that a machine which reports its state may take to slow down, s."""
 
 WAKES_S = 10.0
-"""A boot loader takes no longer, s."""
+"""Longest time that a boot loader takes, s."""
 
 
 @click.command(cls=SectionedCommand, short_help="Type to a controller.")

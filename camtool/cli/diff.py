@@ -24,7 +24,7 @@ from camtool.cli.picture_options import is_viewer, picture_name
 from camtool.records import replace
 
 DEFAULT_LIMIT_MM = 0.01
-"""Stocks that differ by no more count as equal."""
+"""Default of --max-difference: stocks that differ by no more count as equal."""
 
 
 @click.command(cls=SectionedCommand, short_help="What two programs or jobs cut differently.")

@@ -29,16 +29,17 @@ STDOUT = "-"
 """The name of stdout among outputs, and of stdin among inputs."""
 
 KEPT = 40
-"""The most characters of a file's name in that of its temporary file: names are limited."""
+"""Number of characters of a file's name that its temporary file keeps, since the length of names
+is limited."""
 
 MAX_KIND_CHARS = 40
-"""So many characters of a tool's or a set-up's name go into the name of a file."""
+"""Number of characters of a tool's or a set-up's name that become part of a file name."""
 
 READER_S = 10.0
-"""A named pipe is refused when nobody has opened it for reading for so long."""
+"""A named pipe that nobody opens for reading within this time is refused."""
 
 POLL_S = 0.05
-"""A pipe is looked at so often until then."""
+"""Interval of the attempts to open a pipe until then."""
 
 
 _NEW_FILE = (

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from camtool.target.contract import ControllerSetting
 
 PROPOSED = "my-machine"
-"""The name that is proposed for a machine."""
+"""The default name of a machine."""
 
 FLAG = "--{} at camtool init"
 """Source named in errors about a value from a flag or an answer."""
@@ -54,7 +54,7 @@ def _number(text: str) -> float:
 
 
 MAX_SHOWN = 40
-"""So many characters of a wrong number are shown."""
+"""Number of characters of a wrong number that a message shows."""
 
 
 def _step(text: str) -> float:
@@ -71,7 +71,7 @@ AXES: dict[str, tuple[str, Callable[[str], float], str]] = {
     "acceleration": ("acceleration_mm_s2", _number, "Their accelerations, in mm/s²"),
     "backlash": ("backlash_mm", parse_length, "What each loses when it reverses"),
 }
-"""Flag: key of an axis, how its values are read, meaning."""
+"""Flag: (key of an axis, function that reads its values, meaning)."""
 
 
 def axis_settings(flag: str, text: str) -> list[ControllerSetting]:

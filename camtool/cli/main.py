@@ -35,18 +35,18 @@ EXIT_PIPE = 128 + 13
 it."""
 
 AGAIN_S = 0.01
-"""After this time an interruption that was lost is repeated."""
+"""Time after which a lost interruption is repeated."""
 
 _FULL = (errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG)
 """Errors of a full or closed stream, which name no file."""
 
 BLAS_THREADS = "OPENBLAS_NUM_THREADS"
-"""The variable that says how many threads numpy's linear algebra starts when it is loaded. They
-wait by running, 20 to 40 ms of every command on two cores, and our matrices are small: one is
-enough. With one, sums have one order on every machine."""
+"""The environment variable with the number of threads that numpy's linear algebra starts when it
+is loaded. Waiting threads take 20 to 40 ms of every command on two cores, and our matrices are
+small, so one is enough. With one, sums have the same order on every machine."""
 
 GARBAGE_AFTER = 150_000
-"""How many more objects are made than freed before Python looks for cycles of garbage. Its default
+"""Number of objects made and not freed after which Python looks for cycles of garbage. Its default
 of 700 suits programs that run long; loading the libraries and reading a small DXF, which need no
 search, make fewer than this."""
 
@@ -91,7 +91,7 @@ COMMANDS = {
     "zero": "Make this place part zero.",
 }
 """The commands with their lines in the help, which is shown without importing them. Each is a
-function of the same name in a module of the same name, whose short help is its line."""
+function of the same name in a module of the same name, and the line is its short help."""
 
 
 class _Commands(click.Group):

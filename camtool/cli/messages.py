@@ -108,13 +108,13 @@ def say_findings(
 # Summaries and tables: names are bold, values that exceed a limit are coloured.
 
 Marks = Mapping[str, str]
-"""The severity of the lines of these names: "error", "warning" or "info"."""
+"""The severity ("error", "warning" or "info") of lines, by their names."""
 
 MIN_WIDTH = 20
 """Values are wrapped to the width of the terminal, but never to fewer columns than this."""
 
 REPORT_NAMES = 11
-"""Columns before the values in the summary of a report."""
+"""Width, in columns, of the names in the summary of a report."""
 
 _LINES = {
     "--max-error": "error",
@@ -124,7 +124,7 @@ _LINES = {
     "END_NOT_REACHED": "ends",
     "ARC_MISSES_END": "ends",
 }
-"""The line of the summary that a limit, or else a finding, is about."""
+"""The line of the summary that a gate, or the code of a finding, is about."""
 
 
 def show_facts(text: str, name_width: int, marks: Marks, *, err: bool = False) -> None:

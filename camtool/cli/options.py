@@ -437,7 +437,7 @@ def inspection_options(command: Command) -> Command:
 _READ, _CHOSEN = "How the drawing is read", "Which part of it"
 
 _OF_READING = "read_"
-"""Begins the names of these parameters: flags of pictures have `layers` too."""
+"""Prefix of the names of these parameters, since flags of pictures have `layers` too."""
 
 
 class DrawingFlags(Struct, frozen=True):
@@ -535,7 +535,7 @@ def _read_flag(section: str, name: str, flag: Flag, kind: Any) -> Option:
 
 
 ReadJob = Callable[["Table"], "Job"]
-"""Makes a job of the tables of its file."""
+"""The function that makes a job of the tables of its file."""
 
 
 class JobFlags(Struct, frozen=True, dict=True):

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _PICTURE = "Picture"
 OF_ALL = ("--size", "--crop", "--dark")
-"""Content of every still picture."""
+"""Flags that every still picture has."""
 
 PICTURES = (".svg", ".png", ".html")
 
@@ -252,7 +252,7 @@ def _crop(
 
 
 CLOSEUP = "closeup.svg"
-"""A name that says which kind of picture a close-up is."""
+"""A file name that stands for the kind of picture of close-ups."""
 
 
 class Painter(Struct, frozen=True, dict=True):

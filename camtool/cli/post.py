@@ -286,7 +286,8 @@ def _refuse_beside_setups(
 # How `post` and `convert` end: all files or none, and a short summary.
 
 MAX_PLACEHOLDERS = 2
-"""Of a machine file that leaves out no more than these, its own file is to be completed."""
+"""Up to this many missing numbers, the user is advised to complete the machine file; if more are
+missing, to make one with `camtool init`."""
 
 SHORT = {"flat": "mill", "v": "bit"}
 """Short names of kinds of tools in names of files; other kinds keep their name."""
@@ -501,7 +502,7 @@ def _page_alone(run: Run, outputs: ReportOutputs, picture: Painter) -> dict[str,
 POLL_S = 0.4
 
 SETTLED_S = 0.2
-"""For how long the files must stay the same before a change counts."""
+"""Time for which files must stay the same before a change counts."""
 
 Files = Callable[[], Sequence[str]]
 Digests = dict[str, bytes | None]

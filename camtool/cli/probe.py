@@ -166,9 +166,11 @@ def probe(
 
 
 MIN_MM, MAX_MM = 0.001, 10_000.0
-"""Lengths of a probe: a last decimal of a coordinate, and more than any machine travels."""
+"""Lengths of a probe, mm: from the last decimal of a coordinate to more than any machine
+travels."""
 MIN_FEED, MAX_FEED = 0.1, 100_000.0
-"""mm/min: what one decimal can say, and more than any machine moves."""
+"""Feeds of a probe, mm/min: from the least that one decimal can express to more than any machine
+moves."""
 
 
 def check_sizes(lengths: Mapping[str, float | None], feeds: Mapping[str, float]) -> None:

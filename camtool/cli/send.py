@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 MAX_NAMED = 5
 
 NAME_WIDTH = 11
-"""Columns before the words of a dry run."""
+"""Width, in columns, of the names in a dry run."""
 
 
 @click.command(cls=SectionedCommand, short_help="Send a program to its machine.")

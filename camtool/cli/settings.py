@@ -202,4 +202,5 @@ def _is_same(value: str, other: str) -> bool:
 
 
 SAME = 5e-4
-"""Settings are listed with three decimals."""
+"""Settings that differ by no more than this are equal, since they are listed with three
+decimals."""

@@ -220,7 +220,7 @@ GRADES: dict[str, str] = {
     "timed": "its speeds and corners are computed, not its steps",
     "path only": "its programs are written, read and judged; its controller follows them exactly",
 }
-"""What the model of a controller knows, in the order of the list."""
+"""The grades of models of controllers, with explanations, in the order of the list."""
 
 
 def target_items(incomplete: str) -> Iterator[CompletionItem]:

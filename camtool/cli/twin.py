@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from camtool.target.twin import Twin, TwinTrace
 
 MAX_SPEED = "max"
-"""The speed of a clock that keeps to nothing."""
+"""The value of --speed for a clock that does not wait."""
 
 LOOPBACK = "127.0.0.1"
 
 COLUMNS = "time_s,block,x_commanded_mm,y_commanded_mm,z_commanded_mm,x_mm,y_mm,z_mm"
-"""Of a trace; blocks count from 0, −1 is a command."""
+"""The head of a trace; blocks count from 0, −1 is a command."""
 
 
 def parse_speed(text: str) -> float | None:

@@ -26,12 +26,12 @@ ENDING = ("SIGINT", "SIGQUIT", "SIGBREAK", "SIGTERM", "SIGHUP")
 """Signals that would end camtool; not all systems have all of them."""
 
 BY_HAND = ("SIGINT", "SIGQUIT", "SIGBREAK")
-"""Those that a person gives: a second one ends camtool without waiting for the machine. Others may
-come twice for one cause, as SIGHUP does from a shell and from the terminal that it lost."""
+"""Signals that a person sends: a second one ends camtool without waiting for the machine. Others
+may come twice for one cause, as SIGHUP does from a shell and from the terminal that it lost."""
 
 ONE_S = 0.5
-"""Interrupts that follow each other within this time are one: a program that started camtool may
-pass on what the terminal has sent to both."""
+"""Interrupts that follow each other within this time count as one: a program that started camtool
+may pass on what the terminal has sent to both."""
 
 SUSPEND = "SIGTSTP"
 """Ctrl-Z. A sender that slept would leave its machine alone."""
@@ -45,7 +45,8 @@ OVERRIDE_KEYS: Mapping[str, tuple[Override, int]] = {
     "]": ("spindle", OVERRIDE_STEP),
     "[": ("spindle", -OVERRIDE_STEP),
 }
-"""Keys of a terminal, what they change and by how much; "=" brings back 100 %."""
+"""Keys of a terminal, with the override that each changes and by how much; "=" resets all to 100
+%."""
 
 
 def override_orders() -> dict[str, Request | Order]:

@@ -60,13 +60,13 @@ OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)
 """Keys of `[[operations]]`."""
 
 _RECORDED = tuple(name for name in OPERATION if name != FINISH_TOOL)
-"""Keys of operations that say a field of theirs by themselves."""
+"""Keys of operations each of which sets a field by itself."""
 
 _OF_FINISH = ("finish", "finish_feed", "finish_spindle", FINISH_TOOL)
 """Keys of a finishing pass."""
 
 _OF_WALLS = ("allowance", *_OF_FINISH)
-"""Keys whose fields depend on tools."""
+"""Keys whose fields depend on the tools."""
 
 TABLES = ("place", "stock", "keep_out", "setups", "tools", "operations")
 
@@ -74,13 +74,14 @@ AT_THE_TOP = (*WHOLE, *OF_OPERATIONS, "origin", *TABLES)
 """Keys at the top of a job file; the origin may stand here too."""
 
 _OPERATION_NUMBER = re.compile(r"\d{1,6}")
-"""An operation by its number."""
+"""The number of an operation as text."""
 
 _OF_TOOLS = ("material", "tool_library", "tool_table", "tool_table_units")
-"""Keys of the job as a whole that are for its tools."""
+"""Keys of the whole job that concern its tools."""
 
 EITHER = {"depth": "breakthrough", "breakthrough": "depth", "scale": "fit", "fit": "scale"}
-"""Keys that say the same in another way: one of a nearer layer takes the place of the other."""
+"""Pairs of keys that set the same in different ways: a key of a nearer layer replaces the other
+key of a farther one."""
 
 _ANY_STOCK = {"thickness_mm": 1.0}
 

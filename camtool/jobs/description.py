@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Job, Operation
 
 NOT_KNOWN_MM = math.inf
-"""The depth of an operation where neither the job nor the machine gives one."""
+"""Default depth of operations, if neither the job nor the machine gives one."""
 
 
 def described(

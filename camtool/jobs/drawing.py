@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 
 MAX_LOOKS = 4
-"""A drawing whose scale follows from its own size is read no more often than this: each reading
-knows its size within the tolerance of the previous one."""
+"""A drawing whose scale follows from its own size is read at most this many times; each reading
+gives the size to within the tolerance of the reading before."""
 
 
 def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Drawing:
@@ -81,7 +81,7 @@ def read_to_scale(
 
 
 def _takes_all(job: Job, options: ReadOptions) -> bool:
-    """True if the job takes all that is drawn, and its box is one along the axes of the
+    """Return True if the job takes all that is drawn, and its box is one along the axes of the
     drawing."""
     quarters = job.placement.rotate_rad / (0.5 * math.pi)
     return (

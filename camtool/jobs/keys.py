@@ -376,7 +376,7 @@ PLACE = {
         "pitch_mm", Value(plain(lengths), "DXxDY"), "From copy to copy (12x9mm).", '"12x9mm"'
     ),
 }
-"""Keys of `[place]`, in the order in which they act, but that the origin comes last."""
+"""Keys of `[place]`, in the order in which they act, except that `origin` acts last."""
 
 STOCK = {
     "corner": Key("corner_mm", Value(plain(lengths))),
@@ -384,7 +384,7 @@ STOCK = {
     "thickness": Key("thickness_mm", LENGTH),
     "spoilboard": Key("spoilboard_mm", LENGTH),
 }
-"""Keys of `[stock]`: all but the last must be there."""
+"""Keys of `[stock]`; `thickness` is required."""
 
 KEEP_OUT = {
     "name": Key("name", TEXT),
@@ -392,7 +392,7 @@ KEEP_OUT = {
     "y": Key("y_mm", SPAN),
     "z": Key("z_mm", SPAN),
 }
-"""Keys of `[[keep_out]]`: `x` and `y` must be there."""
+"""Keys of `[[keep_out]]`; `x` and `y` are required."""
 
 SETUP = {
     "name": Key("name", TEXT),
@@ -403,7 +403,7 @@ SETUP = {
     "flip_error": Key("flip_error_mm", LENGTH),
     "zero": Key("zero", Value(plain(zero))),
 }
-"""Keys of `[[setups]]`: `name` and `operations` must be there."""
+"""Keys of `[[setups]]`; `name` and `operations` are required."""
 
 TOOL = {
     "diameter": Key("diameter_mm", LENGTH, "0 for a point (default)."),
@@ -426,7 +426,8 @@ TOOL = {
     "surface_speed": Key("surface_speed_m_min", NUMBERS),
     "number": Key("number", COUNT, example="1"),
 }
-"""Keys of `[tools.NAME]`; with `tool_` before them, those with a help are keys of an operation."""
+"""Keys of `[tools.NAME]`; those with a help text are, with the prefix `tool_`, also keys of
+operations."""
 
 LIMITS = {name: TOOL[name] for name in ("chip_load", "surface_speed")}
 """Keys of a tool that its presets may have too."""
@@ -438,7 +439,7 @@ FINISH_TOOL = "finish_tool"
 """Key of an operation: the tool of its finishing pass, by name or number."""
 
 TOOL_KEYS = {f"tool_{name}": key for name, key in TOOL.items() if key.help}
-"""The tool of an operation that names none, key by key."""
+"""Keys of an operation that describe its tool key by key, if it names none."""
 
 
 OPERATION = {
@@ -590,7 +591,7 @@ FLAGS: dict[str, dict[str, Key]] = {
     },
     "How it is cut": {name: key for name, key in OPERATION.items() if key.help},
 }
-"""The keys that are flags too, under the headings of the help. `--text` is one of the drawing."""
+"""The keys that are also flags, under the headings of the help. `--text` is a flag of drawings."""
 
 _FLAGS_OF_OTHER_NAMES = {"tool_tip_angle": "--tool-angle"}
 

@@ -11,14 +11,14 @@ from camtool.planning.job import Stock, Tool
 from camtool.planning.pins import PIN_MM, ROOM_SHARE
 
 BREAKTHROUGH_MM = 0.3
-"""Through cuts are proposed to go so far below the stock."""
+"""Proposed depth of through cuts below the stock."""
 
 
 MAX_PIN_MM = 6.5
-"""Pins are no wider, where the library has other drills."""
+"""Largest diameter of pins for which a drill of the library is proposed."""
 
 PIN_DEPTH_SHARE = 1.5
-"""Holes of pins go into the board below by so many of their diameters."""
+"""Depth of the holes for pins in the board below the stock, over their diameter."""
 
 
 class Proposal(Struct, frozen=True):

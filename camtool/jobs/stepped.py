@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
 
 MAX_STEP_SHARE = 3.0
-"""A circle wider than so many times the one within it is no counterbore of it."""
+"""Largest ratio of the diameters of a counterbore and its hole."""
 
 SINK_SHARES = (1.75, 2.15)
-"""Circles so many times as wide as the one within them may be countersinks of screws."""
+"""Smallest and largest ratio of the diameters of a countersink and its hole."""
 
 SINK_ANGLES_DEG = (90.0, 82.0)
-"""Angles of countersunk screws, metric and of inches ..."""
+"""Angles of countersunk screws: metric, and inch."""
 
 SINK_ANGLE_SLACK_DEG = 1.0
-"""... which a bit has within this."""
+"""Largest difference between the angle of a V bit and one of these."""
 
 PLAIN = ("", "drill", "profile")
-"""Layers of these habits say nothing against a stepped hole."""
+"""Habits of layers that do not exclude a stepped hole."""
 
 
 class Sink(Struct, frozen=True):

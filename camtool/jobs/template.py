@@ -53,20 +53,21 @@ HABITS = {
     "pocket": ("pocket", "recess", "counterbore", "cbore"),
     "profile": ("cut", "outline", "profile"),
 }
-"""Beginnings of words in the names of layers, by what they ask for: kinds of operation, and
-countersinks."""
+"""Beginnings of words in the names of layers, by the kind of operation (or "countersink") that
+they suggest."""
 
 COLOURS = {"#ff0000": "profile", "#0000ff": "engrave"}
-"""Colours that those who cut with lasers draw in: red is cut, blue marks lines."""
+"""Kinds of operation suggested by the colours of drawings for laser cutters: red is cut, blue
+marks lines."""
 
 _DEPTH = re.compile(r"(\d+(?:[.,]\d+)?)\s*mm\b|\b(?:d|depth|z)\s*=\s*-?(\d+(?:[.,]\d+)?)")
 """Depths in names of layers, mm."""
 
 MAX_DEPTH_MM = 50.0
-"""Larger numbers in names of layers are no depths, where the stock is not known."""
+"""Larger numbers in names of layers are not taken for depths, if the stock is not known."""
 
 CUTTING_ORDER = ("over", "at", "along", "within", "beside")
-"""Operations by where they cut: what frees parts comes last."""
+"""The order of operations by where they cut: those that cut parts free come last."""
 
 _WIDTH = 36
 

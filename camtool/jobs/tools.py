@@ -46,7 +46,7 @@ PRESETS = "presets"
 """The key of a tool whose tables are its presets, by material."""
 
 _TOOL_NUMBER = re.compile(r"\d{1,9}")
-"""A tool by its number."""
+"""The number of a tool as text."""
 
 
 class Described(Struct, frozen=True):

@@ -26,18 +26,21 @@ from camtool.geometry.polylines import (
 )
 
 SLOT_MM = 0.01
-"""A slot is as wide as a tool when a tool so much smaller in radius goes through it, and one so
-much larger does not: walls of such slots are cut so far beyond the line."""
+"""A slot is as wide as a tool if a tool with a radius smaller by this passes through it, and one
+with a radius larger by this does not. The walls of such slots may be cut this far beyond the line.
+"""
 
 LETTER_SHARE = 10.0
-"""A crowded contour no larger than so many widths of the tool takes along all that lies in it, as
-letters take their counters."""
+"""A crowded contour up to this many tool diameters large makes everything within it crowded too,
+as a letter does its counters."""
 
 SEGMENTS_AT_A_TIME = 1 << 10
-"""Segments whose neighbours are looked at together: what they find is not looked at again."""
+"""Number of segments whose neighbours are searched at a time; later batches leave out pairs
+already found."""
 
 NEAR_SHARE = 1e-6
-"""Contours that are nearer than the width by this part of it are not crowded, by rounding."""
+"""Contours that are nearer than the tool's width by only this share of it are not crowded:
+rounding."""
 
 
 def has_room(lines: Polylines, radius_mm: float) -> Bools:

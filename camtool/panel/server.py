@@ -47,7 +47,7 @@ MAX_PROBE_MM: Final = 10_000.0
 MAX_MESSAGE_BYTES: Final = 4096
 
 SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
-"""Ends of files that hold programs, besides the machine's own."""
+"""Extensions of files that hold programs, besides the machine's own."""
 
 PAGE_FILES: Final = ("panel.html", "panel.css", "panel.js")
 
@@ -310,7 +310,7 @@ class PanelServer:
         return response
 
     async def _view(self, request: web.Request) -> web.Response:
-        """Answer with the viewer page of the program, which the panel's page shows in a frame."""
+        """Return the viewer page of the program, which the panel's page shows in a frame."""
         if self.program is None:
             raise web.HTTPNotFound
         page = await asyncio.to_thread(self.program.page)

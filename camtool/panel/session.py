@@ -45,8 +45,8 @@ TICK_S: Final = 0.02
 """Interval at which requests are carried out, s."""
 
 HELD_S: Final = 0.08
-"""A held key that nobody confirms for so long counts as let go, s. With `TICK_S` and the line, a
-jog ends within 0.1 s of a page that is gone."""
+"""A held key that is not confirmed for this time counts as released, s. With `TICK_S` and the
+line, a jog ends within 0.1 s after the page is gone."""
 
 MAX_MESSAGES: Final = 200
 

@@ -26,10 +26,11 @@ from camtool.planning.items import Air, Fixed, Setting, Step
 from camtool.planning.job import MILLS, Operation, Stock
 
 REST_OVERLAP = 0.02
-"""The tool that cleared before counts as wider by this part, so that its cut is overlapped."""
+"""The tool that cleared before counts as wider by this share, so that the rest overlaps
+its cut."""
 
 BESIDE_TIMES = 20.0
-"""Beside the stock the air reaches so many times the tool's radius beyond it and what is cut."""
+"""The air beside the stock is a band as wide as this many times the tool's radius."""
 
 
 def left_beside_mm(setting: Setting) -> float:

@@ -90,7 +90,8 @@ MIN_STEP_OVER = 0.1
 """No finer step-over is proposed than this."""
 
 OFF_STOCK_MM = 0.01
-"""A drawing may lie beyond the edge of the stock by this much: nobody measures it finer."""
+"""A drawing may lie beyond the edge of the stock by this much; stock is not measured more
+exactly."""
 
 EDGES = ("left", "right", "lower", "upper")
 """The edges of the stock, seen from above."""

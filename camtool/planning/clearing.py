@@ -40,7 +40,8 @@ from camtool.geometry.polylines import (
 from camtool.planning.paths import MeasuredPath, join_paths, midpoints, true_ranges
 
 SHORTER = (0.95, 0.9, 0.85, 0.8)
-"""Parts of the step that are tried where it leaves tips: rings alone make a smoother path."""
+"""Shares of the step that are tried in turn where it leaves tips: rings alone make a smoother
+path."""
 
 MAX_MARGIN_SHARE = 0.5
 """The largest distance that is left for the ring along the walls, over the tool's radius."""
@@ -49,10 +50,11 @@ SLOT_TOLERANCE = 1e-3
 """A slot narrower than the tool by up to this part of its diameter counts as wide as the tool."""
 
 HAIRS = (1e-5, 1e-4, 3e-4, SLOT_TOLERANCE)
-"""Parts of the diameter by which the tool is taken thinner, in turn."""
+"""Shares of the diameter by which the tool is taken thinner, tried in turn."""
 
 ALL_OF_IT = 0.98
-"""A thinner hair is taken when it shows this part of the length that the tolerance shows."""
+"""The thinnest hair is used with which the slots are at least this share as long as with
+SLOT_TOLERANCE."""
 
 BEYOND = 3.0
 """Distance of a slot's beginning from the region of the true tool, in hairs: sharp corners extend
@@ -68,7 +70,7 @@ ON_LINE_MM = 5e-6
 """A place this near to the boundary of a region is still inside it."""
 
 LINKS_AT_ONCE = 1 << 10
-"""So many links are compared with the boundary of their region together."""
+"""Number of links that are compared with the boundary of their region at a time."""
 
 POLE_SHARE = 0.01
 """Tolerance for the pole of a region, over the extent of the region."""

@@ -38,7 +38,7 @@ from camtool.planning.ramps import (
 from camtool.planning.tabs import Tab, bridges_of, raise_profile, tabs_of
 
 CONTOURS_AT_ONCE = 1 << 12
-"""Contours measured and lifted together: their measures take about 2 KB each."""
+"""Number of contours that are measured and lifted at a time; each takes about 2 KB meanwhile."""
 
 START_SNAP_MM = 1e-3
 """A start nearer than this to a vertex is moved to that vertex, so that no shorter move arises."""

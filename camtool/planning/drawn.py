@@ -43,10 +43,11 @@ if TYPE_CHECKING:
 
 
 PLACES = (0.03, 0.25, 0.5, 0.75, 0.97)
-"""Where on a row it is asked which lines are nearest; its ends lie beside its neighbours' too."""
+"""Shares of a row's length at which the nearest lines are determined; not its ends, which
+neighbouring rows share."""
 
 ROWS_AT_ONCE = 1 << 14
-"""So many rows are asked at a time which lines are nearest to them: some 10 MB."""
+"""Number of rows for which the nearest lines are determined at a time: some 10 MB."""
 
 AS_NEAR_MM = 1e-4
 """Lines whose distances differ by no more than this count as equally near."""
@@ -55,8 +56,8 @@ OUTWARDS = np.array([-1.0, 1.0])
 """The signs by which the low and the high side of a box move when it grows."""
 
 SAME_SIZE_MM = 1e-3
-"""A contour whose size, without the tool, is that of its line within this runs round that line
-alone."""
+"""A contour whose size, without the tool, differs from that of its line by no more than this runs
+round that line alone."""
 
 
 def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> DrawnEdges:

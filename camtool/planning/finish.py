@@ -43,11 +43,13 @@ from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
 
 MAX_ENGAGED_SHARE = 0.5
-"""What a finishing pass meets, in a corner too, is no more than this part of its diameter: all
-that may be left on the wall is twice as much in a corner of 60 degrees."""
+"""A finishing pass at full depth may meet material up to this share of its tool's diameter thick,
+also in corners. The most that may be left on the wall becomes twice as thick in a corner of 60
+degrees."""
 
 SAMPLES_PER_TOOL = 8.0
-"""So many places of a finishing pass are looked at in a length of its tool's diameter."""
+"""Number of places along a finishing pass, per tool diameter, at which the material that is left
+is measured."""
 
 OF_WALLS = (
     PlanningCode.UNREACHED,
@@ -58,11 +60,12 @@ OF_WALLS = (
     PlanningCode.CORNER_FAR,
     PlanningCode.FINISH_IN_PASSES,
 )
-"""What is said of the wall: by the stage that cuts it. All else is said by the first one."""
+"""Findings about the wall, reported by the stage that cuts it; all other findings are reported by
+the first stage."""
 
 OF_BOTH = (PlanningCode.LEAD_LEFT_OUT, PlanningCode.TAB_LEFT_OUT)
-"""What either stage says of its own: tabs are made in the roughing, and may be missing on a wall
-round which it does not get."""
+"""Findings that both stages report for themselves: tabs are made in the roughing, and may be
+missing on a wall that it does not follow all round."""
 
 
 def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]:

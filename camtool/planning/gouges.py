@@ -51,8 +51,8 @@ GOUGE_TOLERANCE_MM = 1e-4
 """Another contour may be cut into by this much before it is a gouge: a tenth of a micrometre."""
 
 MAX_COUNTED = 100
-"""Once so many are found, only those that may be errors are looked for: of hundreds of contours
-that cross, each pair is one."""
+"""After this many findings, only pairs that may be errors are examined: of hundreds of contours
+that cross, each pair would be one."""
 
 SAMPLES_ROUND = 500
 

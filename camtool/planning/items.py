@@ -137,7 +137,7 @@ class Runs(Struct, frozen=True, eq=False):
 
 
 NO_STARTS = np.empty(0, dtype=np.int64)
-"""A closed path may begin at any vertex that is no joint within an arc."""
+"""Empty `starts`: a closed path may begin at any vertex that is no joint within an arc."""
 NO_STARTS.flags.writeable = False
 
 

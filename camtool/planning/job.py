@@ -52,10 +52,11 @@ MIN_TIP_ANGLE_RAD = math.radians(0.1)
 """No tool has a sharper cone; a narrower one is a needle a kilometre long."""
 
 FINISH = " finish"
-"""Ends the names of finishing passes."""
+"""Suffix of the names of finishing stages."""
 
 PIN_SLACK_MM = 0.001
-"""Pins meet within this, when a part is turned over."""
+"""Largest distance between a pin and the turned-over place of the other at which they count as
+meeting."""
 
 ZEROS = {
     "stock-lower-left": (0.0, 0.0),
@@ -91,7 +92,7 @@ _APART = (
     ("point", ("closed", "open", "outer", "inner", "circle", "not circle", "text")),
     ("text", ("not text",)),
 )
-"""Words that cannot be true of one thing."""
+"""Words of `select` that exclude each other: (word, words that cannot be true with it)."""
 
 STAGES = ("", "rough", "finish")
 """Stages of an operation with a finishing pass: all of it (it has none), all but the last
@@ -127,27 +128,28 @@ TOOL_KINDS = ("flat", "ball", "bull", "v", "drill")
 rounded by a corner radius, a V bit, a drill."""
 
 MILLS = ("flat", "ball", "bull")
-"""Those that are as wide as their shank but for their nose."""
+"""Kinds of tools that are as wide as their shank, except at a nose."""
 
 MAX_BY_UNIT = {"mm": 1e5, "mm/min": 1e7, "rev/min": 1e7, "s": 1e6, "rad": 1e6, "": 1e6}
-"""Upper bounds of numbers by their unit, as in `camtool.machine.ranges`: 100 m, 167 m/s,
-eleven days; and a million of what has no unit."""
+"""Upper bounds of numbers by their unit, as in `camtool.machine.ranges`: 100 m, 167 m/s, eleven
+days; and a million for numbers without a unit."""
 
 ALLOWED_TIMES = 10.0
-"""Sizes, and distances from part zero, may be so many times as large where a job allows "long"."""
+"""Factor by which sizes, and distances from part zero, may be larger if the job allows "long"."""
 
 MIN_POSITIVE = 1e-6
-"""Numbers above 0 are no smaller, in any unit: a nanometre."""
+"""Numbers above 0 must be at least this, in any unit (a nanometre)."""
 
 MAX_WIDTH_MM = 1000.0
 """No tool is wider than a metre, and no allowance is larger."""
 
 MAX_POSITION_MM = 1e9
-"""Positions in a drawing are no farther from its zero (a thousand kilometres, as in maps)."""
+"""Positions in a drawing are no farther from its zero than this (a thousand kilometres, as in
+maps)."""
 
 MAX_MOVES = 1_000_000
-"""Passes, pecks and laps that make more moves than this of a drawing are taken as a mistake: a
-program of some 25 MB."""
+"""Passes, pecks and laps that would make more moves than this are taken for a mistake: a program
+of some 25 MB."""
 
 
 def above_zero(name: str, value: float | None, unit: str) -> None:
@@ -192,12 +194,13 @@ def finite(name: str, value: float, unit: str, max_value: float | None = None) -
 
 
 MAX_LONG_MOVES = 3_000_000
-"""As many moves at most where the job allows "long": no program may have more
+"""The same limit if the job allows "long": no program may have more moves
 (`camtool.bounds.MAX_MOVES`)."""
 
 ALLOWED = ("long", "off-stock")
-"""Words by which a job allows what is refused without: programs of more than MAX_MOVES moves and
-drawings larger than any machine; parts, copies and cuts that lie beside the stock."""
+"""Words by which a job allows what is refused by default: "long", programs of more than MAX_MOVES
+moves and drawings larger than any machine; "off-stock", parts, copies and cuts that lie beside the
+stock."""
 
 
 def refuse_endless(

@@ -29,7 +29,8 @@ from camtool.records import FrozenRecord
 GROUP = "camtool.operations"
 
 OWN_PACKAGE = "camtool.operations."
-"""The prefix of camtool's own kinds: exceptions in them are faults of camtool itself."""
+"""The prefix of camtool's own modules: exceptions in these are faults of camtool, not of a
+plug-in."""
 
 TAKES = ("paths", "circles", "holes", "pins", "nothing")
 CUTS = ("beside", "within", "along", "at", "over")

@@ -121,7 +121,7 @@ class Leads(Struct, frozen=True, eq=False):
 
 
 NO_LEADS = Leads(np.empty((0, 3)), np.empty((0, 3)), ())
-"""The tool goes down and up at the contour itself."""
+"""No leads: the tool goes down and up at the contour itself."""
 
 
 def leads_of(

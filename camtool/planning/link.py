@@ -22,13 +22,14 @@ ROUNDED_DECIMALS = 10
 far finer than any machine or tolerance."""
 
 CHANGE_HEIGHTS = 5.0
-"""Where a machine states no height for changes of tools, it lifts them so many times its safe
-height above the stock, or as far as its travel goes: a hand must get between."""
+"""On a machine that states no height for tool changes, the tool is lifted this many times its safe
+height above the stock, or as far as its travel goes, so that a hand can reach it."""
 
 VERTICES_AT_ONCE = 1 << 15
 
 Approach = Callable[[CutRun], tuple[float, float] | None]
-"""The place from which the tool comes at safe height, (x, y) mm, before a run; None: anywhere."""
+"""The function that returns the place (x, y), mm, from which the tool approaches a run at safe
+height; None: from anywhere."""
 
 
 def _rounded(places: Floats) -> Floats:

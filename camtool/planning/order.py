@@ -34,13 +34,14 @@ from camtool.planning.paths import flat_path, joints
 Point = tuple[float, float]
 
 KICKS_EACH = 20
-"""Kicks for each item: more take longer and give shorter travel."""
+"""Number of kicks (random changes of the search) for each item: more take longer and give shorter
+travel."""
 
 MIN_KICKS = 700
-"""Kicks for few items: the search still takes no noticeable time."""
+"""Least number of kicks, for few items: the search still takes no noticeable time."""
 
 MAX_KICKS = 4000
-"""Kicks for many items: less than a second of work."""
+"""Greatest number of kicks, for many items: less than a second of work."""
 
 SEED = 20_011
 
@@ -257,8 +258,8 @@ def _cycle_error(waiting: set[int]) -> OptionError:
 
 
 Ends = tuple[Ints, Floats]
-"""Rows of variants: the items (R,) that they are of, ascending, and (R, 4) the x and y where the
-tool goes down and where it comes up."""
+"""Rows of variants: the item (R,) of each, ascending, and (R, 4) x, y where the tool goes down and
+x, y where it comes up."""
 
 
 def _fixed_ends(items: Items) -> Ends:

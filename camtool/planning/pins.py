@@ -25,10 +25,10 @@ from camtool.planning.naming import flip_lines_of, key_of, pins_of
 from camtool.records import replace
 
 ROOM_SHARE = 2.0
-"""A pin has a strip that is so many times as wide as it is."""
+"""Width of the strip that a pin needs, over its diameter."""
 
 PIN_MM = 3.0
-"""Diameter of pins for which no drill of the job says one."""
+"""Diameter of proposed pins if the job has no drill."""
 
 Pin = tuple[float, float]
 

@@ -43,7 +43,8 @@ MAX_POINTS = 10_000_000
 """Vertices of all copies together: far beyond any program, well within memory."""
 
 SCALE_SHARE = 1e-3
-"""A drawing counts as read for a scale that differs by no more than this share of it."""
+"""A drawing counts as read for a scale from which its own scale of reading differs by no more than
+this share."""
 
 
 class AffineMap(Struct, frozen=True, eq=False):

@@ -41,22 +41,22 @@ from camtool.planning.paths import MeasuredPath, true_ranges
 from camtool.planning.strategies import MAX_SCALLOP_DISCS, SCALLOP_DISC_SHARE
 
 TOGETHER_MM = 5e-6
-"""Two boundaries nearer than this run together: above the error of two offsets in a row."""
+"""Two boundaries nearer than this coincide; it is above the error of two offsets in a row."""
 
 SAME_PLACE_MM = 2e-5
-"""Ends of sections nearer than this are at one place."""
+"""Ends of sections nearer than this are the same point."""
 
 MIN_FOOT_SHARE = 1e-3
 """Pieces smaller than this part of the tool's disc are left out: the foot of a square corner is
 0.068 of it, that of a corner of 156 degrees is just so large."""
 
 PROBES = (0.0, 0.3, 0.5, 0.7, 1.0)
-"""Where a part between two vertices is measured; its ends say nothing on whether it runs
-together with something, only on how far it leads."""
+"""Shares of a part between two vertices at which its distance from the other path is measured. The
+ends do not tell whether it coincides with the other path, only how far it leads away."""
 
 PARTING = 4.0
-"""Ends of sections that meet no other are at one place when they are no farther apart than this
-many times √(2 r · TOGETHER_MM): over that length a disc of radius r leaves a straight wall by
+"""Ends of sections that meet no other are joined when they are no farther apart than this many
+times √(2 r · TOGETHER_MM): over that length a disc of radius r leaves a straight wall by
 TOGETHER_MM, so the place is known no better."""
 
 CORNER_SHARE = 0.25

@@ -353,7 +353,7 @@ def drawn_error_mm(division: Division) -> float:
 
 
 Cost = tuple[int, float, float]
-"""Pieces, their spread, and their errors over their lengths, summed up."""
+"""Number of pieces, the sum of their spreads, and the sum of their errors times lengths."""
 
 
 def _cheapest(division: Division, begin: int) -> tuple[tuple[int, Cost], list[RunPiece]]:

@@ -20,19 +20,20 @@ from camtool.keys import (
 
 STRATEGIES = ("passes", "adaptive", "trochoidal")
 LIMITED = STRATEGIES[1:]
-"""Those that keep to a limit of engagement: of pockets, and of profiles."""
+"""Strategies that keep to a limit of engagement, for pockets and for profiles."""
 
 SCALLOP_DISC_SHARE = 0.0216
-"""An adaptive pocket clears what is within discs of tool centres of this part of the tool's
-radius, and leaves the rest of corners: a scallop, ..."""
+"""An adaptive pocket clears what discs of tool centres with a radius of this share of the tool's
+radius can cover. The rest of a corner stays as a scallop, ..."""
 
 MAX_SCALLOP_DISCS = 5.0
-"""... whose thickness is up to so many times the disc's radius, in corners of 19 degrees; what is
-left elsewhere is more than a scallop."""
+"""... up to this many times as thick as the disc's radius, in corners of 19 degrees; anything
+thicker that is left is no scallop."""
 
 MIN_ENGAGEMENT_RAD = math.radians(5.0)
 MAX_ENGAGEMENT_RAD = math.radians(90.0)
-"""Beside a straight cut a tool that is engaged by 90 degrees removes half of its diameter."""
+"""Largest limit of engagement: along a straight cut, a tool that is engaged by 90 degrees cuts
+with half of its diameter."""
 
 
 def engagement(value: object) -> float:

@@ -76,17 +76,18 @@ PLACES_PER_TAB = 16.0
 MAX_PLACES_ROUND = 2048
 
 PLACE_DECIMALS = 9
-"""Two places are as near when their distances differ in no such decimal of the whole path."""
+"""Two places are equally near when their distances, as shares of the whole path, agree to this
+many decimals."""
 
 FAR_FROM_PLACE = 2.0
-"""A place by hand is of no contour that is farther from it than this many times its tool is wide,
-or (of a narrow tool) than this many times the tab is."""
+"""A hand-placed tab belongs to no contour farther away than this many times the tool's diameter,
+or (of a narrow tool) than this many times the tab's width."""
 
 TAB_SLACK_MM = 1e-5
 """A bridge may be narrower than requested by this much."""
 
 WIDTH_ROUNDS = 8
-"""The length of a tab on a bend is searched in this many rounds of as many places, each round
+"""The length of a tab on a bend is found by this many rounds of PLACES_PER_SIDE trials, each round
 finer."""
 
 BRIDGE_SLACK_MM = 1e-4

@@ -27,7 +27,7 @@ LEVEL_RATIO = 1.25
 """Neighbouring levels of the feed differ by no more than this factor."""
 
 MIN_STRETCH_SHARE = 2.0
-"""The feed does not rise for stretches shorter than so many times the tool's radius."""
+"""The feed does not rise over stretches shorter than this many times the tool's radius."""
 
 THICK_SHARE = 0.02
 """Material that sticks out by less than this part of the tool's radius does not count."""

@@ -47,10 +47,10 @@ LINK_SHARE = 0.5
 """Radius of the arcs at both ends of a way back, over that of the circles."""
 
 MIN_BACK_RAD = 0.25 * math.pi
-"""A way back that is seen from the middle under a smaller angle stays on the circle."""
+"""Angle, seen from the circle's centre, below which a way back stays on the circle."""
 
 SWEPT_SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3)
-"""A band is taken narrower by these parts, in turn, where rounding hides its outline."""
+"""Shares by which a band is taken narrower, in turn, if rounding hides its outline."""
 
 
 def trochoid_step(radius_mm: float, tool_mm: float, limit: float) -> float:

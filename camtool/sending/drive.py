@@ -17,7 +17,7 @@ from camtool.errors import OutputError
 from camtool.target.wire import Conversation, Place, Tell, WireState, Write, port_fault
 
 TICK_S = 0.05
-"""Interval at which requests of the user and signals are read, unless it is given."""
+"""Default interval at which requests of the user and signals are read."""
 
 STOPPING_MESSAGE = "stopping: waiting until it stands (a second Ctrl-C does not wait)"
 
@@ -35,10 +35,10 @@ class Request(Enum):
 
 
 Order = Callable[[Conversation, float], None]
-"""A request with values of its own: what it does to the conversation at a time."""
+"""A request with values: a function that acts on the conversation at a given time."""
 
 Wish = Callable[[], Request | Order | None]
-"""The next request of the user, None without one."""
+"""The function that returns the next request of the user, None without one."""
 
 
 class LineToController(Protocol):

@@ -112,7 +112,7 @@ class Journal:
             os.close(self._handle)
 
     def _end_line(self) -> None:
-        """Seek to the end of the file, and complete a line that a crash cut short."""
+        """Go to the end of the file, and complete a line that a crash cut short."""
         if os.lseek(self._handle, 0, os.SEEK_END):
             os.lseek(self._handle, -1, os.SEEK_END)
             if os.read(self._handle, 1) != b"\n":

@@ -37,8 +37,9 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
     """The arithmetic of one controller."""
 
     samples_per_speed: ClassVar[int] = 16
-    """A speed is measured over so many samples: steps of several axes come in turns, and one alone
-    is up to 41 % off; 16 are at most 3 %. 1 where samples are positions of a smooth motion."""
+    """A speed is measured over this many samples: steps of several axes come in turns, and one
+    alone is up to 41 % off; 16 are at most 3 % off. 1 where samples are positions of a smooth
+    motion."""
 
     def speed_period_s(self, machine: Machine[ControllerT, DialectT]) -> float:
         """Return the shortest time (s) over which a speed is averaged; 0 if the speed between two

@@ -81,7 +81,7 @@ class Mechanics:
             self.axes[index] = scale, low, high, added_mm, REVERSAL_STEPS * coded_mm
             self.states[index] = play_start(float(start_mm[index]), scale, direction)
         self.lean = math.tan(machine.mechanics.squareness_rad) if effects.squareness else 0.0
-        """By how much Y leans towards X: a tangent."""
+        """Tangent of the squareness: how far Y leans towards X."""
         shares = np.array(play_limits(1.0, convention, direction))
         self._varied = _varied(machine, effects, shares)
 

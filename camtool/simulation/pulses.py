@@ -24,8 +24,8 @@ OUTPUTS = Options(
     effects=Effects(play=False, scale=False, squareness=False, repeatability=False),
     chunk_steps=1 << 13,
 )
-"""The options of a run whose pulses are wanted: steps that the controller adds, no mechanics; a
-sample may be some dozen changes of lines."""
+"""The options of a run of which the pulses are wanted: with the steps that the controller adds,
+without mechanics. A sample may mean some dozen changes of lines."""
 
 
 class Pulses(Struct, frozen=True, eq=False):

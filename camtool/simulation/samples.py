@@ -34,7 +34,7 @@ MAX_SAMPLES = 1_000_000
 ROWS_AT_ONCE = 1 << 14
 
 MIN_WAIT_S = 1e-3
-"""A row that begins no later behind the last sample follows it without a stop: rows that a
+"""A row that begins within this time after the last sample follows it without a stop: rows that a
 controller joins to one move share its time by their lengths."""
 
 SPACING_EPS = 1e-6

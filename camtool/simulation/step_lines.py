@@ -25,7 +25,7 @@ from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Ledger, still_ledger
 
 LINES_AT_ONCE = 1024
-"""So many lines or more, of whole rows, are judged by one thread at a time."""
+"""Least number of lines, of whole rows, that one thread judges at a time."""
 
 
 class LineRows(Struct, frozen=True, eq=False):

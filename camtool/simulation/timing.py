@@ -29,8 +29,8 @@ class TimedChunk(Struct, frozen=True, eq=False):
 
 
 Waits = Callable[[Ints, Ints], tuple[Floats, Floats]]
-"""Rows (K,) and numbers (K,) of samples within their rows → s (K,) before each sample, and s (K,)
-from it to the end of its pass."""
+"""The function from rows (K,) and numbers (K,) of samples within their rows to the times (K,), s,
+before each sample and from it to the end of its pass."""
 
 
 class SampleTimes(Struct, frozen=True, eq=False):

@@ -64,49 +64,50 @@ if TYPE_CHECKING:
     from camtool.stock.pieces import LoosePiece
 
 ALONG_MM = 1.0
-"""Along a cut the stock is looked at no farther apart than this, and at both ends."""
+"""The stock is examined along each cut at points no farther apart than this, and at both
+ends ..."""
 
 MAX_PLACES = 50_000
-"""... or so far that there are about this many places, where cuts are longer."""
+"""... or farther apart for longer cuts, so that there are about this many points."""
 
 MAX_CUTS = 500_000
-"""Of programs with more cuts than this every second one is looked at, or every third, ...: of
+"""In programs with more cuts than this only every second one is examined, or every third, ...: of
 millions of cuts thousands lie beside each other."""
 
 EDGE_SHARE = 0.98
-"""... and on both sides of its axis: this part of the radius away from it, less the band beside
-walls, since passes need not lie exactly on each other."""
+"""The stock is also examined on both sides of the axis, at this share of the radius less the band
+beside walls, since passes need not lie exactly on each other."""
 
 LATTICE_POINTS = 20_000
-"""Points of the lattice on which material is looked for that is left, where it is not proved that
+"""Number of lattice points at which leftover material is searched for, if it is not proved that
 there is none."""
 
 TRIED_SQUARES = 40_000
-"""Squares of a layer within which a proof must be found."""
+"""Largest number of squares of a layer for a proof that must succeed quickly."""
 
 SAME_PLACE_MM = 5.0
 """Places of one kind that are nearer to each other than this are one finding."""
 
 REFINED_SQUARES = 20_000
-"""The worst place is searched for in no more squares than this."""
+"""Largest number of squares for the search of the worst place."""
 
 BODY_SHARE = 0.25
-"""Shank and holder are looked at in steps of this part of their radius."""
+"""Shank and holder are examined at steps of this share of their radius ..."""
 
 RIM_POINTS = 16
-"""... and at so many points of their rim, and as many halfway to it."""
+"""... at this many points of their rim, and as many halfway to it."""
 
 TAB_SLACK_MM = 0.05
 """A tab may be narrower by this much, and by the band beside the walls."""
 
 PIECE_POINTS = 50
-"""Points at which it is looked whether a loose piece is a part."""
+"""Number of points at which a loose piece is compared with the outlines of parts."""
 
 MEETING_MM = 1e-3
-"""Faces that meet by less are not told."""
+"""Faces that overlap by no more than this are not reported."""
 
 MIN_CHORDS = 48
-"""A tab is looked at in as many steps as this along its contour."""
+"""Number of steps along its contour, to either side, at which a tab is examined."""
 
 
 class StockRequest(Struct, frozen=True, eq=False):

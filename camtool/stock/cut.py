@@ -36,14 +36,14 @@ SECTION_STEP_MM = 1e-3
 """... or the two are no farther apart than this: at a wall."""
 
 TRIAL_SHARE = 0.2
-"""Distances of two stocks are told to this part of the limit."""
+"""Distances of two stocks are determined to within this share of the limit."""
 
 MAX_TRIAL_SQUARES = 4_000_000
-"""A trial of one distance looks at no more squares: walls that lie just at it take most. The
-bracket is then wider."""
+"""Largest number of squares in a trial of one distance: walls at just that distance take most. The
+bracket is wider if they do not suffice."""
 
 DIFFERENCE_SHARE = 1e-3
-"""Volumes of differences are told to this part of the volume that is cut."""
+"""Volumes of differences are determined to within this share of the volume that is cut."""
 
 Box = tuple[float, float, float, float]
 """Low x, low y, high x and high y, mm."""

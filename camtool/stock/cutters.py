@@ -25,7 +25,7 @@ from camtool.planning.job import Tool
 from camtool.toolpath.wanted import ToolNote
 
 MAX_CONE_RADIUS_MM = 1e3
-"""Radius of a V bit of which only the cone is known."""
+"""Radius given to a V bit of which only the cone is known."""
 
 
 class CutterProfile(Struct, frozen=True):

@@ -31,15 +31,15 @@ from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
 
 THICK_SHARE = 4e-3
 THICK_OF_STEP = 0.2
-"""Chips thinner than the first part of the tool's radius are no engagement, or than the second
-part of the step beside a straight wall where that is less, ..."""
+"""Chips thinner than THICK_SHARE of the tool's radius do not count as engagement, nor those
+thinner than this share of the step beside a straight wall, whichever is less, ..."""
 
 THICK_BESIDE = 2.0
-"""... but those thinner than so many times the distance of the slides from these moves never are:
-they cannot be told from the steps of the axes."""
+"""... nor those thinner than this many times the distance of the slides from the moves: they
+cannot be told from the steps of the axes."""
 
 LEVEL_MM = 0.02
-"""Cuts no more than this above a move have cleared its depth."""
+"""Cuts up to this much above a move count as having cleared its depth."""
 
 TOUCH_MM = 1e-3
 """Moves that go no deeper than this cut nothing."""
@@ -49,24 +49,25 @@ STEEP_SHARE = 1e-3
 down."""
 
 ENTRY_TURNS = 1.0
-"""An entry ends when the tool has gone so many times its circumference from where it went down."""
+"""An entry ends when the tool has travelled this many times its circumference from where it went
+down."""
 
 ENDED_MM = 1e-9
-"""Entries of which less remains have ended."""
+"""An entry with a shorter remaining length than this has ended."""
 
 TOLERATED_SHARE = 1.02
 """Engagements up to this part of the limit keep it."""
 
 MAX_ASKEW_RAD = 0.3
-"""Slides that run beside their path by steps head no farther than this to either side of it, or of
-the chord of its arc, ..."""
+"""Slides that run beside their path in steps deviate from its direction, or that of the chord of
+its arc, by no more than this."""
 
 FINE_RAD = np.radians(0.1)
-"""Bounds of engagements above the limit are told to this angle, ..."""
+"""Bounds of engagements above the limit are determined to within this angle, ..."""
 
 COARSE_RAD = np.radians(1.0)
-"""... and the greatest of an operation that keeps it to this one, as are those of moves in
-pictures."""
+"""... and the greatest engagement of an operation that keeps the limit to within this one, as are
+those of moves in pictures."""
 
 
 CHANGING_WIDTH = "it cuts with a tool whose width changes with its height"

@@ -23,10 +23,10 @@ from camtool.stock.moves import StockMoves
 TOP_MM = 0.0
 
 TOLERANCE_MM = 1e-3
-"""Width of a bracket, unless another one is asked for."""
+"""Default width of a bracket."""
 
 FIRST_SQUARES = 1024
-"""Squares into which a region is divided at first, about."""
+"""Approximate number of squares into which a region is divided at first."""
 
 SQUARES_AT_ONCE = 4096
 
@@ -34,19 +34,20 @@ MAX_SQUARES = 4_000_000
 """A search ends after this many squares: its bracket is then wider, and says so."""
 
 VOLUME_SHARE = 0.01
-"""Width of the bounds of a volume, as a part of it, unless another one is asked for."""
+"""Default width of the bounds of a volume, as a share of it."""
 
 MIN_VOLUME_MM3 = 1e-6
-"""Volumes are not told more exactly than to this."""
+"""Least width of the bounds of a volume."""
 
 LEFT_SHARE = 0.3
-"""Quarters leave open about this part of what their square has left open."""
+"""Expected gap of the bounds of four quarters, over the gap of their square."""
 
 MAX_VOLUME_SQUARES = 100_000
-"""Squares that a volume is divided into, at most: its bounds are then wider."""
+"""Largest number of squares into which a volume is divided: its bounds are wider if they do not
+suffice."""
 
 MIN_HALF_MM = 1e-9
-"""Squares are not divided further: floats end here."""
+"""Squares with a smaller half side are not divided further, because of rounding."""
 
 
 def stock_tree(moves: StockMoves) -> StockTree:
@@ -162,7 +163,8 @@ def greatest_value(
 
 
 Bounds = Callable[[Floats], tuple[Floats, Floats]]
-"""Lower and upper bounds of a function over squares (K, 3)."""
+"""The function from squares (K, 3) to lower and upper bounds (K,), (K,) of a function over
+them."""
 
 
 def integral(

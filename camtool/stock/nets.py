@@ -33,16 +33,18 @@ FLAT_MM = 5e-4
 """Chords of drawn arcs lie within this of them."""
 
 QUARTER = 16
-"""Chords of a quarter of a round end: at a radius of 0.1 mm they are within 0.12 µm of it."""
+"""Number of chords of a quarter of a round end: at a radius of 0.1 mm they are within 0.12 µm of
+it."""
 
 SPECK_MM = 0.05
 """Pieces of a net without room for a disc of this diameter are chips, not conductors."""
 
 MARGIN_MM = 5.0
-"""Copper around the drawing, where the job does not say how large the blank is."""
+"""Width of the copper assumed around the drawing, if the job does not give the size of the
+blank."""
 
 WIDTH_ROUNDS = 12
-"""Halvings of the search for the narrowest copper: to 1/4000 of the widest."""
+"""Rounds of the bisection for the narrowest copper: to 1/4000 of the widest."""
 
 
 class NetFault(Struct, frozen=True):

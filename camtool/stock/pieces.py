@@ -30,23 +30,23 @@ from camtool.stock.heightmap import Box, HeightMap, cell_for, height_map
 from camtool.stock.moves import StockMoves
 
 CELL_SHARE = 1.0 / 3.0
-"""Of the width of the narrowest cut through the stock, the width of a cell."""
+"""Width of a cell, over that of the narrowest cut through the stock."""
 
 MAX_RASTER_CELLS = 4_000_000
-"""Cells are wider where there would be more; pieces within narrower cuts are then missed, which
-`LoosePieces.seen_mm` says."""
+"""Cells are made wider if there would be more than this; pieces within narrower cuts are then
+missed, which `LoosePieces.seen_mm` says."""
 
 MIN_PIECE_SHARE = 0.25
-"""The smallest piece that comes loose, as a share of the area of the narrowest tool's disc:
-smaller ones go away with the chips."""
+"""Area of the smallest piece that is reported, over that of the narrowest tool's disc; smaller
+ones leave with the chips."""
 
 MIN_CUT_SHARE = 1.0
-"""Of that disc, how much of a piece is cut away after it has come loose, at least: less are the
-ends of the cut that frees it."""
+"""Area of a loose piece that must be cut away later to be reported, over that of the disc; the
+ends of the cut that frees it take less."""
 
 MAX_PIECE_CELLS = 400_000
-"""The size of a piece is measured with about so many cells, or fewer where there are many pieces:
-its area is wrong by half of such a cell along its edge at most, its box by a cell."""
+"""A piece is measured with about this many cells, or fewer if there are many pieces: its area is
+off by half of such a cell along its edge at most, its box by a cell."""
 
 STANDING = np.iinfo(np.int64).max
 """Time of cells that are never cut through."""
@@ -55,10 +55,10 @@ STANDING = np.iinfo(np.int64).max
 BEFORE = -1
 
 MAX_LEVELS = 16
-"""So many heights of floors from below are told apart, ..."""
+"""Largest number of heights of floors from below that are distinguished, ..."""
 
 LEVEL_POINTS = 20_000
-"""... of those at so many points of the stock."""
+"""... of those found at this many points of the stock."""
 
 
 class LoosePiece(Struct, frozen=True, eq=False):

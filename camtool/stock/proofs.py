@@ -48,35 +48,35 @@ EPS_MM = 1e-9
 """Rounding of the comparisons."""
 
 SHORT_SHARE = 1.0 / 16.0
-"""Chords are not divided further than to this part of the distance."""
+"""Chords shorter than this share of the distance are not divided further."""
 
 SAGITTA_SHARE = 1.0 / 8.0
-"""Arcs of lines are judged by chords that are nearer to them than this part of the distance."""
+"""Arcs of lines are judged by chords within this share of the distance of them."""
 
 THIN_SHARES = (0.4, 0.05)
-"""Moves lie no farther beside the slides than the first of these parts of the limit; if that does
-not suffice, than the next; ..."""
+"""Largest distance of the thinned moves from the slides, as a share of the limit, tried in turn,
+..."""
 
 MIN_THIN_MM = 1e-4
-"""... but need not be nearer than this."""
+"""... but at least this."""
 
 TRIAL_SHARE = 0.15
-"""Distances above the limit are told to this part of them, ..."""
+"""Distances above the limit are determined to within this share of them, ..."""
 
 FLOOR_SHARE = 0.98
-"""... (those of floors, which one place shows at once, to a fiftieth), ..."""
+"""... those of floors, which a single place shows, to within one minus this, ..."""
 
 MAX_TRIALS = 8
-"""... or as far as so many trials tell."""
+"""... but with no more trials than this."""
 
 MAX_SQUARES = 400_000
-"""Squares of a layer that one trial looks at; if these do not suffice, it proves nothing."""
+"""Largest number of squares of a layer in one trial; if they do not suffice, nothing is proved."""
 
 RING_POINTS = 16
-"""Directions in which the edge of a tool is looked at where it is doubtful."""
+"""Number of directions in which the edge of a tool is examined at a doubtful place."""
 
 MAX_DOUBTFUL = 2_000
-"""Doubtful places of a round that are looked at, and of a groove that are searched."""
+"""Largest number of doubtful places that are examined in a round, or searched in a groove."""
 
 
 class Trial(Struct, frozen=True):
@@ -89,7 +89,7 @@ class Trial(Struct, frozen=True):
 
 
 Judgement = tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]
-"""A value at points (J, 2), and upper bounds of it over squares (K, 3)."""
+"""(Function from points (J, 2) to a value, function from squares (K, 3) to upper bounds of it.)"""
 
 
 class JudgedStock(Struct, frozen=True, eq=False):
@@ -139,7 +139,8 @@ class JudgedStock(Struct, frozen=True, eq=False):
 
 
 CutWithin = Callable[[float], CutStock]
-"""The stock after a program, by moves no farther beside the slides than a distance, mm."""
+"""The function that returns the stock after a program, cut by moves within this distance (mm) of
+the slides."""
 
 
 def proved_gouge(

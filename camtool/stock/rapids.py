@@ -33,24 +33,26 @@ from camtool.stock.moves import StockMoves
 from camtool.toolpath.moves import STOCK_TOP_MM, Kind, Toolpath, are_below_top
 
 CLEARED_MM = 0.01
-"""A rapid's tool may get so far into walls: it and the cuts beside it are rounded separately."""
+"""Depth to which a rapid's tool may enter walls: the rapid and the cuts beside it are rounded
+separately."""
 
 ROOM_SHARE = 0.45
-"""Of that, by how much the tool of a rapid is drawn in, and the tools of the cuts are widened."""
+"""Share of that tolerance by which the tool of a rapid is narrowed, and the tools of the cuts are
+widened."""
 
 MIN_HALF_SHARE = 0.035
-"""Of that, half a side of the smallest squares, so that twice the room and the size of the least
-shape with a square's middle in it, 2 √2 of these, are the tolerance."""
+"""Half side of the smallest squares, as a share of that tolerance: twice the room and the size of
+the least shape with a square's middle in it, 2 √2 of these, make up the tolerance."""
 
 MIN_RADIUS_SHARE = 2.0
-"""Of that, the radius that a tool has at least: a point clears its line, and needs it."""
+"""Least radius of a tool, over that tolerance: a point clears its line, and so needs a width."""
 
 HEIGHT_EPS_MM = 1e-6
 
 RAPIDS_AT_ONCE = 64
 
 SIZE_SQUARES = 4096
-"""The place where a rapid is deepest in the stock is searched for in about so many squares."""
+"""Approximate number of squares for the search of a rapid's deepest place in the stock."""
 
 
 class RapidThroughStock(Struct, frozen=True):

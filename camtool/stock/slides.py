@@ -22,10 +22,10 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.wanted import Operations
 
 THIN_MM = 5e-4
-"""Samples may lie so far beside the moves that stand for them ..."""
+"""Samples may lie this far beside the moves that replace them ..."""
 
 THIN_STEPS = 1.0
-"""... or this many steps of the coarsest axis: steps are stairs beside a sloping line."""
+"""... or this many steps of the coarsest axis, since steps form stairs beside a sloping line."""
 
 
 class ToolsOfRows(Struct, frozen=True, eq=False):

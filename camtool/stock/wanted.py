@@ -81,16 +81,16 @@ DEFAULT_WALL_MM = 0.01
 """Width of the band beside a wall in which nothing is judged, if it is not given."""
 
 DIAGONAL = math.sqrt(2.0)
-"""Of a square over its side, and of a quarter arc over its radius."""
+"""Diagonal of a square over its side, and of a quarter arc over its radius."""
 
 NOSE_SHARE = 0.5
-"""Of the groove of a round nose, the share of its corner beside the flat that must be cut."""
+"""Share of a round nose's corner, next to the flat, within which its groove must be cut."""
 
 FAR_MM = 1e9
-"""Distance from lines where there are none."""
+"""Distance from lines if there are none."""
 
 POINT_MM = 2e-6
-"""Length of the line that stands for a point: lines need one."""
+"""Length of the line that stands for a point, since layers need lines."""
 
 
 class WantedLayer(Struct, frozen=True, eq=False, dict=True):
@@ -106,7 +106,7 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
     depth_mm: float
     reach_mm: float = math.inf
     cutter: CutterProfile | None = None
-    """The tool whose groove about its lines the layer is."""
+    """The tool, if the layer is the groove of a tool along its lines."""
 
     @cached_property
     def segments(self) -> Segments:
@@ -269,7 +269,7 @@ def _tabs_mm(operation: Operation) -> float:
 
 
 DRILLED = ("holes", "pins")
-"""What operations take that drill it."""
+"""Values of `takes` of operations that drill."""
 
 
 class _Layers:

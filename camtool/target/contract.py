@@ -111,10 +111,10 @@ class Target(ABC):
     interpolators: ClassVar[tuple[str, ...]] = ()
     """The choices of `--interpolator`, if there are any."""
     ways: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    """Keys of the machine file that say how its controller draws, with what each may be: what
-    `camtool meet` may propose."""
+    """Keys of the machine file for how its controller draws, with the possible values of each,
+    which `camtool meet` may propose."""
     meanings: ClassVar[Mapping[str, str]] = {}
-    """What words say that move nothing, such as "G21", for `camtool explain`."""
+    """The meanings of words that move nothing, such as "G21", for `camtool explain`."""
     codes: ClassVar[tuple[TargetCode, ...]] = ()
     """The codes of its own findings; their names start with the name of the target and a dot."""
     starts_spindle: ClassVar[bool] = False
@@ -124,7 +124,7 @@ class Target(ABC):
     any_machine: ClassVar[bool] = False
     """True if the machine file describes no particular machine: travel and rates are examples."""
     grade: ClassVar[Grade] = "step-true"
-    """What the model of its controllers knows."""
+    """How much the model of its controllers computes."""
     filter_default: ClassVar[bool] = False
     """True if `camtool filter` uses it by default."""
     no_twin: ClassVar[str] = "its wire is not modelled"

@@ -32,7 +32,7 @@ _ABOUT = {
     "is unknown,\n## and a dimension that depends on it is undecided.\n## No values hold for all "
     "machines: take both # away, and give yours. camtool calibrate writes some.",
 }
-"""Comments on the keys of a table."""
+"""Comments for tables."""
 
 _UNCERTAIN = {
     "uncertainty": {

@@ -39,17 +39,17 @@ class Terminal:
         """Count of answers that are due, for a controller that answers each line; piped input
         waits for them."""
         self.answers = False
-        """True if it answers every line with something, where `due` does not count them."""
+        """True if it answers every line, for a controller whose answers `due` does not count."""
         self.ready = True
         """False while it may not take lines yet, since the opening of the port has reset it."""
         self.failed = ""
-        """Why an answer that is due will never come."""
+        """Reason why a due answer will never come, "" if it may."""
         self.stands = False
-        """True if it has said, since it was told to stop, that it stands."""
+        """True if it has reported, since it was told to stop, that it stands."""
         self.runs_on = False
-        """True if what was typed last ends only with the next thing that is typed."""
+        """True if what was typed last goes on until the next thing is typed."""
         self.rests_s = 0.0
-        """Longest silence while it does what was typed last, s."""
+        """Longest silence while it executes what was typed last, s."""
         self.hello = b""
         """Bytes sent when the port has been opened."""
         self._rest = b""

@@ -30,8 +30,8 @@ from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL, Chunk, Effects, Options
 
 COMMANDED: Final = Options(effects=Effects(False, False, False, False, False))
-"""A model run with this says what the controller commands; the mechanics are those of `Slides`,
-which outlive a block."""
+"""Options with which a model returns what the controller commands; the mechanics are those of
+`Slides`, which outlive a block."""
 
 
 class TwinTrace(Struct, frozen=True, eq=False):
@@ -95,9 +95,9 @@ class Slides:
 
     def __init__(self, machine: Machine[Any, Any]) -> None:
         self.commanded_mm: Floats = np.zeros(3)
-        """(3,) where the controller believes them to be."""
+        """(3,) the position that the controller believes in."""
         self.ends_s: float | None = None
-        """When the travel that is under way will be over; None: nothing is."""
+        """Time at which the travel under way ends; None if nothing is under way."""
         self._mechanics = Mechanics(machine, self.commanded_mm, ALL)
         self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
         self._travel = Travel(np.empty((0, 3)), np.empty(0), np.empty(0), 0.0)
@@ -201,7 +201,7 @@ class Twin(ABC):
     controller does more by itself than move, `wake_s` (when) and `_wake` (what)."""
 
     wire: ClassVar[str]
-    """The line as its terminal programs are told it, such as "115200 8N1"."""
+    """The settings of the line as terminal programs need them, such as "115200 8N1"."""
     byte_s: ClassVar[float] = 0.0
 
     def __init__(self, slides: Slides) -> None:

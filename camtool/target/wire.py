@@ -47,7 +47,7 @@ ToolAt = Literal["", "journal", "zero", "known"]
 Override = Literal["feed", "rapid", "spindle"]
 
 HandAction = Literal["home", "zero", "jog", "hold", "unlock", "line"]
-"""Orders by hand. `jog` moves by so much, `hold` as long as a key is held, `line` is typed."""
+"""Orders by hand. `jog` moves by a distance, `hold` while a key is held, `line` is typed."""
 
 
 class Forecast(Struct, frozen=True, eq=False):
@@ -255,13 +255,13 @@ class Conversation(ABC):
         """True if its place is counted by the steps that the controller reports."""
         self.feed_mm_min: float | None = None
         self.rpm: float | None = None
-        """Feed and spindle speed that the controller reports, None where it does not."""
+        """Feed and spindle speed that the controller reports, None if it reports none."""
         self.is_program_stop = False
-        """True where it was last WAITING because the program stops for an operator (M0)."""
+        """True if the state was last WAITING because the program stops for an operator (M0)."""
         self.overrides: dict[Override, int] = {}
         """Overrides in %, as the controller reports them or was told last."""
         self.next_s = NEVER
-        """The time at which it wants `tick`; whoever calls earlier does no harm."""
+        """The time at which `tick` must be called; earlier calls do no harm."""
         self._out: list[Action] = []
 
     @property
@@ -319,7 +319,8 @@ class Conversation(ABC):
 
     @abstractmethod
     def resume(self, now: float) -> None:
-        """Resume after a pause, or after a stop at which the user had something to do."""
+        """Go on with the program after a pause, or after a stop at which the user had something to
+        do."""
 
     @abstractmethod
     def stop(self, now: float) -> None:
@@ -353,8 +354,8 @@ class Conversation(ABC):
         self._out.append(Write(data))
 
     def _unwrite(self) -> bool:
-        """Withdraw bytes that were to be written and were not handed out yet; return True if there
-        were any."""
+        """Take back bytes that were to be written and were not handed out yet; return True if
+        there were any."""
         told_actions: list[Action] = [action for action in self._out if isinstance(action, Tell)]
         was_unwritten, self._out = len(told_actions) < len(self._out), told_actions
         return was_unwritten
@@ -423,7 +424,7 @@ class PacketByPacket(Conversation):
                 self.state = WireState.PAUSED
 
     def resume(self, now: float) -> None:
-        """Resume with the next packet."""
+        """Go on with the next packet."""
         if self.state is WireState.PAUSING:
             self.state = WireState.SENDING
         elif self.state in HALTS:
@@ -566,7 +567,7 @@ class CommandHand(Hand):
         self._values: Mapping[str, float] = {}
 
     def begin(self, now: float) -> None:
-        """Become READY. Nothing is asked of the controller, so that only what was known of the
+        """Set the state READY. Nothing is asked of the controller, so only what was known of the
         machine before is known."""
         self.state, self.place_mm = WireState.READY, self.manner.at_mm
 
@@ -621,7 +622,7 @@ class CommandHand(Hand):
         """Do nothing: an order by hand has no pause."""
 
     def resume(self, now: float) -> None:
-        """Resume the present order where it waits for the user."""
+        """Let the present order go on where it waits for the user."""
         if self._order is not None:
             self._order.resume(now)
             self._follow()
@@ -649,7 +650,7 @@ class CommandHand(Hand):
         return "" if self._order is None else self._order._unattended
 
     def _follow(self) -> None:
-        """Copy actions, place and state from the conversation of the present order."""
+        """Take over actions, place and state from the conversation of the present order."""
         order = self._order
         if order is None:
             return
@@ -718,10 +719,10 @@ def _moved(place_mm: Place | None, by_mm: Place, sense: float = 1.0) -> Place | 
 
 
 QUIET_S = 0.3
-"""An answer to a typed line is over when nothing has come for so long, s."""
+"""The answer to a typed line is complete when nothing has come for this time, s."""
 
 SILENT_S = 1.5
-"""A typed line to which nothing is answered for so long has no answer, s."""
+"""A typed line that gets no answer within this time gets none at all, s."""
 
 
 class TypedLine(Conversation):

@@ -33,7 +33,7 @@ FIT_END_MM = 1e-9
 """The least-squares centre is found when it moves by less than this."""
 
 MIN_BINS = 3
-"""A circle has three unknowns."""
+"""Least number of bins: a circle has three unknowns."""
 
 
 class FullCircle(Struct, frozen=True):

@@ -159,8 +159,8 @@ class MatchingMoves(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, decoded: Toolpath, written: Toolpath) -> MatchingMoves:
-        """Number the moves of both sides. Points within POSITION_EPS_MM, by rounding, are the
-        same."""
+        """Return numbers for the moves of both sides. Points within POSITION_EPS_MM, by rounding,
+        are the same."""
         numbers = np.concatenate([_numbers(decoded), _numbers(written)])
         number = np.unique(numbers, axis=0, return_inverse=True)[1].reshape(-1)
         return cls(number[: len(decoded)], number[len(decoded) :])

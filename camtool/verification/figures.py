@@ -31,7 +31,7 @@ from camtool.verification.matching import Match
 PERCENTILE = 0.95
 
 PIECES_GUESSED = 500
-"""From so many pieces of lines it is guessed where the percentile is; then all are counted."""
+"""The place of the percentile is guessed from this many pieces of lines; then all are counted."""
 
 
 class Figure:
@@ -42,7 +42,7 @@ class Figure:
         self.at_mm: tuple[float, float] = (math.nan, math.nan)
         """The place of the maximum, mm; of several, the first."""
         self.row = -1
-        """Toolpath row of the maximum."""
+        """Toolpath row of the maximum, −1 without errors."""
         self._max = -math.inf
         self._squares = 0.0
         self._histogram = np.zeros(BINS, dtype=np.int64)

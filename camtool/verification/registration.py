@@ -93,14 +93,16 @@ MIN_PEAK_SHARE = 0.04
 MAX_CANDIDATES = 6
 
 MIN_WALL_SHARE = 0.3
-"""A smaller distance along the same contours is the wall, and the larger ones clear the way to it,
-when it has this part of their length."""
+"""Of several distances along the same contours, the smallest that has this share of the length of
+the longest is the finishing pass along the wall; the larger ones clear the way to it."""
 
 MIN_ON_LINE_SHARE = 0.9
-"""A path that keeps to the lines for this part of what it keeps to at all has no radius."""
+"""If the path runs on the lines for this share of all that keeps to the lines or a distance from
+them, the tool has no radius."""
 
 MIN_RIVAL_SHARE = 0.25
-"""Two radii are ambiguous when the second explains this part as much as the first, elsewhere."""
+"""Two radii are ambiguous when the second explains, elsewhere, this share of what the first
+explains."""
 
 CUT_SHARE = 0.5
 """A track is followed when this part of it is cut; with less, the best side of a contour ..."""
@@ -109,13 +111,14 @@ PARTLY_SHARE = 0.15
 """... with at least this."""
 
 MIN_SHARP_GAIN = 1e-3
-"""Sharp corners take the place of round ones when this part more of them is cut."""
+"""A track with sharp corners replaces one with round corners if this share more of it is cut."""
 
 SEARCH_POINTS = 3000
-"""So many points of the path decide on its place."""
+"""Number of points of the path that decide on its place."""
 
 MAX_MARKS = 300
-"""So many boxes, centres and holes of the program, and of the drawing, are compared in pairs."""
+"""Number of boxes, and of centres and holes, of the program and of the drawing that are compared
+in pairs."""
 
 VOTE_MM = 0.25
 """Shifts that differ by less are one candidate."""
@@ -123,25 +126,25 @@ VOTE_MM = 0.25
 MAX_PLACES = 16
 
 MIN_FOLLOWED_SHARE = 0.5
-"""A drawing lies where its program cuts when this part of the cuts follows its lines."""
+"""A drawing is in the right place if at least this share of the cuts follows its lines."""
 
 MIN_OTHER_SHARE = 0.8
-"""Another scale, mirror or turn is named when so much would follow them."""
+"""Another scale, mirror or turn is named if this share of the cuts would follow the lines."""
 
 MIN_EQUAL_SHARE = 0.97
-"""A second place is as good as the first when it explains this part as much."""
+"""A second place is as good as the first if it explains this share of what the first explains."""
 
 WIDTHS_MM = (1.0, 0.5, 0.25, 0.12, 0.08, 0.05, 0.05, 0.05)
-"""Points within this of the track pull it, one step of Gauss and Newton after the other."""
+"""Points within this distance of the track are used, in successive steps of Gauss and Newton."""
 
 TRACK_MM = 0.1
-"""Tracks are looked at about this far apart, to see what is cut ..."""
+"""Points along tracks are about this far apart, to see what is cut ..."""
 
 MAX_TRACK_POINTS = 200_000
 """... but at no more than about this many points."""
 
 MIN_LEFT_MM = 0.5
-"""A part of a contour that is not cut is named from this length on: ends of paths differ."""
+"""A part of a contour that is not cut is reported from this length on: ends of paths differ."""
 
 TURNS = (
     ("--mirror y", np.diag([1.0, -1.0])),
@@ -546,8 +549,8 @@ def _centres_of(lines: _Lines) -> Floats:
 
 
 def _refine_shift(path: _Path, lines: _Lines, shift: Floats) -> Floats:
-    """Improve a shift until the path keeps to the lines, or to a single distance from them; return
-    it."""
+    """Return a shift, improved step by step until the path keeps to the lines, or to a single
+    distance from them."""
     shift = np.array(shift, dtype=np.float64)
     for width in WIDTHS_MM:
         distance, normal, _ = lines.signed_distances(path.points - shift)

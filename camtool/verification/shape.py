@@ -73,14 +73,15 @@ OVERCUT_MM = 0.005
 """A plan that cuts into what must stay by more than this is an error."""
 
 MAX_MOVES = 10_000
-"""Programs of more cutting moves get no shape: to sweep them would take longest of all ..."""
+"""Programs with more cutting moves get no shape, since sweeping them would take longer than all
+else ..."""
 
 MAX_POINTS = 200_000
 """... and so do programs whose path would need more points than this, ..."""
 
 MAX_CROSSINGS, MAX_PAIRS = 50_000, 3_000_000
-"""... and those whose moves cross each other more often than the first; at most the second number
-of pairs of moves is looked at, about."""
+"""... and those whose moves cross each other more often than the first number; about the second
+number of pairs of moves is examined at most."""
 
 
 SLIDE_SPACING_MM = 0.01

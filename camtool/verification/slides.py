@@ -82,8 +82,8 @@ class Paths(Struct, frozen=True, eq=False):
 
 
 ROWS_AT_ONCE = 16_384
-"""So many rows are judged before their figures are summed up; a fused run then says how far it
-is."""
+"""Number of rows that are judged before their figures are summed up; a fused run reports its
+progress then."""
 
 
 class SlidePass:

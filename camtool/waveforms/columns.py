@@ -18,7 +18,7 @@ LONG_COLUMNS = 2
 """Values that hold for more columns than this are entered one by one."""
 
 STANDING_S = 1e-7
-"""Between two samples that are farther apart than this the machine stands."""
+"""The machine stands between two samples that are farther apart than this."""
 
 
 class Peak(Struct, frozen=True):

@@ -32,10 +32,10 @@ STRIP, STRIP_GAP = 10.0, 12.0
 """Height of a strip of the ribbon, and the gap between two."""
 
 PAD = 0.06
-"""Part of a lane's height that stays free above and below its curves."""
+"""Share of a lane's height that stays free above and below its curves."""
 
 UNITS = (3600.0, "h", 7200.0), (60.0, "min", 600.0), (1.0, "s", 1.0), (1e-3, "ms", 1e-3)
-"""A unit in s, its name, and from how many s on it is used."""
+"""(Unit in s, its name, least span in s for which it is used)."""
 
 
 class Trend(Struct, frozen=True, eq=False):

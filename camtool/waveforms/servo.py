@@ -41,7 +41,7 @@ STEADY_SHARE = 4
 HEIGHT = 110.0
 
 QUANTITIES = 4
-"""Of each axis: reference and speed, wanted and reached position."""
+"""Number of quantities of each axis: reference and speed, wanted and reached position."""
 
 
 class AxisMove(Struct, frozen=True):

@@ -27,10 +27,10 @@ from camtool.waveforms.table import table
 from camtool.waveforms.vcd import dump
 
 PICTURE_MOMENTS = 120
-"""A picture without a span shows so many changes."""
+"""Number of changes that a picture without a span shows."""
 
 MAX_S = 1e9
-"""No stretch begins later or is longer: 30 years."""
+"""Latest begin and greatest length of a stretch, s: 30 years."""
 
 KINDS = (".vcd", ".csv", ".svg", ".png")
 

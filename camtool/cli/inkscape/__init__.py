@@ -15,7 +15,8 @@ from camtool.errors import OutputError
 
 FILES = ("camtool_output.inx", "camtool_output.py", "camtool_effect.inx", "camtool_effect.py")
 COMMAND_LINE = 'COMMAND = ("camtool",)'
-"""The line of camtool_output.py that says how camtool is called."""
+"""The line of camtool_output.py that names the command to call, which is replaced on
+installation."""
 
 
 @click.command(cls=SectionedCommand, short_help="Save and check programs from Inkscape.")

@@ -16,10 +16,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 COMMAND = ("camtool",)
-"""How camtool is called; `camtool inkscape` writes here where it is itself."""
+"""The command to call; `camtool inkscape` replaces this by its own path."""
 
 PREFIX = "camtool: "
-"""Begins each message of camtool."""
+"""The beginning of every message of camtool."""
 
 MAX_MESSAGES = 20
 

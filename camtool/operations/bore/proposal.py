@@ -7,13 +7,13 @@ from camtool.planning.holes import HOLE_SIZE_MM, circle_of
 from camtool.planning.ramps import MIN_HELIX_SHARE
 
 HALF = 0.5
-"""Counterbores of unknown depth go so far into the stock."""
+"""Depth of counterbores, over the thickness of the stock, if the drawing does not say it."""
 
 ENTRY = ("entry", '"helix:3deg"', "how steeply it goes down")
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Propose one operation for the circles within parts that are wider than the tool."""
+    """Return the proposed operation for the circles within parts that are wider than the tool."""
     tool, min_width = remaining.proposal.tool_mm, remaining.proposal.tool_mm + HOLE_SIZE_MM
     if not tool or remaining.habit == "pocket":
         return []
@@ -38,8 +38,8 @@ def propose(remaining: Remaining) -> list[Part]:
 
 
 def _stepped(remaining: Remaining) -> list[Part]:
-    """Propose the counterbores (where the thickness of the stock is known), and the holes within
-    counterbores and countersinks."""
+    """Return the proposed operations for counterbores (where the thickness of the stock is known),
+    and for the holes within counterbores and countersinks."""
     parts = [counterbore(remaining, wide)] if (wide := _wider(remaining)) else []
     holes = [row for row in remaining.rows if row in remaining.steps.holes]
     bored = {row: circle_of(remaining.drawing.paths[row]) for row in holes}

@@ -123,7 +123,7 @@ def radii(wide_mm: float, tool_mm: float, step_mm: float) -> list[float]:
 
     >>> radii(1.0, 1.5, 1.2)
     [1.0]
-    >>> radii(4.5, 1.5, 1.2)
+    >>> [round(each, 6) for each in radii(4.5, 1.5, 1.2)]
     [1.35, 2.4, 3.45, 4.5]
     """
     first = min(wide_mm, CORE_SHARE * tool_mm)

@@ -11,8 +11,8 @@ from camtool.operations.bore.proposal import counterbore
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Propose one operation for the countersinks of each width and V bit; the holes in them are
-    left to the kinds that follow."""
+    """Return one proposed operation for the countersinks of each width and V bit; the holes in
+    them are left to the kinds that follow."""
     groups = defaultdict(list)
     for row, sink in remaining.steps.sunk.items():
         if sink.hole in remaining.rows:

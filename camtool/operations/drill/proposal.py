@@ -10,8 +10,8 @@ SMALL_HOLE = 0.1
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Propose drilling for the points, and for circles that are small or as wide as the tool or a
-    drill of the library."""
+    """Return the proposed operations that drill points, and circles that are small or as wide as
+    the tool or a drill of the library."""
     tool = remaining.proposal.tool_mm
     if remaining.habit == "pocket":
         return []

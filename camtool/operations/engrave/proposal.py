@@ -18,15 +18,16 @@ from camtool.records import replace
 TEXT_DEPTH_MM = 0.2
 
 SIZES_TOLD = 4
-"""At most so many diameters of holes are told."""
+"""Largest number of hole diameters that are listed."""
 
 MAX_POINTS = 4000
-"""In drawings of more vertices the narrowest place is not looked for: the finest bit is taken."""
+"""In drawings with more vertices the narrowest place is not searched for, and the finest bit is
+taken."""
 
 
 def propose(paths: Remaining) -> list[Part]:
-    """Propose engraving for text, for open paths, for closed paths that the end mills are too wide
-    for, or for all that is left if the layer's name asks for it."""
+    """Return the proposed operations that engrave text, open paths, and closed paths that the end
+    mills are too wide for; or all that is left, if the name of the layer asks for it."""
     sources, closed = paths.drawing.sources, paths.drawing.paths.closed
     parts: list[Part] = []
     text = tuple(row for row in paths.rows if is_text(sources[row]))

@@ -22,21 +22,23 @@ from camtool.planning.items import Chosen, Setting, Work, contours_along
 from camtool.planning.naming import at_place, key_of
 
 CHORD_RAD = math.pi / 18.0
-"""Arcs are chords of this angle where the distance of lines is measured: 0.4 % of the radius."""
+"""Arcs become chords of this angle when the distance of lines is measured: 0.4 % of the radius."""
 
 MIN_GAP_SHARE = 0.1
-"""Lines nearer to each other than this part of the groove touch."""
+"""Lines nearer to each other than this share of the groove's width touch ..."""
 
 MIN_GAP_SHARE_AT_ENDS = 0.5
-"""... and so do those of which one ends so near to the other: strokes of letters are drawn so."""
+"""... and so do lines of which one ends within this share of it from the other: strokes of letters
+are drawn so."""
 
 
 FIRST_LINES, MAX_PAIRS = 128, 5_000
-"""At least the first lines are looked at, and as many more, by doubling, as have no more than the
-second number of pairs near each other: hundreds of lines that cross enclose 100,000 places."""
+"""Lines that are compared: at least the first number, doubled as long as no more than the second
+number of pairs are near each other. Hundreds of lines that cross enclose 100,000 places."""
 
 WIDTH_SLACK = 0.01
-"""A tool fits between lines that are nearer than it is wide by this part of that."""
+"""A tool fits between lines that are nearer to each other than it is wide by this share of its
+width."""
 
 
 def engrave(chosen: Chosen, setting: Setting) -> Work:

@@ -7,15 +7,15 @@ from camtool.jobs.template import Part, Remaining
 from camtool.jobs.widths import has_room, is_slot
 
 HALF = 0.5
-"""A pocket of unknown depth leaves this part of the stock below it."""
+"""Share of the thickness that a pocket leaves below it, if its depth is not known."""
 
 SPLINTER_SHARE = 4.0
-"""Windows that are nowhere wider than so many times the tool are cleared."""
+"""Windows that are nowhere wider than this many tool diameters are cleared."""
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Propose a pocket for a layer whose name asks for it, or for the small windows of another
-    layer."""
+    """Return the proposed pocket for a layer whose name asks for it, or for the small windows of
+    another layer."""
     tool, paths = remaining.proposal.tool_mm, remaining.drawing.paths
     if not tool:
         return []

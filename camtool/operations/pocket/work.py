@@ -79,7 +79,7 @@ MAX_STEPS = 10_000
 MAX_FRONTS = 1_000
 
 MAX_HELIX_SHARE = 0.5
-"""Default of the largest radius of a helix, over the tool's radius."""
+"""Default radius of a helix at most, over the tool's radius."""
 
 MAX_HELIX_TURNS = 200
 
@@ -87,7 +87,8 @@ MAX_RAMP_LAPS = 20
 """A ramp that would go back and forth on the whole path more often than this becomes a plunge."""
 
 Link = Callable[[Floats, Floats], Floats | None]
-"""From a place (2,) to another: (k, 3) over the floor, or None when there is no link."""
+"""The function that returns the link (k, 3) over the floor from one place (2,) to another, None if
+there is none."""
 
 
 class Pocket(Struct, frozen=True, eq=False):

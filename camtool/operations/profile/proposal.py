@@ -22,9 +22,9 @@ MIN_TAB_HEIGHT_MM = 0.5
 
 
 def propose(remaining: Remaining) -> list[Part]:
-    """Propose one operation for all closed contours. If the tool is known, propose instead one for
-    slots of its width, one for windows and one for outlines (with tabs if the stock is known), and
-    others for contours that need a finer mill."""
+    """Return one proposed operation for all closed contours. If the tool is known, return instead
+    one for slots of its width, one for windows and one for outlines (with tabs if the stock is
+    known), and others for contours that need a finer mill."""
     if not remaining.proposal.tool_mm:
         select = (("select", '["closed"]', ""),) if remaining.is_divided else ()
         return (

@@ -41,10 +41,10 @@ MAX_SLOT_SHARE = 3.0
 """Narrowest and widest slot, over the tool's diameter."""
 
 FOOT_SHARE = 1.1 * CORNER_SHARE
-"""The pass along a wall is round in corners by this part of the tool's radius."""
+"""Radius of the finishing pass in corners of a slot, over the tool's radius."""
 
 MOVES_ROUND = 5.0
-"""Moves of one circle and its way back."""
+"""Number of moves of one circle and its way back, for an estimate."""
 
 NEAR_SHARE = 0.05
 """A wall begins no farther than this part of the tool's radius from the band that it bounds."""

@@ -35,15 +35,15 @@ MAX_CLEAR_MM = 1.0
 """... and no farther than this."""
 
 MIN_ALONG_MM = 1e-7
-"""A section that runs back by no more is drawn so by rounding."""
+"""A section that runs back by no more than this does so only by rounding."""
 
 SHARP_DEPTH = 0.6134
-"""Depth of an outer ISO thread over its pitch (17/24 of the height of its triangle)."""
+"""Depth of an external ISO thread over its pitch (17/24 of the height of its triangle)."""
 
 MAX_PASSES = 1000
 
 SAMPLES = 4000
-"""Points of the section at which what the nose leaves is measured."""
+"""Number of points of the section at which the material left by the nose is measured."""
 
 
 def _above_zero(operation: Operation, *names: str) -> None:

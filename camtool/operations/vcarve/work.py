@@ -89,7 +89,7 @@ numbers."""
 MAX_SWEEP_RAD = 2.0
 
 MEET_MM = 1e-4
-"""Ends of pieces that are nearer than this meet."""
+"""Ends of pieces that are nearer than this are the same place."""
 
 
 class _Region(Struct, frozen=True, eq=False):
