@@ -323,7 +323,7 @@ class _Joining(Struct, eq=False):
 
     @classmethod
     def of(cls, ends: Ends) -> _Joining:
-        """Return the state without any joint."""
+        """Return the state before any end is joined."""
         no_mates = np.full(len(ends.points), -1, dtype=np.int64)
         segments, arcs = ends.weights[:, 0].copy(), ends.weights[:, 1].copy()
         return cls(ends, no_mates, no_mates.copy(), {}, np.arange(len(ends.group)), segments, arcs)
@@ -461,7 +461,7 @@ def _rank_pairs(ends: Ends, one: Ints, other: Ints) -> tuple[Ints, Ints]:
 
 
 def wrapped(angle: Floats) -> Floats:
-    """Return angles (…,) brought into −π ≤ angle < π."""
+    """Return the same angles, rad, in the range −π ≤ angle < π."""
     return np.asarray((angle + math.pi) % (2.0 * math.pi) - math.pi)
 
 
@@ -608,7 +608,7 @@ def _try_chains(lines: Polylines, chains: Chains) -> tuple[Bools, JoinedChains]:
 
 
 def _single_paths(lines: Polylines, chains: Chains) -> JoinedChains:
-    """Return chains of one path each, unchanged."""
+    """Return these chains, each of one path, with that path unchanged and without gaps."""
     no_gaps = np.empty(0, dtype=np.int64)
     return JoinedChains(
         chains, lines.select(chains.entries // 2), no_gaps, np.empty((0, 2)), np.empty(0)

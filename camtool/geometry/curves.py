@@ -65,11 +65,11 @@ class FunctionCurve(Struct, frozen=True, eq=False):
     breaks: Floats
 
     def point(self, t: Floats) -> Floats:
-        """Return positions (n, 2) mm."""
+        """Return positions (n, 2) mm at parameters (n,)."""
         return self.at(t)
 
     def tangent(self, t: Floats) -> Floats:
-        """Return derivatives (n, 2)."""
+        """Return derivatives (n, 2) at parameters (n,)."""
         return self.derivative(t)
 
 
@@ -90,11 +90,11 @@ class BezierCurve(Struct, frozen=True, eq=False):
         return np.array([0.0, 1.0])
 
     def point(self, t: Floats) -> Floats:
-        """Return positions (n, 2) mm."""
+        """Return positions (n, 2) mm at parameters (n,)."""
         return _bernstein(self.control, t)
 
     def tangent(self, t: Floats) -> Floats:
-        """Return derivatives (n, 2)."""
+        """Return derivatives (n, 2) at parameters (n,)."""
         return (len(self.control) - 1.0) * _bernstein(np.diff(self.control, axis=0), t)
 
     def pieces(self) -> Pieces:
@@ -123,7 +123,7 @@ class EllipseCurve(Struct, frozen=True, eq=False):
         return np.array([0.0, abs(self.end - self.start)])
 
     def point(self, t: Floats) -> Floats:
-        """Return positions (n, 2) mm."""
+        """Return positions (n, 2) mm at parameters (n,)."""
         angle = self._angle(t)[:, None]
         return np.asarray(
             np.asarray(self.centre)
@@ -132,7 +132,7 @@ class EllipseCurve(Struct, frozen=True, eq=False):
         )
 
     def tangent(self, t: Floats) -> Floats:
-        """Return derivatives (n, 2)."""
+        """Return derivatives (n, 2) at parameters (n,)."""
         angle = self._angle(t)[:, None]
         along = np.cos(angle) * np.asarray(self.minor) - np.sin(angle) * np.asarray(self.major)
         return np.asarray(np.copysign(1.0, self.end - self.start) * along)
@@ -201,12 +201,13 @@ class SplineCurve(Struct, frozen=True, eq=False):
         return distinct(self.knots[self.degree : len(self.control) + 1])
 
     def point(self, t: Floats) -> Floats:
-        """Return positions (n, 2) mm."""
+        """Return positions (n, 2) mm at parameters (n,)."""
         value = self._homogeneous(t, 0)
         return np.asarray(value[:, :2] / value[:, 2:])
 
     def tangent(self, t: Floats) -> Floats:
-        """Return derivatives (n, 2): (A'w − A w')/w² of the homogeneous curve (A, w)."""
+        """Return derivatives (n, 2) at parameters (n,): (A'w − A w')/w² of the homogeneous curve
+        (A, w)."""
         value, slope = self._homogeneous(t, 0), self._homogeneous(t, 1)
         weight = value[:, 2:]
         return np.asarray((slope[:, :2] * weight - value[:, :2] * slope[:, 2:]) / weight**2)

@@ -400,7 +400,7 @@ def _common_points(a: _SegmentRows, b: _SegmentRows) -> tuple[Floats, Floats]:
 
 
 def _turn_left(vectors: Floats) -> Floats:
-    """Return vectors (..., 2) turned by +90°."""
+    """Return vectors (..., 2) turned by 90° counter-clockwise."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 

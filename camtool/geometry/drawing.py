@@ -205,7 +205,7 @@ class Drawing:
 
     @cached_property
     def fit(self) -> FitError:
-        """The distance between the paths and what was drawn."""
+        """The distance between the paths and the curves that were drawn."""
         if not self.off_mm.any():
             return FitError()
         rows = segment_rows(self.paths)

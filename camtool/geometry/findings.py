@@ -6,7 +6,7 @@ from camtool.findings import ERROR, WARNING, Code
 
 
 class ContourCode(Code):
-    """Codes of contours."""
+    """Codes of findings about contours."""
 
     SELF_CROSSING = (
         108,

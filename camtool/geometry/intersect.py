@@ -49,7 +49,7 @@ class Crossings(Struct, frozen=True, eq=False):
         return len(self.row_a)
 
     def __getitem__(self, rows: Bools | Ints) -> Crossings:
-        """Return the chosen rows."""
+        """Return the meetings that a mask or indices select."""
         return Crossings(*(column[rows] for column in astuple(self)))
 
 

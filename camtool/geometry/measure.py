@@ -223,7 +223,8 @@ class Frames(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, segments: Segments) -> Frames:
-        """Return the frame of each segment."""
+        """Return the frame of each segment: start, end, tangent, normal, curvature, length and
+        sweep."""
         chord = segments.end - segments.start
         size = np.hypot(chord[:, 0], chord[:, 1])
         unit = chord / size[:, None]
@@ -243,7 +244,7 @@ class Frames(Struct, frozen=True, eq=False):
         )
 
     def __getitem__(self, rows: Bools | Ints) -> Frames:
-        """Return the chosen rows."""
+        """Return the frames that a mask or indices select."""
         return Frames(*(column[rows] for column in astuple(self)))
 
     def tangent_at(self, t: Floats) -> Floats:
@@ -281,7 +282,7 @@ class Frames(Struct, frozen=True, eq=False):
 
 
 def turn_left(vectors: Floats) -> Floats:
-    """Return vectors (K, 2) turned by +90°."""
+    """Return vectors (K, 2) turned by 90° counter-clockwise."""
     return np.column_stack([-vectors[:, 1], vectors[:, 0]])
 
 

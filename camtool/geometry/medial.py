@@ -57,7 +57,7 @@ class MedialTrace(Struct, frozen=True, eq=False):
         return len(self.t)
 
     def rows(self, selection: Ints | Bools) -> MedialTrace:
-        """Return the chosen rows."""
+        """Return the rows that a mask or indices select."""
         return MedialTrace(*(column[selection] for column in astuple(self)))
 
     @property
@@ -67,7 +67,7 @@ class MedialTrace(Struct, frozen=True, eq=False):
 
 
 def concatenated(traces: list[MedialTrace]) -> MedialTrace:
-    """Return the rows of all traces in one trace."""
+    """Return one trace with the rows of all traces in turn."""
     return MedialTrace(*map(np.concatenate, zip(*map(astuple, traces), strict=True)))
 
 

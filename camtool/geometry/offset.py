@@ -446,7 +446,7 @@ class Mitres(Struct, frozen=True, eq=False):
 
     @classmethod
     def about(cls, corners: Corners, rows: Ints, offset: Offset) -> Mitres:
-        """Return the mitres at these outer corners."""
+        """Return the mitres at the outer corners with these rows; the other corners have none."""
         half, d = -0.5 * corners.turn[rows], offset.distance_mm
         is_cut = offset.limit * np.cos(half) < 1.0
         reach, cut = np.zeros(len(corners.turn)), np.zeros(len(corners.turn), dtype=np.bool_)
@@ -602,7 +602,7 @@ class Slices(Struct, frozen=True, eq=False):
         return len(self.element)
 
     def __getitem__(self, rows: Bools | Ints) -> Slices:
-        """Return the chosen slices; the nodes stay."""
+        """Return the slices that a mask or indices select, with all nodes."""
         return Slices(
             self.element[rows],
             self.t0[rows],

@@ -210,7 +210,7 @@ def _span_path(
 
 
 def _join_parts(parts: list[Polylines]) -> Polylines:
-    """Return all paths of all parts, in order."""
+    """Return the paths of all parts, one part after the other."""
     counts = np.concatenate([np.diff(part.offsets) for part in parts])
     return Polylines(
         np.concatenate([part.vertices for part in parts]),
@@ -271,7 +271,7 @@ class Covers(Struct, frozen=True, eq=False):
     sense: Floats
 
     def __getitem__(self, rows: Bools) -> Covers:
-        """Return the chosen rows."""
+        """Return the pairs that a mask selects."""
         return Covers(*(column[rows] for column in astuple(self)))
 
 

@@ -55,7 +55,7 @@ class Polyline:
 
     @classmethod
     def _trusted(cls, vertices: Floats, closed: bool) -> Polyline:
-        """Wrap vertices that were checked before, read-only."""
+        """Return a polyline of vertices that were checked before and are read-only."""
         path = object.__new__(cls)
         object.__setattr__(path, "vertices", vertices)
         object.__setattr__(path, "closed", closed)
@@ -202,7 +202,7 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
 
     @classmethod
     def of(cls, lines: Polyline | Polylines) -> Segments:
-        """Return all segments of the paths, in order."""
+        """Return the segments of all paths, in order."""
         if isinstance(lines, Polyline):
             lines = Polylines.of([lines])
         return cls.leaving(lines, segment_rows(lines))
@@ -240,7 +240,7 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
         return len(self.bulge)
 
     def __getitem__(self, rows: Bools | Ints | slice) -> Segments:
-        """Return the chosen rows."""
+        """Return the segments that a mask, indices or a slice select."""
         return Segments(self.start[rows], self.end[rows], self.bulge[rows], self.path[rows])
 
     @property
@@ -362,7 +362,7 @@ def reverse_lines(lines: Polylines, is_chosen: Bools | None = None) -> Polylines
 
 
 def rotate(p: Polyline, angle_rad: float) -> Polyline:
-    """Return the path turned about (0, 0), CCW positive."""
+    """Return the path turned about (0, 0) by an angle, CCW positive."""
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
     x, y, bulge = p.vertices.T
     vertices = np.column_stack([cosine * x - sine * y, sine * x + cosine * y, bulge])

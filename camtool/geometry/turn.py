@@ -32,7 +32,7 @@ class Turn(Struct, frozen=True):
 
     @property
     def is_over(self) -> bool:
-        """True if the other face is up."""
+        """True if the map turns the part over, so that its other face is up."""
         return self.signs[0] * self.signs[1] < 0.0
 
     @property
@@ -47,7 +47,7 @@ class Turn(Struct, frozen=True):
         return Turn((x, y), other.point(self.shift_mm))
 
     def point(self, at_mm: Pair) -> Pair:
-        """Return the image of a point."""
+        """Return the image of a point under this map."""
         x, y = (
             sign * place + by
             for sign, place, by in zip(self.signs, at_mm, self.shift_mm, strict=True)
@@ -62,7 +62,7 @@ class Turn(Struct, frozen=True):
         return turned_points
 
     def box(self, box: Box) -> Box:
-        """Return the image of a box."""
+        """Return the image of a box under this map."""
         (a, b), (c, d) = self.point(box[:2]), self.point(box[2:])
         return min(a, c), min(b, d), max(a, c), max(b, d)
 

@@ -7,7 +7,7 @@ from camtool.geometry.findings import ContourCode
 
 
 class DrawingCode(Code):
-    """Codes of drawings."""
+    """Codes of findings about drawings."""
 
     UNITLESS = (
         101,

@@ -363,7 +363,7 @@ class _Joined(Struct, frozen=True, eq=False):
         return segment_numbers(self.vertices, self.begin, self.end)
 
     def of(self, indices: Ints) -> Segments:
-        """Return the segments with these indices (K,)."""
+        """Return the segments with these indices (K,) as lines and arcs."""
         begin = self.vertices[self.begin[indices]]
         return Segments.between(begin[:, :2], self.vertices[self.end[indices], :2], begin[:, 2])
 

@@ -233,7 +233,7 @@ class ReadOptions(FrozenRecord):
 
     @property
     def px_an_inch(self) -> float:
-        """Pixels per inch: as asked, or as CSS has it."""
+        """Pixels per inch: `dpi`, or the number that CSS defines."""
         return DPI if self.dpi is None else self.dpi
 
     def as_drawn(self) -> ReadOptions:

@@ -28,7 +28,7 @@ MAX_POINTS = 3_000_000
 
 
 class Unusable(Exception):
-    """The entity gives no piece; the text is the reason."""
+    """The error that an entity cannot become a piece; its text is the reason."""
 
 
 class Piece(Struct, frozen=True, eq=False):

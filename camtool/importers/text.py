@@ -176,7 +176,7 @@ def _stroke_letter(character: str) -> Letter | None:
 
 
 class _Face(Struct, frozen=True, order=True):
-    """An installed font file."""
+    """An installed font file, with the family, style, weight and width that it states."""
 
     path: str
     family: str

@@ -80,7 +80,7 @@ class Floor(Struct, frozen=True, eq=False):
 
     @property
     def box_mm(self) -> Box:
-        """The box of its lines, as wide as they cut."""
+        """The box around the lines of the floor, and as far beside them as they cut."""
         boxes = self.layer.curves.boxes
         wide = max(self.layer.shift_mm, 0.0)
         low, high = boxes[:, :2].min(axis=0) - wide, boxes[:, 2:].max(axis=0) + wide
@@ -125,7 +125,7 @@ class FloorDepths(Struct, frozen=True):
 
 
 class Floors:
-    """The floors that the operations of a plan leave."""
+    """The floors that the operations of a plan are to leave, found by their places."""
 
     def __init__(self, steps: Sequence[Step], beside_mm: float) -> None:
         """Take the steps of the plan, and the largest distance, mm in the plane, of the slides
@@ -186,7 +186,7 @@ class Floors:
 
 
 def _points_along(layer: WantedLayer) -> Floats:
-    """Return points (P, 2) along the lines of a layer."""
+    """Return points (P, 2), at most POINTS_APART_MM apart, along the lines of a layer."""
     every = layer.segments
     count = np.ceil(segment_lengths(every) / POINTS_APART_MM).astype(np.int64) + 1
     owners = np.repeat(np.arange(len(count)), count)

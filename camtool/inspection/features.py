@@ -83,7 +83,8 @@ class CircleFeature(Struct, frozen=True, eq=False):
 
 
 class EdgeFeature(Struct, frozen=True, eq=False):
-    """A straight edge from `start_mm` to `end_mm`."""
+    """A straight edge of the drawing from `start_mm` to `end_mm`, of one or more collinear
+    segments."""
 
     path: int
     start_mm: Place
@@ -163,7 +164,7 @@ class BoundDimension(Struct, frozen=True, eq=False):
 
     @property
     def features(self) -> tuple[Feature, ...]:
-        """All circles and edges on which it depends."""
+        """All circles and edges on which the dimension depends."""
         feature_groups = [
             each.features if isinstance(each, OutlineFeature) else (each,) for each in self.of
         ]
@@ -173,7 +174,8 @@ class BoundDimension(Struct, frozen=True, eq=False):
         )
 
     def in_work_frame(self, placement: AffineMap) -> BoundDimension:
-        """Return it in the work frame, whose lengths are those of the drawing."""
+        """Return the dimension with its features in the work frame, which does not change
+        lengths."""
         direction = placement.matrix @ self.direction / placement.scale
         places = tuple(placement.point(place) for place in self.dimension.places_mm)
         return BoundDimension(
@@ -186,7 +188,7 @@ class BoundDimension(Struct, frozen=True, eq=False):
 
 
 class Features:
-    """Circles and edges in order, with an index of their boxes."""
+    """Circles and edges of a drawing in order, with an index of their boxes."""
 
     def __init__(self, each: Iterable[Feature]) -> None:
         self._each = tuple(each)

@@ -6,7 +6,7 @@ from camtool.findings import ERROR, INFO, WARNING, Code, Sentence
 
 
 class InspectionCode(Code):
-    """Codes of inspection."""
+    """Codes of findings about dimensions."""
 
     NO_GENERAL_TOLERANCE = (
         118,

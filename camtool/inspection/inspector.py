@@ -524,7 +524,7 @@ def _setup_that_cuts(run: Run, path: int) -> JobSetup | None:
 
 
 def _floors(run: Run) -> Floors:
-    """Return the floors that the job of a run asks for."""
+    """Return the floors that the job of a run is to leave."""
     assert run.drawing is not None
     assert run.job is not None
     assert run.verification is not None

@@ -34,7 +34,7 @@ SAME_LIMIT_MM = 1e-6
 
 
 class NotUnderstood(OptionError):
-    """A text that states no limits."""
+    """The error for a text that states no limits."""
 
 
 MAX_WORDS_CHARS = 200
@@ -157,7 +157,7 @@ def normalised_words(words: str) -> str:
 
 
 def _numbers(text: str, mm_per_unit: float) -> LimitsText:
-    """Parse deviations or limits of size."""
+    """Parse a text of two deviations, or of two limits of size."""
     match = _BOTH.fullmatch(text)
     if match:
         unit = match["aunit"] or ""

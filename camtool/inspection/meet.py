@@ -698,7 +698,7 @@ class Bench(Struct, eq=False, dict=True):
         return inspect(self._posted(proposal, self._target(proposal)), self.case.tolerances)
 
     def tables_of(self, proposal: JobChanges) -> Table:
-        """Return the tables of the job file of a proposal."""
+        """Return the tables of the job file with the changes of a proposal."""
         return changed_tables_of(self.case.tables, proposal.changes, proposal.left)
 
     def _target(self, proposal: JobChanges) -> LoadedTarget:

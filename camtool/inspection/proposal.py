@@ -128,7 +128,7 @@ def _pair(place: Place) -> str:
 
 
 def _direction_text(direction: float) -> str:
-    """Format a direction: x, y or degrees."""
+    """Return a direction as text: x, y or degrees."""
     degrees = math.degrees(direction) % 180.0
     for name, angle in (("x", 0.0), ("y", 90.0), ("x", 180.0)):
         if abs(degrees - angle) <= 10.0**-DIGITS:

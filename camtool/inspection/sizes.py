@@ -116,7 +116,10 @@ class SweptSegments(Struct, frozen=True, eq=False, dict=True):
 
 class Stations(Struct, frozen=True, eq=False):
     """Points at which a feature is measured: places (S, 2) mm, unit normals (S, 2) towards the
-    tool, and their indices (S,). `wide`: distance between neighbours, in radians or mm."""
+    tool, and the mask `measured` (S,) of those on the feature.
+
+    `wide`: distance between neighbours, in radians or mm.
+    """
 
     places: Floats
     normals: Floats
@@ -140,7 +143,7 @@ class Cut(Struct, frozen=True, eq=False):
 
 
 def stations_of(feature: Feature, side: int) -> Stations:
-    """Return the stations of a feature."""
+    """Return the stations of a feature, evenly spaced, with normals towards the tool's `side`."""
     if isinstance(feature, CircleFeature):
         wide = 2.0 * math.pi / CIRCLE_STATIONS
         angle = np.arange(0.5 * wide, 2.0 * math.pi, wide)

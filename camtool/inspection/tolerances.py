@@ -143,7 +143,7 @@ def _duplicate_finding(one: Dimension, holds: Dimension, file: str) -> Finding:
 
 
 def _deviations(limits: Limits) -> tuple[float, float]:
-    """Return lower and upper deviation, mm."""
+    """Return the lower and the upper deviation of limits, mm."""
     return limits.lower_mm, limits.upper_mm
 
 
@@ -294,7 +294,7 @@ def _with_place(file: str, place: str) -> Iterator[None]:
 
 
 def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
-    """Convert a row of the file to a dimension."""
+    """Return the dimension that a row of the file describes."""
     place = f"dimension {number}"
     _check_keys(row, str(path), place)
 
@@ -407,7 +407,7 @@ def _unit_name(unit: str) -> str:
 
 
 def _direction(value: Length) -> float:
-    """Convert x, y or an angle to rad."""
+    """Return the direction, rad, of "x", "y" or an angle."""
     if isinstance(value, str) and value.strip().lower() in ("x", "y"):
         return 0.0 if value.strip().lower() == "x" else math.pi / 2.0
     try:

@@ -163,7 +163,7 @@ class Spindle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("default_rpm is outside of min_rpm and max_rpm")
 
     def reaches(self, rpm: float) -> bool:
-        """Return True if the drive has this speed, rev/min."""
+        """Return True if the drive can run at this speed, rev/min."""
         return self.min_rpm <= rpm and (self.max_rpm is None or rpm <= self.max_rpm)
 
 

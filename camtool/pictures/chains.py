@@ -207,7 +207,7 @@ def _single_chains(begin: Floats, end: Floats) -> tuple[Chain, ...]:
 
 
 def chains_of(lines: Polylines) -> tuple[Chain, ...]:
-    """Return each of the polylines as a chain."""
+    """Return a chain for each of the polylines."""
     all_segments = Segments.of(lines)
     cuts = np.searchsorted(all_segments.path, np.arange(len(lines) + 1))
     chains = []

@@ -100,7 +100,7 @@ class LineGroup(Struct, frozen=True, eq=False):
         return plot.lines(self.id, self.chains, look)
 
     def entries(self, view: View) -> Iterator[LegendEntry]:
-        """Yield its entry in the legend."""
+        """Yield the entry of the lines in the legend."""
         look = self.look
         dashes = str(look.get("stroke-dasharray", ""))
         swatch = line_swatch(str(look["stroke"]), float(look["stroke-width"]), dashes)
@@ -124,7 +124,7 @@ class DotGroup(Struct, frozen=True, eq=False):
         return plot.dots(self.id, self.places, self.look)
 
     def entries(self, view: View) -> Iterator[LegendEntry]:
-        """Yield its entry in the legend, if any of the marks is in view."""
+        """Yield the entry of the marks in the legend, if any of them is in view."""
         if any(view.shows(*place) for place in self.places):
             yield LegendEntry(dot_swatch(self.look), self.name)
 
@@ -281,7 +281,7 @@ def _noted(content: Content) -> list[Part]:
 
 
 def faults_of(scene: Scene) -> DotGroup:
-    """Return the marks of the findings of the stock."""
+    """Return the marks at the places of findings about the stock."""
     return DotGroup("faults", "finding of the stock", scene.faults, FAULT_MARK)
 
 
@@ -654,7 +654,7 @@ def layer_names() -> tuple[str, ...]:
 
 
 def layer_of(name: str) -> Layer:
-    """Return the layer of this name."""
+    """Return the layer with this name."""
     return next(layer for layer in LAYERS if layer.name == name)
 
 

@@ -389,12 +389,12 @@ class Ticks(Struct, frozen=True):
     y: tuple[float, ...]
 
     def text(self, value: float) -> str:
-        """Return the text of the number at a tick."""
+        """Return the number at a tick as text, with the decimals that the step needs."""
         return number(value, decimals_of(self.step_mm))
 
     @property
     def left_width(self) -> float:
-        """Width of the widest number along Y."""
+        """Width, in units of the page, of the widest number along Y."""
         return max((text.width(self.text(y), TICK_CAP) for y in self.y), default=0.0)
 
 

@@ -55,7 +55,7 @@ DIRECTIONS = ((1.0, -1.0), (-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 
 class Plot(Struct, frozen=True):
-    """The plot area of a picture, on which layers draw."""
+    """The plot area of a picture: its functions return the SVG that layers draw there."""
 
     view: View
 

@@ -73,7 +73,7 @@ class StockSection(Struct, frozen=True, eq=False):
 
     @property
     def along(self) -> str:
-        """The name of the axis along which the section runs."""
+        """Name of the axis along which the section runs."""
         return "Y" if self.axis == "x" else "X"
 
     @property

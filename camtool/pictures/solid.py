@@ -435,7 +435,7 @@ def _deepest(solid: Solid, camera: Camera, view: View) -> str:
 
 
 def _entries(scene: Scene, options: PictureOptions) -> list[LegendEntry]:
-    """Return the entries of the legend."""
+    """Return the entries of the legend of a view of the stock."""
     if options.view in LEVEL:
         return [LegendEntry(line_swatch(OUTLINE, GHOST_PEN, DASHES), "deepest cuts behind")]
     if scene.drawing is None or not len(scene.drawing.paths) or options.view in ("top", "bottom"):
@@ -508,7 +508,7 @@ class MmBar(Struct, frozen=True, eq=False):
 
     @property
     def labels(self) -> list[tuple[float, str]]:
-        """Round numbers, and the greatest value."""
+        """Values along the bar with their texts: round numbers, and the greatest value."""
         step = round_step(self.top / 4.0)
         decimals = decimals_of(step)
         round_ones = multiples(0.0, self.top, step)
@@ -519,7 +519,7 @@ class MmBar(Struct, frozen=True, eq=False):
 
     @property
     def width(self) -> float:
-        """Width that it needs right of the plot."""
+        """Width that the bar and its numbers need right of the plot."""
         widest = max(text.width(name, TICK_CAP) for _, name in self.labels)
         return BAR_GAP + max(BAR_WIDTH + 12.0 + widest, text.width(self.name, TICK_CAP))
 

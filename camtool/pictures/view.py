@@ -49,7 +49,7 @@ ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
 class PageBox(Struct, frozen=True):
-    """A rectangle; on the page `top` < `bottom`."""
+    """A rectangle with sides parallel to the axes; on the page `top` < `bottom`."""
 
     left: float
     top: float
@@ -92,18 +92,18 @@ class View(Struct, frozen=True):
 
     @property
     def x_range(self) -> tuple[float, float]:
-        """Lowest and highest X in the box, mm."""
+        """Lowest and highest X that the view shows, mm."""
         half = self.box.width / self.scale / 2.0
         return self.centre[0] - half, self.centre[0] + half
 
     @property
     def y_range(self) -> tuple[float, float]:
-        """Lowest and highest Y in the box, mm."""
+        """Lowest and highest Y that the view shows, mm."""
         half = self.box.height / self.scale / 2.0
         return self.centre[1] - half, self.centre[1] + half
 
     def shows(self, x: float, y: float) -> bool:
-        """Return True if a point in mm lies in the box."""
+        """Return True if the view shows a point in mm."""
         (x0, x1), (y0, y1) = self.x_range, self.y_range
         return x0 <= x <= x1 and y0 <= y <= y1
 
@@ -127,7 +127,8 @@ def union(boxes: Iterable[Floats | None]) -> Floats | None:
 
 
 def points_box(points: Floats) -> Floats | None:
-    """Return the extents of points (P, 2)."""
+    """Return the extents (2, 2), [[xmin, xmax], [ymin, ymax]], of points (P, 2); None without
+    any."""
     if not len(points):
         return None
     return np.column_stack([points.min(axis=0), points.max(axis=0)])

@@ -135,13 +135,14 @@ class ToolpathBuilder:
         return np.asarray(self._columns["run"].to_array(), dtype=np.int64)
 
     def drain(self) -> Toolpath:
-        """Return the rows so far and drop them, for programs that are read block by block."""
+        """Return the rows added so far as a Toolpath and remove them, for programs that are read
+        block by block."""
         path, self._start = self.finish(), self.position
         self._columns = {name: _Column(name) for name in (*COLUMNS, "run")}
         return path
 
     def finish(self, findings: Iterable[Finding] = ()) -> Toolpath:
-        """Return the rows so far as a Toolpath."""
+        """Return the rows added so far as a Toolpath."""
         self._gather()
         begin = np.array(self._begin, dtype=np.int64)
         return Toolpath(
@@ -237,7 +238,7 @@ class _Column:
         self._count = end
 
     def to_array(self) -> Any:
-        """Return all rows so far as a read-only array."""
+        """Return all rows of the column as a read-only array."""
         if self._same and self._count:
             return np.broadcast_to(read_only(self._rows), self.shape_of(self._count))
         if len(self._rows) != self._count:

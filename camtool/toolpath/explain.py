@@ -114,7 +114,7 @@ def _modal_words(text: str, meanings: Mapping[str, str]) -> Iterator[str]:
 
 
 class _Teller:
-    """The moves of one toolpath in words."""
+    """Explains the moves of one toolpath in sentences and records."""
 
     def __init__(self, toolpath: Toolpath) -> None:
         self._path = toolpath

@@ -9,7 +9,7 @@ from camtool.findings import ERROR, INFO, WARNING, Code, Sentence
 
 
 class ProgramCode(Code):
-    """Codes of toolpaths and programs."""
+    """Codes of findings about toolpaths and programs."""
 
     GOUGE = (
         203,

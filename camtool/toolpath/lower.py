@@ -258,7 +258,7 @@ def turned(toolpath: Toolpath, angle_deg: float) -> Toolpath:
 
 
 def at_feed(toolpath: Toolpath, feed_mm_min: float) -> Toolpath:
-    """Return the toolpath with all cuts at one feed."""
+    """Return the toolpath with every cut at this feed."""
     return replace(toolpath, feed=np.where(toolpath.is_feed, feed_mm_min, toolpath.feed))
 
 

@@ -91,7 +91,7 @@ class _Entity(SimpleNamespace):
 
     @property
     def closed(self) -> bool:
-        """True if the flag of closed curves is set."""
+        """True if the entity is closed (flag 1)."""
         return bool(self.dxf.flags & 1)
 
     def is_frozen(self) -> bool:
@@ -174,7 +174,7 @@ def _pairs(tags: Tags, rows: Any) -> list[tuple[int, str]]:
 
 
 def _check_version(tags: Tags, bounds: tuple[int, int]) -> None:
-    """Raise ValueError for a version that ezdxf converts."""
+    """Raise ValueError for a file of a DXF version that ezdxf converts on reading."""
     rows = np.arange(*bounds)
     values = [*map(str, tags.values(rows))]
     if values.count("$ACADVER") != 1 or values[-1] == "$ACADVER":
@@ -243,7 +243,7 @@ def _point(pairs: list[tuple[int, str]], k: int) -> tuple[float, float, float]:
 
 
 def _check_attributes(kind: str, attributes: dict[str, Any]) -> None:
-    """Raise ValueError for attributes that ezdxf mends."""
+    """Raise ValueError for attributes with values that ezdxf would repair."""
     colour = attributes.get("color", 1)
     if kind == "LAYER":
         is_valid = 0 < abs(colour) < _MAX_COLOUR - 1 and "name" in attributes

@@ -125,20 +125,20 @@ def batches(rows: Ints) -> Iterator[Ints]:
 
 @dataclass(frozen=True, eq=False)
 class BinaryTags(Tags):
-    """The tags of binary DXF."""
+    """The tags of binary DXF; `held` are their values, already converted."""
 
     held: Sequence[Any] = ()
 
     is_text = False
 
     def raw(self, rows: Ints) -> Iterator[Any]:
-        """Return the values of these tags."""
+        """Return the values of these tags: strings, numbers or bytes."""
         return map(self.held.__getitem__, rows.tolist())
 
     values = raw
 
     def code_as_said(self, row: int) -> str:
-        """Return the group code of a tag."""
+        """Return the group code of a tag, for messages."""
         return str(self.codes[row])
 
     def ended(self, count: int) -> Tags:

@@ -209,7 +209,7 @@ class DxfWalk:
     def _take(
         self, shapes: Iterable[DxfShape], entity: Any, scope: DxfScope, look: DxfLook
     ) -> None:
-        """Add these shapes of an entity to the pieces."""
+        """Add these shapes of an entity to the pieces, and count the entity as used."""
         source = _source(entity, scope)
         for shape in shapes:
             self.pieces.append(
@@ -620,7 +620,8 @@ class DxfLooks(Struct):
 
 
 def _layer(layer: Any) -> DxfLook:
-    """Return the look that a layer gives to its entities."""
+    """Return the look that a layer gives to its entities: its colour and line type, and the reason
+    if it is off or frozen."""
     attributes = vars(layer.dxf)
     name, frozen = printable(str(layer.dxf.name)), bool(layer.is_frozen())
     state = "frozen" if frozen else "off" if layer.is_off() else ""

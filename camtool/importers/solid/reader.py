@@ -273,12 +273,12 @@ class FileUnit(Struct, frozen=True):
 
 
 def unnamed_unit() -> FileUnit:
-    """Return mm as the unit, since BREP files name none."""
+    """Return mm as the unit of a BREP file, since such files name none."""
     return FileUnit("BREP names no unit; its makers count in mm")
 
 
 def script_unit() -> FileUnit:
-    """Return mm as the unit, since build123d counts in mm."""
+    """Return mm as the unit of a script, since build123d counts in mm."""
     return FileUnit("build123d counts in mm")
 
 

@@ -28,7 +28,7 @@ from camtool.units import MM_PER_UNIT
 
 
 class SvgLines(Struct, frozen=True, eq=False):
-    """Straight segments through `points` (n, 2)."""
+    """Straight segments through `points` (n, 2), in user units."""
 
     points: Floats
 

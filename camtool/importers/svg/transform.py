@@ -54,7 +54,7 @@ class Affine(Struct, frozen=True):
         return self.a * self.d - self.b * self.c
 
     def points(self, points: Floats) -> Floats:
-        """Return positions (n, 2) mapped."""
+        """Return the images of positions (n, 2)."""
         x, y = points[:, 0], points[:, 1]
         mapped = np.empty((len(points), 2))
         mapped[:, 0] = self.a * x + self.c * y + self.e
@@ -62,7 +62,7 @@ class Affine(Struct, frozen=True):
         return mapped
 
     def vectors(self, vectors: Floats) -> Floats:
-        """Return directions (n, 2) mapped, without the shift."""
+        """Return the images of directions (n, 2), to which the shift does not apply."""
         return np.asarray(vectors @ np.array([[self.a, self.b], [self.c, self.d]]))
 
     @property
@@ -80,12 +80,12 @@ class Affine(Struct, frozen=True):
 
 
 def translation(x: float, y: float) -> Affine:
-    """Return the shift by (x, y)."""
+    """Return the map that shifts by (x, y)."""
     return Affine(e=x, f=y)
 
 
 def scaling(x: float, y: float) -> Affine:
-    """Return the scale about the origin."""
+    """Return the map that scales by x and y about the origin."""
     return Affine(a=x, d=y)
 
 
