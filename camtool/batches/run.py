@@ -124,7 +124,7 @@ to be up to date."""
 class BatchSettings:
     """Settings of a batch: the output folder `out` and the function `write`; the digests of
     everything that outputs depend on besides the drawing (`base` for all, `own` for each task by
-    stem); `force` makes all outputs again, and replaces files that no batch made; `again` tries
+    stem); `force` makes all outputs again, and replaces files that no batch made; `retries` tries
     drawings again that failed and did not change."""
 
     out: Path
@@ -132,7 +132,7 @@ class BatchSettings:
     base: str
     own: Mapping[str, str]
     force: bool = False
-    again: bool = False
+    retries: bool = False
 
     def key(self, task: DrawingTask, content: str) -> str:
         """Return the digest of everything that the outputs of a drawing depend on."""
@@ -149,7 +149,7 @@ def run_batch(
     outdated: list[DrawingTask] = []
     for task in tasks:
         entry = None if order.force else _up_to_date(task, order, manifest)
-        if entry is None or (entry.error and order.again):
+        if entry is None or (entry.error and order.retries):
             outdated.append(task)
             continue
         yield Outcome(

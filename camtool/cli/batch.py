@@ -55,7 +55,7 @@ _RUN = "How the batch runs"
     help="Time limit for each drawing, such as 60s.",
 )
 @option(_RUN, "--force", is_flag=True, help="Make all again; replace files of others.")
-@option(_RUN, "--again", is_flag=True, help="Try unchanged drawings again that failed.")
+@option(_RUN, "--again", "retries", is_flag=True, help="Try unchanged drawings again that failed.")
 @option(_RUN, "--fail-fast", is_flag=True, help="Stop at the first that fails.")
 @picture_options
 @gate_options
@@ -77,7 +77,7 @@ def batch(
     scheduler: str | None,
     timeout: float | None,
     force: bool,
-    again: bool,
+    retries: bool,
     fail_fast: bool,
     picture: PictureFlags,
     gates: GateFlags,
@@ -118,7 +118,7 @@ def batch(
         looks=picture,
         require=inspection.require,
     )
-    running = RunSettings(jobs, scheduler, timeout, force, again, fail_fast)
+    running = RunSettings(jobs, scheduler, timeout, force, retries, fail_fast)
     run = BatchRun(work, Path(out), running, summary, checks, Verbosity(quiet, verbose))
     flags = BatchFlags(job, inspection, own=not no_own_jobs, inspects=not no_verify)
     return run.run(sources, flags, machine.files())

@@ -60,7 +60,7 @@ class RunSettings:
     scheduler: str | None
     timeout: float | None
     force: bool
-    again: bool
+    retries: bool
     fail_fast: bool
 
 
@@ -246,8 +246,8 @@ class BatchRun:
         self, ordered: OrderedTasks, manifest: Manifest, stop: Stop, shown: Display
     ) -> Generator[Outcome]:
         """Yield the outcomes until something stops the run."""
-        force, again = self.running.force, self.running.again
-        order = BatchSettings(self.out, write_all, self.work.digest(), ordered.own, force, again)
+        force, retries = self.running.force, self.running.retries
+        order = BatchSettings(self.out, write_all, self.work.digest(), ordered.own, force, retries)
         pool = LazyPool(lambda: pool_for(self, shown.note), shown.begin)
         with closing(run_batch(ordered.tasks, order, manifest, pool)) as outcomes:
             for outcome in chain(ordered.failed, outcomes):

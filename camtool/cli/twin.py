@@ -69,7 +69,9 @@ def parse_address(text: str) -> tuple[str, int]:
 )
 @click.option("--seed", default=0, help="Of the faults.")
 @click.option("--trace", metavar="FILE", help="What its slides did, as CSV.")
-@click.option("--once", is_flag=True, help="End when the first client has gone.")
+@click.option(
+    "--once", "ends_with_client", is_flag=True, help="End when the first client has gone."
+)
 @talk_options
 def twin(
     target: str,
@@ -81,7 +83,7 @@ def twin(
     fault: str,
     seed: int,
     trace: str | None,
-    once: bool,
+    ends_with_client: bool,
     quiet: bool,
     verbose: bool,
 ) -> int:
@@ -107,7 +109,7 @@ def twin(
     before = signal.signal(signal.SIGTERM, _interrupted)
     try:
         with suppress(KeyboardInterrupt):
-            serve(wired, port, Clock(factor), once=once, each=journal.note)
+            serve(wired, port, Clock(factor), ends_with_client=ends_with_client, each=journal.note)
     finally:
         signal.signal(signal.SIGTERM, before)
         port.close()

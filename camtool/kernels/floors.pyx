@@ -442,7 +442,7 @@ cdef double _some_sum(
     cdef long double base_level, slope
     cdef Fixed line
     cdef Total[3] real_sums, step_sums
-    cdef Total j, jj, rows, steps, products, twice, big, a, lift, steep
+    cdef Total j, jj, rows, steps, products, double_sum, big, a, lift, steep
     n = parts.some
     if n == 0:
         return 0.0
@@ -457,16 +457,16 @@ cdef double _some_sum(
     lift, steep = <Total>line.lift + 1, <Total>line.steep
     # G + 1 = w + lift + steep·j with the floors w: its sum, twice that by j, and its squares.
     rows = real_sums[0] + lift * <Total>n + steep * j
-    twice = real_sums[1] + 2 * lift * j + 2 * steep * jj
+    double_sum = real_sums[1] + 2 * lift * j + 2 * steep * jj
     products = real_sums[2] + lift * lift * <Total>n + steep * steep * jj
     products += 2 * lift * real_sums[0] + steep * real_sums[1] + 2 * lift * steep * j
-    rows, twice = rows - step_sums[0], twice - step_sums[1]  # Σ I and 2 Σ j I
+    rows, double_sum = rows - step_sums[0], double_sum - step_sums[1]  # Σ I and 2 Σ j I
     products = products - step_sums[2] - rows  # 2 Σ t I
     big, a = <Total>events, <Total>size
-    steps = big * products - a * twice  # 2 Σ u I
+    steps = big * products - a * double_sum  # 2 Σ u I
     slope = along + across * <long double>size / <long double>events
     return <double>(
-        slope * 0.5 * signed_of(twice)
+        slope * 0.5 * signed_of(double_sum)
         + across / <long double>events * 0.5 * signed_of(steps)
         + base_level * signed_of(rows)
     )

@@ -533,7 +533,7 @@ cpdef void project(
     """
     cdef double x0, y0, size, fx, fy, sine, cosine, u0, v0, pixel, u, t, last, next_x, next_y
     cdef double foot, low, high, before, z
-    cdef Int ny, nx, i, j, row, rows, column, cell_before, cell_of, done, until
+    cdef Int ny, nx, i, j, row, rows, column, cell_before, cell_of, row_end, until
     x0, y0, size = grid
     fx, fy, sine, cosine, u0, v0, pixel = camera
     ny, nx = heights.shape[0], heights.shape[1]
@@ -552,7 +552,7 @@ cpdef void project(
             continue
         i = _index((u * fy + t * fx - x0) / size, nx - 1)
         j = _index((t * fy - u * fx - y0) / size, ny - 1)
-        done, cell_before = 0, -1  # pixels below `done` are seen already
+        row_end, cell_before = 0, -1  # pixels below `row_end` are seen already
         before = 0.0
         while t < last and 0 <= i < nx and 0 <= j < ny:
             cell_of = j * nx + i
@@ -566,19 +566,19 @@ cpdef void project(
             high = (t * sine + z * cosine - v0) / pixel
             if cell_before >= 0 and z > before:  # what rises between the cell before and this one
                 until = _index(math.ceil(low), rows)
-                for row in range(done, until):
+                for row in range(row_end, until):
                     cell[row, column] = ~<int> cell_before if z - before > wall else <int> cell_of
                     level[row, column] = <float> min(
                         max((v0 + row * pixel - foot) / cosine, before), z
                     )
-                done = max(done, until)
+                row_end = max(row_end, until)
             elif cell_before < 0:
-                done = _index(math.ceil(low), rows)
+                row_end = _index(math.ceil(low), rows)
             until = _index(math.ceil(high), rows)
-            for row in range(done, until):
+            for row in range(row_end, until):
                 cell[row, column] = <int> cell_of
                 level[row, column] = <float> z
-            done = max(done, until)
+            row_end = max(row_end, until)
             cell_before, before = cell_of, z
             if next_x <= next_y:
                 i += 1 if fx > 0.0 else -1

@@ -808,13 +808,13 @@ cpdef void fill_bins(
     double[:, ::1] bins
 ) noexcept nogil:
     """Put the points x, y (n,) about the centre (cx, cy) into `bins` (720, 9)."""
-    cdef Int done, which, stay
-    done = 0
-    while done < len(x):
-        which = _bin_of(x[done] - cx, y[done] - cy, directions)
-        _count_in_bin(x, y, done, cx, cy, directions, which, &stay)
-        _add(x, y, done, done + stay, cx, cy, bins, which)
-        done += stay
+    cdef Int first, which, stay
+    first = 0
+    while first < len(x):
+        which = _bin_of(x[first] - cx, y[first] - cy, directions)
+        _count_in_bin(x, y, first, cx, cy, directions, which, &stay)
+        _add(x, y, first, first + stay, cx, cy, bins, which)
+        first += stay
 
 
 cdef wide _add(
@@ -1112,7 +1112,7 @@ cdef void _count(int[::1] places, Int count, Int[:, ::1] histograms, Int which) 
 
 cdef void judge_block(Int row, Int count, Judge judge) noexcept nogil:
     """Judge the first `count` samples in the judge's buffers, all of one row."""
-    cdef Int last, own, of_program, k, circle, first, upto, other
+    cdef Int last, own, of_program, k, circle, first, end, other
     cdef Int[:, ::1] rows
     cdef Int[::1] bits
     cdef int[::1] places
@@ -1145,10 +1145,10 @@ cdef void judge_block(Int row, Int count, Judge judge) noexcept nogil:
         figures[row, INNER_MAX] = max(figures[row, INNER_MAX], sums.largest)
         figures[row, INNER_SQUARES] += sums.squares
         _count(places, count, judge.histograms, 0)
-        first, upto = rows[row, FIRST], rows[row, LAST]
+        first, end = rows[row, FIRST], rows[row, LAST]
         z_low, z_high = window[row, 0], window[row, 1]
         other = rows[row, BESIDE]
-        if nearest_errors(slide_x, slide_y, other, first, upto, z_low, z_high, judge.search, errors):
+        if nearest_errors(slide_x, slide_y, other, first, end, z_low, z_high, judge.search, errors):
             _sizes(errors, judge.off[row], size, bits, places, &sums)
             shown = sums.largest
             figures[row, TOTAL_SQUARES] += sums.squares
@@ -1170,17 +1170,17 @@ cpdef judge_samples(Int[::1] row, double[:, ::1] commanded, double[:, ::1] slide
     """Judge K samples in order: row (K,), commanded and slide (K, 3) mm, whose Z is not looked at;
     any number of rows. Return the first sample that is not within `FARTHEST_MM` (none is judged
     from its block on), or −1."""
-    cdef Int done, count, k, axis
+    cdef Int begin, count, k, axis
     cdef Judge judge
     cdef bint near
     cdef double[::1] slide_x, slide_y, x, y
     judge = Judge(task, sums)
     x, y, slide_x, slide_y = judge.x, judge.y, judge.slide_x, judge.slide_y
-    done = 0
-    while done < len(row):
+    begin = 0
+    while begin < len(row):
         count = 0
-        while count < BLOCK and done + count < len(row) and row[done + count] == row[done]:
-            k = done + count
+        while count < BLOCK and begin + count < len(row) and row[begin + count] == row[begin]:
+            k = begin + count
             for axis in range(2):  # NaN fails too
                 near = abs(commanded[k, axis]) <= FARTHEST_MM
                 if not (near and abs(slide[k, axis]) <= FARTHEST_MM):
@@ -1188,6 +1188,6 @@ cpdef judge_samples(Int[::1] row, double[:, ::1] commanded, double[:, ::1] slide
             x[count], y[count] = commanded[k, 0], commanded[k, 1]
             slide_x[count], slide_y[count] = slide[k, 0], slide[k, 1]
             count += 1
-        judge_block(row[done], count, judge)
-        done += count
+        judge_block(row[begin], count, judge)
+        begin += count
     return -1

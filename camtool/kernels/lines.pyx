@@ -135,7 +135,7 @@ cdef struct Drive:
     # An axis: where it starts, its steps and their sense; from which step on the slide moves, where
     # it stands before that; the numbers of its motor.
     Int start, size, sense, first
-    double still, step, added, scale, flank
+    double standing_mm, step, added, scale, flank
 
 
 cdef struct Line:
@@ -180,7 +180,7 @@ cdef inline double _position(Drive* drive, Int steps) noexcept nogil:
 
 cdef inline double _slide(Drive* drive, Int steps) noexcept nogil:
     if steps < drive.first:
-        return drive.still
+        return drive.standing_mm
     return (_position(drive, steps) + drive.added) * drive.scale + drive.flank
 
 
@@ -204,9 +204,9 @@ cdef Int _first_moving(Drive* drive) noexcept nogil:
     cdef double guess
     if drive.size == 0:
         return 1
-    if (_position(drive, 0) + drive.added) * drive.scale + drive.flank == drive.still:
+    if (_position(drive, 0) + drive.added) * drive.scale + drive.flank == drive.standing_mm:
         return 0
-    guess = ((drive.still - drive.flank) / drive.scale - drive.added) / drive.step
+    guess = ((drive.standing_mm - drive.flank) / drive.scale - drive.added) / drive.step
     guess = (guess - float(drive.start)) * drive.sense
     first = max(<Int>min(max(math.floor(guess) - 1.0, 1.0), float(drive.size)), 1)
     while first <= drive.size and not _takes_along(drive, first):
@@ -217,7 +217,7 @@ cdef Int _first_moving(Drive* drive) noexcept nogil:
 cdef inline bint _takes_along(Drive* drive, Int steps) noexcept nogil:
     cdef double place
     place = (_position(drive, steps) + drive.added) * drive.scale + drive.flank
-    return place >= drive.still if drive.sense > 0 else place <= drive.still
+    return place >= drive.standing_mm if drive.sense > 0 else place <= drive.standing_mm
 
 
 cdef class LineJudge:
@@ -280,7 +280,7 @@ cdef void _set_drive(Drive* drive, Int k, Int axis, LineJudge all_) noexcept nog
     cdef Int travel
     travel = all_.travel[k, axis]
     drive.start, drive.size, drive.sense = all_.start[k, axis], abs(travel), 1 if travel >= 0 else -1
-    drive.still, drive.step = all_.slides[k, axis], all_.step_mm[axis]
+    drive.standing_mm, drive.step = all_.slides[k, axis], all_.step_mm[axis]
     drive.added, drive.scale = all_.added[k, axis], all_.axes[axis, 0]
     drive.flank = all_.axes[axis, 1] if travel >= 0 else all_.axes[axis, 2]
     drive.first = _first_moving(drive)
@@ -290,14 +290,14 @@ cdef void _set_drive(Drive* drive, Int k, Int axis, LineJudge all_) noexcept nog
 
 
 cdef void _fill(
-    Drive* drive, Int events, Int phase, Int done, double[::1] commanded, double[::1] slide
+    Drive* drive, Int events, Int phase, Int begin, double[::1] commanded, double[::1] slide
 ) noexcept nogil:
-    """Fill the positions after the events done + 1, done + 2, …"""
+    """Fill the positions after the events begin + 1, begin + 2, …"""
     cdef Int k, steps, counter, more, all_
     cdef double position
     more, all_ = 2 * drive.size, 2 * events
-    steps = (more * done + phase) // all_
-    counter = more * done + phase - all_ * steps
+    steps = (more * begin + phase) // all_
+    counter = more * begin + phase - all_ * steps
     for k in range(len(commanded)):
         counter += more
         if counter >= all_:
@@ -305,28 +305,28 @@ cdef void _fill(
             steps += 1
         position = _position(drive, steps)
         commanded[k] = position
-        slide[k] = drive.still
+        slide[k] = drive.standing_mm
         if steps >= drive.first:
             slide[k] = (position + drive.added) * drive.scale + drive.flank
 
 
 cdef void _step(Line* line, LineJudge all_) noexcept nogil:
     """Judge all events of a line one by one."""
-    cdef Int done, count, axis, k, phase
+    cdef Int begin, count, axis, k, phase
     cdef double[::1] x, y, slide_x, slide_y
-    done = 0
-    while done < line.events:
-        count = min(line.events - done, BLOCK)
+    begin = 0
+    while begin < line.events:
+        count = min(line.events - begin, BLOCK)
         x, y = all_.judge.x[:count], all_.judge.y[:count]
         slide_x, slide_y = all_.judge.slide_x[:count], all_.judge.slide_y[:count]
         phase = line.phase
-        _fill(&line.drives[0], line.events, phase, done, x, slide_x)
-        _fill(&line.drives[1], line.events, phase, done, y, slide_y)
+        _fill(&line.drives[0], line.events, phase, begin, x, slide_x)
+        _fill(&line.drives[1], line.events, phase, begin, y, slide_y)
         if line.lean != 0.0:
             for k in range(count):
                 slide_x[k] += slide_y[k] * line.lean
         judge_block(line.row, count, all_.judge)
-        done += count
+        begin += count
 
 
 # A line in closed form.
@@ -407,7 +407,7 @@ cdef void _set_forms(Line* line, Piece* piece, bint* moving) noexcept nogil:
     cdef Form[2] forms
     for axis in range(2):
         drive = &line.drives[axis]
-        forms[axis].along, forms[axis].across, forms[axis].level = 0.0, 0.0, drive.still
+        forms[axis].along, forms[axis].across, forms[axis].level = 0.0, 0.0, drive.standing_mm
         if moving[axis]:
             step = <long double>drive.step * drive.scale * drive.sense
             forms[axis].level = (
@@ -574,7 +574,7 @@ cdef bint _visit_wanted(
 ) noexcept nogil:
     """Visit the events of caps and crossings, with their errors against the nearest moves; return
     False where these are too many."""
-    cdef Int k, first, end, done, top
+    cdef Int k, first, end, group_low, top
     cdef double far
     cdef Form form
     cdef Found peak
@@ -588,18 +588,18 @@ cdef bint _visit_wanted(
             far = max(far, peak.size)
     if not _list_crossings(line, nominal, pieces, &cores[0], &ends[0], count, far, row, all_):
         return False
-    all_.window_count, all_.visited_count, done = 0, 0, 0
+    all_.window_count, all_.visited_count, group_low = 0, 0, 0
     for k in range(count):
         first, end = cores[k], ends[k]
         if first >= end:
             first = end = pieces[k].low
         if not _visit_cap(line, pieces[k].low, first, row, all_):
             return False
-        while done < all_.crossing_count and all_.crossing_low[done] < end:
-            top = _end_of_group(done, all_)
-            if not _visit_group(line, nominal, done, top, all_):
+        while group_low < all_.crossing_count and all_.crossing_low[group_low] < end:
+            top = _end_of_group(group_low, all_)
+            if not _visit_group(line, nominal, group_low, top, all_):
                 return False
-            done = top
+            group_low = top
         if not _visit_cap(line, end, pieces[k].high, row, all_):
             return False
     return 3 * all_.visited_count < line.events

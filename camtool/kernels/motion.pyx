@@ -22,9 +22,9 @@ from camtool.arrays import Floats, Ints
 
 
 cpdef void legs_fill(
-    Int done, Int[:, ::1] begin, Int[:, ::1] travel, double[::1] step_mm, double[:, ::1] out
+    Int first_pass, Int[:, ::1] begin, Int[:, ::1] travel, double[::1] step_mm, double[:, ::1] out
 ) noexcept:
-    """Fill `out` (n, 3) mm with the positions after the passes of legs, from pass `done` of the
+    """Fill `out` (n, 3) mm with the positions after the passes of legs, from pass `first_pass` of the
     first leg on.
 
     Each leg starts at `begin` (L, 3) steps and goes by `travel` (L, 3) steps, not all of them 0;
@@ -34,11 +34,11 @@ cpdef void legs_fill(
     leg, filled = 0, 0
     while filled < len(out):
         passes = max(abs(travel[leg, 0]), abs(travel[leg, 1]), abs(travel[leg, 2]))
-        run = min(passes - done, len(out) - filled)
+        run = min(passes - first_pass, len(out) - filled)
         for axis in range(3):
             size, sense = abs(travel[leg, axis]), 1 if travel[leg, axis] > 0 else -1
-            position = begin[leg, axis] + sense * (done * size // passes)
-            count, step = done * size % passes, step_mm[axis]
+            position = begin[leg, axis] + sense * (first_pass * size // passes)
+            count, step = first_pass * size % passes, step_mm[axis]
             for k in range(filled, filled + run):
                 count += size
                 if count >= passes:
@@ -47,7 +47,7 @@ cpdef void legs_fill(
                 out[k, axis] = float(position) * step
         filled += run
         leg += 1
-        done = 0
+        first_pass = 0
 
 
 # Samples along the rows of a toolpath.

@@ -747,7 +747,7 @@ cdef void best_step(Route tour, Int item, Step best) noexcept:
     """Set `best` to the step that saves most among those that concern this item; if there is none,
     its gain is the least that counts."""
     cdef Int turned, k, position, last, row, left, right, neighbour, spot, neighbour_row
-    cdef bint alone
+    cdef bint is_single
     cdef double reach, lifted
     position, last = tour.place[item], len(tour.item) - 2
     row, left, right = tour.row[item], row_at(tour, position - 1), row_at(tour, position + 1)
@@ -759,8 +759,8 @@ cdef void best_step(Route tour, Int item, Step best) noexcept:
     _reversal(tour, position, last, best)
     lifted = gap_before + gap_after - gap(tour, left, right)
     # A place gains nowhere more than by being lifted out, and little beside a far neighbour.
-    alone = tour.first[item + 1] - tour.first[item] == 1 and not tour.one_way
-    reach = max(gap_before, gap_after) if alone else math.INFINITY
+    is_single = tour.first[item + 1] - tour.first[item] == 1 and not tour.one_way
+    reach = max(gap_before, gap_after) if is_single else math.INFINITY
     for k in range(tour.near_first[item], tour.near_first[item + 1]):
         neighbour = tour.near[k]
         spot, neighbour_row = tour.place[neighbour], tour.row[neighbour]
@@ -774,7 +774,7 @@ cdef void best_step(Route tour, Int item, Step best) noexcept:
         if gap(tour, neighbour_row, turned) < gap_after:
             _part(tour, position, -1, spot, True, best)
             _reversal(tour, min(position, spot) + 1, max(position, spot), best)
-        if gap(tour, row, neighbour_row) < reach and (lifted > best.gain or not alone):
+        if gap(tour, row, neighbour_row) < reach and (lifted > best.gain or not is_single):
             _single(tour, item, spot - 1, lifted, best)
             _single(tour, item, spot, lifted, best)
 

@@ -240,9 +240,9 @@ class PanelServer:
     async def serve(self, port: int, ready: Callable[[], None]) -> None:
         """Serve until `end` is called; `ready` is called when pages can be opened."""
         self._loop = asyncio.get_running_loop()
-        ended = asyncio.Event()
+        end_request = asyncio.Event()
         loop = self._loop
-        self._end = lambda: loop.call_soon_threadsafe(ended.set)
+        self._end = lambda: loop.call_soon_threadsafe(end_request.set)
         app = web.Application(middlewares=[self._guard])
         app.router.add_get("/", self._page)
         app.router.add_get("/view", self._view)
@@ -255,7 +255,7 @@ class PanelServer:
         self.port = runner.addresses[0][1]
         ready()
         try:
-            await ended.wait()
+            await end_request.wait()
         finally:
             for client in list(self._clients):
                 await client.socket.close()

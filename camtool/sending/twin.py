@@ -159,17 +159,17 @@ def serve(
     port: TwinPort,
     clock: Clock,
     *,
-    once: bool = False,
+    ends_with_client: bool = False,
     each: Callable[[], None] = lambda: None,
 ) -> None:
-    """Carry bytes until the plug is pulled, or with `once` until the first client is gone; `each`
-    is called in every turn."""
+    """Carry bytes until the plug is pulled, or until the first client is gone if
+    `ends_with_client`; `each` is called in every turn."""
     waiting, connected = b"", False
     while not wired.unplugged(clock.now()):
         each()
         file = port.client()
         if file is None:
-            if connected and once:
+            if connected and ends_with_client:
                 return
             connected, waiting = False, b""
             wired.read(clock.now())

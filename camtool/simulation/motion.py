@@ -85,7 +85,7 @@ def one_row(
     iterations: int = 0,
     steps: npt.ArrayLike = (0, 0, 0),
     reversals: npt.ArrayLike = (0, 0, 0),
-    ended: bool = True,
+    is_met: bool = True,
 ) -> Chunk:
     """Return a chunk of a single row: samples (K, 3), `steps` and `reversals` (3,)."""
     ledger = Ledger(
@@ -95,7 +95,7 @@ def one_row(
         iterations=np.array([iterations], dtype=np.int64),
         steps=np.array([steps], dtype=np.int64),
         reversals=np.array([reversals], dtype=np.int64),
-        ended=np.array([ended], dtype=np.bool_),
+        ended=np.array([is_met], dtype=np.bool_),
     )
     return Chunk(np.full(len(commanded), row, dtype=np.int64), commanded, slide, ledger)
 

@@ -195,7 +195,7 @@ cpdef (Int, Int) timers_fill(moves, Int first, rules, counters, issued):
 
     Return the move to continue with and the number of samples filled.
     """
-    cdef Int k, move, done, row, before
+    cdef Int k, move, ticks, row, before
     cdef Timers timers
     timers = Timers(moves, rules, counters, issued)
     k, move = 0, first
@@ -204,8 +204,8 @@ cpdef (Int, Int) timers_fill(moves, Int first, rules, counters, issued):
             _begin(move, timers)
         row, before = timers.move_row[move], timers.under_way[0]
         k = _run(timers, row, move, k)
-        done = before - timers.under_way[0]
-        timers.duration_ms[row] += done * (timers.half_period[move] + 1)
+        ticks = before - timers.under_way[0]
+        timers.duration_ms[row] += ticks * (timers.half_period[move] + 1)
         if timers.under_way[0] > 0:
             break
         move += 1

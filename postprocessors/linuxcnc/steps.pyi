@@ -4,7 +4,7 @@ from camtool.kernels.motion import Ways
 MAX_CHAIN_POINTS: int
 
 def merge_lines(
-    points: Floats, breaks: Bools, tolerance: Floats, chain: Ints, moved: Floats
+    points: Floats, breaks: Bools, tolerance: Floats, chain: Ints, projected: Floats
 ) -> None: ...
 
 REACH: int

@@ -61,9 +61,9 @@ cdef bint _joins(double[:, ::1] points, Int base, Int new, double tolerance) noe
 
 cpdef void merge_lines(
     double[:, ::1] points, uint8_t[::1] breaks, double[:] tolerance, Int[::1] chain,
-    double[:, ::1] moved
+    double[:, ::1] projected
 ) noexcept:
-    """Fill `chain` (N,) with the chain of each of N moves, numbered from 0, and `moved` (N, 3)
+    """Fill `chain` (N,) with the chain of each of N moves, numbered from 0, and `projected` (N, 3)
     with the new ends of the moves: on the chain's line, never going back.
 
     `points` (N+1, 3): the start and all ends; `breaks` (N,): moves that do not join the one
@@ -77,7 +77,7 @@ cpdef void merge_lines(
             number, base = number + 1, k
         chain[k] = number
         for axis in range(3):
-            moved[k, axis] = points[k + 1, axis]
+            projected[k, axis] = points[k + 1, axis]
     base = 0
     for k in range(len(breaks)):
         if k + 1 == len(breaks) or chain[k + 1] != chain[k]:
@@ -86,7 +86,7 @@ cpdef void merge_lines(
                 reached = max(reached, _share(points, base, k + 1, j + 1))
                 for axis in range(3):
                     travel = points[k + 1, axis] - points[base, axis]
-                    moved[j, axis] = points[base, axis] + reached * travel
+                    projected[j, axis] = points[base, axis] + reached * travel
             base = k + 1
 
 

@@ -284,7 +284,7 @@ class _Run:
             iterations=self._account.samples[first:last].copy(),
             steps=self._account.steps[first:last].copy(),
             reversals=reversals,
-            ended=~is_complete | self._account.ended[rows],
+            ended=~is_complete | self._account.has_ended[rows],
         )
         # The next chunk may go on in the last of these rows.
         self._account.steps[first:last] = 0

@@ -37,7 +37,7 @@ class State(NamedTuple):
 class Account(NamedTuple):
     ticks: Floats
     steps: Ints
-    ended: Bools
+    has_ended: Bools
     samples: Ints
 
 def slaves_fill(

@@ -83,7 +83,7 @@ class Account(NamedTuple):
 
     ticks: Floats
     steps: Ints
-    ended: Bools
+    has_ended: Bools
     samples: Ints
 
 
@@ -155,7 +155,7 @@ cdef Int to_go_of(Int* slave, double* axis, Int sense) noexcept:
     Posi does not fall: within the turn number k it is c + 1023 k, c = 0 … 1023. It first reaches T
     in the turn k' = ⌈T / 1023⌉ − 1, or in the present one, at c' = max(T − 1023 k', 0).
     """
-    cdef Int stage, goal, up, wraps, seen, turn, to_go
+    cdef Int stage, goal, up, wraps, turned, turn, to_go
     cdef bint ahead
     stage = slave[STAGE]
     if stage == FOLLOWING:
@@ -172,9 +172,9 @@ cdef Int to_go_of(Int* slave, double* axis, Int sense) noexcept:
     if sense != 0:
         up = 1 if sense > 0 else 0
     wraps = slave[WRAPS]
-    seen = _seen_way(slave, axis, up) - (TURN - 1) * wraps
+    turned = _seen_way(slave, axis, up) - (TURN - 1) * wraps
     turn = max(wraps, (max(goal, 0) + TURN - 2) // (TURN - 1) - 1)
-    to_go = (turn - wraps) * TURN + max(goal - (TURN - 1) * turn, 0) - seen
+    to_go = (turn - wraps) * TURN + max(goal - (TURN - 1) * turn, 0) - turned
     # The direction is that of the last count: a motor that turns back must count first.
     return int(to_go) if up == slave[UP] else int(max(to_go, 1))
 
@@ -440,14 +440,14 @@ cdef class Slaves:
     cdef Int[::1] table, clock, samples
     cdef double[:, ::1] axes, motors
     cdef double[::1] pauses, begin, ticks
-    cdef uint8_t[::1] ended, thin
+    cdef uint8_t[::1] has_ended, thin
     cdef double lag
     cdef bint text
 
     def __init__(self, program: Program, state: State, account: Account) -> None:
         self.lines, self.pauses, self.axes, self.table, self.lag, self.text, self.thin = program
         self.motors, self.slaves, self.clock, self.begin = state
-        self.ticks, self.steps, self.ended, self.samples = account
+        self.ticks, self.steps, self.has_ended, self.samples = account
 
 
 cdef void _open(Slaves all_, Int line) noexcept:
@@ -472,9 +472,9 @@ cdef void _close(Slaves all_, Int line, Int tick) noexcept:
     cdef double[:, ::1] motors
     cdef double[::1] begin
     lines, motors, begin = all_.lines, all_.motors, all_.begin
-    done = max(motors[0, DONE], motors[1, DONE], motors[2, DONE])
+    last_tick = max(motors[0, DONE], motors[1, DONE], motors[2, DONE])
     pause = all_.pauses[line]
-    after = max(done + abs(pause), float(tick))
+    after = max(last_tick + abs(pause), float(tick))
     if pause < 0.0:
         after = math.ceil(after)
     parted = min(begin[1], after) if begin[1] > begin[0] else after
@@ -720,7 +720,7 @@ cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1]
             continue
         if float(tick) - begin[0] > float(all_.lines[line, MAX_TICKS]):
             if not _all_still(slaves):
-                all_.ended[all_.lines[line, SECOND_ROW]] = False
+                all_.has_ended[all_.lines[line, SECOND_ROW]] = False
             _given_up(all_.motors, slaves, tick)
             for index in range(3):
                 ahead[index].sense = UNKNOWN_SENSE

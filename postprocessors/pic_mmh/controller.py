@@ -378,7 +378,7 @@ class PicMmhRun:
         never ends."""
         remaining, is_done = leg.samples, leg.samples == 0
         if is_done and not leg.ended:
-            yield one_row(row, NO_SAMPLES, NO_SAMPLES, ended=False)
+            yield one_row(row, NO_SAMPLES, NO_SAMPLES, is_met=False)
         while not is_done:
             filled, passes, is_done = leg.fill(self._buffer[:remaining])
             remaining -= filled
@@ -408,7 +408,7 @@ class PicMmhRun:
             iterations=passes,
             steps=travelled,
             reversals=reversals[0],
-            ended=is_ended,
+            is_met=is_ended,
         )
 
     def _rest_chunk(self, row: int, kind: Kind, position: Ints) -> Chunk:

@@ -104,10 +104,10 @@ cdef void scan(
     No coordinate changes by more than one from sample to sample: of `STRIDE` of them none is 0, or
     nearer than the nearest, when the one before is far enough away.
     """
-    cdef Int x, y, entered, seen, min_square, k, square, nearest, gap
+    cdef Int x, y, entered, sample_count, min_square, k, square, nearest, gap
     cdef bint in_window
     x, y, entered = tracker[0], tracker[1], tracker[2]
-    seen, nearest, min_square, k = tracker[3], tracker[4], tracker[5], 0
+    sample_count, nearest, min_square, k = tracker[3], tracker[4], tracker[5], 0
     while k < count:
         if abs(x) > STRIDE and abs(y) > STRIDE and k + STRIDE <= count:
             gap = max(abs(x - end_x), abs(y - end_y)) - STRIDE
@@ -123,9 +123,9 @@ cdef void scan(
         if low <= entered <= high:
             square = (x - end_x) * (x - end_x) + (y - end_y) * (y - end_y)
             if min_square < 0 or square < min_square:
-                nearest, min_square = seen + k, square
+                nearest, min_square = sample_count + k, square
     tracker[0], tracker[1], tracker[2] = x, y, entered
-    tracker[3], tracker[4], tracker[5] = seen + count, nearest, min_square
+    tracker[3], tracker[4], tracker[5] = sample_count + count, nearest, min_square
 
 
 # Arcs by direct search (DSM), the step-by-step method of the PIC18F8720 controller.
@@ -349,15 +349,15 @@ cpdef Int first_at(Int[::1] state, Int end_x, Int end_y, Int limit) noexcept:
     a whole turn. No coordinate changes by more than one per iteration, so the end cannot be met in
     fewer iterations than the larger of its two distances.
     """
-    cdef Int done, distance, run
-    done = 0
-    while done < limit:
+    cdef Int iterations, distance, run
+    iterations = 0
+    while iterations < limit:
         distance = int(max(abs(state[0] - end_x), abs(state[1] - end_y)))
-        run = min(max(distance, 1), limit - done)
+        run = min(max(distance, 1), limit - iterations)
         skip(state, run)
-        done += run
+        iterations += run
         if state[0] == end_x and state[1] == end_y:
-            return done
+            return iterations
     return -1
 
 
@@ -369,35 +369,35 @@ cpdef (Int, Int) nearest_to(Int[::1] state, Int end_x, Int end_y, Int low, Int h
     As in `first_at`, a position that is to be no farther than d cannot come before `apart` − d
     iterations. Long strides first bound how near it comes.
     """
-    cdef Int done, best, min_square, off_x, off_y, square, run, x, y, error, sx, sy
+    cdef Int iterations, best, min_square, off_x, off_y, square, run, x, y, error, sx, sy
     if high < low:
         return -1, -1
     skip(state, low)
     x, y, error, sx, sy = state[0], state[1], state[2], state[3], state[4]
-    done, best, min_square = low, -1, -1
+    iterations, best, min_square = low, -1, -1
     while True:
         off_x, off_y = abs(state[0] - end_x), abs(state[1] - end_y)
         square = off_x * off_x + off_y * off_y
         if min_square < 0 or square < min_square:
             min_square = square
-        if done == high:
+        if iterations == high:
             break
-        run = min(max(off_x, off_y, 1), high - done)
+        run = min(max(off_x, off_y, 1), high - iterations)
         skip(state, run)
-        done += run
+        iterations += run
     state[0], state[1], state[2], state[3], state[4] = x, y, error, sx, sy
-    done = low
+    iterations = low
     while True:
         off_x, off_y = abs(state[0] - end_x), abs(state[1] - end_y)
         square = off_x * off_x + off_y * off_y
         if square < min_square or (best < 0 and square == min_square):
-            best, min_square = done, square
-        if done == high:
+            best, min_square = iterations, square
+        if iterations == high:
             return best, min_square
         run = max(off_x, off_y) - int(math.sqrt(float(min_square)))
-        run = min(max(run, 1), high - done)
+        run = min(max(run, 1), high - iterations)
         skip(state, run)
-        done += run
+        iterations += run
 
 
 # Arcs by stairs (the incremental method): one axis per iteration.
@@ -749,7 +749,7 @@ cdef void _stop(
     """Fill `out` (4,) with the stop of one arc that does not start at its centre. Scratch buffers:
     positions, registers (2,) and state (8,) of an interpolator, and a tracker (6,) of
     `approach_start`."""
-    cdef Int expected, size, end_x, end_y, low, high, seen, at, filled, _, best, off_x, off_y
+    cdef Int expected, size, end_x, end_y, low, high, begin, at, filled, _, best, off_x, off_y
     cdef Int nearest
     cdef Int[::1] part_x, part_y
     cdef bint met
@@ -767,7 +767,7 @@ cdef void _stop(
     tracker[5] = -1 if low > 0 else off_x * off_x + off_y * off_y
     out[STOP_SAMPLES], out[STOP_X], out[STOP_Y], out[MET] = 0, leg[A], leg[B], 0
     size = min(LOOKED_AT, 8 * (max(abs(leg[A]), abs(leg[B])) + 1))
-    part_x, part_y, seen = path_x[:size], path_y[:size], 0
+    part_x, part_y, begin = path_x[:size], path_y[:size], 0
     while True:
         filled, _, met = fill_leg(leg, method, state, registers, part_x, part_y)
         at = -1
@@ -777,7 +777,7 @@ cdef void _stop(
             best = tracker[4]
             scan(part_x, part_y, filled, end_x, end_y, tracker, low, high)
             if tracker[4] != best:
-                nearest = tracker[4] - seen - 1
+                nearest = tracker[4] - begin - 1
                 out[STOP_SAMPLES] = tracker[4]
                 out[STOP_X], out[STOP_Y] = part_x[nearest], part_y[nearest]
             if tracker[2] > high:
@@ -785,10 +785,10 @@ cdef void _stop(
             if met and (reading == EQUAL or tracker[2] >= low):
                 at = filled - 1
         if at >= 0:
-            out[STOP_SAMPLES], out[STOP_X], out[STOP_Y] = seen + at + 1, part_x[at], part_y[at]
+            out[STOP_SAMPLES], out[STOP_X], out[STOP_Y] = begin + at + 1, part_x[at], part_y[at]
             out[MET] = 1 if part_x[at] == end_x and part_y[at] == end_y else 0
             return
-        seen += filled
+        begin += filled
 
 
 cdef void _stop_by_closed_form(
@@ -796,37 +796,37 @@ cdef void _stop_by_closed_form(
 ) noexcept:
     """Fill `out` as `_stop` does, for direct search: no coordinate changes by more than one per
     iteration, so an event that is at least n iterations away is searched only from then on."""
-    cdef Int expected, end_x, end_y, low, high, first, last, done, at, to_x, to_y, entered, x, y
+    cdef Int expected, end_x, end_y, low, high, first, last, begin, at, to_x, to_y, entered, x, y
     cdef Int short, run, _
     end_x, end_y = leg[END_X], leg[END_Y]
     expected = expected_quadrants(leg[A], leg[B], leg[CW] != 0, end_x, end_y)
     start_leg(leg, DSM, rounded, state)
     if reading == FINAL_QUADRANT:
-        done = _enter(state, expected)
+        begin = _enter(state, expected)
         to_x, to_y = heading(end_x, end_y, leg[CW] != 0)
         entered = 0
         while True:
             x, y = state[0], state[1]
             short = int(max(to_x * (end_x - x), to_y * (end_y - y)))
-            if done > 0 and (entered == 1 or short <= 0):
+            if begin > 0 and (entered == 1 or short <= 0):
                 break
             run = max(1, min(short, abs(x), abs(y)))
             skip(state, run)
-            done += run
+            begin += run
             if (state[0] == 0 and x != 0) or (state[1] == 0 and y != 0):
                 entered = 1
-        out[STOP_SAMPLES], out[STOP_X], out[STOP_Y] = done, state[0], state[1]
+        out[STOP_SAMPLES], out[STOP_X], out[STOP_Y] = begin, state[0], state[1]
         out[MET] = 1 if state[0] == end_x and state[1] == end_y else 0
         return
     low, high = max(0, expected - 1), expected + 1
     first = _enter(state, low)
     last = first + _enter(state, high + 1 - low) - 1
     start_leg(leg, DSM, rounded, state)
-    done = max(0, first - 1) if reading == NEAREST else 0
-    skip(state, done)
-    at = first_at(state, end_x, end_y, last - done)
+    begin = max(0, first - 1) if reading == NEAREST else 0
+    skip(state, begin)
+    at = first_at(state, end_x, end_y, last - begin)
     if at > 0:
-        out[STOP_SAMPLES], out[STOP_X], out[STOP_Y], out[MET] = done + at, end_x, end_y, 1
+        out[STOP_SAMPLES], out[STOP_X], out[STOP_Y], out[MET] = begin + at, end_x, end_y, 1
         return
     start_leg(leg, DSM, rounded, state)
     at, _ = nearest_to(state, end_x, end_y, first, last)
@@ -838,16 +838,16 @@ cdef void _stop_by_closed_form(
 cdef Int _enter(Int[::1] state, Int count) noexcept:
     """Run on by direct search until `count` more quadrants are entered; return the number of
     iterations."""
-    cdef Int done, x, y, run
-    done = 0
+    cdef Int iterations, x, y, run
+    iterations = 0
     while count > 0:
         x, y = state[0], state[1]
         run = int(max(1, min(abs(x), abs(y))))
         skip(state, run)
-        done += run
+        iterations += run
         if (state[0] == 0 and x != 0) or (state[1] == 0 and y != 0):
             count -= 1
-    return done
+    return iterations
 
 
 cpdef void arc_stops(Int[:, ::1] legs, (Int, bint, Int) how, Int[:, ::1] out):
@@ -1365,7 +1365,7 @@ cdef void _land(
     when there is none."""
     cdef double radius, latest
     cdef Int end_x, end_y, low, high, met, near, _, first, count, row, min_square, off_x, off_y, square
-    cdef Int upto, room
+    cdef Int window_end, room
     cdef bint nearer
     radius = _radius(arc[START_X], arc[START_Y])
     end_x, end_y = arc[WANTED_X], arc[WANTED_Y]
@@ -1398,13 +1398,13 @@ cdef void _land(
             _store_landing(row, first, search, out)
     if min_square >= 0:
         return
-    upto, room = first, len(search.path_x)
-    while upto > 0:
-        first = max(0, upto - room)
-        count = upto - first
+    window_end, room = first, len(search.path_x)
+    while window_end > 0:
+        first = max(0, window_end - room)
+        count = window_end - first
         _fill_path(arc, first, count, search)
         for row in range(count - 1, -1, -1):
             if _lands(arc, row, first, search):
                 _store_landing(row, first, search, out)
                 return
-        upto = first
+        window_end = first

@@ -31,7 +31,7 @@ CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILI
 MAX_QUESTIONS = 0
 MAX_SHARED_CLASS_NAMES = 0
 MAX_SUPERLATIVES = 0
-MAX_RIDDLES = 30
+MAX_RIDDLES = 0
 
 RIDDLE = re.compile(
     r"_*(?:found|made|way|most|asked|kept|held|said|apart|whole|mine|theirs|taken|known|about|on|left"
