@@ -32,7 +32,7 @@ from camtool.geometry.polylines import Polylines
 from camtool.importers.options import Reading, ReadOptions, options_of
 from camtool.importers.read import content, read_bytes
 from camtool.jobs.build import JobTables, job_of_file, read_job_file
-from camtool.jobs.drawing import chosen_for_job, refuse_unmatched
+from camtool.jobs.drawing import read_for_job, refuse_unmatched
 from camtool.jobs.keys import field_value
 from camtool.jobs.tools import Shop
 from camtool.libraries.read import is_path, path_of, read_objects
@@ -190,7 +190,7 @@ def as_drawing(drawing: Drawable, target: str | LoadedTarget | None, job: Job) -
     if isinstance(drawing, Drawing):
         return drawing
     options = options_of({"text": job.text} if job.text else {}, _machine_of(target))
-    return ShownDrawing.of(chosen_for_job(_reader_of(drawing), options, job))
+    return ShownDrawing.of(read_for_job(_reader_of(drawing), options, job))
 
 
 def _reader_of(drawing: Drawable) -> Callable[[ReadOptions], Drawing]:

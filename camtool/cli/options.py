@@ -476,7 +476,7 @@ class DrawingFlags(Struct, frozen=True):
         data, file = content(Path(name)) if data is None else (data, name)
         if job is None:
             return read_bytes(data, file, options)
-        return read_for_job(data, file, options, job)
+        return read_for_job(functools.partial(read_bytes, data, file), options, job)
 
     def is_program(self, name: str, target: LoadedTarget) -> bool:
         """Return True if the file has the extension of the target's programs, or a content that is

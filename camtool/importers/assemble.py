@@ -86,20 +86,6 @@ class Found(Struct, frozen=True, eq=False):
     marks: Sequence[Mark] = ()
     callouts: Sequence[Callout] = ()
 
-    def drawing(self, file: str, options: ReadOptions) -> Drawing:
-        """Return the Drawing made of what was found (see `assemble`)."""
-        return assemble(
-            self.pieces,
-            file=file,
-            units=self.units,
-            used=self.used,
-            skipped=self.skipped,
-            findings=self.findings,
-            options=options,
-            marks=self.marks,
-            callouts=self.callouts,
-        )
-
 
 def assemble(
     pieces: list[Piece],
@@ -107,18 +93,18 @@ def assemble(
     file: str,
     units: Units,
     used: dict[str, int],
-    skipped: list[Skipped],
-    findings: list[Finding],
     options: ReadOptions,
+    skipped: Sequence[Skipped] = (),
+    findings: Sequence[Finding] = (),
     marks: Sequence[Mark] = (),
     callouts: Sequence[Callout] = (),
 ) -> Drawing:
     """Return the Drawing of these pieces; contours are in the order in which their first pieces
     came.
 
-    `findings` are those of the reader (units, repairs); gaps, size and one ENTITY_SKIPPED for each
-    kind of `skipped` are added here. A drawing of `marks` alone has no paths; `callouts` are all
-    kept, whatever is selected. Raises DrawingError when a number is no position or when nothing is
+    `findings` are those of the reader (units, repairs); gaps, size and one ENTITY_SKIPPED for
+    each kind of `skipped` are added here. A drawing of `marks` alone has no paths; `callouts` are
+    all kept, whatever is selected. DrawingError when a number is no position or when nothing is
     left to draw.
     """
     every = pieces

@@ -20,7 +20,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import DrawingError, GeometryError
 from camtool.geometry.boxes import moves_of, nearest_pairs
-from camtool.geometry.chain import Chained, Kinds, chain, numbered
+from camtool.geometry.chain import Kinds, chain, numbered
 from camtool.geometry.drawing import Gap, Healing, Skipped
 from camtool.geometry.intersect import self_crossings_of
 from camtool.geometry.measure import path_lengths, point_at
@@ -250,13 +250,20 @@ def heal_contours(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions)
     tolerance = min(SAME_LINE_MM, options.tolerance_mm)
     single = without_overlaps(clean.lines, numbered(places, len(lasting)), tolerance)
     sources = clean.piece[single.source]
-    chained = _chain_paths(pieces, single.lines, sources, options)
+    members = [pieces[index] for index in sources.tolist()]
+    layers = [piece.layer for piece in members]
+    kinds = Kinds(
+        groups=None if options.across_layers else layers,
+        styles=[(piece.colour, piece.line_type) for piece in members],
+        layers=layers,
+    )
+    chained = chain(single.lines, gap_of(options), kinds=kinds)
     lines, arcs = _recognise_arcs(chained.lines, options)
     merged = without_tiny(lines, TINY_SHARE * options.tolerance_mm)
-    members = _members(chained.members, sources)
+    rows = _members(chained.members, sources)
     return Healed(
         lines=merged.lines,
-        members=members,
+        members=rows,
         closed_gaps=chained.closed_gaps,
         open_gaps=chained.open_gaps,
         healing=Healing(
@@ -267,7 +274,7 @@ def heal_contours(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions)
             tiny_merged=merged.count,
             arcs_recognised=arcs,
             branches=chained.branches,
-            crossings=self_crossings_of(merged.lines, [pieces[one[0]].layer for one in members]),
+            crossings=self_crossings_of(merged.lines, [pieces[one[0]].layer for one in rows]),
         ),
     )
 
@@ -279,20 +286,6 @@ def _members(chains: tuple[tuple[int, ...], ...], sources: Ints) -> tuple[tuple[
         return chains
     rows = sources.tolist()
     return tuple(tuple(dict.fromkeys(rows[index] for index in one)) for one in chains)
-
-
-def _chain_paths(
-    pieces: Sequence[Piece], lines: Polylines, sources: Ints, options: ReadOptions
-) -> Chained:
-    """Return the paths joined at their ends, within one layer unless `options.across_layers`."""
-    members = [pieces[index] for index in sources.tolist()]
-    layers = [piece.layer for piece in members]
-    kinds = Kinds(
-        groups=None if options.across_layers else layers,
-        styles=[(piece.colour, piece.line_type) for piece in members],
-        layers=layers,
-    )
-    return chain(lines, gap_of(options), kinds=kinds)
 
 
 def _recognise_arcs(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]:

@@ -9,13 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from functools import partial
 from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
 from camtool.importers.options import Selection
 from camtool.importers.pieces import NAMED, NoMatchError
-from camtool.importers.read import read_bytes
 from camtool.patterns import guess, matches
 from camtool.records import replace
 
@@ -30,18 +28,12 @@ MAX_LOOKS = 4
 gives the size to within the tolerance of the reading before."""
 
 
-def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Drawing:
-    """Parse the bytes of a drawing file, as finely as the job needs, with the layers that its
-    operations take (in all set-ups) or those that `options` select. OptionError for a layer or
-    colour of the job that the drawing does not have, unless `options` select some."""
-    return chosen_for_job(partial(read_bytes, data, file), options, job)
-
-
-def chosen_for_job(
+def read_for_job(
     read: Callable[[ReadOptions], Drawing], options: ReadOptions, job: Job
 ) -> Drawing:
-    """Return the drawing that `read` gives with the options for the job; otherwise like
-    `read_for_job`."""
+    """Return the drawing that `read` gives, of the layers that the job's operations take, in all
+    set-ups of the part, or of those that `options` select. OptionError for a layer or colour of
+    the job that the drawing has not, unless `options` select some."""
     job = job.whole
     selection, wanted_layers = options.select, layers_of(job)
     options = replace(options, select=replace(selection, layers=selection.layers or wanted_layers))

@@ -22,7 +22,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.errors import CamtoolError, DrawingError, OptionError
-from camtool.importers.assemble import Found
+from camtool.importers.assemble import Found, assemble
 from camtool.importers.options import DEFAULTS, ReadOptions
 from camtool.importers.read import refuse_flags_of_pictures
 from camtool.plugins import EntryPoint, entry_points
@@ -124,15 +124,17 @@ def read_objects(value: object, options: ReadOptions = DEFAULTS) -> Drawing:
     used: dict[str, int] = {}
     for kind, count in chain.from_iterable(content.used.items() for content in contents):
         used[kind] = used.get(kind, 0) + count
-    return Found(
+    return assemble(
         [piece for content in contents for piece in content.pieces],
-        contents[0].units,
-        used,
-        [item for content in contents for item in content.skipped],
-        [finding for content in contents for finding in content.findings],
-        [mark for content in contents for mark in content.marks],
-        [callout for content in contents for callout in content.callouts],
-    ).drawing(name, drawn)
+        file=name,
+        options=drawn,
+        units=contents[0].units,
+        used=used,
+        skipped=[item for content in contents for item in content.skipped],
+        findings=[finding for content in contents for finding in content.findings],
+        marks=[mark for content in contents for mark in content.marks],
+        callouts=[callout for content in contents for callout in content.callouts],
+    )
 
 
 def name_of(value: object) -> str:

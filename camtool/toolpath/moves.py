@@ -171,7 +171,7 @@ class Toolpath:
     @property
     def starts(self) -> Floats:
         """Start points of all rows, (N, 3) mm."""
-        return np.concatenate([self.start[None, :], self.end[:-1]]) if len(self) else self.end
+        return np.concatenate([self.start[None, :], self.end[:-1]])[: len(self.end)]
 
     def starts_of(self, rows: Ints | Indices) -> Floats:
         """Return the start points (K, 3) mm of these rows."""

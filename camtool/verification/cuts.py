@@ -147,7 +147,7 @@ def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool, across: Bools | None = 
 
 def moves_across(toolpath: Toolpath) -> Bools:
     """Return the mask (N,) of rows that move in XY."""
-    return toolpath.by_parts(lambda part: _lengths(part) > POSITION_EPS_MM)
+    return np.asarray(toolpath.by_parts(_lengths) > POSITION_EPS_MM)
 
 
 def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:

@@ -81,7 +81,6 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         units=units,
         used={options.trace: len(shapes_and_rings)},
         skipped=skipped,
-        findings=[],
         options=options,
     )
 

@@ -101,7 +101,6 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         units=Units("mm", 1.0, "boards say their unit, and are read in mm"),
         used=dict(used),
         skipped=skipped,
-        findings=[],
         options=options,
     )
 

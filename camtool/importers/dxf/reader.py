@@ -12,10 +12,12 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+from msgspec.structs import asdict
+
 from camtool.errors import DrawingError
 from camtool.findings import Finding, Severity
 from camtool.geometry.drawing import Drawing, Skipped, Units
-from camtool.importers.assemble import Found, font_findings
+from camtool.importers.assemble import Found, assemble, font_findings
 from camtool.importers.dxf.load import Loaded, load, quiet, without_collector
 from camtool.importers.dxf.walk import DxfWalk
 from camtool.importers.findings import (
@@ -39,7 +41,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
             loaded, layout_of(loaded.document, options.layout, file), file, options
         )
     del loaded  # what the file holds is in the pieces now
-    return content.drawing(file, options)
+    return assemble(file=file, options=options, **asdict(content))
 
 
 def walk_space(loaded: Loaded, space: Any, file: str, options: ReadOptions) -> Found:

@@ -44,8 +44,6 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         file=file,
         units=units,
         used={"stroke": len(pieces)},
-        skipped=[],
-        findings=[],
         options=options,
     )
 

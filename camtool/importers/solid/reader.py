@@ -26,12 +26,13 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import asdict
 
 from camtool.errors import DrawingError
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing, Skipped
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.importers.assemble import Found, unit_or_mm
+from camtool.importers.assemble import Found, assemble, unit_or_mm
 from camtool.importers.findings import (
     FILE_REPAIRED_BODIES,
     FILE_REPAIRED_IN_PART,
@@ -59,9 +60,8 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         "height": height,
         "tolerance": max(options.tolerance_mm / scale, POSITION_EPS_MM),
     }
-    return found_in(run_worker(data, request, file), unit.why, scale, options).drawing(
-        file, options
-    )
+    content = found_in(run_worker(data, request, file), unit.why, scale, options)
+    return assemble(file=file, options=options, **asdict(content))
 
 
 def found_in(answer: dict[str, Any], why: str, scale: float, options: ReadOptions) -> Found:
