@@ -55,6 +55,10 @@ class Code(IntEnum):
         code.means, code.mend = means, mend
         return code
 
+    def says(self, text: str, unit: str = "", severity: Severity | None = None) -> Sentence:
+        """Return a sentence of this code."""
+        return Sentence(self, text, unit, severity)
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class TargetCode(FrozenRecord):
@@ -64,6 +68,10 @@ class TargetCode(FrozenRecord):
     severities: tuple[Severity, ...]
     means: str
     mend: str
+
+    def says(self, text: str, unit: str = "", severity: Severity | None = None) -> Sentence:
+        """Return a sentence of this code."""
+        return Sentence(self, text, unit, severity)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -130,7 +138,7 @@ class Sentence(FrozenRecord):
 
     >>> from camtool.planning.findings import PlanningCode
     >>> text = "{measured:# hole is|# holes are} wider than {drill:g} mm"
-    >>> some = Sentence(PlanningCode.HOLE_SIZE, text)
+    >>> some = PlanningCode.HOLE_SIZE.says(text)
     >>> print(some(measured=1, drill=3.0, where="layer 0"))
     warning HOLE_SIZE [layer 0]: 1 hole is wider than 3 mm
     """

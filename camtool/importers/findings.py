@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from camtool.findings import INFO, WARNING, Code, Sentence
+from camtool.findings import INFO, WARNING, Code
 from camtool.geometry.findings import ContourCode
 
 
@@ -100,105 +100,81 @@ class DrawingCode(Code):
     )
 
 
-UNITLESS = Sentence(
-    DrawingCode.UNITLESS,
-    "the file names no unit ({said}): read as mm; if that is wrong, give --units",
+UNITLESS = DrawingCode.UNITLESS.says(
+    "the file names no unit ({said}): read as mm; if that is wrong, give --units"
 )
-UNITLESS_PX = Sentence(
-    DrawingCode.UNITLESS,
+UNITLESS_PX = DrawingCode.UNITLESS.says(
     "{why}: read as px, {px_an_inch:g} an inch; if that is wrong, name the unit of a user unit "
-    "with --units, or give --dpi",
+    "with --units, or give --dpi"
 )
-IMPLAUSIBLE_SIZE = Sentence(
-    DrawingCode.IMPLAUSIBLE_SIZE,
+IMPLAUSIBLE_SIZE = DrawingCode.IMPLAUSIBLE_SIZE.says(
     "the drawing is {width:.6g} x {height:.6g} mm with unit {drawn_in} ({why}); if that is "
     "wrong, name the unit with --units",
     "mm",
 )
-ENTITY_SKIPPED = Sentence(DrawingCode.ENTITY_SKIPPED, "{measured} {kind} left out: {reason}")
-GAP_OPEN = Sentence(
-    DrawingCode.GAP_OPEN, "two open ends are {size_um:.4g} µm apart and stay open", "mm"
+ENTITY_SKIPPED = DrawingCode.ENTITY_SKIPPED.says("{measured} {kind} left out: {reason}")
+GAP_OPEN = DrawingCode.GAP_OPEN.says(
+    "two open ends are {size_um:.4g} µm apart and stay open", "mm"
 )
-GAP_OPEN_MORE = Sentence(
-    DrawingCode.GAP_OPEN,
-    "{count:# more gap stays|# more gaps stay} open, of {least_um:.4g} to {most_um:.4g} µm",
-    "mm",
+GAP_OPEN_MORE = DrawingCode.GAP_OPEN.says(
+    "{count:# more gap stays|# more gaps stay} open, of {least_um:.4g} to {most_um:.4g} µm", "mm"
 )
-FILE_REPAIRED = Sentence(
-    DrawingCode.FILE_REPAIRED,
-    "the file is faulty and was repaired ({measured}): {repairs}{more:|; and # more|; and # more}",
+FILE_REPAIRED = DrawingCode.FILE_REPAIRED.says(
+    "the file is faulty and was repaired ({measured}): {repairs}{more:|; and # more|; and # more}"
 )
-FILE_REPAIRED_BODIES = Sentence(
-    DrawingCode.FILE_REPAIRED,
+FILE_REPAIRED_BODIES = DrawingCode.FILE_REPAIRED.says(
     "{measured} of {bodies:# body|# bodies} {measured:has|have} faces or edges that do not fit "
-    "together",
+    "together"
 )
-FILE_REPAIRED_IN_PART = Sentence(
-    DrawingCode.FILE_REPAIRED, "the file is damaged, something may be missing: {complaint}"
+FILE_REPAIRED_IN_PART = DrawingCode.FILE_REPAIRED.says(
+    "the file is damaged, something may be missing: {complaint}"
 )
-GAP_CLOSED = Sentence(DrawingCode.GAP_CLOSED, "a gap of {size_um:.4g} µm was closed", "mm")
-GAP_CLOSED_MORE = Sentence(
-    DrawingCode.GAP_CLOSED,
-    "{count:# more gap was|# more gaps were} closed, of {least_um:.4g} to {most_um:.4g} µm",
-    "mm",
+GAP_CLOSED = DrawingCode.GAP_CLOSED.says("a gap of {size_um:.4g} µm was closed", "mm")
+GAP_CLOSED_MORE = DrawingCode.GAP_CLOSED.says(
+    "{count:# more gap was|# more gaps were} closed, of {least_um:.4g} to {most_um:.4g} µm", "mm"
 )
-SELF_CROSSING = Sentence(
-    ContourCode.SELF_CROSSING,
-    "a closed contour crosses itself{measured:| at # places}",
-    severity=WARNING,
+SELF_CROSSING = ContourCode.SELF_CROSSING.says(
+    "a closed contour crosses itself{measured:| at # places}", severity=WARNING
 )
-SELF_CROSSING_MORE = Sentence(
-    ContourCode.SELF_CROSSING,
+SELF_CROSSING_MORE = ContourCode.SELF_CROSSING.says(
     "{measured:# more closed contour crosses itself|# more closed contours cross themselves}",
     severity=WARNING,
 )
-BRANCHED = Sentence(
-    ContourCode.BRANCHED, "{measured} ends meet; the straightest were joined", severity=WARNING
+BRANCHED = ContourCode.BRANCHED.says(
+    "{measured} ends meet; the straightest were joined", severity=WARNING
 )
-BRANCHED_MORE = Sentence(
-    ContourCode.BRANCHED,
-    "more than two ends meet at {measured:# more place|# more places}",
-    severity=WARNING,
+BRANCHED_MORE = ContourCode.BRANCHED.says(
+    "more than two ends meet at {measured:# more place|# more places}", severity=WARNING
 )
-DRAWN_TWICE = Sentence(
-    DrawingCode.DRAWN_TWICE,
+DRAWN_TWICE = DrawingCode.DRAWN_TWICE.says(
     "{doubles} drawn twice and {overlaps} lying on others in whole or in part: {measured:.6g} mm "
     "left out",
     "mm",
 )
-TINY_MERGED = Sentence(
-    DrawingCode.TINY_MERGED,
-    "{measured:# segment|# segments} too short to matter {measured:was|were} merged",
+TINY_MERGED = DrawingCode.TINY_MERGED.says(
+    "{measured:# segment|# segments} too short to matter {measured:was|were} merged"
 )
-ARCS_RECOGNISED = Sentence(DrawingCode.ARCS_RECOGNISED, "chords became {measured:# arc|# arcs}")
-FONT_SUBSTITUTED = Sentence(DrawingCode.FONT_SUBSTITUTED, "{measured:# text|# texts}: {what}")
-SECTION_CHOSEN = Sentence(
-    DrawingCode.SECTION_CHOSEN,
+ARCS_RECOGNISED = DrawingCode.ARCS_RECOGNISED.says("chords became {measured:# arc|# arcs}")
+FONT_SUBSTITUTED = DrawingCode.FONT_SUBSTITUTED.says("{measured:# text|# texts}: {what}")
+SECTION_CHOSEN = DrawingCode.SECTION_CHOSEN.says(
     "the section at z = {heights} mm is drawn; the model spans z = {bottom:.6g} to {top:.6g} mm; "
     "--section-z chooses another height",
     "mm",
 )
-SECTION_CHOSEN_FACES = Sentence(
-    DrawingCode.SECTION_CHOSEN,
+SECTION_CHOSEN_FACES = DrawingCode.SECTION_CHOSEN.says(
     "the highest level face of each solid at z = {heights} mm is drawn; the model spans z = "
     "{bottom:.6g} to {top:.6g} mm; --section-z chooses another height",
     "mm",
 )
-NOT_APPLIED = Sentence(DrawingCode.NOT_APPLIED, "{measured} {what} {why}")
-NOT_APPLIED_TO_ENTITY = Sentence(
-    DrawingCode.NOT_APPLIED, "{measured} {kind}: {what} is not applied"
+NOT_APPLIED = DrawingCode.NOT_APPLIED.says("{measured} {what} {why}")
+NOT_APPLIED_TO_ENTITY = DrawingCode.NOT_APPLIED.says("{measured} {kind}: {what} is not applied")
+CALLOUT_NOT_READ = DrawingCode.CALLOUT_NOT_READ.says(
+    "{measured} {kind} cannot be inspected: {reason}"
 )
-CALLOUT_NOT_READ = Sentence(
-    DrawingCode.CALLOUT_NOT_READ,
-    "{measured} {kind} cannot be inspected: {reason}",
+UNIT_GUESSED = DrawingCode.UNIT_GUESSED.says(
+    "the file names no unit ({why}): read as {taken}; if that is wrong, name the unit with --units"
 )
-UNIT_GUESSED = Sentence(
-    DrawingCode.UNIT_GUESSED,
-    "the file names no unit ({why}): read as {taken}; if that is wrong, name the unit with "
-    "--units",
-)
-UNIT_GUESSED_BY_PROGRAM = Sentence(
-    DrawingCode.UNIT_GUESSED,
+UNIT_GUESSED_BY_PROGRAM = DrawingCode.UNIT_GUESSED.says(
     "{program} wrote the file, which took {px_an_inch:g} px an inch, and it was read so; if it "
     "comes out too large, give --dpi {usual:g}",
     severity=WARNING,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from camtool.findings import ERROR, INFO, WARNING, Code, Sentence
+from camtool.findings import ERROR, INFO, WARNING, Code
 
 
 class InspectionCode(Code):
@@ -78,98 +78,73 @@ class InspectionCode(Code):
     )
 
 
-NO_GENERAL_TOLERANCE = Sentence(
-    InspectionCode.NO_GENERAL_TOLERANCE,
-    "{general} has no value for a {kind} of {measured:.4g} mm: it has no limits",
-    "mm",
+NO_GENERAL_TOLERANCE = InspectionCode.NO_GENERAL_TOLERANCE.says(
+    "{general} has no value for a {kind} of {measured:.4g} mm: it has no limits", "mm"
 )
-DIMENSION_UNBOUND = Sentence(
-    InspectionCode.DIMENSION_UNBOUND,
+DIMENSION_UNBOUND = InspectionCode.DIMENSION_UNBOUND.says(
     "{name} is not inspected: {measured:nothing that is drawn fits|one fits|# features fit}",
     severity=WARNING,
 )
-DIMENSION_NOT_CUT = Sentence(
-    InspectionCode.DIMENSION_NOT_CUT,
-    "{name} is not inspected: the program does not cut its {what}",
-    severity=WARNING,
+DIMENSION_NOT_CUT = InspectionCode.DIMENSION_NOT_CUT.says(
+    "{name} is not inspected: the program does not cut its {what}", severity=WARNING
 )
-DIMENSION_NOT_CUT_ACROSS = Sentence(
-    InspectionCode.DIMENSION_NOT_CUT,
+DIMENSION_NOT_CUT_ACROSS = InspectionCode.DIMENSION_NOT_CUT.says(
     "{name} is not inspected: its {what} is cut in set-up {other!r}, and what is cut there lies "
     "{beside} beside what is cut here (flip_error)",
     severity=WARNING,
 )
-DIMENSION_NOT_CUT_THERE = Sentence(
-    InspectionCode.DIMENSION_NOT_CUT,
+DIMENSION_NOT_CUT_THERE = InspectionCode.DIMENSION_NOT_CUT.says(
     "{name} is not inspected: the slides leave what is drawn by too much, or may leave it",
     severity=WARNING,
 )
-DIMENSION_NOT_CUT_NO_FLOOR = Sentence(
-    InspectionCode.DIMENSION_NOT_CUT,
-    "{name} is not inspected: the job cuts no floor at its place",
-    severity=WARNING,
+DIMENSION_NOT_CUT_NO_FLOOR = InspectionCode.DIMENSION_NOT_CUT.says(
+    "{name} is not inspected: the job cuts no floor at its place", severity=WARNING
 )
-DIMENSION_NOT_CUT_THROUGH = Sentence(
-    InspectionCode.DIMENSION_NOT_CUT,
+DIMENSION_NOT_CUT_THROUGH = InspectionCode.DIMENSION_NOT_CUT.says(
     "{name} is not inspected: the cut at its place goes through the stock, {measured:.4g} mm deep "
     "in {limit:.4g} mm",
     "mm",
     WARNING,
 )
-DIMENSION_NOT_CUT_NARROW = Sentence(
-    InspectionCode.DIMENSION_NOT_CUT,
+DIMENSION_NOT_CUT_NARROW = InspectionCode.DIMENSION_NOT_CUT.says(
     "{name} is not inspected: no depth is measured within {measured:.4g} mm of walls, and its "
     "floor has no other place",
     "mm",
     WARNING,
 )
-DIMENSION_NOT_CUT_NO_STOCK = Sentence(
-    InspectionCode.DIMENSION_NOT_CUT,
-    "{name} is not inspected: the job does not say how thick its stock is",
-    severity=WARNING,
+DIMENSION_NOT_CUT_NO_STOCK = InspectionCode.DIMENSION_NOT_CUT.says(
+    "{name} is not inspected: the job does not say how thick its stock is", severity=WARNING
 )
-CALLOUT_TEXT = Sentence(
-    InspectionCode.CALLOUT_TEXT,
-    "the text {text!r} is not understood: this dimension is not inspected",
-    severity=WARNING,
+CALLOUT_TEXT = InspectionCode.CALLOUT_TEXT.says(
+    "the text {text!r} is not understood: this dimension is not inspected", severity=WARNING
 )
-DIMENSION_DIFFERS = Sentence(
-    InspectionCode.DIMENSION_DIFFERS,
-    "{name} is to be {limit:.6g} mm, but {measured:.6g} mm are drawn",
-    "mm",
-    ERROR,
+DIMENSION_DIFFERS = InspectionCode.DIMENSION_DIFFERS.says(
+    "{name} is to be {limit:.6g} mm, but {measured:.6g} mm are drawn", "mm", ERROR
 )
-DIMENSION_DIFFERS_VIEW = Sentence(
-    InspectionCode.DIMENSION_DIFFERS,
+DIMENSION_DIFFERS_VIEW = InspectionCode.DIMENSION_DIFFERS.says(
     "says {limit:.6g} mm where {measured:.6g} mm are drawn, by the scale of its view (DIMLFAC, or "
     "that of its block): it is not inspected",
     "mm",
     WARNING,
 )
-DIMENSION_TWICE = Sentence(
-    InspectionCode.DIMENSION_TWICE, "measures the same as {holds}, which holds", severity=INFO
+DIMENSION_TWICE = InspectionCode.DIMENSION_TWICE.says(
+    "measures the same as {holds}, which holds", severity=INFO
 )
-DIMENSION_TWICE_DIFFERS = Sentence(
-    InspectionCode.DIMENSION_TWICE,
+DIMENSION_TWICE_DIFFERS = InspectionCode.DIMENSION_TWICE.says(
     "measures the same as {holds} with other limits ({limits}, there {others}), which hold",
     severity=WARNING,
 )
-COUNT_DIFFERS = Sentence(
-    InspectionCode.COUNT_DIFFERS,
+COUNT_DIFFERS = InspectionCode.COUNT_DIFFERS.says(
     "{name} counts {limit:.0f} equal features, but {measured:.0f} of this size are drawn: only "
-    "this one is inspected",
+    "this one is inspected"
 )
-NOTHING_REQUIRED = Sentence(
-    InspectionCode.NOTHING_REQUIRED,
-    "no dimension with limits was inspected, so that nothing is known of what --require asks",
+NOTHING_REQUIRED = InspectionCode.NOTHING_REQUIRED.says(
+    "no dimension with limits was inspected, so that nothing is known of what --require asks"
 )
-DIMENSION_NOT_IN_OUT = Sentence(
-    InspectionCode.DIMENSION_NOT_IN,
-    "{name} is out: {measured:.4f} mm at worst, where {limit:.4f} mm is the limit",
-    "mm",
+DIMENSION_NOT_IN_OUT = InspectionCode.DIMENSION_NOT_IN.says(
+    "{name} is out: {measured:.4f} mm at worst, where {limit:.4f} mm is the limit", "mm"
 )
-DIMENSION_NOT_IN_UNDECIDED = Sentence(
-    InspectionCode.DIMENSION_NOT_IN,
+DIMENSION_NOT_IN_UNDECIDED = InspectionCode.DIMENSION_NOT_IN.says(
     "{name} is undecided: {measured:.4f} mm at worst, where {limit:.4f} mm is the limit; {why}",
     "mm",
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from camtool.arrays import Floats
-from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, and_more
+from camtool.findings import ERROR, INFO, WARNING, Code, and_more
 from camtool.toolpath.findings import ProgramCode
 
 FINDINGS_LISTED = 10
@@ -132,125 +132,97 @@ class StockCode(Code):
     )
 
 
-CUT_TOO_DEEP = Sentence(
-    StockCode.CUT_TOO_DEEP,
+CUT_TOO_DEEP = StockCode.CUT_TOO_DEEP.says(
     "{by}cut {measured:.4g} mm too deep, to Z {z:.4f} where Z {low:.4f} is the lowest"
     + and_more("places"),
     "mm",
 )
-MATERIAL_LEFT = Sentence(
-    StockCode.MATERIAL_LEFT,
+MATERIAL_LEFT = StockCode.MATERIAL_LEFT.says(
     "{measured:.4g} mm of material is left, up to Z {z:.4f} where Z {high:.4f} is the highest"
     + and_more("places"),
     "mm",
 )
-PASS_TOO_DEEP = Sentence(
-    StockCode.PASS_TOO_DEEP,
+PASS_TOO_DEEP = StockCode.PASS_TOO_DEEP.says(
     "{operation} takes {measured:.4g} mm at once, where {limit:.4g} mm is the most"
     + and_more("blocks"),
     "mm",
 )
-TAB_MISSING = Sentence(
-    StockCode.TAB_MISSING,
+TAB_MISSING = StockCode.TAB_MISSING.says(
     "{operation}: the tab here is cut away, {measured:.4g} mm of {limit:.4g} mm of its height are "
     "left",
     "mm",
 )
-TAB_MISSING_ALL = Sentence(
-    StockCode.TAB_MISSING, "{operation}: tabs are asked for, and none is left"
+TAB_MISSING_ALL = StockCode.TAB_MISSING.says("{operation}: tabs are asked for, and none is left")
+TAB_THIN = StockCode.TAB_THIN.says(
+    "{operation}: the tab here is {measured:.4g} mm wide instead of {limit:.4g} mm", "mm"
 )
-TAB_THIN = Sentence(
-    StockCode.TAB_THIN,
-    "{operation}: the tab here is {measured:.4g} mm wide instead of {limit:.4g} mm",
-    "mm",
+TOOL_IN_STOCK = StockCode.TOOL_IN_STOCK.says(
+    "the {body} of {tool} is {measured:.4g} mm deep in the stock" + and_more("blocks"), "mm"
 )
-TOOL_IN_STOCK = Sentence(
-    StockCode.TOOL_IN_STOCK,
-    "the {body} of {tool} is {measured:.4g} mm deep in the stock" + and_more("blocks"),
-    "mm",
+KEEP_OUT_ENTERED = StockCode.KEEP_OUT_ENTERED.says(
+    "the {body} of {tool} enters {box!r} by {measured:.4g} mm" + and_more("blocks"), "mm"
 )
-KEEP_OUT_ENTERED = Sentence(
-    StockCode.KEEP_OUT_ENTERED,
-    "the {body} of {tool} enters {box!r} by {measured:.4g} mm" + and_more("blocks"),
-    "mm",
+RAPID_IN_STOCK = ProgramCode.RAPID_IN_STOCK.says(
+    "a rapid runs through the stock, {depth:.4g} mm below its top" + and_more("rapids"), "mm"
 )
-RAPID_IN_STOCK = Sentence(
-    ProgramCode.RAPID_IN_STOCK,
-    "a rapid runs through the stock, {depth:.4g} mm below its top" + and_more("rapids"),
-    "mm",
-)
-LOOSE_PIECE = Sentence(
-    ProgramCode.LOOSE_PIECE,
+LOOSE_PIECE = ProgramCode.LOOSE_PIECE.says(
     "a piece of {width:.3g} by {height:.3g} mm comes loose here beside the running tool, because "
     "nothing holds it: give it tabs in an operation of its own, clear it with a pocket, or fasten "
     "it from below" + and_more("pieces"),
     "mm2",
 )
-LOOSE_PIECE_CUT = Sentence(
-    ProgramCode.LOOSE_PIECE,
+LOOSE_PIECE_CUT = ProgramCode.LOOSE_PIECE.says(
     "the part of {width:.3g} by {height:.3g} mm comes loose here, and is cut again from {again} "
     "on: cut its outline last, or give it tabs" + and_more("pieces"),
     "mm2",
 )
-LOOSE_PIECE_BEFORE = Sentence(
-    ProgramCode.LOOSE_PIECE,
+LOOSE_PIECE_BEFORE = ProgramCode.LOOSE_PIECE.says(
     "what is cut here, {width:.3g} by {height:.3g} mm, has come loose in a set-up before: cut its "
     "outline in the last set-up, or give it tabs",
     "mm2",
 )
-NETS_JOINED = Sentence(
-    StockCode.NETS_JOINED, "{operation}: two nets are joined near here" + and_more("pairs")
+NETS_JOINED = StockCode.NETS_JOINED.says(
+    "{operation}: two nets are joined near here" + and_more("pairs")
 )
-NET_CUT = Sentence(
-    StockCode.NET_CUT,
-    "{operation}: a net is in {measured:.0f} pieces after the cut" + and_more("nets"),
-    "pieces",
+NET_CUT = StockCode.NET_CUT.says(
+    "{operation}: a net is in {measured:.0f} pieces after the cut" + and_more("nets"), "pieces"
 )
-NETS_APART = Sentence(
-    StockCode.NETS_APART,
+NETS_APART = StockCode.NETS_APART.says(
     "{operation}: all nets, {measured:.0f}, are apart and whole; the narrowest groove beside one "
     "is {groove}, and the narrowest copper {copper}",
     "nets",
 )
-ENGAGEMENT_TOO_HIGH = Sentence(
-    StockCode.ENGAGEMENT_TOO_HIGH,
+ENGAGEMENT_TOO_HIGH = StockCode.ENGAGEMENT_TOO_HIGH.says(
     "{operation}: the tool is engaged by {measured:.2f} degrees, where {limit:.2f} are allowed",
     "°",
 )
-ENGAGEMENT_KEPT = Sentence(
-    StockCode.ENGAGEMENT_KEPT,
+ENGAGEMENT_KEPT = StockCode.ENGAGEMENT_KEPT.says(
     "{operation}: the tool is engaged by {measured:.2f} degrees at most; {limit:.2f} are allowed",
     "°",
 )
-STOCK_NOT_JUDGED_TOOLS = Sentence(
-    StockCode.STOCK_NOT_JUDGED,
+STOCK_NOT_JUDGED_TOOLS = StockCode.STOCK_NOT_JUDGED.says(
     "it is not known which of {measured:.0f} tools cuts what: depths, passes, tabs, loose pieces, "
     "shanks and holders are not judged, and of rapids all below the stock top count: {mend}",
     "tools",
 )
-STOCK_NOT_JUDGED_BEFORE = Sentence(
-    StockCode.STOCK_NOT_JUDGED,
+STOCK_NOT_JUDGED_BEFORE = StockCode.STOCK_NOT_JUDGED.says(
     "what other programs of this job cut is not known here: material that is left, passes, shanks "
-    "and holders are not judged, and pieces only if this program alone cuts them off",
+    "and holders are not judged, and pieces only if this program alone cuts them off"
 )
-STOCK_NOT_JUDGED_NARROW = Sentence(
-    StockCode.STOCK_NOT_JUDGED,
+STOCK_NOT_JUDGED_NARROW = StockCode.STOCK_NOT_JUDGED.says(
     "the stock is too large to look for pieces that come loose within cuts of {measured:.3g} mm: "
     "those within cuts of {limit:.3g} mm or more are found",
     "mm",
 )
-STOCK_NOT_JUDGED_ENGAGEMENT = Sentence(
-    StockCode.STOCK_NOT_JUDGED, "{operation}: the engagement of its tool is not judged: {reason}"
+STOCK_NOT_JUDGED_ENGAGEMENT = StockCode.STOCK_NOT_JUDGED.says(
+    "{operation}: the engagement of its tool is not judged: {reason}"
 )
-TOOL_NOT_KNOWN = Sentence(StockCode.TOOL_NOT_KNOWN, "not known, and not judged: {bodies}")
-FACES_MEET = Sentence(
-    StockCode.FACES_MEET,
+TOOL_NOT_KNOWN = StockCode.TOOL_NOT_KNOWN.says("not known, and not judged: {bodies}")
+FACES_MEET = StockCode.FACES_MEET.says(
     "this set-up and {other!r} meet: together they cut {measured:.4g} mm more than the stock is "
     "thick",
     "mm",
 )
-FLOOR_LEFT = Sentence(
-    StockCode.FLOOR_LEFT,
-    "this set-up and {other!r} leave {measured:.4g} mm of the stock here, and nowhere less",
-    "mm",
+FLOOR_LEFT = StockCode.FLOOR_LEFT.says(
+    "this set-up and {other!r} leave {measured:.4g} mm of the stock here, and nowhere less", "mm"
 )

@@ -5,7 +5,7 @@ A machine's own sentences stand in its `postprocessors/<machine>/findings.py`.
 
 from __future__ import annotations
 
-from camtool.findings import ERROR, INFO, WARNING, Code, Sentence
+from camtool.findings import ERROR, INFO, WARNING, Code
 
 
 class ProgramCode(Code):
@@ -212,29 +212,21 @@ class ProgramCode(Code):
     )
 
 
-EVENT_LEFT_OUT_COOLANT = Sentence(
-    ProgramCode.EVENT_LEFT_OUT,
+EVENT_LEFT_OUT_COOLANT = ProgramCode.EVENT_LEFT_OUT.says(
     "{count:# word for coolant is|# words for coolant are} left out: the machine has none (mist "
     "and flood of [coolant] in its file)",
     severity=WARNING,
 )
-INPUT_REFUSED = Sentence(ProgramCode.INPUT_REFUSED, "{message}")
-FEED_ABOVE_LIMIT_LOWERED = Sentence(
-    ProgramCode.FEED_ABOVE_LIMIT,
+INPUT_REFUSED = ProgramCode.INPUT_REFUSED.says("{message}")
+FEED_ABOVE_LIMIT_LOWERED = ProgramCode.FEED_ABOVE_LIMIT.says(
     "{cuts:# cut|# cuts} of up to {measured:g} mm/min {cuts:is|are} written at {limit:g}, the "
     "highest feed of {machine}",
     "mm_min",
     WARNING,
 )
-SURFACE_FOLLOWED_WITHIN = Sentence(
-    ProgramCode.SURFACE_FOLLOWED,
-    "the cuts are {measured:.4f} mm or less from the probed surface (limit {limit:g})",
-    "mm",
-    INFO,
+SURFACE_FOLLOWED_WITHIN = ProgramCode.SURFACE_FOLLOWED.says(
+    "the cuts are {measured:.4f} mm or less from the probed surface (limit {limit:g})", "mm", INFO
 )
-SURFACE_FOLLOWED_NOT = Sentence(
-    ProgramCode.SURFACE_FOLLOWED,
-    "a cut is {measured:.4f} mm from the probed surface, and {limit:g} are allowed",
-    "mm",
-    ERROR,
+SURFACE_FOLLOWED_NOT = ProgramCode.SURFACE_FOLLOWED.says(
+    "a cut is {measured:.4f} mm from the probed surface, and {limit:g} are allowed", "mm", ERROR
 )

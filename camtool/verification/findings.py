@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, and_more
+from camtool.findings import ERROR, INFO, WARNING, Code, and_more
 from camtool.toolpath.findings import ProgramCode
 
 
@@ -36,12 +36,7 @@ class VerificationCode(Code):
         "each leaves an error",
         "cut larger, or simplify the drawing",
     )
-    NO_MOTION = (
-        406,
-        WARNING,
-        "the program moves nothing",
-        "check that it is the right file",
-    )
+    NO_MOTION = (406, WARNING, "the program moves nothing", "check that it is the right file")
     RETURN_TO_MACHINE_ZERO = (
         407,
         INFO,
@@ -167,378 +162,283 @@ class VerificationCode(Code):
     )
 
 
-OUT_OF_TRAVEL_IN_PROGRAM = Sentence(
-    ProgramCode.OUT_OF_TRAVEL,
-    "the program spans {measured:.3f} mm of {axis}, the axis has {limit:g} mm: {mend}",
-    "mm",
+OUT_OF_TRAVEL_IN_PROGRAM = ProgramCode.OUT_OF_TRAVEL.says(
+    "the program spans {measured:.3f} mm of {axis}, the axis has {limit:g} mm: {mend}", "mm"
 )
-DRAWING_PLACE_NOWHERE = Sentence(
-    VerificationCode.DRAWING_PLACE,
-    "{measured:.0f} % of the cuts follow the drawing, wherever it is moved",
-    "%",
-    ERROR,
+DRAWING_PLACE_NOWHERE = VerificationCode.DRAWING_PLACE.says(
+    "{measured:.0f} % of the cuts follow the drawing, wherever it is moved", "%", ERROR
 )
-DRAWING_PLACE_OTHERWISE = Sentence(
-    VerificationCode.DRAWING_PLACE,
-    "{measured:.0f} % of the cuts follow the drawing, {limit:.0f} % would with {flag}",
-    "%",
-    ERROR,
+DRAWING_PLACE_OTHERWISE = VerificationCode.DRAWING_PLACE.says(
+    "{measured:.0f} % of the cuts follow the drawing, {limit:.0f} % would with {flag}", "%", ERROR
 )
-DRAWING_PLACE_ELSEWHERE = Sentence(
-    VerificationCode.DRAWING_PLACE,
+DRAWING_PLACE_ELSEWHERE = VerificationCode.DRAWING_PLACE.says(
     "{measured:.0f} % of the cuts follow the drawing where its zero is, {limit:.0f} % would if it "
     "lay at X{x:.3f} Y{y:.3f}: --align",
     "%",
     ERROR,
 )
-DRAWING_PLACE_AMBIGUOUS = Sentence(
-    VerificationCode.DRAWING_PLACE,
+DRAWING_PLACE_AMBIGUOUS = VerificationCode.DRAWING_PLACE.says(
     "the cuts follow the drawing at X{x:.3f} Y{y:.3f} and as well at X{other_x:.3f} "
     "Y{other_y:.3f}: give its place with --origin in the place of --align",
     "%",
     ERROR,
 )
-DRAWING_PLACE_MOVED = Sentence(
-    VerificationCode.DRAWING_PLACE, "the drawing was moved to X{x:.3f} Y{y:.3f}", severity=INFO
+DRAWING_PLACE_MOVED = VerificationCode.DRAWING_PLACE.says(
+    "the drawing was moved to X{x:.3f} Y{y:.3f}", severity=INFO
 )
-TOOL_FOUND_SEVERAL = Sentence(
-    VerificationCode.TOOL_FOUND,
+TOOL_FOUND_SEVERAL = VerificationCode.TOOL_FOUND.says(
     "{share:.0%} of the cuts keep to the drawing for a tool of {measured:.3f} mm, "
     "{other_share:.0%} for one of {other:.3f} mm: give --tool-diameter",
     "mm",
     ERROR,
 )
-TOOL_FOUND_OTHER = Sentence(
-    VerificationCode.TOOL_FOUND,
+TOOL_FOUND_OTHER = VerificationCode.TOOL_FOUND.says(
     "the cuts keep to the drawing for a tool of {measured:.3f} mm, not {limit:.3f} mm",
     "mm",
     WARNING,
 )
-NOT_CUT = Sentence(VerificationCode.NOT_CUT, "{contour} is not cut" + and_more("contours"))
-NOT_CUT_PART = Sentence(
-    VerificationCode.NOT_CUT,
+NOT_CUT = VerificationCode.NOT_CUT.says("{contour} is not cut" + and_more("contours"))
+NOT_CUT_PART = VerificationCode.NOT_CUT.says(
     "{measured:.3f} mm of the path along {contour} is not cut ({share:.0%})"
     + and_more("contours"),
     "mm",
 )
-CUT_INTO_PART = Sentence(
-    VerificationCode.CUT_INTO_PART,
-    "cuts up to {measured:.3f} mm into what {contour} leaves standing" + and_more("moves"),
-    "mm",
+CUT_INTO_PART = VerificationCode.CUT_INTO_PART.says(
+    "cuts up to {measured:.3f} mm into what {contour} leaves standing" + and_more("moves"), "mm"
 )
-CUTS_BESIDE = Sentence(
-    VerificationCode.CUTS_BESIDE,
+CUTS_BESIDE = VerificationCode.CUTS_BESIDE.says(
     "{measured:.3f} mm of cuts in {moves:# move follows|# moves follow} no contour of the drawing",
     "mm",
 )
-OFF_DRAWING = Sentence(
-    VerificationCode.OFF_DRAWING,
-    "the program runs up to {measured:.4f} mm beside the drawing",
-    "mm",
+OFF_DRAWING = VerificationCode.OFF_DRAWING.says(
+    "the program runs up to {measured:.4f} mm beside the drawing", "mm"
 )
-ARC_MISSES_END = Sentence(
-    ProgramCode.ARC_MISSES_END,
+ARC_MISSES_END = ProgramCode.ARC_MISSES_END.says(
     "the {move} does not stop at its end, passing it {measured:.1f} steps away: the real machine "
     "would run on" + and_more("arcs"),
     "steps",
     ERROR,
 )
-ARC_MISSES_END_FAR = Sentence(
-    ProgramCode.ARC_MISSES_END,
+ARC_MISSES_END_FAR = ProgramCode.ARC_MISSES_END.says(
     "the {move} does not stop at its end: the real machine would run on" + and_more("arcs"),
     "steps",
     ERROR,
 )
-CONTOUR_MISSING = Sentence(
-    VerificationCode.CONTOUR_MISSING,
+CONTOUR_MISSING = VerificationCode.CONTOUR_MISSING.says(
     "{share:.0%} of {contour} is not cut by the program: up to {measured:.3f} mm from every "
     "decoded cutting move" + and_more("contours"),
     "mm",
 )
-CONTOUR_MISSING_AT_DEPTH = Sentence(
-    VerificationCode.CONTOUR_MISSING,
+CONTOUR_MISSING_AT_DEPTH = VerificationCode.CONTOUR_MISSING.says(
     "{share:.0%} of {contour} is not cut by the program: up to {measured:.3f} mm from every "
     "decoded cutting move, and none is at its depth" + and_more("contours"),
     "mm",
 )
-CONTOUR_MISSING_NO_CUTS = Sentence(
-    VerificationCode.CONTOUR_MISSING,
+CONTOUR_MISSING_NO_CUTS = VerificationCode.CONTOUR_MISSING.says(
     "{share:.0%} of {contour} is not cut by the program: there are no decoded cutting moves at "
     "all" + and_more("contours"),
     "mm",
 )
-CONTOUR_MISSING_ELSEWHERE = Sentence(
-    VerificationCode.CONTOUR_MISSING,
-    "cut {measured:.4f} mm beside what was asked" + and_more("contours"),
-    "mm",
+CONTOUR_MISSING_ELSEWHERE = VerificationCode.CONTOUR_MISSING.says(
+    "cut {measured:.4f} mm beside what was asked" + and_more("contours"), "mm"
 )
-CONTOUR_MISSING_OTHER_DEPTH = Sentence(
-    VerificationCode.CONTOUR_MISSING,
-    "what was asked is cut at another depth" + and_more("contours"),
-    "mm",
+CONTOUR_MISSING_OTHER_DEPTH = VerificationCode.CONTOUR_MISSING.says(
+    "what was asked is cut at another depth" + and_more("contours"), "mm"
 )
-CONTOUR_MISSING_NOTHING_CUT = Sentence(
-    VerificationCode.CONTOUR_MISSING,
-    "the program cuts nothing" + and_more("contours"),
-    "mm",
+CONTOUR_MISSING_NOTHING_CUT = VerificationCode.CONTOUR_MISSING.says(
+    "the program cuts nothing" + and_more("contours"), "mm"
 )
-CONTOUR_MISSING_HOLE = Sentence(
-    VerificationCode.CONTOUR_MISSING,
-    "a hole {measured:.3f} mm deep is not drilled by the program" + and_more("holes"),
-    "mm",
+CONTOUR_MISSING_HOLE = VerificationCode.CONTOUR_MISSING.says(
+    "a hole {measured:.3f} mm deep is not drilled by the program" + and_more("holes"), "mm"
 )
-CONTOUR_MISSING_HOLE_DEPTH = Sentence(
-    VerificationCode.CONTOUR_MISSING,
+CONTOUR_MISSING_HOLE_DEPTH = VerificationCode.CONTOUR_MISSING.says(
     "a hole {measured:.3f} mm deep is not drilled by the program: there is one of another depth"
     + and_more("holes"),
     "mm",
 )
-EXTRA_CUT = Sentence(
-    VerificationCode.EXTRA_CUT,
+EXTRA_CUT = VerificationCode.EXTRA_CUT.says(
     "{share:.0%} of a cut was not wanted: up to {measured:.3f} mm from every wanted cutting move"
     + and_more("cuts"),
     "mm",
 )
-EXTRA_CUT_AT_DEPTH = Sentence(
-    VerificationCode.EXTRA_CUT,
+EXTRA_CUT_AT_DEPTH = VerificationCode.EXTRA_CUT.says(
     "{share:.0%} of a cut was not wanted: up to {measured:.3f} mm from every wanted cutting "
     "move, and none is at its depth" + and_more("cuts"),
     "mm",
 )
-EXTRA_CUT_NONE_WANTED = Sentence(
-    VerificationCode.EXTRA_CUT,
+EXTRA_CUT_NONE_WANTED = VerificationCode.EXTRA_CUT.says(
     "{share:.0%} of a cut was not wanted: there are no wanted cutting moves at all"
     + and_more("cuts"),
     "mm",
 )
-EXTRA_CUT_ELSEWHERE = Sentence(
-    VerificationCode.EXTRA_CUT,
-    "a cut lies {measured:.4f} mm beside what was asked" + and_more("contours"),
-    "mm",
+EXTRA_CUT_ELSEWHERE = VerificationCode.EXTRA_CUT.says(
+    "a cut lies {measured:.4f} mm beside what was asked" + and_more("contours"), "mm"
 )
-EXTRA_CUT_OTHER_DEPTH = Sentence(
-    VerificationCode.EXTRA_CUT,
-    "a cut is at another depth than was asked" + and_more("contours"),
-    "mm",
+EXTRA_CUT_OTHER_DEPTH = VerificationCode.EXTRA_CUT.says(
+    "a cut is at another depth than was asked" + and_more("contours"), "mm"
 )
-EXTRA_CUT_NOTHING_ASKED = Sentence(
-    VerificationCode.EXTRA_CUT,
-    "nothing was asked to be cut" + and_more("contours"),
-    "mm",
+EXTRA_CUT_NOTHING_ASKED = VerificationCode.EXTRA_CUT.says(
+    "nothing was asked to be cut" + and_more("contours"), "mm"
 )
-EXTRA_CUT_PLUNGE = Sentence(
-    VerificationCode.EXTRA_CUT,
-    "a plunge to {measured:.3f} mm was not asked for" + and_more("plunges"),
-    "mm",
+EXTRA_CUT_PLUNGE = VerificationCode.EXTRA_CUT.says(
+    "a plunge to {measured:.3f} mm was not asked for" + and_more("plunges"), "mm"
 )
-EXTRA_CUT_AGAIN = Sentence(
-    VerificationCode.EXTRA_CUT,
-    "a move is cut {measured} times, asked for {limit:once|# times}" + and_more("moves"),
-    "times",
+EXTRA_CUT_AGAIN = VerificationCode.EXTRA_CUT.says(
+    "a move is cut {measured} times, asked for {limit:once|# times}" + and_more("moves"), "times"
 )
-EXTRA_CUT_HOLE = Sentence(
-    VerificationCode.EXTRA_CUT,
-    "a hole {measured:.3f} mm deep was not wanted" + and_more("holes"),
-    "mm",
+EXTRA_CUT_HOLE = VerificationCode.EXTRA_CUT.says(
+    "a hole {measured:.3f} mm deep was not wanted" + and_more("holes"), "mm"
 )
-EXTRA_CUT_HOLE_DEPTH = Sentence(
-    VerificationCode.EXTRA_CUT,
+EXTRA_CUT_HOLE_DEPTH = VerificationCode.EXTRA_CUT.says(
     "a hole {measured:.3f} mm deep was not wanted: there is one of another depth"
     + and_more("holes"),
     "mm",
 )
-MANY_REVERSALS = Sentence(
-    VerificationCode.MANY_REVERSALS,
+MANY_REVERSALS = VerificationCode.MANY_REVERSALS.says(
     "X and Y reverse {measured:once|# times} while cutting a part of {size:.3g} mm; small parts "
     "were seen to fail above {limit}",
     "reversals",
 )
-PLAY_NOT_KNOWN = Sentence(
-    ProgramCode.PLAY_NOT_KNOWN,
+PLAY_NOT_KNOWN = ProgramCode.PLAY_NOT_KNOWN.says(
     "the machine file gives no backlash for {axis}: its error is predicted as if there were none",
     severity=INFO,
 )
-NO_MOTION = Sentence(VerificationCode.NO_MOTION, "the program moves nothing")
-NO_MOTION_BELOW = Sentence(
-    VerificationCode.NO_MOTION,
-    "the program cuts nothing: no feed move goes along below the stock top",
+NO_MOTION = VerificationCode.NO_MOTION.says("the program moves nothing")
+NO_MOTION_BELOW = VerificationCode.NO_MOTION.says(
+    "the program cuts nothing: no feed move goes along below the stock top"
 )
-RETURN_TO_MACHINE_ZERO = Sentence(
-    VerificationCode.RETURN_TO_MACHINE_ZERO,
+RETURN_TO_MACHINE_ZERO = VerificationCode.RETURN_TO_MACHINE_ZERO.says(
     "the program returns to machine zero, which is taken to lie at ({zero}) mm from part zero "
-    "(controller.machine_zero_mm)",
+    "(controller.machine_zero_mm)"
 )
-ABOVE_GATE = Sentence(
-    VerificationCode.ABOVE_GATE,
-    "the predicted error is {measured:.2f} µm at most; {limit:.2f} µm is allowed",
-    "um",
+ABOVE_GATE = VerificationCode.ABOVE_GATE.says(
+    "the predicted error is {measured:.2f} µm at most; {limit:.2f} µm is allowed", "um"
 )
-ABOVE_GATE_UNKNOWN = Sentence(
-    VerificationCode.ABOVE_GATE,
-    "no error is known, because nothing was compared, so the limit is not met",
-    "um",
+ABOVE_GATE_UNKNOWN = VerificationCode.ABOVE_GATE.says(
+    "no error is known, because nothing was compared, so the limit is not met", "um"
 )
-ABOVE_GATE_GOUGED = Sentence(
-    VerificationCode.ABOVE_GATE,
+ABOVE_GATE_GOUGED = VerificationCode.ABOVE_GATE.says(
     "what stays is gouged by {measured:.2f} µm or more (see GOUGE); {limit:.2f} µm is allowed",
     "um",
 )
-ABOVE_GATE_STOCK = Sentence(
-    VerificationCode.ABOVE_GATE,
-    "the {what} is {measured:.2f} µm at X {x:.3f} Y {y:.3f}{most}; {limit:.2f} µm is allowed",
-    "um",
+ABOVE_GATE_STOCK = VerificationCode.ABOVE_GATE.says(
+    "the {what} is {measured:.2f} µm at X {x:.3f} Y {y:.3f}{most}; {limit:.2f} µm is allowed", "um"
 )
-ABOVE_GATE_NOT_PROVED = Sentence(
-    VerificationCode.ABOVE_GATE,
-    "no {what} above {limit:.2f} µm was found, but {proved} is proved",
-    "um",
+ABOVE_GATE_NOT_PROVED = VerificationCode.ABOVE_GATE.says(
+    "no {what} above {limit:.2f} µm was found, but {proved} is proved", "um"
 )
-ABOVE_GATE_NO_STOCK = Sentence(
-    VerificationCode.ABOVE_GATE,
-    "no {what} is known without a drawing, a job and its tools, so the limit is not met",
-    "um",
+ABOVE_GATE_NO_STOCK = VerificationCode.ABOVE_GATE.says(
+    "no {what} is known without a drawing, a job and its tools, so the limit is not met", "um"
 )
-ABOVE_GATE_ENGAGEMENT = Sentence(
-    VerificationCode.ABOVE_GATE,
+ABOVE_GATE_ENGAGEMENT = VerificationCode.ABOVE_GATE.says(
     "{operation}: the tool is engaged by {measured:.2f} degrees {place}; {limit:.2f} are allowed",
     "°",
 )
-ABOVE_GATE_NO_ENGAGEMENT = Sentence(
-    VerificationCode.ABOVE_GATE,
-    "the engagement is not known, so the limit is not met: {reason}",
-    "°",
+ABOVE_GATE_NO_ENGAGEMENT = VerificationCode.ABOVE_GATE.says(
+    "the engagement is not known, so the limit is not met: {reason}", "°"
 )
-ABOVE_GATE_REVERSALS = Sentence(
-    VerificationCode.ABOVE_GATE,
-    "X and Y reverse {measured:once|# times} while cutting; {limit} are allowed",
-    "reversals",
+ABOVE_GATE_REVERSALS = VerificationCode.ABOVE_GATE.says(
+    "X and Y reverse {measured:once|# times} while cutting; {limit} are allowed", "reversals"
 )
-ABOVE_GATE_TIME = Sentence(
-    VerificationCode.ABOVE_GATE, "the program takes {takes}; {allowed} is allowed", "s"
+ABOVE_GATE_TIME = VerificationCode.ABOVE_GATE.says(
+    "the program takes {takes}; {allowed} is allowed", "s"
 )
-END_NOT_REACHED = Sentence(
-    VerificationCode.END_NOT_REACHED,
+END_NOT_REACHED = VerificationCode.END_NOT_REACHED.says(
     "the controller leaves {count:# move beside its end|# moves beside their ends}, up to "
     "{measured:.2f} µm",
     "um",
 )
-OVERCUT = Sentence(
-    VerificationCode.OVERCUT, "the cut itself goes {measured:.4g} mm beyond what is drawn", "mm"
+OVERCUT = VerificationCode.OVERCUT.says(
+    "the cut itself goes {measured:.4g} mm beyond what is drawn", "mm"
 )
-FEED_DIFFERS = Sentence(
-    VerificationCode.FEED_DIFFERS,
+FEED_DIFFERS = VerificationCode.FEED_DIFFERS.says(
     "{moves:# move runs|# moves run} at another feed: {measured:g} mm/min, where {limit:g} is "
     "asked for",
     "mm_min",
     ERROR,
 )
-FEED_DIFFERS_OWN = Sentence(
-    VerificationCode.FEED_DIFFERS,
+FEED_DIFFERS_OWN = VerificationCode.FEED_DIFFERS.says(
     "{moves:# move runs|# moves run} at another feed: {measured:g} mm/min, where {limit:g} is "
     "the machine's own",
     "mm_min",
     WARNING,
 )
-FEED_DIFFERS_IN_AIR = Sentence(
-    VerificationCode.FEED_DIFFERS,
+FEED_DIFFERS_IN_AIR = VerificationCode.FEED_DIFFERS.says(
     "{moves:# move runs|# moves run} at a feed in the air, {measured:g} mm/min, where a rapid is "
     "meant: slow, and harmless",
     "mm_min",
     WARNING,
 )
-SPINDLE_DIFFERS = Sentence(
-    VerificationCode.SPINDLE_DIFFERS,
-    "{moves:# move runs|# moves run} with {turning}, where {wanted} is asked for",
-    "rev_min",
-    ERROR,
+SPINDLE_DIFFERS = VerificationCode.SPINDLE_DIFFERS.says(
+    "{moves:# move runs|# moves run} with {turning}, where {wanted} is asked for", "rev_min", ERROR
 )
-SPINDLE_DIFFERS_UNASKED = Sentence(
-    VerificationCode.SPINDLE_DIFFERS,
+SPINDLE_DIFFERS_UNASKED = VerificationCode.SPINDLE_DIFFERS.says(
     "{moves:# move runs|# moves run} with {turning}, where {wanted} is not asked for",
     "rev_min",
     INFO,
 )
-CUT_OTHER_WAY = Sentence(
-    VerificationCode.CUT_OTHER_WAY,
-    "the cut runs the other way round than was asked" + and_more("contours"),
+CUT_OTHER_WAY = VerificationCode.CUT_OTHER_WAY.says(
+    "the cut runs the other way round than was asked" + and_more("contours")
 )
-CLEARANCE_LOW = Sentence(
-    VerificationCode.CLEARANCE_LOW,
+CLEARANCE_LOW = VerificationCode.CLEARANCE_LOW.says(
     "{rapids:# rapid runs|# rapids run} lower than Z {limit:g} mm, asked for: down to Z "
     "{measured:g} mm",
     "mm",
 )
-CLEARANCE_LOW_OWN = Sentence(
-    VerificationCode.CLEARANCE_LOW,
+CLEARANCE_LOW_OWN = VerificationCode.CLEARANCE_LOW.says(
     "{rapids:# rapid runs|# rapids run} lower than Z {limit:g} mm, the machine's own: down to Z "
     "{measured:g} mm",
     "mm",
 )
-MOVES_CHANGED = Sentence(
-    VerificationCode.MOVES_CHANGED,
+MOVES_CHANGED = VerificationCode.MOVES_CHANGED.says(
     "{moves:# move ends|# moves end} elsewhere than in the program that camtool writes, by "
     "{measured:.4g} mm at most; all others are the same",
     "mm",
 )
-END_DIFFERS = Sentence(
-    VerificationCode.END_DIFFERS,
-    "the tool ends at Z {measured:g} mm, where Z {limit:g} mm is asked for",
-    "mm",
+END_DIFFERS = VerificationCode.END_DIFFERS.says(
+    "the tool ends at Z {measured:g} mm, where Z {limit:g} mm is asked for", "mm"
 )
-END_DIFFERS_NO_END = Sentence(
-    VerificationCode.END_DIFFERS, "the program has no block that ends it", severity=ERROR
+END_DIFFERS_NO_END = VerificationCode.END_DIFFERS.says(
+    "the program has no block that ends it", severity=ERROR
 )
-END_DIFFERS_PLACE = Sentence(
-    VerificationCode.END_DIFFERS,
-    "the tool ends at {end}; camtool would end at {wanted}",
-    severity=WARNING,
+END_DIFFERS_PLACE = VerificationCode.END_DIFFERS.says(
+    "the tool ends at {end}; camtool would end at {wanted}", severity=WARNING
 )
-SETTING_DIFFERS_WAIT = Sentence(
-    VerificationCode.SETTING_DIFFERS,
+SETTING_DIFFERS_WAIT = VerificationCode.SETTING_DIFFERS.says(
     "the tool stands still {where_it} for {measured:g} s at {places:# place|# places}, where "
     "{limit:g} s is asked for",
     "s",
 )
-SETTING_DIFFERS_TOOL = Sentence(
-    VerificationCode.SETTING_DIFFERS,
+SETTING_DIFFERS_TOOL = VerificationCode.SETTING_DIFFERS.says(
     "{moves:# move runs|# moves run} with tool {measured:g}, where tool {limit:g} is asked for",
     severity=ERROR,
 )
-SETTING_DIFFERS_TOOL_UNASKED = Sentence(
-    VerificationCode.SETTING_DIFFERS,
+SETTING_DIFFERS_TOOL_UNASKED = VerificationCode.SETTING_DIFFERS.says(
     "{moves:# move runs|# moves run} with tool {measured:g}, where no tool is asked for",
     severity=INFO,
 )
-SETTING_DIFFERS_COOLANT = Sentence(
-    VerificationCode.SETTING_DIFFERS,
-    "{moves:# move runs|# moves run} with {coolant}, where {wanted} is asked for",
-    severity=ERROR,
+SETTING_DIFFERS_COOLANT = VerificationCode.SETTING_DIFFERS.says(
+    "{moves:# move runs|# moves run} with {coolant}, where {wanted} is asked for", severity=ERROR
 )
-SETTING_DIFFERS_COOLANT_UNASKED = Sentence(
-    VerificationCode.SETTING_DIFFERS,
-    "{moves:# move runs|# moves run} with {coolant}, where none is asked for",
-    severity=INFO,
+SETTING_DIFFERS_COOLANT_UNASKED = VerificationCode.SETTING_DIFFERS.says(
+    "{moves:# move runs|# moves run} with {coolant}, where none is asked for", severity=INFO
 )
-SETTING_DIFFERS_CORNERS = Sentence(
-    VerificationCode.SETTING_DIFFERS,
+SETTING_DIFFERS_CORNERS = VerificationCode.SETTING_DIFFERS.says(
     "{moves:# move runs|# moves run} with corners rounded {room}, where {limit:g} mm is asked for",
     "mm",
     ERROR,
 )
-SETTING_DIFFERS_NO_CORNERS = Sentence(
-    VerificationCode.SETTING_DIFFERS,
+SETTING_DIFFERS_NO_CORNERS = VerificationCode.SETTING_DIFFERS.says(
     "{moves:# move runs|# moves run} with corners rounded {room}, where none is to be rounded",
     "mm",
     ERROR,
 )
-SETTING_DIFFERS_DWELL = Sentence(
-    VerificationCode.SETTING_DIFFERS,
+SETTING_DIFFERS_DWELL = VerificationCode.SETTING_DIFFERS.says(
     "the tool waits {measured:g} s, where {limit:g} s are asked for; at {places:# place|# places}",
     "s",
     ERROR,
 )
-SECTION_CUT = Sentence(
-    VerificationCode.SECTION_CUT,
+SECTION_CUT = VerificationCode.SECTION_CUT.says(
     "the predicted cut goes up to {gouge:.3g} µm into the section (at X {x:.3f} Y {y:.3f}) and "
     "leaves up to {measured:.3g} µm of it",
     "um",
