@@ -218,9 +218,9 @@ class FlashcutRun:
 
 
 class TimerBatch(Struct, frozen=True, eq=False):
-    """The first `filled` samples of `issued`, which are of `moves`; `rows` (R,), from `low` on:
-    those that move in them, or do not move. `move`: the one to go on with, and `under_way` of
-    `Counters`, after the last sample."""
+    """Samples of a batch: the first `filled` rows of the buffers `issued`, made by `moves`. `rows`
+    (R,), from `low` on: the rows that have samples here, or do not move. `move` and `under_way`
+    (of `Counters`): the move to continue with, and the timers' state, after the last sample."""
 
     low: int
     rows: Ints
@@ -235,13 +235,13 @@ MS_PER_S = 1000.0
 
 
 class MoveTimes(Struct, frozen=True, eq=False):
-    """The K samples of a batch as `steps` (K, 3) since the one before, with their `row` (K,), and
-    which of M moves each is of, `number` (K,).
+    """The K samples of a batch: `steps` (K, 3) since the sample before, `row` (K,), and `number`
+    (K,), the index of the move that each belongs to.
 
-    Of these moves: when each begins, `begin_ms` (M,), the half period of a tick of its longer axis
-    `half_period_ms` (M,), its directions `ways` (M, 3), the row `first_row` (M,), and the steps
-    `added` (M, 3) right before it, each of which takes `added_step_ms` (M,). `is_under_way`: the
-    last of them goes on in the next batch.
+    For each of M moves: its start `begin_ms` (M,), the half period of its longer axis
+    `half_period_ms` (M,), its directions `ways` (M, 3), its row `first_row` (M,), and the
+    compensation steps `added` (M, 3) right before it, each of which takes `added_step_ms` (M,).
+    `is_under_way`: the last move continues in the next batch.
     """
 
     steps: Ints
@@ -419,8 +419,8 @@ def _chords(toolpath: Toolpath, per_turn: int) -> Indices:
 
 
 class MoveTable(Struct, frozen=True, eq=False):
-    """Number of moves that each row of a placed toolpath makes, and the moves of any window of
-    rows."""
+    """Table of the moves of a placed toolpath: how many each row makes, and the moves of any
+    window of rows."""
 
     toolpath: Toolpath
     chords: Indices

@@ -101,7 +101,8 @@ class _Excess(Struct):
 
 
 class _Reader:
-    """Blocks in, rows out; knows the feed in force and whether the program has ended."""
+    """Reads blocks and adds rows to the path; keeps the feed in force and whether the program has
+    ended."""
 
     def __init__(self, machine: FlashcutMachine) -> None:
         self.path = ToolpathBuilder()
@@ -265,9 +266,9 @@ class _Reader:
 
 
 class DecodedMoves:
-    """N plain blocks: kind (N,), where the tool stands behind each (N, 3) mm, centre (N, 2) mm,
-    feed in force (N,) mm/min, which are arcs, and which move (N,). `count`: so many, from the
-    first on, are surely what `_Reader.block` would make of them; the others are not to be used."""
+    """N plain blocks decoded by columns: kind (N,), position of the tool after each (N, 3) mm,
+    centre (N, 2) mm, feed in force (N,) mm/min, and masks of arcs and of blocks that move. Only
+    the first `count` blocks may be used: for them `_Reader.block` would give exactly the same."""
 
     def __init__(
         self,

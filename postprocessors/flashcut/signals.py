@@ -87,8 +87,8 @@ class _Steps(Struct, frozen=True, eq=False):
 
 
 class _CoilRun:
-    """State of a run: the moves with their times, and states that come later than those of the
-    next batch may."""
+    """State of a run: the moves with their times, and coil states that may come after some of the
+    next batch."""
 
     def __init__(self, toolpath: Toolpath, run: FlashcutRun, machine: _Machine) -> None:
         controller = machine.controller

@@ -175,8 +175,8 @@ def _event_findings(toolpath: Toolpath, dialect: FlashcutDialect) -> Iterator[Fi
 
 
 class _Blocks:
-    """The P blocks of all moves: `row` (P,) of the table, and what of it a block has. `events`
-    (E,): before which of them each event of the table stands."""
+    """The P blocks of all moves: `row` (P,) of the table, and masks of the words that each has.
+    `events` (E,): the index of the block before which each event of the table stands."""
 
     def __init__(self, table: PlainRows, feeds: Ints, dialect: FlashcutDialect) -> None:
         """Find the blocks of all moves. `feeds` (M,): the feed of each row of the table in units

@@ -66,8 +66,8 @@ class ArcCounts(Struct):
 
 
 class RowArcs(Struct, frozen=True, eq=False):
-    """All rows' ends (N, 3) and offsets (N, 2) in units, one row, seen as many, where there are no
-    arcs; and `pieces` in place of some rows."""
+    """Ends (N, 3) and offsets of centres (N, 2) of all rows, in units; `pieces`: the rows that
+    replace a row. Without arcs `offset` is a single row that is seen as N rows."""
 
     end: Ints
     offset: Ints

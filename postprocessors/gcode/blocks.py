@@ -74,7 +74,7 @@ _SIGNS: Final = {
 
 
 class ProgramLines:
-    """The lines of a program, counted from 0; CR alone ends one too."""
+    """The lines of a program, counted from 0; a lone CR ends a line too."""
 
     def __init__(self, data: bytes) -> None:
         self.data = _BARE_RETURN.sub(b"\n", data) if b"\r" in data else data
@@ -96,9 +96,9 @@ class ProgramLines:
 
 
 class PlainBlocks(Struct, frozen=True, eq=False):
-    """N blocks in a row whose lines hold nothing but words of G X Y Z I J F, each once at most, G
-    being G0 to G3: numbers (N, 7) and facts (N, 5) of `camtool.kernels.words`; `first`: the index
-    of the first of them. What a block has no word for is undefined in `numbers`."""
+    """N consecutive blocks that have no words but G X Y Z I J F, each at most once, G being G0 to
+    G3: numbers (N, 7) and facts (N, 5) as in `camtool.kernels.words`. `first`: the index of the
+    first block. `numbers` is undefined where a block does not have the word."""
 
     numbers: Floats
     facts: Ints
@@ -132,9 +132,9 @@ Take = Callable[[PlainBlocks], int]
 
 
 class PlainRuns:
-    """Runs of plain lines, as they are met: where lines are not plain, or few of them are taken,
-    it is asked less and less often; and twice as many are offered at most as were taken before.
-    `most_chars` and `free` are those of `words.plain_lines`."""
+    """Finds runs of plain lines and offers them to a reader. Where lines are not plain, or the
+    reader takes few of them, it tries less and less often; it offers at most twice as many as were
+    taken before. `most_chars` and `free` are those of `words.plain_lines`."""
 
     def __init__(self, lines: ProgramLines, most_chars: int, *, free_order: bool) -> None:
         self._lines, self._most_chars, self._free = lines, most_chars, free_order

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 
 class LineFault(Exception):
-    """Why a controller stops at a line; `at`: where in its text without blanks, or the letter of
-    the word, None for the line as a whole. The reader makes a ProgramError of it, which has the
-    place."""
+    """Fault at which a controller stops in a line. `at`: the offset in its text without blanks, or
+    the letter of the word; None for the whole line. The reader turns it into a ProgramError with
+    the place."""
 
     def __init__(self, message: str, column: int | str | None = None, mend: str = "") -> None:
         super().__init__(message)

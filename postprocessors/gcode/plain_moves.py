@@ -43,8 +43,8 @@ KINDS[[0, 10, 20, 30]] = [Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW]
 
 
 class PlainState(Struct, frozen=True):
-    """State before a run of plain blocks: the motion (a G word tenfold, −1: none), the feed (0:
-    none), mm of a unit, and the position of the tool."""
+    """State before a run of plain blocks: the motion (ten times its G word, −1: none), the feed
+    (0: none), the length of the unit in mm, and the position of the tool."""
 
     motion: int
     feed: float
@@ -53,10 +53,10 @@ class PlainState(Struct, frozen=True):
 
 
 class PlainMoves:
-    """N plain blocks with absolute coordinates: for each the motion in force, the feed in force
-    (N,) mm/min, where the tool stands behind it (N, 3) mm, the centre of an arc (N, 2) mm, and
-    whether it moves. `count`: so many, from the first on, are surely what a reader makes of them
-    one by one too; the others are not to be used."""
+    """N plain blocks with absolute coordinates, decoded by columns: the motion in force, the feed
+    in force (N,) mm/min, the position of the tool after each (N, 3) mm, the centre of an arc (N,
+    2) mm, and whether it moves. Only the first `count` blocks may be used: for them the reader
+    would give exactly the same one by one."""
 
     def __init__(self, blocks: PlainBlocks, state: PlainState, rule: ArcRule) -> None:
         self._plain = blocks
@@ -142,7 +142,8 @@ def sure_arcs(start: Floats, end: Floats, centre: Floats, rule: ArcRule) -> Bool
 
 
 class FastFeeds:
-    """The F words above the machine's highest feed: how many, the first of them, the highest."""
+    """F words above the machine's highest feed: their number, the block of the first, and the
+    highest."""
 
     def __init__(self, limit_mm_min: float) -> None:
         self._limit = limit_mm_min

@@ -247,7 +247,8 @@ def _path_modes(
 
 
 class BlockOrder:
-    """The blocks of motions, which are texts by columns, and all others between them."""
+    """The order of a program's blocks: those of motions, which are written by columns, and all
+    others between them."""
 
     def __init__(self, is_motion: Bools) -> None:
         """Begin with M rows that are sent. `is_motion` (M,): those that are motions, written by
@@ -314,7 +315,7 @@ class BlockOrder:
 
 class LineNumbers(Struct, frozen=True):
     """Numbers of blocks: N`first`, by `step`, with at least `digits` digits, up to `highest`
-    (None: without end), behind which they begin again."""
+    (None: without limit), after which they start again."""
 
     first: int = 1
     step: int = 1
@@ -375,10 +376,10 @@ def rounding_findings(toolpath: Toolpath, rows: tuple[int, ...]) -> Iterator[Fin
 
 
 class Sent(Struct, frozen=True, eq=False):
-    """The rows to send, events among them: kind (M,), end (M, 3) and offset (M, 2) in units,
-    feed (M,) in units of the F word, row (M,) of the toolpath; `written` (M, 3): which coordinates
-    are written; `forget` (M,): homing or a tool change since the last motion. `dropped` moves were
-    too small."""
+    """The rows to send, events among them: kind (M,), end (M, 3) and offset (M, 2) in units, feed
+    (M,) in units of the F word, row (M,) of the toolpath. `written` (M, 3): the coordinates that
+    are written; `forget` (M,): true after homing or a tool change since the last motion, so that
+    everything is written again; `dropped`: the number of moves that were too small."""
 
     kind: Codes
     end: Ints
@@ -606,8 +607,9 @@ def changes_of(values: Ints, counts: Bools) -> Bools:
 
 
 class Event(Struct, frozen=True):
-    """A row that is no motion; `where` names it in errors. `mounted_before`: a tool change before
-    the first move at a feed. `spindle_on`, `cools`: what the program has switched on so far."""
+    """A row that is not a motion; `where` names it in errors. `mounted_before`: true for a tool
+    change before the first move at a feed. `spindle_on`, `cools`: what the program has switched on
+    so far."""
 
     kind: Kind
     value: float
@@ -622,8 +624,9 @@ class Event(Struct, frozen=True):
 
 
 class Events(Struct, frozen=True):
-    """`blocks` of the rows that have some; rows whose value was `rounded`; `spindle_on` at the
-    end of the program; the rows of tool `changes` that have blocks."""
+    """Blocks of events. `blocks`: those of each row that has some; `rounded`: rows whose value was
+    rounded; `spindle_on`: at the end of the program; `changes`: the rows of tool changes that have
+    blocks."""
 
     blocks: Mapping[int, Sequence[str]]
     rounded: tuple[int, ...]

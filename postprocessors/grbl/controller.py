@@ -116,8 +116,8 @@ def plan_to_end(path: Toolpath, machine: _Machine) -> Iterator[PlannedBlocks]:
 
 
 class PlannedBlocks(Struct, frozen=True, eq=False):
-    """The `blocks` (B,) of the rows low:high, as they are planned: `plan` and `squares` of these
-    and of those behind them, and the mask (B,) of those behind which the machine stands."""
+    """The planned `blocks` (B,) of the rows low:high: `plan` and `squares` of these and of the
+    blocks behind them, and a mask (B,) of those after which the machine stands."""
 
     low: int
     high: int
@@ -186,7 +186,7 @@ def idle_delay_s(controller: GrblController) -> float:
 
 
 class GrblSamples:
-    """All step events of some rows, numbered from 0; none are held."""
+    """All step events of some rows, numbered from 0, computed when they are asked for."""
 
     def __init__(self, planned: PlannedBlocks, seconds: Floats, machine: _Machine) -> None:
         """Prepare the samples of planned blocks. `seconds` (B,): the duration of each block."""
@@ -300,8 +300,8 @@ Shorts = npt.NDArray[np.int32]
 
 
 class Blocks(Struct, frozen=True, eq=False):
-    """B blocks in order: the row (B,) that each is of, which target (B,) of all it ends at, where
-    it starts and its way, both (B, 3) steps. Targets without a block are those without a step."""
+    """B blocks in order: the row (B,) and the target (B,) at which each ends, and its start and
+    travel, both (B, 3) steps. Targets without a step have no block."""
 
     row: Shorts
     target: Shorts
@@ -434,8 +434,8 @@ def speeds_of(
 
 
 class Stops(Struct, frozen=True, eq=False):
-    """Masks of the stops of the machine: before rows (N,), and at targets without a step within
-    rows (N,), None where there are no such rows."""
+    """Masks of stops of the machine: before rows (N,), and at targets without a step within rows
+    (N,); None if there are no such rows."""
 
     rows: Bools
     lit: Bools | None

@@ -119,8 +119,8 @@ class ParserModes(Struct):
 
 
 class GrblBlock(Struct):
-    """The words of a line: numbers, the modes that they make, the command of this line alone
-    ("G4", "G92.1" …), what uses the coordinates, and where the words stand."""
+    """The words of a line: numbers, the modes that result, the command of this line alone ("G4",
+    "G92.1" …), the word that uses the coordinates, and the columns of the words."""
 
     modes: ParserModes
     numbers: dict[str, float] = field(default_factory=dict)
@@ -133,7 +133,7 @@ class GrblBlock(Struct):
 
 
 class ParserNotes(Struct):
-    """Blocks (index from 0) at which something was passed over or taken for granted."""
+    """Blocks (index from 0) at which something was ignored or assumed."""
 
     coolant: list[int] = field(default_factory=list)
     pauses: list[int] = field(default_factory=list)
@@ -145,7 +145,7 @@ class ParserNotes(Struct):
 
 
 class GrblParser:
-    """The state of the parser, and what lines make of it."""
+    """State of the parser, which lines change."""
 
     def __init__(self, machine: GrblMachine, path: ToolpathBuilder, notes: ParserNotes) -> None:
         dialect: GrblDialect = machine.dialect

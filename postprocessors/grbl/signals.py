@@ -73,8 +73,9 @@ class GrblSignals(SignalModel):
 
 class _Stretch(Struct, frozen=True, eq=False):
     """S segments in order: `block` (S,) of a window, `ends` (S,) in eighths of a step from the
-    first one on, `tick` (S,) in eighths of a step, `cycles` (S,) of a tick, `begin` (S,), the
-    cycle at which each begins. `from_eighths`: where in its block the first one begins."""
+    start of the first block, `tick` (S,) in eighths of a step, `cycles` (S,) of a tick, `begin`
+    (S,), the cycle at which each begins. `from_eighths`: where in its block the first one
+    begins."""
 
     block: Ints
     ends: Ints

@@ -173,10 +173,10 @@ class GrblTwinSettings(ProbedPart, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class _Planned(Struct, eq=False):
-    """A block in the ring: its start and way (3,) steps, length, the speed that the program asks
-    for, that which it gets without overrides, the highest that its axes allow, acceleration,
-    highest speed at its start; mm and s. `rapid` and `fixed` say which override counts, `spindle`
-    and `rpm` what its first segment asks for."""
+    """A block in the ring: its start and travel (3,) steps, length, programmed speed, speed
+    without overrides, highest speed of its axes, acceleration, highest speed at its start; mm and
+    s. `rapid` and `fixed` say which override applies, `spindle` and `rpm` what its first segment
+    sets."""
 
     start: Ints
     way: Ints
@@ -208,7 +208,7 @@ Line = Generator[float | None, None, int]
 
 
 class _Abort(Exception):
-    """A reset: whatever the main program does, it ends, and begins anew."""
+    """A reset: the main program ends, whatever it does, and starts again."""
 
 
 # Numbers as grbl has them: 32-bit floats.
@@ -342,8 +342,8 @@ def _checksum(text: bytes | bytearray) -> int:
 
 
 class _Parser(GrblParser):
-    """grbl's parser with its own frames and lengths. What a line does is left behind: `actions`
-    in their order, then the moves of the path, a probing move among them, then `flow`."""
+    """grbl's parser with its own frames and tool lengths. The result of a line is `actions` in
+    their order, then the moves of the path, a probing move among them, then `flow`."""
 
     def __init__(
         self, machine: Machine[GrblController, GrblDialect], path: ToolpathBuilder, memory: _Memory
@@ -516,7 +516,7 @@ class _Parser(GrblParser):
 
 
 class GrblTwin(Twin):
-    """A grbl that has just been powered."""
+    """A virtual grbl that has just been switched on."""
 
     wire = "115200 8N1"
     byte_s = 10.0 / 115200.0

@@ -291,7 +291,7 @@ def _packets(data: bytes, forecast: Forecast) -> Iterator[Packet]:
 
 
 class _Line:
-    """A line that is out: a packet, a query, or a command; whether its answer has come."""
+    """A line that was sent: a packet, a query or a command; and whether its answer has come."""
 
     def __init__(self, data: bytes, packet: int | None = None) -> None:
         self.data = data
@@ -1052,11 +1052,9 @@ def override_aim(name: Override, percent: int) -> int:
 
 
 class GrblProbing(GrblConversation):
-    """A cycle of touches: one line after the other, each when the one before has been answered.
-
+    """A cycle of touches, one line after the other, each when the one before has been answered.
     Touches are G38.3, which ends without an alarm where nothing was touched, so that the tool can
-    go back. `ok` to it comes behind `[PRB:x,y,z:1]`, in the frame of the machine.
-    """
+    go back. Its `ok` comes after `[PRB:x,y,z:1]`, in the frame of the machine."""
 
     def __init__(self, cycle: ProbeCycle, machine: GrblMachine, manner: Manner) -> None:
         super().__init__((), machine, manner)
@@ -1440,7 +1438,7 @@ protocol_exec_rt_system)."""
 
 
 class GrblTerminal(Terminal):
-    """Lines; ? ! ~ and ^X alone go out as the real-time bytes they are."""
+    """Typed lines; ? ! ~ and ^X alone are sent as the real-time bytes that they are."""
 
     stop = JOG_CANCEL + HOLD
     asks = knock = STATUS

@@ -68,7 +68,7 @@ class Firmware(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class PulseTimes:
-    """Seconds for counts of steps."""
+    """Durations of moves by their number of steps, s."""
 
     def __init__(self, firmware: Firmware) -> None:
         self._firmware = firmware

@@ -153,7 +153,7 @@ class I8751Wire(Wire):
 
 
 class I8751Terminal(Terminal):
-    """Bytes go out in hex, and letters come back."""
+    """Bytes typed in hex, and the letters that come back."""
 
     end = b""
     about = (
@@ -231,7 +231,7 @@ def _parts(stream: bytes, machine: I8751Machine) -> Iterator[_Part]:
 
 
 class I8751Conversation(PacketByPacket):
-    """A byte and its reply."""
+    """A conversation in single bytes, each sent after the reply to the one before."""
 
     stands = "stopped: it has executed what it was sent, and stands"
     goes_on = "it executes the packet to its end; its switch stops it"

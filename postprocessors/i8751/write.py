@@ -216,7 +216,7 @@ def dump_text(records: Records, machine: I8751Machine, dialect: I8751Dialect) ->
 
 
 class _Dump:
-    """Runs of bytes with their meaning and replies; no bytes for a line of comment alone."""
+    """Runs of bytes with their meaning and replies; a run without bytes is a line of comment."""
 
     def __init__(self, records: Records, machine: I8751Machine, dialect: I8751Dialect) -> None:
         self._records = records

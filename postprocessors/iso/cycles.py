@@ -24,7 +24,8 @@ ENOUGH_MM: Final = 1e-9
 
 
 class CycleWords(Struct):
-    """A cycle: which kind of hole it makes, what its letters say, and their numbers in force."""
+    """A cycle: the kind of hole that it makes, the meaning of its letters, and their numbers in
+    force."""
 
     kind: str
     letters: dict[str, str]
@@ -51,7 +52,7 @@ def cycle_code(template: str) -> int | None:
 
 
 class HoleMoves(Struct, frozen=True):
-    """Where the moves of holes go, and how the controller makes them."""
+    """Adds the moves of holes to a path, as the controller makes them."""
 
     moves: PartMoves
     shift: Sequence[float]

@@ -121,7 +121,8 @@ def look_ahead(
 
 
 class _Queue:
-    """The moves from `first` on are not planned yet. Squares of speeds, (mm/s)²."""
+    """Queue of moves; those from `first` on are not planned yet. Speeds are kept as squares,
+    (mm/s)²."""
 
     def __init__(self, delta: Floats, mcr_delta: Floats, limit: Floats, corner: Floats) -> None:
         self._delta, self._mcr_delta = delta.tolist(), mcr_delta.tolist()

@@ -34,7 +34,8 @@ AnyMachine = Machine[Any, Any]
 
 
 class Planner(Struct, frozen=True):
-    """The record of a controller's settings, what its model knows, and how to get the model."""
+    """A planner: the record of its controller's settings, the grade of its model, and a function
+    that imports the model."""
 
     record: type[SlideStart]
     grade: Literal["step-true", "timed"]
@@ -95,7 +96,7 @@ def seconds_of(toolpath: Toolpath, machine: AnyMachine) -> Floats | None:
 
 
 class PlannedModel(ControllerModel[Any, Any]):
-    """The model that the machine's own planner has."""
+    """Passes each call on to the model of the machine's own planner."""
 
     def run(self, toolpath: Toolpath, machine: AnyMachine, options: Options) -> Iterator[Chunk]:
         """Yield the motion in chunks."""

@@ -140,7 +140,7 @@ class _Word(Struct, frozen=True):
 
 
 class _Modes(Struct):
-    """What stays in force from block to block."""
+    """Modal state, which holds from block to block."""
 
     motion: int | None = None
     absolute: bool = True
@@ -388,7 +388,7 @@ class _Reader:
 
 
 class _Execution:
-    """One block, in the order in which controllers execute its words."""
+    """Execution of one block, in the order in which controllers execute its words."""
 
     def __init__(self, reader: _Reader, block: Block, words: list[_Word]) -> None:
         self._reader, self._block = reader, block

@@ -60,7 +60,7 @@ class _Line(Struct, frozen=True):
 
 
 class _Sample(Struct):
-    """What was seen."""
+    """The settings and questions collected from a sample program."""
 
     settings: list[ControllerSetting] = field(default_factory=list)
     questions: list[OpenKey] = field(default_factory=list)

@@ -40,8 +40,8 @@ MIN_MOVE_MM = 1e-9
 class PlannedMoves(Struct, frozen=True, eq=False):
     """The moves of a planner, M rows of a toolpath: `row` (M,) of the program that each is a part
     of; the speeds `entry`, `peak` and `exit` (M,) mm/s, `acceleration` (M,) mm/s² and `length`
-    (M,) mm, which is 0 where nothing moves. `extra_s` (M,): how much longer than its ramps a move
-    takes; None where it does not."""
+    (M,) mm, which is 0 where nothing moves. `extra_s` (M,): time that a move takes in addition to
+    its ramps; None if there is none."""
 
     path: Toolpath
     row: Ints
@@ -69,7 +69,7 @@ class PlannedMoves(Struct, frozen=True, eq=False):
 
 
 class TimedModel(ControllerModel[Any, Any]):
-    """A planner that says times."""
+    """Model of a planner that gives times."""
 
     @abstractmethod
     def planned(self, path: Toolpath, machine: _Machine) -> PlannedMoves:

@@ -192,7 +192,7 @@ def _shared(seconds: Floats, row: Ints) -> Floats:
 
 
 class TextForm:
-    """The texts of numbers, as words of a dialect have them."""
+    """Writes numbers as the words of a dialect."""
 
     def __init__(self, machine: IsoMachine) -> None:
         dialect = machine.dialect
@@ -418,7 +418,7 @@ def _inverse_times(sent: Sent, path: Toolpath, machine: IsoMachine, form: TextFo
 
 
 class _EventWords:
-    """The blocks of events."""
+    """Writes the blocks of events."""
 
     def __init__(self, machine: IsoMachine, form: TextForm) -> None:
         self._machine, self._form = machine, form
@@ -551,7 +551,7 @@ def _line_numbers(dialect: IsoDialect) -> LineNumbers | None:
 
 
 class _Remarks:
-    """Comments in the dialect's own form; "" for those that it cannot have."""
+    """Writes comments in the dialect's form; "" for those that it cannot have."""
 
     def __init__(self, dialect: IsoDialect) -> None:
         comments = dialect.comments

@@ -18,9 +18,9 @@ from ..gcode.part_moves import PLANES, PartMoves
 
 
 class Queued(Struct):
-    """A move that waits: its end and its centre (in the order of the plane: first, second, normal)
-    in units of the program; `turn` 0 for a straight one; the direction in which it was programmed,
-    and how far its arc was to turn (0: its end stays)."""
+    """A move that waits for its end: end and centre (in the axis order of the plane: first,
+    second, normal) in units of the program; `turn` 0 for a straight one; the direction in which it
+    was programmed, and the angle by which its arc was to turn (0: its end is fixed)."""
 
     kind: Kind
     end: list[float]
@@ -34,7 +34,7 @@ class Queued(Struct):
 
 
 class Canon(PartMoves):
-    """Moves, and those that wait."""
+    """Receives canonical moves and events, adds rows to the path, and keeps those that wait."""
 
     def __init__(
         self, path: ToolpathBuilder, full_turn_rad: float, *, is_lathe: bool = False

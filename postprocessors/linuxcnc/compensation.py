@@ -38,7 +38,7 @@ Flat = tuple[float, float]
 
 
 class ProgrammedArc(Struct):
-    """An arc as it is programmed: end, centre, and turns begun, above 0 counter-clockwise."""
+    """An arc as programmed: end, centre, and number of turns begun, above 0 counter-clockwise."""
 
     end: list[float]
     centre: Flat
@@ -46,7 +46,7 @@ class ProgrammedArc(Struct):
 
 
 class Compensation:
-    """The side and the radius, and what it must remember of the last move."""
+    """State of cutter compensation: the side, the radius, and the end of the last move."""
 
     def __init__(self, canon: Canon) -> None:
         self.side = 0

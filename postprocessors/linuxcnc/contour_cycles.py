@@ -39,8 +39,8 @@ Emit = Callable[[str, complex, complex], None]
 
 
 class BlockMotions(Struct, frozen=True):
-    """What the interpreter does with a single move: straight ones and arcs, by their motion, block
-    and words, and the centres of arcs by I and K or by R."""
+    """The interpreter's functions for a single move: to make a straight move or an arc from its
+    motion, block and words, and to find the centre of an arc from I and K or from R."""
 
     straight: Callable[[int, LinuxcncBlock, dict[str, float]], None]
     arc: Callable[[int, LinuxcncBlock, dict[str, float]], None]
@@ -49,8 +49,8 @@ class BlockMotions(Struct, frozen=True):
 
 
 class Segment(Struct):
-    """A line, or an arc about `centre`; `corner`: the distance of a fillet or a chamfer that its
-    neighbours have still to give room."""
+    """A line, or an arc about `centre`. `corner`: the size of a fillet or chamfer that still has
+    to be fitted between its neighbours."""
 
     start: complex
     end: complex
@@ -130,7 +130,8 @@ class Segment(Struct):
 
 
 class LatheContour:
-    """The segments of a contour in the frame in which Z and X fall, and the way back from it."""
+    """The segments of a contour in the frame in which Z and X fall along it, and the map back to
+    the program."""
 
     def __init__(self, segments: list[Segment], emit: Emit) -> None:
         self.segments = segments

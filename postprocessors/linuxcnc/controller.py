@@ -134,10 +134,10 @@ def _corner_sentence(mode: PathMode) -> str:
 
 
 class PlannedWindow(Struct, frozen=True, eq=False):
-    """The moves of some rows of a program, and the corners at their starts. Where more of the
-    program lies before or behind them, the first corner and the last move miss their neighbours.
-    `origin` (N,): the row that each row of `tangents.path` is, or is half of.
-    """
+    """The moves of some rows of a program, and the corners at their starts. Where the program
+    continues before or behind the window, the first corner and the last move lack their
+    neighbours. `origin` (N,): the row of the program that each row of `tangents.path` is, or is
+    half of."""
 
     origin: Ints
     tangents: Tangents
@@ -381,11 +381,11 @@ def _lengths(moves: PlannerMoves, corners: PlannerCorners) -> tuple[Floats, Floa
 
 
 class _Profile(Struct, frozen=True, eq=False):
-    """The times of the parts of a window: s (M,) of the half of the blend at the start of each
-    move, of what blends leave of it, and of the half of the blend at its end; `rows_s` (P,) of the
-    rows of the path, and `origin_s` of the rows that these are, or are halves of.
+    """The times of a window's parts, s: for each move (M,) the half of the blend at its start,
+    what blends leave of it, and the half of the blend at its end; `rows_s` (P,) of the rows of the
+    path, and `origin_s` of the program's rows that these are, or are halves of.
 
-    `block` (M,) of the plan that a move is, −1 for one that blends leave nothing of.
+    `block` (M,): the block of the plan for each move, −1 for one of which blends leave nothing.
     """
 
     window_plan: PlannedWindow
@@ -687,12 +687,12 @@ def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
 
 class PlannerMoves(Struct, frozen=True, eq=False):
     """M moves in order. row_of (N,): the move of each row of the program, −1 for rows that do not
-    move; row (M,): the first of each, and mode (M,) its mode. length mm, speed mm/s (as
-    programmed, within the limits), acceleration mm/s² (of the whole machine in that direction),
-    each (M,); is_arc (M,), and of arcs the `highest` speed (M,) mm/s and the acceleration `bend`
-    (M,) mm/s² that turns the tool at it, 0 of lines;
-    waits (M,): the machine comes to rest before this move, whatever the corner; same_kind
-    (M,): this move and the one before are both rapids or both at a feed; cuts (M,): at a feed."""
+    move; row (M,): the first row of each move, and mode (M,) the path mode there. length mm, speed
+    mm/s (as programmed, within the limits), acceleration mm/s² (of the whole machine in that
+    direction), each (M,); is_arc (M,), and for arcs the `highest` speed (M,) mm/s and the
+    centripetal acceleration `bend` (M,) mm/s² at that speed, 0 for lines; waits (M,): the machine
+    comes to rest before this move, whatever the corner; same_kind (M,): this move and the one
+    before are both rapids or both at a feed; cuts (M,): at a feed."""
 
     row_of: Ints
     row: Ints
@@ -756,7 +756,7 @@ def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> PlannerMove
 
 
 class Tangents:
-    """Unit tangents at the ends of rows of a path, of which merged ones are straight."""
+    """Unit tangents at the ends of the rows of a path, in which merged rows are straight."""
 
     def __init__(self, path: Toolpath) -> None:
         self.path = path
@@ -918,9 +918,9 @@ class PlannerCorners(Struct, frozen=True, eq=False):
     part of the acceleration that a bend takes from the moves on both sides; `reach` and `reach_on`
     (M,) mm: how far from the corner a blend begins on the move before, and ends on the move
     behind, 0 without one; `acceleration` (M,) mm/s² along blends; `length` (M,) mm along them;
-    `shape` (3, M, 3): their centres, and from there to where they begin and end. Where moves
-    overlap: `before` and `after` (M,) mm, how far from the corner they do, `overlap` (M,) s, for
-    how long, and `ramp` (M,), in which part of that time the second of them speeds up; 0
+    `shape` (3, M, 3): their centres, and the vectors from there to their starts and ends. Where
+    moves overlap: `before` and `after` (M,) mm, how far from the corner they do; `overlap` (M,) s,
+    how long; and `ramp` (M,), the part of that time in which the second of them speeds up; 0
     elsewhere. `joins` (M,): the line before the corner is part of the blend."""
 
     speed: Floats
@@ -1156,9 +1156,9 @@ def _overlap(
 
 
 class _Rounds(Struct, frozen=True, eq=False):
-    """Blends as they are wanted, each (K,): `theta` of the corners as the planner takes it; the
-    `tolerance` mm; radius mm; speed mm/s; and the acceleration `acceleration` mm/s² in their
-    plane."""
+    """Wanted blends, each (K,): half the angle `theta` of the corner as the planner assumes it;
+    the tolerance, mm; the radius, mm; the speed, mm/s; and the acceleration in their plane,
+    mm/s²."""
 
     theta: Floats
     tolerance: Floats
@@ -1283,10 +1283,11 @@ MIN_THETA_RAD = np.pi / 12.0
 
 
 class _Side(Struct, frozen=True, eq=False):
-    """Either of the two moves at K corners, in the plane as complex numbers: its tangent there, of
-    arcs the circle that touches it (`centre`, `radius`), the `sign` by which a blend's radius
-    counts where it touches it from inside (−1) or outside (1), and the angle `max_angle` that a
-    blend may use; so much of the move counts, `longest` mm, and by so much θ is `less`."""
+    """One of the two moves at K corners, with points as complex numbers: its tangent there; for
+    arcs the circle that touches it (`centre`, `radius`), the `sign` with which a blend's radius
+    counts where it touches that circle from inside (−1) or outside (1), and the angle `max_angle`
+    that a blend may use; `longest` mm: the part of the move that a blend may use; `less`: by how
+    much θ is reduced."""
 
     is_arc: Bools
     tangent: Floats

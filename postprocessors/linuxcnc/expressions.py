@@ -39,7 +39,7 @@ _PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
 class Scanner:
-    """Reads values from a text, from `at` on."""
+    """Parses values from a text, from `at` on."""
 
     def __init__(self, text: str, begin: int = 0) -> None:
         self.text, self.at = text, begin

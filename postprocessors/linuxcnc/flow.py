@@ -44,7 +44,7 @@ CONDITIONS: Final = ("while", "repeat", "if", "elseif")
 
 
 class EndOfFile(LineFault):
-    """The file ends, and the program has not."""
+    """Raised when the file ends before the program does."""
 
 
 class TextPosition(Struct):
@@ -55,8 +55,8 @@ class TextPosition(Struct):
 
 
 class FlowLabel(Struct):
-    """First place of a label, the word that used it, and the repetitions left of a `repeat`, −1:
-    it has not begun."""
+    """A label: its first place, the word that used it, and the repetitions left of a `repeat`, −1
+    before it begins."""
 
     kind: str
     place: TextPosition
@@ -64,10 +64,9 @@ class FlowLabel(Struct):
 
 
 class Call(Struct):
-    """A call that is under way: of which sub, how ("call", "M98"), the place to come back to, the
-    parameters before it, and the modes that M70 and M73 have saved for it (None: none).
-
-    `again`: how often M98 L is still to call. The first of them stands for the program itself."""
+    """An active call: the name of the sub, its kind ("call", "M98"), the place to return to, the
+    parameters before it, and the modes that M70 and M73 have saved in it (None: none). `again`:
+    the calls of M98 L still to make. The first call stands for the program itself."""
 
     sub: str = ""
     kind: str = ""
@@ -80,7 +79,7 @@ class Call(Struct):
 
 
 class _Word(Struct):
-    """An O word: what it is, its label, and where its text goes on."""
+    """An O word: its kind, its label, and the offset at which its text continues."""
 
     kind: str
     label: Any
@@ -90,7 +89,8 @@ class _Word(Struct):
 
 
 class Flow:
-    """The reading of one program. `restore` brings back modes that a call has saved."""
+    """Reads one program in the order of execution. `restore` restores modes that a call has
+    saved."""
 
     def __init__(
         self,

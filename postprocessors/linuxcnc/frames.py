@@ -35,7 +35,7 @@ OFFSETS: Final = 5211
 
 
 class FrameCodes(InterpreterState, ABC):
-    """The state, and what moves its frame."""
+    """Interpreter state with the codes that move its frame."""
 
     def __init__(
         self, machine: LinuxcncMachine, path: ToolpathBuilder, notes: InterpreterNotes

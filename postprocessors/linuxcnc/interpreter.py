@@ -33,7 +33,7 @@ INPUT_VALUE: Final = 5399
 
 
 class Interpreter(BlockMoves):
-    """Carries out blocks."""
+    """Executes blocks."""
 
     def _names(self) -> dict[str, Callable[[], float]]:
         from .modes import names_of

@@ -49,7 +49,7 @@ REFUSED: Final = {
 
 
 class BlockMoves(FrameCodes):
-    """The state, its frames, and the moves of blocks."""
+    """Interpreter state with its frames and the moves of blocks."""
 
     def _go_home(self, code: int, words: dict[str, float], g: Mapping[str, int]) -> None:
         """Execute G28 or G30: go by way of the block's coordinates to the stored place, in the

@@ -28,9 +28,9 @@ MM_PER_INCH: Final = 25.4
 
 
 class Mounted(Struct, frozen=True):
-    """From a `row` of the path and a `block` on: the tool in the spindle, the length in force and
-    its own in the tool table (None: not known), mm; `measured`: what was last said of lengths was
-    about this tool."""
+    """Tool state from a `row` of the path and a `block` on: the tool in the spindle, the length in
+    force, and the tool's own length in the tool table (None: not known), mm. `measured`: true if
+    the last code about lengths was about this tool."""
 
     row: int
     block: int
@@ -41,7 +41,7 @@ class Mounted(Struct, frozen=True):
 
 
 class InterpreterNotes(Struct):
-    """Blocks (index from 0) at which something was passed over or taken for granted."""
+    """Blocks (index from 0) at which something was ignored or assumed."""
 
     coolant: list[int] = field(default_factory=list)
     pauses: list[int] = field(default_factory=list)
@@ -60,7 +60,7 @@ class InterpreterNotes(Struct):
 
 class Series(Struct):
     """Values that canned cycles keep from block to block: the height at which the first of them
-    began (None: none has), and the words R, P, Q, I, J, K and that of the depth."""
+    began (None: no cycle has begun), and the words R, P, Q, I, J, K and the depth."""
 
     height: float | None = None
     words: dict[str, float] = field(default_factory=dict)

@@ -67,7 +67,7 @@ class ProgramText(ProgramLines):
 
 
 class Folder:
-    """Folder in which the files of subs are looked for; None for a program that is no file."""
+    """Folder in which the files of subs are searched; None for a program that is not in a file."""
 
     def __init__(self, folder: Path | None, line_chars: int) -> None:
         self._folder = folder

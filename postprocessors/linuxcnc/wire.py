@@ -82,7 +82,7 @@ Script = Generator["str | float", str, None]
 
 
 class _Refused(Exception):
-    """It cannot go on, and why."""
+    """Raised when the conversation cannot continue, with the reason."""
 
 
 class LinuxcncWire(Wire):
@@ -738,7 +738,7 @@ def _without_password(request: str) -> str:
 
 
 class LinuxcncTerminal(Terminal):
-    """Lines to linuxcncrsh, which is greeted first."""
+    """Typed lines for linuxcncrsh, after a greeting."""
 
     end = b"\r\n"
     stop = b"set abort\r\n"

@@ -337,12 +337,9 @@ equal parts."""
 
 
 class MasterOrders(Struct, frozen=True, eq=False):
-    """L orders of the master.
-
-    orders (L, 11): `Program.lines` of the kernel; pauses_s (L,) behind each, negative where the
-    next line begins on a tick; extra_s (N,): what rows take besides (dwells, and the numbers of a
-    job on their way from the PC).
-    """
+    """L orders of the master. orders (L, 11): `Program.lines` of the kernel; pauses_s (L,) behind
+    each, negative where the next line begins on a tick; extra_s (N,): additional time of rows
+    (dwells, and the transmission of a job's numbers from the PC)."""
 
     orders: Indices
     pauses_s: Floats

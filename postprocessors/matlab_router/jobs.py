@@ -66,8 +66,8 @@ Where = Callable[[str, int, int], str]
 
 
 class ReadJob(Struct, frozen=True, eq=False):
-    """`first` (2,) and `length` (2, n) units, `speed` (2, n) counts in 5 ms with the signs of the
-    directions; `number` from 1; `where` names places."""
+    """A job as read: `first` (2,) and `length` (2, n) units, `speed` (2, n) counts in 5 ms with
+    the signs of the directions; `number` from 1; `where` gives the places of its numbers."""
 
     number: int
     first: Ints
@@ -235,7 +235,7 @@ def _check_repeats(job: ReadJob, xy: Ints) -> None:
 
 
 class _Text:
-    """The text and how far it has been read."""
+    """The text of a program, and the offset up to which it has been read."""
 
     def __init__(self, data: bytes) -> None:
         odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)

@@ -82,7 +82,7 @@ def path_of(jobs: Iterable[ReadJob], machine: MatlabRouterMachine) -> Toolpath:
 
 
 class _Moves:
-    """Jobs in, the rows of a toolpath out."""
+    """Takes jobs and builds the rows of a toolpath."""
 
     def __init__(self, machine: MatlabRouterMachine, dialect: ResolvedDialect) -> None:
         self._machine = machine
@@ -157,7 +157,8 @@ class _Moves:
 
 
 class Executed(Struct, frozen=True, eq=False):
-    """`points` (n+1, 2) units where the machine comes to stand, and where it was `listed` to."""
+    """Points of an executed job in units: `points` (n+1, 2), where the slaves bring the tool, and
+    `listed` (n+1, 2), where the listed master would."""
 
     points: Ints
     listed: Ints
@@ -283,7 +284,7 @@ class Worst(Struct):
 
 
 class JobFindings(Struct):
-    """Counts of what the machine does otherwise, or cannot do, in all jobs."""
+    """Counts, over all jobs, of what the machine executes differently or cannot execute."""
 
     machine: MatlabRouterMachine
     dialect: ResolvedDialect

@@ -98,7 +98,7 @@ class MatlabRouterWire(Wire):
 
 
 class MatlabRouterTerminal(Terminal):
-    """Numbers, of which nothing but an echo comes back."""
+    """Typed numbers; nothing but an echo comes back."""
 
     end = END
     about = (
@@ -154,7 +154,7 @@ def rest_of(data: bytes, machine: MatlabRouterMachine, first: int) -> tuple[byte
 
 
 class MatlabRouterConversation(PacketByPacket):
-    """The numbers of a job, one by one, and its time."""
+    """A conversation that sends a job number by number, and then waits for its simulated time."""
 
     stands = "nothing more was sent; by the simulated time it stands, and says nothing"
     goes_on = "it runs the job to its end; its switch stops it"

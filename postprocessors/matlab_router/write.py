@@ -62,7 +62,7 @@ Pair = tuple[list[int], list[int]]
 
 
 class JobNumbers(Struct, frozen=True):
-    """Words of the numbers of a job, x and y in pairs."""
+    """The numbers of a job as they are written, x and y in pairs."""
 
     count: int
     first: tuple[int, int]

@@ -82,8 +82,8 @@ class CommandedPath(Struct, frozen=True, eq=False):
 
 
 class Periods(Struct, frozen=True, eq=False):
-    """s between two outputs: `rapid_s` of rapids, at least `least_s` of all others; `step_mm` (2,)
-    in XY and in Z."""
+    """Seconds between two outputs: `rapid_s` in rapids, at least `least_s` in all other rows;
+    `step_mm` (2,) in XY and in Z."""
 
     rapid_s: float
     least_s: float

@@ -56,7 +56,7 @@ MAX_TOOL: Final = 99
 
 
 class UnitGrid(Struct, frozen=True):
-    """The units of one form laid over the steps of one axis."""
+    """The units in which a form writes coordinates, and the steps of one axis that they mean."""
 
     units_per_mm: int
     most_units: int

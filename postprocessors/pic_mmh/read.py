@@ -159,7 +159,8 @@ class _Excess(Struct):
 
 
 class _Reader:
-    """Blocks in, rows out; knows where the tool stands and whether the program has ended."""
+    """Reads blocks and adds rows to the path; keeps the position of the tool and whether the
+    program has ended."""
 
     def __init__(self, machine: PicMmhMachine) -> None:
         dialect = machine.dialect

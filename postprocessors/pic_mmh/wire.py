@@ -250,7 +250,7 @@ def _steps(letter: str, way_mm: float, step_mm: float) -> list[tuple[bytes, int]
 
 
 class PicMmhConversation(PacketByPacket):
-    """A block, its echo, its steps."""
+    """A conversation that sends a block, compares its echo, and counts its steps."""
 
     goes_on = "it makes the string that it has to its end; any character stops it"
     halts_within = True

@@ -386,8 +386,8 @@ class _Writer:
 
 
 class StepArcs(Struct, frozen=True, eq=False):
-    """J arcs that are more than nothing: their rows; columns of `arcs` (J, 7) in steps; signed
-    sweeps rad; landings (J, 3). `nothing`: the rows of those whose end is their start."""
+    """J arcs that have a length, in steps: their rows; the columns of `arcs` (J, 7) of the kernel;
+    signed sweeps, rad; landings (J, 3). `nothing`: the rows of arcs whose end is their start."""
 
     row: Ints
     table: Ints
@@ -436,10 +436,10 @@ class StepArcs(Struct, frozen=True, eq=False):
 
 
 class Points(Struct, frozen=True, eq=False):
-    """P points in order: their rows; X and Y in units (P, 2), as they stand behind the point;
-    whether a block is sent, whether it is one of Z, whether one of an arc. `before` (J, 2): the
-    units from which each arc starts; `misfit`: the first row with a point that cannot be written,
-    or else the number of rows."""
+    """P points in order: their rows; X and Y in units after the point (P, 2); masks of points for
+    which a block is sent, of blocks of Z, and of blocks of arcs. `before` (J, 2): the units from
+    which each arc starts; `misfit`: the first row with a point that cannot be written, or the
+    number of rows if there is none."""
 
     row: Ints
     units: Ints
@@ -451,8 +451,9 @@ class Points(Struct, frozen=True, eq=False):
 
 
 class Chords(Struct, frozen=True, eq=False):
-    """Lines for J arcs: `count` (J,) of them each; and all their ends but the last of each arc,
-    which is its own: `end` (K, 2) mm, the arc, and which of its chords, from 0."""
+    """Lines for J arcs: their number `count` (J,) for each, and all ends except the last of each
+    arc, which is the arc's own: `end` (K, 2) mm, the arc, and the number of the chord in it, from
+    0."""
 
     count: Ints
     end: Floats

@@ -61,8 +61,7 @@ def read_block(data: bytes, machine: ValcncMachine, start: Point) -> tuple[Toolp
 
 
 class _Missed(Struct):
-    """Count of arcs that the controller's own angle ends past or short of their end, and the
-    worst."""
+    """Count of arcs whose end the controller's own angle misses, and the worst of them."""
 
     count: int = 0
     most_mm: float = 0.0
@@ -70,7 +69,7 @@ class _Missed(Struct):
 
 
 class _Reader:
-    """Blocks in, rows out, in mm."""
+    """Reads blocks and adds rows to the path, in mm."""
 
     def __init__(self, machine: ValcncMachine, start: Point = (0.0, 0.0, 0.0)) -> None:
         self._dialect = machine.dialect

@@ -163,8 +163,8 @@ def _block_packet(text: bytes, machine: ValcncMachine, at_mm: Place) -> Packet:
 
 
 class ValcncHand(CommandHand):
-    """A machine whose place is kept here: it is known once the user has said that the controller
-    stands at part zero, and after a program."""
+    """A machine whose position is kept by the sender: it is known once the user has stated that
+    the controller stands at part zero, and after a program."""
 
     def __init__(self, wire: ValcncWire, machine: ValcncMachine, manner: Manner) -> None:
         super().__init__(wire, machine, manner)
@@ -201,7 +201,7 @@ class ValcncHand(CommandHand):
 
 
 class ValcncTerminal(Terminal):
-    """Blocks, one a line, of which none is known to be answered."""
+    """Typed blocks, one a line; it is not known that any is answered."""
 
     about = (
         "blocks such as G01 X1 Y0 Z0, each when the one before has been drawn; no answer is "
@@ -214,7 +214,8 @@ class ValcncTerminal(Terminal):
 
 
 class ValcncConversation(PacketByPacket):
-    """A block, its time, and its answer where it has one."""
+    """A conversation that sends a block, and waits for its simulated time and its answer, if it
+    has one."""
 
     goes_on = "it draws the block that it has to its end; its switch stops it"
 
