@@ -239,7 +239,7 @@ class MachineFlags(Struct, frozen=True):
         return [] if self.machine is None else [self.machine]
 
     def name(self) -> str | None:
-        """Name of the target, as given or as in the machine file; None without either."""
+        """Return the target's name, as given or by the machine file; None without either."""
         if self.target is not None or self.machine is None:
             return self.target
         from camtool.target.loader import extended_by

@@ -126,7 +126,7 @@ class Slides:
         self.ends_s = now + travel.total_s + (float(delays[-1]) if count else 0.0)
 
     def next_s(self) -> float | None:
-        """Time of the next output, or of the end; None if nothing is under way."""
+        """Return the time of the next output, or of the end; None if nothing is under way."""
         if self.ends_s is None:
             return None
         due = self._times[self.done : self.done + 1]
@@ -232,8 +232,9 @@ class Twin(ABC):
         return self._take_output()
 
     def next_s(self) -> float | None:
-        """Time at which it may send something if nothing comes in; None: never. A controller that
-        reports its outputs sends something at each; one that does not needs only `wake_s`."""
+        """Return the time at which it may send something if nothing is received; None: never. A
+        controller that reports its outputs sends something at each; for others `wake_s` is
+        enough."""
         times = [time_s for time_s in (self.wake_s(), self.slides.next_s()) if time_s is not None]
         return min(times, default=None)
 
@@ -247,7 +248,7 @@ class Twin(ABC):
         """Handle a byte that comes in at `self.now`."""
 
     def wake_s(self) -> float | None:
-        """Time of its next own action, besides the outputs of a travel; None: never."""
+        """Return the time of its next own action, besides the outputs of a travel; None: never."""
         return self.slides.ends_s
 
     def _wake(self) -> None:  # noqa: B027 - not all do more than move

@@ -68,7 +68,7 @@ class Forecast(Struct, frozen=True, eq=False):
         return len(self.seconds)
 
     def end_of(self, block: int) -> Place | None:
-        """End of a block; None behind the last one that does anything."""
+        """Return the end of a block, mm; None behind the last block that does anything."""
         if block >= len(self.end_mm):
             return None
         x, y, z = self.end_mm[block].tolist()
