@@ -27,12 +27,7 @@ class CamtoolError(Exception):
     exit_code = 2
 
     def __init__(
-        self,
-        message: str,
-        *,
-        file: str | None = None,
-        where: str | None = None,
-        mend: str = "",
+        self, message: str, *, file: str | None = None, where: str | None = None, mend: str = ""
     ) -> None:
         self.message = message
         self.file = file

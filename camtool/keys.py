@@ -284,8 +284,7 @@ def word(words: Sequence[str]) -> Callable[[Given], Any]:
         name = text(value)
         if name not in words:
             raise OptionError(
-                f"unknown word {name!r}",
-                mend=f"{guess(name, words)}use one of {', '.join(words)}",
+                f"unknown word {name!r}", mend=f"{guess(name, words)}use one of {', '.join(words)}"
             )
         return name
 

@@ -38,19 +38,8 @@ from camtool.stock.findings import STOCK_NOT_JUDGED_TOOLS
 from camtool.stock.moves import stock_moves_of_toolpath
 from camtool.stock.slides import slide_moves
 from camtool.toolpath.findings import SURFACE_FOLLOWED_NOT, SURFACE_FOLLOWED_WITHIN
-from camtool.toolpath.lower import (
-    at_feed,
-    carried_over,
-    turned,
-    within_feeds,
-    without_coolant,
-)
-from camtool.toolpath.moves import (
-    Kind,
-    changes_between_cuts,
-    feeds_below_top,
-    toolpath_extents,
-)
+from camtool.toolpath.lower import at_feed, carried_over, turned, within_feeds, without_coolant
+from camtool.toolpath.moves import Kind, changes_between_cuts, feeds_below_top, toolpath_extents
 from camtool.toolpath.program import Program
 from camtool.toolpath.surface import Surface, follow, surface_error
 from camtool.toolpath.touching import untouched_place

@@ -26,13 +26,7 @@ from camtool.libraries.exports import (
 )
 from camtool.plain import embedded_address, one_line
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verification.report import (
-    ChangedValue,
-    ReportPage,
-    Setup,
-    finding_reports,
-    page_html,
-)
+from camtool.verification.report import ChangedValue, ReportPage, Setup, finding_reports, page_html
 
 if TYPE_CHECKING:
     from camtool.pictures.options import PictureOptions
@@ -103,9 +97,7 @@ class Run(Shown):
         """The program's bytes; PostError when a finding is an error: it must not be run."""
         if self.program is None or self.failed:
             raise PostError(
-                "the program has errors and must not be run",
-                file=self.source,
-                mend="see findings",
+                "the program has errors and must not be run", file=self.source, mend="see findings"
             )
         return self.program.data
 

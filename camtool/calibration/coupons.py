@@ -370,10 +370,7 @@ def dxf(sheet: CouponSheet) -> bytes:
             if path.layer not in document.layers:
                 document.layers.add(path.layer, color=COLOUR)
             space.add_lwpolyline(
-                path.vertices,
-                format="xyb",
-                close=path.closed,
-                dxfattribs={"layer": path.layer},
+                path.vertices, format="xyb", close=path.closed, dxfattribs={"layer": path.layer}
             )
         text = io.StringIO(newline="\n")
         document.write(text)

@@ -160,11 +160,7 @@ def sarif(files: Sequence[CheckedFile], own_codes: Iterable[TargetCode] = ()) ->
     findings = list(dict.fromkeys(each for file in files for each in file.findings))
     names = sorted({each.code for each in findings})
     rules = [_rule(name, codes.get(name)) for name in names]
-    driver = {
-        "name": "camtool",
-        "semanticVersion": __version__,
-        "rules": rules,
-    }
+    driver = {"name": "camtool", "semanticVersion": __version__, "rules": rules}
     run = {
         "tool": {"driver": driver},
         "columnKind": "unicodeCodePoints",

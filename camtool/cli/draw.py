@@ -31,12 +31,7 @@ def _length(text: str, name: str, low: float, high: float) -> float:
 
 @click.command(cls=SectionedCommand, short_help="A page to draw a figure on.")
 @click.option(
-    "-o",
-    "--output",
-    metavar="PAGE",
-    default="draw.html",
-    show_default=True,
-    help="An .html file.",
+    "-o", "--output", metavar="PAGE", default="draw.html", show_default=True, help="An .html file."
 )
 @click.option("--width", default="100", show_default=True, help="Of the sheet, mm or with a unit.")
 @click.option("--height", default="100", show_default=True, help="Of the sheet.")

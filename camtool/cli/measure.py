@@ -144,11 +144,7 @@ Profiles = list[tuple[str, float, "Floats"]]
 
 
 def _facts(
-    stock: CutStock,
-    points: list[tuple[float, float]],
-    profiles: Profiles,
-    *,
-    with_volume: bool,
+    stock: CutStock, points: list[tuple[float, float]], profiles: Profiles, *, with_volume: bool
 ) -> dict[str, Any]:
     """Return all figures as data for JSON."""
     import numpy as np
@@ -206,11 +202,7 @@ def _table(profiles: Profiles) -> str:
 
 
 def _text(
-    stock: CutStock,
-    points: list[tuple[float, float]],
-    profiles: Profiles,
-    *,
-    with_volume: bool,
+    stock: CutStock, points: list[tuple[float, float]], profiles: Profiles, *, with_volume: bool
 ) -> str:
     """Return the figures as readable text."""
     import numpy as np

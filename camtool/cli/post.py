@@ -162,11 +162,7 @@ def posting_options(command: Command) -> Command:
     inner = machine_options(gate_options(inner))
     return decorate(
         inner,
-        [
-            click.option(
-                "--no-verify", is_flag=True, help="Write without simulating the machine."
-            ),
-        ],
+        [click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")],
     )
 
 
@@ -265,11 +261,7 @@ def post(
 
 
 def _refuse_beside_setups(
-    posting: Posting,
-    plots: PlotFlags,
-    split: str | None,
-    names: Sequence[str | None],
-    job: Job,
+    posting: Posting, plots: PlotFlags, split: str | None, names: Sequence[str | None], job: Job
 ) -> None:
     """Raise a usage error for flags and outputs that are not possible where a job gives several
     programs, one for each set-up."""

@@ -196,11 +196,7 @@ class SceneSource:
         with self.job.name_job_file():
             if self.simulate:
                 run = post_drawing(
-                    read,
-                    job,
-                    target,
-                    trace_points=points_for([self.output]),
-                    progress=progress(),
+                    read, job, target, trace_points=points_for([self.output]), progress=progress()
                 )
                 return run.scene(title), run.findings if run.failed else read.findings
             progress().begin("planning")

@@ -118,8 +118,7 @@ def probe(
     check_sizes({"--margin": margin or None}, {})
     if not lowest < clear:
         raise OptionError(
-            f"{lowest:g} mm is not below the height between points, {clear:g} mm",
-            where="--lowest",
+            f"{lowest:g} mm is not below the height between points, {clear:g} mm", where="--lowest"
         )
     target = machine.load()
     wire = wire_of(target)

@@ -10,14 +10,7 @@ import click
 
 from camtool.calibration import servo as bench
 from camtool.calibration.servo import respond, simulate_step
-from camtool.cli.files import (
-    STDOUT,
-    check_new,
-    check_places,
-    display_name,
-    read_bytes,
-    write_all,
-)
+from camtool.cli.files import STDOUT, check_new, check_places, display_name, read_bytes, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import (

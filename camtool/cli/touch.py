@@ -10,26 +10,14 @@ import click
 
 from camtool.cli.home import UNLOCK, axes_of, carried, port_options
 from camtool.cli.messages import say, show_text
-from camtool.cli.options import (
-    MachineFlags,
-    SectionedCommand,
-    feed,
-    length,
-)
+from camtool.cli.options import MachineFlags, SectionedCommand, feed, length
 from camtool.cli.probe import asked_to_begin, check_sizes, journaled, touch_options
 from camtool.errors import OptionError
 from camtool.sending.line import manner_of, wire_of
 from camtool.toolpath import probing
 from camtool.toolpath.probing import Axis, Measured, Place, ProbeScript, Touch
 
-AXES_OF = {
-    "plate": "z",
-    "edge": "xy",
-    "corner": "xy",
-    "bore": "xy",
-    "boss": "xy",
-    "skew": "",
-}
+AXES_OF = {"plate": "z", "edge": "xy", "corner": "xy", "bore": "xy", "boss": "xy", "skew": ""}
 """What can be touched, and the axes that it gives a zero."""
 
 LABELS = {

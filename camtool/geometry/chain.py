@@ -240,11 +240,7 @@ class Joints(Struct, frozen=True, eq=False):
     single: Bools
 
     def named(
-        self,
-        ends: Ends,
-        layers: Sequence[str],
-        members: Sequence[Sequence[int]],
-        closed: Bools,
+        self, ends: Ends, layers: Sequence[str], members: Sequence[Sequence[int]], closed: Bools
     ) -> tuple[Branch, ...]:
         """Return the branches with their places, sorted by place, layer and size.
 

@@ -119,11 +119,7 @@ def _smallest(drawing: Drawing, segments: Segments) -> dict[str, Any]:
     return {
         name: None
         if item is None
-        else {
-            "size_mm": item.size_mm,
-            "at_mm": list(item.at_mm),
-            "paths": list(item.paths),
-        }
+        else {"size_mm": item.size_mm, "at_mm": list(item.at_mm), "paths": list(item.paths)}
         for name, item in features.items()
     }
 

@@ -77,8 +77,7 @@ class Selection(FrozenRecord):
         Flag("--colour", "Only this colour (#ff0000, red, or 1 to 255).", "PATTERN"),
     ] = ()
     line_types: Annotated[
-        tuple[str, ...],
-        Flag("--line-type", "Only these line types (DASHED, CENTER*).", "PATTERN"),
+        tuple[str, ...], Flag("--line-type", "Only these line types (DASHED, CENTER*).", "PATTERN")
     ] = ()
 
 
@@ -123,9 +122,7 @@ class ReadOptions(FrozenRecord):
     tolerance_mm: Annotated[
         float,
         Flag(
-            "--tolerance",
-            "Largest distance of fitted arcs from the curves of the part.",
-            "LENGTH",
+            "--tolerance", "Largest distance of fitted arcs from the curves of the part.", "LENGTH"
         ),
     ] = TOLERANCE_MM
     gap_mm: Annotated[float, Flag("--gap", "Ends nearer than this are joined.", "LENGTH")] = GAP_MM
@@ -147,16 +144,11 @@ class ReadOptions(FrozenRecord):
         bool, Flag("--allow-scripts", "Run a build123d script, with your rights.")
     ] = False
     width_mm: Annotated[
-        float | None,
-        Flag("--width", "How wide a PNG or JPEG is.", "LENGTH", for_pixels=True),
+        float | None, Flag("--width", "How wide a PNG or JPEG is.", "LENGTH", for_pixels=True)
     ] = None
     own_dpi: Annotated[
         bool,
-        Flag(
-            "--own-dpi",
-            "A PNG or JPEG has the pixels per inch that it says.",
-            for_pixels=True,
-        ),
+        Flag("--own-dpi", "A PNG or JPEG has the pixels per inch that it says.", for_pixels=True),
     ] = False
     threshold: Annotated[
         float,
@@ -207,8 +199,7 @@ class ReadOptions(FrozenRecord):
             )
         if self.text not in TEXTS:
             raise OptionError(
-                f"text {self.text!r} is not known",
-                mend=f"use one of {', '.join(TEXTS)}",
+                f"text {self.text!r} is not known", mend=f"use one of {', '.join(TEXTS)}"
             )
         if self.section_z_mm is not None and not math.isfinite(self.section_z_mm):
             raise OptionError(f"section_z_mm is {self.section_z_mm}, it must be a height")

@@ -112,9 +112,7 @@ def refuse_flags_of_pictures(options: ReadOptions, file: str) -> None:
     for name, flag, _ in flags_of(ReadOptions):
         if flag.for_pixels and getattr(options, name) != getattr(DEFAULTS, name):
             raise OptionError(
-                f"{flag.name} is for pictures of pixels",
-                file=file,
-                mend=f"leave {flag.name} out",
+                f"{flag.name} is for pictures of pixels", file=file, mend=f"leave {flag.name} out"
             )
 
 

@@ -361,9 +361,7 @@ WHOLE = {
 
 PLACE = {
     "origin": Key(
-        "origin",
-        Value(plain(origin), "PLACE"),
-        "Part zero: drawing, lower-left, centre, or x,y.",
+        "origin", Value(plain(origin), "PLACE"), "Part zero: drawing, lower-left, centre, or x,y."
     ),
     "mirror": Key("mirror", one_of(("x", "y")), "Turn the sign of x, or of y.", '"x"'),
     "rotate": Key("rotate_rad", ANGLE, "Counterclockwise, in degrees.", '"90deg"'),
@@ -454,12 +452,7 @@ OPERATION = {
         '["inner", "circle"]',
     ),
     "select_size": Key("size_mm", LENGTHS, "And so large.", '"3..8mm"'),
-    "select_area": Key(
-        "area_mm2",
-        NUMBERS,
-        "And of such an area, mm².",
-        '"10..200"',
-    ),
+    "select_area": Key("area_mm2", NUMBERS, "And of such an area, mm².", '"10..200"'),
     "select_entities": Key(
         "entities", Value(plain(layers), "NAMES"), "And these by handle or id.", '["2F"]'
     ),
@@ -473,10 +466,7 @@ OPERATION = {
     "chamfer": Key("chamfer_mm", LENGTH, "Its width from above.", '"0.5mm"'),
     "tip_offset": Key("tip_offset_mm", LENGTH, "Its bit's tip below it.", '"0.1mm"'),
     "allowance": Key(
-        "allowance_mm",
-        LENGTH,
-        "Left on the wall; below 0: cut beyond the line.",
-        '"0.1mm"',
+        "allowance_mm", LENGTH, "Left on the wall; below 0: cut beyond the line.", '"0.1mm"'
     ),
     "finish": Key("finish_mm", LENGTH, "Left for a last pass.", '"0.1mm"'),
     "finish_feed": Key("finish_feed_mm_min", FEED, "Of that pass."),
@@ -502,16 +492,10 @@ OPERATION = {
         '"ramp:3deg"',
     ),
     "lead_in": Key(
-        "lead_in",
-        Value(lead, "LEAD", tables=True),
-        "none, line:1mm or arc:1mm.",
-        '"arc:1mm"',
+        "lead_in", Value(lead, "LEAD", tables=True), "none, line:1mm or arc:1mm.", '"arc:1mm"'
     ),
     "lead_out": Key(
-        "lead_out",
-        Value(lead, "LEAD", tables=True),
-        "The same at the end.",
-        '"arc:1mm"',
+        "lead_out", Value(lead, "LEAD", tables=True), "The same at the end.", '"arc:1mm"'
     ),
     "overlap": Key("overlap_mm", LENGTH, "Cut beyond the start.", '"0.2mm"'),
     "start": Key(
@@ -529,18 +513,12 @@ OPERATION = {
     "corners": Key("corners", one_of(CORNERS), "Relief of inner corners.", '"dogbone"'),
     "joins": Key("joins", one_of(JOINS), "The tool's path around outer corners.", '"mitre"'),
     "mitre_limit": Key(
-        "mitre_limit",
-        FACTOR,
-        "How long a mitre may be.",
-        "2.0",
-        only=("joins", ("mitre",)),
+        "mitre_limit", FACTOR, "How long a mitre may be.", "2.0", only=("joins", ("mitre",))
     ),
     "pattern": Key("pattern", one_of(PATTERNS), "How a pocket is cleared."),
     "rest": Key("rest", TEXT),
     "step_over": Key(
-        "step_over",
-        Value(plain(fraction), "PART"),
-        "Part of the diameter (0.4, 40%).",
+        "step_over", Value(plain(fraction), "PART"), "Part of the diameter (0.4, 40%)."
     ),
     "angle": Key("angle_rad", ANGLE, "Of a zigzag.", only=("pattern", ("zigzag",))),
     "peck": Key("peck_mm", LENGTH, "How deep a drill goes at a time.", '"0.2mm"'),
@@ -561,15 +539,7 @@ def is_known(name: str, kind: str) -> bool:
 PRESET = {
     **{
         name: OPERATION[name]
-        for name in (
-            "feed",
-            "plunge_feed",
-            "spindle",
-            "coolant",
-            "step_down",
-            "step_over",
-            "peck",
-        )
+        for name in ("feed", "plunge_feed", "spindle", "coolant", "step_down", "step_over", "peck")
     },
     **LIMITS,
 }

@@ -25,15 +25,7 @@ from typing import Any
 from msgspec import Struct, field
 
 from camtool.errors import MachineError, OptionError
-from camtool.jobs.keys import (
-    LIMITS,
-    OPERATION,
-    PRESET,
-    TOOL,
-    TOOL_KEYS,
-    TOOL_NAME,
-    WHOLE,
-)
+from camtool.jobs.keys import LIMITS, OPERATION, PRESET, TOOL, TOOL_KEYS, TOOL_NAME, WHOLE
 from camtool.jobs.tool_table import TableTool, read_tool_table
 from camtool.keys import Given, Table, record_of, refuse_idle, table_of
 from camtool.patterns import guess

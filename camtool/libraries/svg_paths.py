@@ -31,8 +31,7 @@ def read(value: Any, name: str, options: ReadOptions) -> Found:
         subpaths = continuous_parts(value)
     else:
         raise OptionError(
-            f"{name} is of type {type(value).__name__} of svgpathtools",
-            mend="give its paths",
+            f"{name} is of type {type(value).__name__} of svgpathtools", mend="give its paths"
         )
     fitter = CurveFitter(options.tolerance_mm)
     to_mm = scaling(units.mm_per_unit, -units.mm_per_unit)

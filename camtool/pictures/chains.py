@@ -72,10 +72,7 @@ class Chain(Struct, frozen=True, eq=False):
         sweep = float(self.sweep[index])
         if sweep == 0.0:
             dx, dy = (end - begin).tolist()
-            return (
-                float(begin[0]) + share * dx,
-                float(begin[1]) + share * dy,
-            ), math.atan2(dy, dx)
+            return (float(begin[0]) + share * dx, float(begin[1]) + share * dy), math.atan2(dy, dx)
         cx, cy = self.centre[index].tolist()
         x, y = float(begin[0]) - cx, float(begin[1]) - cy
         angle = math.atan2(y, x) + share * sweep

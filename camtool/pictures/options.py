@@ -85,8 +85,7 @@ def check_width(width_px: int) -> None:
     """Raise OptionError for a width out of range."""
     if not MIN_PX <= width_px <= MAX_PX:
         raise OptionError(
-            f"a picture cannot be {width_px} pixels wide",
-            mend=f"take {MIN_PX} to {MAX_PX}",
+            f"a picture cannot be {width_px} pixels wide", mend=f"take {MIN_PX} to {MAX_PX}"
         )
 
 

@@ -432,9 +432,7 @@ def _stock_pair(
 
 
 def stock_pair(
-    moves: StockMoves,
-    box_mm: tuple[float, float, float, float] | None,
-    thickness_mm: float | None,
+    moves: StockMoves, box_mm: tuple[float, float, float, float] | None, thickness_mm: float | None
 ) -> StockPair:
     """Return the stock that these moves cut; where its box or thickness is None, it is as large as
     they need."""

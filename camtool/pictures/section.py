@@ -34,15 +34,7 @@ from camtool.pictures.page import (
 )
 from camtool.pictures.svg import Look, PathData, element, number
 from camtool.pictures.text import TextStyle
-from camtool.pictures.view import (
-    MARGIN,
-    View,
-    decimals_of,
-    fit,
-    multiples,
-    page_width,
-    round_step,
-)
+from camtool.pictures.view import MARGIN, View, decimals_of, fit, multiples, page_width, round_step
 
 SHAPES = (0.3, 0.6)
 """Least and greatest height of the plot, as a share of its width."""

@@ -110,5 +110,5 @@ SLOT_KEYS = {
         '"150%"',
         only=("strategy", ("trochoidal",)),
         default=SlotWidth(1.5, True),
-    ),
+    )
 }

@@ -210,10 +210,7 @@ def _resume_point(state: JournalState, decoded: Toolpath, tool_at: ToolAt) -> Re
 def _shift(path: Toolpath, by_mm: Floats) -> Toolpath:
     """Return the path shifted by `by_mm` (3,)."""
     return replace(
-        path,
-        start=path.start + by_mm,
-        end=path.end + by_mm,
-        centre=path.centre + by_mm[:2],
+        path, start=path.start + by_mm, end=path.end + by_mm, centre=path.centre + by_mm[:2]
     )
 
 

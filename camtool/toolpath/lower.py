@@ -275,7 +275,5 @@ def within_feeds(toolpath: Toolpath, machine: Machine) -> Toolpath:
         measured=max_feed, limit=limit, cuts=int(fast.sum()), machine=machine.target.name
     )
     return replace(
-        toolpath,
-        feed=np.where(fast, limit, toolpath.feed),
-        findings=(*toolpath.findings, finding),
+        toolpath, feed=np.where(fast, limit, toolpath.feed), findings=(*toolpath.findings, finding)
     )

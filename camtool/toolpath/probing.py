@@ -255,12 +255,7 @@ def _side(
 
 
 def corner(
-    start: Place,
-    senses: tuple[int, int],
-    how: Touch,
-    along_mm: float,
-    *,
-    is_inside: bool = False,
+    start: Place, senses: tuple[int, int], how: Touch, along_mm: float, *, is_inside: bool = False
 ) -> Measured:
     """Touch the two sides of a corner, in the direction `senses` of X and of Y. If zero is set,
     the corner becomes X0 Y0.

@@ -37,18 +37,7 @@ from camtool.simulation.timing import TimedChunk, reversals_of
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import FlashcutController, FlashcutDialect
-from .steps import (
-    HOME_X,
-    HOME_Y,
-    HOME_Z,
-    XY,
-    Counters,
-    Issued,
-    Moves,
-    Rules,
-    Z,
-    timers_fill,
-)
+from .steps import HOME_X, HOME_Y, HOME_Z, XY, Counters, Issued, Moves, Rules, Z, timers_fill
 from .timers import feeds_of, half_periods_ms, shortest_ms
 
 _Machine = Machine[FlashcutController, FlashcutDialect]

@@ -64,11 +64,7 @@ MOTIONS: Final = frozenset({"G00", "G01", "G02", "G03"})
 MORE_FEEDS: Final = {"G01": ("ZF",), "G02": ("XYIJF",), "G03": ("XYIJF",)}
 """Further templates where feeds may stand everywhere."""
 
-SPINDLE: Final = {
-    "M03": Kind.SPINDLE_CW,
-    "M04": Kind.SPINDLE_CCW,
-    "M05": Kind.SPINDLE_OFF,
-}
+SPINDLE: Final = {"M03": Kind.SPINDLE_CW, "M04": Kind.SPINDLE_CCW, "M05": Kind.SPINDLE_OFF}
 NOT_INCHES: Final = frozenset({"G20", "G21", "G30", "G31"})
 """Arcs in the list that the thesis cites (L393-432), which it does not implement."""
 

@@ -92,10 +92,7 @@ class _CoilRun:
 
     def __init__(self, toolpath: Toolpath, run: FlashcutRun, machine: _Machine) -> None:
         controller = machine.controller
-        self._parts, self._states = (
-            controller.half_periods_per_step,
-            states_per_step(controller),
-        )
+        self._parts, self._states = (controller.half_periods_per_step, states_per_step(controller))
         self._clock = MoveClock(run, machine)
         self._spindle = _spindle_senses(toolpath, spins_always=not machine.dialect.spindle_stops)
         self._done: tuple[int, Ints] | None = None

@@ -34,26 +34,10 @@ from camtool.toolpath.words import WordColumn, texts_of
 from .arcs import ArcCounts, RowArcs, arcs_of
 from .checks import check, feed_units
 from .comments import comments, header
-from .cycles import (
-    CYCLE,
-    THREAD,
-    Cycle,
-    CycleHole,
-    cycle_blocks,
-    holes_of,
-    rows_kept,
-    threads_of,
-)
+from .cycles import CYCLE, THREAD, Cycle, CycleHole, cycle_blocks, holes_of, rows_kept, threads_of
 from .dialect import UNITS, GcodeDialect, Unit, feed_decimals
 from .findings import ARC_MENDED, MOVE_COLLAPSED, VALUE_ROUNDED
-from .format import (
-    NumberStyle,
-    check_length,
-    format_column,
-    format_number,
-    values_of,
-    word_of,
-)
+from .format import NumberStyle, check_length, format_column, format_number, values_of, word_of
 
 VALUE: Final = NumberStyle(3, strip=True)
 """Spindle speeds and dwells are written to a thousandth."""
@@ -224,10 +208,7 @@ def in_units(
     places = {name: getattr(toolpath, name) / unit.mm for name in ("end", "centre", "start")}
     lengths = {name: getattr(dialect, name) / unit.mm for name in ARC_LENGTHS}
     decimals = dialect.decimals + unit.more_decimals
-    return (
-        replace(toolpath, **places),
-        replace(dialect, decimals=decimals, **lengths),
-    )
+    return (replace(toolpath, **places), replace(dialect, decimals=decimals, **lengths))
 
 
 def _path_modes(

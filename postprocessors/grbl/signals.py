@@ -19,14 +19,7 @@ from camtool.simulation.pulses import Pulses, in_order
 from camtool.target.signals import Board, SignalModel, StepDirection
 from camtool.toolpath.moves import Toolpath
 
-from .controller import (
-    Blocks,
-    GrblModel,
-    PlannedBlocks,
-    dwells_of,
-    idle_delay_s,
-    plan_to_end,
-)
+from .controller import Blocks, GrblModel, PlannedBlocks, dwells_of, idle_delay_s, plan_to_end
 from .dialect import GrblController, GrblDialect
 from .steps import Segments
 

@@ -226,11 +226,7 @@ class GrblWire(Wire):
         return GrblTerminal()
 
     def command(
-        self,
-        action: str,
-        machine: GrblMachine,
-        values: Mapping[str, float],
-        manner: Manner,
+        self, action: str, machine: GrblMachine, values: Mapping[str, float], manner: Manner
     ) -> GrblConversation:
         """Return the conversation that homes (`$H`), unlocks (`$X`), zeroes (G10 L20 of G54) or
         jogs (`$J=`)."""
@@ -1524,13 +1520,7 @@ def _parse_report(line: str) -> bool:
     return bool(_STATUS.fullmatch(line) or _BANNER.match(line))
 
 
-SWITCHES: Final = {
-    "P": "probe",
-    "D": "door",
-    "H": "hold",
-    "R": "reset",
-    "S": "start",
-}
+SWITCHES: Final = {"P": "probe", "D": "door", "H": "hold", "R": "reset", "S": "start"}
 """Letters of a report's `Pn:`; others are limit switches of axes (report.c)."""
 
 

@@ -45,11 +45,7 @@ def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
 
     header = tuple(block.format(unit=unit.word) for block in HEADER)
     style = ProgramStyle(
-        dialect,
-        header,
-        lambda event: _words(event, dialect),
-        mounted=mounted,
-        model=GrblModel(),
+        dialect, header, lambda event: _words(event, dialect), mounted=mounted, model=GrblModel()
     )
     program = write_modal(toolpath, machine, style)
     return replace(program, findings=(*program.findings, *_by_hand(toolpath, dialect)))

@@ -103,11 +103,7 @@ class I8751Wire(Wire):
         return I8751Terminal()
 
     def command(
-        self,
-        action: str,
-        machine: I8751Machine,
-        values: Mapping[str, float],
-        manner: Manner,
+        self, action: str, machine: I8751Machine, values: Mapping[str, float], manner: Manner
     ) -> I8751Conversation:
         """Return the conversation of a jog: a program of its steps, at the machine's only speed.
         Homing is an empty program behind a reset."""

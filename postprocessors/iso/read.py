@@ -26,11 +26,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Listing
 
 from ..gcode.faults import LineFault
-from ..gcode.findings import (
-    NEVER_READ,
-    SPINDLE_SPEED_NOT_SAID,
-    WORDS_PASSED_OVER_PAUSE,
-)
+from ..gcode.findings import NEVER_READ, SPINDLE_SPEED_NOT_SAID, WORDS_PASSED_OVER_PAUSE
 from ..gcode.part_moves import PLANES, PartMoves, turn_of
 from ..gcode.plain_moves import FastFeeds
 from .cycles import CycleWords, HoleMoves, cycles_of, run_hole
@@ -727,10 +723,7 @@ class _Execution:
         if (radius > 0.0) != ccw:
             height = -height
         x, y = (end[0] - begin[0]) / chord, (end[1] - begin[1]) / chord
-        return (
-            (begin[0] + end[0]) / 2.0 - y * height,
-            (begin[1] + end[1]) / 2.0 + x * height,
-        )
+        return ((begin[0] + end[0]) / 2.0 - y * height, (begin[1] + end[1]) / 2.0 + x * height)
 
     # Cycles
 

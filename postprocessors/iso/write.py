@@ -198,13 +198,10 @@ class TextForm:
         dialect = machine.dialect
         self._words = dialect.words
         self.number = dialect.program.number
-        self.modes = {
-            "{units}": dialect.unit.word,
-            "{feeds}": _FEED_CODES[dialect.feeds.mode],
-        }
+        self.modes = {"{units}": dialect.unit.word, "{feeds}": _FEED_CODES[dialect.feeds.mode]}
         self.decimals = dialect.words.decimals + dialect.unit.more_decimals
         self.feed_decimals = {
-            "per-minute": feed_decimals(machine) + dialect.unit.more_decimals,
+            "per-minute": feed_decimals(machine) + dialect.unit.more_decimals
         }.get(dialect.feeds.mode, dialect.feeds.decimals)
 
     def length(self, letter: str, units: Ints, written: Bools) -> WordColumn:

@@ -21,10 +21,7 @@ from .lines import AXES
 from .parameters import Parameters
 from .state import InterpreterNotes, InterpreterState
 
-FRAMES: Final = {
-    **{540 + 10 * k: k + 1 for k in range(6)},
-    **{591 + k: k + 7 for k in range(3)},
-}
+FRAMES: Final = {**{540 + 10 * k: k + 1 for k in range(6)}, **{591 + k: k + 7 for k in range(3)}}
 """G54 to G59.3, tenfold, by number: the parameters of frame n begin at 5201 + 20 n."""
 
 HOMES: Final = {280: 5161, 281: 5161, 300: 5181, 301: 5181}

@@ -279,11 +279,7 @@ class BlockMoves(FrameCodes):
         self._put(compensation.arc(ProgrammedArc(end, centre, turn), self._flat(), spread))
 
     def _centre(
-        self,
-        begin: list[float],
-        end: list[float],
-        letters: list[str],
-        offsets: dict[str, float],
+        self, begin: list[float], end: list[float], letters: list[str], offsets: dict[str, float]
     ) -> tuple[float, float]:
         """Return the centre that I, J and K give; LineFault where the radii at both ends differ
         too much."""

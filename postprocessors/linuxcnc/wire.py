@@ -184,11 +184,7 @@ class LinuxcncWire(Wire):
         return (-x, -x, -x), (x, x, x)
 
     def command(
-        self,
-        action: str,
-        machine: LinuxcncMachine,
-        values: Mapping[str, float],
-        manner: Manner,
+        self, action: str, machine: LinuxcncMachine, values: Mapping[str, float], manner: Manner
     ) -> LinuxcncConversation:
         """Return the conversation that homes (`set home -1`), zeroes (G10 L20 of the active frame)
         or jogs (`set jog_incr`), axis by axis, or repeatedly while a key is held."""
@@ -428,11 +424,7 @@ class LinuxcncConversation(Conversation):
         for name, expected, mend in (
             ("estop", "OFF", "its emergency stop is pressed: release it at the machine"),
             ("machine", "ON", "it is off: switch it on at the machine"),
-            (
-                "program_status",
-                "IDLE",
-                "a program runs on it: wait for its end, or abort it",
-            ),
+            ("program_status", "IDLE", "a program runs on it: wait for its end, or abort it"),
         ):
             if (yield from self._get(name)).upper() != expected:
                 raise _Refused(mend)

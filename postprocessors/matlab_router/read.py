@@ -224,13 +224,7 @@ class DrivenLines:
             self._bend(points, travel, speed, took, parted, times)
 
     def _bend(
-        self,
-        points: Ints,
-        travel: Floats,
-        speed: Ints,
-        took: Floats,
-        bent: Bools,
-        times: Ints,
+        self, points: Ints, travel: Floats, speed: Ints, took: Floats, bent: Bools, times: Ints
     ) -> None:
         """Fill in the two rows of each bent line: both axes move up to the bend, then the later
         one moves alone."""

@@ -17,15 +17,7 @@ import numpy as np
 from camtool.arrays import Ints
 from camtool.errors import MachineError, PostError
 from camtool.target.terminal import Terminal
-from camtool.target.wire import (
-    LATE_S,
-    Forecast,
-    Manner,
-    Packet,
-    PacketByPacket,
-    Reopen,
-    Wire,
-)
+from camtool.target.wire import LATE_S, Forecast, Manner, Packet, PacketByPacket, Reopen, Wire
 
 from .dialect import (
     FIXED_Y_UNITS,

@@ -130,11 +130,7 @@ class PicMmhWire(Wire):
         return PicMmhTerminal(machine)
 
     def command(
-        self,
-        action: str,
-        machine: PicMmhMachine,
-        values: Mapping[str, float],
-        manner: Manner,
+        self, action: str, machine: PicMmhMachine, values: Mapping[str, float], manner: Manner
     ) -> PicMmhConversation:
         """Return the conversation of a command: `H;` homes; `Q;` zeroes all axes at once;
         `PX+1000;` jogs by steps; `JX+;` moves one axis until it is stopped ("hold")."""

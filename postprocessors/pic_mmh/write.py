@@ -274,9 +274,7 @@ class _Writer:
         numbers."""
         numbers, grid = self._numbers, self._grid
         units = np.where(
-            arcs.at_end[:, None],
-            numbers.end_units[arcs.row, :2],
-            grid.nearest_units(arcs.stop),
+            arcs.at_end[:, None], numbers.end_units[arcs.row, :2], grid.nearest_units(arcs.stop)
         )
         units = np.where(arcs.at_start[:, None], points.before, units)
         centre = numbers.centre_units[arcs.row]

@@ -91,11 +91,7 @@ class ValcncWire(Wire):
         return ValcncTerminal()
 
     def command(
-        self,
-        action: str,
-        machine: ValcncMachine,
-        values: Mapping[str, float],
-        manner: Manner,
+        self, action: str, machine: ValcncMachine, values: Mapping[str, float], manner: Manner
     ) -> Conversation:
         """Return the conversation of a jog: a program of one block, or of two where Z moves too,
         up first or down last. Other actions as for all wires; MachineError for a zero."""

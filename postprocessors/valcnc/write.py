@@ -39,13 +39,7 @@ from ..gcode.plain import (
 from .dialect import ValcncDialect, ValcncMachine, scales_of
 from .findings import ARC_MENDED, COORDINATES_SCALED, EVENT_LEFT_OUT, FEED_ROUNDED
 
-UNSAID: Final = (
-    Kind.DWELL,
-    Kind.SPINDLE_CW,
-    Kind.SPINDLE_CCW,
-    Kind.SPINDLE_OFF,
-    Kind.TOOL_CHANGE,
-)
+UNSAID: Final = (Kind.DWELL, Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.SPINDLE_OFF, Kind.TOOL_CHANGE)
 
 MAX_UNITS: Final = 99_999.0
 """An arc becomes lines when its centre is farther from its start (in units of the program)."""

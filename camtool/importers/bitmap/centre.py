@@ -273,10 +273,7 @@ def _middles(nodes: dict[Pixel, int]) -> dict[int, tuple[float, float]]:
 
 
 def _pair_straightest(
-    chains: list[list[Pixel]],
-    arms: list[tuple[int, bool]],
-    middle: tuple[float, float],
-    look: int,
+    chains: list[list[Pixel]], arms: list[tuple[int, bool]], middle: tuple[float, float], look: int
 ) -> dict[tuple[int, bool], tuple[int, bool]]:
     """Return the pairs of chain ends that continue each other at a junction, both ways round.
 
@@ -300,9 +297,7 @@ def _pair_straightest(
 
 
 def _paths(
-    count: int,
-    chains: list[list[Pixel]],
-    continuations: dict[tuple[int, bool], tuple[int, bool]],
+    count: int, chains: list[list[Pixel]], continuations: dict[tuple[int, bool], tuple[int, bool]]
 ) -> list[tuple[list[tuple[int, bool]], bool]]:
     """Return paths of chains that continue each other: each chain's index with True if it runs
     backwards, and for the path True if it is closed."""

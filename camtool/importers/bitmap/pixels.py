@@ -119,7 +119,5 @@ def _too_large(size: str, file: str) -> DrawingError:
 
 def _broken_file_error(file: str) -> DrawingError:
     return DrawingError(
-        "is a broken PNG or JPEG",
-        file=file,
-        mend="save it again from the program that made it",
+        "is a broken PNG or JPEG", file=file, mend="save it again from the program that made it"
     )

@@ -32,12 +32,7 @@ MAX_TEXT_LENGTH = 2000
 
 _ROTATED, _ALIGNED, _DIAMETER, _RADIUS = 0, 1, 3, 4
 _TYPE = 0x0F
-_NOT_READ = {
-    2: "is an angle",
-    5: "is an angle",
-    6: "is an ordinate",
-    8: "is the length of an arc",
-}
+_NOT_READ = {2: "is an angle", 5: "is an angle", 6: "is an ordinate", 8: "is the length of an arc"}
 _VALUES = {
     3: "dimpost",
     47: "dimtp",
@@ -126,11 +121,7 @@ def _measured_places(
         return "linear", [dxf.defpoint2, dxf.defpoint3], direction
     if kind in (_DIAMETER, _RADIUS):
         require(entity, ("defpoint", "defpoint4"))
-        return (
-            "diameter" if kind == _DIAMETER else "radius",
-            [dxf.defpoint, dxf.defpoint4],
-            None,
-        )
+        return ("diameter" if kind == _DIAMETER else "radius", [dxf.defpoint, dxf.defpoint4], None)
     raise Unusable(_NOT_READ.get(kind, "is of a type that is not known"))
 
 

@@ -29,14 +29,7 @@ _SPACES = re.compile(r"[*$](model|paper)_space", re.IGNORECASE)
 _MAX_COLOUR = 257
 _NAME, _ELEVATION, _PAPER, _EMBEDDED = 2, 38, 67, 101
 
-_COMMON = {
-    5: "handle",
-    6: "linetype",
-    8: "layer",
-    60: "invisible",
-    62: "color",
-    420: "true_color",
-}
+_COMMON = {5: "handle", 6: "linetype", 8: "layer", 60: "invisible", 62: "color", 420: "true_color"}
 _ROUND = {10: "center", 40: "radius", 210: "extrusion"}
 _ELLIPSE = {10: "center", 11: "major_axis", 40: "ratio", 41: "start_param", 42: "end_param"}
 _ATTRIBUTES = {
@@ -51,10 +44,7 @@ _ATTRIBUTES = {
 }
 """The kinds that are read here, and the names of their attributes by group code."""
 
-_LISTS = {
-    "LWPOLYLINE": (10, 40, 41, 42),
-    "SPLINE": (10, 11, 40, 41),
-}
+_LISTS = {"LWPOLYLINE": (10, 40, 41, 42), "SPLINE": (10, 11, 40, 41)}
 """The group codes that a kind repeats."""
 
 _POINTS = frozenset((10, 11, 12, 13, 210))

@@ -144,10 +144,7 @@ _NO_PART = {
 }
 """$INSUNITS in which no part is drawn."""
 
-_GUESSES = {
-    0: ("in", 25.4, "inches", Severity.WARNING),
-    1: ("mm", 1.0, "metric", Severity.INFO),
-}
+_GUESSES = {0: ("in", 25.4, "inches", Severity.WARNING), 1: ("mm", 1.0, "metric", Severity.INFO)}
 """$MEASUREMENT, and how much is at stake when the guess is wrong."""
 
 

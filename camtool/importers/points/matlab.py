@@ -159,10 +159,7 @@ class _Job:
         return np.asarray(length * np.sign(speed))
 
     def _agree(
-        self,
-        points: Floats,
-        lengths: tuple[Floats, int] | None,
-        speeds: tuple[Floats, int] | None,
+        self, points: Floats, lengths: tuple[Floats, int] | None, speeds: tuple[Floats, int] | None
     ) -> None:
         """Raise DrawingError if the lengths, directions, count or first point contradict xy."""
         steps = np.diff(points, axis=0)

@@ -39,13 +39,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     units = _units(table, options)
     pieces = [piece_of(stroke, units.mm_per_unit) for stroke in table.strokes]
     del data, table  # their numbers are in the pieces
-    return assemble(
-        pieces,
-        file=file,
-        units=units,
-        used={"stroke": len(pieces)},
-        options=options,
-    )
+    return assemble(pieces, file=file, units=units, used={"stroke": len(pieces)}, options=options)
 
 
 def _table(data: bytes, file: str) -> PointTable:

@@ -401,8 +401,7 @@ class SvgWalk:
         self._by_use += cost
         if self._by_use > MAX_USED:
             raise DrawingError(
-                f"more than {MAX_USED} elements and curves are drawn through use",
-                where=node.label,
+                f"more than {MAX_USED} elements and curves are drawn through use", where=node.label
             )
 
 

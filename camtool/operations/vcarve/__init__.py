@@ -5,13 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, OperationKind
 VCARVE = OperationKind(
     name="vcarve",
     work="camtool.operations.vcarve.work:vcarve",
-    keys=(
-        *COMMON_KEYS,
-        *SELECTING_KEYS,
-        "depth",
-        "step_down",
-        "last_pass",
-    ),
+    keys=(*COMMON_KEYS, *SELECTING_KEYS, "depth", "step_down", "last_pass"),
     rank=6,
     cuts="within",
     rest="floor",

@@ -219,9 +219,7 @@ def _too_narrow(region: _Region, trace: MedialTrace, cone: Cone) -> Iterator[Fin
     tip, widest = 2.0 * cone.tip_mm, 2.0 * float(trace.rho.max())
     if widest <= tip:
         yield CONTOUR_TOO_SMALL_FOR_TIP(
-            where=at_place(region.name, region.lines[0].start.tolist()),
-            measured=widest,
-            limit=tip,
+            where=at_place(region.name, region.lines[0].start.tolist()), measured=widest, limit=tip
         )
         return
     pieces = unreached(region.lines, cone.tip_mm)

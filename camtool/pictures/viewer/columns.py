@@ -352,12 +352,7 @@ def _wanted_columns(wanted_path: Segments | None) -> Columns:
     }
 
 
-def _arc_columns(
-    name: str,
-    is_arc: Bools,
-    centre: Floats,
-    sweep: Floats,
-) -> Columns:
+def _arc_columns(name: str, is_arc: Bools, centre: Floats, sweep: Floats) -> Columns:
     """Return the indices of the rows that are arcs, and the centre x, y and sweep of each."""
     rows = np.flatnonzero(is_arc)
     bends = np.column_stack([centre[rows], sweep[rows]])

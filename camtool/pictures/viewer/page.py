@@ -42,14 +42,7 @@ from camtool.pictures.colours import (
 from camtool.pictures.content import Content, content_of
 from camtool.pictures.layers import LineGroup, Part, TextGroup, from_the_ground_up, swept_words
 from camtool.pictures.polar import ROOM, circle_pair, dial_of, notes, plot
-from camtool.pictures.scene import (
-    Playback,
-    ReportTable,
-    Scene,
-    StockPair,
-    by_feed,
-    stock_pair,
-)
+from camtool.pictures.scene import Playback, ReportTable, Scene, StockPair, by_feed, stock_pair
 from camtool.pictures.svg import Look, element, number
 from camtool.pictures.viewer.columns import (
     Columns,
