@@ -8,8 +8,7 @@
     camtool.preview(posted).save("logo.svg")
 
 What stands in `__all__` lives in `camtool.api` and is loaded when it is first used, so that
-`import camtool` costs nothing (docs/decisions/0015-python.md).
-"""
+`import camtool` costs nothing (docs/decisions/0015-python.md)."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
 `import camtool` provides all of it. The result of one call is passed to the next; none of these
 calls writes a file. Lengths are mm, angles rad, feeds mm/min, errors of reports µm. A mistake of
 the caller raises a CamtoolError with one line that says what is wrong, where, and how to correct
-it; what is wrong with a part is a finding in the result, not an exception.
-"""
+it; what is wrong with a part is a finding in the result, not an exception."""
 
 from __future__ import annotations
 
@@ -138,8 +137,7 @@ def read_drawing(
     `offsets` (M+1,), `closed` (M,); `layers`, `colours` and `sources` have M items each. Lines
     and arcs are exact; other curves become arcs within `tolerance_mm`, by default that of the
     `target` if one is given. Tolerances apply to the part: give its `scale` where a job scales it.
-    Raises DrawingError, and OptionError for options that cannot be. Source: docs/formats.md.
-    """
+    Raises DrawingError, and OptionError for options that cannot be. Source: docs/formats.md."""
     options = options_of(reading, _machine_of(target))
     if isinstance(drawing, Drawing):
         raise OptionError("drawing is read already", mend="pass it on, or read its source anew")
@@ -153,8 +151,7 @@ def check(
     smallest features, open ends, repairs and findings; mm.
 
     Options are those of `read_drawing`, and none for a drawing that is read already. Raises as
-    `read_drawing` does. Source: docs/formats.md.
-    """
+    `read_drawing` does. Source: docs/formats.md."""
     if isinstance(drawing, Drawing) and not reading and target is None:
         return facts_of(drawing)
     return facts_of(read_drawing(drawing, target=target, **reading))
@@ -174,8 +171,7 @@ def read_job(
     `operations`: only those, by name or number. With a `drawing`, layers and colours that it lacks
     are refused; its file is read as finely as the `target` needs. `libraries`: files of tools that
     the job may name, the nearest first. Raises OptionError, which names
-    file, table, key and the correction. Source: docs/jobs.md.
-    """
+    file, table, key and the correction. Source: docs/jobs.md."""
     job = job_of_file(Path(file), _patterns(operations), tuple(map(Path, libraries)))
     if isinstance(drawing, Drawing):
         refuse_unmatched(drawing, job)
@@ -220,8 +216,7 @@ def job_of(**settings: Any) -> Job:
     Texts and lists are read as in a job file: `depth_mm="1/8in"`, `tabs="4:3mm:1mm"`,
     `layers="CUT"` (one layer; several are separated by commas); so are the numbers of `tabs`,
     `lead_in` and the like. Other numbers are mm, rad, s and mm/min. Raises TypeError for an
-    unknown name, and OptionError, which names the field, for a value that it cannot have.
-    """
+    unknown name, and OptionError, which names the field, for a value that it cannot have."""
     return made(**{name: field_value(name, value) for name, value in settings.items()})
 
 
@@ -240,8 +235,7 @@ def offset(
 
     `joins`: what is about outer corners; a "mitre" longer than `mitre_limit` times the distance
     is cut off. Open contours and marks are left out. Raises OptionError for joins that do not
-    exist, and where nothing is left. Source: camtool/geometry/offset.py.
-    """
+    exist, and where nothing is left. Source: camtool/geometry/offset.py."""
     read = as_drawing(drawing, None, Job())
     layers = np.array(read.layers, dtype=object)
     parts: list[Polylines] = []
@@ -283,8 +277,7 @@ def load_target(
     without a name, the target that the file extends.
 
     `settings`: {"axes.x.backlash_mm": 0.2}, or a list as for `--set`. The suffix of a key says its
-    unit. Raises UnknownTargetError (with the nearest names) and MachineError.
-    """
+    unit. Raises UnknownTargetError (with the nearest names) and MachineError."""
     if isinstance(settings, Mapping):
         settings = [f"{key}={_as_toml(value)}" for key, value in settings.items()]
     file = None if machine is None else Path(machine)
@@ -321,8 +314,7 @@ def plan(drawing: Drawable, target: str | LoadedTarget, job: Job | None = None) 
     N rows in columns: `kind` (N,), `end` (N, 3), `centre` (N, 2), `feed` (N,). Without a job, a
     tool of no width follows all lines; `job_of(tool_diameter_mm=0.2, side="auto")` makes a simple
     one. Of a file, only the layers that the operations name are cut. Raises OptionError where the
-    drawing or the machine does not allow what the job asks. Source: docs/toolpaths.md.
-    """
+    drawing or the machine does not allow what the job asks. Source: docs/toolpaths.md."""
     from camtool.planning.plan import plan as planned
 
     loaded_target, job_used = as_target(target), job or Job()
@@ -345,8 +337,7 @@ def post(
     `data` are the bytes of the program, `verification` its figures (None with `check=False`),
     `findings` those of all stages. `compensate`, as the job's, corrects the path for
     backlash, scale and squareness; exceeding one of the `gates` is a finding. Raises OptionError,
-    and PostError for what the machine or its dialect cannot do. Source: docs/verifying.md.
-    """
+    and PostError for what the machine or its dialect cannot do. Source: docs/verifying.md."""
     loaded_target, job_used = as_target(target), _with_compensation(job, compensate)
     read = as_drawing(drawing, loaded_target, job_used)
     return post_drawing(read, job_used, loaded_target, check=check, gates=gates)
@@ -365,8 +356,7 @@ def post_by_tool(
     machines without a tool changer; otherwise as `post`.
 
     All of them are planned together, in one work frame; each is complete, and judged alone against
-    what its operations ask for. Raises as `post` does. Source: docs/verifying.md.
-    """
+    what its operations ask for. Raises as `post` does. Source: docs/verifying.md."""
     loaded_target, job_used = as_target(target), _with_compensation(job, compensate)
     read = as_drawing(drawing, loaded_target, job_used)
     return by_tool(read, job_used, loaded_target, check=check, gates=gates)
@@ -385,8 +375,7 @@ def post_by_setup(
     job; otherwise as `post`.
 
     `job.setup(NAME)` is the job of one of them. Raises as `post` does, and OptionError for a job
-    without set-ups. Source: docs/jobs.md.
-    """
+    without set-ups. Source: docs/jobs.md."""
     loaded_target, job_used = as_target(target), _with_compensation(job, compensate)
     read = as_drawing(drawing, loaded_target, job_used)
     return by_setup(read, job_used, loaded_target, check=check, gates=gates)
@@ -410,8 +399,7 @@ def inspect(
 
     `tolerances`: the file that names them besides those of the drawing; None: these alone. What
     falls short of `require` is an error of `findings`. Raises OptionError for a wrong file,
-    and where the job scales the part. Source: docs/tolerances.md, ISO 14253-1.
-    """
+    and where the job scales the part. Source: docs/tolerances.md, ISO 14253-1."""
     from camtool.inspection.tolerances import dimensions_of
     from camtool.inspection.verdicts import Tolerances
     from camtool.inspection.verdicts import inspect as inspected
@@ -436,8 +424,7 @@ def meet(
     `tolerances` as for `inspect`; `job`: the file (None: a tool of no width follows all lines).
     `max_trials` programs are tried (None: 100). `text` is the new job file, `run` its program;
     `certificate` says why no job does, None where one does. Raises OptionError where the job
-    has errors, and where no dimension has limits. Source: docs/tolerances.md.
-    """
+    has errors, and where no dimension has limits. Source: docs/tolerances.md."""
     from camtool.inspection.meet import DEFAULT_TRIALS, MeetingCase
     from camtool.inspection.meet import meet as met
     from camtool.inspection.tolerances import dimensions_of
@@ -470,8 +457,7 @@ def convert(
     `program`: its bytes or its file. `feed_mm_min` replaces all feeds. Of the result, `data` are
     the new bytes and `verification` the figures (None with `check=False`). Raises ProgramError
     with block and column, and PostError for what the second machine cannot do. Source:
-    docs/verifying.md, docs/dialects.
-    """
+    docs/verifying.md, docs/dialects."""
     before, after = as_target(from_), as_target(to)
     data, source = as_bytes(program)
     return convert_program(data, before, after, file=source, feed_mm_min=feed_mm_min, check=check)
@@ -483,8 +469,7 @@ def cut_stock(run: Run, job: Job | None = None) -> CutStock:
     `heights(points)` gives the exact height over points (J, 2), 0 at the top, and `bounds(points)`
     what it may be; `section("x", 20.0)` a profile, `removed_mm3()` the volume between two bounds.
     The tools are those of the run's job, or of `job`. Raises OptionError where a tool is not
-    known. Source: docs/stock.md.
-    """
+    known. Source: docs/stock.md."""
     if run.decoded is None or run.target is None:
         raise OptionError("a run without a program leaves no stock", mend="post a drawing")
     return stock_after(run.decoded, run.target, run.job if job is None else job)
@@ -508,8 +493,7 @@ def verify(
     the program is checked against what the job asks for: cuts, direction, feeds, spindle, tool,
     clearance, end. A failed check is in `report`, not raised. `report` holds errors
     in µm, sizes in mm, times in s. Raises ProgramError with block and column, and OptionError.
-    Source: docs/verifying.md.
-    """
+    Source: docs/verifying.md."""
     loaded_target, job_used = as_target(target), job or Job()
     data, source = as_bytes(program)
     read = None if against is None else as_drawing(against, loaded_target, job_used)
@@ -524,8 +508,7 @@ def signals(program: bytes | Program | str | Path, target: str | LoadedTarget) -
 
     `count()` gives the steps of each motor and the time in s, `levels()` the bytes of all ports in
     chunks, `save("a.vcd")` a dump, a table (.csv) or a picture (.svg, .png). Raises MachineError
-    for a target without steps, ProgramError with block and column. Source: docs/signals.md.
-    """
+    for a target without steps, ProgramError with block and column. Source: docs/signals.md."""
     data, source = as_bytes(program)
     return Signals.of(data, as_target(target), Path(source).name)
 
@@ -545,8 +528,7 @@ def compare(
     "backlash=0,0.1,0.2" (mm), or targets by names of your own. `rows` holds errors in µm and times
     in s, `verdicts` the verification of each variant. Raises ProgramError with block and column,
     OptionError for unknown variants, and MachineError for values that the machine cannot have.
-    Source: docs/verifying.md.
-    """
+    Source: docs/verifying.md."""
     loaded_target, job_used, judging_used = as_target(target), job or Job(), judging or Judging()
     data, source = as_bytes(program)
     read = None if against is None else as_drawing(against, loaded_target, job_used)
@@ -599,8 +581,7 @@ def calibrate(
     `measurements`: the TOML file that `camtool coupon --measurements` begins; it names the target
     unless one is given. `machine`: a file that extends the target with what is known so far.
     `machine_file` of the result is the text of a new one. Raises InputError, which names file,
-    table and key, OptionError and MachineError. Source: docs/calibration.md.
-    """
+    table and key, OptionError and MachineError. Source: docs/calibration.md."""
     machine_path = None if machine is None else Path(machine)
     if not isinstance(measurements, Measurements):
         measurements = read_measurements(Path(measurements))
@@ -628,8 +609,7 @@ class Looks(TypedDict, total=False):
     `exaggerate` the factor by which deviations from the wanted path are enlarged, `layers` the
     names of the layers to show, `polar` the number (from 1) of the circle whose radial errors are
     plotted instead. `view`: "plan" (the moves from above), or the stock after them: "iso",
-    "front", "side", "top", "leftover" or "gouge".
-    """
+    "front", "side", "top", "leftover" or "gouge"."""
 
     size_px: int | None
     crop_mm: tuple[float, float, float, float] | None
@@ -652,8 +632,7 @@ def preview(
 
     Several values are drawn side by side, at one scale and with one scale of errors;
     `titles` replace their own, in order. Raises OptionError for looks that make no picture.
-    Source: docs/pictures.md, docs/viewer.md.
-    """
+    Source: docs/pictures.md, docs/viewer.md."""
     scenes = [_as_shown(each).scene() for each in (what, *others)]
     if len(titles) > len(scenes):
         raise TypeError(f"{len(titles)} titles for {len(scenes)} values")

@@ -1,6 +1,5 @@
 """A Comparison: one program run as several variants, such as with other interpolators, with other
-backlash, or without a part of the mechanics.
-"""
+backlash, or without a part of the mechanics."""
 
 from __future__ import annotations
 
@@ -167,8 +166,7 @@ def variants_of(variants_text: str, load: Load, judging: Judging) -> list[Progra
     """Return the variants that `variants_text` names: `interpolators`, `mechanics`, or
     KEY=VALUE,VALUE,...
 
-    OptionError for anything else, and MachineError for values that the machine cannot have.
-    """
+    OptionError for anything else, and MachineError for values that the machine cannot have."""
     if variants_text == "interpolators":
         return _interpolators(load(()), judging)
     if variants_text == "mechanics":

@@ -13,8 +13,7 @@
 
 Every message is one line: what is wrong, where, and how to fix it. Findings of severity
 error are not exceptions: they are collected (see `camtool.findings`) and give exit code 1.
-Any other exception is a fault of camtool itself: exit code 3.
-"""
+Any other exception is a fault of camtool itself: exit code 3."""
 
 from __future__ import annotations
 

@@ -7,8 +7,7 @@ lowest room that all of them may import. A machine's own sentences stand in its 
 plug-in adds codes of its own there too (`TargetCode`). docs/findings.md is made from all of them.
 
 Numbers are stable: add, never renumber. Hundreds: 1xx drawing, 2xx planning, 3xx program, 4xx
-motion and result, 5xx inspection, 6xx stock.
-"""
+motion and result, 5xx inspection, 6xx stock."""
 
 from __future__ import annotations
 
@@ -38,8 +37,7 @@ ERROR: Final = Severity.ERROR
 class Code(IntEnum):
     """A code: number, severities (the usual one first), its meaning, and the remedy.
 
-    Each room has an enumeration of its own codes, which is a subclass of this one.
-    """
+    Each room has an enumeration of its own codes, which is a subclass of this one."""
 
     severities: tuple[Severity, ...]
     means: str
@@ -78,8 +76,7 @@ class TargetCode(FrozenRecord):
 class Finding(FrozenRecord):
     """A remark, warning or error with its place, the measured value and the limit, if any.
 
-    `unit` belongs to both `measured` and `limit` ("mm", "um", "chars", "mm_min", ...).
-    """
+    `unit` belongs to both `measured` and `limit` ("mm", "um", "chars", "mm_min", ...)."""
 
     code: Code | TargetCode
     severity: Severity

@@ -7,8 +7,7 @@
 
 Whatever is wrong is an OptionError that names the file, the table and the key (or the flag), and
 says how to fix it. `camtool.jobs.keys` has the keys of jobs; an operation may bring keys of its
-own (`camtool.planning.kinds`).
-"""
+own (`camtool.planning.kinds`)."""
 
 from __future__ import annotations
 
@@ -64,8 +63,7 @@ class Key(Struct, frozen=True):
     `help` is the help text of its flag; a key without help has no flag. `example` appears in the
     files that `camtool job new` begins. `only`: (other key, its values): with other values of that
     key this one has no effect. `default`: the value of the field if the key is not given, for keys
-    that only one kind of operation has; the defaults of all others are in their records.
-    """
+    that only one kind of operation has; the defaults of all others are in their records."""
 
     field: str
     value: Value
@@ -131,8 +129,7 @@ def record_of(
     """Make the record of a table's values. Each value is first tried alone, so that an error names
     its key.
 
-    `base`: fields that the record cannot be made without, for these trials.
-    """
+    `base`: fields that the record cannot be made without, for these trials."""
     fields: dict[str, Any] = {}
     for name, raw in table.given.items():
         key = keys[name]

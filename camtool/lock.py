@@ -1,8 +1,7 @@
 """A lock file that one process at a time holds, locked by the operating system.
 
 The lock ends with the process, so that it is never stale. The file names the process and is
-removed at the end; after a crash it remains, unlocked, and the next process takes it over.
-"""
+removed at the end; after a crash it remains, unlocked, and the next process takes it over."""
 
 from __future__ import annotations
 
@@ -29,8 +28,7 @@ def held(place: Path, refusal: Callable[[str], Exception]) -> Iterator[bool]:
     """Hold the lock file at `place` within the block; yield False if its file system has no locks.
 
     Raises `refusal(owner)` if another process holds it, where `owner` describes that process, and
-    OSError if the file cannot be made.
-    """
+    OSError if the file cannot be made."""
     handle, locked = _open_locked(place, refusal)
     try:
         with suppress(OSError):  # a full disk: the lock holds without a name in it

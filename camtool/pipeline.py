@@ -8,8 +8,7 @@
     lint_program     bytes of a program → decoded, judged without its motion
     read_program     bytes of a program → decoded, not judged
 
-Nothing here reads or writes a file.
-"""
+Nothing here reads or writes a file."""
 
 from __future__ import annotations
 
@@ -106,8 +105,7 @@ class Judging(FrozenRecord):
     found from the program too. `interpolator` replaces the controller's own; `effects` are the
     parts of the mechanics that act (None: all); exceeding `gates` is a finding. `worst` moves are
     listed, and `trace_points` of the slides' path are kept (None: the default numbers);
-    `keep_ledger` keeps time, steps and reversals of each row.
-    """
+    `keep_ledger` keeps time, steps and reversals of each row."""
 
     interpolator: str | None = None
     effects: Effects | None = None
@@ -147,8 +145,7 @@ def post_drawing(
     `check=False` leaves out the last two; `brief` leaves out the shape of the part that comes out,
     and what the job would be without its measures against reversals and backlash. At most
     `trace_points` of the slides' path are kept (None: the default). `progress` is told of each
-    stage. Raises OptionError, MachineError, and PostError for what the target cannot write.
-    """
+    stage. Raises OptionError, MachineError, and PostError for what the target cannot write."""
     from camtool.stock.before import planned_before
 
     posting = _Posting(check, gates, trace_points, brief, progress=progress or Progress())
@@ -192,8 +189,7 @@ def post_by_tool(
     without a tool changer; otherwise as `post_drawing`.
 
     All are planned together, in one frame, so that they cut what the single program would; each is
-    complete, and is judged alone against what its operations ask for.
-    """
+    complete, and is judged alone against what its operations ask for."""
     from camtool.planning.plan import parted, planned, turns_of_tools
     from camtool.stock.before import planned_before
 
@@ -243,8 +239,7 @@ def post_by_setup(
     otherwise as `post_drawing`.
 
     Each is judged in its own frame, in the stock that the set-ups before it leave. OptionError for
-    a job without set-ups.
-    """
+    a job without set-ups."""
     from camtool.stock.before import stock_before
 
     if not job.setups:
@@ -514,8 +509,7 @@ def convert_program(
     is left out, since a program begins there. Feeds that are too fast for the second machine
     become its highest feed; `feed_mm_min` replaces all feeds. The moves are turned by `turn_deg`
     counter-clockwise about part zero. With a `surface` the cuts follow it, within the machine's
-    tolerance for curves, and are compared with it. ProgramError names file, block and column.
-    """
+    tolerance for curves, and are compared with it. ProgramError names file, block and column."""
     progress = progress or Progress()
     progress.begin(f"reading {PurePath(file).name}")
     decoded = _decode(data, source, file)
@@ -954,8 +948,7 @@ def _row_from(program: Program, decoded: Toolpath, written: Toolpath) -> Indices
     """Return (N,) the row of the written toolpath for each decoded row, −1 for none.
 
     A canned cycle is one block, written from its first cut. Where the controller makes the same
-    moves of it as were planned, each move gets its own row.
-    """
+    moves of it as were planned, each move gets its own row."""
     import numpy as np
 
     last = len(program.row_of_block)

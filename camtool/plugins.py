@@ -1,8 +1,7 @@
 """Entry points of installed packages, by which they add machines, operations and importers.
 
 `importlib.metadata` finds them too, but it loads the package for electronic mail
-(docs/decisions/0085-entry-points.md).
-"""
+(docs/decisions/0085-entry-points.md)."""
 
 from __future__ import annotations
 
@@ -44,8 +43,7 @@ def entry_points(group: str) -> tuple[EntryPoint, ...]:
     """Return the entry points of a group, in the order of `sys.path`.
 
     A search reads a file of every installed package. It is repeated only after a folder of
-    `sys.path` has changed, as it does when a package is installed.
-    """
+    `sys.path` has changed, as it does when a package is installed."""
     return _search(group, _path_state())
 
 

@@ -11,8 +11,7 @@ configuration folder, holds everywhere:
 
 Machine files have names: `my-3018` is `my-3018.toml` beside the project's `camtool.toml`, or in
 `machines/` of the configuration folder. `tools.toml` beside either `camtool.toml` is a library of
-tools.
-"""
+tools."""
 
 from __future__ import annotations
 

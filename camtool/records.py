@@ -1,8 +1,7 @@
 """Records and copies of them.
 
 A record is a frozen `msgspec.Struct`, or a frozen dataclass where users of the Python API hold it
-(docs/decisions/0077-one-way-to-copy-a-record.md). `replace` copies both.
-"""
+(docs/decisions/0077-one-way-to-copy-a-record.md). `replace` copies both."""
 
 from __future__ import annotations
 

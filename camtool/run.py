@@ -1,8 +1,7 @@
 """The Run: one program, its source, its motion, and its verification.
 
 `camtool.pipeline` makes Runs; commands, batches and `import camtool` pass them on. The drawings
-and toolpaths that `import camtool` returns are here too: they show a picture in a notebook.
-"""
+and toolpaths that `import camtool` returns are here too: they show a picture in a notebook."""
 
 from __future__ import annotations
 
@@ -66,8 +65,7 @@ class Run(Shown):
     None when planning found an error; `verification` is None then, and when none was asked for.
     `findings` are those of all stages. `before` is the run of the same job without its measures
     against reversals and backlash, if it takes any; `part` says which of several programs of a
-    drawing it is.
-    """
+    drawing it is."""
 
     source: str
     target: LoadedTarget

@@ -2,8 +2,7 @@
 
 Machine files, job files and measurements come through here. `read_table` reads a file, `convert`
 makes a record of it: an unknown key, a wrong type or a number out of range is an error that says
-which values are allowed. `toml_lines` makes text of tables.
-"""
+which values are allowed. `toml_lines` makes text of tables."""
 
 from __future__ import annotations
 

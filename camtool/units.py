@@ -1,7 +1,6 @@
 """Lengths, angles, feeds and times with their units, converted to plain floats on input.
 
-Inside camtool everything is mm, seconds and radians; feeds are mm/min in toolpaths.
-"""
+Inside camtool everything is mm, seconds and radians; feeds are mm/min in toolpaths."""
 
 from __future__ import annotations
 

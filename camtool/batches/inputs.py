@@ -6,8 +6,7 @@
 
 Outputs keep the path below the folder, or below the part of a pattern that has no wildcard. Names
 that differ only in case, or in how accents are encoded, count as the same: on other computers they
-are one file, and programs are copied there.
-"""
+are one file, and programs are copied there."""
 
 from __future__ import annotations
 
@@ -31,8 +30,7 @@ def find_tasks(
 
     `outputs` are outputs of earlier runs (resolved paths), which are not taken as drawings.
     Raises InputError when a source has no drawing, OutputError when two drawings have the same
-    output.
-    """
+    output."""
     tasks: dict[Path, DrawingTask] = {}
     places = RealPaths()
     for source in sources:
@@ -116,8 +114,7 @@ def files_below(folder: Path, excluded: Path | None = None) -> Iterator[Path]:
     """Yield the files in a folder and below it, sorted, without hidden ones and those in
     `excluded`.
 
-    Raises InputError for a folder that cannot be read, so that no drawing is left out silently.
-    """
+    Raises InputError for a folder that cannot be read, so that no drawing is left out silently."""
     folders = []
     for entry in _entries(folder):
         if entry.name.startswith("."):

@@ -18,8 +18,7 @@ def lock_folder(folder: Path) -> Iterator[bool]:
     system has no locks.
 
     Raises OutputError, which names the process that holds the lock or the reason why the folder
-    cannot be written.
-    """
+    cannot be written."""
 
     def refuse_taken(who: str) -> OutputError:
         return OutputError(

@@ -2,8 +2,7 @@
 
 When a process of a standard library's pool is killed, the whole pool is broken. Here each worker
 has a pipe of its own: the end of the pipe shows which drawing it was making, and a new worker
-takes its place.
-"""
+takes its place."""
 
 from __future__ import annotations
 
@@ -228,8 +227,7 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 def serve(pipe: Connection) -> None:
     """Run a worker: receive a BatchWork, then tasks, until None or the end of the pipe.
 
-    Ctrl-C reaches every process of a terminal; workers ignore it, because the parent ends them.
-    """
+    Ctrl-C reaches every process of a terminal; workers ignore it, because the parent ends them."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in _ONE_THREAD:  # before numpy is loaded: the workers share the cores already
         os.environ.setdefault(name, "1")
@@ -269,8 +267,7 @@ def peak_mib() -> float:
     """Return the peak memory of this process, MiB; 0 if the system does not report it.
 
     Linux's getrusage gives the parent's memory at the fork if that was larger, even after an
-    exec; VmHWM is that of this program alone.
-    """
+    exec; VmHWM is that of this program alone."""
     try:
         status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
         return float(status.partition("VmHWM:")[2].split()[0]) / (1 << 10)

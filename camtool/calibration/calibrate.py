@@ -1,8 +1,7 @@
 """From measurements of coupons to the values of the machine, with their uncertainties.
 
 measurements ─▶ readings, each an equation ─▶ `solve`, least squares ─▶ `calibrate`, in the
-machine's units ─▶ `to_text`, `to_data`
-"""
+machine's units ─▶ `to_text`, `to_data`"""
 
 from __future__ import annotations
 
@@ -77,8 +76,7 @@ class Solution(Struct, frozen=True, eq=False):
     uncertainty of the instrument). `predicted` (n,) mm: the readings by the model; `sigma` (n,)
     mm: standard deviations of the residuals, nan where not known. `freedom`: number of readings
     less that of estimated parameters. `spread`: s, in mm where the u_i are not known, else in
-    their units; nan without freedom.
-    """
+    their units; nan without freedom."""
 
     values: Floats
     covariance: Floats
@@ -131,8 +129,7 @@ def _sigma(residual: Floats, leverage: Floats, freedom: int, *, has_uncertainty:
     readings.
 
     Without reading i the sum of squares is smaller by r_i² / (1 − h_i), h the leverage. A reading
-    that alone determines a parameter (h = 1) has no residual.
-    """
+    that alone determines a parameter (h = 1) has no residual."""
     redundancy = np.clip(1.0 - leverage, 0.0, 1.0)
     is_testable = redundancy > SINGULAR
     sigmas = np.full(len(residual), 1.0 if has_uncertainty else np.nan)
@@ -278,8 +275,7 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
     """Estimate the values of `machine` from measurements.
 
     InputError for a file of another target, a file without measurements, and a backlash below
-    zero.
-    """
+    zero."""
     _check_target(measurements, machine)
     readings = readings_of(measurements, machine)
     if not readings:
@@ -382,8 +378,7 @@ def _known_uncertainty(model: Model, solution: Solution) -> Uncertainty:
     Of the cells of an axis J takes the mean; their variance is the mean of those of the cells,
     which is more than that of the mean: a part lies in few cells. Readings that fit without any
     residual say nothing of their uncertainty. Where all coupons were cut with compensation, what
-    it errs by is in the backlash.
-    """
+    it errs by is in the backlash."""
     covariance = np.nan_to_num(solution.covariance)
     certain = ~(np.diag(covariance) > 0.0)
     rows = {

@@ -14,8 +14,7 @@ in the middle of their longest line, they reach every mark after a run-up.
 Squares are open, with a hook beside a corner at both ends: cut from either end, opposite edges are
 reached from opposite sides. Circles are closed and begin where X reverses. (Two joined
 lines: PIC thesis, L2353-2423; parallel-port thesis, L1165; squares and circles: PIC thesis,
-L2457-2594; steps: ValCNC thesis, L1645.)
-"""
+L2457-2594; steps: ValCNC thesis, L1645.)"""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """The machine file of a calibration, for `--machine`: it extends the target.
 
 The values of the user's own machine file stay; measured values replace them, each with its
-uncertainty and its source in a comment.
-"""
+uncertainty and its source in a comment."""
 
 from __future__ import annotations
 

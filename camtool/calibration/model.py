@@ -38,8 +38,7 @@ the table the circle is sheared and stretched. Because straight lines stay strai
 along the direction t is D(u) / |v| with v = ((cos t − q·sin t) / k_x, sin t / k_y), u = v / |v|.
 
 All equations also accept complex numbers, so that the solver can take derivatives without
-subtraction: the imaginary part of f(p + i·h) / h.
-"""
+subtraction: the imaginary part of f(p + i·h) / h."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
 step.csv ─read_response─▶ MeasuredResponse ─identify─▶ Identification ─design─▶ LoopDesign
 
 The motor is that of `MotorModel`; the loop is the IP controller of the thesis on matlab-router
-(eq. 4.19-4.45, L2267-2880), whose integral alone sees the reference.
-"""
+(eq. 4.19-4.45, L2267-2880), whose integral alone sees the reference."""
 
 from __future__ import annotations
 
@@ -48,8 +47,7 @@ def read_response(text: str, file: str, drive_percent: float | None) -> Measured
     """Read a table of samples: columns `time_s` (or `time_ms`), `speed` or `counts`, and `drive`.
 
     Without a head the columns are seconds, speed and drive. Without a column of the drive it is
-    `drive_percent` from the first sample on. InputError, which names the line.
-    """
+    `drive_percent` from the first sample on. InputError, which names the line."""
     rows = [
         (number, [cell.strip() for cell in row])
         for number, row in enumerate(csv.reader(io.StringIO(text), delimiter=_delimiter(text)), 1)
@@ -214,8 +212,7 @@ def identify(responses: Sequence[MeasuredResponse], tick_s: float) -> Identifica
     """Identify a motor by least squares over all samples of several responses.
 
     The friction is determined by two drives, or by a motor that coasts to rest; otherwise it is 0,
-    and the note says so. InputError for a motor that does not move.
-    """
+    and the note says so. InputError for a motor that does not move."""
     start = _first_guess(responses, tick_s)
     fits = [_fit(responses, tick_s, [*start, friction]) for friction in FRICTIONS]
     best, jacobian, residuals = min(fits, key=lambda fit: float(fit[2] @ fit[2]))

@@ -94,8 +94,7 @@ def batch(
     others; exit code 1 when any failed. Files that no batch made, or
     that were changed since, are replaced only with --force. A job file beside a drawing,
     part.toml for part.dxf, is its job, and part.tolerances.toml has its dimensions; --job and
-    --tolerances are for those without one.
-    """
+    --tolerances are for those without one."""
     if no_verify and (gates.given or reports):
         raise click.UsageError("--no-verify leaves nothing to report or to hold against limits")
     if scheduler is not None and (jobs is not None or timeout is not None):

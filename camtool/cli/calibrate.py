@@ -40,8 +40,7 @@ def calibrate(
     """Estimate steps, backlash and squareness from MEASUREMENTS, a TOML file of measured coupons.
 
     `camtool coupon` draws them and begins that file. With -o, a machine file for --machine is
-    written, with the uncertainty and the source of each number behind it.
-    """
+    written, with the uncertainty and the source of each number behind it."""
     flags = MachineFlags.of(target, machine, ()) if target or machine else None
     check_places([measurements, *(flags.files() if flags else ())], [output, report])
     measured = read_measurements(Path(measurements))

@@ -45,8 +45,7 @@ def check(
     """Say what an importer sees in each DRAWING (- is stdin).
 
     Units and why, size, layers, entities used and not used, gaps, and the smallest features. Of
-    several drawings all are looked at, whatever is wrong with one of them.
-    """
+    several drawings all are looked at, whatever is wrong with one of them."""
     picture.check([preview], DRAWING)
     one = _Check(drawing, report, preview, picture, quiet, verbose)
     if len(sources) == 1:

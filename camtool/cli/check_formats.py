@@ -4,8 +4,7 @@
 
 All three are made from the same records and hold no time and no absolute path, so that the same
 files give the same bytes. Names and texts come from drawings: each writer escapes them for its
-format, and characters that cannot be seen are shown as escapes in all of them.
-"""
+format, and characters that cannot be seen are shown as escapes in all of them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """The flags `--sarif`, `--junit` and `--annotations`: findings for other programs.
 
 They are written although a file has errors, or cannot be used at all: then most of all somebody
-wants to read them.
-"""
+wants to read them."""
 
 from __future__ import annotations
 

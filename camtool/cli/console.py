@@ -81,8 +81,7 @@ def console(
     \b
     camtool console grbl /dev/ttyUSB0
     echo '$$' | camtool console grbl /dev/ttyUSB0
-    camtool console linuxcnc socket://localhost:5007
-    """
+    camtool console linuxcnc socket://localhost:5007"""
     loaded_target = MachineFlags.of(target if machine is None else None, machine, settings).load()
     wire = wire_of(loaded_target)
     terminal = wire.terminal(loaded_target.machine)

@@ -84,8 +84,7 @@ def convert(
     The moves that the first controller decodes are written for the second one, read back,
     simulated and compared with them. Exit code 1 (and no file) when something is wrong. With
     --surface (camtool probe writes it) the cuts follow the measured top of the blank; --from and
-    --to may be the same machine.
-    """
+    --to may be the same machine."""
     if not -MAX_TURN_DEG <= turn_deg <= MAX_TURN_DEG:
         raise OptionError(f"{turn_deg:g} is no angle from -360 to 360", where="--turn")
     outputs = ReportOutputs(preview, report, page)

@@ -88,8 +88,7 @@ def coupon(
     circles  three of them: the same, from eight diameters each
     steps    a ruler along each axis, forwards and backwards: step scale and backlash
 
-    Cut them: camtool post coupon.dxf --kind engrave --start longest-line --gap 0.
-    """
+    Cut them: camtool post coupon.dxf --kind engrave --start longest-line --gap 0."""
     named, output = output is not None, output or "coupon.dxf"
     if output != STDOUT and PurePath(output).suffix.lower() not in DRAWINGS:
         raise click.UsageError(f"-o {output!r} ends in neither .dxf nor .svg")

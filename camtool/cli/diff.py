@@ -72,8 +72,7 @@ def diff(
     A and B are programs of the machine, or drawings, which are posted with the job. Without B, A
     is compared with itself under another machine or job. The distance is proved: no point of the
     one surface is farther from the other, in the plane or along Z. Exit code 1 when it is more
-    than --max-difference, or cannot be proved to be less.
-    """
+    than --max-difference, or cannot be proved to be less."""
     is_other = other_target is not None or other_machine is not None
     if second is None and other_job is None and not is_other:
         raise click.UsageError(

@@ -43,8 +43,7 @@ def draw(
 ) -> int:
     """Write a page for a browser on which a figure is drawn: left click sets a point, right click
     ends the line, a pen draws freely, and keys do the same. It saves a list of points, which
-    camtool post takes like any drawing. The lower left corner of the sheet is X0 Y0.
-    """
+    camtool post takes like any drawing. The lower left corner of the sheet is X0 Y0."""
     page = drawing_page(
         _length(width, "--width", MIN_GRID_MM, MAX_SHEET_MM),
         _length(height, "--height", MIN_GRID_MM, MAX_SHEET_MM),

@@ -41,8 +41,7 @@ def explain(
 
     Moves are those that the controller decodes, in millimetres from part zero, whatever units and
     modes the block is written in; a feed is told where it changes. Lines are those of the file;
-    of a program without lines, such as one in binary, its blocks.
-    """
+    of a program without lines, such as one in binary, its blocks."""
     if first is not None and last is not None and last < first:
         raise OptionError(f"ends before line {first} of --from", where=f"--to {last}")
     check_places([program, *machine.files()], [report])

@@ -4,8 +4,7 @@ Before any work the places are checked: no output is an input, and no two output
 whatever names and links they are called. Then each file is written whole beside its place, under a
 temporary name; streams (`-`, devices, pipes) come next, for what they have taken cannot be taken
 back; only when all of that is done are the files renamed. So an error (a full disk, a reader that
-is gone, Ctrl-C) leaves old files as they were and no new one.
-"""
+is gone, Ctrl-C) leaves old files as they were and no new one."""
 
 from __future__ import annotations
 
@@ -164,8 +163,7 @@ def _place_identity(name: str) -> Hashable:
     """Return the identity of a place that is written: its file, or its folder and name.
 
     Names that differ only in case, or in how accents are coded, are taken for one: they are one
-    file on other computers, and programs travel.
-    """
+    file on other computers, and programs travel."""
     try:
         status = os.fstat(sys.stdout.fileno()) if name == STDOUT else Path(name).stat()
     except (io.UnsupportedOperation, AttributeError):  # a stdout that is no file of the system's
@@ -195,8 +193,7 @@ def _is_stream(name: str) -> bool:
 def _write_stream(name: str, data: Content) -> None:
     """Write all data to stdout or to a named pipe or device, and flush it.
 
-    Raises BrokenPipeError if the program that reads stdout has ended, else OutputError.
-    """
+    Raises BrokenPipeError if the program that reads stdout has ended, else OutputError."""
     if name == STDOUT and sys.stdout is None:
         raise OutputError("is closed", file="<stdout>", mend="give a file name")
     try:

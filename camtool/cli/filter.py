@@ -3,8 +3,7 @@
 LinuxCNC runs the line that `[FILTER]` of its INI file gives for a file's extension, through a
 shell, with the file's name behind it. The program is expected on stdout; a line
 `FILTER_PROGRESS=10` on stderr moves its progress bar; when the exit code is not 0 it shows what
-else was on stderr (LinuxCNC's manual, "Filter programs").
-"""
+else was on stderr (LinuxCNC's manual, "Filter programs")."""
 
 from __future__ import annotations
 
@@ -36,8 +35,7 @@ def filter(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
     svg = camtool filter --tool-diameter 1mm --depth 0.5mm
 
     A job file beside a drawing, part.toml for part.dxf, is its job; --job is for those without
-    one. The target is linuxcnc unless --target or --machine names another one.
-    """
+    one. The target is linuxcnc unless --target or --machine names another one."""
     if posting.machine.by_default or posting.machine.name() is None:
         machine = MachineFlags(filter_target(), None, posting.machine.settings)
         posting = replace(posting, machine=machine)

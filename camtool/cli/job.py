@@ -49,8 +49,7 @@ def job() -> None:
     \b
     camtool job new   part.dxf -o part.toml         a file to fill in, from the layers
     camtool job check part.toml --against part.dxf  what it says, and what it takes
-    camtool post part.dxf -t grbl --job part.toml   the program
-    """
+    camtool post part.dxf -t grbl --job part.toml   the program"""
 
 
 @job.command(cls=SectionedCommand, short_help="Begin a job file.")
@@ -87,8 +86,7 @@ def new(
 
     With a tool, or a library that has an end mill, it cuts the drawing as a machinist would, and
     says why; with the thickness of the stock it cuts through it, over tabs. It works as it is;
-    every other key stands there as a comment.
-    """
+    every other key stands there as a comment."""
     from camtool.geometry.drawing import is_text
     from camtool.jobs.proposal import Proposal
     from camtool.jobs.template import job_template, pin_words, proposed

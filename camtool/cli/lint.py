@@ -41,8 +41,7 @@ def lint(
     Words and blocks that it refuses, arcs and feeds that it makes otherwise, travel, rapids in the
     stock: all that `camtool verify` finds without moving the machine's model, in a fraction of the
     time. Of several programs all are looked at, whatever is wrong with one of them. Exit code 1
-    when a finding is an error, a program that cannot be decoded included.
-    """
+    when a finding is an error, a program that cannot be decoded included."""
     check_places([*programs, *machine.files()], [report, *checks.names])
     target = machine.load()
     checked = [

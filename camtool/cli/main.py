@@ -1,8 +1,7 @@
 """The command `camtool`: the group, and the one place where errors become exit codes.
 
 0 fine · 1 the job has findings of severity error · 2 wrong use or bad input · 3 a fault of ours ·
-130 interrupted · 141 the reader of stdout has gone.
-"""
+130 interrupted · 141 the reader of stdout has gone."""
 
 from __future__ import annotations
 
@@ -152,8 +151,7 @@ def cli() -> None:
     camtool coupon  lines -o coupon.dxf         a drawing to cut and measure
     camtool calibrate lengths.toml -t pic-mmh   the machine's numbers from what was measured
 
-    Lengths take units: 0.2mm, 1/8in, 200um; bare numbers are mm. Every command has --help.
-    """
+    Lengths take units: 0.2mm, 1/8in, 200um; bare numbers are mm. Every command has --help."""
 
 
 def main() -> NoReturn:

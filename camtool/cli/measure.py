@@ -98,8 +98,7 @@ def measure(
     """Say how deep the stock is cut after PROGRAM (- is stdin) has run, at points and along lines.
 
     Heights are exact for the simulated path of the machine's slides: no grid. Z is 0 at the top of
-    the stock. The tools are those of the job (--job) or of the flags (--tool-diameter ...).
-    """
+    the stock. The tools are those of the job (--job) or of the flags (--tool-diameter ...)."""
     if not (points or sections or volume):
         raise click.UsageError("nothing to measure: give --at, --section or --volume")
     if table is not None and not sections:

@@ -65,8 +65,7 @@ def meet(
     Allowances, direction, start, feed, compensation, approach, order and the controller's way to
     draw are tried, each by a program that is posted, simulated and inspected. The best job is
     written, with what it changes. Where none holds, exit code 1, and why: the dimension that
-    decides, and how good the machine would have to be.
-    """
+    decides, and how good the machine would have to be."""
     from camtool.inspection.meet import DEFAULT_TRIALS, MeetingCase, is_proposal, to_data, to_text
     from camtool.inspection.meet import meet as met
     from camtool.inspection.tolerances import dimensions_of

@@ -2,8 +2,7 @@
 
 Messages always go to stderr, so that stdout stays for machines. Streams that are no terminal get
 the same words without colours. Colours are click's and not rich's: loading rich takes a tenth of
-the time of a whole `verify`.
-"""
+the time of a whole `verify`."""
 
 from __future__ import annotations
 

@@ -63,8 +63,7 @@ def panel(
 
     The page is served to this computer alone, at an address with a key that is printed. Without
     --port it moves a virtual machine. Ctrl-C stops the machine and ends the panel; a browser that
-    is closed ends neither.
-    """
+    is closed ends neither."""
     from camtool.panel.program import LoadedProgram
     from camtool.panel.server import PanelServer
     from camtool.panel.session import Session

@@ -29,9 +29,7 @@ def ports(names: tuple[str, ...], ask: bool, as_json: bool, quiet: bool, verbose
 
     --ask opens each of them, or each PORT, at the rates that are known, sends the bytes that it
     lists, and says what answers. These bytes move nothing, but a board that is reset when its port
-    is opened stops what it does: ask only where no program runs.
-    """
-
+    is opened stops what it does: ask only where no program runs."""
     if names and not ask:
         raise OptionError("a PORT is for --ask", where="ports")
     port_list = [each for each in list_serial_ports() if not names or each.name in names]
@@ -60,7 +58,6 @@ def ports(names: tuple[str, ...], ask: bool, as_json: bool, quiet: bool, verbose
 
 def _wires() -> list[Wire]:
     """Return the wires (serial protocols) of all targets that have one."""
-
     wires = [target.wire() for _, (target, _) in each_target(find_target, names=own_names())]
     return [wire for wire in wires if isinstance(wire, Wire)]
 
@@ -68,7 +65,6 @@ def _wires() -> list[Wire]:
 def _asked(name: str, wires: list[Wire]) -> list[dict[str, Any]]:
     """Ask at one port, wire by wire, until a controller is recognised; return the answers
     as data."""
-
     answers: list[dict[str, Any]] = []
     for wire, port in questions(name, wires):
         try:

@@ -213,8 +213,7 @@ def post(
 
     The program is read back from its bytes, run through a model of the machine's own controller
     and mechanics, and compared with the drawing. Exit code 1 (and no file) when something is
-    wrong.
-    """
+    wrong."""
     if watching and STDOUT in (source, output, report, page, *checks.names):
         raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
     outputs = ReportOutputs(preview, report, page, checks, plots)
@@ -322,8 +321,7 @@ def finish(
     """Write the requested files of a run and report them; return the exit code. `picture` draws
     the pictures.
 
-    If the run has an error, only the page of `--report` is written, which shows what is wrong.
-    """
+    If the run has an error, only the page of `--report` is written, which shows what is wrong."""
     outputs = requested.outputs
     say_findings(run.findings, quiet=quiet, verbose=verbose)
     if run.failed or run.program is None:
@@ -510,8 +508,7 @@ def watch(
     """Call `action` now and after each change of the `files`, until Ctrl-C; then 0.
 
     The list of files may change with their content: a job file names a tool table.
-    An error is shown on one line, and watching goes on: the next save may fix it.
-    """
+    An error is shown on one line, and watching goes on: the next save may fix it."""
     try:
         seen_digests = _digests(files)
         say(f"camtool: watching {', '.join(seen_digests)}; Ctrl-C ends", quiet=quiet)

@@ -83,8 +83,7 @@ def preview(
 
     With --target, a file with the target's own extension (such as .pic), or whose content is no
     drawing, is taken for its program. With --compensate, a toolpath is shown as it is written. Of
-    a job with set-ups there is a picture of each, PICTURE-1-NAME, unless --setup names one.
-    """
+    a job with set-ups there is a picture of each, PICTURE-1-NAME, unless --setup names one."""
     if simulate and machine.name() is None:
         raise click.UsageError("--simulate needs --target")
     picture.check([output], _canvas(machine, simulate=simulate))

@@ -111,9 +111,7 @@ def probe(
     The tool stands above part zero, which was touched off; heights are measured from there.
     `camtool convert PROGRAM --from NAME --to NAME --surface FILE` lets the cuts follow them.
     Points in the holes of a drawing and in the clamps of a job are left out. Ctrl-C stops the
-    machine. Exit code 1, and no file, when a point was not touched.
-    """
-
+    machine. Exit code 1, and no file, when a point was not touched."""
     check_sizes({"--step": step, "--clear": clear, "--lowest": lowest or None}, {"--feed": feed})
     check_sizes({"--margin": margin or None}, {})
     if not lowest < clear:
@@ -206,7 +204,6 @@ def journaled(
     """Yield the cycle, which writes each touch to the journal as a JSON line, and the function
     that ends the journal; without a file name, the cycle unchanged. OutputError for a file that
     cannot be written."""
-
     if name is None:
         yield cycle, lambda reason, measured: None
         return
@@ -241,7 +238,6 @@ def journaled(
 
 def _contours(name: str) -> list[Segments]:
     """Return the closed contours of the drawing in this file."""
-
     rings = [Segments.of(path) for path in read_drawing(Path(name)).paths if path.closed]
     if not rings:
         raise OptionError("has no closed contours", where=f"--holes {name}")
@@ -250,7 +246,6 @@ def _contours(name: str) -> list[Segments]:
 
 def _boxes(name: str) -> list[Box]:
     """Return the keep-out boxes of a job file, in the work frame."""
-
     boxes = job_of_file(Path(name)).keep_out
     if not boxes:
         raise OptionError("has no [[keep_out]]", where=f"--job {name}")

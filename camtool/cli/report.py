@@ -2,8 +2,7 @@
 
 A page (`--report`) is HTML, Markdown or JSON. HTML holds its picture. Markdown links to a picture
 beside it: the one of `--preview`, or else an SVG of the page's own name, which never takes the
-place of a file that the page did not bring along; Markdown on stdout has none.
-"""
+place of a file that the page did not bring along; Markdown on stdout has none."""
 
 from __future__ import annotations
 

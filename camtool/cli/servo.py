@@ -47,8 +47,7 @@ def servo() -> None:
     camtool servo identify step.csv -t matlab-router --axis x --drive 70
     camtool servo design -t matlab-router --settling 250ms --damping 0.707
     camtool servo step -t matlab-router --speed 3515
-    camtool servo show star.m -t matlab-router -o servo.svg --from 2s --span 1s
-    """
+    camtool servo show star.m -t matlab-router -o servo.svg --from 2s --span 1s"""
 
 
 @servo.command(cls=SectionedCommand, short_help="The motor of an axis, from measured steps.")
@@ -78,8 +77,7 @@ def identify(
     (- is stdin): a table with a head of time_s (or time_ms), speed (counts in a tick) or counts
     (of the encoder), and drive (percent).
 
-    Two drives, or a motor that coasts to rest at the end, determine the friction.
-    """
+    Two drives, or a motor that coasts to rest at the end, determine the friction."""
     check_places([*responses, *machine.files()], [output, report])
     if output is not None and output != STDOUT:
         check_new(output)

@@ -51,8 +51,7 @@ def settings(
     backup FILE       writes them to FILE
     restore FILE      shows what would change, asks, writes it, and reads all of it again
 
-    read and compare take a FILE instead of --port: what grbl answered to $$, or LinuxCNC's INI.
-    """
+    read and compare take a FILE instead of --port: what grbl answered to $$, or LinuxCNC's INI."""
     target = machine.load()
     if what in ("backup", "restore") and (file is None or port is None):
         raise OptionError("FILE and --port are needed", where=f"settings {what}")
@@ -115,7 +114,6 @@ def _pair(line: str) -> dict[str, str]:
 def asked_settings(target: LoadedTarget, port: str, baud: int | None, *, quiet: bool) -> list[str]:
     """Read the settings of the controller at a port twice and return them as lines; InputError if
     it does not list them or both readings differ."""
-
     conversation = wire_of(target).settings(target.machine, manner_of(target))
     reason = carried(conversation, target, port, baud, quiet=quiet)
     if reason:
@@ -128,7 +126,6 @@ def _restore(
 ) -> int:
     """Write the settings of a file that differ from those of the controller; return the exit
     code."""
-
     new_values = _settings_of(file)
     now = dict(map(_name_value, asked_settings(target, port, baud, quiet=quiet)))
     unknown = new_values.keys() - now.keys()

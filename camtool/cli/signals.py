@@ -81,8 +81,7 @@ def signals(
     """Show when the controller of PROGRAM (- is stdin) sets each of its lines: steps and
     directions, or the coils of its motors, as its own timers and interpolators make them.
 
-    Without -o it counts the steps of a whole run.
-    """
+    Without -o it counts the steps of a whole run."""
     names = None if motors is None else [name.strip() for name in motors.split(",")]
     options = PictureOptions(size_px=size, dark=dark)
     pictures = [name for name in outputs if PurePath(name).suffix.lower() in (".svg", ".png")]

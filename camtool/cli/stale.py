@@ -50,8 +50,7 @@ def stale(
     Each FILE is a drawing, its program or its job file (part.dxf, part.nc, part.toml), or a folder
     to search for drawings; with --programs a drawing or folder. Give the flags that the programs
     were posted with. Nothing is written; exit code 1 when a program is not byte for byte what
-    camtool writes now.
-    """
+    camtool writes now."""
     target = posting.load()
     posting = replace(posting, no_verify=not posting.gates.given)
     drawings_by_name = (
@@ -104,8 +103,7 @@ def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
     those beside a program or job file, or those in folders.
 
     An SVG beside a drawing may be a picture of its program, so one name may have several files;
-    the likeliest drawing is first. InputError for files that do not exist.
-    """
+    the likeliest drawing is first. InputError for files that do not exist."""
     names = dict.fromkeys(name for file in files for name in _names(Path(file)))
     drawings_by_name = {name: _ordered(_files_named(name)) for name in names}
     return {name: drawings for name, drawings in drawings_by_name.items() if drawings}
@@ -116,8 +114,7 @@ def drawings_of(files: Sequence[str], programs: Path) -> dict[Path, list[Path]]:
     programs in the folder `programs`.
 
     InputError for what does not exist or is no drawing, OutputError for two drawings with one
-    output name, as in a batch.
-    """
+    output name, as in a batch."""
     if not programs.is_dir():
         raise InputError("is no folder", file=str(programs), mend="give the --out of the batch")
 

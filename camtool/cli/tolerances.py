@@ -44,8 +44,7 @@ def tolerances() -> None:
     camtool tolerances new  part.dxf                  a file to fill in, from the drawing
     camtool tolerances show tolerances.toml           what it says
     camtool tolerances show tolerances.toml --against part.dxf
-                                                      the same with sizes and limits as numbers
-    """
+                                                      the same with sizes and limits as numbers"""
 
 
 @tolerances.command(cls=SectionedCommand, short_help="Begin a file of tolerances.")
@@ -68,8 +67,7 @@ def new(
 ) -> None:
     """Write the dimensions of DRAWING (- is stdin): those that it says itself with their limits,
     then its circles, slots and the overall sizes of its outlines, to which you give limits. With
-    --job the depths of its pockets, grooves and blind holes, and what is left under its floors.
-    """
+    --job the depths of its pockets, grooves and blind holes, and what is left under its floors."""
     output = output or FILE
     flags = JobFlags(job_file, project=project_of(Path.cwd()))
     check_places([source, *flags.files(), *machine.files()], [output])

@@ -100,9 +100,7 @@ def touch(
     skew    the angle of a side, for camtool convert --turn
 
     Each place is touched twice, fast and slowly. Between places the tool stops where it touches.
-    Ctrl-C stops the machine. Exit code 1, and no zero, when something is not as it should be.
-    """
-
+    Ctrl-C stops the machine. Exit code 1, and no zero, when something is not as it should be."""
     values = axes_of(axes)
     wrong = values.keys() - set(AXES_OF[what])
     if wrong:

@@ -94,8 +94,7 @@ def twin(
     \b
     camtool twin grbl                          then camtool send part.nc -t grbl --port PATH
     camtool twin grbl --tcp 5007 --speed max
-    camtool twin pic-mmh --assume echo=character --fault drop=0.001 --trace slides.csv
-    """
+    camtool twin pic-mmh --assume echo=character --fault drop=0.001 --trace slides.csv"""
     name = target if machine is None else None
     loaded_target = MachineFlags.of(name, machine, settings).load()
     virtual = loaded_target.twin(assume)

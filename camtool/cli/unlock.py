@@ -15,6 +15,5 @@ def unlock(machine: MachineFlags, port: str, baud: int | None, quiet: bool, verb
     """Unlock a controller that has locked itself, after an alarm or until it is homed.
 
     Look first why it is locked. A board that is reset when its port opens locks itself again:
-    there give --unlock to the command that is to follow.
-    """
+    there give --unlock to the command that is to follow."""
     return act("unlock", machine, port, baud, {}, quiet=quiet, unlock=True)

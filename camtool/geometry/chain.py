@@ -30,8 +30,7 @@ class Chained(Struct, frozen=True, eq=False):
 
     `closed_gaps`: every gap above `POSITION_EPS_MM` that was bridged. `open_gaps`: for paths that
     stay open, the nearest other open end (or the own other one), when it looks like a gap.
-    `branches`: where more than two ends met.
-    """
+    `branches`: where more than two ends met."""
 
     lines: Polylines
     members: tuple[tuple[int, ...], ...]
@@ -44,8 +43,7 @@ class Kinds(Struct, frozen=True):
     """Properties of paths besides their shape, one item each; None where all are alike.
 
     Paths of different `groups` are never joined. At a branch, paths of one `style` (colour, line
-    type) are joined first. `layers` name places; left out, the groups do.
-    """
+    type) are joined first. `layers` name places; left out, the groups do."""
 
     groups: Sequence[Hashable] | None = None
     styles: Sequence[Hashable] | None = None
@@ -85,8 +83,7 @@ def chain(
     matter too. A chain whose own ends meet becomes closed, unless it would enclose nothing (a line
     and its double). Closed paths stay as they are. Results are in the order of their first
     members, and run in the direction in which that one was drawn. GeometryError when the gap is
-    negative or not finite, or the number of groups is not that of the paths.
-    """
+    negative or not finite, or the number of groups is not that of the paths."""
     if not (np.isfinite(gap_mm) and gap_mm >= 0.0):
         raise GeometryError(f"a gap of {gap_mm} mm is not 0 or more")
     paths = _Paths.of(lines, kinds or Kinds(groups=groups))
@@ -306,8 +303,7 @@ class _Joining(Struct, eq=False):
     """The joints made so far: `mates`, `node` and `branches` as in `Joints`.
 
     Joined paths form a set: `above` leads from each path to the first of its set, which has the
-    number of `segments` and `arcs` of all.
-    """
+    number of `segments` and `arcs` of all."""
 
     ends: Ends
     mates: Ints
@@ -353,8 +349,7 @@ class _Joining(Struct, eq=False):
         may have been meant to meet these.
 
         `is_alone` (2M,) is the mask of the ends that no other one meets exactly, `exact` the pairs
-        of the others.
-        """
+        of the others."""
         is_free = is_alone & (self.mates < 0) & (self.node < 0)
         if reach <= POSITION_EPS_MM or not is_free.any():
             return
@@ -517,8 +512,7 @@ def _split_rings(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
 class Chains(Struct, frozen=True, eq=False):
     """C chains of `entries` (E,): the ends by which their paths are entered (2i forwards).
 
-    Chain c has entries[begins[c]:begins[c + 1]]; `rings` (C,) says which are closed by joints.
-    """
+    Chain c has entries[begins[c]:begins[c + 1]]; `rings` (C,) says which are closed by joints."""
 
     entries: Ints
     begins: Ints
@@ -555,8 +549,7 @@ def join_chains(lines: Polylines, chains: Chains) -> list[JoinedChains]:
     """Return the paths made of chains of these open paths, in up to three batches.
 
     A ring that makes no path is tried as an open chain; an open chain that makes none gives its
-    single paths.
-    """
+    single paths."""
     results: list[JoinedChains] = []
     remaining = chains
     for _ in range(2):
@@ -580,8 +573,7 @@ def join_chains(lines: Polylines, chains: Chains) -> list[JoinedChains]:
 def _try_chains(lines: Polylines, chains: Chains) -> tuple[Bools, JoinedChains]:
     """Return the mask (C,) of the chains that make a path, and these paths.
 
-    A chain makes none if fewer than two vertices remain, or if it is a ring without an area.
-    """
+    A chain makes none if fewer than two vertices remain, or if it is a ring without an area."""
     vertices, counts, gaps = _chain_vertices(lines, chains)
     is_path = np.asarray(counts >= 2)
     path = np.repeat(np.arange(len(chains)), counts)
@@ -663,8 +655,7 @@ def _bridge_gaps(
     which one vertex is dropped, and the gaps.
 
     The path before a joint ends at the row `end`, the one after it begins at the row `begin`. Gaps
-    are a mask of joints, their places (G, 2) and sizes (G,), mm.
-    """
+    are a mask of joints, their places (G, 2) and sizes (G,), mm."""
     before, after = vertices[end, :2], vertices[begin, :2]
     size = np.hypot(*(before - after).T)
     middle = 0.5 * (before + after)
@@ -727,8 +718,7 @@ def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float)
     like one that was meant to meet.
 
     `ends` are those of M paths with `lengths` (M,) mm and `layers`. Each pair of ends comes once;
-    ends that coincide are no gap.
-    """
+    ends that coincide are no gap."""
     gaps: dict[tuple[int, int], Gap] = {}
     is_open = np.flatnonzero(np.repeat(ends.is_open, 2))
     for group in distinct(ends.group[is_open // 2]):

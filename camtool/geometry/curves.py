@@ -2,8 +2,7 @@
 
 `fit` asks no more of a curve than the protocol `Curve`; the classes here are the ones that
 drawings hold. Those that are rational Bézier curves, piece by piece, are `Pieced`: they are
-fitted by compiled kernels, many times faster.
-"""
+fitted by compiled kernels, many times faster."""
 
 from __future__ import annotations
 
@@ -31,8 +30,7 @@ class Curve(Protocol):
 
     `tangent` is the derivative: it need not be unit and may vanish. `breaks` (k,) rises from the
     first parameter to the last; in between stand all places where the curve may have a corner,
-    and knots (between two breaks the curve is smooth, save for cusps).
-    """
+    and knots (between two breaks the curve is smooth, save for cusps)."""
 
     @property
     def breaks(self) -> Floats:
@@ -108,8 +106,7 @@ class EllipseCurve(Struct, frozen=True, eq=False):
     """centre + cos(t)·major + sin(t)·minor, t from `start` to `end` rad (end below start: CW).
 
     `major` and `minor` (2,) mm may be any two conjugate half axes: they need not be square to
-    each other, so an affine map of an ellipse maps its three vectors.
-    """
+    each other, so an affine map of an ellipse maps its three vectors."""
 
     centre: Floats
     major: Floats
@@ -159,8 +156,7 @@ class EllipseCurve(Struct, frozen=True, eq=False):
 
 class SplineCurve(Struct, frozen=True, eq=False):
     """A B-spline, rational when weights differ: `knots` (n + degree + 1,), `control` (n, 2) mm,
-    `weights` (n,) all positive. GeometryError when these do not belong together.
-    """
+    `weights` (n,) all positive. GeometryError when these do not belong together."""
 
     degree: int
     knots: Floats
@@ -216,8 +212,7 @@ class SplineCurve(Struct, frozen=True, eq=False):
         """Return each span a..b between knots as a Bézier piece: its control points are the
         blossom at (a … a, b … b).
 
-        De Boor's triangle with an argument of its own at each level computes the blossom.
-        """
+        De Boor's triangle with an argument of its own at each level computes the blossom."""
         degree, knots, origin = self.degree, self.knots, self.control[0]
         weights = np.asarray(self.weights)[:, None]
         points = np.concatenate([(self.control - origin) * weights, weights], axis=1)
@@ -242,8 +237,7 @@ class SplineCurve(Struct, frozen=True, eq=False):
         algorithm for all t at once.
 
         The derivative of a spline is a spline of degree p−1 over the inner knots, with control
-        points p (c[i+1] − c[i]) / (u[i+p+1] − u[i+1]).
-        """
+        points p (c[i+1] − c[i]) / (u[i+p+1] − u[i+1])."""
         degree, knots, weights = self.degree, self.knots, np.asarray(self.weights)
         points = np.column_stack([self.control * weights[:, None], weights])
         for _ in range(order):

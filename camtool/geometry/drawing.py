@@ -63,8 +63,7 @@ class Branch(Struct, frozen=True):
     """A place (x, y) mm where more than two open ends meet: how many, and the layer of one.
 
     `paths`: the indices of the paths that pass it, if these enclose something else when the ends
-    are joined in another way; none if all ways enclose the same.
-    """
+    are joined in another way; none if all ways enclose the same."""
 
     at_mm: tuple[float, float]
     ends: int
@@ -90,8 +89,7 @@ class Callout(Struct, frozen=True):
     "<>" for what is measured, "" for nothing else than that. `upper_mm` and `lower_mm`: the
     deviations of its style, None without any. `mm_per_unit`: the unit of the numbers in its text.
     `scale`: its text says so many times what is drawn (a view of another scale). `exact`: its
-    frame says that it is theoretically exact, without limits.
-    """
+    frame says that it is theoretically exact, without limits."""
 
     kind: Literal["linear", "diameter", "radius"]
     points_mm: tuple[tuple[float, float], ...]
@@ -113,8 +111,7 @@ class Healing(Struct, frozen=True):
     `duplicates`: pieces drawn twice as a whole and left out; `overlaps`: parts of pieces that
     lie on others and were left out; `tiny_merged`: segments too short to matter that went into
     their neighbours; `arcs_recognised`: arcs made of chords. `branches` and `crossings` are the
-    places where the drawing leaves a choice, or is wrong.
-    """
+    places where the drawing leaves a choice, or is wrong."""
 
     duplicates: int = 0
     duplicates_mm: float = 0.0
@@ -159,8 +156,7 @@ class Drawing:
     counts the entities of each kind that became geometry; `skipped` the others, with the reason.
     `marks` are single points; a drawing of marks alone has no paths. `gaps` stay open,
     `closed_gaps` were bridged. `unchosen`: the closed contours that were left out by choice.
-    `callouts`: its dimensions.
-    """
+    `callouts`: its dimensions."""
 
     paths: Polylines
     layers: tuple[str, ...]

@@ -80,8 +80,7 @@ def drawing_facts(drawing: Drawing) -> dict[str, Any]:
     `smallest_radius_mm` and `smallest`: see `_smallest`. `open_ends`: place, path and layer of
     each; `gaps` stay open, `closed_gaps` were bridged: place, size, layer. `duplicates` and
     `overlaps`: count and length of what was left out; `tiny_merged`, `arcs_recognised`: counts;
-    `branches`: place, ends, layer; `crossings`: place, path, layer.
-    """
+    `branches`: place, ends, layer; `crossings`: place, path, layer."""
     segments = Segments.of(drawing.paths)
     arcs, closed = segments.is_arc, drawing.paths.closed
     return {
@@ -107,9 +106,7 @@ def _smallest(drawing: Drawing, segments: Segments) -> dict[str, Any]:
     """Return the smallest features of a drawing: each as size_mm, at_mm and paths, or None.
 
     `radius`, `segment`, `contour` (shorter side of its box) and `distance` (between two closed
-    contours).
-    """
-
+    contours)."""
     features = {
         "radius": smallest_radius(segments),
         "segment": shortest_segment(segments),

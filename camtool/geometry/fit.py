@@ -6,8 +6,7 @@ the longest biarcs, arcs and lines within the tolerance are chained so that thei
 
 Errors are distances from dense points of the true curve to the arcs. The other direction needs no
 measuring: both have the same ends, and while the distance is below the arcs' radii the foot points
-of the curve on the chain move continuously from its first point to its last, so they cover it.
-"""
+of the curve on the chain move continuously from its first point to its last, so they cover it."""
 
 from __future__ import annotations
 
@@ -63,8 +62,7 @@ class Fit(Struct, frozen=True, eq=False):
 
     `max_mm`, `rms_mm`: distances from the true curve, weighted by its length; `length_mm` of the
     curve. A closed curve ends where it began: leave out the last vertex to close the path. A
-    curve that is a point gives one vertex.
-    """
+    curve that is a point gives one vertex."""
 
     vertices: Floats
     max_mm: float
@@ -82,8 +80,7 @@ def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
     curve is.
 
     Raises GeometryError when the curve is not finite, or for a tolerance below `POSITION_EPS_MM`
-    (positions nearer than that are one).
-    """
+    (positions nearer than that are one)."""
     if not (math.isfinite(tolerance_mm) and tolerance_mm >= POSITION_EPS_MM):
         raise GeometryError(
             f"a fitting tolerance of {tolerance_mm} mm is not above {POSITION_EPS_MM} mm"
@@ -98,8 +95,7 @@ def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: flo
     positive.
 
     An arc of more than a half circle is cut into equal parts; a full circle ends exactly where it
-    begins.
-    """
+    begins."""
     parts = max(1, math.ceil(abs(sweep_rad) / SPAN_TURN_RAD))
     angle = start_rad + sweep_rad * np.arange(parts + 1) / parts
     bulge = np.full(parts + 1, np.clip(math.tan(sweep_rad / parts / 4.0), -1.0, 1.0))
@@ -114,8 +110,7 @@ def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: flo
 def split_bulges(vertices: Floats, closed: bool) -> Floats:
     """Return the path with every arc of more than a half circle (|bulge| > 1) cut into two halves.
 
-    Vertices (n, 3), of an open path the last one without a segment; mm or any other unit.
-    """
+    Vertices (n, 3), of an open path the last one without a segment; mm or any other unit."""
     large = np.abs(vertices[:, 2]) > 1.0 + BULGE_EPS
     if not closed:
         large[-1:] = False
@@ -177,8 +172,7 @@ def _fitted(
     points of the curve for each step between parameters (n,), and the last one.
 
     A fit whose error turns out too large is repeated with finer nodes, since errors peak between
-    them; if that is not enough, with less of the tolerance as well.
-    """
+    them; if that is not enough, with less of the tolerance as well."""
     target, steps, fineness = SEARCH_SHARE * tolerance, MIN_STEPS, tolerance
     for attempt in range(ATTEMPTS):
         nodes = nodes_of(fineness, steps)
@@ -231,8 +225,7 @@ def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
     takes to know the curve between them within the tolerance.
 
     A curve that is a point gives one node. Raises GeometryError when the curve's parameters do not
-    rise or its points are not finite.
-    """
+    rise or its points are not finite."""
     breaks = np.asarray(curve.breaks, dtype=np.float64)
     if len(breaks) < 2 or not np.isfinite(breaks).all() or not (np.diff(breaks) > 0.0).all():
         raise GeometryError("the parameters of a curve do not rise")
@@ -337,8 +330,7 @@ def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: f
     """Return the mask of the steps, `rows`, that must be halved: the curve between their ends is
     not known well enough.
 
-    `probes` (3, steps, 2) are points of the curve within each step, the middle first.
-    """
+    `probes` (3, steps, 2) are points of the curve within each step, the middle first."""
     error = step_errors(nodes.point, nodes.leave, nodes.arrive, rows, probes)
     arms = probes[0] - nodes.point[rows], probes[0] - nodes.point[rows + 1]
     size = np.maximum(np.hypot(*arms[0].T), np.hypot(*arms[1].T))

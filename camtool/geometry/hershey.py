@@ -2,8 +2,7 @@
 
 The font is "rowmans" of the package Hershey-Fonts, on its own grid: capitals are 21 units high,
 the baseline lies at y = 9, y grows downwards. It serves engraving and the labels of pictures alike
-and needs no font file.
-"""
+and needs no font file."""
 
 from __future__ import annotations
 

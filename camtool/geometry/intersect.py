@@ -14,8 +14,7 @@ Every candidate (two roots, and the four end points) is then measured: it counts
 `position_eps_mm` of both curves and within that of the range of both. So nearly tangent and
 coincident curves need no case of their own: coincident ones meet at the ends of what they share.
 The tolerance decides whether two curves meet at all and whether two meetings are one; it never
-moves a crossing.
-"""
+moves a crossing."""
 
 from __future__ import annotations
 
@@ -36,8 +35,7 @@ class Crossings(Struct, frozen=True, eq=False):
     """All meetings in columns, J rows: `row_a`, `row_b` (J,), `point` (J, 2) mm, `ta`, `tb` (J,).
 
     `ta` and `tb` are fractions of the lengths, exactly 0 or 1 at an end. A pair that shares a
-    run has two rows, one for each end of the run.
-    """
+    run has two rows, one for each end of the run."""
 
     row_a: Ints
     row_b: Ints
@@ -69,8 +67,7 @@ def crossings(
 def self_crossings(segments: Segments) -> Crossings:
     """Return all common points of two different segments, each pair once (row_a < row_b).
 
-    The end that a segment shares with the next one of its path is left out.
-    """
+    The end that a segment shares with the next one of its path is left out."""
     boxes, frames = segment_boxes(segments), Frames.of(segments)
     parts = []
     for row_a, row_b in box_pairs(boxes, boxes, reach_mm=POSITION_EPS_MM):
@@ -150,8 +147,7 @@ def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
     """Compute the two points (K, 2) that the full curves share (see the top); NaN if none.
 
     Where they miss each other, both are the point of the common line nearest to R: the caller
-    measures how near that is.
-    """
+    measures how near that is."""
     rounder = np.abs(b.curvature) >= np.abs(a.curvature)
     k_round = np.where(rounder, b.curvature, a.curvature)
     k_flat = np.where(rounder, a.curvature, b.curvature)
@@ -186,8 +182,7 @@ def _if_apart(points: Floats, a: Frames, b: Frames, eps: float) -> Floats:
     """Return the points (K, 2), with NaN where the curves stay within `eps` of each other over all
     their length.
 
-    There rounding alone would place a crossing; the ends of what they share are found as ends.
-    """
+    There rounding alone would place a crossing; the ends of what they share are found as ends."""
     angle, bend = _angle_and_bend(points, a, b)
     shorter = np.minimum(a.length, b.length)
     is_indistinct = np.abs(angle) * shorter + 0.5 * bend * shorter**2 <= eps
@@ -208,8 +203,7 @@ def _touching(crossings: Crossings, frames: Frames, eps: float) -> Bools:
     most.
 
     Two curves that meet at the angle θ, with curvatures that differ by k, part again after 2θ/k,
-    and are θ²/(2k) apart at most until then.
-    """
+    and are θ²/(2k) apart at most until then."""
     angle, bend = _angle_and_bend(
         crossings.point, frames[crossings.row_a], frames[crossings.row_b]
     )
@@ -289,8 +283,7 @@ def _pass_through(crossings: Crossings, segments: Segments, frames: Frames) -> B
     """Return the mask of meetings at a vertex at which the path crosses itself: the directions of
     passage a separate those of b.
 
-    A passage has two directions: back to where the path comes from, and on to where it goes.
-    """
+    A passage has two directions: back to where the path comes from, and on to where it goes."""
     back_a, on_a = _passage(crossings.row_a, crossings.ta, segments, frames)
     back_b, on_b = _passage(crossings.row_b, crossings.tb, segments, frames)
     same_passage = _one_passage(crossings, segments)

@@ -10,8 +10,7 @@ approximated or pruned: the axis is traced by the boundary itself.
 
 An *interval* is the part of an element whose discs touch one and the same partner. Each disc is
 seen from both of the elements that it touches; so an interval of one that falls between its
-samples is found from the samples of the other.
-"""
+samples is found from the samples of the other."""
 
 from __future__ import annotations
 
@@ -126,8 +125,7 @@ def _insert_rows(
     """Return the trace with more rows inserted, and the mask of its gaps still to be halved.
 
     These are the gaps beside those new rows for which `is_open` is true, unless too narrow for
-    another number between.
-    """
+    another number between."""
     merged = concatenated([trace, new_rows])
     order = np.lexsort((merged.t, merged.element))
     merged = merged.rows(order)
@@ -143,8 +141,7 @@ def _refine_gaps(
     """Halve all open gaps once, or cut them where the partner changes; return the trace and the
     mask of the gaps that stay open.
 
-    A halved gap stays open while the curve deviates from its chord by more than the tolerance.
-    """
+    A halved gap stays open while the curve deviates from its chord by more than the tolerance."""
     rows = np.flatnonzero(open_gaps)
     middle = 0.5 * (trace.t[rows] + trace.t[rows + 1])
     halves = discs_at(boundary, trace.element[rows], middle, _partners(trace, rows))
@@ -199,8 +196,7 @@ def _seen_from_partners(boundary: Boundary, trace: MedialTrace) -> MedialTrace:
     """Return the discs of the trace as seen from their partners, where the partner's own rows near
     that place do not show the element.
 
-    They mark intervals that fell between the samples.
-    """
+    They mark intervals that fell between the samples."""
     is_pair = trace.partner != trace.element
     element, t, partner = (trace.partner[is_pair], trace.u[is_pair], trace.element[is_pair])
     # Numbers that sort as element and place do; places lie in 0 … 1.

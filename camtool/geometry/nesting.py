@@ -2,8 +2,7 @@
 
 A point is inside a closed path when it is inside the polygon of its chords, or when it lies
 between a chord and its arc, but not both (XOR, arc by arc). A point exactly on a chord is taken
-as slightly above and to the right of it, in both tests alike, so that no point counts twice.
-"""
+as slightly above and to the right of it, in both tests alike, so that no point counts twice."""
 
 from __future__ import annotations
 
@@ -39,8 +38,7 @@ class Nesting(Struct, frozen=True, eq=False, dict=True):
     A closed path j holds path i when the vertices of i and the middles of its segments lie inside
     j, or nearer to its line than `POSITION_EPS_MM` (but not all of them: a path does not hold its
     double, and doubles count as one). Paths that cross a closed path are not in it. `part_of`: the
-    nesting that has these paths in the rows `rows`, ascending, so that nothing is found twice.
-    """
+    nesting that has these paths in the rows `rows`, ascending, so that nothing is found twice."""
 
     lines: Polylines
     part_of: Nesting | None = None

@@ -55,8 +55,7 @@ POSITION_EPS_MM, and all points that are so on that side are in the result. Loop
 of the first piece of the source that they run along, and begin there.
 
 All inner loops are compiled (camtool/kernels/offsets.pyx) and ask trees of boxes, so the time
-grows as n log n in the number of segments, and with the number of true meetings.
-"""
+grows as n log n in the number of segments, and with the number of true meetings."""
 
 from __future__ import annotations
 
@@ -145,8 +144,7 @@ def offset_shape(
     a mitre of any length (up to SHARP_LIMIT).
 
     GeometryError for an open path and for a distance that is not finite, OptionError for joins
-    that do not exist and a mitre limit below 1.
-    """
+    that do not exist and a mitre limit below 1."""
     offset = _checked_offset(lines, distance_mm, joins, mitre_limit)
     if offset is None or len(lines) == 0:
         return lines
@@ -159,8 +157,7 @@ def offset_each(
     """Return the offset of each closed path as a region of its own: the loops, and for each the
     path that it belongs to (J,), ascending.
 
-    Paths that lie so far apart that their offsets cannot meet are computed together.
-    """
+    Paths that lie so far apart that their offsets cannot meet are computed together."""
     offset = _checked_offset(lines, distance_mm, joins, mitre_limit)
     if offset is None or len(lines) == 0:
         return lines, np.arange(len(lines))
@@ -186,8 +183,7 @@ def swept_outline(lines: Polylines, radius_mm: float) -> Polylines | None:
 
     The paths may be open, cross themselves and each other, and repeat each other: each has both of
     its sides as elements, so that whatever bounds one of them is there. None where rounding hides
-    how the boundary goes on (MAX_DEAD_END_MM).
-    """
+    how the boundary goes on (MAX_DEAD_END_MM)."""
     offset = Offset(radius_mm)
     raw = raw_offset(_both_sides(lines), offset)
     source = source_arrays(Segments.of(lines), raw.kites)
@@ -247,8 +243,7 @@ def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:
     another.
 
     The rows of a group are in the order of Hilbert's curve, so that neighbours in the plane are
-    near each other in it.
-    """
+    near each other in it."""
     order = hilbert_order(boxes[:, :2], boxes[:, 2:])
     wide = boxes + reach_mm * np.array([-1.0, -1.0, 1.0, 1.0])
     index, group = BoxIndex(wide), np.full(len(boxes), -1)
@@ -387,8 +382,7 @@ class Corners(Struct, frozen=True, eq=False):
     the corner that the same segment begins at.
 
     Where a path turns straight back, rounding alone says whether it turns left or right. It is
-    then taken to turn right: a join too much is invalid, or leads nowhere, and goes later.
-    """
+    then taken to turn right: a join too much is invalid, or leads nowhere, and goes later."""
 
     place: Floats
     before: Floats
@@ -437,8 +431,7 @@ class Mitres(Struct, frozen=True, eq=False):
 
     At a corner where the path turns by 2h, the tangents of both shifted segments meet when they
     have gone on by d tan h, at d / cos h from the corner. Where that is more than the limit L
-    allows, they end at a line across, L d from the corner: after d (L − cos h) / sin h.
-    """
+    allows, they end at a line across, L d from the corner: after d (L − cos h) / sin h."""
 
     reach: Floats
     cut: Bools
@@ -464,8 +457,7 @@ class Mitres(Struct, frozen=True, eq=False):
         """Return the lines of mitres that are no parts of shifted lines, and the corner of each.
 
         They go on from a shifted arc, across where the mitre is cut off, and on to a shifted arc.
-        `is_arc` (K, 2) is true if the segment before, or after, each corner is an arc.
-        """
+        `is_arc` (K, 2) is true if the segment before, or after, each corner is an arc."""
         d, reach = offset.distance_mm, self.reach[:, None]
         left_foot = corners.place + d * turn_left(corners.before)
         right = corners.place + d * turn_left(corners.after)
@@ -503,8 +495,7 @@ def raw_offset(lines: Polylines, offset: Offset) -> RawOffset:
 
     An arc that bends left with a radius up to the distance has nothing there: every point beyond
     its centre is nearer to another of its points. Inner corners need no join: the elements beside
-    them cross, there or elsewhere.
-    """
+    them cross, there or elsewhere."""
     segments = Segments.of(lines)
     frames = Frames.of(segments)
     corners = Corners.of(frames, lines)
@@ -560,8 +551,7 @@ def trim_raw(raw: RawOffset, source: Arrays, offset: Offset) -> RawOffset:
 
     What is removed could never be kept, and what is kept is not cut by it: this only saves cuts,
     whose number would grow with the square of the number of elements where the distance is large
-    against them.
-    """
+    against them."""
     spare = TRIM_SPARE * VALIDITY_EPS_MM
     ends = trimmed_ends(curve_rows_of(raw.elements), source, (offset.distance_mm, spare))
     low, high = ends.T
@@ -661,8 +651,7 @@ def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
     """Return the node (P,) of each point (P, 2), and the nodes (N, 2), each the first point of its
     group.
 
-    Points within `eps_mm` share a node, and so do chains of such points.
-    """
+    Points within `eps_mm` share a node, and so do chains of such points."""
     skew = points @ np.array(SKEW)
     node, first = merged(points, skew, np.argsort(skew), eps_mm)
     return node, points[first]
@@ -675,8 +664,7 @@ def valid_slices(slices: Slices, elements: Segments, source: Arrays, offset: Off
     A point is too near if it falls short of the distance, or lies in a kite, by more than
     VALIDITY_EPS_MM. The raw offset changes between valid and invalid only where it meets itself,
     so that one point would do; several guard against slices that are too near by hardly anything
-    anywhere.
-    """
+    anywhere."""
     limits = (offset.distance_mm, VALIDITY_EPS_MM)
     curves = curve_rows_of(elements)
     return far_enough(curves, slices.element, slices.span, source, limits)
@@ -689,8 +677,7 @@ def without_doubles(slices: Slices, elements: Segments) -> Slices:
     """Return the slices without repeated ones, and without pairs that run to and fro along each
     other.
 
-    Such a pair encloses nothing: there the offset splits into two, or collapses to a line.
-    """
+    Such a pair encloses nothing: there the offset splits into two, or collapses to a line."""
     middle = 0.5 * (slices.t0 + slices.t1)
     eps = 2.0 * NODE_EPS_MM
     return slices[doubles_left(curve_rows_of(elements), slices.element, middle, slices.ends, eps)]
@@ -707,8 +694,7 @@ def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
 
     At a node where several slices leave, the leftmost one is taken: the region that is far enough
     from the source is on the left, and parts of it that only touch become loops of their own. Each
-    loop begins with its first slice, and they come in the order of these.
-    """
+    loop begins with its first slice, and they come in the order of these."""
     rows, begins = traced(curve_rows_of(elements), slices.element, slices.span, slices.ends)
     if len(rows) == 0:
         return []
@@ -726,8 +712,7 @@ def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> tuple[Pol
     element become one segment.
 
     Segments up to POSITION_EPS_MM are dropped, and so are paths of which nothing remains or whose
-    mean width, area over half the length, is no more than that.
-    """
+    mean width, area over half the length, is no more than that."""
     eps = POSITION_EPS_MM
     begins = np.concatenate([[0], np.cumsum([len(loop) for loop in loops])]).astype(np.int64)
     rows = np.concatenate([np.empty(0, dtype=np.int64), *loops])

@@ -6,8 +6,7 @@ paths overlap, the longer one stays whole.
 
 Everything else stays whole: closed paths, because two contours that share an edge are two parts
 that both need cutting, and open paths of several segments, because they were drawn as one stroke.
-A path that overlaps itself stays too.
-"""
+A path that overlaps itself stays too."""
 
 from __future__ import annotations
 
@@ -46,8 +45,7 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
     """Return the paths without what lies on another path of the same group, `groups` (M,).
 
     The rules are at the top of this file. A remainder shorter than `within_mm` is left out with
-    the overlap beside it.
-    """
+    the overlap beside it."""
     unchanged = Unlapped(lines, np.arange(len(lines)), 0, 0.0)
     if not _may_be_loose(lines).any():
         return unchanged
@@ -243,8 +241,7 @@ class Intervals(Struct, frozen=True, eq=False):
     """K intervals: `path` (K,) that each came from, `group` (K,), `loose` (K,), `length` (K,) mm.
 
     Lines have `start` (K, 2) and the unit `direction` (K, 2); circles `centre` (K, 2), `radius`
-    (K,) and the first angle `low` (K,) rad. The others are NaN.
-    """
+    (K,) and the first angle `low` (K,) rad. The others are NaN."""
 
     path: Ints
     group: Ints
@@ -260,8 +257,7 @@ class Intervals(Struct, frozen=True, eq=False):
 class Covers(Struct, frozen=True, eq=False):
     """Pairs of intervals on one carrier: of the interval `a`, `begin` to `end` mm lie on `b`.
 
-    A place s mm along b is at  shift + sense·s  along a.
-    """
+    A place s mm along b is at  shift + sense·s  along a."""
 
     a: Ints
     b: Ints
@@ -323,8 +319,7 @@ def _shared_line(intervals: Intervals, a: Ints, b: Ints, tolerance: float) -> Co
     place.
 
     The distance of the lines is linear along them, so that it is largest at the ends of the
-    stretch.
-    """
+    stretch."""
     along, length_b = intervals.direction[a], intervals.length[b]
     from_a = intervals.start[b] - intervals.start[a]
     shift = (from_a * along).sum(axis=1)
@@ -346,8 +341,7 @@ def _on_circles(intervals: Intervals, within_mm: float) -> Iterator[Covers]:
     """Yield the covers of arcs on one circle.
 
     Circles of a grid of holes have equal centres in x, or in y, and equal radii: only along a
-    slanted line are their centres apart, so that boxes are laid along one.
-    """
+    slanted line are their centres apart, so that boxes are laid along one."""
     arcs = np.flatnonzero(~np.isnan(intervals.radius))
     is_searched = intervals.loose[arcs]
     if not is_searched.any():
@@ -371,8 +365,7 @@ def _shared_circle(intervals: Intervals, a: Ints, b: Ints, tolerance: float) -> 
     """Yield the stretches that each arc of `a` has in common with the arc of `b` in the same
     place.
 
-    There are two yields, since b may cover both the begin and the end of a.
-    """
+    There are two yields, since b may cover both the begin and the end of a."""
     radius, turn = intervals.radius[a], 2.0 * np.pi
     lead_angle = np.mod(intervals.low[b] - intervals.low[a], turn)
     for shift in (lead_angle * radius, (lead_angle - turn) * radius):

@@ -9,8 +9,7 @@ paths one after the other, `offsets` where each begins, `closed` per path. Every
 once, here, so that no function behind needs to: finite numbers, |bulge| ≤ 1, and no segment
 shorter than `POSITION_EPS_MM`. Arrays are read-only.
 
-`Segments` is the working form of the pure functions beside this file: one row per segment.
-"""
+`Segments` is the working form of the pure functions beside this file: one row per segment."""
 
 from __future__ import annotations
 
@@ -42,8 +41,7 @@ class Polyline:
     """A path of lines and arcs: `vertices` (n, 3) of x, y, bulge in mm; n ≥ 2.
 
     The bulge of the last vertex of an open path has no segment and is stored as 0.
-    Raises GeometryError when the numbers are no polyline.
-    """
+    Raises GeometryError when the numbers are no polyline."""
 
     vertices: Floats
     closed: bool = False
@@ -80,8 +78,7 @@ class Polyline:
 class Polylines:
     """Many paths in columns: `vertices` (N, 3), `offsets` (M+1,), `closed` (M,).
 
-    Path i owns vertices[offsets[i]:offsets[i+1]]. Raises GeometryError, naming path and vertex.
-    """
+    Path i owns vertices[offsets[i]:offsets[i+1]]. Raises GeometryError, naming path and vertex."""
 
     vertices: Floats
     offsets: Ints
@@ -192,8 +189,7 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
 
         s = sweep/4, b = tan s, chord c = |end − start|:
         radius = c (1 + b²) / (4 |b|);
-        centre = midpoint + (1 − b²)/(4b) · (chord vector turned by +90°).
-    """
+        centre = midpoint + (1 − b²)/(4b) · (chord vector turned by +90°)."""
 
     start: Floats
     end: Floats
@@ -403,8 +399,7 @@ def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bool
     `vertices` (N, 3) of x, y, bulge, mm, path after path, `counts` (M,) of each. A vertex is
     dropped when it coincides with the one kept before it, which takes over its bulge, in place: a
     bulge belongs to the segment that leaves. The first point of a closed path, repeated at its
-    end, is dropped without being counted: it says "closed" once more.
-    """
+    end, is dropped without being counted: it says "closed" once more."""
     first = np.cumsum(counts) - counts
     filled = counts > 0
     begins = np.zeros(len(vertices), dtype=np.bool_)
@@ -424,8 +419,7 @@ def encloses(vertices: Floats, owner: Ints, counts: Ints) -> Bools:
     """Return the mask (M,), false for paths of two vertices without a bulge: closed, they would
     run to and fro along one line.
 
-    `owner` (N,) is the path of each vertex, `counts` (M,) the number of vertices of each path.
-    """
+    `owner` (N,) is the path of each vertex, `counts` (M,) the number of vertices of each path."""
     bent = np.bincount(owner, weights=vertices[:, 2] != 0.0, minlength=len(counts))
     return np.asarray((counts != 2) | (bent != 0.0))
 
@@ -434,8 +428,7 @@ def _leave_out(path: Floats, keep: Bools) -> None:
     """Drop repeated vertices of one path by changing `keep` and bulges in place.
 
     `keep` comes with false for vertices that coincide with the one before them. It becomes false
-    for those that coincide with the last one kept, which takes the bulge of the last of them.
-    """
+    for those that coincide with the last one kept, which takes the bulge of the last of them."""
     next_row = 0
     for row in np.flatnonzero(~keep).tolist():
         if row < next_row:

@@ -11,8 +11,7 @@ Drawings are often exploded into chords. A run of chords becomes an arc when
   are off smoothly and stay chords.
 
 The arc begins and ends exactly at points of the path. Every point that it replaces is measured
-against it afterwards: none is off by more than the tolerance, or the chords stay.
-"""
+against it afterwards: none is off by more than the tolerance, or the chords stay."""
 
 from __future__ import annotations
 
@@ -49,8 +48,7 @@ def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
 
     Each point that an arc replaces lies within `tolerance_mm` of it; existing arcs and all other
     lines stay. An arc of more than a half circle counts once, though it is written as two; so
-    does a whole circle.
-    """
+    does a whole circle."""
     if len(path.vertices) < MIN_POINTS:
         return path, 0
     noise = min(rounding_noise(path.vertices[:, :2]), tolerance_mm)
@@ -72,8 +70,7 @@ def rounding_noise(points: Floats) -> float:
     """Estimate by how much rounding to decimals has moved the points, mm.
 
     It follows from the fewest decimals with which all of them can be written; `NOISE_MM` if none
-    of `DECIMALS` suffice.
-    """
+    of `DECIMALS` suffice."""
     for decimals in DECIMALS:
         units = points * 10.0**decimals
         if np.abs(units - np.round(units)).max() <= GRID_SHARE:
@@ -130,8 +127,7 @@ def _arcs(start: Floats, end: Floats, circle: Floats) -> Iterator[Floats]:
     vertices.
 
     Up to a half circle it has two rows, above it three, with a point in the middle; near a half
-    circle both are tried.
-    """
+    circle both are tried."""
     centre, radius, sweep = circle[:2], float(circle[2]), float(circle[3])
     turn = math.copysign(1.0, sweep)
     if np.array_equal(start, end):
@@ -174,8 +170,7 @@ def without_tiny(lines: Polylines, limit_mm: float) -> MergedPaths:
     """Return the paths with segments below `limit_mm` merged into their neighbours; no vertex
     moves by more than that.
 
-    A path of which too little would remain stays as it is.
-    """
+    A path of which too little would remain stays as it is."""
     has_short = np.zeros(len(lines), dtype=np.bool_)
     for segments in Segments.batches(lines):
         has_short[segments.path[segment_lengths(segments) <= limit_mm]] = True

@@ -8,8 +8,7 @@ Every reader ends here, so that a DXF and an SVG of the same part give the same 
 
 A *piece* is one entity or one subpath, in mm, Y up. A *gap* lies between two open ends.
 Tolerances: POSITION_EPS_MM (two points are one), `options.gap_mm` (two ends are joined), and
-those of `healing`.
-"""
+those of `healing`."""
 
 from __future__ import annotations
 
@@ -105,8 +104,7 @@ def assemble(
     `findings` are those of the reader (units, repairs); gaps, size and one ENTITY_SKIPPED for
     each kind of `skipped` are added here. A drawing of `marks` alone has no paths; `callouts` are
     all kept, whatever is selected. DrawingError when a number is no position or when nothing is
-    left to draw.
-    """
+    left to draw."""
     every = pieces
     pieces, marks, unwanted = selected_with_marks(every, marks, options.select, file)
     clean = clean_pieces(pieces, file)
@@ -148,8 +146,7 @@ def _closed_contours_left_out(
     """Return the closed contours among the pieces that were not chosen.
 
     They are joined among themselves alone, without findings, because they are not cut. Pieces with
-    coordinates that are not finite or too large are left out.
-    """
+    coordinates that are not finite or too large are left out."""
     chosen_set = set(chosen_pieces)
     unchosen = [piece for piece in every if piece not in chosen_set and is_placed(piece)]
     if not unchosen:
@@ -205,8 +202,7 @@ def selected_with_marks(
     """Return the chosen pieces and marks, and the counts of those left out, with the reason.
 
     Both go through one selection, so that a layer that holds only marks counts as a layer. Raises
-    DrawingError as `select_pieces` does.
-    """
+    DrawingError as `select_pieces` does."""
     if selection == Selection():
         return list(pieces), list(marks), []
     nowhere = np.zeros((1, 3))
@@ -223,8 +219,7 @@ def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], l
     """Return each mark once, and the counts of repeated ones; two marks of a layer within
     POSITION_EPS_MM are one.
 
-    DrawingError when a number is not finite or beyond MAX_COORDINATE_MM.
-    """
+    DrawingError when a number is not finite or beyond MAX_COORDINATE_MM."""
     unique_marks: list[Mark] = []
     cells: set[tuple[str, int, int]] = set()
     removed: Counter[str] = Counter()
@@ -309,8 +304,7 @@ def size_findings(drawing: Drawing) -> list[Finding]:
 def gap_findings(gaps: Sequence[Gap], gap_mm: float, *, closed: bool) -> list[Finding]:
     """Return a finding for each of MAX_GAP_FINDINGS gaps, and one that counts the others.
 
-    Of `closed` gaps the largest come first, of open ones the smallest.
-    """
+    Of `closed` gaps the largest come first, of open ones the smallest."""
     ranked = sorted(gaps, key=lambda gap: -gap.size_mm if closed else gap.size_mm)
     findings = [
         (GAP_CLOSED if closed else GAP_OPEN)(

@@ -10,8 +10,7 @@
                  first line of two numbers
 
 What is known to be something else (G-code, a mesh, PDF, DWG, other pictures of pixels, other XML
-and other archives) is refused with what to do about it.
-"""
+and other archives) is refused with what to do about it."""
 
 from __future__ import annotations
 

@@ -5,8 +5,7 @@
 
 Cleaning checks numbers, takes out repeated points and keeps each piece once. Its tolerance is
 POSITION_EPS_MM, below which two points are one; it decides what is a repeated point, what has no
-length, and what is drawn twice.
-"""
+length, and what is drawn twice."""
 
 from __future__ import annotations
 
@@ -45,8 +44,7 @@ IS_DRAWN_TWICE = "is drawn twice"
 class Cleaned(Struct, frozen=True, eq=False):
     """Paths, the piece that each came from (M,), and counts of what was left out.
 
-    `duplicates` pieces, with a length of `duplicates_mm`, were drawn twice.
-    """
+    `duplicates` pieces, with a length of `duplicates_mm`, were drawn twice."""
 
     lines: Polylines
     piece: Ints
@@ -59,8 +57,7 @@ def clean_pieces(pieces: Sequence[Piece], file: str) -> Cleaned:
     """Return the pieces as paths without repeated points and each drawn once, and the counts of
     what was left out.
 
-    DrawingError when a number is not finite or beyond MAX_COORDINATE_MM, or a piece is no path.
-    """
+    DrawingError when a number is not finite or beyond MAX_COORDINATE_MM, or a piece is no path."""
     if not pieces:
         return Cleaned(Polylines.of([]), np.empty(0, dtype=np.int64))
     vertices, counts = _columns(pieces, file)
@@ -108,8 +105,7 @@ def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
     """Return the vertices (N, 3) of all pieces in one array, and the number of vertices of each
     piece.
 
-    DrawingError when one is not finite or too far away.
-    """
+    DrawingError when one is not finite or too far away."""
     counts = np.array([len(piece.vertices) for piece in pieces], dtype=np.int64)
     if counts.sum() > MAX_POINTS:
         raise too_many_points(file)
@@ -140,8 +136,7 @@ def _kinds(
 ) -> list[Skipped]:
     """Return counts of the chosen pieces by kind, with the reason why they are left out.
 
-    `times` (of each piece) counts a piece more than once; `before` is put before the kind.
-    """
+    `times` (of each piece) counts a piece more than once; `before` is put before the kind."""
     counts: Counter[str] = Counter()
     for index in np.flatnonzero(is_chosen).tolist():
         counts[pieces[index].kind] += 1 if times is None else int(times[index])
@@ -169,8 +164,7 @@ def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
 
     Each segment is a number (`segment_numbers`); a path is the sum of its segments, the same from
     any start. With 64 bits, the chance that two different paths among a million are taken for the
-    same is one in thirty million.
-    """
+    same is one in thirty million."""
     count = len(lines)
     if not count:
         return np.empty(0, dtype=np.bool_)
@@ -188,8 +182,7 @@ def segment_numbers(vertices: Floats, begin: Ints | Indices, end: Ints | Indices
     """Return a 64-bit hash (K,) of each segment, from its rounded ends and bulge; the same in both
     directions.
 
-    `begin` and `end` (K,) are the rows of its ends in `vertices` (N, 3).
-    """
+    `begin` and `end` (K,) are the rows of its ends in `vertices` (N, 3)."""
     numbers = np.empty(len(begin), dtype=np.uint64)
     for first in range(0, len(begin), SEGMENTS_AT_ONCE):
         batch = slice(first, first + SEGMENTS_AT_ONCE)
@@ -400,8 +393,7 @@ def _add_distances(
 
     `is_gone` are rows of drawn segments that no result equals, `new` those of the result that no
     drawn one equals. Distances are measured from drawn to result and from result to drawn, and the
-    reader's own error is added.
-    """
+    reader's own error is added."""
     # From drawn segments to the result: to the nearest segment, and to others nearly as near.
     for rows, distances, point, row in _near_segments(drawn, is_gone, result, 2.0):
         total = distances[point, None] + drawn_off[drawn.begin[rows[point]]]
@@ -419,8 +411,7 @@ def _near_segments(
     nearest other segment.
 
     Each batch gives for its P points the segment (P,) and the distance (P,) mm, then pairs (J,),
-    (J,) of a point and another segment whose distance is at most `times` the nearest one.
-    """
+    (J,) of a point and another segment whose distance is at most `times` the nearest one."""
     if not len(indices):
         return
     moves = moves_of(other_segments.of(np.arange(len(other_segments))))

@@ -2,8 +2,7 @@
 
 `ReadOptions` and its `Selection` are the table: name, type, default and flag of each option. The
 flags of commands are made from it, and `Reading` has the same names and types as keywords of the
-Python API, where a type checker wants them written out.
-"""
+Python API, where a type checker wants them written out."""
 
 from __future__ import annotations
 
@@ -63,8 +62,7 @@ class Selection(FrozenRecord):
     """Patterns that select entities; an empty field selects all.
 
     `layers` and `exclude_layers`: patterns with `*`, `?` and `[…]`, in any case. `colours`:
-    "#rrggbb". `line_types`: patterns like those of layers (DASHED, CENTER*).
-    """
+    "#rrggbb". `line_types`: patterns like those of layers (DASHED, CENTER*)."""
 
     layers: Annotated[
         tuple[str, ...], Flag("--layer", "Only these layers (CUT, ENG*).", "PATTERN")
@@ -102,8 +100,7 @@ class ReadOptions(FrozenRecord):
     file claims): pixels at least as dark as `threshold` (0 white … 1 black) are drawn, or with
     `invert` those as light; shapes of less than `speckle_px` pixels are not; contours are smoothed
     within `smooth_px` pixels; `trace`: one of TRACES.
-    Raises OptionError.
-    """
+    Raises OptionError."""
 
     format: Annotated[
         str | None,
@@ -231,8 +228,7 @@ class ReadOptions(FrozenRecord):
         """Return the options with lengths on the part divided by `scale`, so that they apply to
         the drawing.
 
-        A tolerance is not reduced below POSITION_EPS_MM: positions nearer than this are one.
-        """
+        A tolerance is not reduced below POSITION_EPS_MM: positions nearer than this are one."""
         from camtool.geometry.polylines import POSITION_EPS_MM
 
         return replace(
@@ -319,8 +315,7 @@ def options_of(fields: Mapping[str, Any], machine: Machine | None = None) -> Rea
     """Return the options with these fields of `ReadOptions` and `Selection`, by name.
 
     Lengths may be texts with a unit, and a single pattern may stand without a list. Tolerances
-    that are not given are those of the `machine`, if there is one. Raises OptionError.
-    """
+    that are not given are those of the `machine`, if there is one. Raises OptionError."""
     settings: dict[str, Any] = {}
     if machine is not None:
         defaults = machine.defaults

@@ -3,8 +3,7 @@ type.
 
 A pattern has `*`, `?` and `[…]` and is the same in any case, as names in CAD are. A pattern that
 chooses nothing is an error that names what there is: a misspelt layer must not cut everything,
-or nothing.
-"""
+or nothing."""
 
 from __future__ import annotations
 
@@ -37,8 +36,7 @@ class Piece(Struct, frozen=True, eq=False):
     A closed piece may repeat its first point at its end. `source` begins with the kind of the
     entity ("CIRCLE 2F", "path outline"). `line_type` as a DXF names it, "" elsewhere. `off_mm`
     (n, 2): the largest and the rms distance of what is drawn from the segment that leaves each
-    vertex; None where the segments are what is drawn.
-    """
+    vertex; None where the segments are what is drawn."""
 
     vertices: Floats
     closed: bool
@@ -93,8 +91,7 @@ def select_pieces(
 ) -> tuple[list[Piece], list[Skipped]]:
     """Return the chosen pieces in order, and for each kind the number left out, with the reason.
 
-    DrawingError when a pattern (except of `exclude_layers`) matches no piece at all.
-    """
+    DrawingError when a pattern (except of `exclude_layers`) matches no piece at all."""
     if selection == Selection():
         return list(pieces), []
     rules = _rules(selection, pieces, file)
@@ -142,8 +139,7 @@ def matching_names(
 ) -> set[str] | None:
     """Return the names that any pattern matches, None without patterns.
 
-    NoMatchError, which lists the names there are, for a pattern that matches none.
-    """
+    NoMatchError, which lists the names there are, for a pattern that matches none."""
     if not patterns:
         return None
     available = list(dict.fromkeys(names))

@@ -2,8 +2,7 @@
 
 A third party adds a format by an entry point of the group `camtool.importers` that names an
 `Importer`, such as a module with its two functions. It is asked about what is none of camtool's
-own formats; docs/formats.md has an example.
-"""
+own formats; docs/formats.md has an example."""
 
 from __future__ import annotations
 
@@ -66,8 +65,7 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
     """Return the Drawing in the content of a file.
 
     `file` names it in messages, and its extension is a hint at the format. DrawingError when there
-    is no drawing in it, OptionError for an option that its format does not have.
-    """
+    is no drawing in it, OptionError for an option that its format does not have."""
     if not data.strip():
         raise DrawingError("is empty", file=file, mend=_EXPORT_AGAIN)
     suffix = Path(file).suffix.lower()
@@ -87,8 +85,7 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
 def _read_by_others(data: bytes, file: str, suffix: str, options: ReadOptions) -> Drawing | None:
     """Return the Drawing made by the first plug-in that recognises the content; None if none does.
 
-    DrawingError, which names the plug-in, for one that fails in an unexpected way.
-    """
+    DrawingError, which names the plug-in, for one that fails in an unexpected way."""
     for point in sorted(entry_points(GROUP), key=lambda point: point.name):
         try:
             importer = cast(Importer, point.load())

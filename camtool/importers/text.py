@@ -2,8 +2,7 @@
 
 Letters are outlines of an installed font, or the single strokes of Hershey's Roman. They are
 measured in heights of a capital: the baseline is y = 0, a capital reaches y = 1. Fonts are found
-by ezdxf, which lists the installed ones once for all its uses; nothing is downloaded.
-"""
+by ezdxf, which lists the installed ones once for all its uses; nothing is downloaded."""
 
 from __future__ import annotations
 
@@ -90,8 +89,7 @@ class Font(Struct, frozen=True, eq=False):
 
     `letter` returns None for a character that it lacks: a blank of the width `blank` takes its
     place. `em` is the size by which the font is asked for. The baseline is the foot of an "x",
-    which lies `foot` above the font's own.
-    """
+    which lies `foot` above the font's own."""
 
     name: str
     outlines: bool
@@ -258,8 +256,7 @@ def _outline_font(path: str) -> Font | None:
 def _outline(glyphs: Any, capital: float, character: str) -> Letter | None:
     """Return the outline of a letter, in heights of a capital; None if the font lacks it.
 
-    `capital` is the height of a capital in the units of the font.
-    """
+    `capital` is the height of a capital in the units of the font."""
     if ord(character) not in glyphs.cmap:
         return None
     base = np.array([0.0, float(glyphs.font_measurements.baseline)])
@@ -314,8 +311,7 @@ def describe_lacking(font: str, substituted: str, missing: str) -> str:
     """Return words for what a font lacks, "" if nothing.
 
     `font` draws in place of the font `substituted` ("" when it is the wanted one) and has none of
-    the characters `missing`.
-    """
+    the characters `missing`."""
     notes = []
     if substituted:
         notes.append(f"font {substituted} is not installed: drawn with {font}")

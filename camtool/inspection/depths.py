@@ -10,8 +10,7 @@ other dimensions, the widths.
 The least and the greatest depth are bounds, proved by branch and bound to `TOLERANCE_MM`, of the
 moves of the predicted slides and of all that may lie beside them. Of a groove or hole whose bottom
 is a line or a point (V bits, drills, round noses) it is the deepest across, looked at along its
-line.
-"""
+line."""
 
 from __future__ import annotations
 
@@ -226,8 +225,7 @@ def depths_of(floors: Sequence[Floor], moves: StockMoves) -> list[FloorDepths | 
     the band beside its walls.
 
     The Z of the moves must be exact to 1 / Z_WEIGHT of their uncertainty in the plane
-    (`beside_mm`), which is added to the bounds.
-    """
+    (`beside_mm`), which is added to the bounds."""
     tree, slack = stock_tree(moves), moves.beside_mm / Z_WEIGHT
     measured = (
         (_along_line if floor.is_line else _over_region)(floor, tree, moves.beside_mm)
@@ -288,8 +286,7 @@ def proposed_floors(drawing: Drawing, job: Job, machine: Machine) -> Iterator[Di
     """Yield a dimension for the depth of each floor that a job cuts, and for the thickness left
     under those of pockets if the job knows its stock.
 
-    Places are in the frame of the drawing. Cuts through the stock have none.
-    """
+    Places are in the frame of the drawing. Cuts through the stock have none."""
     placement = replace(job.placement, copies=(1, 1), pitch_mm=(0.0, 0.0))
     single = replace(job, placement=placement)
     floors = Floors(planned(drawing, single, machine, undivided=True).steps, 0.0)

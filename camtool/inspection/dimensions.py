@@ -25,8 +25,7 @@ DEPTHS: Final = ("depth", "thickness")
 """Kinds of dimensions along Z, of the floor at a place.
 
 The drawing gives no size for them: the nominal size is what the job asks for, unless the file
-states one.
-"""
+states one."""
 
 ZONES: Final = ("position", "straightness", "roundness", "profile")
 """Kinds that are widths of zones of ISO 1101: they have no nominal size and no lower limit."""
@@ -54,8 +53,7 @@ class Dimension(Struct, frozen=True):
     `nominal_mm` None: as drawn; `limits` None: none are known, and it is only predicted, unless
     they depend on the nominal value and this is not known yet: `words` of limits ("H7"), and the
     `general` tolerance ("ISO 2768-m") where there are none, "" each (`limits.limited`).
-    `source`: where it comes from ("DIMENSION 4F", "tolerances.toml, dimension 3").
-    """
+    `source`: where it comes from ("DIMENSION 4F", "tolerances.toml, dimension 3")."""
 
     name: str
     kind: Kind

@@ -3,8 +3,7 @@
 A dimension names places (`camtool.inspection.dimensions`). A place belongs to a centre that lies
 there, to an edge that it lies on and that is perpendicular to the direction of measurement, or to
 the outermost point of a circle in that direction. A place that fits no feature, or several that
-differ, is a finding, and the dimension is not inspected.
-"""
+differ, is a finding, and the dimension is not inspected."""
 
 from __future__ import annotations
 
@@ -262,8 +261,7 @@ def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension 
     """Return a dimension with the features that it measures, or the finding that says why none, or
     several, fit.
 
-    Depths and thicknesses have no features in the drawing and are always bound.
-    """
+    Depths and thicknesses have no features in the drawing and are always bound."""
     if dimension.kind == "distance":
         return _distance(dimension, features, file)
     if dimension.kind in DEPTHS:
@@ -305,8 +303,7 @@ def _closed_circle_first(circles: list[CircleFeature]) -> list[CircleFeature]:
     """Return the closed circle alone if exactly one of these concentric circles is closed, else
     all of them.
 
-    A dimension there is that of the hole, not of a fillet around it.
-    """
+    A dimension there is that of the hole, not of a fillet around it."""
     closed = [each for each in circles if each.is_closed]
     return closed if len(closed) == 1 else circles
 
@@ -355,8 +352,7 @@ def _distance(dimension: Dimension, features: Features, file: str) -> BoundDimen
 def _place_of(end: DistanceEnd, direction: Floats) -> Floats:
     """Return the drawn point (2,) mm at which this end of a distance lies.
 
-    The start of an edge, the centre of a circle, or its outermost point along `direction`.
-    """
+    The start of an edge, the centre of a circle, or its outermost point along `direction`."""
     if isinstance(end.feature, EdgeFeature):
         return np.asarray(end.feature.start_mm)
     offset = end.side * end.feature.radius_mm if end.how == "outermost" else 0.0

@@ -1,8 +1,7 @@
 """The dimensions of a program's part on any variant of its machine: simulate, and measure.
 
 The features of all dimensions are found once, and with them which moves cut each; for every
-variant of the machine the program is simulated again and the same stations are measured.
-"""
+variant of the machine the program is simulated again and the same stations are measured."""
 
 from __future__ import annotations
 
@@ -126,8 +125,7 @@ class _FarCut(Struct, frozen=True, eq=False):
     def edges(self, machine: Machine, wider_mm: float) -> Floats:
         """Return the position (L, S) mm of the machined edge in the frame of the dimensions.
 
-        What is left of an edge in one frame is right of it in another that is turned over.
-        """
+        What is left of an edge in one frame is right of it in another that is turned over."""
         slides = self.inspector.slides(machine).wider(0.5 * wider_mm)
         edges = edge_at(self.feature, self.cut, rows_of(slides, self.cut, self.feature))
         mirrored = isinstance(self.feature, EdgeFeature) and self.turn.is_over
@@ -137,8 +135,7 @@ class _FarCut(Struct, frozen=True, eq=False):
 class _OtherSetups:
     """The other set-ups of a part, each posted when a dimension first needs it.
 
-    `cuts` are the cuts found there, by the `id` of the same cut in the frame of the dimensions.
-    """
+    `cuts` are the cuts found there, by the `id` of the same cut in the frame of the dimensions."""
 
     def __init__(self, run: Run) -> None:
         self._run = run
@@ -150,8 +147,7 @@ class _OtherSetups:
         """Return the cut of a feature by another set-up, in the frame of the dimensions; None if
         no set-up cuts it.
 
-        The set-up is posted and simulated when it is first needed.
-        """
+        The set-up is posted and simulated when it is first needed."""
         run, setup = self._run, _setup_that_cuts(self._run, drawn.path)
         if setup is None:
             return None
@@ -183,8 +179,7 @@ class _OtherSetups:
         """The largest distances, mm, by which set-ups that are turned over may lie beside the
         first face; None for one that is not known.
 
-        They are those of all set-ups that cut a feature, this one included.
-        """
+        They are those of all set-ups that cut a feature, this one included."""
         assert self._run.job is not None
         if not self.setups or self._run.job.setup_of is None:
             return []
@@ -197,8 +192,7 @@ class Inspector:
     of the machine.
 
     `dimensions` can be measured; `findings` say why the others cannot. A feature that another
-    set-up of the part cuts is measured as that set-up cuts it.
-    """
+    set-up of the part cuts is measured as that set-up cuts it."""
 
     def __init__(self, run: Run, dimensions: Iterable[Dimension]) -> None:
         """Take a run with a drawing, a job and a verification. Raises OptionError if its job
@@ -233,8 +227,7 @@ class Inspector:
         NaN for features that are not cut.
 
         `left_mm`: additional allowance, mm, on the walls of these paths of the drawing, by path.
-        The path of the tool and the edge that it cuts move outwards by it.
-        """
+        The path of the tool and the edge that it cuts move outwards by it."""
         edges = self._edges(variant or MachineVariant(self._target.machine))
         allowances = left_mm or {}
         sizes = []
@@ -292,8 +285,7 @@ class Inspector:
         """Return the positions (T,) mm of the edges of all cuts on a variant of the machine, one
         cut after the other, NaN where an edge is not cut.
 
-        Three values of each depth follow.
-        """
+        Three values of each depth follow."""
         edges = self._edges(variant).values()
         depths = (self._depth(each, variant) for each in self.dimensions if each.floor is not None)
         sizes = ((each.fit_mm, each.low_mm, each.high_mm) for each in depths)
@@ -303,8 +295,7 @@ class Inspector:
         """Measure a depth or a thickness on a variant of the machine.
 
         A change of the motion in the plane alone changes no depth, so that one simulation serves
-        all variants of the same Z.
-        """
+        all variants of the same Z."""
         z = variant.machine.axes.z
         if z not in self._depths_by_z:
             mean_machine = without_scatter(MachineVariant(self._target.machine)).machine
@@ -349,8 +340,7 @@ class Inspector:
         """Return the values (N, 3 D) mm of N parts.
 
         The edges of each part are mixed, with the weights (N, M), from the edges `nodes` (M, T) of
-        M simulated parts.
-        """
+        M simulated parts."""
         cuts = {id(cut): cut for each in self.dimensions for cut in each.cuts}
         own_edges: dict[int, tuple[Floats, Floats]] = {}  # levels, and the nodes' edges there
         begin = 0
@@ -417,8 +407,7 @@ def _edges_of(bound: BoundDimension) -> Floats:
     """Return the weights (E, 2), in X and Y, of the edges that determine a dimension.
 
     A centre is midway between two edges, a zone is as wide as the error of one. Round features
-    have edges on all sides, which count in X and in Y alike.
-    """
+    have edges on all sides, which count in X and in Y alike."""
     kind = bound.dimension.kind
     if kind in DEPTHS:
         return np.array([[0.0, 0.0, 1.0]])

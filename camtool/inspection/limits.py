@@ -8,8 +8,7 @@
 
     words ──read_words──▶ LimitsText ──limits(nominal size)──▶ Limits
 
-Every error is an OptionError in one line with its mend; the caller adds file and place.
-"""
+Every error is an OptionError in one line with its mend; the caller adds file and place."""
 
 from __future__ import annotations
 
@@ -59,8 +58,7 @@ class LimitsText(Struct, frozen=True):
     """Limits parsed from text, before the nominal size is known.
 
     One of these is set, or a class and its deviations: `iso` ("H7", or ""), `deviations_mm`,
-    `sizes_mm` (lower, upper). `unit`: that of their numbers ("" if the text names none).
-    """
+    `sizes_mm` (lower, upper). `unit`: that of their numbers ("" if the text names none)."""
 
     iso: str = ""
     deviations_mm: tuple[float, float] | None = None
@@ -128,8 +126,7 @@ def read_words(words: str, mm_per_unit: float = 1.0) -> LimitsText:
     """Parse a text of limits; OptionError if it is not understood or contradicts itself.
 
     Decimals may have a comma, the sign may be a typographic minus, and ± may be written `%%p` as
-    in DXF, or `+-`.
-    """
+    in DXF, or `+-`."""
     if len(words) > MAX_WORDS_CHARS:
         raise NotUnderstood(f"limits of {len(words)} characters are not read", mend=_EXAMPLES)
     text = normalised_words(words)

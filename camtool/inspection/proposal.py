@@ -2,8 +2,7 @@
 
 A slot is a closed path of two equal half circles and two edges. Every other closed path that is no
 circle has an overall size along x and along y, where it ends at an edge or at the outermost point
-of an arc: a corner is no feature that could be measured.
-"""
+of an arc: a corner is no feature that could be measured."""
 
 from __future__ import annotations
 
@@ -54,8 +53,7 @@ def propose_file(
 
     Further values are the findings about its callouts, and the errors of callouts whose limits are
     wrong: these are written without limits. A dimension that fits no drawn feature becomes a
-    comment. InputError for a drawing without anything to measure.
-    """
+    comment. InputError for a drawing without anything to measure."""
     faults: list[DrawingError] = []
     said_dimensions, findings = dimensions_of(drawing, faults=faults)
     features = features_of(drawing.paths)

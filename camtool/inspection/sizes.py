@@ -20,8 +20,7 @@ sizes are taken at all depths at which moves lie, and the extreme ones are those
 
 Sizes of it are those of ISO 14405-1 (two-point sizes, the least-squares size) and zones of ISO
 1101 (minimum zones, as linear programmes in the deviations, which are small beside the feature).
-Not modelled: surface texture, taper of the tool, burrs.
-"""
+Not modelled: surface texture, taper of the tool, burrs."""
 
 from __future__ import annotations
 
@@ -118,8 +117,7 @@ class Stations(Struct, frozen=True, eq=False):
     """Points at which a feature is measured: places (S, 2) mm, unit normals (S, 2) towards the
     tool, and the mask `measured` (S,) of those on the feature.
 
-    `wide`: distance between neighbours, in radians or mm.
-    """
+    `wide`: distance between neighbours, in radians or mm."""
 
     places: Floats
     normals: Floats
@@ -180,8 +178,7 @@ def envelope(
     station; with `above_mm` also where what clears it lies more than that above the middle of all.
 
     Segments that cross a normal themselves are measured first, which is quick and gives a bound:
-    of the others only those can matter whose discs reach below it.
-    """
+    of the others only those can matter whose discs reach below it."""
     crossing = _envelope(feature, stations, swept, mask, levels_mm, -math.inf)
     bound = math.inf
     finite = mask & np.isfinite(crossing)
@@ -287,8 +284,7 @@ def _reach(radius: Floats, least_v: Floats, bound_mm: float) -> Floats:
     """Return how far (K,) mm beside a normal the centre of a disc may lie, if the disc is to reach
     below `bound_mm` on it.
 
-    The centre is no lower than `least_v`: v − √(r² − u²) ≤ bound needs u² ≤ r² − (v − bound)².
-    """
+    The centre is no lower than `least_v`: v − √(r² − u²) ≤ bound needs u² ≤ r² − (v − bound)²."""
     if bound_mm == -math.inf:
         return np.zeros(len(radius))
     below = np.maximum(least_v - bound_mm, 0.0)
@@ -302,8 +298,7 @@ def cut_of(feature: Feature, wanted_moves: SweptSegments) -> Cut | None:
     """Return how the wanted moves cut a feature; None if they do not.
 
     A tool that tapers makes a feature only where it runs along it, or where its edge at the
-    surface is the feature itself: a chamfer is none.
-    """
+    surface is the feature itself: a chamfer is none."""
     straight = np.isfinite(wanted_moves.z)
     walls = _cut_of(feature, wanted_moves.of(straight))
     tapering = _cut_of(feature, wanted_moves.of(~straight))
@@ -381,8 +376,7 @@ def _offsets(feature: Feature, swept: SweptSegments, indices: Ints) -> tuple[Flo
     """Return the distances (J,) mm of the midpoints of segments from the feature, and the mask of
     those beside it and within reach.
 
-    Distances are above 0 outside of a circle and left of an edge.
-    """
+    Distances are above 0 outside of a circle and left of an edge."""
     middle = 0.5 * (swept.a[indices] + swept.b[indices])
     if isinstance(feature, CircleFeature):
         spoke = middle - np.asarray(feature.centre_mm)
@@ -413,8 +407,7 @@ def edge_at(feature: Feature, cut: Cut, swept: SweptSegments) -> Floats:
     """Return the position (L, S) mm of the machined edge of a feature at each depth, outwards from
     a circle and to the left of an edge; NaN where it is not cut.
 
-    `swept` is the path of the slides.
-    """
+    `swept` is the path of the slides."""
     edges = envelope(feature, cut.stations, swept, cut.seen, levels_mm=cut.levels_mm)
     edges[~np.isfinite(edges)] = np.nan
     return np.asarray(cut.side * edges)
@@ -433,8 +426,7 @@ def size_of(
     """Return the size of a dimension; None if one of its features is not cut.
 
     `edges` are the positions (L, S) of the machined edges, as from `edge_at`, in the order of
-    `bound.features`. Below the deepest cut of a feature its deepest edge counts.
-    """
+    `bound.features`. Below the deepest cut of a feature its deepest edge counts."""
     levels = [cut.levels_mm for cut in cuts]
     values = sizes_of(bound, levels, [each[None] for each in edges])[0]
     return MachinedSize(*values.tolist()) if np.isfinite(values).all() else None
@@ -446,8 +438,7 @@ def sizes_of(
     """Return best fit, least and largest local size (N, 3) mm of N parts at once.
 
     `edges_of_features` (N, L, S) are the positions of the edges of each feature at its depths
-    `levels_mm` (L,); NaN where one is not cut. A station counts if it is cut on all N parts.
-    """
+    `levels_mm` (L,); NaN where one is not cut. A station counts if it is cut on all N parts."""
     every = distinct(np.concatenate(levels_mm))[::-1]
     sizes_by_level: list[Floats] = []
     last: list[Floats] = []
@@ -473,8 +464,7 @@ def distinct_levels(nodes: Floats) -> Ints:
     """Return the indices of the depths at which the edges of a feature, on any of M parts, differ
     from those at the next deeper index returned.
 
-    `nodes` (M, L, S) mm are the positions of the edges.
-    """
+    `nodes` (M, L, S) mm are the positions of the edges."""
     kept_levels = [nodes.shape[1] - 1]
     for level in range(nodes.shape[1] - 2, -1, -1):
         if not _are_equal(nodes[:, level], nodes[:, kept_levels[-1]]):
@@ -569,8 +559,7 @@ def _lengths(vectors: Floats) -> Floats:
     """Return the lengths (N, J) of vectors (2, N, J).
 
     Squares of sizes of parts are far from the limits of floats, so that the root is exact enough
-    and much faster than `numpy.hypot`.
-    """
+    and much faster than `numpy.hypot`."""
     x, y = vectors
     return np.asarray(np.sqrt(x * x + y * y))
 
@@ -586,8 +575,7 @@ def fit_circles(points: Floats, near_mm: Floats) -> tuple[Floats, Floats]:
     and radii (N,), mm. `near_mm` (2,) is a place near the centres.
 
     Gauss-Newton with the derivatives of the first circle about `near_mm`, from which the others
-    differ by micrometres: with d = |p − c| and u = (p − c)/d, [u, 1] (δc, R) = d.
-    """
+    differ by micrometres: with d = |p − c| and u = (p − c)/d, [u, 1] (δc, R) = d."""
     spoke = points[:, 0].T - near_mm
     distance = np.hypot(spoke[:, 0], spoke[:, 1])
     terms = np.column_stack([spoke / distance[:, None], np.ones(len(spoke))])
@@ -633,8 +621,7 @@ def _distances_between(first: _Values, second: _Values) -> Floats:
     """Return the distance (N, 3), best fit, least and largest, of two ends on N parts.
 
     It is measured point by point if both are edges side by side, otherwise between any two of
-    their points.
-    """
+    their points."""
     fit = second.fit_mm - first.fit_mm
     if first.across is not None and second.across is not None:
         low, high = second.across.min(), second.across.max()
@@ -685,8 +672,7 @@ def minimise_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
 
     Uses the dual simplex method, from a wide box: K conditions hold exactly; the most violated one
     replaces one of them until none is violated. Conditions that are optimal for the first bounds
-    are a start for all, which differ little.
-    """
+    are a start for all, which differ little."""
     wide = 1e3 * (1.0 + np.abs(bounds).max(axis=1, initial=0.0))
     signs = np.where(goal >= 0.0, 1.0, -1.0)
     every = np.vstack([rows, np.diag(signs)])
@@ -700,8 +686,7 @@ def _exchange(goal: Floats, every: Floats, limits: Floats, active: Ints) -> tupl
     """Return x (N, K) and its active conditions (N, K), after exchanging the given ones until none
     is violated.
 
-    Conditions are the rows `every` (J, K) with `limits` (N, J).
-    """
+    Conditions are the rows `every` (J, K) with `limits` (N, J)."""
     active, solutions = active.copy(), np.zeros(active.shape)
     open_ = np.arange(len(active))
     for _ in range(MAX_EXCHANGES):

@@ -4,8 +4,7 @@
     Drawing.callouts ──text, style──▶ dimensions ────┴─bind─▶ known size: limits ──▶ Dimension
 
 A dimension of the file holds where a callout measures the same. The nominal size is what file or
-text say, else what is drawn; where both are known they must agree within DIFFERS_MM.
-"""
+text say, else what is drawn; where both are known they must agree within DIFFERS_MM."""
 
 from __future__ import annotations
 
@@ -56,8 +55,7 @@ from camtool.units import MM_PER_UNIT, parse_angle, parse_length
 DIFFERS_MM = 0.02
 """A nominal size that differs more from the drawn size is an error.
 
-Inches with three decimals are rounded by up to 0.0127 mm.
-"""
+Inches with three decimals are rounded by up to 0.0127 mm."""
 
 MAX_SIZE_MM = 1e6
 
@@ -79,8 +77,7 @@ def dimensions_of(
 
     A dimension that fits no feature is included. Raises CamtoolError for a file or a callout whose
     limits are wrong, with its place and how to correct it; if `faults` is given, the errors of
-    callouts are added to it, and these dimensions have no limits.
-    """
+    callouts are added to it, and these dimensions have no limits."""
     if isinstance(tolerances_file, Path):
         tolerances_file = read_tolerances(tolerances_file)
     general, stated = tolerances_file or ("", ())
@@ -153,8 +150,7 @@ def _with_limits(
     """Return the dimension with its limits, now that the size of its feature is known, in a list;
     [] and a finding if its nominal size differs from the drawn one.
 
-    A dimension without a feature keeps what is known.
-    """
+    A dimension without a feature keeps what is known."""
     drawn = bound.drawn_mm if isinstance(bound, BoundDimension) else dimension.nominal_mm
     if dimension.kind in DEPTHS:
         drawn = dimension.nominal_mm
@@ -255,8 +251,7 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
 def read_tolerances(path: Path) -> Asked:
     """Read a tolerance file: its general tolerance ("" for none) and its dimensions.
 
-    CamtoolError with file, place and correction for invalid content.
-    """
+    CamtoolError with file, place and correction for invalid content."""
     file = str(path)
     file_table = read_table(path)
     if isinstance(file_table.get("dimension"), dict):

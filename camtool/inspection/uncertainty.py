@@ -54,8 +54,7 @@ says by how much it can change each value; nothing is assumed of where within th
 the temperature is so bounded: of a room ±ROOM_K, of the materials EXPANSIONS_OF_MACHINES and
 EXPANSIONS_OF_PARTS, where [uncertainty] does not say them. Not modelled: distributions other than
 normal ones (a backlash is cut off at 0 in draws), products of two directions, and directions
-whose scale or squareness depend on the place.
-"""
+whose scale or squareness depend on the place."""
 
 from __future__ import annotations
 
@@ -116,8 +115,7 @@ class MachineVariant:
     Its tool is wider by `wider_mm` than in the job, cuts deeper by `deeper_mm`, and its stock is
     thicker by `thicker_mm`; features of other set-ups lie `beside_mm` (x, y) of their places.
     Variants of these alone share the machine object of the original, so that its motion is not
-    simulated again.
-    """
+    simulated again."""
 
     machine: Machine
     wider_mm: float = 0.0
@@ -181,8 +179,7 @@ class Input(Struct, frozen=True):
     values that depend on it. It moves the machine along `along`, (direction, factor), or the
     machined edges: then `edges` are its shares in X, Y and Z. If it is not known, `missing` are
     the keys that would tell it, and `most` is an upper bound of its error, explained by the words
-    `within` (infinite and "": nothing bounds it).
-    """
+    `within` (infinite and "": nothing bounds it)."""
 
     name: str
     unit: str
@@ -258,8 +255,7 @@ def inputs_of(
     `flip_errors_mm`: how far set-ups may lie beside each other, one for each that is turned over
     (None: not known). What nothing depends on is left out: the uncertainty of a compensation of 0,
     that of a tool without width, and scatter that is not modelled. Sizes are predicted without
-    scatter.
-    """
+    scatter."""
     stated = machine.uncertainty
     inputs: list[Input] = []
     axes = [
@@ -483,8 +479,7 @@ def edges_of(features: Sequence[tuple[int, Floats]]) -> Floats:
     together.
 
     Each feature has weights (E_f, 2) or (E_f, 3), and a number of values, such as 2 for a least
-    and a greatest diameter. Features share no edges.
-    """
+    and a greatest diameter. Features share no edges."""
     axes = max((own_weights.shape[1] for _, own_weights in features), default=2)
     rows = sum(count for count, _ in features)
     weights = np.zeros((rows, sum(len(own_weights) for _, own_weights in features), axes))
@@ -522,8 +517,7 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
     uncertain. `probed` (K, P) mm: the change of a value by the probe of an unknown input, else 0.
     `runs`: number of variants that were simulated. `drawn` (N, K) mm: the values of machines drawn
     at random, without what shifts single edges, of which `scatter` (K,) mm is the standard
-    deviation; `linear` (K,): True where a value is linear in all inputs.
-    """
+    deviation; `linear` (K,): True where a value is linear in all inputs."""
 
     inputs: tuple[Input, ...]
     values: Floats
@@ -616,8 +610,7 @@ def propagate(
 
     There are at most eleven, fourteen where the values are `extremes` (minima and maxima along a
     feature), and one more measurement where the tool has a width. `edges` (K, E, 2 or 3) are the
-    weights of the values' edges.
-    """
+    weights of the values' edges."""
     base = without_scatter(inputs.variant)
     factors, covariance = inputs.factors, inputs.covariance
     spread = np.sqrt(np.clip(np.diag(factors @ covariance @ factors.T), 0.0, None))
@@ -729,8 +722,7 @@ def _weights_of(
     """Return the weights (N, M) with which M simulated machines are mixed into N machines at
     `offsets` (N, D) along the directions.
 
-    They are piecewise linear between the nodes, and extrapolated beyond the outer ones.
-    """
+    They are piecewise linear between the nodes, and extrapolated beyond the outer ones."""
     weights = np.zeros((len(offsets), count))
     weights[:, 0] = 1.0
     each = np.arange(len(offsets))
@@ -751,8 +743,7 @@ def _normals(count: int, draws: int) -> Floats:
     """Return standard normal samples (N, P), whose covariance is exactly the unit matrix.
 
     Each column holds the middles of N equally likely intervals in random order (a Latin hypercube)
-    before it is transformed.
-    """
+    before it is transformed."""
     random, middles = np.random.default_rng(SEED), _quantiles(draws)
     columns = [random.permutation(middles) for _ in range(count)]
     every = np.column_stack(columns) if columns else np.zeros((draws, 0))
@@ -802,8 +793,7 @@ def monte_carlo(values: Values, inputs: Inputs, edges: Floats, draws: int, seed:
     """Return the values of variants drawn from the joint normal distribution of the inputs, each
     simulated with its own scatter of the axes.
 
-    Unknown inputs keep their value; a backlash below 0 becomes 0.
-    """
+    Unknown inputs keep their value; a backlash below 0 becomes 0."""
     random = np.random.default_rng(seed)
     process = next((each for each in inputs.each if all(each.edges)), None)
     samples = []
@@ -859,8 +849,7 @@ def both_below(a: float, b: float, correlation: float) -> float:
         ∫_{−∞}^{a} φ(x) Φ((b − r·x) / √(1 − r²)) dx,
 
     by Gauss and Legendre's rule on pieces. Near r = ±1 the second factor is steep at x = b/r: the
-    pieces are finer there.
-    """
+    pieces are finer there."""
     r = min(1.0, max(-1.0, correlation))
     sine = math.sqrt((1.0 - r) * (1.0 + r))
     if sine < CERTAIN:

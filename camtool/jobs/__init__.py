@@ -4,5 +4,4 @@ keys         every key: what it may be, the field that it fills, the flag that s
 build        the tables of a file and of flags as a Job
 drawing      the drawing that a job is for, as finely read as its part needs
 description  what a job does with a drawing
-template     a file to fill in, from the layers of a drawing
-"""
+template     a file to fill in, from the layers of a drawing"""

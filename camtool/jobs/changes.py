@@ -3,8 +3,7 @@
     JobTables of the file ─┐
     JobTables of flags ────┴─▶ together ─▶ tables ─changed─▶ tables ─text_of─▶ a job file
 
-The tables are plain TOML. `build_job` makes of their text what it makes of file and flags.
-"""
+The tables are plain TOML. `build_job` makes of their text what it makes of file and flags."""
 
 from __future__ import annotations
 
@@ -57,8 +56,7 @@ def merged_tables(file: JobTables, flags: JobTables, folder: Path) -> Values:
     together.
 
     OptionError for flags of a tool where the operation names its tool: a job file has one or the
-    other.
-    """
+    other."""
     job_values = _raw(_merged(flags.whole, file.whole))
     for key in FILES:
         key_value = flags.whole.given.get(key) or file.whole.given.get(key)

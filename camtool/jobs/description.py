@@ -1,7 +1,6 @@
 """The description of a job as JSON: its operations, what they take of a drawing, and the sides.
 
-Contours of one operation, layer, side and reason are one group.
-"""
+Contours of one operation, layer, side and reason are one group."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """The drawing that a job is for: read as finely as the part needs, of the layers that are cut.
 
 A layer or colour of an operation that chooses nothing is an error that names what there is: a
-misspelt layer must not leave a part of the work undone.
-"""
+misspelt layer must not leave a part of the work undone."""
 
 from __future__ import annotations
 

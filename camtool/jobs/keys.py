@@ -5,8 +5,7 @@
 
 Kinds of operations name the keys that they know, and may bring keys of their own
 (`camtool.planning.kinds`). docs/jobs.md explains the keys; a test keeps the page and these tables
-equal.
-"""
+equal."""
 
 from __future__ import annotations
 

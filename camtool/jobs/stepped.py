@@ -7,8 +7,7 @@
 Seen from above both are the same. The name of a layer decides, and else the sizes: heads of
 countersunk screws are about twice as wide as their holes (ISO 15065 and ISO 273: 1.8 to 2.1 times
 for M1.6 to M10), and a countersink needs a V bit of 90 or 82 degrees that is wide enough. In doubt
-it is a countersink, which takes less away: it can be bored out afterwards.
-"""
+it is a countersink, which takes less away: it can be bored out afterwards."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Widths of what is drawn: the contours beside or within which a tool has no room, and slots.
 
 Tools run in waste: around outer contours, and within inner ones. Contours that bound the same
-waste must be at least as far from each other as the tool is wide, or it cuts into one of them.
-"""
+waste must be at least as far from each other as the tool is wide, or it cuts into one of them."""
 
 from __future__ import annotations
 

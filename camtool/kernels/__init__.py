@@ -1,8 +1,7 @@
 """Compiled inner loops: arrays in, arrays out.
 
 Each .pyx file is Cython, compiled when the package is installed (setup.py). A .pyi beside it holds
-the types of what Python code imports from it, a .pxd what other kernels import.
-"""
+the types of what Python code imports from it, a .pxd what other kernels import."""
 
 from importlib.machinery import PathFinder
 

@@ -2,8 +2,7 @@
 
 Programs say lengths in decimals, so half steps occur exactly (0.07 µm at 0.14 µm a step) but
 arrive as binary fractions a hair above or below: a quotient within `HALF_STEP_GUARD` below a half
-is taken as the half. Plain numpy: nothing here depends on what came before.
-"""
+is taken as the half. Plain numpy: nothing here depends on what came before."""
 
 from __future__ import annotations
 

@@ -18,8 +18,7 @@ def read(value: Any, name: str, options: ReadOptions) -> Found:
     """Return the pieces that an ezdxf document shows in model space or `options.layout`, or the
     given layout shows; the document says the unit.
 
-    DrawingError naming layer and entity, OptionError for other objects of ezdxf.
-    """
+    DrawingError naming layer and entity, OptionError for other objects of ezdxf."""
     from ezdxf.document import Drawing
     from ezdxf.layouts.base import BaseLayout
 

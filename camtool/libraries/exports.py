@@ -1,8 +1,7 @@
 """Drawings, toolpaths and predicted paths as objects of shapely, ezdxf and svgpathtools; mm.
 
 Objects of a drawing come as {layer: object}, which `read` takes back. What a library does not know
-is left out: svgpathtools has no points, shapely no arcs, ezdxf gets no line types but by name.
-"""
+is left out: svgpathtools has no points, shapely no arcs, ezdxf gets no line types but by name."""
 
 from __future__ import annotations
 
@@ -197,8 +196,7 @@ def circle_of(path: Polyline) -> tuple[float, float, float] | None:
 def shapely_of_moves(toolpath: Toolpath, tolerance_mm: float = CHORD_MM) -> dict[str, Any]:
     """Return the moves as 3-D lines of shapely: "cuts" at a feed and "rapids".
 
-    Each unbroken sequence of moves is one line, with arcs as chords within the tolerance.
-    """
+    Each unbroken sequence of moves is one line, with arcs as chords within the tolerance."""
     check_tolerance(tolerance_mm)
     return {
         "cuts": _lines_of(toolpath, toolpath.is_feed, tolerance_mm),

@@ -1,7 +1,6 @@
 """Arrays of numpy: (N, 2) points, or (N, 3) with the bulge of the segment that leaves each.
 
-An array is read as an .npy file is: closed where its last point is its first.
-"""
+An array is read as an .npy file is: closed where its last point is its first."""
 
 from __future__ import annotations
 

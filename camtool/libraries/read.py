@@ -5,8 +5,7 @@ class is derived from, stands in: nothing is imported to find that out. A third 
 library by an entry point of the group `camtool.libraries`, named as that package, for a module
 with the function `read` of `Library`; docs/python.md has an example.
 
-Objects may be alone, in lists, or in a dictionary {layer: objects}.
-"""
+Objects may be alone, in lists, or in a dictionary {layer: objects}."""
 
 from __future__ import annotations
 
@@ -61,8 +60,7 @@ class Library(Protocol):
         """Return the pieces and marks that the object holds, in mm; `name` is its place in
         messages.
 
-        DrawingError when it cannot be read, OptionError when it is no drawing.
-        """
+        DrawingError when it cannot be read, OptionError when it is no drawing."""
 
 
 class ReadObject(Struct, frozen=True):
@@ -106,8 +104,7 @@ def read_objects(value: object, options: ReadOptions = DEFAULTS) -> Drawing:
     """Return the Drawing of an object, a list of objects, or a dictionary {layer: objects}.
 
     Raises OptionError, which names the argument, for what is no drawing, for mixed units and for
-    options of files; DrawingError when an object cannot be read.
-    """
+    options of files; DrawingError when an object cannot be read."""
     name = name_of(value)
     if options.format is not None:
         raise OptionError(f"format {options.format!r} is for files", mend="leave format out")
@@ -150,8 +147,7 @@ def items_of(value: Any, place: str, layer: str, depth: int) -> Iterator[tuple[A
     """Yield each drawable object within `value`, which may be nested lists or {layer: objects},
     with its place for messages and its layer.
 
-    OptionError for anything that is no drawing.
-    """
+    OptionError for anything that is no drawing."""
     if depth > MAX_NESTING:
         raise OptionError(
             f"{place} lies deeper than {MAX_NESTING} lists", mend="give one list of objects"
@@ -198,8 +194,7 @@ def as_array(value: Any, place: str) -> Any:
 def read_one(value: object, place: str, options: ReadOptions) -> Found:
     """Return the pieces and marks of one object, read by the module of its library.
 
-    DrawingError, which names the plug-in, if a plug-in fails in an unexpected way.
-    """
+    DrawingError, which names the plug-in, if a plug-in fails in an unexpected way."""
     library = library_of(value)
     if library is None:
         raise OptionError(f"{place} is of no library that is read", mend=f"give {_KINDS}")

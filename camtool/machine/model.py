@@ -2,8 +2,7 @@
 
 Field names carry their units. `msgspec` checks types and ranges and refuses unknown keys;
 `camtool.tables` turns its complaints into errors that name file, table and key. The records of
-`[controller]` and `[dialect]` are the target's: `Machine` is generic over both.
-"""
+`[controller]` and `[dialect]` are the target's: `Machine` is generic over both."""
 
 from __future__ import annotations
 
@@ -182,8 +181,7 @@ class Coolant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class SlideStart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """State of the slides when a program begins, and the place of machine zero.
 
-    `machine_zero_mm` is its place in the work frame: homing goes there.
-    """
+    `machine_zero_mm` is its place in the work frame: homing goes there."""
 
     start_play: Literal["preloaded", "centred"] = "preloaded"
     start_direction: Literal["+", "-"] = "+"
@@ -199,8 +197,7 @@ class PathController(SlideStart, frozen=True, tag_field="model", tag="path"):
     """Any controller, as if it followed the programmed lines and arcs exactly.
 
     It stands in for controllers whose own arithmetic is not modelled. `grid` "steps": ends and
-    arc centres lie on the axes' coded steps; "none": they are taken as programmed.
-    """
+    arc centres lie on the axes' coded steps; "none": they are taken as programmed."""
 
     grid: Literal["steps", "none"] = "steps"
 
@@ -237,8 +234,7 @@ class PlayCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     `x_mm` and `y_mm` are the edges of the cells, ascending, in table coordinates: those of the
     work frame less `controller.machine_zero_mm`. `play_mm[j][i]` holds from y_mm[j] up to
-    y_mm[j + 1] and from x_mm[i] up to x_mm[i + 1]; outside of all edges holds the nearest cell.
-    """
+    y_mm[j + 1] and from x_mm[i] up to x_mm[i + 1]; outside of all edges holds the nearest cell."""
 
     x_mm: tuple[Place, ...]
     y_mm: tuple[Place, ...]
@@ -282,8 +278,7 @@ class MechanicsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Properties of the mechanics as a whole.
 
     `squareness_rad`: by how much the angle between +X and +Y is less than a right angle. `seed`:
-    of the random numbers for the repeatability of the axes.
-    """
+    of the random numbers for the repeatability of the axes."""
 
     squareness_rad: Annotated[float, Meta(ge=-MAX_SQUARENESS_RAD, le=MAX_SQUARENESS_RAD)] = 0.0
     seed: Annotated[int, Meta(ge=0, le=(1 << 32) - 1)] = 0
@@ -490,8 +485,7 @@ class Machine(
         """Highest feed, mm/min: the lowest of the limits that are given; inf where none is.
 
         The limits are `max_feed_mm_min`, `max_step_rate_hz` on the finest axis (feed / step), and
-        the highest rates of X and Y.
-        """
+        the highest rates of X and Y."""
         return min(self._feed_limits(self.axes.x, self.axes.y))
 
     @property
@@ -510,8 +504,7 @@ class Machine(
         """Speed of a rapid, mm/min: the first of these that is given.
 
         `rapid_mm_min`; `rapid_step_rate_hz` on the slower axis of X and Y; the highest rate of
-        the slower one; the highest feed. Inf where nothing is: rapids then take no time.
-        """
+        the slower one; the highest feed. Inf where nothing is: rapids then take no time."""
         x, y, limits = self.axes.x, self.axes.y, self.limits
         if limits.rapid_mm_min is not None:
             return limits.rapid_mm_min

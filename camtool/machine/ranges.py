@@ -5,8 +5,7 @@ enough that a number in other units, or one with a slip of the exponent, is refu
 written. It also keeps arithmetic on it finite: squares of positions, steps of a travel.
 
 Every number of a machine file has one of these ranges or a narrower one of its own (its field says
-why); `camtool.tables` says it when a number lies outside. A test looks at all of them.
-"""
+why); `camtool.tables` says it when a number lies outside. A test looks at all of them."""
 
 from __future__ import annotations
 

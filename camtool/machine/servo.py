@@ -12,8 +12,7 @@ class MotorModel(Struct, frozen=True):
     u acts `dead_time_s` late.
 
     Speeds ω are counts of the encoder in a tick, drives u are percent. A drive of at most
-    `friction_percent` does not move it from rest.
-    """
+    `friction_percent` does not move it from rest."""
 
     gain: float
     time_constant_s: float
@@ -29,8 +28,7 @@ class SpeedLoop(Struct, frozen=True):
     """The speed loops of X, Y and Z: u(k) = u(k−1) − Kpd (ω(k) − ω(k−1)) + Kid e.
 
     `tick_s` between two passes of the loop. `kid`, `kpd` as the controller stores them: multiples
-    of `gain_unit`, whole ones if `is_whole`.
-    """
+    of `gain_unit`, whole ones if `is_whole`."""
 
     tick_s: float
     motors: tuple[MotorModel, ...]
@@ -46,8 +44,7 @@ class ServoTicks(Struct, frozen=True, eq=False):
     `row` (K,) of the toolpath, and which of its orders the controller runs, `line` (K,), −1 for
     none. Of each axis (K, 3): the loop's `reference` and the mean `speed`, counts in a tick, the
     `drive`, percent; where the order asks the motor to be, `wanted`, and where it is, `reached`,
-    counts from home. `goal` (K, 3) is the speed of the order, without ramps.
-    """
+    counts from home. `goal` (K, 3) is the speed of the order, without ramps."""
 
     at_s: Floats
     row: Ints

@@ -105,8 +105,7 @@ def checked(operation: Operation, stock: Stock | None) -> Operation:
 def faced(_: Chosen, setting: Setting) -> Work:
     """Return one item with the runs that clear the top of the stock at all levels of the setting.
 
-    OptionError for a step-over so small that the passes would be too many.
-    """
+    OptionError for a step-over so small that the passes would be too many."""
     import numpy as np
 
     from camtool.geometry.polylines import Polyline, Polylines

@@ -3,8 +3,7 @@
 High or square panels stand side by side, wide ones one below the other; more than two fill a grid.
 Each panel has a title and notes of its own; legend, scale bar and colour bar belong to all. Polar
 plots share their magnification. A panel is drawn at (0, 0) and then moved to its place, so that
-equal scenes make equal panels.
-"""
+equal scenes make equal panels."""
 
 from __future__ import annotations
 
@@ -66,8 +65,7 @@ def render_beside(scenes: Sequence[Scene], name: str, options: PictureOptions = 
     """Return the SVG or PNG bytes of the scenes, by the extension of `name`.
 
     OutputError for other extensions, OptionError for .html and for options that ask for what a
-    scene does not have.
-    """
+    scene does not have."""
     if PurePath(name).suffix.lower() == ".html":
         raise OptionError(
             "an .html page shows one scene", file=name, mend="side by side, use .svg or .png"
@@ -112,8 +110,7 @@ def draw_beside(scenes: Sequence[Scene], options: PictureOptions = AS_USUAL) -> 
 def _views(contents: Sequence[Content], options: PictureOptions) -> tuple[PanelGrid, list[View]]:
     """Return the grid of panels and the view of each; they differ in the height of their heads.
 
-    The fit runs twice, since the width of the colour bar follows from the height of the plots.
-    """
+    The fit runs twice, since the width of the colour bar follows from the height of the plots."""
     window, scale = contents[0].window, _scale(contents)
     across, height = (window[:, 1] - window[:, 0]).tolist()
     columns = columns_of(len(contents), wide=height < WIDE * across)
@@ -220,8 +217,7 @@ class PanelGrid(Struct, frozen=True):
     """A grid of panels of `width`, margins included, in `columns` on a page of width `page`.
 
     `heads` are the SVG of titles and notes, `head_bottoms` the heights in each panel at which the
-    heads of its row end, `rows` the page heights at which the rows begin.
-    """
+    heads of its row end, `rows` the page heights at which the rows begin."""
 
     columns: int
     page: float

@@ -1,8 +1,7 @@
 """Toolpaths and drawings seen from above: chains of lines and arcs, places, and path data.
 
 A chain is an unbroken run of moves of one kind. Arcs stay arcs in the SVG; longer ones are written
-as several, since the centre of a nearly half or full circle is ill-defined by its end points.
-"""
+as several, since the centre of a nearly half or full circle is ill-defined by its end points."""
 
 from __future__ import annotations
 
@@ -146,8 +145,7 @@ def _chains(toolpath: Toolpath, is_chosen: Bools) -> tuple[Chain, ...]:
     """Return the chosen rows as chains, each line or arc once: passes at several depths, and a
     line there and back, look the same.
 
-    No move in XY lies between the rows of a chain.
-    """
+    No move in XY lies between the rows of a chain."""
     rows = np.flatnonzero(is_chosen)
     if not len(rows):
         return ()
@@ -257,8 +255,7 @@ def _is_flat(chain: Chain, index: int, sweep: float) -> bool:
     """Return True if an arc lies nearer to its chord than `POSITION_EPS_MM`, so that a line is
     drawn.
 
-    height = chord/2 · tan(sweep/4); renderers are inexact for radii of kilometres.
-    """
+    height = chord/2 · tan(sweep/4); renderers are inexact for radii of kilometres."""
     chord = math.dist(chain.points[index], chain.points[index + 1])
     return abs(sweep) < math.pi and 0.5 * chord * math.tan(abs(sweep) / 4.0) < POSITION_EPS_MM
 
@@ -419,8 +416,7 @@ def tapers(
     the depth.
 
     For each feed below the stock top (among the rows of `is_chosen` (N,)) it is the hull of the
-    discs at both ends, of radius `radius_at(depth)` mm. () for more moves than MAX_TAPERS.
-    """
+    discs at both ends, of radius `radius_at(depth)` mm. () for more moves than MAX_TAPERS."""
     below = toolpath.is_feed & (np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2]) < 0.0)
     rows = np.flatnonzero(below if is_chosen is None else below & is_chosen)
     if len(rows) > MAX_TAPERS:
@@ -455,8 +451,7 @@ def _hull(one: Floats, radius: float, other: Floats, last: float) -> Chain | Non
     """Return the outline of two discs and what lies between them; None for points.
 
     Their common tangents touch both where the radius makes the angle φ with the line from one to
-    the other, cos φ = (r − s) / d; there are none where one disc contains the other.
-    """
+    the other, cos φ = (r − s) / d; there are none where one disc contains the other."""
     if max(radius, last) < MIN_TAPER_MM:
         return None
     gap = other - one

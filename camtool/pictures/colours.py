@@ -4,8 +4,7 @@ The map runs from dark blue over magenta to orange, light and dark in even steps
 matplotlib's CC0 "plasma", without its yellow end, which is lost on white paper). Lightness grows
 all along it, so that the colour-blind and a grey print show the same order.
 On a dark ground the map is cut at its other end: it runs from violet to plasma's yellow.
-Layers of a drawing are told apart by the colours of Okabe and Ito (jfly.uni-koeln.de/color).
-"""
+Layers of a drawing are told apart by the colours of Okabe and Ito (jfly.uni-koeln.de/color)."""
 
 from __future__ import annotations
 

@@ -73,8 +73,7 @@ class Content(Struct, frozen=True, eq=False, dict=True):
     toolpath, empty without one; `places` belong to the drawing; `trace` is the predicted path
     where it is shown, and `engaged` the moves by engagement. `window` (2, 2) mm is the part of the
     plane that is shown, `crop_mm` the part that was asked for; `shown` are the names of layers,
-    None: the usual ones; `times` is the factor by which errors are exaggerated.
-    """
+    None: the usual ones; `times` is the factor by which errors are exaggerated."""
 
     scene: Scene
     groups: tuple[Group, ...]

@@ -2,8 +2,7 @@
 
 `content.py` sorts the scene into chains and places, `layers.py` draws them layer by layer, and
 `page.py` arranges the page; this file puts them together. Equal scenes give equal bytes: no dates,
-no random ids, no fonts. Inside the group "mm" coordinates are those of the part, in mm, Y up.
-"""
+no random ids, no fonts. Inside the group "mm" coordinates are those of the part, in mm, Y up."""
 
 from __future__ import annotations
 
@@ -123,8 +122,7 @@ def _scales_and_legend(content: Content, page: PageLayout) -> list[str]:
 def render(scene: Scene, name: str, options: PictureOptions = AS_USUAL) -> bytes:
     """Return the SVG, PNG or HTML bytes of the scene, by the extension of `name`.
 
-    OutputError for other extensions. HTML is the viewer's page, which takes no options.
-    """
+    OutputError for other extensions. HTML is the viewer's page, which takes no options."""
     if PurePath(name).suffix.lower() == ".html":
         from camtool.pictures.viewer.page import viewer_page
 
@@ -136,8 +134,7 @@ def rendered(drawn: Callable[[PictureOptions], str], name: str, options: Picture
     """Return SVG or PNG bytes, by the extension of `name`, of what `drawn` makes: SVG text for
     options with a width.
 
-    OutputError for other extensions.
-    """
+    OutputError for other extensions."""
     suffix = PurePath(name).suffix.lower()
     if suffix not in (".svg", ".png"):
         raise OutputError("is not a picture file", file=name, mend="use .svg or .png")

@@ -1,8 +1,7 @@
 """The moves of the slides, coloured by the engagement of their tool.
 
 The map of colours runs from 0° to 180°, in every picture. Entries, which limits do not count, and
-moves that cut nothing have colours of their own.
-"""
+moves that cut nothing have colours of their own."""
 
 from __future__ import annotations
 
@@ -39,8 +38,7 @@ def steps_of(bound_rad: Floats) -> Ints:
     """Return the step of the colour map (M,) for each engagement (M,) rad.
 
     It is AIR for NaN and for engagements below the uncertainty of the bounds: a chip that counts
-    is engaged by more.
-    """
+    is engaged by more."""
     angle = np.nan_to_num(bound_rad)
     steps = np.clip(np.degrees(angle) / TOP_DEG * BINS, 0.0, BINS - 1).astype(np.int64)
     return np.where(angle > COARSE_RAD, steps, AIR)

@@ -5,8 +5,7 @@ legend calls it.
 too: one row adds a layer. A row names the parts of its layer, lines, dots or texts, which pictures
 and pages draw and explain alike; or it has functions of its own for pictures, and then the
 viewer's script needs one as well (`camtool.pictures.viewer.page.SCRIPTED`). Nothing here loads
-numpy: help and completion ask for the names.
-"""
+numpy: help and completion ask for the names."""
 
 from __future__ import annotations
 
@@ -167,8 +166,7 @@ class Layer(Struct, frozen=True):
     needs: content that a picture must have: a "drawing", "moves", or the predicted "path".
     under_path: the layer stays when the predicted path is shown.
     hint: reason why the layer may be empty, if that is not the drawing.
-    key: key that switches the layer in the viewer.
-    """
+    key: key that switches the layer in the viewer."""
 
     name: str
     parts: Callable[[Content], Sequence[Part]] | None = None

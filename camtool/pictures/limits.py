@@ -3,8 +3,7 @@
 Each dimension with limits has a row: the zone between the limits, a thick line from the least to
 the largest predicted size, a thin one that adds their expanded uncertainty (2 u), and a dot at the
 best fit, in the colour of the verdict. Whatever lies beyond a limit by more than the width of the
-zone ends at the edge.
-"""
+zone ends at the edge."""
 
 from __future__ import annotations
 

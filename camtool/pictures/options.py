@@ -37,8 +37,7 @@ class PictureOptions(FrozenRecord):
     `layers`: the names of the layers to show, None: the usual ones.
 
     OptionError for a size or a part that makes no picture, a factor out of range, and a part, a
-    factor or layers with `polar` or a view of the stock.
-    """
+    factor or layers with `polar` or a view of the stock."""
 
     size_px: int | None = None
     crop_mm: tuple[float, float, float, float] | None = None

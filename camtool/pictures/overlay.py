@@ -1,8 +1,7 @@
 """Several predicted paths of one program over each other in one window.
 
 The wanted path lies below, pale and wide; each variant is a thin line in a colour of its own. The
-window is small (some tens of steps), so every step shows.
-"""
+window is small (some tens of steps), so every step shows."""
 
 from __future__ import annotations
 

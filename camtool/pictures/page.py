@@ -1,8 +1,7 @@
 """The page of a picture: where its parts lie, and what stands around the plot.
 
 That is the head, axes with their numbers, legend, colour bar and scale bar; `sheet` makes the SVG
-of all parts.
-"""
+of all parts."""
 
 from __future__ import annotations
 
@@ -61,8 +60,7 @@ class PageLayout(Struct, frozen=True, eq=False):
     """The layout of a page.
 
     `head` is the SVG of title and notes, `rows` the legend; the first row is centred on
-    `legend_y`, the scale bar on `bar_y`; `width` and `height` are those of the page.
-    """
+    `legend_y`, the scale bar on `bar_y`; `width` and `height` are those of the page."""
 
     head: str
     view: View
@@ -110,8 +108,7 @@ def fitted(
     """Return the view of a window on a page of this width, and its ticks.
 
     `margin_of` gives the width that a view needs at its right. The fit is repeated `FITS` times,
-    since the room for the numbers follows from the scale.
-    """
+    since the room for the numbers follows from the scale."""
     left, right = MARGIN + GUESSED_LEFT, width - MARGIN
     for _ in range(FITS):
         view = fit(window, left, top, right, shapes)
@@ -129,8 +126,7 @@ def foot_of(rows: list[list[LegendEntry]], legend_y: float) -> float:
 def mat(box: PageBox, width: float, height: float) -> str:
     """Return the SVG of the paper around the plot, which hides whatever reaches out of it.
 
-    A clip would do the same, but takes the renderer as long as all lines together.
-    """
+    A clip would do the same, but takes the renderer as long as all lines together."""
     path = PathData()
     paper = PageBox(0.0, 0.0, width, height + math.ceil(width / MIN_PX))
     for each in (paper, box):
@@ -247,8 +243,7 @@ def rows_of(entries: Sequence[LegendEntry], first: float, room: float) -> list[l
     """Return the entries in rows, the first no wider than `first`, the others no wider than
     `room`.
 
-    The first row stays empty if no entry fits into it.
-    """
+    The first row stays empty if no entry fits into it."""
     rows: list[list[LegendEntry]] = []
     if entries and _width(entries[0]) - ENTRY_GAP > first:
         rows.append([])
@@ -270,8 +265,7 @@ def rows_beside(
     free.
 
     This is the first row if an entry fits beside the bar, else the last row with so much room,
-    else a row of its own.
-    """
+    else a row of its own."""
     first = room - bar
     if not entries or _width(entries[0]) - ENTRY_GAP <= first:
         return rows_of(entries, first, room), 0

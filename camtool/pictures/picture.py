@@ -39,8 +39,7 @@ class Picture:
         """Return the bytes of a file with this name: .svg, .png, or .html, the viewer's page of
         one scene, without options.
 
-        OutputError for other extensions, OptionError for options that do not fit.
-        """
+        OutputError for other extensions, OptionError for options that do not fit."""
         if isinstance(self.scene, tuple):
             return render_beside(self.scene, name, self.options)
         if isinstance(self.scene, Overlay):
@@ -72,8 +71,7 @@ def closeups(scene: Scene, options: PictureOptions) -> Iterator[tuple[str, Pictu
     error, and the worst circle.
 
     There are none where nothing was predicted. Size and ground are those of `options`, the rest is
-    as usual.
-    """
+    as usual."""
     usual = PictureOptions(size_px=options.size_px, dark=options.dark)
     points, errors = scene.trace_points, scene.trace_error_mm
     if points is not None and errors is not None and scene.worst and len(points):
@@ -105,8 +103,7 @@ def on_stock(
     drawing.
 
     It shows part zero, pins, the line about which the part is turned over, and `swept_mm`, the box
-    that tools and holders pass over.
-    """
+    that tools and holders pass over."""
     if scene.drawing is None:
         return None
     laid = Scene(

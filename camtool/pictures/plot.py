@@ -1,7 +1,6 @@
 """The Plot: lines, marks, arrows and texts, as the layers of a picture draw them.
 
-Lines are written in mm (their group flips and scales), marks in units of the page.
-"""
+Lines are written in mm (their group flips and scales), marks in units of the page."""
 
 from __future__ import annotations
 
@@ -74,8 +73,7 @@ class Plot(Struct, frozen=True):
         """Return about how many mm of a chain are in view.
 
         Each move whose box touches the window counts with its length, but with no more than the
-        window's diagonal.
-        """
+        window's diagonal."""
         low, high = np.array([self.view.x_range, self.view.y_range]).T
         lengths = chain.lengths()
         is_near = np.empty(len(lengths), dtype=np.bool_)
@@ -187,8 +185,7 @@ def _along(chain: Chain, low: float, high: float) -> tuple[tuple[float, float], 
     chain's length.
 
     It is the middle of the longest move, or part of a move, between these, and so away from
-    corners.
-    """
+    corners."""
     ends = np.cumsum(chain.lengths())
     begins = np.concatenate([[0.0], ends[:-1]])
     first = np.maximum(begins, low * ends[-1])

@@ -42,8 +42,7 @@ def circle_pair(scene: Scene, circle_number: int) -> tuple[CircleErrors, ...]:
     """Return the circle with this number, from 1, and the same circle cut in the other direction,
     if there is one; counterclockwise first.
 
-    OptionError if there is no such circle.
-    """
+    OptionError if there is no such circle."""
     if not 1 <= circle_number <= len(scene.rounds):
         count = len(scene.rounds)
         raise OptionError(
@@ -176,8 +175,7 @@ def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
     """Return the dial for errors (B, 3) µm of circles, on a plot of this width, with its middle at
     (0, 0).
 
-    It is scaled so that the largest error of all, outward or inward, just fits.
-    """
+    It is scaled so that the largest error of all, outward or inward, just fits."""
     outer = 0.5 * width - MARGIN - ROOM
     errors = np.concatenate([each.ravel() for each in errors_um])
     finite = errors[np.isfinite(errors)]
@@ -284,8 +282,7 @@ def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
     """Return the SVG of the numbers of the rings, µm, along the direction in which they hide the
     fewest errors.
 
-    Numbers that would hide an error are left out if at least `MIN_LABELS` others remain.
-    """
+    Numbers that would hide an error are left out if at least `MIN_LABELS` others remain."""
     places = np.array([_places(errors, dial) for errors in errors_um]).reshape(-1, 2)
     clear, numbers = [], []
     for degrees in LABELS_DEG:

@@ -2,8 +2,7 @@
 
 Pixels are computed with sums, products, quotients and roots alone, which all processors round
 alike. Colours are mixed as light (squares of the values of the page) and written as its roots.
-The map stands on a board; where the stock is cut through, the board is seen.
-"""
+The map stands on a board; where the stock is cut through, the board is seen."""
 
 from __future__ import annotations
 
@@ -60,8 +59,7 @@ class Camera(Struct, frozen=True):
     table by the angle with this `sine`.
 
     The lamp stands in the direction `lamp` (to the right, away from the viewer), and `rise` times
-    as high as it is far away.
-    """
+    as high as it is far away."""
 
     direction: tuple[float, float]
     sine: float
@@ -104,8 +102,7 @@ class Stage(Struct, frozen=True, eq=False):
 
     `bottom_mm` and `deep_mm`: heights of the board and of the deepest floor. `marks` (NY, NX): how
     much the marks of the tool catch the light, −1 … 1. `tint` (NY, NX, 3): the light of the
-    colours of floors, in place of those of the material.
-    """
+    colours of floors, in place of those of the material."""
 
     heights: Heights
     corner_mm: tuple[float, float]
@@ -152,8 +149,7 @@ def _marks(height_map: HeightMap, moves: StockMoves) -> Heights:
     """Return how much the tool marks of each cell (NY, NX) catch the light, −1 … 1.
 
     It is the cosine of twice the angle between the cut and the diagonal; 0 where nothing cut, or
-    straight down.
-    """
+    straight down."""
     travel = moves.end[:, :2] - moves.start[:, :2]
     square = travel[:, 0] * travel[:, 0] + travel[:, 1] * travel[:, 1]
     catch = np.where(
@@ -189,8 +185,7 @@ def picture_of(
     """Return the pixels (H, W, 3) of a window (left, low, right, high; mm on the picture) with
     `sizes` (W, H).
 
-    The board has the colour `ground`.
-    """
+    The board has the colour `ground`."""
     wide, high = sizes[0] * SAMPLES, sizes[1] * SAMPLES
     pixel = (window[2] - window[0]) / wide
     cell = np.empty((high, wide), dtype=np.int32)
@@ -231,8 +226,7 @@ class _LitStage(Struct, frozen=True, eq=False):
     `flat`, `steep`: how directly they face the lamp as floors and as walls; `shade`: the height
     below which it does not shine; `open_sky`: the share of the sky that they see; `fade`: how much
     of all this the board shows, 0 at its edges. `open_board`: the light of the board far from the
-    stock.
-    """
+    stock."""
 
     stage: Stage
     flat: Heights

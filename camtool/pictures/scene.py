@@ -1,8 +1,7 @@
 """The Scene: all that one picture shows, in the work frame, mm.
 
 `scene_of` makes it of what is known of a part: its drawing, its toolpath, the verification of its
-program. The viewer also asks for its `Playback`: seconds, errors, the program's lines, tables.
-"""
+program. The viewer also asks for its `Playback`: seconds, errors, the program's lines, tables."""
 
 from __future__ import annotations
 
@@ -70,8 +69,7 @@ class Scene:
     is cut on a lathe, and seen in its half section.
 
     With a trace the picture leaves out rapids and plunges, and feeds are pale. ValueError when the
-    trace is incomplete or not finite.
-    """
+    trace is incomplete or not finite."""
 
     title: str = ""
     drawing: Drawing | None = None
@@ -207,8 +205,7 @@ class Playback(Struct, frozen=True, eq=False):
     the scene's trace.
 
     `blocks` are the program's lines, one per block, None without a program; `binary`: they are
-    bytes in hex. ValueError when the lengths of the columns differ, and for impossible seconds.
-    """
+    bytes in hex. ValueError when the lengths of the columns differ, and for impossible seconds."""
 
     seconds: Floats
     error_mm: Floats
@@ -228,8 +225,7 @@ def by_feed(toolpath: Toolpath, rapid_mm_min: float) -> Playback:
     """Return the times of a toolpath without a simulation.
 
     Each move runs at its feed, rapids at `rapid_mm_min` (inf: in no time), and dwells last their
-    seconds.
-    """
+    seconds."""
     seconds = np.zeros(len(toolpath))
     if len(toolpath):
         travel = toolpath.end - toolpath.starts
@@ -273,8 +269,7 @@ def scene_of(
 
     `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer;
     `tabs` are the places (x, y) mm of tabs. `wanted_path` are the moves that the program should
-    make. With a verification and a `target` the simulated slides cut the stock.
-    """
+    make. With a verification and a `target` the simulated slides cut the stock."""
     if drawing is not None and toolpath is None:
         return scene_of_drawing(drawing, title)
     drawn = drawing
@@ -501,8 +496,7 @@ def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
     """Return the width of the cut at the surface, mm; None if it changes along the path.
 
     The width of a V bit, or a round nose, depends on its depth: it has one width if a single
-    operation cuts level, that of its deepest pass.
-    """
+    operation cuts level, that of its deepest pass."""
     from camtool.verification.case import nose_of, tool_mm
 
     tool = nose_of(job)

@@ -1,8 +1,7 @@
 """Sections of the stock: heights along a line, with the heights that are wanted there.
 
 Heights are drawn larger than places where the stock is thin; the factor is a round number and
-stands above the picture.
-"""
+stands above the picture."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
 `iso` shows the block from outside, aslant, and `bottom` too, turned over about the axis X; `front`
 and `side` as a drawing does; all with its sizes along its edges. `top`, `leftover`, `gouge` show
 it from above, with axes. The raster is a PNG within the SVG; all that is written stands in the SVG
-itself.
-"""
+itself."""
 
 from __future__ import annotations
 
@@ -143,8 +142,7 @@ def draw_solid(scene: Scene, options: PictureOptions) -> str:
     """Return SVG text of a view of the stock.
 
     OptionError if moves or tools are not known, or if the view needs wanted moves and there are
-    none.
-    """
+    none."""
     if scene.cut is None:
         raise OptionError(
             f"the view {options.view} shows the stock, and nothing cuts it here",
@@ -343,8 +341,7 @@ def _on_the_stock(marks: DotGroup, solid: Solid, camera: Camera) -> DotGroup:
     """Return marks at (x, y) mm moved to where the camera sees those places on the surface of the
     stock; marks beside the stock are left out.
 
-    Marks behind a higher part of the stock are seen through it.
-    """
+    Marks behind a higher part of the stock are seen through it."""
     at = np.array(marks.places, dtype=np.float64).reshape(-1, 2)
     heights = solid.height_map.at(at).clip(-solid.pair.thickness_mm)
     rows = np.column_stack([at, heights])[~np.isnan(heights)].tolist()
@@ -371,8 +368,7 @@ def _raster(
 ) -> str:
     """Return the SVG image of the stage that fills a box of the page.
 
-    It has one pixel for each pixel of the picture, up to a picture width of MAX_RASTER_PX.
-    """
+    It has one pixel for each pixel of the picture, up to a picture width of MAX_RASTER_PX."""
     size_px = options.size_px or SVG_WIDTH_PX
     per_unit = min(size_px, MAX_RASTER_PX) / page_width(size_px)
     left, right = math.floor(box.left * per_unit), math.ceil(box.right * per_unit)

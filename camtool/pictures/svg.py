@@ -1,8 +1,7 @@
 """SVG text: numbers, escaping, elements and path data.
 
 There is one form of everything, so that equal input gives equal bytes: fixed decimals
-without trailing zeros, attributes in the order given, one element a line.
-"""
+without trailing zeros, attributes in the order given, one element a line."""
 
 from __future__ import annotations
 
@@ -23,8 +22,7 @@ _NO_XML = "\N{REPLACEMENT CHARACTER}"
 _NOT_XML = "[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 """Characters that XML 1.0 (fifth edition, §2.2) does not allow.
 
-Compiled at first use, because the help loads this file too, and compiling takes 4 ms.
-"""
+Compiled at first use, because the help loads this file too, and compiling takes 4 ms."""
 
 Attributes = Mapping[str, str | float]
 Look = dict[str, str | float]
@@ -106,8 +104,7 @@ class PathData:
         """Add a circular arc to this point, |sweep| < 2π; a positive sweep turns from +X towards
         +Y.
 
-        In SVG, large-arc is 1 for |sweep| > π, and sweep-flag is 1 for growing angles.
-        """
+        In SVG, large-arc is 1 for |sweep| > π, and sweep-flag is 1 for growing angles."""
         size = number(radius, self._decimals)
         large, growing = int(abs(sweep_rad) > math.pi), int(sweep_rad > 0.0)
         end = f"{number(x, self._decimals)} {number(y, self._decimals)}"

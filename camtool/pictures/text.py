@@ -1,8 +1,7 @@
 """Labels drawn with single strokes, so that a picture needs no font and looks the same everywhere.
 
 The letters are those of `camtool.geometry.hershey`; a letter that the font lacks is an empty box.
-The text itself stands in the label's `<title>` and `aria-label`.
-"""
+The text itself stands in the label's `<title>` and `aria-label`."""
 
 from __future__ import annotations
 
@@ -54,8 +53,7 @@ def shortened(text: str, cap: float, limit: float) -> str:
 def wrapped(text: str, cap: float, limit: float) -> list[str]:
     """Return the text broken into lines no wider than `limit`.
 
-    Lines break at blanks but not before a unit; a longer word is shortened.
-    """
+    Lines break at blanks but not before a unit; a longer word is shortened."""
     lines: list[str] = []
     for word in filter(None, _UNIT.split(one_line(text))):
         longer = f"{lines[-1]} {word}" if lines else word

@@ -2,8 +2,7 @@
 
 Consecutive points in the same step of the colour map become one line, and all lines of one step
 become one path of the SVG, so that 20,000 points stay well below a megabyte. Larger errors are
-drawn later: the largest lie on top.
-"""
+drawn later: the largest lie on top."""
 
 from __future__ import annotations
 
@@ -36,8 +35,7 @@ class ErrorTrace(Struct, frozen=True, eq=False):
 
     points (T, 2) mm, error_um (T,) absolute error, cutting (T,) True if the tool cuts between the
     previous point and this one, top_um the upper end of the colour map, times the factor by which
-    the distances of the points from the wanted path are enlarged.
-    """
+    the distances of the points from the wanted path are enlarged."""
 
     points: Floats
     error_um: Floats
@@ -49,8 +47,7 @@ class ErrorTrace(Struct, frozen=True, eq=False):
 def trace_of(scene: Scene, times: float = 1.0) -> ErrorTrace | None:
     """Return the predicted path of a scene; None when there is none or it never cuts.
 
-    Where the wanted path is known, its errors are drawn `times` as large.
-    """
+    Where the wanted path is known, its errors are drawn `times` as large."""
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or not cutting.any():
         return None

@@ -18,8 +18,7 @@ ORDINARY_PX = (1000, 1200)
 """Pictures between these widths have a page of `PAGE` units.
 
 The page of a smaller or larger picture is scaled by the square root of its size: letters grow with
-the picture, but less than it does.
-"""
+the picture, but less than it does."""
 
 MIN_PAGE = 560.0
 """Least width of a page in units: head, legend and numbers need it."""
@@ -158,8 +157,7 @@ def fit(
     """Return the view that shows a window in a box from `left` to `right`.
 
     The box has the shape of the window; `shapes` are the least and the greatest height, as a share
-    of the width.
-    """
+    of the width."""
     sizes = shown[:, 1] - shown[:, 0]
     left, top, right = float(math.ceil(left)), float(math.ceil(top)), float(math.floor(right))
     width = right - left

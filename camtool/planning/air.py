@@ -4,8 +4,7 @@
     [stock] ─what lies beside it──────────────────────────────────┴▶ regions of air at a level
 
 A region counts as cleared as far as a tool within it surely reaches: its disc, a little wider,
-covers it. What a tool with a nose leaves above its tip does not count.
-"""
+covers it. What a tool with a nose leaves above its tip does not count."""
 
 from __future__ import annotations
 

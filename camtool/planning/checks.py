@@ -2,8 +2,7 @@
 
 Everything that is cut lies below the stock top, z < 0. The stock, where the job knows one, ends at
 its sides and at its thickness; beside it is air, so leads and overrun may go there. Rapids through
-it are found in `camtool.stock.rapids`.
-"""
+it are found in `camtool.stock.rapids`."""
 
 from __future__ import annotations
 
@@ -110,8 +109,7 @@ def checked(
     Errors: an axis beyond its travel, a cut deeper than the stock, a feed that the machine cannot
     make (on slopes: along Z), an operation whose tool the program cannot ask for; of the `steps`,
     what is drawn beside the stock, leads and clamps beside it. A warning: something is cut wholly
-    beside the stock.
-    """
+    beside the stock."""
     edge_findings = [
         *_clamps_off_stock(job),
         *(each for step in steps for each in _off_stock(step, job.stock)),
@@ -235,8 +233,7 @@ def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
 
     An error: a part and an engraving that are not whole then, and what lies wholly beside it. A
     pocket that is open at the edge, a notch, and a line that runs out of the stock may be meant: a
-    warning. The tool itself may run beside the stock.
-    """
+    warning. The tool itself may run beside the stock."""
     is_repeat = step.operation.stage == "finish" or step.operation.rest_of is not None
     if stock is None or stock.box_mm is None or is_repeat or not step.runs:
         return []
@@ -402,8 +399,7 @@ def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Findin
     """Yield findings for the move that exceeds the highest rate of X and Y most, and for the move
     that exceeds that of Z most.
 
-    Of a feed the part |dz| / length goes along Z, and the rest of the triangle across.
-    """
+    Of a feed the part |dz| / length goes along Z, and the rest of the triangle across."""
     across, along = _lengths(toolpath)
     length = np.hypot(across, along)
     moves = toolpath.is_feed & (length > 0.0)
@@ -449,8 +445,7 @@ def doubtful_settings(
     A point that follows closed contours and a plunge at the feed of the cut count only where
     programs of the target can start a spindle (`starts_spindle`) and the machine has one: others
     engrave with points. A missing speed counts where the program switches it. A round nose leaves
-    nothing of a wall that is cut through the `stock` by as much.
-    """
+    nothing of a wall that is cut through the `stock` by as much."""
     starts_spindle = starts_spindle and machine.spindle.switched != "none"
     asks_speed = starts_spindle and machine.spindle.switched == "program"
     cutting = [step for step in steps if step.runs]
@@ -576,8 +571,7 @@ def ridge_mm(tool: Tool, step_over: float) -> float:
     """Return the height of the ridges that a nose of radius r leaves on a floor, mm.
 
     Halfway between two paths the floor is x = ½ (step − flat) beside the flat of the tool; the
-    nose is r − √(r² − x²) above its tip there.
-    """
+    nose is r − √(r² − x²) above its tip there."""
     flat = tool.diameter_mm - 2.0 * tool.nose_mm
     half_gap = max(0.5 * (step_over * tool.diameter_mm - flat), 0.0)
     return tool.nose_mm - math.sqrt(max(tool.nose_mm**2 - half_gap**2, 0.0))

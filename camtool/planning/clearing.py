@@ -4,8 +4,7 @@
                        ──straight lines at an angle──────▶ strokes ┴──linked──▶ path
 
 The tool centre region is the pocket shrunk by the tool's radius. Nothing of the pocket is
-left over: `ring_cells` and `zigzag_paths` say why. Links (`route`) never leave the region.
-"""
+left over: `ring_cells` and `zigzag_paths` say why. Links (`route`) never leave the region."""
 
 from __future__ import annotations
 
@@ -150,8 +149,7 @@ def ring_paths(root: Cell, steps: Steps) -> tuple[list[Floats], Cell]:
     which the first begins.
 
     There is more than one path only where rounding hides the link from one ring to the next
-    (`LinkedPath`).
-    """
+    (`LinkedPath`)."""
     linked = LinkedPath()
     first = None
     for cell, outer_cell in _inside_out(root, linked):
@@ -168,8 +166,7 @@ def _inside_out(root: Cell, linked: LinkedPath) -> Iterator[tuple[Cell, Cell]]:
     tool can reach it.
 
     The first is the one with the greatest height; later the cell nearest to the end of the path so
-    far (`linked`, which the caller extends meanwhile).
-    """
+    far (`linked`, which the caller extends meanwhile)."""
     stack = [(root, list(root.inner))]
     outer_cell: Cell | None = None
     while stack:
@@ -228,8 +225,7 @@ def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
     within m of that ring.
 
     There is more than one path only where rounding hides the link from one stroke to the next
-    (`LinkedPath`).
-    """
+    (`LinkedPath`)."""
     connected, linked = ConnectedRegion(region), LinkedPath()
     margin = min(scan.radius_mm - 0.5 * scan.step_mm, MAX_MARGIN_SHARE * scan.radius_mm)
     for part in parts_of(offset_shape(region, margin)):
@@ -268,8 +264,7 @@ def _order(strokes: Strokes) -> list[tuple[int, bool]]:
     """Return the order of all strokes, as (index, True if cut from its end).
 
     After a stroke comes one beside it, as long as there is one; else the nearest end of any stroke
-    with at most one neighbour left, so that no row of strokes is interrupted.
-    """
+    with at most one neighbour left, so that no row of strokes is interrupted."""
     neighbours = _neighbours(strokes)
     remaining = set(range(len(strokes)))
     ordered: list[tuple[int, bool]] = []
@@ -327,8 +322,7 @@ def slot_paths(region: Polylines, tool_radius_mm: float) -> list[Floats]:
 
     For a slightly thinner tool the tool centre region is a band as thin as the difference
     ("hair"). The part of it beyond the region of the true tool is a slot. Of the hairs that show
-    all slots the thinnest is taken, so that the band is as near to the centre line as possible.
-    """
+    all slots the thinnest is taken, so that the band is as near to the centre line as possible."""
     diameter = 2.0 * tool_radius_mm
     widest = _bands(region, tool_radius_mm, SLOT_TOLERANCE * diameter)
     if not widest:
@@ -408,8 +402,7 @@ class LinkedPath:
     def cut(self, stroke: Floats, region: ConnectedRegion) -> None:
         """Add a stroke, after a link within `region`, which must hold both its ends.
 
-        If rounding hides the link (`route`), the tool comes up and another path begins.
-        """
+        If rounding hides the link (`route`), the tool comes up and another path begins."""
         tool_place = self.end_place
         self.join(None if tool_place is None else route(tool_place, stroke[0, :2], region), stroke)
 
@@ -434,8 +427,7 @@ class LinkedPath:
         from their nearest place, as they are oriented or (not `is_forward`) reversed; open ones
         from either end.
 
-        The first is reached through `outer_region`, which contains the region.
-        """
+        The first is reached through `outer_region`, which contains the region."""
         remaining = [MeasuredPath.of(path) for path in paths]
         while remaining:
             tool_place = self._near(remaining[0].path)
@@ -552,8 +544,7 @@ def routes(starts: Floats, ends: Floats, region: ConnectedRegion) -> list[Floats
     shorter direction.
 
     None for a link whose line leaves or enters at a place that rounding hides, or whose two places
-    are not in one connected region.
-    """
+    are not in one connected region."""
     links: list[Floats | None] = []
     for low in range(0, len(starts), LINKS_AT_ONCE):
         batch = slice(low, low + LINKS_AT_ONCE)
@@ -719,8 +710,7 @@ def scanned(line: Segments, region: Segments) -> tuple[Ints, Floats, Floats]:
     """Return the parts of K straight lines that are within a region: rows (J,), and the begin and
     end (J,), (J,) of each part as shares of its line.
 
-    Ascending by row and begin; pieces up to POSITION_EPS_MM are left out.
-    """
+    Ascending by row and begin; pieces up to POSITION_EPS_MM are left out."""
     common = crossings(line, region)
     rows = np.concatenate([np.arange(len(line)), np.arange(len(line)), common.row_a])
     part = np.concatenate([np.zeros(len(line)), np.ones(len(line)), common.ta])

@@ -5,8 +5,7 @@
 A closed contour is one run: down, round and round, the overlap. With leads it is one run for each
 pass, from the lead-in to the lead-out; where it ramps down, it stays one run, and goes out and
 back at each level. An open one is one run, to and fro, when it is reversible, and else one run for
-each pass. So the leads of a contour are cut step by step, as the contour itself.
-"""
+each pass. So the leads of a contour are cut step by step, as the contour itself."""
 
 from __future__ import annotations
 
@@ -78,8 +77,7 @@ def runs_of(
 
     `paths` (M) are those of the contours, from the chosen starts in the chosen directions. On its
     leads the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
-    OptionError for impossible tabs.
-    """
+    OptionError for impossible tabs."""
     parts: list[Runs] = []
     counts: list[int] = []
     findings: list[Finding] = []
@@ -253,8 +251,7 @@ def with_starts(
 
     - "longest-line": the middle of the longest line; without lines, of the longest arc.
     - "corner": where the path turns, and where it begins to round a corner of the part, in an arc
-      as large as the tool's centre is away from it, `away_mm`.
-    """
+      as large as the tool's centre is away from it, `away_mm`."""
     any_vertex = np.empty(0, dtype=np.int64)
     if not path.closed or rule == "nearest":
         return path, any_vertex

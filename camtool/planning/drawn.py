@@ -15,8 +15,7 @@ The edge that a contour or a run cuts is the drawn line. Its size, and that of w
 
 What runs round several lines has all of them as its nominal edge. Round a line the box of the
 centre would not do: sharp joins reach farther out than the radius. Chamfers break the edges that
-other operations cut, and drills make what their own diameter says: they have no edge here.
-"""
+other operations cut, and drills make what their own diameter says: they have no edge here."""
 
 from __future__ import annotations
 
@@ -242,8 +241,7 @@ def _cleared_boxes(runs: Runs, tool: Tool) -> Floats:
 
     It is that of the discs as wide as the tool is at the surface. Along a move their radius
     changes evenly, by d over an arc of radius R and sweep s: seen in the direction a, their edge
-    is farthest where the centre stands at the angle a + arcsin(d / (R s)) of the arc.
-    """
+    is farthest where the centre stands at the angle a + arcsin(d / (R s)) of the arc."""
     vertices, first = runs.vertices, runs.first[:-1]
     heights, height_index = np.unique(np.minimum(vertices[:, 2], 0.0), return_inverse=True)
     reach = np.array([tool.radius_at(-z) for z in heights.tolist()])[height_index.reshape(-1)]
@@ -280,8 +278,7 @@ def kept_of(steps: Sequence[Step]) -> tuple[ProtectedRegion, ...]:
 
     A profile leaves the part, a pocket and a carving what is outside of their region; engraving,
     drilling and chamfers leave nothing in particular. Where reliefs go into the corners of the
-    part, they are meant to, and such an operation leaves nothing in particular.
-    """
+    part, they are meant to, and such an operation leaves nothing in particular."""
     return tuple(each for step in steps for each in _protected_regions(step))
 
 

@@ -11,8 +11,7 @@ from where that wall is free may come nearer by this. A pocket that is cut beyon
 looked at like a profile.
 
 A contour that encloses something else when ends that branch are joined in another way is no
-region: to clear it, carve it, or cut beside it is an error.
-"""
+region: to clear it, carve it, or cut beside it is an error."""
 
 from __future__ import annotations
 

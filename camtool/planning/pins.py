@@ -3,8 +3,7 @@ turned over.
 
 The two lie on both sides of the line, as far apart as the stock is wide, in the wider of the two
 strips beside the part that the line crosses. So they meet in no other way: turned over about the
-other axis, or turned about by half, the part has them in the other strip.
-"""
+other axis, or turned about by half, the part has them in the other strip."""
 
 from __future__ import annotations
 

@@ -4,8 +4,7 @@
     items ─reversals─▶ items ─order─▶ items with start and direction ─runs─▶ runs
     runs of all operations ─link─▶ toolpath ─▶ checked
 
-Operations follow each other as the job lists them; each is put into order on its own.
-"""
+Operations follow each other as the job lists them; each is put into order on its own."""
 
 from __future__ import annotations
 
@@ -90,8 +89,7 @@ class Plan(Struct, frozen=True, eq=False):
 def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
     """Return the toolpath that cuts the drawing, in the work frame, with the findings of planning.
 
-    OptionError if the drawing or the machine does not allow what the job asks.
-    """
+    OptionError if the drawing or the machine does not allow what the job asks."""
     return planned(drawing, job, machine).toolpath
 
 
@@ -100,8 +98,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
 
     `undivided`: return the plan with which verification compares a program. Contours that were
     divided into runs to avoid axis reversals are left whole. Those that were not keep their chosen
-    start points, on which ramps, leads and tabs depend. No approach moves are added.
-    """
+    start points, on which ramps, leads and tabs depend. No approach moves are added."""
     if job.setups:
         names = ", ".join(setup.name for setup in job.setups)
         raise OptionError(

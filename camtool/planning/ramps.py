@@ -19,8 +19,7 @@ Where a lead goes out of the contour, it is cut at every level: at the place whe
 ends the tool goes out and back, once it is down at the level.
 
 On an open path the tool goes down to and fro near the end where it is, back to that end, and then
-along the level to the other end, which takes away what the ramp left.
-"""
+along the level to the other end, which takes away what the ramp left."""
 
 from __future__ import annotations
 
@@ -85,8 +84,7 @@ def spiral_with_stops(
     """Return the profile of a spiral, and for each level except the last a length at which the
     tool has reached it; all these lie at the place where the last lap ends.
 
-    All ramps are as long as that of the largest step, so that all end at one place.
-    """
+    All ramps are as long as that of the largest step, so that all end at one place."""
     above = (0.0, *levels_mm[:-1])
     ramp = max(a - z for a, z in zip(above, levels_mm, strict=True)) / math.tan(angle_rad)
     laps_each = math.ceil((ramp + overlap_mm) / total_mm)
@@ -107,8 +105,7 @@ def to_and_fro(
     before ended.
 
     Down from `above_mm` and between the levels straight (`angle_rad` None), or sloping by the
-    angle.
-    """
+    angle."""
     points: ZProfile = []
     for turn, z in enumerate(levels_mm):
         pass_points: ZProfile = [(0.0, z), (total_mm, z)]
@@ -161,8 +158,7 @@ def feeds_along(vertices: Floats, feeds: Feeds) -> Floats:
     """Return the feeds (n − 1,), mm/min, of the moves between vertices (n, 4).
 
     Vertical moves have the plunge feed; all others the feed of the cut, reduced where necessary so
-    that its vertical part does not exceed the plunge feed.
-    """
+    that its vertical part does not exceed the plunge feed."""
     across = _lengths(vertices[:, [0, 1, 3]])
     rise = np.abs(np.diff(vertices[:, 2]))
     sloping = rise > 0.0

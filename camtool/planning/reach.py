@@ -5,8 +5,7 @@ leaves are the feet of corners and places narrower than the tool. Both boundarie
 arcs, and the inner one never crosses the outer one: they run together, part, and meet again.
 
     region  ─ sections that do not run together with the opened one ──┐
-    opened  ─ sections that do not run together with the region, back ┴─▶ closed: the pieces
-"""
+    opened  ─ sections that do not run together with the region, back ┴─▶ closed: the pieces"""
 
 from __future__ import annotations
 
@@ -84,8 +83,7 @@ def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
 
     The region is on the left of its closed paths, which may also be the holes of an endless one.
     Pieces smaller than MIN_FOOT_SHARE of the disc's area are left out. GeometryError for open
-    paths.
-    """
+    paths."""
     if tool_radius_mm <= POSITION_EPS_MM or len(region) == 0:
         return []
     reached = opened(region, tool_radius_mm)
@@ -126,8 +124,7 @@ def _difference(
     """Return the closed paths around the part of the region that is not in `reached`, which must
     lie in the region.
 
-    Pieces that are surely smaller than `least_mm2` may be left out.
-    """
+    Pieces that are surely smaller than `least_mm2` may be left out."""
     if len(reached) == 0:
         return region
     inner = _separate_sections(reached, region, least_mm2)
@@ -144,8 +141,7 @@ def _separate_sections(lines: Polylines, other: Polylines, least_mm2: float) -> 
     Sections begin and end at vertices of either side, since where one path parts from the other,
     the other parts from it. A section of length l that leads at most h away encloses no more than
     2 l h: if that is less than `least_mm2` it is left out, as are the many at the blunt corners of
-    a fine polygon.
-    """
+    a fine polygon."""
     segments = Segments.of(lines)
     row, low, high = _split(segments, other.vertices[:, :2])
     parts = np.array(PROBES)
@@ -288,8 +284,7 @@ def unreached_findings(
     paths), cannot touch.
 
     Corners are not reported where the operation makes reliefs, nor for chamfers, whose bevels are
-    round there. Slots narrower than the tool by `hair_mm` count as reached.
-    """
+    round there. Slots narrower than the tool by `hair_mm` count as reached."""
     radius = setting.operation.wall_radius_mm
     pieces = unreached(region, radius - 0.5 * hair_mm)
     largest_foot = CORNER_SHARE * np.pi * radius**2

@@ -10,8 +10,7 @@ V when it turns, and leaves what lies between its edge and the corner C of the p
          V ·  ╱ ║            the dog-bone is d (1/sin(α/2) − 1) long, the overcut d / tan(α/2).
          ───· V'║
 
-A corner that is rounded in the drawing, by however small an arc, is not sharp.
-"""
+A corner that is rounded in the drawing, by however small an arc, is not sharp."""
 
 from __future__ import annotations
 
@@ -55,8 +54,7 @@ def add_reliefs(
 
     `kind` is "dogbone" or "overcut". Reliefs keep at least `near_mm` from the lines of `keep_out`,
     and from the walls of the original beyond the corner: the tool's radius, reduced by what is cut
-    beyond the lines.
-    """
+    beyond the lines."""
     if near_mm == 0.0:
         return RelievedPath(path, np.empty((0, 2)))
     along, walls = MeasuredPath.of(path), MeasuredPath.of(original)
@@ -121,8 +119,7 @@ def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner:
     """Return the direction (2,) beyond V along the longer wall.
 
     Of two equally long walls it is the one nearer to the X axis, so that symmetric parts stay
-    symmetric.
-    """
+    symmetric."""
     length_here = along.reach[vertex : vertex + 1]
     before = along.at(length_here - 0.5 * np.diff(along.reach)[vertex - 1])
     pair = np.array([corner - 1, corner]) % len(walls.segments)

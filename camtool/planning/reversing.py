@@ -12,8 +12,7 @@ a ramp, a start by rule or by hand. Of the others of those, only the start is ch
 climb or conventionally keeps its direction, divided or not.
 
     path ──parts_of──▶ parts of one direction in x and one in y ──reversals_along──▶ reversals
-    parts, reversals ──▶ places where it may be divided ──▶ the cheapest division ──▶ pieces
-"""
+    parts, reversals ──▶ places where it may be divided ──▶ the cheapest division ──▶ pieces"""
 
 from __future__ import annotations
 
@@ -91,8 +90,7 @@ def fewer_reversals(items: Items, machine: Machine) -> tuple[Items, tuple[Findin
     An axis without backlash and compensation may reverse anywhere. The runs of a contour together
     are the contour: they meet exactly, keep its name, source and setting, and know the whole path
     as their `outline`. If neither axis has backlash or compensation nothing is changed, and the
-    finding is `PLAY_NOT_KNOWN`.
-    """
+    finding is `PLAY_NOT_KNOWN`."""
     residual = residuals(machine)
     if not any(each.matters for each in residual):
         return items, (PLAY_NOT_KNOWN_TO_SAVE(where="axes x, y", machine=machine.target.name),)
@@ -258,8 +256,7 @@ class Division(Struct, frozen=True, eq=False):
     with the smallest greatest error is taken; then with the fewest runs; then that which drives
     the axes in one direction throughout, as far as it can, so that the error is the same all over
     the part; then with the smallest error over its length: two passes of dynamic programming along
-    the path.
-    """
+    the path."""
 
     parts: Parts
     reversals: tuple[AxisReversals, AxisReversals]
@@ -445,8 +442,7 @@ class Parts(Struct, frozen=True, eq=False, dict=True):
         """Return the open path from place `first` to place `last`; on a closed path, places beyond
         A go on round.
 
-        Parts of one segment are joined again.
-        """
+        Parts of one segment are joined again."""
         index = np.arange(first, last) % len(self)
         row, count = self.row[index], len(index)
         is_new = np.ones(count, dtype=np.bool_)
@@ -480,8 +476,7 @@ def parts_of(path: Polyline) -> Parts:
 
     The tangent of an arc turns from chord direction − sweep/2 to chord direction + sweep/2; it
     lies along an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at most.
-    No part is shorter than `POSITION_EPS_MM`.
-    """
+    No part is shorter than `POSITION_EPS_MM`."""
     segments = Segments.of(path)
     quarter = 0.5 * np.pi
     chord, sweep = segments.end - segments.start, segments.sweep
@@ -515,8 +510,7 @@ class AxisReversals(Struct, frozen=True, eq=False):
     reversals, before the first motion and after the last one. `first`, `last` (T,): the places at
     the two ends of each span; `last` goes on beyond A where the span of a closed path holds its
     first place. `moves`: the places between which the axis of an open path moves at all; None for
-    a closed one, and where it never moves.
-    """
+    a closed one, and where it never moves."""
 
     sense: Ints
     first: Ints
@@ -613,8 +607,7 @@ class Approaches:
 
     It is asked run by run, with nothing between them but the moves up, across and down (a tool
     change needs a fresh one): an axis that still stands engaged from the run before goes straight
-    to the start. Backlash is the largest of all regions.
-    """
+    to the start. Backlash is the largest of all regions."""
 
     def __init__(self, machine: Machine) -> None:
         self._drives = [
@@ -630,8 +623,7 @@ class Approaches:
 
         The place lies beside the run, nearer than the backlash and `APPROACH_MARGIN_MM` on each
         axis. Nothing keeps it within the travel: a nearer one would not do, and the toolpath that
-        holds it is checked as a whole.
-        """
+        holds it is checked as a whole."""
         path = flat_path(run.vertices)
         places = run.vertices[:1, :2] if path is None else parts_of(path).places
         x, y = (
@@ -710,8 +702,7 @@ class Residual(Struct, frozen=True):
 
     The difference of the two is |backlash − c|. Compensation as exact as the backlash would leave
     none;
-    the PIC machine's leaves 11.5 µm in X and 9.5 µm in Y (docs/decisions/0005-play.md).
-    """
+    the PIC machine's leaves 11.5 µm in X and 9.5 µm in Y (docs/decisions/0005-play.md)."""
 
     minus_mm: float
     plus_mm: float

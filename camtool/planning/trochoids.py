@@ -10,8 +10,7 @@ matter of two discs.
     band without what these have cleared ─fronts─▶ legs of corners, and of what is wider
 
 Between two circles a cusp stays beside each edge of the band (`cusp_mm`), as high as s² / (8 ρ) on
-a straight line for the step s. The fronts count on no more than is cleared within the cusps.
-"""
+a straight line for the step s. The fronts count on no more than is cleared within the cusps."""
 
 from __future__ import annotations
 

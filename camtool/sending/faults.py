@@ -2,8 +2,7 @@
 and a plug that is pulled.
 
 Faults belong to the line, not to the machine. They are drawn byte by byte from a seed, so that a
-run with faults can be repeated exactly, however its bytes are divided into pieces.
-"""
+run with faults can be repeated exactly, however its bytes are divided into pieces."""
 
 from __future__ import annotations
 
@@ -122,8 +121,7 @@ class WiredTwin:
     times.
 
     `there` are the faults towards the machine, `back` those from it; `paced`: bytes take the
-    time that follows from the baud rate.
-    """
+    time that follows from the baud rate."""
 
     def __init__(
         self,

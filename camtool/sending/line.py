@@ -1,8 +1,7 @@
 """The line to a controller: a serial port, a pseudo-terminal or a socket, locked by one process.
 
 pyserial opens all of them: `/dev/ttyUSB0`, `COM3`, `socket://localhost:5007`. Nothing listens on
-the network here.
-"""
+the network here."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """The page of `send --live`: the viewer's page, which shows how far the machine has come.
 
 It is one self-contained HTML file, which a browser opens from the disk and which reloads itself;
-no network port is opened for it. All but the state is made once.
-"""
+no network port is opened for it. All but the state is made once."""
 
 from __future__ import annotations
 

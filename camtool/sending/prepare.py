@@ -1,8 +1,7 @@
 """Preparation of a program for its machine: it is verified, simulated and cut into packets; and
 the rest of a program from any of its blocks, with a safe way back into the cut.
 
-This module opens no port and reads no file.
-"""
+This module opens no port and reads no file."""
 
 from __future__ import annotations
 
@@ -324,8 +323,7 @@ def rest_of(
     It begins like the program, at part zero, or at `begin_mm` if part zero is known: up; tool,
     spindle and coolant as they are at the block; across to above the place; down to it at the
     plunge feed. Then the same moves follow, which are read back and compared. OptionError for a
-    block that does not exist, and for one after which nothing moves.
-    """
+    block that does not exist, and for one after which nothing moves."""
     rows = np.flatnonzero(decoded.block >= first)
     blocks = int(decoded.block.max(initial=-1)) + 1
     if first == blocks:

@@ -18,8 +18,7 @@ acceleration and no look-ahead. For each row of the toolpath:
 
 Between two samples an error changes by no more than the length of the path between them, so the
 largest error exceeds that at the nearer sample by at most half the spacing. Extents, reversals and
-the steps of each axis do not depend on the spacing.
-"""
+the steps of each axis do not depend on the spacing."""
 
 from __future__ import annotations
 
@@ -119,8 +118,7 @@ def round_to_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
 
     Raises ProgramError for arcs without a centre and for positions that cannot be counted. An arc
     shorter than a step, which rounding would turn into a full circle, becomes a line; one that is
-    less than a step short of a full circle becomes a full circle.
-    """
+    less than a step short of a full circle becomes a full circle."""
     check_positions(toolpath, machine)
     home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
     exact = with_event_positions(toolpath, home)
@@ -149,8 +147,7 @@ def _centre_arcs(path: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) ->
     With the direction u and the midpoint m of the chord, the nearest such point to the centre c is
     c − ((c − m)·u) u. Its distance from c is the difference of the radii times radius / chord. An
     arc of small sweep still runs between its ends, but one that is nearly a full circle would move
-    far to one side: for more than half a turn the chord must therefore be at least the radius.
-    """
+    far to one side: for more than half a turn the chord must therefore be at least the radius."""
     step = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     begin, end, centre = (path.starts_of(arcs)[:, :2], path.end[arcs, :2], path.centre[arcs])
     chord, start_arm, end_arm = end - begin, begin - centre, end - centre

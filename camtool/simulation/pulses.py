@@ -3,8 +3,7 @@
 `row_pulses` makes them from the chunks of a controller's model, whose samples are the outputs of
 its loop, at the times that its clock (`camtool.simulation.timing`) gives them. Steps that the
 controller adds at a reversal come before the sample that reverses, those of X first, as its own
-loop issues them.
-"""
+loop issues them."""
 
 from __future__ import annotations
 

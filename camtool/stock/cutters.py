@@ -10,8 +10,7 @@
 
 Every profile is convex and does not fall with the distance. The compiled loops of
 `camtool.kernels.stock` rely on both: along a straight move the height over a point is then a
-convex function of the place on the move.
-"""
+convex function of the place on the move."""
 
 from __future__ import annotations
 

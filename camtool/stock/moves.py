@@ -3,8 +3,7 @@
 They are those of the simulated slides, with all of the mechanics, thinned
 (`camtool.stock.slides`), or those of a toolpath, whose arcs become chords. The true path lies
 nowhere farther than `beside_mm` from them, so every figure of the stock is known to within what
-this distance does to it.
-"""
+this distance does to it."""
 
 from __future__ import annotations
 
@@ -30,8 +29,7 @@ class StockMoves(Struct, frozen=True, eq=False):
 
     `start`, `end` (M, 3); `row` (M,): the row of the decoded toolpath of each, ascending; `rapid`
     (M,): True for moves that should not touch the stock; `tool` (M,): the index of its cutter in
-    `cutters`. The slides are nowhere farther than `beside_mm` from these moves.
-    """
+    `cutters`. The slides are nowhere farther than `beside_mm` from these moves."""
 
     start: Floats
     end: Floats

@@ -8,8 +8,7 @@ are part of the type to which the table is converted.
 A target whose file lacks numbers that differ from machine to machine names them at its top; the
 user's file must give them:
 
-    needs = ["axes.x.coded_step_mm", "axes.y.coded_step_mm"]
-"""
+    needs = ["axes.x.coded_step_mm", "axes.y.coded_step_mm"]"""
 
 from __future__ import annotations
 

@@ -73,8 +73,7 @@ def machine_template(
     value of the target's own file (`base_text`) is a comment with its source, for the user to
     uncomment and change; every axis has `backlash_mm`, since every machine has backlash. `needs`
     are keys that the user must give. OptionError for a name that is not a word of small letters,
-    digits and hyphens.
-    """
+    digits and hyphens."""
     if not NAME.fullmatch(name):
         raise OptionError(
             f"{name!r} is no name for a machine", mend="use small letters, digits and hyphens"

@@ -80,8 +80,7 @@ class ToolpathBuilder:
     ) -> ToolpathBuilder:
         """Add an arc in XY about the absolute `centre`, or a helix if `z` is given.
 
-        It is a full turn when its end lies above, below or at its start.
-        """
+        It is a full turn when its end lies above, below or at its start."""
         kind = Kind.ARC_CCW if ccw else Kind.ARC_CW
         return self._move(kind, (x, y, z), feed, centre)
 

@@ -74,8 +74,7 @@ def explain(
     """Yield the blocks of a decoded program on the lines `first` to `last` (of the file; where its
     blocks have no lines, these blocks), in the order of the file.
 
-    `meanings` are those of words that move nothing, such as "G21".
-    """
+    `meanings` are those of words that move nothing, such as "G21"."""
     highest = int(toolpath.block.max(initial=-1)) + 1
     count = highest if listing is None else len(listing.blocks)
     lines = () if listing is None else listing.lines

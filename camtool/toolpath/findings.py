@@ -1,7 +1,6 @@
 """Codes that plans, programs and verification share, and the sentences of toolpaths.
 
-A machine's own sentences stand in its `postprocessors/<machine>/findings.py`.
-"""
+A machine's own sentences stand in its `postprocessors/<machine>/findings.py`."""
 
 from __future__ import annotations
 

@@ -12,8 +12,7 @@ different radii is a spiral (`PolarArcs`).
 
     carried_over        a program decoded from one machine, without what only that machine needs
     at_feed             all cuts at one feed
-    within_feeds        no cut faster than the machine's highest feed
-"""
+    within_feeds        no cut faster than the machine's highest feed"""
 
 from __future__ import annotations
 
@@ -94,8 +93,7 @@ def helices_to_steps(toolpath: Toolpath, max_dz_mm: float) -> LoweredToolpath:
 
     Down comes after XY and up before it, so the tool is nowhere deeper than on the true slope, and
     nowhere more than `max_dz_mm` above it. Rapids become two moves. Raises OptionError for a step
-    that is not above 0 and PostError for an arc without a centre or beyond `MAX_PARTS`.
-    """
+    that is not above 0 and PostError for an arc without a centre or beyond `MAX_PARTS`."""
     if not (math.isfinite(max_dz_mm) and max_dz_mm > 0.0):
         raise OptionError(f"step {max_dz_mm:g} mm of a slope is not above 0")
     rise = np.abs(toolpath.end[:, 2] - toolpath.starts[:, 2]) if len(toolpath) else np.zeros(0)
@@ -114,8 +112,7 @@ def arcs_to_lines(toolpath: Toolpath, rows: Bools, tolerance_mm: float) -> Lower
     centre or beyond `MAX_PARTS`.
 
     A chord over the sweep t of a radius r deviates by the sagitta r(1 − cos t/2) = 2r sin²(t/4),
-    so t = 4 asin √(tolerance / 2r).
-    """
+    so t = 4 asin √(tolerance / 2r)."""
     if not (math.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise OptionError(f"tolerance {tolerance_mm:g} mm is not above 0")
     is_arc = toolpath.is_arc & rows
@@ -132,8 +129,7 @@ def arcs_within(toolpath: Toolpath, max_sweep_rad: float) -> LoweredToolpath:
     """Split arcs that sweep more than `max_sweep_rad` into equal parts that do not.
 
     Raises OptionError for a sweep that is not above 0 and PostError for an arc without a centre
-    or beyond `MAX_PARTS`.
-    """
+    or beyond `MAX_PARTS`."""
     if not (math.isfinite(max_sweep_rad) and max_sweep_rad > 0.0):
         raise OptionError(f"sweep {max_sweep_rad:g} rad is not above 0")
     arms = PolarArcs(toolpath, toolpath.is_arc)
@@ -205,8 +201,7 @@ def _with_rows(
     """Return a toolpath with these kinds, ends and centres; its other columns are those of the
     rows `row` that the new rows came from.
 
-    The three arrays become read-only and are not copied.
-    """
+    The three arrays become read-only and are not copied."""
     kind, end, centre = read_only(kind), read_only(end), read_only(centre)
     return LoweredToolpath(toolpath.picked(row, kind=kind, end=end, centre=centre), row)
 

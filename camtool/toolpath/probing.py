@@ -3,8 +3,7 @@
 A cycle is a generator. It yields one `ProbeStep` after the other, is sent the place at which the
 tool then stands (`ProbeAnswer`), and returns what it has measured, in the work frame in which it
 began. Each place is touched twice, fast and then slowly. Where a touch finds nothing, the tool
-goes back the way it came, and the cycle ends with a MachineError.
-"""
+goes back the way it came, and the cycle ends with a MachineError."""
 
 from __future__ import annotations
 
@@ -45,8 +44,7 @@ class ProbeStep(Struct, frozen=True):
 
     "go": move rapidly, whatever the probe says; "guard": move at `feed` (mm/min), and stop where
     the probe touches; "touch": the same, towards what is to be measured; "zero": the tool stands
-    at these coordinates from now on.
-    """
+    at these coordinates from now on."""
 
     action: Literal["go", "guard", "touch", "zero"]
     axes: Mapping[Axis, float]
@@ -105,8 +103,7 @@ class CycleRun:
         """Return the reason why the probe cannot have touched at this place: the step does not
         pass there. "" if it can.
 
-        The place is what the controller reported.
-        """
+        The place is what the controller reported."""
         assert self.step is not None
         for axis, before, reported in zip(AXES, self.place, touched, strict=True):
             end = self.step.axes.get(axis, before)
@@ -151,8 +148,7 @@ class Touch(Struct, frozen=True):
 
     Between the places the tool moves at `travel` and stops if it touches anything. `radius_mm`:
     radius of the tool or of the tip of the probe. `sets_zero`: what is measured gets the
-    coordinates `values`, 0 if there are none.
-    """
+    coordinates `values`, 0 if there are none."""
 
     reach_mm: float = 10.0
     fast: float = 100.0
@@ -318,8 +314,7 @@ def boss(start: Place, how: Touch, size_mm: float, clear_mm: float, depth_mm: fl
     becomes X0 Y0.
 
     The tool stands free above its centre. It goes out beyond each side by `clear_mm`, and down by
-    `depth_mm`; X is touched again through the centre, and the tool ends above it.
-    """
+    `depth_mm`; X is touched again through the centre, and the tool ends above it."""
     x, y, z = start
     x, _ = yield from _across((x, y, z), "x", how, size_mm, clear_mm, depth_mm)
     y, height = yield from _across((x, y, z), "y", how, size_mm, clear_mm, depth_mm)
@@ -395,8 +390,7 @@ def height_map(
     `heights`, in order.
 
     Between the points the probe is at `clear_mm`; it goes down to `lowest_mm` at most, at `feed`
-    mm/min.
-    """
+    mm/min."""
 
     def run(_: Place) -> ProbeScript:
         yield ProbeStep("go", {"z": clear_mm})

@@ -19,8 +19,7 @@ class Program:
     `extension` (".pic").
 
     `row_of_block` (B,) gives for each block the row of the toolpath that it came from, −1 for
-    blocks of the dialect's own (header, footer).
-    """
+    blocks of the dialect's own (header, footer)."""
 
     data: bytes
     extension: str

@@ -23,8 +23,7 @@ def refuse(
     the row.
 
     `rows` maps rows of `is_bad` to rows of `toolpath`, where `is_bad` is of a toolpath made from
-    it.
-    """
+    it."""
     if is_bad.any():
         row = int(np.argmax(is_bad)) if rows is None else int(rows[np.argmax(is_bad)])
         text = message if isinstance(message, str) else message(row)

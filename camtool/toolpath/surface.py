@@ -3,8 +3,7 @@
 A `Surface` has heights at the nodes of a grid, in the work frame of the program: 0 is the stock
 top that the program was made for. Between the nodes it is bilinear. `follow` adds its height to
 each cut: lines are divided where the surface bends more than a tolerance, arcs are divided into
-arcs (helices), and never become chords.
-"""
+arcs (helices), and never become chords."""
 
 from __future__ import annotations
 
@@ -38,8 +37,7 @@ class Surface(Struct, frozen=True, eq=False):
     """A measured surface: heights `z` (NY, NX) mm at the nodes `x` (NX,), `y` (NY,) mm, which
     ascend.
 
-    ValueError when the shapes disagree or a height is not finite.
-    """
+    ValueError when the shapes disagree or a height is not finite."""
 
     x: Floats
     y: Floats
@@ -86,8 +84,7 @@ def filled(x: Floats, y: Floats, z: Floats) -> Surface:
     """Return the surface with the nodes that were not probed (NaN) filled in smoothly.
 
     Each of them gets the mean of its four neighbours, found by iteration until nothing changes by
-    more than FILL_MM. ValueError if no node was probed.
-    """
+    more than FILL_MM. ValueError if no node was probed."""
     missing = np.isnan(z)
     if missing.all():
         raise ValueError("no node was probed")
@@ -156,8 +153,7 @@ def follow(toolpath: Toolpath, surface: Surface, tolerance_mm: float) -> Toolpat
     Rapids are raised by the highest place of the surface, so that their clearance is kept over
     all of it. Arcs stay arcs, as helices whose height is linear in the angle. PostError for a cut
     beside the surface and for more than `MAX_PARTS` moves; OptionError for a tolerance that is
-    not above 0.
-    """
+    not above 0."""
     if not (math.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise OptionError(f"tolerance {tolerance_mm:g} mm is not above 0")
     cuts = np.flatnonzero(toolpath.is_feed)
@@ -236,8 +232,7 @@ def _shares(
     """Return the shares (K,) of a move, up to 1, at which its parts end.
 
     Parts end at the lines of the grid; between these the move is divided so often that the surface
-    bends by no more than the tolerance within a part.
-    """
+    bends by no more than the tolerance within a part."""
     end = toolpath.end[row]
     centre = toolpath.centre[row] if sweep else None
     crossings = [np.array([0.0, 1.0])]
@@ -309,8 +304,7 @@ def _bends(
 
     In a cell the height is a + b·x + c·y + d·x·y. Along a line its second derivative is constant,
     2·d·dx·dy. Along an arc of radius r about a centre where the slope is g, the derivative by the
-    angle is at most r·g + 2·r²·d, and g is at most the greatest slope of the cell and r·d.
-    """
+    angle is at most r·g + 2·r²·d, and g is at most the greatest slope of the cell and r·d."""
     column, _ = _cell(surface.x, points[:, 0])
     row, _ = _cell(surface.y, points[:, 1])
     width = surface.x[column + 1] - surface.x[column]
@@ -383,8 +377,7 @@ def surface_error(flat: Toolpath, written: Toolpath, surface: Surface) -> tuple[
 
     It is measured at many places of each cut; a place of `written` is compared with that place of
     `flat` which has come equally far in its run. PostError if the two have different numbers of
-    runs.
-    """
+    runs."""
     plain, warped = _Cuts(flat), _Cuts(written)
     if plain.runs != warped.runs:
         raise PostError(

@@ -1,8 +1,7 @@
 """Places where the top of the stock is not cut yet, to touch off a tool that was mounted.
 
 X0 Y0, where zero was set     if nothing has been cut there so far, and else
-a place between the cuts      the nearest to it, on a grid over all that is cut
-"""
+a place between the cuts      the nearest to it, on a grid over all that is cut"""
 
 from __future__ import annotations
 

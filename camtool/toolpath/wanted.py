@@ -28,8 +28,7 @@ class DrawnEdges(Struct, frozen=True, eq=False):
     line together. `followed` (E,): the tool's centre runs on the line, and the edges of the cut
     lie beside it; `cleared` (E,): the edge bounds all that the tool removes, not one closed pass
     beside it. `datum_off_mm`: the part of `off_mm` that comes from placing the drawing by a box,
-    the same for all rows.
-    """
+    the same for all rows."""
 
     off_mm: Floats
     edge: Ints
@@ -116,8 +115,7 @@ class ProtectedRegion(Struct, frozen=True, eq=False):
     `runs`: vertices (n, 4) each of x, y, z, bulge, mm. `lines`: M closed paths, outer ones before
     those within them; the inside of a path is protected where `stays` (M,) is true, else free.
     `beyond`: True if the area outside all paths is protected. `into_mm`: depth by which the runs
-    shall cut into the region.
-    """
+    shall cut into the region."""
 
     runs: tuple[Floats, ...]
     lines: Polylines

@@ -3,8 +3,7 @@
     x = WordColumn("X", units[:, 0], written[:, 0], decimals=3)
     texts = texts_of([code, x, y], blanks=True)      b"G1 X1.500 Y2.000\\nG0 X..."
 
-Blocks without words (events, comments) are inserted afterwards (`TextLines.with_lines`).
-"""
+Blocks without words (events, comments) are inserted afterwards (`TextLines.with_lines`)."""
 
 from __future__ import annotations
 
@@ -26,8 +25,7 @@ class WordColumn(Struct, frozen=True, eq=False):
 
     `kept`: decimals that are written even if they are 0 (None: all); `digits`: least number of
     digits before the point; `plus`: write a sign before numbers that are not negative;
-    `bare_point`: write a point behind a number without decimals.
-    """
+    `bare_point`: write a point behind a number without decimals."""
 
     letter: str
     units: Ints | Codes

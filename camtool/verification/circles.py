@@ -10,8 +10,7 @@ least and the largest radius and the mean point. Memory does not grow with the s
 
 c' is the centre of the least-squares circle through the mean points of the bins; all bins have the
 same weight, as all angles have for a ball-bar. The extremes of a bin are found about c and used
-about c'. With the centres e apart this is wrong by no more than e · 2π/720, 0.9 % of e.
-"""
+about c'. With the centres e apart this is wrong by no more than e · 2π/720, 0.9 % of e."""
 
 from __future__ import annotations
 
@@ -66,8 +65,7 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[FullCircle]:
     turn) only the deepest is returned.
 
     `gap_mm`: by how much centres and radii may differ, and how much of the circumference may be
-    missing (a writer may close an arc by a line).
-    """
+    missing (a writer may close an arc by a line)."""
     toolpath = cuts.toolpath
     arcs = np.flatnonzero(toolpath.is_arc & cuts.is_cut)
     arcs = arcs[toolpath.starts_of(arcs)[:, 2] == toolpath.end[arcs, 2]]
@@ -179,8 +177,7 @@ def least_squares_centre(points: Floats) -> Floats:
 
     Gauss-Newton from the origin: with d = |p − c| and u = (p − c)/d, the residual d − R changes by
     −u·δc − δR, so each round solves the 3 × 3 normal equations of [u, 1] (δc, R) = d. The origin
-    must lie inside the points.
-    """
+    must lie inside the points."""
     centre = np.zeros(2)
     for _ in range(FIT_ROUNDS):
         spoke = points - centre

@@ -7,8 +7,7 @@ with `flat_cuts=True` all its feed moves in XY cut.
 
 A contour is what the tool cuts without leaving the stock: consecutive cutting rows, with events,
 rows without motion and feeds straight down or up between them (steps from one pass to the next,
-the sides of tabs). A rapid, an air move or homing ends it.
-"""
+the sides of tabs). A rapid, an air move or homing ends it."""
 
 from __future__ import annotations
 
@@ -38,8 +37,7 @@ class CutMoves(Struct, frozen=True, eq=False):
     Arcs run about the programmed centre with the radius of their start; above 180° they are two
     segments. `row` (K,) is the toolpath row of each; row r owns segments
     first[r]:first[r+1] (`first` (N+1,)). `contour` (N,) is the number of the row's contour, from
-    0, and −1 for rows that do not cut.
-    """
+    0, and −1 for rows that do not cut."""
 
     toolpath: Toolpath
     segments: Segments
@@ -377,8 +375,7 @@ def _lengths_and_areas(toolpath: Toolpath, rows: Indices) -> Floats:
     and the origin, mm².
 
     Green's theorem: half the cross product of the ends of a move, and for an arc of sweep t the
-    area (r²/2)(t − sin t) of its circular segment on top.
-    """
+    area (r²/2)(t − sin t) of its circular segment on top."""
     begin, end = toolpath.starts_of(rows)[:, :2], toolpath.end[rows, :2]
     length = np.hypot(*(end - begin).T)
     area = 0.5 * (begin[:, 0] * end[:, 1] - begin[:, 1] * end[:, 0])

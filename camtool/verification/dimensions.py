@@ -15,8 +15,7 @@ sizes are those of the tool centre's path.
     error_percent = (predicted − nominal) / nominal · 100
 
 is positive when the part comes out too large. (The thesis's equation 5.5, L2755, takes
-real − measured: the same figure with the other sign.)
-"""
+real − measured: the same figure with the other sign.)"""
 
 from __future__ import annotations
 
@@ -129,8 +128,7 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Pre
     moves (`goal`), predicted from the extents of the slides.
 
     Contours to which no row belongs are left out (a finding names them), and so are contours that
-    cut no edge, if edges are known.
-    """
+    cut no edge, if edges are known."""
     if not slides.has_sizes:
         return
     centre, lowest = _extents(goal.cuts, _wanted_rows(goal))

@@ -5,8 +5,7 @@ contour belongs to the wanted contour that is nearest to most of its samples, if
 within the tolerance of it; otherwise the next by that count is tried, up to `MAX_CONTOUR_TRIES`. A
 contour that no single wanted contour covers (a foreign program may cut several without lifting, or
 more than wanted) is matched row by row: a row belongs to the contour that is nearest to all of its
-inner samples.
-"""
+inner samples."""
 
 from __future__ import annotations
 
@@ -36,8 +35,7 @@ class Match(Struct, frozen=True, eq=False):
     that do not cut. `only` (N,) is that contour where the slides are compared with it alone, else
     ANY_CONTOUR. `circle` (N,) is the index of the full circle that the row follows, or −1.
     `off_mm` (N,) is the largest distance of the drawing from the wanted rows beside it
-    (`DrawnEdges.off_mm`).
-    """
+    (`DrawnEdges.off_mm`)."""
 
     row: Indices
     contour: Indices
@@ -105,8 +103,7 @@ def nearest_at_height(
     near in XY.
 
     `choice` (S,): the only contour to compare with, constant along a segment; only its near moves
-    are found. None: all contours. `limits_mm`: what is near, in XY and in height.
-    """
+    are found. None: all contours. `limits_mm`: what is near, in XY and in height."""
     limit_mm, depth_mm = limits_mm
     near_mm = max(limit_mm, MIN_LIMIT_MM)
     points, z = samples.points, samples.z
@@ -158,8 +155,7 @@ def _candidates(contours: Indices, nearest_contours: Indices) -> list[Ints]:
     decoded contour, then the second, and so on; −1 if there are no more.
 
     `contours` (S,) is the decoded contour of each sample (ascending), `nearest_contours` (S,) the
-    wanted one.
-    """
+    wanted one."""
     pairs, votes = np.unique(
         np.column_stack([contours, nearest_contours]), axis=0, return_counts=True
     )

@@ -1,8 +1,7 @@
 """Errors over time: the distance of the slides from the wanted path at each moment.
 
 The motion is run once more, in chunks, and judged by the compiled judge of `slides`, whose trace
-keeps every sample of a chunk here: the largest error over time is that of the report.
-"""
+keeps every sample of a chunk here: the largest error over time is that of the report."""
 
 from __future__ import annotations
 

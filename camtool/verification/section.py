@@ -2,8 +2,7 @@
 
 The nose is a circle about each place of the slides. A point of the wanted section is gouged by how
 much nearer than its radius the slides come to it, and has material left by how much farther they
-stay away. Arcs of the section are exact; the path of the slides is within half a step.
-"""
+stay away. Arcs of the section are exact; the path of the slides is within half a step."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Plots over time of a judged program: speed, position, and distance from the wanted path.
 
 The program runs once more, with the times that its controller gives each sample, and is reduced to
-the columns of the picture on the way.
-"""
+the columns of the picture on the way."""
 
 from __future__ import annotations
 

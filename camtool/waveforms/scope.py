@@ -1,8 +1,7 @@
 """A stretch of signals as an oscilloscope shows it: a lane for each line, time to the right.
 
 Beside each lane stands how long the line is high and low, the shortest and the longest time of the
-complete ones in the stretch.
-"""
+complete ones in the stretch."""
 
 from __future__ import annotations
 

@@ -5,8 +5,7 @@
     2,9,9,1,0,0,1,1
 
 A player waits until `time_…` after its start and writes each byte to its port. docs/signals.md
-describes the format.
-"""
+describes the format."""
 
 from __future__ import annotations
 

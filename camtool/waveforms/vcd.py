@@ -2,8 +2,7 @@
 
 A module for each port has its lines as wires; the module `motors` has the positions and the block
 of the program, as integers. Written here: a dump is a few kinds of lines, and whole columns of
-changes become text at once, thousands of moments a call.
-"""
+changes become text at once, thousands of moments a call."""
 
 from __future__ import annotations
 

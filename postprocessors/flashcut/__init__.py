@@ -1,8 +1,7 @@
 """The micro machine tool on a PC's parallel port: `G01 X1.0 Y1.0 F3.0`.
 
 docs/dialects/flashcut.md explains the format, its contradictions and what was chosen;
-docs/controllers/flashcut.md what the controller does with it.
-"""
+docs/controllers/flashcut.md what the controller does with it."""
 
 from __future__ import annotations
 

@@ -15,8 +15,7 @@ What it does with a row of the toolpath, in the order of this file:
 5. At each change of an axis's direction the compensation steps are issued, a step's time each
    (`controller.compensation_half_period_ms`).
 
-Every move ends: the longer axis arrives.
-"""
+Every move ends: the longer axis arrives."""
 
 from __future__ import annotations
 
@@ -230,8 +229,7 @@ class MoveTimes(Struct, frozen=True, eq=False):
     For each of M moves: its start `begin_ms` (M,), the half period of its longer axis
     `half_period_ms` (M,), its directions `ways` (M, 3), its row `first_row` (M,), and the
     compensation steps `added` (M, 3) right before it, each of which takes `added_step_ms` (M,).
-    `is_under_way`: the last move continues in the next batch.
-    """
+    `is_under_way`: the last move continues in the next batch."""
 
     steps: Ints
     row: Ints
@@ -366,8 +364,7 @@ def half_periods(
     """Return (N,) the half period, ms, of the longer axis of each row, for steps of `step_mm`;
     rapids have the shortest. `moves_one_axis` gives a mask of the rows of one axis.
 
-    ProgramError for feeds whose half period the controller cannot count.
-    """
+    ProgramError for feeds whose half period the controller cannot count."""
 
     def count_periods(part: Toolpath) -> Indices:
         feed = np.where(part.is_feed, part.feed, np.inf)

@@ -28,8 +28,7 @@ class FlashcutDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stock go "straight" to their end, or along X and then along Y ("one-axis"), which the timers
     do exactly; `slants`: lines of X and Y in one block ("whole"), or in as many as these timers
     do exactly ("split"); `z_up`: the sign of Z away from the work; `spindle_stops`: M05 stops it;
-    `arc_spread_mm`: the radii at an arc's start and end may differ by this much.
-    """
+    `arc_spread_mm`: the radii at an arc's start and end may differ by this much."""
 
     decimals: Annotated[int, Meta(ge=1, le=4)] = 3
     trailing_zeros: bool = False
@@ -61,8 +60,7 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
     (L1583-1587). `coil_states_per_step` of the signals (`signals`); 2 for each half period where
     left out. `rounding` of each displacement to steps (L1208). `goes_on_from`: a displacement
     (L1101) is counted from where the program was ("programmed") or from where the steps have led
-    ("reached"). `chords_per_turn`: arcs become "una serie de puntos" (L1089), number not said.
-    """
+    ("reached"). `chords_per_turn`: arcs become "una serie de puntos" (L1089), number not said."""
 
     half_period_ms: Annotated[int, Meta(ge=1, le=60_000)] = 3
     single_axis_half_period_ms: Annotated[int, Meta(ge=1, le=60_000)] | None = None

@@ -1,8 +1,7 @@
 """Reading flashcut, one block a line, by the four templates of the thesis (L980-1016).
 
 The real program hands each line to the routine of its code; what it does with a line that fits no
-template is not known, so here such a line is an error with block, line and column.
-"""
+template is not known, so here such a line is an error with block, line and column."""
 
 from __future__ import annotations
 

@@ -9,8 +9,7 @@ states, and a step of two half periods (Tabla 4.1) all four. At P = 3 that gives
     step k of an axis: its states, evenly in the time since its step before, at whole milliseconds
 
 The states of a step that the end of the move cuts off are not begun. Steps of a compensation come
-before the move, X, Y, Z. The spindle makes a step with each of the longer axis (L1097, L1137).
-"""
+before the move, X, Y, Z. The spindle makes a step with each of the longer axis (L1097, L1137)."""
 
 from __future__ import annotations
 

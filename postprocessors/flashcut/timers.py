@@ -33,8 +33,7 @@ def half_periods_ms(
 
     A step takes some half periods P, each of which is a millisecond late:
 
-        60 step / feed = parts (P + 1) / 1000,      the nearest whole P, but never a shorter one
-    """
+        60 step / feed = parts (P + 1) / 1000,      the nearest whole P, but never a shorter one"""
     with np.errstate(over="ignore"):
         step_ms = 60_000.0 * step_mm / feed_mm_min
     periods = np.floor(step_ms / controller.half_periods_per_step - 1.0 + 0.5 + PERIOD_GUARD)

@@ -3,8 +3,7 @@
     rows ──checked──▶ XY and Z apart ──units, arcs repaired──▶ blocks, F where it changes
 
 The syntax has F in G01 of XY alone (L989-992). So a feed that changes before a Z move or an arc
-is written as a G01 to where the tool is: X and Y "aún así es necesario", L985.
-"""
+is written as a G01 to where the tool is: X and Y "aún así es necesario", L985."""
 
 from __future__ import annotations
 
@@ -98,8 +97,7 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> LoweredToolpa
     The timers make the shorter axis too long where it has more steps than the half period P has
     milliseconds (docs/controllers/flashcut.md). A line of n and m ≤ n steps becomes K = ⌈m / (P −
     1)⌉ pieces; piece k ends at the whole steps next to k·n/K and k·m/K from its start, so that the
-    controller, which rounds the travel of each piece by itself, has nothing to round.
-    """
+    controller, which rounds the travel of each piece by itself, has nothing to round."""
     controller = machine.controller
     if not isinstance(controller, FlashcutController):
         return LoweredToolpath(toolpath, np.arange(len(toolpath)))

@@ -10,8 +10,7 @@ sent is the end and the offset centre − start. For each arc, by its rounded nu
                                         3. lines within a unit of the arc
 
 "Accepts" also means that the rounded arc turns as the wanted one does: an arc of a few
-units may come out as nearly a full turn, and a short one of a large radius as a full circle.
-"""
+units may come out as nearly a full turn, and a short one of a large radius as a full circle."""
 
 from __future__ import annotations
 
@@ -115,8 +114,7 @@ def arcs_accepted(
     """Return a mask (K,), true for arcs that the controller accepts and executes in the wanted
     direction and number of turns.
 
-    `sweep_rad` (K,) > 0 as wanted; `points`: start, end, centre (K, 2) in units.
-    """
+    `sweep_rad` (K,) > 0 as wanted; `points`: start, end, centre (K, 2) in units."""
     unit = 10.0**-dialect.decimals
     start, end, centre = points
     start_arm, end_arm = (start - centre).astype(np.float64), (end - centre).astype(np.float64)
@@ -214,8 +212,7 @@ def _recentre(
 
     The centre from which both rounded ends are equally far and which is nearest to c is c + ((m −
     c)·t) t, with m the middle of the chord and t its direction. It is hardly ever a whole number
-    of units, so those around it are tried, the nearest to c first.
-    """
+    of units, so those around it are tried, the nearest to c first."""
     begin, stop = ends
     chord = (stop - begin).astype(np.float64)
     length = math.hypot(*chord)

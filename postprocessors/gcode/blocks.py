@@ -15,8 +15,7 @@ own over `ProgramLines`, or, where blocks are rows of words and nothing else, by
 Columns are those of the file's own line, from 1, and are only worked out when something is wrong,
 so that words need not carry them.
 
-Writers never use this module, readers never `format.py`.
-"""
+Writers never use this module, readers never `format.py`."""
 
 from __future__ import annotations
 
@@ -173,8 +172,7 @@ class Lexing(Struct, frozen=True):
     numbers.
 
     `letters`: those that begin words, capitals only. `blanks`: spaces and tabs "anywhere" (even
-    inside a number), or "between" words (and around them). `line_chars`: longest line.
-    """
+    inside a number), or "between" words (and around them). `line_chars`: longest line."""
 
     letters: str
     blanks: Literal["anywhere", "between"] = "between"
@@ -208,8 +206,7 @@ def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator
 
     In large programs thousands of lines in a row are plain moves, and a Python object for each
     would take most of the time: `take` is offered such runs as columns. It need not recognise
-    faults, since every block that it leaves is yielded here.
-    """
+    faults, since every block that it leaves is yielded here."""
     check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     check_ascii(data)
     lines = ProgramLines(data)

@@ -2,8 +2,7 @@
 messages.
 
 Every line is made by `comment`, so that no name from a drawing or a job can end a comment or be
-obeyed in one. Lines of several parts are broken between these where they would become too long.
-"""
+obeyed in one. Lines of several parts are broken between these where they would become too long."""
 
 from __future__ import annotations
 
@@ -78,8 +77,7 @@ def comments(
 
     `of_row` (B,): the toolpath row of each block; `message`: the text that a comment for the
     operator begins with; `mounted`: what the operator is told at the rows where a tool is changed
-    by hand; `seconds` (N,): how long the controller takes for each row, where that is known.
-    """
+    by hand; `seconds` (N,): how long the controller takes for each row, where that is known."""
     no_rows = np.empty(0, dtype=np.int64)
     begins, tells = no_rows, np.flatnonzero(toolpath.kind == Kind.MESSAGE)
     if dialect.comments == "contours":

@@ -8,8 +8,7 @@ controller counts pecks from R, the plan from the stock: the bites of G83 are no
 that were planned, and the first of them may be in the air.
 
 A thread whose passes are those of LinuxCNC's G76 becomes that. From the drive line, where the tool
-stands, the crest is I away, and the passes are J √1, J √2 … below it, up to the full depth K.
-"""
+stands, the crest is I away, and the passes are J √1, J √2 … below it, up to the full depth K."""
 
 from __future__ import annotations
 

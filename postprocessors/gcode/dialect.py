@@ -5,8 +5,7 @@ the end, as the numbers of the block give them). An arc is refused when
 
     |r1 − r2| > most_difference,
     or |r1 − r2| > difference and |r1 − r2| > part · r,
-    or r < least_radius.
-"""
+    or r < least_radius."""
 
 from __future__ import annotations
 
@@ -47,8 +46,7 @@ class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     what the machine wants, as its controller takes it.
     `arc_most_radius_mm`: larger arcs are written as lines; `arc_full_turn_rad`: the
     controller takes an arc that turns by less for a full circle; `arc_chord_slack_mm`: by how much
-    half the chord may exceed R.
-    """
+    half the chord may exceed R."""
 
     units: Literal["mm", "in"] = "mm"
     decimals: Annotated[int, Meta(ge=3, le=6)] = 3

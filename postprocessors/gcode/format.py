@@ -7,8 +7,7 @@ words, lines that fit. Shared by the dialects that write words of a letter and a
     comment("logo (v2).dxf")                   "(logo _v2_.dxf)"
     check_length(data, 80, "line", mend)       PostError for the first longer line
 
-Readers never use this module, writers never `blocks.py`.
-"""
+Readers never use this module, writers never `blocks.py`."""
 
 from __future__ import annotations
 
@@ -46,8 +45,7 @@ class NumberStyle(Struct, frozen=True):
 def units_of(values: Floats, decimals: int) -> Ints:
     """Return values (any shape) as whole units of 10^−decimals, half away from zero.
 
-    ValueError for values that are not finite or too large to be exact.
-    """
+    ValueError for values that are not finite or too large to be exact."""
     units = np.empty(np.shape(values), dtype=np.int64)
     flat_values, flat_units = np.ravel(values), units.reshape(-1)
     for low in range(0, len(flat_values), VALUES_AT_ONCE):

@@ -2,8 +2,7 @@
 frame of the part.
 
 Part zero is the zero of the frame (G54 …, G10, G92, rotation) in which the program makes its first
-move; a later frame is placed by what it differs in. Arcs in XZ and YZ become chords.
-"""
+move; a later frame is placed by what it differs in. Arcs in XZ and YZ become chords."""
 
 from __future__ import annotations
 

@@ -8,8 +8,7 @@ is the end and the offset centre − start. For each arc, by its rounded numbers
     a centre within RECENTRE_REACH units of the rounded one, from which start and end are equally
     far to within a unit, and about which the arc turns as wanted
                                      the one nearest to the wanted centre
-    otherwise                        lines within a unit of the arc
-"""
+    otherwise                        lines within a unit of the arc"""
 
 from __future__ import annotations
 

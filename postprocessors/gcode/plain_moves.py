@@ -1,8 +1,7 @@
 """Reading blocks of plain moves by columns: thousands of lines with G0 to G3, X Y Z I J and F.
 
 A column knows no fault: `PlainMoves` says of how many blocks it is sure, and a reader takes the
-next one as a block of words.
-"""
+next one as a block of words."""
 
 from __future__ import annotations
 

@@ -5,8 +5,7 @@
 Coordinates, feeds and motion words are written when they change; an arc always has X Y I J. The
 first move in XY has both coordinates, and so has the first after homing and after a tool change:
 the real tool may then stand anywhere. After a change it goes to its height again before it moves
-in XY. Comment lines and `%` are lines, but no blocks.
-"""
+in XY. Comment lines and `%` are lines, but no blocks."""
 
 from __future__ import annotations
 
@@ -81,8 +80,7 @@ class ProgramStyle(Struct, frozen=True, eq=False):
     mode, `own_mode`: that of rows that ask for none; `cycles`: holes are written as cycles;
     `change_first`: nothing moves before the first tool is mounted, whose length counts from then.
     `model`: that of its controller, for the times in comments. `axes` and `offsets`: the letters
-    of X, Y and Z, "" for one that is not written, and of I and J.
-    """
+    of X, Y and Z, "" for one that is not written, and of I and J."""
 
     dialect: GcodeDialect
     header: tuple[str, ...]
@@ -658,8 +656,7 @@ def common_words(event: Event) -> tuple[str, ...]:
     block can express.
 
     Homing is a rapid in machine coordinates, `G53 G0`: G28 would go where the operator's memory of
-    it points.
-    """
+    it points."""
     if event.kind in SWITCHES:
         return (SWITCHES[event.kind],)
     if event.kind == Kind.HOME_XY:

@@ -50,8 +50,7 @@ class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
     next for so long, 255 keeps the motors on and holds nothing (`st_go_idle`, stepper.c).
     `least_step_hz`: no axis that has the most steps makes fewer a second: 16 MHz / (65535 · 8),
     the longest tick of its timer at the highest smoothing (`st_prep_buffer`, stepper.c).
-    `laser_mode` is its $32: a laser instead of a spindle, whose power changes while it moves.
-    """
+    `laser_mode` is its $32: a laser instead of a spindle, whose power changes while it moves."""
 
     firmware: Literal["grbl", "grblHAL", "FluidNC"] = "grbl"
     arc_tolerance_mm: Tolerance = 0.002

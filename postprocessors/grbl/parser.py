@@ -4,8 +4,7 @@
 
 So a line does all that it says or nothing, and stops with an error of grbl's own number
 (doc/csv/error_codes_en_US.csv). Positions are those of the machine, in mm; the frame in force when
-the program begins has its zero at 0.
-"""
+the program begins has its zero at 0."""
 
 from __future__ import annotations
 

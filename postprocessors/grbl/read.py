@@ -3,8 +3,7 @@ parser.
 
     parser   what a line does, with grbl's own errors
 
-Where hundreds of lines in a row are plain moves, they are read by columns, past the parser.
-"""
+Where hundreds of lines in a row are plain moves, they are read by columns, past the parser."""
 
 from __future__ import annotations
 
@@ -189,8 +188,7 @@ def _too_slow(path: Toolpath, machine: GrblMachine) -> Iterator[Finding]:
     """Yield FEED_TOO_SLOW for cuts slower than the longest tick of the timer allows.
 
     A line of d mm whose leading axis makes n steps cannot be slower than d/n mm times the lowest
-    step rate; an arc cannot be slower than where it runs along an axis.
-    """
+    step rate; an arc cannot be slower than where it runs along an axis."""
     if not isinstance(machine.controller, GrblController):
         return
     least_hz = machine.controller.least_step_hz

@@ -2,8 +2,7 @@
 
 Each setting is a line `$110=500.000` (grbl 1.1 wiki, "Grbl v1.1 Configuration"); senders put a
 prompt before it, grbl 0.9 and some senders its meaning behind it. Other lines (`ok`, the banner,
-status reports) are passed over.
-"""
+status reports) are passed over."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
 Blocks become segments of about 10 ms with one tick each (`steps.Segments`); within them the
 counters of Bresenham say in which tick an axis steps. The interrupt of a tick computes the steps
 that the one after it puts on the pins, the directions first (stepper.c). All pins are of port D
-(cpu_map.h of an Uno).
-"""
+(cpu_map.h of an Uno)."""
 
 from __future__ import annotations
 

@@ -8,8 +8,7 @@ receive buffer fills. Blocks become steps by the model of the controller, and ar
 each that comes, as in grbl: a sender that is too slow costs speed, never steps.
 
 Places on the machine are those that grbl counts in its own steps; `_origin` is where its zero lies
-among the steps of the slides, which homing and a new start of the board change.
-"""
+among the steps of the slides, which homing and a new start of the board change."""
 
 from __future__ import annotations
 

@@ -10,8 +10,7 @@ exceeds the buffer, whatever happens to the answers.
 
 `ok` means planned, not done: done for certain is what lies before all that its planner can hold,
 and everything once it is idle (grbl 1.1 wiki, "Grbl v1.1 Interface"; serial.c, planner.h,
-stepper.c, protocol.c).
-"""
+stepper.c, protocol.c)."""
 
 from __future__ import annotations
 
@@ -1219,8 +1218,7 @@ class GrblHand(GrblConversation, Hand):
 
     A jog that lasts as long as a key is held is a chain of short jogs, no longer than the distance
     in which the machine can stop, as grbl's page on jogging advises: whatever becomes of the
-    sender, the machine stands soon. 0x85 ends it at once (jogging.md).
-    """
+    sender, the machine stands soon. 0x85 ends it at once (jogging.md)."""
 
     def __init__(self, machine: GrblMachine, manner: Manner) -> None:
         super().__init__((), machine, manner)

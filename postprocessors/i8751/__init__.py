@@ -1,8 +1,7 @@
 """The 2½-D machine on an Intel 8751: packets of bytes such as `01 03 00 64`.
 
 docs/dialects/i8751.md explains the format, its contradictions and what was chosen;
-docs/controllers/i8751.md what the controller does with it.
-"""
+docs/controllers/i8751.md what the controller does with it."""
 
 from __future__ import annotations
 

@@ -9,8 +9,7 @@ What it does with a row of the toolpath:
 3. Each leg takes its pulses' time with their ramps: `camtool_postprocessors.i8751.pulses`,
    where the options of `[dialect]` say which reading of the thesis is meant.
 
-It issues nothing at reversals; compensation in a machine file would be steps at the start rate.
-"""
+It issues nothing at reversals; compensation in a machine file would be steps at the start rate."""
 
 from __future__ import annotations
 

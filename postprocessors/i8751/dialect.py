@@ -1,8 +1,7 @@
 """The keys of `[dialect]` and `[controller]` of an i8751 machine.
 
 Where the thesis contradicts itself or is silent, an option says which reading is meant;
-docs/dialects/i8751.md explains each, with the lines of the thesis.
-"""
+docs/dialects/i8751.md explains each, with the lines of the thesis."""
 
 from __future__ import annotations
 
@@ -33,8 +32,7 @@ class I8751Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     the chords of an arc may. `plus_backward`: axes ("xz") whose motors turn backward for +. The
     options of `Firmware` are those on pulses. `long_runs`: a motor may be sent more steps at once
     than the low byte can hold; without them a program means the same whatever the high byte
-    counts.
-    """
+    counts."""
 
     tolerance_mm: Tolerance
     arc_tolerance_mm: Tolerance
@@ -88,8 +86,7 @@ class I8751Controller(SlideStart, frozen=True, tag_field="model", tag="i8751"):
     """The Intel 8751.
 
     How its firmware counts and times pulses decides what its bytes mean too, so those options
-    stand once, in `[dialect]`: `camtool_postprocessors.i8751.pulses`.
-    """
+    stand once, in `[dialect]`: `camtool_postprocessors.i8751.pulses`."""
 
 
 class I8751Link(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -27,8 +27,7 @@ but tolerance ≥ half of the coarser step gives 2·reach ≥ a.
 The diagonal runs lower D·b − M·d by b·d in all: the first one by the reach, each further one by
 twice the reach. So n records need a reach of b·d / (2n − 1), or n = (e / tolerance + 1) / 2
 rounded up. With n known, the line is walked again with that smaller reach, which leaves it as
-many records, but of more equal length and nearer to the line.
-"""
+many records, but of more equal length and nearer to the line."""
 
 from __future__ import annotations
 
@@ -47,8 +46,7 @@ def reaches(steps: Ints, step_mm: tuple[float, float], tolerance_mm: float) -> I
     """Return (N,) the reach of each line of (N, 2) steps: the greatest |D·b − M·d| at which a
     record's end stays within the tolerance of the line.
 
-    It is at least a // 2, since rounding ends to whole steps can already cost that much.
-    """
+    It is at least a // 2, since rounding ends to whole steps can already cost that much."""
     length = np.hypot(steps[:, 0] * step_mm[0], steps[:, 1] * step_mm[1])
     reach = np.floor(tolerance_mm * length / (step_mm[0] * step_mm[1])).astype(np.int64)
     return np.asarray(np.maximum(reach, np.abs(steps).max(axis=1, initial=0) // 2))
@@ -72,8 +70,7 @@ class StepLine(Struct, frozen=True):
     def pieces(self, max_steps: int) -> list[tuple[int, int]]:
         """Split the line into records and return the steps (dx, dy) of each, in order.
 
-        Their sum is the whole line; no record has more than `max_steps` steps along an axis.
-        """
+        Their sum is the whole line; no record has more than `max_steps` steps along an axis."""
         long, shorter = max(abs(self.dx), abs(self.dy)), min(abs(self.dx), abs(self.dy))
         x_is_long = abs(self.dx) >= abs(self.dy)
         right, y_sense = (1 if self.dx >= 0 else -1), (1 if self.dy >= 0 else -1)

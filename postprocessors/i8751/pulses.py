@@ -7,8 +7,7 @@ start delay throughout; a longer one takes 45 pulses to speed up, each with a de
 while the authors speak of 70 Hz and of 2.46 ms less at each pulse: "declared".
 
 The motors of X and Y run together for as many pulses as the smaller of their counts, and then the
-other one goes on alone (L4683-4705). Both are routines of their own (L4768-4873).
-"""
+other one goes on alone (L4683-4705). Both are routines of their own (L4768-4873)."""
 
 from __future__ import annotations
 
@@ -46,8 +45,7 @@ class Firmware(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     `first_pulse`: whether the first pulse of a motor's move is the last one again (L4556-4566).
     `cruise`: the delay that is left, or the rate that is declared. `delay`: the equation, or the
     cycles of the listing. `start_reload`: F2H, L3171-3180. `elbow`: whether the motor that goes
-    on alone begins a ramp anew.
-    """
+    on alone begins a ramp anew."""
 
     high_byte: Literal["256", "255"] = "256"
     first_pulse: Literal["moves", "repeats"] = "moves"
@@ -89,8 +87,7 @@ class PulseTimes:
         """Return (N, 2) seconds of records of `steps` (N, 2): of both motors together, and of one
         alone.
 
-        Where one ramp covers both ("flows"), the time is divided in proportion to the pulses.
-        """
+        Where one ramp covers both ("flows"), the time is divided in proportion to the pulses."""
         pulses = self._firmware.pulses(steps)
         shorter, longer = pulses.min(axis=1), pulses.max(axis=1)
         both_s = self._run_s(shorter)

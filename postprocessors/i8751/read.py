@@ -6,8 +6,7 @@ from 0; the END has the block after the last record. Ends are steps times the co
 The machine has one speed, so nothing distinguishes a rapid from a cut. Part zero is the top of the
 stock: in a program that goes below it, what stays at or above it and what rises straight up are
 rapids, the rest are lines. Their feed is the length of the line over the controller's time for it,
-ramps and dog-leg included.
-"""
+ramps and dog-leg included."""
 
 from __future__ import annotations
 
@@ -62,8 +61,7 @@ class Decoded(Struct, frozen=True, eq=False):
 class ByteFault(Exception):
     """A byte (offset from 0) that no controller could take at this place of a record (from 0).
 
-    The reader of packets or of a hex dump turns it into a ProgramError with its place.
-    """
+    The reader of packets or of a hex dump turns it into a ProgramError with its place."""
 
     def __init__(self, offset: int, record: int, message: str, mend: str) -> None:
         self.offset = offset

@@ -3,8 +3,7 @@
 A record moves X and Y, waits T1, moves Z, waits T2 (L4151-4167). Every end is rounded to whole
 steps from part zero, never from the record before, so that rounding does not add up. Arcs become
 chords, slopes become flat moves and small ones of Z, lines are cut where their dog-leg would stray
-too far (`dogleg.py`) and where a motor would make more steps than two bytes can hold.
-"""
+too far (`dogleg.py`) and where a motor would make more steps than two bytes can hold."""
 
 from __future__ import annotations
 
@@ -254,8 +253,7 @@ def _with_x_steps(steps: Ints) -> Ints:
     next record.
 
     Only for controllers that take no record in which both X and Y stand still (the thesis shows
-    none). The step aside is taken back as soon as a record moves X or Y anyway, or at the end.
-    """
+    none). The step aside is taken back as soon as a record moves X or Y anyway, or at the end."""
     result = steps.copy()
     x_offset = 0
     for record, (x, y, z) in enumerate(steps.tolist()):
@@ -281,8 +279,7 @@ class _Plain(Struct, frozen=True, eq=False):
         """Return the records with waits, messages and end; `first` (N,) is the record of each row.
 
         A wait follows in T2 of the record before it. What exceeds T2, or comes before the first
-        record, goes into additional records that move nothing.
-        """
+        record, goes into additional records that move nothing."""
         if not len(self.steps):
             raise PostError(
                 "nothing moves by a whole step: there is no program to write",

@@ -2,8 +2,7 @@
 
 M1 and M2 (X and Y) are the low and the high half of P2, M3 (Z) the low half of P1 (L2125-2137,
 L4516-4518). A pulse is written first, then comes its delay. The first pulse of a motor is the
-first cell of its table, forward, or the last one, backward (Tablas III.5, III.6).
-"""
+first cell of its table, forward, or the last one, backward (Tablas III.5, III.6)."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 
 Nothing is taken before the key 13H (L4397-4426). Then each byte of a record is stored and answered
 (L4428-4463), and nothing moves until 45H ends the packet; when its records have been executed the
-controller says F, and takes the next packet or 54H, which it answers by A (L4343-4383).
-"""
+controller says F, and takes the next packet or 54H, which it answers by A (L4343-4383)."""
 
 from __future__ import annotations
 
@@ -53,8 +52,7 @@ class I8751TwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True,
     LISTO and OTRO. `motor_reply`: to the number of a motor, printed as B and as 8. `dwell_reply`:
     to the two bytes of a wait, B being the reply to a motor. `packet_end`: to 45H. `opening` of
     the line by somebody does "nothing", or a "reset". `homing`: at the "start" of its program, to
-    optos that stand at `origin_mm` on each axis, from where the power came on; or "none".
-    """
+    optos that stand at `origin_mm` on each axis, from where the power came on; or "none"."""
 
     key: Literal["once", "each-packet"] = "once"
     line_end: Literal["crlf", "cr", "lf", "none"] = "crlf"

@@ -5,8 +5,7 @@ is answered by LISTO, or by OTRO, and is then sent again (L4397-4426). Each byte
 answered by one character (L4428-4463), and each packet by F when it has been executed
 (L4343-4366). So nothing moves before all of a packet has been answered. A reply that is missing
 or another one ends the program; a wrong bit on the way to the machine is not seen, since replies
-do not repeat what came. `[dialect]` and `[link]` say what the thesis leaves open.
-"""
+do not repeat what came. `[dialect]` and `[link]` say what the thesis leaves open."""
 
 from __future__ import annotations
 

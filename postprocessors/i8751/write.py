@@ -18,8 +18,7 @@ The listing is what the operator of the second version types: distances in mm wi
 
 The hex dump shows every byte of the packets with its offset, its meaning and the expected reply:
 
-    0001  01 03 00 64              ; 1: X +100 steps (+1.250 mm) <- B M M M
-"""
+    0001  01 03 00 64              ; 1: X +100 steps (+1.250 mm) <- B M M M"""
 
 from __future__ import annotations
 

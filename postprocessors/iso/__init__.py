@@ -1,8 +1,7 @@
 """Any controller by data: a dialect of ISO 6983 that a machine file describes;
 docs/dialects/iso.md explains its keys, docs/controllers/path.md the model without a planner.
 
-`machines/` has the files of controllers that camtool knows.
-"""
+`machines/` has the files of controllers that camtool knows."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 reader would not take.
 
 Each complaint names the key and what to do. Templates are checked as texts first, then head, foot
-and events are read by the dialect's own reader.
-"""
+and events are read by the dialect's own reader."""
 
 from __future__ import annotations
 

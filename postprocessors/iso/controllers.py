@@ -28,8 +28,7 @@ class KlipperController(SlideStart, frozen=True, tag_field="model", tag="klipper
     `max_z_velocity_mm_s`, `max_z_accel_mm_s2`: those of all axes where they are left out.
     `square_corner_velocity_mm_s`: the speed at which it takes a corner of 90°.
     `minimum_cruise_ratio`: the part of a short move that must be cruised. `arc_resolution_mm`:
-    length of the chords.
-    """
+    length of the chords."""
 
     max_velocity_mm_s: Speed
     max_accel_mm_s2: Acceleration
@@ -49,8 +48,7 @@ class MarlinController(SlideStart, frozen=True, tag_field="model", tag="marlin")
     JD_HANDLE_SMALL_SEGMENTS. `mm_per_arc_segment`, `min_arc_segments`, `arc_correction`,
     `min_steps` and `buffer_blocks`: MM_PER_ARC_SEGMENT, MIN_ARC_SEGMENTS, N_ARC_CORRECTION,
     MIN_STEPS_PER_SEGMENT, BLOCK_BUFFER_SIZE. `min_step_hz`: MINIMAL_STEP_RATE.
-    `min_segment_ms`: M205 B of a firmware with SLOWDOWN, 0 without.
-    """
+    `min_segment_ms`: M205 B of a firmware with SLOWDOWN, 0 without."""
 
     travel_acceleration_mm_s2: Acceleration
     junction_deviation_mm: Slack = 0.013

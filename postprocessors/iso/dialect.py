@@ -2,8 +2,7 @@
 reader share.
 
 A *template* is a text with fields in braces, such as `S{rpm} M3`: the writer fills the fields in,
-the reader finds their values. docs/dialects/iso.md has each key with an example.
-"""
+the reader finds their values. docs/dialects/iso.md has each key with an example."""
 
 from __future__ import annotations
 
@@ -37,8 +36,7 @@ class WordFormat(Struct, frozen=True, forbid_unknown_fields=True):
     "always", "needed" (never where no decimals follow), or "never" at all. `whole_letters`: the
     letters whose numbers without a point count units of the last decimal. `code_digits`: G1 or
     G01. `blanks` between words; `motion`, `coordinates` and `feed`: whether these words are
-    written when they "change", or in "all" blocks.
-    """
+    written when they "change", or in "all" blocks."""
 
     decimals: Decimals = 3
     inch_decimals: Decimals = 4
@@ -75,8 +73,7 @@ class CommentFormat(Struct, frozen=True, forbid_unknown_fields=True):
 
     `style` of those that are written; `reads`: other styles that the controller takes as well;
     `show` as for the other dialects of G-code; `max_chars` of a text; `upper_case` makes capitals
-    of small letters; `characters` beyond letters, digits and blanks that may stand in one.
-    """
+    of small letters; `characters` beyond letters, digits and blanks that may stand in one."""
 
     style: Literal["parentheses", "semicolon", "none"] = "parentheses"
     reads: tuple[CommentStyle, ...] = ()
@@ -99,8 +96,7 @@ class ProgramFormat(Struct, frozen=True, forbid_unknown_fields=True):
     {units} is G21 or G20 and {feeds} G94, G95 or G93; `foot`: blocks at the end, of which the last
     one is `end`, or "" where a program ends with its last line; `retract`: up to the highest Z
     before that if the tool is left in the material. `never`: codes that must not appear;
-    `passed_over`: codes that the reader takes and that move nothing.
-    """
+    `passed_over`: codes that the reader takes and that move nothing."""
 
     units: Literal["mm", "in"] = "mm"
     frame: Annotated[str, Meta(pattern="^%?$")] = ""
@@ -130,8 +126,7 @@ class ArcFormat(Struct, frozen=True, forbid_unknown_fields=True):
     "radius" (R), or "chords": no arcs at all. `full_circles` as one arc ("whole") or as two;
     `helices`: arcs may change Z; `max_sweep_deg`: longer arcs are written as equal parts (left
     out: 360, and 120 where `form` is "radius"); `min_radius_mm` and `max_radius_mm`: others are
-    written as lines; `difference_mm`: the radii at start and end may differ by so much.
-    """
+    written as lines; `difference_mm`: the radii at start and end may differ by so much."""
 
     form: Literal["offsets", "centre", "radius", "chords"] = "offsets"
     full_circles: Literal["whole", "halves"] = "whole"
@@ -161,8 +156,7 @@ class EventFormat(Struct, frozen=True, forbid_unknown_fields=True):
     which is 255 there; `rpm_decimals` of {rpm}; `dwell` {s} or {ms}; `tool_change` {tool};
     `message` {text}, "" for a plain comment. `first_tool`: whether the tool of the first cut is
     changed to by the program, or mounted before it ("by-hand"); `mount_messages`: the operator is
-    told what to mount at each change.
-    """
+    told what to mount at each change."""
 
     rpm_decimals: Annotated[int, Meta(ge=0, le=3)] = 3
     spindle_cw: Templates = ("S{rpm} M3",)

@@ -15,8 +15,7 @@ and in 64-bit floats as there:
    faster than with a lower acceleration a (1 − `minimum_cruise_ratio`): `mcr` below.
 
 Each motor steps where its axis passes the middle between two steps. Times of steps are sent within
-25 µs; they are exact here.
-"""
+25 µs; they are exact here."""
 
 from __future__ import annotations
 
@@ -100,8 +99,7 @@ def look_ahead(
     of each of K moves between two stops.
 
     Moves enter a queue one by one. As soon as the queue holds enough time, its first moves are
-    planned with what is known until then.
-    """
+    planned with what is known until then."""
     deviation, ratio = _junction_deviation_mm(controller), 1.0 - controller.minimum_cruise_ratio
     delta = 2.0 * length * acceleration
     mcr_delta = np.minimum(2.0 * length * controller.max_accel_mm_s2 * ratio, delta)
@@ -144,8 +142,7 @@ class _Queue:
 
         A move cannot accelerate where the speed at its start is limited only by what the moves
         behind it can brake: such moves wait for the peak of an earlier one. `mcr`: the same plan
-        with the lower acceleration of the minimum cruise ratio, which bounds the peaks.
-        """
+        with the lower acceleration of the minimum cruise ratio, which bounds the peaks."""
         plan = list[tuple[float, float, float]]()
         next_start = next_mcr = peak = 0.0
         pending, end = 0, high

@@ -1,8 +1,7 @@
 """Reading: the lines of a program as a machine file says them, and its templates as patterns.
 
 A *block* is a line with something besides comments, a block number, % and the number of the
-program. Its text keeps the columns of the file's own line: what is left out became blanks.
-"""
+program. Its text keeps the columns of the file's own line: what is left out became blanks."""
 
 from __future__ import annotations
 

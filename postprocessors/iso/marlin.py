@@ -16,8 +16,7 @@ src/module/planner.cpp (`_populate_block`, `reverse_pass`, `forward_pass`,
 6. A trapezoid in whole steps, no slower than `min_step_hz` at its ends.
 
 Computed in 64-bit floats where Marlin has 32: a target within a hundredth of a step of the middle
-between two may go to the other one.
-"""
+between two may go to the other one."""
 
 from __future__ import annotations
 
@@ -212,8 +211,7 @@ def jerk_corners(unit: Floats, speed: Floats, jerk_mm_s: tuple[float, float, flo
 
     The corner is passed at the lower speed of both moves, times the factor by which no axis
     changes its speed by more than its jerk; or at the safe speeds of both, at which the machine
-    may stop and start at once, where those are higher.
-    """
+    may stop and start at once, where those are higher."""
     jerk = np.array(jerk_mm_s)
     own = np.abs(unit) * speed[:, None]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -251,8 +249,7 @@ class _Rates(Struct, frozen=True, eq=False):
 
         The stepper times each step by the rate reached before it, the first two by the rate of the
         start. So a ramp from a low rate takes longer than its integral, and one to a low rate
-        shorter. The `EXACT` slowest steps of each ramp are added up one by one.
-        """
+        shorter. The `EXACT` slowest steps of each ramp are added up one by one."""
         waits = np.minimum(self.up, self.events - 1.0)
         seconds, spent, peak = 1.0 / self.first, np.zeros(len(self.first)), self.first
         for step in range(EXACT):

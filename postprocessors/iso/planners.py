@@ -8,8 +8,7 @@ is a file of its own in this folder with its model, a record in `controllers.py`
     "marlin": Planner(MarlinController, "timed", _marlin)
 
 where `_marlin` imports the file and returns its `ControllerModel`. The exact path (`model =
-"path"`) is always there; it knows no times of acceleration.
-"""
+"path"`) is always there; it knows no times of acceleration."""
 
 from __future__ import annotations
 

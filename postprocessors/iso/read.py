@@ -5,8 +5,7 @@ rows of words, and mean what ISO 6983 and its relatives agree on; a word that ne
 part nor the file knows is an error with its column.
 
     lines   text to blocks, and templates as patterns
-    cycles  holes
-"""
+    cycles  holes"""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """What a sample program of a controller shows of its dialect, as keys of a machine file; what it
 leaves open becomes a question with a default.
 
-Nothing is guessed silently: each value says what in the program shows it.
-"""
+Nothing is guessed silently: each value says what in the program shows it."""
 
 from __future__ import annotations
 

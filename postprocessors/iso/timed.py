@@ -1,8 +1,7 @@
 """What the models of timed planners share: chords in place of arcs, samples, and trapezoids.
 
 A timed planner says how fast each of its moves may be, and how it meets the next one. The slides
-follow its moves, rounded to the nearest steps; acceleration changes times, not places.
-"""
+follow its moves, rounded to the nearest steps; acceleration changes times, not places."""
 
 from __future__ import annotations
 
@@ -142,8 +141,7 @@ def with_chords(path: Toolpath, counts: Ints, inner: Floats) -> tuple[Toolpath, 
     moves.
 
     `counts` (N,): the number of moves that each row becomes, at least 1; `inner` (M − N, 3) mm:
-    the ends of all but the last move of each row, in order.
-    """
+    the ends of all but the last move of each row, in order."""
     row = np.repeat(np.arange(len(path)), counts)
     end = path.end[row]
     is_inner = np.ones(len(row), dtype=np.bool_)

@@ -7,8 +7,7 @@ followed exactly, each a block with one acceleration.
 A corner between two directions with the angle 180° − θ is met at v² = v₉₀² (√2 − 1) s / (1 − s),
 s = cos(θ/2): at v₉₀ for θ = 90°, at any speed straight on, at rest straight back. That is a circle
 that touches both, at one distance from every corner and one acceleration. With v₉₀ = 0 it stops at
-every corner. An arc is no faster than √(a r).
-"""
+every corner. An arc is no faster than √(a r)."""
 
 from __future__ import annotations
 

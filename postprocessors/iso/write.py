@@ -3,8 +3,7 @@
     rows ──lowered──▶ what its arcs can say ──units──▶ words by columns, templates filled in
 
 A template's fields become numbers as the words of the dialect are written. Where a speed is not
-known, the words that have it are left out.
-"""
+known, the words that have it are left out."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Canonical calls to rows, as LinuxCNC's interpreter makes them.
 
 While the cutter's radius is compensated, the last move waits until the next one is known, and
-events wait behind it.
-"""
+events wait behind it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Comments that LinuxCNC obeys: `(debug,…)`, and others that show, log or stop.
 
 `#5` and `#<name>` in them are shown as numbers: with six decimals, or as `%d`, `%f` (four
-decimals) and `%.2f` ask from there on.
-"""
+decimals) and `%.2f` ask from there on."""
 
 from __future__ import annotations
 

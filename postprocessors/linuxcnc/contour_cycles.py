@@ -3,8 +3,7 @@
 
 The contour is the sub that Q names. It is turned and mirrored so that Z and X fall along it; there
 G71 cuts level by level in X, from the contour's first segment to where the level meets it again.
-G72 is G71 with both axes exchanged. Points are complex: Z + iX.
-"""
+G72 is G71 with both axes exchanged. Points are complex: Z + iX."""
 
 from __future__ import annotations
 

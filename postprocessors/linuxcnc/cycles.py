@@ -3,8 +3,7 @@ them (interp_cycles.cc, interp_convert.cc).
 
 A cycle goes over its hole at the height at which the series of cycles began, or at R; down to R as
 a rapid; drills; and comes back to R, or with G98 to the height. All of that stands in the plane of
-G17, G18 or G19, whose normal is the axis of the hole. Corners are met exactly.
-"""
+G17, G18 or G19, whose normal is the axis of the hole. Corners are met exactly."""
 
 from __future__ import annotations
 

@@ -75,8 +75,7 @@ class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxc
     `blend_tolerance_mm`. `servo_period_s`: SERVO_PERIOD of the ini file. `lookahead_moves`:
     ARC_BLEND_OPTIMIZATION_DEPTH, `kink_ratio`: ARC_BLEND_KINK_RATIO, the part of the highest
     acceleration that a bend may take up within one period and pass for straight (defaults of
-    initraj.cc).
-    """
+    initraj.cc)."""
 
     servo_period_s: Annotated[float, Meta(ge=1e-6, le=1.0)] = 0.001
     lookahead_moves: Annotated[int, Meta(ge=2, le=10_000)] = 50

@@ -4,8 +4,7 @@ A value is compiled once and evaluated as often as its line is executed: a plain
 all else a function of the parameters. Text is that of `lines.closed`: small letters, no blanks.
 Operators of one rank go from left to right, `**` too; the ranks are those of LinuxCNC
 (`precedence` in interp_internal.cc): `**`, then `* / mod`, `+ -`, comparisons, `and or xor`.
-Angles are in degrees; two numbers are `eq` when they differ by less than 0.0001.
-"""
+Angles are in degrees; two numbers are `eq` when they differ by less than 0.0001."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
     machine = R(p + axis offset) + origin + tool offset
 
 with p in the program, the axis offset of G92 and G52, the origin and the turn R of a work frame.
-Frames and homes are stored in parameters, in the units of the machine.
-"""
+Frames and homes are stored in parameters, in the units of the machine."""
 
 from __future__ import annotations
 

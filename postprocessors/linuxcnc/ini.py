@@ -3,8 +3,7 @@
 Keys and units are those of its manual, "INI Configuration": lengths in LINEAR_UNITS of [TRAJ],
 velocities in these a second. Axes have their limits in [AXIS_X] and so on; what is a motor's, its
 steps and its backlash, stands in the [JOINT_n] that the kinematics give to the axis: `trivkins`
-gives joint 0 to the first letter of its `coordinates`, and so on. Other kinematics are refused.
-"""
+gives joint 0 to the first letter of its `coordinates`, and so on. Other kinematics are refused."""
 
 from __future__ import annotations
 

@@ -5,8 +5,7 @@ is executed.
     block = line.block(given)     its words with their numbers, in modal groups
 
 The expressions of a line are compiled by `expressions`, where it has any. A line that begins with
-an O word (or M98, M99) is flow's own, and none of these words.
-"""
+an O word (or M98, M99) is flow's own, and none of these words."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@ expressions ask for them (`#<_feed>`).
 
 LinuxCNC writes a block of the modes that differ and executes it, so that a feed comes back with
 one decimal and a speed with none (gen_settings, interp_convert.cc). M73 brings them back when its
-sub ends.
-"""
+sub ends."""
 
 from __future__ import annotations
 

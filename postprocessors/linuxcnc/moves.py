@@ -1,8 +1,7 @@
 """The moves of a block: straight ones, arcs, splines, and the way home.
 
 Cycles, threads and cutter compensation have files of their own, which only programs load that use
-them.
-"""
+them."""
 
 from __future__ import annotations
 

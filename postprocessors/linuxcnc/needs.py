@@ -1,6 +1,5 @@
 """Needs of the words of a block: its motion, and a use for each of its words (enhance_block,
-check_g_codes and check_other_codes of LinuxCNC).
-"""
+check_g_codes and check_other_codes of LinuxCNC)."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@ the state of the interpreter.
 
 A numbered parameter that nobody has set is 0 (those of 31 to 5000 may be stored on the machine); a
 named one is an error. What only the machine knows has no value here: results of probing, inputs,
-values of the INI file and of HAL.
-"""
+values of the INI file and of HAL."""
 
 from __future__ import annotations
 
@@ -40,8 +39,7 @@ class Parameters:
     interpreter's state.
 
     `unset`: the numbers that were read before anybody set them, and where; `known`: numbers with
-    a value from the beginning on.
-    """
+    a value from the beginning on."""
 
     def __init__(
         self,

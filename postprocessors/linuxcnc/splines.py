@@ -2,8 +2,7 @@
 
 A spline is a NURBS with a clamped uniform knot vector; G5 and G5.1 are one of order 4 and 3 with
 as many control points. LinuxCNC divides it into four pieces for each control point, by its
-parameter, and puts two arcs with its tangents on each (NURBS_FEED and biarc, emccanon.cc).
-"""
+parameter, and puts two arcs with its tangents on each (NURBS_FEED and biarc, emccanon.cc)."""
 
 from __future__ import annotations
 
@@ -91,8 +90,7 @@ def _two_arcs(
     (unit vectors), and have a common tangent where they meet.
 
     The legs of both tangent polygons are of one length b, where the polygon's middle leg is 2b: |v
-    + b (s + e)| = 2b for v from the end to the start, a quadratic equation for b.
-    """
+    + b (s + e)| = 2b for v from the end to the start, a quadratic equation for b."""
     vx, vy = start[0] - end[0], start[1] - end[1]
     c = vx * vx + vy * vy
     b = 2.0 * (vx * (start_direction[0] + arriving[0]) + vy * (start_direction[1] + arriving[1]))

@@ -1,7 +1,6 @@
 """The state of the interpreter: the modes in force, the position, the tools, and what was noted.
 
-Numbers are in the units of the program, as LinuxCNC has them; `Canon` makes rows in mm of them.
-"""
+Numbers are in the units of the program, as LinuxCNC has them; `Canon` makes rows in mm of them."""
 
 from __future__ import annotations
 

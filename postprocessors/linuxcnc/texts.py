@@ -1,8 +1,7 @@
 """The texts of a program: its own file, and those of the subs that it calls, by lines.
 
 LinuxCNC looks for `o<name> call` in the folder of the program: `name.ngc`. Nothing outside of that
-folder is opened.
-"""
+folder is opened."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
 Lines of text come in and are answered one by one. A program is a file, which is read by the
 target's own reader and run by its model as a whole; what is asked about it (line, place, state)
 follows from how much of the motion is over. Nothing moves before it is switched on, enabled and
-homed.
-"""
+homed."""
 
 from __future__ import annotations
 

@@ -7,8 +7,7 @@ may be the line that is read, which is ahead of the motion, since the line of th
 still stands there: so a block is done for certain only when the simulated time allows it too.
 
 A conversation is written as it is held: generators, which yield a request and are sent its answer,
-or yield how long to wait.
-"""
+or yield how long to wait."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 or as the serial stream.
 
 docs/dialects/matlab-router.md explains the format, its contradictions and what was chosen;
-docs/controllers/matlab-router.md what the controller does with it.
-"""
+docs/controllers/matlab-router.md what the controller does with it."""
 
 from __future__ import annotations
 

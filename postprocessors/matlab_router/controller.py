@@ -11,8 +11,7 @@ What the machine does with the rows of a toolpath:
    the motors still coast then, and are sampled on until the next line begins.
 
 A sample is the place of all motors at a tick of 5 ms. `docs/controllers/matlab-router.md` has the
-sources, and what is inferred.
-"""
+sources, and what is inferred."""
 
 from __future__ import annotations
 
@@ -350,8 +349,7 @@ def lines_of(path: Toolpath, rows: int, machine: _Machine) -> MasterOrders:
     """Return the orders for the first `rows` rows of a quantised toolpath.
 
     Raises ProgramError for a line without a feed above 0, a dwell without its seconds, and part
-    zero set anew away from part zero.
-    """
+    zero set anew away from part zero."""
     _check(path, rows)
     router = machine.controller
     way_mm = (path.end - path.starts)[:rows] * SIGNS if rows else np.zeros((0, 3))

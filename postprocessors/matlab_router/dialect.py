@@ -1,8 +1,7 @@
 """The keys of `[dialect]` and `[controller]` of a matlab-router machine.
 
 The thesis's text, its listing and what is safe to send differ; `profile` chooses between them as
-a whole, and each option of its own overrides its profile. `Lnnnn` are lines of the thesis.
-"""
+a whole, and each option of its own overrides its profile. `Lnnnn` are lines of the thesis."""
 
 from __future__ import annotations
 
@@ -111,8 +110,7 @@ class ResolvedDialect(Struct, frozen=True):
     home (L3319-3321).
     `max_lines` of one job; `arc_tolerance_mm` chords of arcs; `bend_tolerance_mm` how far whole
     speeds may bend a line. `plunge_mm` down from home, at `plunge_mm_min`. `spindle_rpm` is what
-    the reader gives for the tool, which can only be switched.
-    """
+    the reader gives for the tool, which can only be switched."""
 
     profile: str
     format: str
@@ -160,8 +158,7 @@ class MatlabRouterController(SlideStart, frozen=True, tag_field="model", tag="ma
     `pause_s`: behind homing, the first point and the plunge; `turnaround_s` between two lines,
     and `start_lag_s` from X to Y: the master's I2C messages at 50 kHz (L4718-4929).
     `header_pause_s` and `number_pause_s`: behind each of a job's first three numbers and behind
-    the others (L4294-4360).
-    """
+    the others (L4294-4360)."""
 
     slaves: Literal["listing", "text"] = "listing"
     plant_gain: tuple[PlantGain, PlantGain, PlantGain] = (8.896, 5.599, 9.767)

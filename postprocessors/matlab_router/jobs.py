@@ -4,8 +4,7 @@ receiving one, checked as a whole; and the same for people.
 A number that would make a slave run away or never end is an error here, with its place, because
 no path could be given: the loop of the slaves runs `distance / 2 − 1` times in an unsigned int16
 (L5589-5729), so a distance of 1 (or a first point below 2) runs 65535 times, and a speed of 0
-never gets there.
-"""
+never gets there."""
 
 from __future__ import annotations
 

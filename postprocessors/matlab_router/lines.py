@@ -5,8 +5,7 @@ of two units and counts `distance / 2 − 1` of them downwards (L5589-5729), so 
 
 - a distance of 1 (and a first point at 0 or 1) makes it run away: never sent;
 - an odd distance loses its unit: vertices lie on a grid of two units unless asked otherwise;
-- a speed of 0 on a distance never ends: never sent.
-"""
+- a speed of 0 on a distance never ends: never sent."""
 
 from __future__ import annotations
 
@@ -94,8 +93,7 @@ def jobs_of(
 ) -> tuple[Jobs, LineChanges]:
     """Return the jobs and the counts of what was changed to make them.
 
-    PostError for what lies outside of the area or has a feed that cannot be written.
-    """
+    PostError for what lies outside of the area or has a feed that cannot be written."""
     maker = _Maker(toolpath, machine, dialect)
     lines = maker.lines(cuts)
     return Jobs(lines, maker.speeds(lines), maker.offsets(lines)), maker.changes

@@ -2,8 +2,7 @@
 
 Each job: home with Z, then X and Y; to the first point along X, then along Y; the plunge; the
 lines, one after the other, with a full stop at each vertex (L4718-4929). Going home is written as
-rapids to the place of home, so that other machines can follow.
-"""
+rapids to the place of home, so that other machines can follow."""
 
 from __future__ import annotations
 
@@ -125,8 +124,7 @@ class _Moves:
         """Add one row for each line at height `z`.
 
         Two rows, up to a kink and after it, where the axes do not arrive together and the path is
-        thereby off the straight line by more than the tolerance.
-        """
+        thereby off the straight line by more than the tolerance."""
         run = DrivenLines(result.points, np.abs(job.speed.T), self._dialect.bend_tolerance_mm)
         self._findings.bent.add(
             run.bent, run.most_bend * UNIT_MM, f"job {job.number}, line {run.first_bent + 1}"
@@ -194,8 +192,7 @@ class DrivenLines:
     A line becomes two rows when it bends by more than the tolerance, or when a speed is off by
     more than `MAX_SPEED_ERROR_COUNTS` from that of its distance: from the rows and the speed along
     them the speeds of the axes can be found again. `end` (m, 2) units, `speed` (m,) counts in 5 ms
-    of both axes together, `line` (m,) its index; `bent` counts the lines beyond the tolerance.
-    """
+    of both axes together, `line` (m,) its index; `bent` counts the lines beyond the tolerance."""
 
     def __init__(self, points: Ints, speed: Ints, tolerance_mm: float) -> None:
         travel = np.diff(points, axis=0).astype(np.float64)

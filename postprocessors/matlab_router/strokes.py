@@ -3,8 +3,7 @@ make them at all.
 
 A stroke is what is cut between one plunge and the next raise of the tool; each becomes a job of
 its own (L3938-3949). Everything above the stock is travel: the master goes home and to the first
-point of each job by itself. What it cannot do is a PostError that names the move.
-"""
+point of each job by itself. What it cannot do is a PostError that names the move."""
 
 from __future__ import annotations
 

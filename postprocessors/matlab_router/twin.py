@@ -3,8 +3,7 @@ docs/wires/matlab-router.md has it.
 
 Numbers come as characters and a carriage return, until a job is complete (L4668-4708). With its
 last number the machine goes home, to the first point and down, and runs the lines (L4718-4929).
-Then the master does nothing more until it is reset. It says nothing, but perhaps an echo.
-"""
+Then the master does nothing more until it is reset. It says nothing, but perhaps an echo."""
 
 from __future__ import annotations
 
@@ -50,8 +49,7 @@ class MatlabRouterTwinSettings(
 
     `echo`: the master sends back the characters that it takes, or "none". `reset`: it is reset
     when somebody opens the port and nothing moves (as a user's hand would), or, as a mended master
-    might be, by "itself" when a job is done; what has come meanwhile then waits in the cable.
-    """
+    might be, by "itself" when a job is done; what has come meanwhile then waits in the cable."""
 
     echo: Literal["none", "characters"] = "none"
     reset: Literal["opening", "itself"] = "opening"

@@ -4,8 +4,7 @@ Each number goes out in digits and a carriage return, with a pause behind it (L4
 is acknowledged: homing begins on the last number (L4668-4929), and nothing tells when a job is
 done, nor stops it. The master takes one job and must be reset for the next. Where it sends back
 what it takes, as the library of its compiler does, each number is compared before the next one
-goes out.
-"""
+goes out."""
 
 from __future__ import annotations
 

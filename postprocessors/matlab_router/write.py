@@ -4,8 +4,7 @@
 
 Nothing of a drawing's own text is ever written: a program holds numbers and camtool's words only.
 Blocks, for the map to the toolpath: each job has one for the move to its first point, then one for
-each line.
-"""
+each line."""
 
 from __future__ import annotations
 

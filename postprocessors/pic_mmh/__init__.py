@@ -1,8 +1,7 @@
 """The micro machine tool on a PIC18F8720: `G02X02969.00Y03400.00I03012.00...;`.
 
 docs/dialects/pic-mmh.md explains the format, its contradictions and what was chosen;
-docs/controllers/pic-mmh.md what the controller does with it.
-"""
+docs/controllers/pic-mmh.md what the controller does with it."""
 
 from __future__ import annotations
 

@@ -17,8 +17,7 @@ What the controller takes for the end of an arc is not documented (`controller.a
 its end without standing on it goes round again on the real machine, mostly for ever. Here its
 samples stop at the nearest approach to the end in the expected sweep, `ended` is False, and the
 next row goes on from the programmed end, without a reversal on the way there. An arc that starts
-at its centre has no samples and the same fate.
-"""
+at its centre has no samples and the same fate."""
 
 from __future__ import annotations
 
@@ -463,8 +462,7 @@ def compensations(toolpath: Toolpath, machine: Machine[Any, PicMmhDialect]) -> F
     back, wherever that is: so the motor stands where the controller counts, and errors do not add
     up. A row has one value: where an axis turns back in it and away again, the second turn gets
     that of the first. The value is NaN until the first turn away: the controller still has the
-    last value of the program before. MachineError without regions.
-    """
+    last value of the program before. MachineError without regions."""
     controller, cells = machine.controller, machine.play_map.used
     if not any(cells):
         raise MachineError(
@@ -575,8 +573,7 @@ def arc_reach(arc: StepArc, fill: Filler) -> tuple[int, bool]:
 
     When it is not met in the expected sweep and a quadrant more, return the number until the
     nearest approach to the end there, and False: the controller then goes round at least once
-    more, if it ever stops. `fill` must be fresh. Time and memory are bounded.
-    """
+    more, if it ever stops. `fill` must be fresh. Time and memory are bounded."""
     expected = expected_quadrants(arc.x, arc.y, arc.clockwise, arc.end_x, arc.end_y)
     low, high = expected - 1, expected + 1
     end = np.array([arc.end_x, arc.end_y], dtype=np.int64)

@@ -15,8 +15,7 @@ class PicMmhDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     `form` "example": `X02969.00`, sign only when negative (L1731); "annex": `X+02969` (L3284).
     `buffer_chars`: characters that the controller's buffer takes, `;` included; None: as many as
-    the form's blocks have. The thesis's vector holds 35 (L1740-1742), its sample block has 43.
-    """
+    the form's blocks have. The thesis's vector holds 35 (L1740-1742), its sample block has 43."""
 
     form: Literal["example", "annex"] = "example"
     buffer_chars: Count | None = None
@@ -31,8 +30,7 @@ class PicMmhController(SlideStart, frozen=True, tag_field="model", tag="pic-mmh"
 
     `arc_end`: how an arc knows its end, see `steps`. `compensation`: the sender sets it once
     ("everywhere"), or between blocks, to the play of the region in which the axis turns away from
-    `start_direction` ("by-region"; the thesis's own proposal, L3243-3249).
-    """
+    `start_direction` ("by-region"; the thesis's own proposal, L3243-3249)."""
 
     arcs: Interpolator = "dsm"
     arc_end: ArcEnd = "final-quadrant"

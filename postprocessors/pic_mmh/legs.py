@@ -1,8 +1,7 @@
 """A whole program of the PIC controller as legs, in columns, for the compiled run that judges.
 
 The controller goes on from the end that each row gave it, whatever became of the row; so where
-every leg begins is known before any is run.
-"""
+every leg begins is known before any is run."""
 
 from __future__ import annotations
 
@@ -125,7 +124,6 @@ class FusedLegs:
     def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
         """Run the rows low:high, which follow those run before, and judge them; return their
         ledger."""
-
         method, rounded, by_event, step_mm = self._how
         legs = self._course.legs(low, high)
         counts = np.zeros((len(legs), loops.COUNT_COLUMNS), dtype=np.int64)

@@ -5,8 +5,7 @@ the move, its source and the value.
 
 A *unit* is the finest difference that the form can represent: 0.01 µm in the example form, 1 µm in
 the annex form. A position is kept twice, as whole units (what is sent) and as whole steps (where
-the controller then stands):  steps = round(units · unit / step), half away from zero.
-"""
+the controller then stands):  steps = round(units · unit / step), half away from zero."""
 
 from __future__ import annotations
 
@@ -81,8 +80,7 @@ class UnitGrid(Struct, frozen=True):
         """Return values (mm, any shape) as whole units; they must fit.
 
         A value half-way between two steps is written one unit farther from zero: it means the same
-        step, but no longer depends on the last bit of the controller's division.
-        """
+        step, but no longer depends on the last bit of the controller's division."""
         scaled = values_mm * self.units_per_mm
         units = (np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64)
         in_steps = np.abs(units) / (self.units_per_mm * self.step_mm)
@@ -106,8 +104,7 @@ class Numbers(Struct, frozen=True, eq=False):
     the feed word.
 
     `centre_*` are (0, 0) and `feed_units` 0 where the row has none; a centre that cannot be
-    written is none (`far_arcs`).
-    """
+    written is none (`far_arcs`)."""
 
     grids: tuple[UnitGrid, UnitGrid, UnitGrid]
     end_units: Ints
@@ -121,8 +118,7 @@ class Numbers(Struct, frozen=True, eq=False):
 def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: PicMmhDialect) -> Numbers:
     """Convert a toolpath to the integers of the program: units of the format, steps and feeds.
 
-    Raises PostError for the first that the format cannot hold or the machine cannot do.
-    """
+    Raises PostError for the first that the format cannot hold or the machine cannot do."""
     x, y, z = (UnitGrid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     grids = (x, y, z)
     _check_coordinates(toolpath, grids)
@@ -203,8 +199,7 @@ def _feed_units(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[Ints, Findi
     and FEED_ROUNDED if a feed was rounded down to that unit, else None.
 
     The link carries one report per step and so bounds the step rate, feed / (60 · step)
-    (L3196-3199); F00 would make the controller divide by 0.
-    """
+    (L3196-3199); F00 would make the controller divide by 0."""
     unit = machine.feed.unit_mm_min
     max_units = min(MAX_FEED_UNITS, math.floor(machine.max_feed_mm_min / unit + UNIT_TOLERANCE))
     mend = f"the highest feed is {max_units * unit:g} mm/min, the lowest {unit:g} mm/min"
@@ -241,8 +236,7 @@ def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
     rounded.
 
     Dwells are whole seconds of two digits (L3359-3366), rounded up and split; spindle speeds have
-    four digits (L3418-3426), tools two (L3455-3464).
-    """
+    four digits (L3418-3426), tools two (L3455-3464)."""
     kind, value = Kind(int(toolpath.kind[row])), float(toolpath.value[row])
     if kind == Kind.SPINDLE_OFF:
         return ["M05;"], False

@@ -3,8 +3,7 @@
 
 A program is cut at `;`; line ends and blanks between blocks are passed over. The first characters
 choose the pattern that the whole block must match (`patterns`); only a block that does
-not is walked word by word, to find where it goes wrong.
-"""
+not is walked word by word, to find where it goes wrong."""
 
 from __future__ import annotations
 
@@ -305,8 +304,7 @@ def patterns(form: str) -> Patterns:
     """Return for each code its possible shapes: their letters ("XYF") and the pattern of the text
     behind the code.
 
-    A coordinate has two groups, digits before and after the point; other values have one.
-    """
+    A coordinate has two groups, digits before and after the point; other values have one."""
     return {
         code: tuple(
             (

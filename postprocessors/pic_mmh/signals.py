@@ -1,8 +1,7 @@
 """The phases of the PIC18F8720's motors: two lines each on port D, four states (annex A.3).
 
 The byte is written first, then the loop waits for its period: an output begins it. X goes
-backwards through its states for positive moves, and Y forwards (L3532-3599, A.5).
-"""
+backwards through its states for positive moves, and Y forwards (L3532-3599, A.5)."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
 Characters go into the vector until `;`, the string goes back, and what can be deciphered is done
 (L1592-1615, L1735-1770). Each step is reported by a byte; a character that comes in while
 something moves stops it, and is received (L1789-1807). What cannot be deciphered is passed over in
-silence (L1755-1757, L1769-1770).
-"""
+silence (L1755-1757, L1769-1770)."""
 
 from __future__ import annotations
 
@@ -54,8 +53,7 @@ class PicMmhTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True
     negative sense), or "none". `compensation`: whether the steps of a compensation are "reported"
     as well or "silent". `overflow`: a string that is longer than the buffer is "lost" or "kept".
     `interruption`: the character that stops a motion is "kept" as the first of a string, or
-    "lost".
-    """
+    "lost"."""
 
     echo: Literal["string", "character", "none"] = "string"
     step_byte: Literal["bits", "letters", "none"] = "bits"

@@ -4,8 +4,7 @@ A block goes out whole and comes back (L1592-1596, L1670-1673); what comes back 
 it is executed, and each output of steps reports a byte; any character that comes meanwhile stops
 the machine (L1789-1807), so nothing is written until the block is over: when as many reports have
 come as the simulation makes outputs, and its time is over. The controller says neither "done" nor
-"wrong". `[link]` says what its thesis leaves open.
-"""
+"wrong". `[link]` says what its thesis leaves open."""
 
 from __future__ import annotations
 

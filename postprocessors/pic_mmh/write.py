@@ -6,8 +6,7 @@ Everything that can be refused by its numbers alone is refused before the first 
 (`numbers.py`). A row begins at the step where the row before it ended, whatever blocks that took;
 so every arc is planned from there by itself (`land` in `steps.pyx`), and ends where the next row
 begins. A point is where one block may bring the tool: a block is sent only when it moves the
-controller's own step position.
-"""
+controller's own step position."""
 
 from __future__ import annotations
 
@@ -484,8 +483,7 @@ def chord_ends(start: Floats, centre: Floats, sweep_rad: Floats, sagitta_mm: flo
     """Return the fewest equal chords within `sagitta_mm` of each arc.
 
     `start`, `centre` (J, 2) mm; signed sweeps (J,). A chord over the angle a deviates by R (1 −
-    cos(a/2)); no chord turns by more than a right angle.
-    """
+    cos(a/2)); no chord turns by more than a right angle."""
     arms = start - centre
     radius = np.hypot(arms[:, 0], arms[:, 1])
     with np.errstate(divide="ignore"):

@@ -1,8 +1,7 @@
 """The home-made CNC on a PIC18F4550: `G01 X1.2500 Y0.0000 Z-0.1250`.
 
 docs/dialects/valcnc.md explains the format, its contradictions and what was chosen;
-docs/controllers/valcnc.md what the controller does with it.
-"""
+docs/controllers/valcnc.md what the controller does with it."""
 
 from __future__ import annotations
 

@@ -12,8 +12,7 @@ What it does with a row of the toolpath:
    `steps`. It ends where its angle leads, and the next row begins there.
 4. Every pass takes one delay of 166.667 µs (L1336): there are no ramps, feeds or faster rapids.
 
-It issues nothing at reversals; compensation in a machine file would be steps at the same rate.
-"""
+It issues nothing at reversals; compensation in a machine file would be steps at the same rate."""
 
 from __future__ import annotations
 
@@ -80,8 +79,7 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
         """Return the toolpath with ends on whole steps, and with the centres of arcs equally far
         from both ends.
 
-        ProgramError for what the controller cannot follow.
-        """
+        ProgramError for what the controller cannot follow."""
         pieces = _Pieces(toolpath, machine)
         if machine.controller.rounding == "nearest":
             return round_to_steps(toolpath, machine)
@@ -215,8 +213,7 @@ class _Pieces:
         """Return (J, 5) the values of `arc_angles` for each arc among the first `count` rows.
 
         Raises ProgramError for an arc about its own start, or with a chord longer than its
-        diameter.
-        """
+        diameter."""
         if not len(self._arc_rows):
             return np.zeros((0, 5))
         angles = np.zeros((count, 5))

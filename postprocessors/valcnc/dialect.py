@@ -29,8 +29,7 @@ class ValcncDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     a block may have; `max_sweep_deg`: longer arcs are written as equal parts; `full_circles` as
     the reader takes an arc that ends where it starts; `missing_words`: what a block without X, Y
     or Z means there; `z_order` when one moves Z along with X or Y; `arc_spread_mm`: the radii at
-    an arc's start and end may differ by this much.
-    """
+    an arc's start and end may differ by this much."""
 
     coord_scale: Scale
     nominal_step_mm: Step
@@ -53,8 +52,7 @@ class ValcncController(SlideStart, frozen=True, tag_field="model", tag="valcnc")
     flotante ... convertido en una cantidad de pasos", L1226). Arcs: how long a piece of them is
     drawn as one line ("se divide el ángulo α en pequeños tramos", by "la longitud de su arco",
     L1330), or how many lines every arc has, where `arc_segments` says it; `arc_end`: whether the
-    last one ends where the sum of the angles leads (L1330) or at the end that was programmed.
-    """
+    last one ends where the sum of the angles leads (L1330) or at the end that was programmed."""
 
     step_rate_hz: Rate = 6000.0
     rounding: Literal["nearest", "truncated"] = "nearest"

@@ -3,8 +3,7 @@ the block, wherever they stand (L1179, L1222-1226).
 
 What the thesis does not describe (a missing word, Z along with X, a full
 circle, an arc whose chord exceeds its diameter) is an error with block, line and column, unless an
-option of `[dialect]` defines what happens.
-"""
+option of `[dialect]` defines what happens."""
 
 from __future__ import annotations
 
@@ -125,8 +124,7 @@ class _Reader:
         It stops at the first block for which `block` might return something else. A block is sure
         if it has all words of a line or an arc in their order and does not move Z together with X
         or Y, and if the ends of its arc are equally far from the centre, and nearer to each other
-        than `NEARLY_DIAMETER`.
-        """
+        than `NEARLY_DIAMETER`."""
         numbers, form = blocks.numbers, blocks.facts[:, words.FORM]
         line, arc = form == form_of("GXYZ"), form == form_of("GXYZIJ")
         kind = np.where(line | arc, numbers[:, words.G_WORD], 0.0).astype(np.int64)

@@ -1,7 +1,6 @@
 """The lines of ValCNC's drivers: a step and a direction each (Tabla 9, L1342-1356).
 
-A pass of its loop sets the step lines, waits 166.667 µs and resets them (L1336).
-"""
+A pass of its loop sets the step lines, waits 166.667 µs and resets them (L1336)."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 
 Characters go into a line until a line feed; blanks and wrong characters are dropped on the way
 (L1179). The line is a block, which is then drawn step by step (L1222-1336). Whatever cannot be
-decoded is passed over in silence: the thesis describes no message and no answer.
-"""
+decoded is passed over in silence: the thesis describes no message and no answer."""
 
 from __future__ import annotations
 
@@ -39,8 +38,7 @@ class ValcncTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True
 
     `busy`: what comes in while a block is drawn is "lost", since nothing receives it, or "kept"
     until it is done. `wrong`: a wrong character is "dropped" alone, or spoils its "block".
-    `answer`: what it says when a block is done.
-    """
+    `answer`: what it says when a block is done."""
 
     busy: Literal["lost", "kept"] = "lost"
     wrong: Literal["dropped", "block"] = "dropped"

@@ -4,8 +4,7 @@
 no error is documented; the only pace of the PC's own program is its animation. So a block goes out
 when the one before must be over, and a stop or a pause can only leave out what comes next. Of 128
 characters and more a block is lost; that a block ends with a line feed is inferred from `C`. Where
-`[link]` names an answer, it is waited for as well.
-"""
+`[link]` names an answer, it is waited for as well."""
 
 from __future__ import annotations
 

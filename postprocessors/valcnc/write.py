@@ -4,8 +4,7 @@
 
 Lengths are scaled before they are rounded, so arcs are made consistent in the very numbers that
 the controller computes with. On axes of unequal steps a circle would be an ellipse in those
-numbers: there arcs become lines.
-"""
+numbers: there arcs become lines."""
 
 from __future__ import annotations
 

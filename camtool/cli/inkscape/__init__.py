@@ -28,8 +28,7 @@ def inkscape(out: str | None, quiet: bool, verbose: bool) -> int:
     """Install two entries into Inkscape (1.0 or later), which call this camtool.
 
     "Save as… Verified program of a machine" writes a program, "Extensions > CAM > Check the cut"
-    says what would be cut. Run it again after camtool has moved.
-    """
+    says what would be cut. Run it again after camtool has moved."""
     folder = Path(out) if out is not None else _user_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,6 @@
 """Inkscape: say in a dialog what a machine would cut of the drawing, and how far off.
 
-The drawing on stdout is the one that came: an effect gives back what stays on the canvas.
-"""
+The drawing on stdout is the one that came: an effect gives back what stays on the canvas."""
 
 from __future__ import annotations
 

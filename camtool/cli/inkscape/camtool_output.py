@@ -2,8 +2,7 @@
 
 Inkscape runs this file with its own Python, which need not have camtool nor any library: it calls
 the command. It gives a drawing as the last word, takes the program from stdout, and shows what is
-on stderr in a dialog (inkscape.gitlab.io/extensions, "Output extensions").
-"""
+on stderr in a dialog (inkscape.gitlab.io/extensions, "Output extensions")."""
 
 from __future__ import annotations
 
@@ -42,8 +41,7 @@ def post(options: Namespace, output: str, *more: str) -> tuple[bytes, list[str]]
     """Run `camtool post` for the drawing, in its folder; return its stdout and its messages.
     Raises Refusal with the errors.
 
-    Machine and job come from the folder: its `camtool.toml`, and `part.toml` for `part.svg`.
-    """
+    Machine and job come from the folder: its `camtool.toml`, and `part.toml` for `part.svg`."""
     document = Path(os.environ.get("DOCUMENT_PATH", ""))
     folder = document.parent if document.is_absolute() else Path.home()
     try:

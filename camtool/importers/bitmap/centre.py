@@ -6,8 +6,7 @@
 
 Thinning takes pixels away from all sides alike, so that what remains lies in the middle, within a
 pixel, and hangs together as the picture does. At the end of a stroke the line ends up to half the
-width of the stroke before it: a tool as wide as the stroke covers it.
-"""
+width of the stroke before it: a tool as wide as the stroke covers it."""
 
 from __future__ import annotations
 
@@ -100,8 +99,7 @@ class _Graph:
     """The pixels of thin lines, each linked to its neighbours.
 
     A pixel is linked to neighbours in its row and column, and to diagonal ones that no such
-    neighbour connects to it.
-    """
+    neighbour connects to it."""
 
     def __init__(self, thin: Bools, dark: Bools) -> None:
         self.dark = np.pad(dark, 1)
@@ -127,8 +125,7 @@ class _Graph:
     def chains(self) -> list[list[Pixel]]:
         """Return the chains of linked pixels from one end or junction to the next, both included.
 
-        Closed chains without a junction come last; they begin and end at the same pixel.
-        """
+        Closed chains without a junction come last; they begin and end at the same pixel."""
         chains, used_links = [], set[tuple[Pixel, Pixel]]()
         visited = set[Pixel]()
         for begin, links in self.links.items():
@@ -182,8 +179,7 @@ def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
     """Return the centre lines of the strokes, and the number of dots that are left out since they
     have no length.
 
-    A line is its points (n, 2) in pixels (frame as in `outline`), and True if it is closed.
-    """
+    A line is its points (n, 2) in pixels (frame as in `outline`), and True if it is closed."""
     graph = _Graph(thin(dark), dark)
     _prune(graph)
     dots = sum(1 for links in graph.links.values() if not links)
@@ -277,8 +273,7 @@ def _pair_straightest(
 ) -> dict[tuple[int, bool], tuple[int, bool]]:
     """Return the pairs of chain ends that continue each other at a junction, both ways round.
 
-    The pair with the smallest turn is made first; each end is in one pair at most.
-    """
+    The pair with the smallest turn is made first; each end is in one pair at most."""
     headings = []
     for chain, last in arms:
         path = chains[chain][::-1] if last else chains[chain]

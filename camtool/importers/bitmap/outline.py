@@ -6,8 +6,7 @@ drawn with smooth edges, or photographed, is found to a small part of a pixel, o
 white alone in the middle between two pixels. Where four pixels meet crosswise their mean decides.
 
 Lines are closed, do not cross, and have what is dark on their left. Beyond the picture it is
-light. Units are pixels, x to the right from its left edge, y upwards from its lower edge.
-"""
+light. Units are pixels, x to the right from its left edge, y upwards from its lower edge."""
 
 from __future__ import annotations
 
@@ -87,8 +86,7 @@ def _directed(field: Ink, dark: Bools, level: float) -> tuple[Ints, Ints]:
     pixels.
 
     Sides are numbered: first those between neighbours in a row, then those between neighbours in a
-    column.
-    """
+    column."""
     width = field.shape[1]
     corners = [dark[:-1, :-1], dark[:-1, 1:], dark[1:, 1:], dark[1:, :-1]]
     code = np.zeros(corners[0].shape, dtype=np.uint8)

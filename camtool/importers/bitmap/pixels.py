@@ -2,8 +2,7 @@
 
 Pillow decodes them. Here is decided what a pixel is: colours by their luminance, also CMYK; what
 is transparent over white; 16 bits as they are; a camera held sideways as its EXIF says. The size
-is looked at before anything is decoded.
-"""
+is looked at before anything is decoded."""
 
 from __future__ import annotations
 

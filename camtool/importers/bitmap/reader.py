@@ -5,8 +5,7 @@
                               dark ──centre──┴──strokes──▶ centre lines
 
 How large a picture is must be said: its pixels have no size of their own, and what the file claims
-of it counts only where that is asked for.
-"""
+of it counts only where that is asked for."""
 
 from __future__ import annotations
 

@@ -8,8 +8,7 @@ Least squares over a run averages the stairs out: a straight edge of a drawing c
 wherever its stairs lie. Two lines, or arcs, meet where they cross, which restores corners that
 pixels have cut. Where what comes out is beyond the limit somewhere, a run is divided, at last into
 its points.
-Nothing here is random, and nothing depends on where the picture lies.
-"""
+Nothing here is random, and nothing depends on where the picture lies."""
 
 from __future__ import annotations
 
@@ -103,8 +102,7 @@ class PixelStrokes(Struct, frozen=True, eq=False):
     """Lines and arcs that stand for points.
 
     `vertices` (n, 3) x, y, bulge; of an open path the last one is its end. `off` (n, 2): the
-    largest and the rms distance of the points from the segment that leaves each vertex.
-    """
+    largest and the rms distance of the points from the segment that leaves each vertex."""
 
     vertices: Floats
     off: Floats
@@ -114,8 +112,7 @@ def strokes(points: Floats, limit: float, *, closed: bool) -> PixelStrokes:
     """Return lines and arcs within `limit` pixels of the points (n, 2).
 
     An open path keeps its ends, a closed one its area to a share of AREA_SHARE: for thin shapes
-    the limit is halved until it does.
-    """
+    the limit is halved until it does."""
     if not closed:
         return _chain_of_shapes(points, _runs(points, limit), limit, closed=False)
     circle = _circle(points)
@@ -236,8 +233,7 @@ def _arc(points: Floats) -> _Shape | None:
 def _best(points: Floats, limit: float) -> _Shape | None:
     """Return the line that fits the points within `limit`, else the arc that does, else None.
 
-    An arc is preferred where it fits clearly better and is not nearly straight.
-    """
+    An arc is preferred where it fits clearly better and is not nearly straight."""
     line = _line(points)
     if line.largest <= FLAT_SHARE * limit:
         return line
@@ -263,8 +259,7 @@ def _runs(points: Floats, limit: float) -> list[int]:
     """Return the indices at which runs begin, and the number of points at the end.
 
     A run is as long as one line or arc can follow; then the division between neighbours moves to
-    where the squared distances from both are least.
-    """
+    where the squared distances from both are least."""
     tolerance, ends = SEARCH_SHARE * limit, [0]
     while ends[-1] < len(points):
         ends.append(_reach(points, ends[-1], tolerance))
@@ -314,8 +309,7 @@ def _chain_of_shapes(
     """Return the chain of the lines and arcs of these runs, which meet where neighbours intersect.
 
     Where a shape does not follow its points between these intersections, it begins and ends at the
-    points between the runs instead.
-    """
+    points between the runs instead."""
     runs = [
         _Run(part := points[low:high], _best(part, limit) or _line(part))
         for low, high in pairwise(ends)
@@ -399,8 +393,7 @@ class _Run(Struct, frozen=True, eq=False):
         rms distance from the points.
 
         Where the shape is too far from its points the run is halved, if need be down to single
-        points. A segment shorter than MIN_SEGMENT_PX gives no vertex.
-        """
+        points. A segment shorter than MIN_SEGMENT_PX gives no vertex."""
         if math.hypot(*(end - begin)) <= MIN_SEGMENT_PX:
             return [], []
         half = len(self.part) // 2

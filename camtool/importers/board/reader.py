@@ -8,8 +8,7 @@
 What a file is follows from its own attribute (X2's .FileFunction) or from its name. Layers are
 COPPER-TOP, COPPER-BOTTOM, COPPER-INNER, OUTLINE, DRILL-0.80 and SLOT-0.80 (mm); any other Gerber
 gives GERBER. Areas are united with shapely, arcs as chords within FLAT_MM, and the chords that
-remain become arcs again: their ends lie on the circles exactly.
-"""
+remain become arcs again: their ends lie on the circles exactly."""
 
 from __future__ import annotations
 
@@ -304,8 +303,7 @@ def _groups(objects: Iterable[_Drawn]) -> Iterator[tuple[bool, list[BaseGeometry
 def _flash(primitives: Sequence[Any], is_dark: bool) -> BaseGeometry:
     """Return the area of one object.
 
-    A hole in an aperture shows what lies below it, so it is removed from this object alone.
-    """
+    A hole in an aperture shows what lies below it, so it is removed from this object alone."""
     shape: BaseGeometry = shapely.Polygon()
     for each in primitives:
         area = _area(each)

@@ -8,8 +8,7 @@ type, colour, owner and whatever else), and LWPOLYLINEs without their vertices:
                  ├──▶ lines: ends and handles of the LINEs that follow one of ezdxf's
                  └──▶ vertices of ezdxf's LWPOLYLINEs
 
-Where handles are missing or name two entities, all is left to ezdxf, which mends them.
-"""
+Where handles are missing or name two entities, all is left to ezdxf, which mends them."""
 
 from __future__ import annotations
 
@@ -48,8 +47,7 @@ class Bulk(Struct, frozen=True, eq=False):
     """What was read in bulk, and the mask `others` (N,) of the tags that are left to ezdxf.
 
     `lines`: the LINEs that follow a LINE, by the handle of that one; `vertices` (K, 5) of an
-    LWPOLYLINE, by its handle.
-    """
+    LWPOLYLINE, by its handle."""
 
     others: Bools
     lines: Mapping[str, BulkLines] = field(default_factory=dict)
@@ -104,8 +102,7 @@ def _lines(tags: Tags, marks: Ints, is_line: Bools, is_other: Bools) -> dict[str
     first of each sequence.
 
     Entity k has the tags marks[k] to marks[k + 1]. The tags of the LINEs returned are cleared in
-    `is_other`, in place.
-    """
+    `is_other`, in place."""
     sizes = np.diff(marks)
     follows = np.zeros(len(sizes) + 1, dtype=np.bool_)
     follows[1:-1] = is_line[1:] & is_line[:-1] & (sizes[1:] == sizes[:-1])
@@ -143,8 +140,7 @@ def _lines(tags: Tags, marks: Ints, is_line: Bools, is_other: Bools) -> dict[str
 def _say_the_same(tags: Tags, rows: Ints, size: int) -> Bools:
     """Return a mask (K,) of entities that equal the one before them except in handle and ends.
 
-    Each has `size` tags from its row (K,) in `rows` on, and so has the one before it.
-    """
+    Each has `size` tags from its row (K,) in `rows` on, and so has the one before it."""
     table = tags.codes[rows[:, None] + np.arange(size)]
     is_same = np.asarray((table == tags.codes[rows[:, None] + np.arange(-size, 0)]).all(axis=1))
     for k in range(size):
@@ -181,8 +177,7 @@ def _vertices(tags: Tags, begins: Ints, ends: Ints, is_other: Bools) -> dict[str
     start and end width, bulge.
 
     The k-th one has the tags begins[k] to ends[k]; the tags read are cleared in `is_other`, in
-    place.
-    """
+    place."""
     rows_by_handle: dict[str, Floats] = {}
     for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
         codes = tags.codes[begin:end]

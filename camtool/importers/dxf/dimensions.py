@@ -7,8 +7,7 @@
 Numbers of a text and of a style are in the unit in which the dimension shows what it measures:
 that of the drawing, times DIMLFAC and the scale of the blocks that it stands in. Where this is
 neither the unit of the drawing nor mm nor inches, the dimension belongs to a view of another scale
-(`Callout.scale`). DIMLFAC does not apply to DIMTP and DIMTM (AutoCAD's help on DIMLFAC).
-"""
+(`Callout.scale`). DIMLFAC does not apply to DIMTP and DIMTM (AutoCAD's help on DIMLFAC)."""
 
 from __future__ import annotations
 
@@ -52,8 +51,7 @@ def callout(
     inspected.
 
     `mm_per_unit`: the unit of the drawing. `paper`: it is in a layout, where a negative DIMLFAC
-    applies too.
-    """
+    applies too."""
     kind, places, direction = _measured_places(entity)
     plane = frame.plane(entity.dxf.extrusion, 0.0)
     if not plane.scale:
@@ -100,8 +98,7 @@ def _measured_places(
     the angle along which it measures.
 
     The angle, rad in the plane of the dimension, is None if it measures the distance of the
-    points.
-    """
+    points."""
     dxf = entity.dxf
     if entity.is_dimensional_constraint:
         raise Unusable("is a constraint")
@@ -160,8 +157,7 @@ def _number(style: Mapping[str, Any], name: str, otherwise: float) -> float:
 def _factor(style: Mapping[str, Any], paper: bool) -> float:
     """Return DIMLFAC, by which shown lengths are larger than measured ones.
 
-    A negative one applies in layouts (`paper`) only; 0 counts as 1.
-    """
+    A negative one applies in layouts (`paper`) only; 0 counts as 1."""
     factor = _number(style, "dimlfac", 1.0)
     if factor < 0.0:
         factor = -factor if paper else 1.0
@@ -173,8 +169,7 @@ def _unit(factor: float, own_mm: float, mm_per_unit: float) -> tuple[float, floa
     say things are.
 
     `factor` is DIMLFAC, `own_mm` the length of a unit where the dimension stands, scaled by its
-    blocks.
-    """
+    blocks."""
     shown_mm = own_mm / factor
     for unit_mm in (mm_per_unit, 1.0, 25.4):
         if abs(shown_mm / unit_mm - 1.0) <= SCALE_SHARE:

@@ -6,8 +6,7 @@
 
 Nothing is audited: an audit deletes what it does not like, and here every entity is either used
 or counted with a reason. A file whose entities are not all there is refused, whatever could be
-saved; one that ends behind them is whole enough.
-"""
+saved; one that ends behind them is whole enough."""
 
 from __future__ import annotations
 
@@ -66,8 +65,7 @@ class Loaded(Struct, frozen=True):
 def load(data: bytes, file: str, *, plain: bool = False) -> Loaded:
     """Return the document in `data`; DrawingError when it is no DXF, cut off or beyond repair.
 
-    `plain`: a `PlainDocument` is enough, if the file holds nothing that needs ezdxf.
-    """
+    `plain`: a `PlainDocument` is enough, if the file holds nothing that needs ezdxf."""
     _check_bytes(data, file)
     tags = binary_tags(data, file) if data.startswith(BINARY_DXF) else ascii_tags(data, file)
     if len(tags.codes) > MAX_TAGS:

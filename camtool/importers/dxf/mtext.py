@@ -49,8 +49,7 @@ def write_mtext(
 
     Fonts are pairs: the one used, and the one asked for if it was replaced, else "". `look` comes
     from the text style; `font` is the font that the style asks for, and the mode of text. Raises
-    Unusable if the text is empty, or has codes that cannot be read.
-    """
+    Unusable if the text is empty, or has codes that cannot be read."""
     reader = _Reader(look, font)
     row, column = divmod(int(entity.dxf.attachment_point) - 1, 3)
     if not 0 <= row < len(_SHARES):
@@ -244,8 +243,7 @@ class MTextCell(Struct, frozen=True, eq=False):
     """A word, a stack of two texts, or the space between two words (glue), in one look.
 
     A stack has a `bar`: "^" no bar, "/" a bar, "#" a slanted one. `lift` is 0 on the baseline of
-    the line, 1 in its middle, 2 at its top.
-    """
+    the line, 1 in its middle, 2 at its top."""
 
     look: TextLook
     text: str
@@ -271,8 +269,7 @@ class Paragraph(Struct, frozen=True, eq=False):
     """A paragraph of an MTEXT.
 
     `share`: 0 left, 0.5 centred, 1 right; `indents` of the first line, the others, and the right
-    edge; `stops` of tabs as (x, share); `blank` is the height of an empty line.
-    """
+    edge; `stops` of tabs as (x, share); `blank` is the height of an empty line."""
 
     cells: tuple[MTextCell, ...]
     share: float
@@ -288,8 +285,7 @@ class MTextLine(Struct, frozen=True, eq=False):
     """A line of text: its cells, each with the x of its left end.
 
     The last cell ends at `right`, `margin` stays free after it; `stretch` marks a line that is
-    widened to its column.
-    """
+    widened to its column."""
 
     cells: tuple[tuple[float, MTextCell], ...]
     height: float

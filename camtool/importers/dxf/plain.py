@@ -2,8 +2,7 @@
 
 `plain_document` returns what `DxfWalk` asks of ezdxf's document: the layers, and model space with
 its entities and their attributes by ezdxf's names. It returns None where there is more to know:
-blocks in use, texts, paper space, damaged numbers. ezdxf reads such files, and mends them.
-"""
+blocks in use, texts, paper space, damaged numbers. ezdxf reads such files, and mends them."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
     bytes ──load──▶ document ──DxfWalk of model space or a layout──▶ pieces ──assemble──▶ Drawing
 
 What cannot be used is counted with a reason: layers that are off or frozen, kinds without lines,
-entities that lack what they need.
-"""
+entities that lack what they need."""
 
 from __future__ import annotations
 

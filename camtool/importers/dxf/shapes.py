@@ -2,8 +2,7 @@
 
 DXF keeps flat entities in a coordinate system of their own (OCS: the arbitrary axis algorithm of
 the DXF reference), and blocks are placed by any affine map. `WorldMap` is that map, from the world
-of an entity to mm; `Plane` is the image of the plane that the entity lies in, seen from above.
-"""
+of an entity to mm; `Plane` is the image of the plane that the entity lies in, seen from above."""
 
 from __future__ import annotations
 
@@ -43,8 +42,7 @@ class Plane(Struct, frozen=True, eq=False, dict=True):
     mm.
 
     `scale` is that of circles, 0 if they become ellipses; `sign` is −1 if the map mirrors. `rise`
-    (2,): how the origin moves for each unit of elevation.
-    """
+    (2,): how the origin moves for each unit of elevation."""
 
     u: Floats
     v: Floats
@@ -58,8 +56,7 @@ class Plane(Struct, frozen=True, eq=False, dict=True):
         """Return the plane spanned by the axes `u` and `v` (3,) at `origin` (3,); Unusable if it
         is tilted or has no area.
 
-        `rise` (3,) is the shift of the origin for each unit of elevation.
-        """
+        `rise` (3,) is the shift of the origin for each unit of elevation."""
         longest = max(math.hypot(*u), math.hypot(*v))
         if not longest <= MAX_COORDINATE_MM:  # nor is NaN
             raise Unusable("is too large to be exact to a micrometre")
@@ -194,8 +191,7 @@ def fit_arcs(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
     """Return arcs that fit a curve within the tolerance; DrawingError if it reaches too far.
 
     `size` holds numbers, mm, that bound the place and size of the curve, such as its control
-    points.
-    """
+    points."""
     furthest = float(np.abs(size).max())
     if not furthest <= MAX_COORDINATE_MM:  # nor is NaN
         raise DrawingError(
@@ -235,8 +231,7 @@ _FRAME_VERTEX = 16  # flag of a vertex that only steers a splined POLYLINE
 Reader = Callable[[Any, WorldMap, float], Sequence[DxfShape]]
 """Function that makes shapes of an entity, given the map and the tolerance (mm).
 
-Raises Unusable, and DrawingError (without file and place) for numbers that are not finite.
-"""
+Raises Unusable, and DrawingError (without file and place) for numbers that are not finite."""
 
 
 def line(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
@@ -318,8 +313,7 @@ def whole_turn(sweep: float) -> float:
 def elliptic(axes: Floats, start: float, sweep: float, tolerance_mm: float) -> DxfShape:
     """Return an arc of an ellipse, `axes` (3, 2): centre and half axes.
 
-    It is exact if the ellipse is a circle, else fitted; with a sweep of ±2π it is closed.
-    """
+    It is exact if the ellipse is a circle, else fitted; with a sweep of ±2π it is closed."""
     centre, u, v = axes
     closed = abs(sweep) == 2.0 * math.pi
     plane = Plane.of(np.append(u, 0.0), np.append(v, 0.0), np.append(centre, 0.0))
@@ -377,8 +371,7 @@ def polyline_with_bulges(
 ) -> DxfShape:
     """Return the shape of a polyline (n, 3) of x, y, bulge in its own plane.
 
-    It is exact, or its arcs are fitted where the plane squeezes circles to ellipses.
-    """
+    It is exact, or its arcs are fitted where the plane squeezes circles to ellipses."""
     if len(local) == 0:
         raise Unusable("has no vertices")
     rows = np.empty(local.shape)
@@ -443,8 +436,7 @@ def spline_through(
     """Return degree, knots and control points (n, 3) of the spline that CAD programs draw through
     these points.
 
-    `tangents` are those of both ends, or none. Unusable when there are too few points.
-    """
+    `tangents` are those of both ends, or none. Unusable when there are too few points."""
     from ezdxf.math import fit_points_to_cad_cv
 
     steps = np.hypot(*np.diff(fit_points[:, :2], axis=0).T)
@@ -468,8 +460,7 @@ def spline_of(
     """Return the fitted shape of the spline with control points (n, 2) mm; empty `weights` are all
     equal.
 
-    Unusable when knots, weights and control points do not belong together.
-    """
+    Unusable when knots, weights and control points do not belong together."""
     if degree > MAX_DEGREE:
         raise Unusable(f"has degree {degree}, at most {MAX_DEGREE} is read")
     if not len(control):
@@ -517,8 +508,7 @@ def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     each edge.
 
     A boundary that is taken from other entities of the drawing is left out, because these are read
-    themselves.
-    """
+    themselves."""
     elevation = float(numbers(entity.dxf.elevation)[2])
     plane = frame.plane(entity.dxf.extrusion, elevation)
     paths = [path for path in entity.paths if not path.path_type_flags & _TEXT_BOX]
@@ -607,8 +597,7 @@ def solid(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
 def face(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
     """Return the closed outline of a flat 3DFACE, or only its visible edges if some are hidden.
 
-    Raises Unusable if the face is not flat, or has no visible edge.
-    """
+    Raises Unusable if the face is not flat, or has no visible edge."""
     require(entity, _CORNERS[:3])
     named = [name for name in _CORNERS if entity.dxf.hasattr(name)]
     corners = frame.flat(numbers([tuple(entity.dxf.get(name)) for name in named]))

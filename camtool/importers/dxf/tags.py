@@ -5,8 +5,7 @@ also accept "1_0" as a number, and find one in garbage ("x1y"); here whatever is
 the reading. `frame_of` finds the sections, and whether the file is whole.
 
 The values of ASCII stay in the bytes of the file until they are asked for: as strings they would
-take eight times as much memory.
-"""
+take eight times as much memory."""
 
 from __future__ import annotations
 
@@ -63,8 +62,7 @@ Codes = npt.NDArray[np.int32]
 class Tags(ABC):
     """The tags of a file, comments (999) included: group codes `codes` (N,), and a value for each.
 
-    `notes`: phrases about damage that does not affect the rest.
-    """
+    `notes`: phrases about damage that does not affect the rest."""
 
     codes: Codes
     notes: tuple[str, ...] = ()
@@ -151,8 +149,7 @@ class TextTags(Tags):
     r"""The tags of ASCII DXF: line 2k of `data` is the code of tag k, line 2k + 1 its value; line
     j begins at the byte `at[j]`.
 
-    `escaped`: characters may be written as \U+00D6 or \M+1…
-    """
+    `escaped`: characters may be written as \U+00D6 or \M+1…"""
 
     data: bytes = b""
     at: npt.NDArray[np.int32] = field(default_factory=lambda: np.zeros(1, dtype=np.int32))
@@ -360,8 +357,7 @@ def _plain_lines(data: bytes) -> tuple[bytes, str, tuple[str, ...]]:
     """Return the text with line feeds at line ends, its encoding, and its faults.
 
     In the encoding a line feed is a single byte; it is that of the byte-order mark, else that of
-    the header.
-    """
+    the header."""
     notes: tuple[str, ...] = ()
     if data.startswith(_UTF16_MARKS):
         encoding, otherwise = "utf-16", "replace"

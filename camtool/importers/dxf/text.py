@@ -2,8 +2,7 @@
 
 Alignment follows what CAD programs store: a line is as wide as its letters advance, BOTTOM lies
 below the baseline by the depth of "p", MIDDLE halfway between that and the top of the capitals
-(the two alignment points of drawings saved by AutoCAD agree with it to 3 digits).
-"""
+(the two alignment points of drawings saved by AutoCAD agree with it to 3 digits)."""
 
 from __future__ import annotations
 
@@ -57,8 +56,7 @@ class TextShape(Struct, frozen=True, eq=False):
     """The curves of a text, in world coordinates, and the font that they are drawn with.
 
     `substituted` names the wanted font if it is another one, else ""; `missing` holds each
-    character that the font lacks, as often as it occurs.
-    """
+    character that the font lacks, as often as it occurs."""
 
     contours: list[TextContour]
     font: str
@@ -75,8 +73,7 @@ def text_strokes(entity: Any, mode: str) -> TextShape:
     """Return a TEXT, ATTRIB, ATTDEF or MTEXT as curves; mode is "outline" or "stroke".
 
     An ATTDEF shows its tag, or its value when that is constant. Raises Unusable when the text is
-    empty or invisible, has no finite size, or needs an outline font where none is installed.
-    """
+    empty or invisible, has no finite size, or needs an outline font where none is installed."""
     if entity.dxftype() == "MTEXT":
         return _mtext(entity, entity.doc, mode)
     if entity.dxftype() in ("ATTRIB", "ATTDEF"):
@@ -138,8 +135,7 @@ def _runs(raw: str) -> list[tuple[str, Rule]]:
     """Split a text at its codes into parts, each with the lines drawn along it.
 
     %%c %%d %%p %%% %%nnn are characters; %%u %%o %%k begin and end underline, overline and
-    strike-through.
-    """
+    strike-through."""
     rules, runs, position = Rule.NONE, [], 0
     text = "".join(c if c >= " " else " " for c in _CARET.sub(_control, raw))
     for code in [*_CODE.finditer(text), None]:

@@ -1,8 +1,7 @@
 """The walk through model space or a layout of a DXF document: pieces, marks and counts.
 
 Blocks are placed by walking them with the map of each INSERT, so that arcs stay arcs wherever the
-map lets them. All LINEs of one space or block are mapped at once: drawings have thousands.
-"""
+map lets them. All LINEs of one space or block are mapped at once: drawings have thousands."""
 
 from __future__ import annotations
 
@@ -56,8 +55,7 @@ class DxfScope(Struct, frozen=True, eq=False):
 
     `frame` maps to mm, `look` is that of the INSERT, `blocks` are the names of those around.
     `within` is added to the source of each path; `source`, that of a dimension and the like,
-    replaces the sources of its parts.
-    """
+    replaces the sources of its parts."""
 
     frame: WorldMap
     look: DxfLook | None = None
@@ -164,8 +162,7 @@ class DxfWalk:
         """Make the pieces of all LINEs of a scope, in the places reserved for them, to keep the
         order of the file.
 
-        `lines` are the index of the first reserved piece, the entity and its look.
-        """
+        `lines` are the index of the first reserved piece, the entity and its look."""
         following = [self._following(entity) for _, entity, _ in lines]
         counts = np.array([1 + len(bulk.handles) for bulk in following])
         first = np.cumsum(counts) - counts
@@ -315,8 +312,7 @@ class DxfWalk:
     def _visit(self) -> None:
         """Raise DrawingError if more than MAX_INSERTED entities within blocks are visited.
 
-        Blocks of dimensions have no INSERT, so that `_count` does not bound them.
-        """
+        Blocks of dimensions have no INSERT, so that `_count` does not bound them."""
         self._visited += 1
         if self._visited > MAX_INSERTED:
             raise _too_many()
@@ -422,8 +418,7 @@ def parts_of(entity: Any) -> list[Any]:
     """Return the entities with which a dimension, leader, multiple line or proxy is drawn.
 
     Unusable when there are none. The points that define a dimension are left out, and so is the
-    filling between multiple lines.
-    """
+    filling between multiple lines."""
     left_out = {"POINT", "HATCH"} if entity.dxftype() == "MLINE" else {"POINT"}
     parts: list[Any] = []
     try:
@@ -503,8 +498,7 @@ def matrix(insert: Any) -> Floats:
     """Return the matrix (4, 4), for row vectors, that places the entities of a block where its
     INSERT stands.
 
-    DrawingError for numbers that are not finite, Unusable for an extrusion of 0.
-    """
+    DrawingError for numbers that are not finite, Unusable for an extrusion of 0."""
     dxf = insert.dxf
     numbers = (*dxf.insert, *dxf.extrusion, dxf.rotation)
     spacing, scales = (dxf.column_spacing, dxf.row_spacing), (dxf.xscale, dxf.yscale, dxf.zscale)
@@ -521,8 +515,7 @@ def member_shifts(insert: Any) -> Iterator[Floats]:
     """Yield for each member of an INSERT's array its shift (3,) from the first one, in world
     units.
 
-    The array turns with the INSERT, but its spacing is not scaled.
-    """
+    The array turns with the INSERT, but its spacing is not scaled."""
     columns, rows = _array(insert)
     dxf, ocs = insert.dxf, insert.ocs()
     turn = np.radians(dxf.rotation)
@@ -565,8 +558,7 @@ class DxfLook(Struct, frozen=True):
     """Layer, colour and line type of an entity; `hidden` says why it is not shown ("" if it is).
 
     `frozen`: an INSERT on its layer shows nothing at all; on one that is merely off it still
-    shows what its block has on other layers.
-    """
+    shows what its block has on other layers."""
 
     layer: str = "0"
     colour: str = FOREGROUND

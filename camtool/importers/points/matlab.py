@@ -11,8 +11,7 @@ x_points, y_points, lx, ly, velx and vely are single rows of these. An array may
 side, (n, 2). The points come from xy, else from the first point and lxy with the signs of
 velxy; what else is there must agree with them. The speeds are the machine's: they are not used.
 
-Source: thesis on the router, its listing and example (L3196-3228, L4444-4515, L4294-4360).
-"""
+Source: thesis on the router, its listing and example (L3196-3228, L4444-4515, L4294-4360)."""
 
 from __future__ import annotations
 
@@ -91,8 +90,7 @@ class _Job:
         """Return True if arrays of pairs are (n, 2) instead of (2, n).
 
         An array (2, 2) may be either: it follows the other arrays, and alone it is read as (2, n),
-        as the router does.
-        """
+        as the router does."""
         votes: dict[bool, MatlabArray] = {}
         for name in _PAIRS:
             value = self.values.get(name)

@@ -8,8 +8,7 @@
 The content says which; `tables` has all but the last. A stroke is closed when the file says so
 or when its last point is its first. Numbers are mm unless the file or the caller names another
 unit. Every fault is an error with its line (or its row in an array). Nothing in a file is ever run
-or unpickled.
-"""
+or unpickled."""
 
 from __future__ import annotations
 

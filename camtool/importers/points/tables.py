@@ -25,8 +25,7 @@ class Stroke(Struct, frozen=True, eq=False):
     """A polyline: `points` (n, 2) or (n, 3) of x, y, bulge in the file's unit.
 
     `source` says where it stands in the file. `closed` is None when the file does not say: then
-    the stroke is closed if it ends where it began.
-    """
+    the stroke is closed if it ends where it began."""
 
     points: Floats
     source: str
@@ -38,8 +37,7 @@ class PointTable(Struct, frozen=True, eq=False):
     """All strokes of a file, its unit (None when the file names none), and the reason `why` for
     that unit.
 
-    `mm_per_unit` is given only for a unit that `camtool.units` does not have.
-    """
+    `mm_per_unit` is given only for a unit that `camtool.units` does not have."""
 
     strokes: list[Stroke]
     unit: str | None = None
@@ -99,8 +97,7 @@ class _Lines(Struct):
 
     `parted` is the separator ("" for blanks), `comma_line` and `point_line` the first lines with a
     decimal comma and a decimal point, `proven`: a line has proved that its commas are decimal
-    ones.
-    """
+    ones."""
 
     file: str
     parted: str | None = None
@@ -148,8 +145,7 @@ class _Lines(Struct):
         """Return the numbers of one line.
 
         The pattern matches plain numbers and is many times faster; any other line is read field by
-        field.
-        """
+        field."""
         match = pattern.fullmatch(content)
         if match is None:
             return self._diagnosed(content, line)
@@ -203,8 +199,7 @@ class _Lines(Struct):
         """Note that a line has a decimal comma; DrawingError if another line has a decimal point.
 
         `proven`: the line itself proves that its commas are decimal ones and do not separate x
-        from y.
-        """
+        from y."""
         self.comma_line = self.comma_line or line
         self.proven = self.proven or proven or _PROOF.search(content) is not None
         if "." in content:

@@ -1,7 +1,6 @@
 """Solid models to bodies with their names and colours: STEP, BREP, and build123d scripts.
 
-`TopoDS_Shape` and all else of OpenCASCADE has no types for Python: it is `Any` here.
-"""
+`TopoDS_Shape` and all else of OpenCASCADE has no types for Python: it is `Any` here."""
 
 from __future__ import annotations
 
@@ -43,8 +42,7 @@ def _tree_bodies(topods: Any, shape: Any, layer: str, colour: str) -> list[Body]
     or the inherited ones.
 
     `topods` is the same shape at its place in the whole: children of build123d do not move with
-    their parent.
-    """
+    their parent."""
     from OCP.TopoDS import TopoDS_Iterator
 
     layer = layer_of(shape.label) or layer
@@ -108,8 +106,7 @@ def layer_of(label: object) -> str:
 def colour_of(colour: Any) -> str:
     """Return "#rrggbb" of a `Quantity_Color`.
 
-    Its channels are linear: sRGB is 1.055 c^(1/2.4) − 0.055.
-    """
+    Its channels are linear: sRGB is 1.055 c^(1/2.4) − 0.055."""
     parts = [
         12.92 * part if part <= 0.0031308 else 1.055 * part ** (1.0 / 2.4) - 0.055
         for part in (colour.Red(), colour.Green(), colour.Blue())

@@ -2,8 +2,7 @@
 
 A face is level when it is plane and its normal is vertical. Of a solid the highest level face
 that looks up is taken (and those beside it at the same height), or the faces that the plane of
-a section shares with it.
-"""
+a section shares with it."""
 
 from __future__ import annotations
 
@@ -29,8 +28,7 @@ SECTION_MARGIN = 0.1
 class SolidOutline(Struct, frozen=True, eq=False):
     """The outline of a face: its wires as paths; or loose edges.
 
-    `kind` is "face", "section", "wire" or "edge".
-    """
+    `kind` is "face", "section", "wire" or "edge"."""
 
     kind: str
     layer: str
@@ -55,8 +53,7 @@ def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outl
     """Return the outlines of the bodies: of their highest level faces, or of their section at this
     height.
 
-    DrawingError when the plane of the section misses them all.
-    """
+    DrawingError when the plane of the section misses them all."""
     boxes = [_box(body.shape) for body in bodies]
     low, high = min(box[2] for box in boxes), max(box[5] for box in boxes)
     if height is not None and not low - POSITION_EPS_MM <= height <= high + POSITION_EPS_MM:
@@ -96,8 +93,7 @@ def _choose_faces(
     """Choose the faces of a body whose outlines become the drawing.
 
     Return the kind of outline, the faces, the edges that belong to no face, and the height of the
-    faces, None if they were not chosen by height.
-    """
+    faces, None if they were not chosen by height."""
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 
     flat = box[5] - box[2] <= POSITION_EPS_MM
@@ -273,8 +269,7 @@ def reversed_vertices(vertices: Floats) -> Floats:
 def join_edges(edges: list[EdgePath]) -> EdgePath:
     """Return edges, each of which ends where the next begins, joined to one closed path.
 
-    A gap above POSITION_EPS_MM is added to the error of the segment before it.
-    """
+    A gap above POSITION_EPS_MM is added to the error of the segment before it."""
     vertices = np.concatenate([path.vertices[:-1] for path in edges])
     errors = [path.off[:-1].copy() for path in edges]
     for row, step in zip(errors, _steps(edges).tolist(), strict=True):

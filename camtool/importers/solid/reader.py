@@ -10,8 +10,7 @@ stay exact; ellipses, splines and all other curves are fitted within the toleran
 
 OpenCASCADE brings the interpreter down over some damaged files, and prints what it likes: it
 works in a process of its own (`worker`). A script is a program with all the rights of its
-user: it is run only when the caller allows it.
-"""
+user: it is run only when the caller allows it."""
 
 from __future__ import annotations
 
@@ -80,8 +79,7 @@ def found_in(answer: dict[str, Any], why: str, scale: float, options: ReadOption
 def _kind(data: bytes, file: str, options: ReadOptions) -> tuple[str, FileUnit]:
     """Return "step", "brep" or "script" by the content, and the unit of the file.
 
-    DrawingError for a file that is cut off or unknown, or a script that is not allowed.
-    """
+    DrawingError for a file that is cut off or unknown, or a script that is not allowed."""
     head = text_head(data)
     if is_step(head):
         if _STEP_END not in data:
@@ -163,8 +161,7 @@ _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 def run_worker(data: bytes, request_items: dict[str, Any], file: str) -> dict[str, Any]:
     """Run the worker on these bytes; return its answer with a `complaint` of the reader, or "".
 
-    DrawingError when the model is damaged; RuntimeError for a fault of camtool itself.
-    """
+    DrawingError when the model is damaged; RuntimeError for a fault of camtool itself."""
     script = request_items["kind"] == "script"
     with tempfile.TemporaryDirectory() as folder:
         source, answer, chatter = (Path(folder, name) for name in ("source", "answer", "chatter"))
@@ -190,8 +187,7 @@ def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
     """Run the worker, which writes its messages to the file descriptor `output`; return its exit
     code.
 
-    DrawingError if it takes more than `seconds`.
-    """
+    DrawingError if it takes more than `seconds`."""
     try:
         process = subprocess.run(
             [sys.executable, "-P", "-c", START, str(request)],

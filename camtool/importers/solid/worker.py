@@ -1,7 +1,6 @@
 """The process in which solid models are read: bytes in one file, JSON in another one.
 
-It ends without an answer when OpenCASCADE brings it down.
-"""
+It ends without an answer when OpenCASCADE brings it down."""
 
 from __future__ import annotations
 
@@ -41,8 +40,7 @@ def find_outlines(request: dict[str, Any]) -> dict[str, Any]:
     numbers.
 
     Other keys: `kind` ("step", "brep", "script"), `height` of a section or None, `tolerance` of
-    fitting, both in the model's mm, and `file`, the model's name for messages.
-    """
+    fitting, both in the model's mm, and `file`, the model's name for messages."""
     script = request["kind"] == "script"
     return outlines_of(
         lambda: _bodies(request), request["height"], request["tolerance"], script=script
@@ -54,8 +52,7 @@ def outlines_of(
 ) -> dict[str, Any]:
     """Return the outlines of the bodies that `bodies_of` makes, as plain lists and numbers.
 
-    DrawingError where OpenCASCADE fails on them: those of a `script`, or else of a file.
-    """
+    DrawingError where OpenCASCADE fails on them: those of a `script`, or else of a file."""
     try:
         bodies = bodies_of()
         result = outlines(bodies, height, tolerance)

@@ -1,7 +1,6 @@
 """Colours of SVG as "#rrggbb".
 
-Source: Scalable Vector Graphics 1.1, 4.4 for the names; CSS Color Module 3, chapter 4.
-"""
+Source: Scalable Vector Graphics 1.1, 4.4 for the names; CSS Color Module 3, chapter 4."""
 
 from __future__ import annotations
 

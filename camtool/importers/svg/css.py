@@ -4,8 +4,7 @@ Selectors are made of types, classes, ids and attributes, and of ancestors and p
 `path`, `.cut`, `#outline`, `path.cut[id]`, `g.layer > path`. Rules with others (`p + q`, `:hover`)
 and blocks for other media are left out and counted.
 
-Source: Cascading Style Sheets 2.1, chapters 4.1 (syntax), 5 (selectors) and 6.4 (cascade).
-"""
+Source: Cascading Style Sheets 2.1, chapters 4.1 (syntax), 5 (selectors) and 6.4 (cascade)."""
 
 from __future__ import annotations
 
@@ -57,8 +56,7 @@ class _Rule(Struct, frozen=True):
     """A rule for one selector: its compounds as steps from the element outwards, and its
     declarations.
 
-    `child[i]` is true if step i + 1 must be the parent of step i, false for any ancestor.
-    """
+    `child[i]` is true if step i + 1 must be the parent of step i, false for any ancestor."""
 
     steps: tuple[_Compound, ...]
     child: tuple[bool, ...]
@@ -121,8 +119,7 @@ class CssRules(Struct):
     def holding(self, node: Node) -> list[Declarations]:
         """Return the declarations that apply to an element, the strongest last.
 
-        DrawingError when the sheets would take too long to apply.
-        """
+        DrawingError when the sheets would take too long to apply."""
         if not self._count:
             return []
         lists = [self._by_tag[""], self._by_tag.get(node.tag, []), self._by_id.get(node.get("id"))]
@@ -188,8 +185,7 @@ def _parse_selector(selector: str) -> tuple[tuple[_Compound, ...], tuple[bool, .
     """Return the steps of a selector from the element outwards, and for each but the first True if
     it must be the parent of the step before, False for any ancestor.
 
-    None for a selector with other signs (`+`, `:hover`).
-    """
+    None for a selector with other signs (`+`, `:hover`)."""
     words = selector.replace(">", " > ").split()
     steps: list[_Compound] = []
     child: list[bool] = []

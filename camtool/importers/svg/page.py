@@ -4,8 +4,7 @@ The page's lower left corner is (0, 0). What decides, in this order: the caller'
 height with the viewBox; 96 px an inch. Y' = page height − Y, so a page of unknown height is
 mirrored about its own zero line.
 
-Source: Scalable Vector Graphics 1.1, 7.10 to 7.12; CSS 2.1, 4.3.2 for the units.
-"""
+Source: Scalable Vector Graphics 1.1, 7.10 to 7.12; CSS 2.1, 4.3.2 for the units."""
 
 from __future__ import annotations
 
@@ -57,8 +56,7 @@ Writer = tuple[str, float]
 def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> SvgPage:
     """Return the page of the root element; DrawingError when its size or viewBox makes no sense.
 
-    Without `options.dpi` a px has the size that the program `writer` gives it.
-    """
+    Without `options.dpi` a px has the size that the program `writer` gives it."""
     if writer is not None and options.units is None and options.dpi is None:
         options = replace(options, dpi=writer[1])
     else:

@@ -2,8 +2,7 @@
 
     bytes ──as_safe_utf8──▶ UTF-8 ──parse_tree──▶ nodes ──page_of──▶ map to mm ──SvgWalk──▶ pieces
 
-Source: Scalable Vector Graphics 1.1 and, where it says more, 2.
-"""
+Source: Scalable Vector Graphics 1.1 and, where it says more, 2."""
 
 from __future__ import annotations
 
@@ -361,8 +360,7 @@ class SvgWalk:
         """Draw the content of an inner svg or a symbol; `size` is the element that gives its size:
         itself, or its `use`.
 
-        Pieces that leave the frame are counted, not clipped.
-        """
+        Pieces that leave the frame are counted, not clipped."""
         try:
             frame = frame_of(node, size, scope, self._lengths(scope, scope.style))
         except DrawingError as error:
@@ -480,8 +478,7 @@ class CurveFitter:
 
     With `box_only`, a Bézier curve whose control points lie within the box of the curves before it
     is replaced by its chord: it lies in the convex hull of its control points, and so does not
-    enlarge the box. Of 900 such curves 24 are fitted.
-    """
+    enlarge the box. Of 900 such curves 24 are fitted."""
 
     def __init__(self, tolerance_mm: float, *, box_only: bool = False) -> None:
         self.tolerance_mm = tolerance_mm
@@ -492,8 +489,7 @@ class CurveFitter:
         """Return the vertices (n, 3) of a subpath in mm, the last one its end, and how far the
         curves lie from the arcs.
 
-        DrawingError when it reaches out of bounds.
-        """
+        DrawingError when it reaches out of bounds."""
         first = subpath.segments[0]
         if len(subpath.segments) == 1 and isinstance(first, SvgLines):
             points = np.concatenate([subpath.start[None, :], first.points])
@@ -537,8 +533,7 @@ class CurveFitter:
         """Return True if the control points (n, 2) lie within the box so far; if not, enlarge the
         box by the ends of their curve.
 
-        A curve that is shorter than a position may be left out, and so does not enlarge it.
-        """
+        A curve that is shorter than a position may be left out, and so does not enlarge it."""
         low, high = control.min(axis=0), control.max(axis=0)
         is_within = bool((low >= self._low).all() and (high <= self._high).all())
         if not is_within and (high - low).max() > POSITION_EPS_MM:

@@ -91,8 +91,7 @@ class ClipFrame(Struct, frozen=True):
     """The frame of an inner svg or a symbol.
 
     `to_mm` maps from the units inside, `viewport` is the size there to which percentages refer;
-    `box` is the frame in the units outside, which `outer` maps to mm.
-    """
+    `box` is the frame in the units outside, which `outer` maps to mm."""
 
     to_mm: Affine
     viewport: tuple[float, float]
@@ -115,8 +114,7 @@ def frame_of(node: Node, size: Node, scope: SvgScope, lengths: Lengths) -> ClipF
     DrawingError for wrong numbers.
 
     `size` is the element that gives the size: itself, or the `use` that draws it. An svg that a
-    `use` draws keeps its place and the sizes that the `use` does not name.
-    """
+    `use` draws keeps its place and the sizes that the `use` does not name."""
     frame_node = node if node.tag == "svg" else None
     x = lengths.along(frame_node, "x", "x") if frame_node else 0.0
     y = lengths.along(frame_node, "y", "y") if frame_node else 0.0

@@ -6,8 +6,7 @@ A subpath is a start and segments in user units, Y down as in the file:
     Bezier       control points after the start: (2, 2) or (3, 2)
     Arc          centre + u·cos t + v·sin t, t from `begin` over the signed `sweep`, to `end`
 
-Source: Scalable Vector Graphics 1.1, appendix F.6 (elliptical arcs).
-"""
+Source: Scalable Vector Graphics 1.1, appendix F.6 (elliptical arcs)."""
 
 from __future__ import annotations
 
@@ -70,8 +69,7 @@ def arc_between(start: complex, end: complex, radii: complex, turn: float, flags
     DrawingError when the radii are so unlike the chord that the arithmetic fails.
 
     In the frame where the ellipse is the unit circle, with the chord's half h = (p1 − p0)/2, |h| =
-    sin(half the small sweep), the centre lies at the chord's middle ± i·h/|h|·√(1 − |h|²).
-    """
+    sin(half the small sweep), the centre lies at the chord's middle ± i·h/|h|·√(1 − |h|²)."""
     rx, ry = abs(radii.real), abs(radii.imag)
     axis = complex(math.cos(turn), math.sin(turn))
 
@@ -137,8 +135,7 @@ def parse_path(data: str) -> tuple[list[Subpath], str]:
     or "".
 
     DrawingError for data that cannot be drawn at all: too many or too large, or arcs without a
-    shape.
-    """
+    shape."""
     if len(data) > MAX_PATH_CHARACTERS:
         raise DrawingError(f"path data have more than {MAX_PATH_CHARACTERS} characters")
     pen = _Pen()
@@ -179,8 +176,7 @@ def _drawn(data: str, pen: _Pen) -> str:
 def _arcs(pen: _Pen, relative: bool, text: str) -> str:
     """Draw the arcs of an "A" command with the pen; return its fault, or "".
 
-    Flags need no separator after them ("a1 1 0 011 2").
-    """
+    Flags need no separator after them ("a1 1 0 011 2")."""
     start = _START.match(text)
     offset = start.end() if start else 0
     drawn = 0
@@ -202,8 +198,7 @@ class _Pen(Struct):
     """The pen that draws path data: its place, the open subpath, and the finished subpaths.
 
     The open subpath is its segments, and after them the corners of straight lines that are not yet
-    among them.
-    """
+    among them."""
 
     place: complex = 0j
     start: complex = 0j
@@ -281,8 +276,7 @@ class _Pen(Struct):
 
         The first control point of a smooth curve (S, T) is the last control point of the curve
         before it, reflected in the point between them; without a curve of the same degree before
-        it, it is that point itself.
-        """
+        it, it is that point itself."""
         kind, relative = letter.upper(), letter.islower()
         numbers = _floats(words)
         points = list(map(complex, numbers[::2], numbers[1::2]))
@@ -346,8 +340,7 @@ class Lengths(Struct, frozen=True):
     """Converts lengths to user units.
 
     A user unit is a px; percentages are of the `viewport` (width, height), if it is known; em is
-    `font_px`, ex half of it.
-    """
+    `font_px`, ex half of it."""
 
     options: ReadOptions
     viewport: tuple[float, float] | None
@@ -410,8 +403,7 @@ def subpaths(node: Node, lengths: Lengths) -> tuple[list[Subpath], str]:
     """Return the subpaths of a shape in user units, [] if it draws nothing, and the fault in its
     data that ends them, or "".
 
-    DrawingError if it cannot be drawn at all.
-    """
+    DrawingError if it cannot be drawn at all."""
     match node.tag:
         case "path":
             data = node.get("d")

@@ -150,8 +150,7 @@ class StyleSheet:
     def style(self, node: Node, above: SvgStyle) -> SvgStyle:
         """Return the style of an element, given that of its parent.
 
-        DrawingError when the sheets would take too long to apply.
-        """
+        DrawingError when the sheets would take too long to apply."""
         attributes = node.attributes
         values = {name: attributes[name] for name in _ATTRIBUTES if name in attributes}
         strong: dict[str, str] = {}
@@ -222,8 +221,7 @@ def _longhands(text: str) -> dict[str, str]:
     """Split `font: [style, variant, weight or stretch] size[/line-height] family` into its single
     properties.
 
-    The size is "?" for a system font and for text that is no font.
-    """
+    The size is "?" for a system font and for text that is no font."""
     longhands = {"font-style": "normal", "font-weight": "normal", "font-variant": "normal",
             "font-stretch": "normal", "font-size": "?", "font-family": ""}  # fmt: skip
     if text.lower() in ("inherit", "initial", "unset"):

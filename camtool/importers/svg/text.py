@@ -6,8 +6,7 @@ Blanks collapse over the whole text, line ends being blanks, unless `xml:space` 
 keeps them. A letter that x or y gives a place begins a chunk; text-anchor lies at the chunk's
 first letter. Letters come from `importers.text`, as those of a DXF do: without kerning. What would
 move or shape letters and is not done here refuses the whole text, with the reason.
-Source: Scalable Vector Graphics 2, chapter 11 (11.5: the layout).
-"""
+Source: Scalable Vector Graphics 2, chapter 11 (11.5: the layout)."""
 
 from __future__ import annotations
 
@@ -69,8 +68,7 @@ class Text(Struct, frozen=True, eq=False):
     """A text drawn: its runs, and the number of its letters.
 
     `unseen`: reasons why some of them are not drawn; `lacks`: what fonts lack; `plainer`: font
-    weights that were replaced by regular or bold.
-    """
+    weights that were replaced by regular or bold."""
 
     runs: list[TextRun]
     letters: int
@@ -90,8 +88,7 @@ def text_of(
 
     `style` is its style; `style_of` gives the style of an element within it from that of its
     parent. Raises Unusable, with the reason, when it cannot be drawn as it is shown, DrawingError
-    for a position that is no length.
-    """
+    for a position that is no length."""
     flow = _Flow(style_of, lengths_of)
     flow.visit(node, style, _keeps_blanks(node))
     flow.end()
@@ -156,8 +153,7 @@ class _Flow(Struct, eq=False):
     def end(self) -> None:
         """Remove a last blank, which collapses too.
 
-        Unusable when there are no letters, or some whose places are not known.
-        """
+        Unusable when there are no letters, or some whose places are not known."""
         if self._after_blank and self.letters:
             self.letters.pop()
             self.at.pop(len(self.letters), None)
@@ -288,8 +284,7 @@ def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
     """Yield chunks of words: a chunk begins at each letter that has an x or y of its own.
 
     Unusable where a line continues behind letters that text-anchor has moved: the standard
-    continues from where they were before that, renderers from where they are.
-    """
+    continues from where they were before that, renderers from where they are."""
     starts = sorted(
         {0, *flow.at}
         | {k for k in range(1, len(flow.letters)) if flow.styles[k] != flow.styles[k - 1]}
@@ -322,8 +317,7 @@ def _draw_chunk(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[T
 
     All are moved so that the start, middle or end of the chunk lies at its first letter's place
     (text-anchor). Unusable where a dx within the chunk changes its span: the standard takes it
-    into account, not all renderers do.
-    """
+    into account, not all renderers do."""
     begin = min(words.x for words in chunk)
     end = max(words.end for words in chunk)
     gaps = any(words.x != before.end for before, words in pairwise(chunk))

@@ -3,8 +3,7 @@
     ( x' )   ( a c ) ( x )   ( e )
     ( y' ) = ( b d ) ( y ) + ( f )
 
-Source: Scalable Vector Graphics 1.1, 7.7 and 7.8 (viewBox and preserveAspectRatio).
-"""
+Source: Scalable Vector Graphics 1.1, 7.7 and 7.8 (viewBox and preserveAspectRatio)."""
 
 from __future__ import annotations
 
@@ -136,8 +135,7 @@ def view_box_map(box: SvgBox, onto: SvgBox, align: str) -> Affine:
     preserveAspectRatio, `align`.
 
     meet: scale = min(sx, sy), all is visible; slice: the greater one, all is covered. What is left
-    over, viewport − scale · box, is shared out by Min (0), Mid (½), Max (1).
-    """
+    over, viewport − scale · box, is shared out by Min (0), Mid (½), Max (1)."""
     match = _ALIGN.fullmatch(align or "xMidYMid")
     if match is None:
         raise DrawingError(f"preserveAspectRatio {shortened(align)} is not known")
@@ -198,8 +196,7 @@ def parse_origin(text: str, length: Length) -> tuple[float, float]:
     """Return the point (x, y) that transform-origin names, in user units; DrawingError for other
     text.
 
-    Of a single value the other one is "center".
-    """
+    Of a single value the other one is "center"."""
     words = text.lower().split()[:2]
     if len(words) == 1:
         words = ["center", words[0]] if words[0] in _VERTICAL else [words[0], "center"]

@@ -117,8 +117,7 @@ def _parser(builder: _Builder, data: bytes) -> Any:
     It takes all data in one go: expat before 2.6 begins a long attribute anew with each portion.
 
     Elements go to the builder as expat gives them: the way through SAX's own records of names and
-    attributes takes longer than all the rest.
-    """
+    attributes takes longer than all the rest."""
     from defusedxml.expatreader import DefusedExpatParser
 
     entities = data.count(b"&") <= MAX_REFERENCES
@@ -283,8 +282,7 @@ def as_safe_utf8(data: bytes) -> bytes:
     """Return the document unpacked, in UTF-8 or another encoding that expat reads, and without
     references to files outside.
 
-    DrawingError for one that is too large or cannot be decoded.
-    """
+    DrawingError for one that is too large or cannot be decoded."""
     if data.startswith(GZIP):
         data = _unpack(data)
     if len(data) > MAX_BYTES:
@@ -297,8 +295,7 @@ def as_safe_utf8(data: bytes) -> bytes:
 def writer_dpi(head: bytes) -> tuple[str, float] | None:
     """Return the program that wrote the file and its px per inch, where that is not 96; else None.
 
-    Old versions of Inkscape used 90, Adobe Illustrator uses 72.
-    """
+    Old versions of Inkscape used 90, Adobe Illustrator uses 72."""
     head = head[:_HEAD_BYTES]
     inkscape = _OLD_INKSCAPE.search(head)
     if inkscape is not None:

@@ -20,8 +20,7 @@ CCW the teeth of a spindle that turns CW go with the feed: inside a hole that is
 
 In a hole hardly wider than the tool (ρ below MIN_HELIX_SHARE · r) a helix has hundreds of turns,
 in which the axes hardly move and the tool rubs: there the tool plunges in the middle, in pecks no
-deeper than the step down and the tool's diameter, and goes once round at the full depth.
-"""
+deeper than the step down and the tool's diameter, and goes once round at the full depth."""
 
 from __future__ import annotations
 
@@ -75,8 +74,7 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
     """Return one Fixed item for each circle that is wider than the tool.
 
     Circles within another one are bored with it. Paths that are no circle, and circles without
-    room for the tool, are named in findings. OptionError for a tool that cuts no width.
-    """
+    room for the tool, are named in findings. OptionError for a tool that cuts no width."""
     operation = setting.operation
     if operation.tool.radius_mm == 0.0 and len(chosen.lines):
         raise OptionError(

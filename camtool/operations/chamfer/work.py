@@ -12,8 +12,7 @@ profile of that radius would: so a chamfer is one, whose depth its width makes
 (`chamfered`).
 Round an outer corner the cone rolls about the corner, and the bevels meet in a mitre there; in an
 inner one it leaves its own round. All passes run along the same line, each deeper than the one
-before.
-"""
+before."""
 
 from __future__ import annotations
 
@@ -38,8 +37,7 @@ def chamfered(operation: Operation, _: Stock | None) -> Operation:
     A cone of half angle α and tip radius t is r(h) = t + h·tan α wide, h above its tip. Its tip
     runs an offset o below the bevel, whose lower edge is the drawn line: the axis runs r(o) beside
     that line, and the bevel is w = r(D) − r(o) wide at the stock top for a tip D = o + w / tan α
-    deep. OptionError without a width, for a tool that is no V bit, and for one too narrow.
-    """
+    deep. OptionError without a width, for a tool that is no V bit, and for one too narrow."""
     place = f"operation {operation.name or operation.kind!r}, key chamfer"
     if operation.chamfer_mm is None:
         raise OptionError(

@@ -3,8 +3,7 @@
     marks, circles ──each place once──▶ holes ──pecks──▶ one Fixed item per hole
 
 The tip goes to the full depth, and no farther: a hole that is to go through with its whole
-diameter needs a depth greater by the height of the cone, ½·diameter / tan(½·tip angle).
-"""
+diameter needs a depth greater by the height of the cone, ½·diameter / tan(½·tip angle)."""
 
 from __future__ import annotations
 
@@ -40,8 +39,7 @@ def drill(chosen: Chosen, setting: Setting) -> Work:
 
     Places that are drawn twice are drilled once; of concentric circles, the one nearest to the
     drill's diameter counts. Marks and circles that are no hole for this drill are named in
-    findings; it is an error if none is left.
-    """
+    findings; it is an error if none is left."""
     operation = setting.operation
     holes, large, other_names = drilled_holes(chosen, operation)
     limit = largest_hole_mm(operation)

@@ -1,8 +1,7 @@
 """Engraving: the tool centre runs on the line itself.
 
 Open paths stay open and may be cut from either end; closed ones keep the direction in which they
-are drawn and may begin anywhere. The material stays on both sides.
-"""
+are drawn and may begin anywhere. The material stays on both sides."""
 
 from __future__ import annotations
 
@@ -45,8 +44,7 @@ def engrave(chosen: Chosen, setting: Setting) -> Work:
     """Return a contour for each path, as it is drawn.
 
     Climb and conventional are sides of a wall, and a groove has two of them: OptionError for a
-    direction other than "drawn".
-    """
+    direction other than "drawn"."""
     operation = setting.operation
     if operation.direction != "drawn":
         raise OptionError(

@@ -7,8 +7,7 @@
 The axis runs r(D) beside the copper: the radius of the tool D above its tip, where the top of the
 copper passes it. That is a chamfer whose bevel has no width, so that a V bit and a mill are the
 same here. `isolation` adds rings farther out, which overlap at the bottom of the copper. Whether
-the nets are apart then, and whole, is proved on the predicted cut (`camtool.stock.nets`).
-"""
+the nets are apart then, and whole, is proved on the predicted cut (`camtool.stock.nets`)."""
 
 from __future__ import annotations
 
@@ -32,8 +31,7 @@ def isolated(operation: Operation, _: Stock | None) -> Operation:
     drawn edge by the tool's radius at the top of the copper.
 
     OptionError without a depth, for a depth that leaves copper, for a tool without width there,
-    and for an isolation narrower than one cut or with too many rings.
-    """
+    and for an isolation narrower than one cut or with too many rings."""
     copper_mm = operation.own_value("copper")
     if operation.depth_mm is None:
         raise OptionError(

@@ -4,8 +4,7 @@
 edges of parts and which are edges of holes (`sides`), and the tool runs a tool's radius (and the
 allowance, which below 0 brings it nearer) away: outside of parts and islands, inside of holes.
 Where parts lie nearer to each other than the tool is wide, one contour runs round both. `outside`
-and `inside` take each closed path on its own. Open paths have no inside: the tool runs on them.
-"""
+and `inside` take each closed path on its own. Open paths have no inside: the tool runs on them."""
 
 from __future__ import annotations
 
@@ -128,8 +127,7 @@ def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
 
     Two if contours that were not chosen reverse the side of some paths: the windows of a plate
     without the plate, or a part within a window without the window. These paths form the second
-    region.
-    """
+    region."""
     if not closed:
         return []
     is_even = chosen.nesting.levels.depth[closed] % 2 == 0
@@ -365,8 +363,7 @@ def _far_corners(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterat
     """Yield findings for corners of the tool's path that lie far from the drawn corner, as sharp
     and mitred joins do.
 
-    At a corner of angle α the straight sides of the path meet at away / sin(α/2) from it.
-    """
+    At a corner of angle α the straight sides of the path meet at away / sin(α/2) from it."""
     max_distance = FAR_CORNER * setting.operation.away_mm
     for line in lines:
         drawn = Segments.of(chosen.lines.select(line.sources))

@@ -6,8 +6,7 @@ radius with exact arcs; that is the finishing pass. Levels of roughing run towar
 
     Y │            ╭──────── bar
       │     ┌──────┘ section        ◀── levels, from the bar down
-      └─────┴───────────────▸ X     part's end on the right
-"""
+      └─────┴───────────────▸ X     part's end on the right"""
 
 from __future__ import annotations
 

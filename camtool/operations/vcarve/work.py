@@ -20,8 +20,7 @@ it rolls along the boundary.
 
 What is cut is right to `CARVE_TOLERANCE_MM`: all vertices lie on the medial axis or on the
 parallel curve, exact to rounding; lines and arcs between them leave the axis, sideways and in
-radius together, by no more than the tolerance; side branches that reach no farther go.
-"""
+radius together, by no more than the tolerance; side branches that reach no farther go."""
 
 from __future__ import annotations
 
@@ -104,8 +103,7 @@ def vcarve(chosen: Chosen, setting: Setting) -> Work:
     """Return one Fixed item for each region that the closed paths enclose (even-odd).
 
     If paths cross, the regions are undefined: a finding of severity error, and no items.
-    OptionError for an open path and for a tool that is no V bit.
-    """
+    OptionError for an open path and for a tool that is no V bit."""
     cone = Cone.of(setting.operation)
     _refuse_open(chosen, setting.operation)
     crossing = list(islice(_crossings(chosen), CROSSINGS_SHOWN))
@@ -283,8 +281,7 @@ def grooves(trace: MedialTrace, band: Band) -> list[Floats]:
     """Return pieces (n, 4) of x, y, rho, bulge: the parts of the medial axis whose disc radius rho
     is within the band, each once. Along an arc the radius changes evenly with the sweep.
 
-    `trace` must have rows at both limits of the band (`with_level`).
-    """
+    `trace` must have rows at both limits of the band (`with_level`)."""
     rho = trace.rho
     low_rho, high_rho = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
     same_pair = (trace.element[1:] == trace.element[:-1]) & (
@@ -436,8 +433,7 @@ def pruned(graph: Graph, tolerance_mm: float) -> Graph:
     out of the disc at the other end of the branch.
 
     A disc (m, ρ) reaches |m − m'| + ρ − ρ' out of another one (m', ρ'); along a branch of several
-    pieces these add up at most.
-    """
+    pieces these add up at most."""
     degree = np.bincount(graph.ends.ravel(), minlength=len(graph.places))
     reach = np.zeros(len(graph.places))
     is_kept: Bools = np.ones(len(graph.pieces), dtype=np.bool_)
@@ -478,8 +474,7 @@ def walks(graph: Graph, again_mm: float) -> list[Floats]:
     jumps between near places to one closed walk, which is found piece by piece (Hierholzer) and
     cut at the jumps, where the tool is lifted. Short pieces between two such places (up to
     `again_mm` long) are walked twice instead, into a corner and back, which saves a jump each. A
-    walk begins at the end with the smaller disc.
-    """
+    walk begins at the end with the smaller disc."""
     graph = _doubled(graph, again_mm)
     ends = np.concatenate([graph.ends, _jumps(graph)])
     result = []

@@ -1,8 +1,7 @@
 """A page on which a figure is drawn by mouse, pen or keys, and saved as a list of points.
 
 One file without a server: it saves its figure as a download, in the form that
-`camtool.importers.points` reads.
-"""
+`camtool.importers.points` reads."""
 
 from __future__ import annotations
 

@@ -4,8 +4,7 @@ All columns follow each other in one block of bytes, little-endian, each beginni
 four: f4 (float), u1 (byte), or v1, v2, v3: integers as differences from the number one, two or
 three before (the first ones from 0), each as 7 bits a byte, the lowest first, with the sign in the
 lowest bit. Floats of 32 bits hold a place on a table of 8 m to 1 µm; integers may be counts of a
-unit, with which the page multiplies them.
-"""
+unit, with which the page multiplies them."""
 
 from __future__ import annotations
 
@@ -102,8 +101,7 @@ class StockBox(Struct, frozen=True):
 def height_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
     """Return the heights that the stock should have, and those that earlier set-ups have left.
 
-    They are empty if they are not known, or nothing was cut before.
-    """
+    They are empty if they are not known, or nothing was cut before."""
     goal, heights_before = None, None
     if stock is not None and pair is not None:
         left, low, right, _ = stock.box
@@ -125,8 +123,7 @@ def _run_columns(name: str, heights: HeightMap | None, stock: StockBox | None) -
     grid of the stock.
 
     A value counts shares of 1/GOAL_COUNTS of its thickness; both columns are empty without
-    heights.
-    """
+    heights."""
     values, counts = np.empty(0, dtype=INT), np.empty(0, dtype=INT)
     if heights is not None and stock is not None:
         shares = np.rint(heights.heights.ravel() * (GOAL_COUNTS / -stock.bottom))
@@ -142,8 +139,7 @@ def slide_columns(pair: StockPair | None, rows: int, cell_mm: float) -> Columns:
     `rows` of the toolpath makes.
 
     Places are where the first move begins and where each one ends. Successive moves that bend by
-    less than a share of `cell_mm` become one; there are MAX_POINTS at most, if need be coarser.
-    """
+    less than a share of `cell_mm` become one; there are MAX_POINTS at most, if need be coarser."""
     moves = None if pair is None else pair.moves
     if moves is None or not len(moves):
         no_counts = np.empty(0, dtype=INT)
@@ -173,8 +169,7 @@ def engagement_columns(pair: StockPair | None, toolpath: Toolpath | None) -> Col
     """Return the greatest engagement of the tool in each of N rows, degrees, entries left out.
 
     It is ENTRY_DEG for rows that only enter, NaN where nothing is cut, and the column is empty
-    where no tool is known.
-    """
+    where no tool is known."""
     result = np.full(0 if toolpath is None else len(toolpath), np.nan)
     if pair is None or toolpath is None or not len(pair.moves) or len(pair.moves) > MAX_ENGAGED:
         return {"move_engaged": result[:0].astype(FLOAT)}
@@ -222,8 +217,7 @@ def stepped(numbers: npt.NDArray[np.integer], stride: int) -> bytes:
     """Return integers as differences from the number `stride` before, in as many bytes as each
     needs.
 
-    A byte holds 7 bits, the lowest first; its highest bit says that more follow.
-    """
+    A byte holds 7 bits, the lowest first; its highest bit says that more follow."""
     flat = numbers.ravel().astype(np.int64)
     steps = flat - np.concatenate([np.zeros(stride, dtype=np.int64), flat[:-stride]])[: len(flat)]
     zigzag = (steps << 1) ^ (steps >> 63)
@@ -305,8 +299,7 @@ def _wide(scene: Scene, toolpath: Toolpath) -> npt.NDArray[np.generic]:
     """Return how far (N, 2) mm the tool cuts to each side at the start and the end of each feed;
     (0, 2) if that is the same all over.
 
-    It changes with the depth of a tapered tool, and from tool to tool.
-    """
+    It changes with the depth of a tapered tool, and from tool to tool."""
     turns = scene.turns if scene.nose is None else ((0, scene.nose),)
     if not turns:
         return np.empty((0, 2), dtype=FLOAT)
@@ -381,8 +374,7 @@ class Traced(Struct, frozen=True, eq=False):
 def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
     """Return the predicted path of a scene, coloured by a map that ends at `top_um`.
 
-    ValueError when the playback does not have a row for each of its points.
-    """
+    ValueError when the playback does not have a row for each of its points."""
     worst = np.array(scene.worst, dtype=np.float64).reshape(-1, 2)
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or run is None or not len(run.trace_row):
@@ -455,8 +447,7 @@ def thinned(points: Floats, bins: Ints, largest_mm: float, max_points: int = MAX
     more than need be.
 
     The ends of all pieces of one colour, `bins` (T,), are kept, unless these alone are more than
-    `max_points`.
-    """
+    `max_points`."""
     kept_rows = np.arange(len(points))
     near_mm = finest_mm(largest_mm)
     while True:

@@ -83,8 +83,7 @@ def viewer_page(scene: Scene, live: str = "") -> bytes:
     """Return the HTML file of a scene, UTF-8.
 
     Without a playback in the scene every move runs at its feed. `live`: HTML of the state of a
-    program that is being sent. ValueError when the playback is that of another toolpath.
-    """
+    program that is being sent. ValueError when the playback is that of another toolpath."""
     run, content = _run(scene), content_of(scene)
     traced = traced_of(scene, run, _top_um(scene, run))
     rows, columns = _rows(content)
@@ -196,8 +195,7 @@ def _body(tool: Tool) -> tuple[float | None, ...]:
 def _stock_of(scene: Scene) -> StockPair | None:
     """Return the stock and the moves that cut it; None without moves.
 
-    Where no tool is known, the moves are those of a point.
-    """
+    Where no tool is known, the moves are those of a point."""
     toolpath = scene.toolpath
     if toolpath is None or not toolpath.is_motion.any():
         return None
