@@ -81,7 +81,7 @@ def show(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Everything about one machine."""
+    """Show everything about one machine."""
     _show(str(context.info_name), machine, settings, as_json)
 
 

@@ -75,7 +75,7 @@ def tools(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> 
 @talk_options
 @click.pass_context
 def show(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> None:
-    """Everything about one tool."""
+    """Show everything about one tool."""
     name, every = str(context.info_name), _all_tools()
     if name not in every:
         names = f"known are {', '.join(every)}" if every else "camtool tools new begins a library"

@@ -543,8 +543,8 @@ class _Clearing:
         return numbers[0], None
 
     def older_ones(self) -> tuple[list[int], list[list[int]]]:
-        """For each stroke, how many of older fronts lie so near that they matter, and for which
-        newer ones it matters itself."""
+        """Return for each stroke the number of strokes of older fronts near enough to matter,
+        and the newer strokes for which it matters itself."""
         if not self.strokes:
             return [], []
         cell = 2.0 * self.tool_mm
