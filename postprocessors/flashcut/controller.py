@@ -107,7 +107,7 @@ class FlashcutRun:
         check_rows(path, len(path))
         self._rows = len(path)
         self.waits_s = waits_s(path, len(path))
-        """(R,) s of rows without motion."""
+        """Seconds (R,) of rows without motion."""
         self._table = MoveTable.of(path, machine)
         self.start_mm = path.start
         self._mechanics = Mechanics(machine, path.start, options.effects)

@@ -123,17 +123,17 @@ class PlainRows(Struct, frozen=True, eq=False):
 
     @property
     def starts(self) -> Ints:
-        """(M, 3) units: where each row begins."""
+        """Starts (M, 3) of the rows, in units."""
         return np.concatenate([self.start[None, :], self.end])[:-1]
 
     @property
     def is_arc(self) -> Bools:
-        """(M,) true for ARC_CW and ARC_CCW."""
+        """Mask (M,) of the arcs."""
         return are_arcs(self.kind)
 
     @property
     def moves(self) -> Bools:
-        """(M,) true for motions that leave their start, and for all arcs."""
+        """Mask (M,) of motions that leave their start, and of all arcs."""
         motion = self.kind <= Kind.ARC_CCW
         return np.asarray(self.is_arc | (motion & (self.end != self.starts).any(axis=1)))
 

@@ -121,7 +121,8 @@ class PlainMoves:
 
     @property
     def last(self) -> tuple[int | None, float]:
-        """The motion (tenfold, None: none) and the feed in force behind the sure ones."""
+        """Motion (ten times its G word, None: none) and feed in force after the first `count`
+        blocks."""
         motion = int(self.motion[self.count - 1])
         return (motion if motion >= 0 else None), float(self.feed[self.count - 1])
 

@@ -371,7 +371,7 @@ class Sent(Struct, frozen=True, eq=False):
 
     @property
     def is_motion(self) -> Bools:
-        """(M,) true for motions."""
+        """Mask (M,) of the motions."""
         return np.asarray(self.kind <= Kind.ARC_CCW)
 
     def event_rows(self, events: Events) -> Iterator[tuple[int, int]]:

@@ -313,7 +313,7 @@ class Blocks(Struct, frozen=True, eq=False):
 
     @property
     def events(self) -> Shorts:
-        """(B,) steps of the axis that has the most of them."""
+        """Step events (B,) of each block: the steps of the axis that has the most."""
         return np.asarray(np.abs(self.way).max(axis=1, initial=0))
 
     def part(self, low: int, high: int) -> Blocks:

@@ -351,7 +351,7 @@ class _Parser(GrblParser):
         self._memory, self._rows = memory, path
         self._zero = (0.0, 0.0, 0.0)
         self.places = list(memory.frames[0])
-        """(3,) the zero of the frame in force."""
+        """Zero (3,) of the frame in force."""
         self.offset = [0.0, 0.0, 0.0]
         self.length = 0.0
         self.rpm = 0.0
@@ -581,7 +581,7 @@ class GrblTwin(Twin):
 
     @property
     def _steps(self) -> Ints:
-        """(3,) where it takes itself to stand (`sys_position`)."""
+        """Position (3,) in steps by grbl's own count (`sys_position`)."""
         return np.asarray(self._signs * (self._slide_steps() - self._origin))
 
     def _set_steps(self, steps: Ints) -> None:

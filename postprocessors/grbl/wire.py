@@ -372,7 +372,7 @@ class GrblConversation(Conversation):
 
     @property
     def is_still(self) -> bool:
-        """True behind a hold that it has confirmed."""
+        """True after a hold that grbl has confirmed."""
         return self.state is WireState.FINISHED or (
             self._stood and self.is_over and not self._alarm
         )
@@ -498,7 +498,7 @@ class GrblConversation(Conversation):
 
     @property
     def _homes(self) -> bool:
-        """True while homing is under way: nothing but a reset is heard then."""
+        """True during homing: grbl then reacts to nothing but a reset."""
         return any(line.data == HOMING for line in self._out_lines)
 
     @property
@@ -614,7 +614,7 @@ class GrblConversation(Conversation):
 
     @property
     def _reasons(self) -> str:
-        """Return the messages about the lock and the closed switches, as the end of a sentence."""
+        """Messages about the lock and the closed switches, as the end of a sentence."""
         reasons = [f"it says {each!r}" for each in dict.fromkeys(self._messages)]
         if self._closed:
             reasons.append(f"it reports closed switches: {_switches(self._closed)}")

@@ -47,7 +47,7 @@ class I8751Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def high_byte_steps(self) -> int:
-        """Steps that one unit of PH is worth."""
+        """Steps that one unit of PH stands for."""
         return int(self.high_byte)
 
     @property
@@ -77,7 +77,7 @@ class I8751Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def signs(self) -> tuple[int, int, int]:
-        """For X, Y, Z: 1 when + is forward, -1 when + is backward."""
+        """Signs of X, Y, Z: 1 when + is forward, -1 when + is backward."""
         x, y, z = (-1 if axis in self.plus_backward else 1 for axis in "xyz")
         return x, y, z
 

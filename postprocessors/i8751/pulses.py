@@ -76,7 +76,7 @@ class PulseTimes:
         if firmware.cruise == "declared":
             periods = np.linspace(periods[0], 1.0 / DECLARED_HZ, RAMP_PULSES + 1)
         self.periods_s: Floats = periods
-        """(46,) s between pulses: the ramp up, and the cruise."""
+        """Seconds (46,) between pulses: the ramp up, then the cruise."""
         self._ramp_s = float(periods[:-1].sum())
 
     def alone_s(self, steps: Ints) -> Floats:

@@ -217,7 +217,7 @@ class IsoDialect(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def unit(self) -> Unit:
-        """The unit of lengths, and how many decimals more than mm it is written with."""
+        """Unit of lengths, with the number of decimals that it has more than mm."""
         if self.program.units == "mm":
             return Unit("mm", 1.0, "G21", 0)
         return Unit("inch", 25.4, "G20", self.words.inch_decimals - self.words.decimals)
@@ -229,7 +229,7 @@ class IsoDialect(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def gcode(self) -> GcodeDialect:
-        """Return the options that the shared writer of G-code has; lengths in mm."""
+        """Options for the shared writer of G-code; lengths in mm."""
         words, arcs = self.words, self.arcs
         return GcodeDialect(
             units=self.program.units,

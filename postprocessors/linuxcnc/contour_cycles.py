@@ -59,7 +59,7 @@ class Segment(Struct):
 
     @property
     def size(self) -> float:
-        """Chord, or the radius if that is smaller."""
+        """Length of the chord, or the radius if that is smaller."""
         chord = abs(self.start - self.end)
         return chord if self.centre is None else min(chord, abs(self.start - self.centre))
 

@@ -956,17 +956,17 @@ class Bends(Struct, frozen=True, eq=False):
 
     @property
     def inward(self) -> Floats:
-        """(K, 3) unit vectors to the centre of a blend."""
+        """Unit vectors (K, 3) from the corner to the centre of a blend."""
         return _unit(self.after - self.before)
 
     @property
     def onward(self) -> Floats:
-        """(K, 3) unit vectors along a blend, in its middle."""
+        """Unit vectors (K, 3) along the middle of a blend."""
         return _unit(self.after + self.before)
 
     @property
     def theta(self) -> Floats:
-        """(K,) rad: half the angle between the way back and the way on."""
+        """Half the interior angle (K,) of the corner, rad: straight on it is π/2."""
         cosine = np.clip(-(self.before * self.after).sum(axis=1), -1.0, 1.0)
         return np.asarray(0.5 * np.arccos(cosine))
 

@@ -186,7 +186,7 @@ class Flow:
 
     @property
     def level(self) -> int:
-        """Depth of calls under way; 0 in the program itself."""
+        """Number of active calls; 0 in the program itself."""
         return len(self.calls) - 1
 
     @property
@@ -196,7 +196,7 @@ class Flow:
 
     @property
     def caller(self) -> str:
-        """The call that is under way, for messages: `o<slot> called in line 7`; "" for none."""
+        """The active call, for messages: `o<slot> called in line 7`; "" for none."""
         names = [
             f"o<{call.sub}> called in {_of_place(call.called)}"
             for call in reversed(self.calls[1:])
@@ -206,7 +206,7 @@ class Flow:
 
     @property
     def block_line(self) -> int:
-        """The line of the program itself that is executed: in the file of a sub, that of its
+        """Line of the program itself that is being executed; in the file of a sub, the line of its
         call."""
         if not self.here.text.name:
             return self.here.line

@@ -284,7 +284,8 @@ class LinuxcncConversation(Conversation):
 
     @property
     def stop_index(self) -> int:
-        """Index of the next stop, of those between the motions about the line that it reports."""
+        """Index of the next stop among those between the motions before and after the reported
+        line."""
         low = high = min(self.acknowledged, len(self.packets) - 1)
         while low > 0 and not self.packets[low - 1].seconds:
             low -= 1

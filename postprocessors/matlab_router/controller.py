@@ -150,7 +150,7 @@ class _Run:
         self._path = path
         self._lines: MasterOrders = lines_of(path, self._rows, machine)
         self.standing_s = np.cumsum(self._lines.extra_s)
-        """(R,) s that rows up to each take besides its ticks."""
+        """Time (R,) s that the rows up to each take in addition to its ticks."""
         self._mechanics = Mechanics(machine, path.start, options.effects)
         # With even backlash the slide does not depend on what lies between two reversals.
         thin = (path.kind[: self._rows] == Kind.RAPID) & (

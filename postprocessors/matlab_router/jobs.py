@@ -76,7 +76,7 @@ class ReadJob(Struct, frozen=True, eq=False):
 
     @property
     def steps(self) -> Ints:
-        """(2, n) units, signed: the distances that the program asks for."""
+        """Signed distances (2, n) in units that the program asks for."""
         return np.asarray(np.where(self.speed < 0, -self.length, self.length))
 
 

@@ -515,7 +515,8 @@ def compensations(toolpath: Toolpath, machine: Machine[Any, PicMmhDialect]) -> F
 # Positions are steps: relative to the arc's centre for arcs, magnitudes from the start for lines.
 
 Filler: TypeAlias = Callable[[Ints], tuple[int, int, bool]]
-"""(n, 2) buffer → rows filled, passes run, and whether the end is met with the last row."""
+"""Function that fills a buffer (n, 2); it returns the rows filled, the passes run, and whether the
+last row is the end."""
 
 SEARCH_ROWS = 1 << 14
 """Positions that the search for the end looks at in one go (256 KiB, stays in the cache)."""
